@@ -1,0 +1,238 @@
+"""The errors of the library, and the checks that raise them.
+
+Every message says what was expected, what was got and, where there is one, what to do about it.
+Nothing here knows about tracking.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "AsterismError",
+    "FormatError",
+    "ParameterError",
+    "SolverLimit",
+    "check_array",
+    "check_fields",
+    "check_number",
+]
+
+
+class AsterismError(Exception):
+    """Base of every error that the library raises on purpose."""
+
+
+class ParameterError(AsterismError, ValueError):
+    """An argument is not what it must be.
+
+    Parameters
+    ----------
+    name : str
+        The argument.
+    expected, got : str
+        What it must be and what it was.
+    hint : str, optional
+        What to do about it.
+    """
+
+    def __init__(self, name: str, expected: str, got: object, hint: str = "") -> None:
+        self.name, self.expected, self.got, self.hint = name, expected, str(got), hint
+        super().__init__(f"{name}: expected {expected}, got {got}" + (f" ({hint})" if hint else ""))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.name, self.expected, self.got, self.hint)
+
+
+class FormatError(AsterismError, ValueError):
+    """A file is not what its format says.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    place : str
+        Where in it: a line, a byte, a parameter.
+    expected, got : str
+        What should stand there and what does.
+    hint : str, optional
+        What to do about it.
+    """
+
+    def __init__(
+        self, path: str | Path, place: str, expected: str, got: object, hint: str = ""
+    ) -> None:
+        self.path, self.place, self.expected = str(path), place, expected
+        self.got, self.hint = str(got), hint
+        super().__init__(
+            f"{path}: {place}: expected {expected}, got {got}" + (f" ({hint})" if hint else "")
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.path, self.place, self.expected, self.got, self.hint)
+
+
+class SolverLimit(AsterismError, RuntimeError):
+    """A problem is larger than a solver's stated limit.
+
+    Parameters
+    ----------
+    what : str
+        What was counted.
+    size, limit : int
+        The size that was met and the limit.
+    hint : str
+        The documented way out.
+    """
+
+    def __init__(self, what: str, size: int, limit: int, hint: str) -> None:
+        self.what, self.size, self.limit, self.hint = what, size, limit, hint
+        super().__init__(f"{what}: {size} exceeds the limit of {limit} ({hint})")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.what, self.size, self.limit, self.hint)
+
+
+def check_number(
+    name: str,
+    value: object,
+    *,
+    above: float = -math.inf,
+    below: float = math.inf,
+    closed: bool = False,
+    integer: bool = False,
+    hint: str = "",
+) -> None:
+    """Raise unless `value` is a finite number in an interval.
+
+    Parameters
+    ----------
+    name : str
+        How the caller knows the value.
+    value : object
+        The value.
+    above, below : float
+        Ends of the interval: open, or closed with ``closed=True``.
+    closed, integer : bool
+        Whether the ends belong to it; whether the number must be whole.
+    hint : str
+        Added to the message.
+
+    Raises
+    ------
+    ParameterError
+        If it is not.
+
+    Examples
+    --------
+    >>> check_number("p_detection", 1.5, above=0, below=1)
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: p_detection: expected a number in (0, 1), got 1.5
+    """
+    kind = "a whole number" if integer else "a number"
+    left, right = ("[", "]") if closed else ("(", ")")
+    if math.isinf(above) and math.isinf(below):
+        expected = f"a finite {kind[2:]}"
+    elif math.isinf(below):
+        expected = f"{kind} {'≥' if closed else '>'} {above:g}"
+    elif math.isinf(above):
+        expected = f"{kind} {'≤' if closed else '<'} {below:g}"
+    else:
+        expected = f"{kind} in {left}{above:g}, {below:g}{right}"
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise ParameterError(name, expected, repr(value), hint)
+    number = float(value)
+    if integer and not number.is_integer():
+        raise ParameterError(name, expected, f"{number:g}", hint)
+    inside = above <= number <= below if closed else above < number < below
+    if not (math.isfinite(number) and inside):
+        raise ParameterError(name, expected, f"{number:g}", hint)
+
+
+def check_array(
+    name: str,
+    value: ArrayLike,
+    shape: tuple[int | str, ...],
+    *,
+    dtype: type = np.float64,
+    finite: bool = True,
+) -> NDArray[Any]:
+    """Give `value` as a C-contiguous array of a shape and type, or raise.
+
+    Parameters
+    ----------
+    name : str
+        How the caller knows the value.
+    value : array_like
+        The value.
+    shape : tuple of int or str
+        A size per axis, or a letter where any size will do.
+    dtype : type
+        The type of the items.
+    finite : bool
+        Whether NaN and infinities are refused.
+
+    Returns
+    -------
+    ndarray
+        The array; the input itself where it already fits.
+
+    Raises
+    ------
+    ParameterError
+        If it does not fit.
+    """
+    wanted = f"an array of shape ({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in ("biuf" if dtype is np.float64 else "biu") and array.size:
+            raise ParameterError(name, f"{wanted} of numbers", f"type {array.dtype}")
+        array = np.ascontiguousarray(array, dtype=dtype)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, ParameterError):
+            raise
+        raise ParameterError(name, f"{wanted} of numbers", str(error)) from error
+    fits = array.ndim == len(shape) and all(
+        isinstance(want, str) or want == have for want, have in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise ParameterError(name, wanted, f"shape {array.shape}")
+    if finite and array.dtype.kind == "f" and not np.isfinite(array).all():
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise ParameterError(name, "finite numbers", f"{array[place]} at index {place}")
+    return array
+
+
+def check_fields(name: str, given: Iterable[str], known: Iterable[str]) -> None:
+    """Raise if a name is given that is not known, with the nearest known one as a hint.
+
+    Parameters
+    ----------
+    name : str
+        What the names belong to.
+    given, known : iterable of str
+        The names.
+
+    Raises
+    ------
+    ParameterError
+        At the first unknown name.
+    """
+    import difflib
+
+    known = list(known)
+    for field in given:
+        if field not in known:
+            near = difflib.get_close_matches(field, known, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else ""
+            raise ParameterError(name, f"one of {', '.join(known)}", repr(field), hint)

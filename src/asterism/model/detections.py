@@ -1,0 +1,263 @@
+"""What the cameras saw: points without names, frame by frame, and the file they came from.
+
+Nothing here says which point is which marker; that is a `Tracks`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from asterism.errors import ParameterError, check_array
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism.model.tracks import Tracks
+
+__all__ = ["Capture", "Detections"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Detections:
+    """Unnamed points over time: one struct of arrays, ordered by frame.
+
+    Make one with `from_frames` or `from_dense`; the constructor takes the arrays as they are kept.
+
+    Parameters
+    ----------
+    times : array_like, shape (T,)
+        Seconds, strictly increasing; the spacing may vary.
+    offsets : array_like of int, shape (T + 1,)
+        Frame ``t`` holds the points ``offsets[t]:offsets[t + 1]``. Frames may be empty.
+    points : array_like, shape (N, D)
+        Positions in metres, D = 2 or 3, all finite.
+
+    Raises
+    ------
+    ParameterError
+        If an array does not fit the others.
+
+    Examples
+    --------
+    >>> d = Detections.from_frames([0.0, 0.01], [[[0, 0, 0], [1, 0, 0]], [[0, 0, 0]]])
+    >>> d
+    Detections(2 frames, 3 points, 3-D, 0 to 0.01 s)
+    >>> d.frame(1)
+    array([[0., 0., 0.]])
+    """
+
+    times: NDArray[np.float64]
+    offsets: NDArray[np.int64]
+    points: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        times = check_array("times", self.times, ("T",))
+        offsets = check_array("offsets", self.offsets, (len(times) + 1,), dtype=np.int64)
+        points = check_array("points", self.points, ("N", "D"))
+        if points.shape[1] not in (2, 3):
+            raise ParameterError("points", "2 or 3 coordinates a point", points.shape[1])
+        backward = np.flatnonzero(np.diff(times) <= 0)
+        if len(backward):
+            i = int(backward[0])
+            raise ParameterError(
+                "times",
+                "strictly increasing seconds",
+                f"{times[i]:g} then {times[i + 1]:g} at frames {i} and {i + 1}",
+                "sort the frames, and merge or drop those with the same time",
+            )
+        if offsets[0] != 0 or offsets[-1] != len(points) or (np.diff(offsets) < 0).any():
+            raise ParameterError(
+                "offsets",
+                f"a rising sequence from 0 to {len(points)} (the number of points)",
+                f"{offsets[0]} … {offsets[-1]}",
+            )
+        for name, array in (("times", times), ("offsets", offsets), ("points", points)):
+            view = array.view()
+            view.flags.writeable = False
+            object.__setattr__(self, name, view)
+
+    @classmethod
+    def from_frames(cls, times: ArrayLike, frames: Sequence[ArrayLike]) -> Self:
+        """Make detections from one array of points a frame.
+
+        Parameters
+        ----------
+        times : array_like, shape (T,)
+            Seconds.
+        frames : sequence of T array_like, each of shape (n_t, D)
+            The points of each frame in metres; an empty list for a frame without points.
+
+        Returns
+        -------
+        Detections
+
+        Raises
+        ------
+        ParameterError
+            If the numbers of times and frames differ, or a frame has the wrong shape.
+        """
+        times = check_array("times", times, ("T",))
+        if len(frames) != len(times):
+            raise ParameterError("frames", f"{len(times)} arrays, one a time", len(frames))
+        arrays: list[NDArray[np.float64]] = []
+        n_axes = 0
+        for t, frame in enumerate(frames):
+            array = np.asarray(frame)
+            if array.size == 0:
+                arrays.append(np.empty((0, 0)))
+                continue
+            array = check_array(f"frames[{t}]", array, ("n", n_axes or "D"))
+            n_axes = array.shape[1]
+            arrays.append(array)
+        n_axes = n_axes or 3
+        points = np.concatenate(
+            [np.empty((0, n_axes)), *(a.reshape(-1, n_axes) for a in arrays if a.size)]
+        )
+        offsets = np.concatenate([[0], np.cumsum([len(a) for a in arrays])]).astype(np.int64)
+        return cls(times=times, offsets=offsets, points=points)
+
+    @classmethod
+    def from_dense(cls, times: ArrayLike, positions: ArrayLike) -> Self:
+        """Make detections from named positions, forgetting the names.
+
+        Parameters
+        ----------
+        times : array_like, shape (T,)
+            Seconds.
+        positions : array_like, shape (T, K, D)
+            Metres; NaN in any coordinate where a marker was not seen.
+
+        Returns
+        -------
+        Detections
+            The points of a frame in the order of the markers. `Tracks.from_dense` keeps the names.
+        """
+        times = check_array("times", times, ("T",))
+        dense = check_array("positions", positions, (len(times), "K", "D"), finite=False)
+        is_seen = np.isfinite(dense).all(axis=2)
+        offsets = np.concatenate([[0], np.cumsum(is_seen.sum(axis=1))]).astype(np.int64)
+        return cls(times=times, offsets=offsets, points=dense[is_seen])
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames T."""
+        return len(self.times)
+
+    @property
+    def n_points(self) -> int:
+        """Number of detections N."""
+        return len(self.points)
+
+    @property
+    def n_axes(self) -> int:
+        """Number of coordinates D, 2 or 3."""
+        return self.points.shape[1]
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Number of points of each frame, shape (T,)."""
+        return np.diff(self.offsets)
+
+    @cached_property
+    def frame_of(self) -> NDArray[np.int64]:
+        """Frame of each detection, shape (N,)."""
+        return np.repeat(np.arange(self.n_frames, dtype=np.int64), self.counts)
+
+    @property
+    def step(self) -> float:
+        """Usual time from frame to frame: the median spacing in seconds, 0 with under two frames."""
+        return float(np.median(np.diff(self.times))) if self.n_frames > 1 else 0.0
+
+    def frame(self, t: int) -> NDArray[np.float64]:
+        """Points of frame `t`, shape (n_t, D), metres."""
+        return self.points[self.offsets[t] : self.offsets[t + 1]]
+
+    def __iter__(self) -> Iterator[tuple[float, NDArray[np.float64]]]:
+        """Give ``(time, points)`` frame by frame, as a live source would."""
+        for t in range(self.n_frames):
+            yield float(self.times[t]), self.frame(t)
+
+    def __len__(self) -> int:
+        return self.n_frames
+
+    def _summary(self) -> str:
+        span = f", {self.times[0]:g} to {self.times[-1]:g} s" if self.n_frames else ""
+        return f"{self.n_frames} frames, {self.n_points} points, {self.n_axes}-D{span}"
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._summary()})"
+
+
+def _no_channels() -> NDArray[np.int64]:
+    return np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Capture(Detections):
+    """Detections that were read from a file, with what else the file knew.
+
+    Parameters
+    ----------
+    path : Path
+        The file; writing a result in the same format takes from it all that is not a point.
+    format : str
+        Its format, a key of `asterism.io.FORMATS`.
+    rate : float
+        Frames a second as the file states it, 0 where it does not.
+    first_frame : int
+        The file's number of its first frame.
+    units : str
+        The unit of length in the file, "mm" or "m"; `points` are metres whatever it is.
+    channels : array_like of int, shape (N,)
+        The file's own channel (column, trajectory) of each detection, -1 where there is none.
+    labels : array_like of int, shape (N,)
+        The file's own identities: one for each named channel and one for each unbroken piece of
+        an unnamed channel, because recorders reuse those for other markers; -1 where none.
+    names : tuple of str or None
+        Name of each identity, None where it has none.
+    modelled : tuple of str
+        Names of computed points (joint centres, angles, forces) that were left out.
+    warnings : tuple of str
+        What was odd about the file and how it was taken.
+
+    See Also
+    --------
+    asterism.read : makes one.
+    """
+
+    path: Path = field(default_factory=Path)
+    format: str = ""
+    rate: float = 0.0
+    first_frame: int = 1
+    units: str = "m"
+    channels: NDArray[np.int64] = field(default_factory=_no_channels)
+    labels: NDArray[np.int64] = field(default_factory=_no_channels)
+    names: tuple[str | None, ...] = ()
+    modelled: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("channels", "labels"):
+            array = check_array(name, getattr(self, name), (self.n_points,), dtype=np.int64)
+            view = array.view()
+            view.flags.writeable = False
+            object.__setattr__(self, name, view)
+
+    @property
+    def tracks(self) -> Tracks:
+        """The file's own identities as `Tracks`: truth, where the file is labelled."""
+        from asterism.model.tracks import Tracks
+
+        return Tracks(detections=self, labels=self.labels, names=self.names)
+
+    def __repr__(self) -> str:
+        n_named = sum(name is not None for name in self.names)
+        return f"Capture({self.path.name!r}, {self._summary()}, {n_named} named)"

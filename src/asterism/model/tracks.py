@@ -1,0 +1,165 @@
+"""Who is whom: one integer a detection.
+
+A `Tracks` is the result of every method and the form of every ground truth. It holds no copy of
+the points: the labels lie beside the detections that they speak of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from asterism.errors import ParameterError, check_array
+from asterism.model.detections import Detections
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Tracks"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Tracks:
+    """A partition of detections into tracks and clutter.
+
+    Parameters
+    ----------
+    detections : Detections
+        The points, N in number.
+    labels : array_like of int, shape (N,)
+        Track of each detection, 0 … K - 1, or -1 for clutter. A track has at most one detection
+        in a frame.
+    names : sequence of (str or None), optional
+        Marker name of each track, None where it is not known. Their number is K; without names
+        K is the largest label + 1.
+    confidence : array_like, shape (N,), optional
+        Probability in [0, 1] that the label is right, from methods that know it.
+
+    Raises
+    ------
+    ParameterError
+        If the arrays do not fit each other, or a track has two detections in one frame.
+
+    Examples
+    --------
+    >>> d = Detections.from_frames([0, 1], [[[0, 0, 0], [1, 0, 0]], [[1, 0, 0], [0, 0, 0]]])
+    >>> tracks = Tracks(detections=d, labels=[0, 1, 1, 0], names=("LASI", None))
+    >>> tracks.positions()[1]
+    array([[0., 0., 0.],
+           [1., 0., 0.]])
+    """
+
+    detections: Detections
+    labels: NDArray[np.int64]
+    names: tuple[str | None, ...] = ()
+    confidence: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        n = self.detections.n_points
+        labels = check_array("labels", self.labels, (n,), dtype=np.int64)
+        if labels.size and labels.min() < -1:
+            raise ParameterError("labels", "track numbers ≥ 0, or -1 for clutter", labels.min())
+        n_tracks = int(labels.max()) + 1 if labels.size else 0
+        names = tuple(self.names)
+        if names and len(names) < n_tracks:
+            raise ParameterError("names", f"a name or None for each of {n_tracks} tracks", names)
+        names += (None,) * (n_tracks - len(names))
+        is_track = labels >= 0
+        frames = self.detections.frame_of[is_track]
+        key = np.sort(frames * max(n_tracks, 1) + labels[is_track])
+        twice = np.flatnonzero(np.diff(key) == 0)
+        if len(twice):
+            frame, track = divmod(int(key[twice[0]]), n_tracks)
+            raise ParameterError(
+                "labels", "at most one detection of a track in a frame",
+                f"two of track {track} in frame {frame}",
+            )  # fmt: skip
+        object.__setattr__(self, "names", names)
+        for name, array in (("labels", labels), ("confidence", self._checked_confidence(n))):
+            if array is not None:
+                array = array.view()
+                array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    def _checked_confidence(self, n: int) -> NDArray[np.float64] | None:
+        if self.confidence is None:
+            return None
+        confidence = check_array("confidence", self.confidence, (n,))
+        if confidence.size and (confidence.min() < 0 or confidence.max() > 1):
+            worst = confidence[np.argmax(np.abs(confidence - 0.5))]
+            raise ParameterError("confidence", "probabilities in [0, 1]", worst)
+        return confidence
+
+    @classmethod
+    def from_dense(
+        cls, times: ArrayLike, positions: ArrayLike, names: Sequence[str | None] = ()
+    ) -> Self:
+        """Make tracks from named positions, a ground truth say.
+
+        Parameters
+        ----------
+        times : array_like, shape (T,)
+            Seconds.
+        positions : array_like, shape (T, K, D)
+            Metres; NaN where a marker was not seen.
+        names : sequence of str, optional
+            K marker names.
+
+        Returns
+        -------
+        Tracks
+        """
+        detections = Detections.from_dense(times, positions)
+        is_seen = np.isfinite(np.asarray(positions, dtype=np.float64)).all(axis=2)
+        n_markers = is_seen.shape[1]
+        labels = np.broadcast_to(np.arange(n_markers), is_seen.shape)[is_seen]
+        return cls(
+            detections=detections,
+            labels=labels,
+            names=tuple(names) if names else (None,) * n_markers,
+        )
+
+    @property
+    def n_tracks(self) -> int:
+        """Number of tracks K, those without a detection included."""
+        return len(self.names)
+
+    @cached_property
+    def lengths(self) -> NDArray[np.int64]:
+        """Number of detections of each track, shape (K,)."""
+        return np.bincount(self.labels[self.labels >= 0], minlength=self.n_tracks)
+
+    @cached_property
+    def by_track(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Detections grouped by track, in time order.
+
+        Returns
+        -------
+        order : ndarray of int, shape (M,)
+            Indices of the M detections that are in tracks.
+        offsets : ndarray of int, shape (K + 1,)
+            Track ``k`` holds ``order[offsets[k]:offsets[k + 1]]``.
+        """
+        members = np.flatnonzero(self.labels >= 0)
+        order = members[np.argsort(self.labels[members], kind="stable")]
+        return order, np.concatenate([[0], np.cumsum(self.lengths)]).astype(np.int64)
+
+    def positions(self) -> NDArray[np.float64]:
+        """Positions by frame and track, shape (T, K, D), metres, NaN where a track was not seen."""
+        d = self.detections
+        dense = np.full((d.n_frames, self.n_tracks, d.n_axes), np.nan)
+        is_track = self.labels >= 0
+        dense[d.frame_of[is_track], self.labels[is_track]] = d.points[is_track]
+        return dense
+
+    def __repr__(self) -> str:
+        n_clutter = int((self.labels < 0).sum())
+        return (
+            f"Tracks({self.n_tracks} tracks, {len(self.labels) - n_clutter} detections in them, "
+            f"{n_clutter} clutter, {self.detections.n_frames} frames)"
+        )
