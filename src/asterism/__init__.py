@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from asterism.model import DWPA as DWPA
     from asterism.model import Capture as Capture
     from asterism.model import Detections as Detections
+    from asterism.model import InteractingMotions as InteractingMotions
     from asterism.model import LinearMotion as LinearMotion
     from asterism.model import Motion as Motion
     from asterism.model import Population as Population
@@ -39,7 +40,7 @@ _HOME = {
     **dict.fromkeys(("AsterismError", "FormatError", "ParameterError", "SolverLimit"), "errors"),
     **dict.fromkeys(
         (
-            "DWNA", "DWPA", "Capture", "Detections", "LinearMotion", "Motion", "Population",
+            "DWNA", "DWPA", "Capture", "Detections", "InteractingMotions", "LinearMotion", "Motion", "Population",
             "RandomWalk", "Sensor", "TrackingModel", "Tracks",
         ),
         "model",

@@ -1,7 +1,7 @@
 """What things are: detections, tracks and the one generative model that every method searches."""
 
 from asterism.model.detections import Capture, Detections
-from asterism.model.motion import DWNA, DWPA, LinearMotion, Motion, RandomWalk
+from asterism.model.motion import DWNA, DWPA, InteractingMotions, LinearMotion, Motion, RandomWalk
 from asterism.model.population import Population
 from asterism.model.sensor import Sensor
 from asterism.model.tracking_model import TrackingModel
@@ -12,6 +12,7 @@ __all__ = [
     "DWPA",
     "Capture",
     "Detections",
+    "InteractingMotions",
     "LinearMotion",
     "Motion",
     "Population",

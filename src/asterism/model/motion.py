@@ -16,7 +16,7 @@ from asterism.errors import ParameterError, check_array, check_number
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["DWNA", "DWPA", "MOTIONS", "LinearMotion", "Motion", "RandomWalk"]
+__all__ = ["DWNA", "DWPA", "MOTIONS", "InteractingMotions", "LinearMotion", "Motion", "RandomWalk"]
 
 
 class Motion:
@@ -25,6 +25,16 @@ class Motion:
     kind: ClassVar[str]
     H: NDArray[np.float64]
     """Observation, shape (n,): position = H · state."""
+
+    @property
+    def modes(self) -> tuple[Motion, ...]:
+        """The models among which a marker may change; one, unless the motion is interacting."""
+        return (self,)
+
+    @property
+    def mode_transitions(self) -> NDArray[np.float64]:
+        """Probability of going from mode to mode in a step, shape (M, M)."""
+        return np.ones((1, 1))
 
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
         """F for each Δ of `dt` (M,), shape (M, n, n)."""
@@ -280,7 +290,90 @@ class LinearMotion(Motion):
         return self.prior_covariance + noise_sigma**2 * np.outer(along, along)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InteractingMotions(Motion):
+    """A marker that changes between motions: at rest, moving, thrown.
+
+    The filter keeps a state for each and mixes them (interacting multiple model, Blom &
+    Bar-Shalom 1988); a detection is weighed against the mixture of their predictions, which is an
+    approximation of the exact sum over all sequences of modes.
+
+    Parameters
+    ----------
+    models : sequence of 2 or 3 Motion
+        Of one kind, differing in their noise. The first one's prior holds for new tracks.
+    transitions : array_like, shape (M, M)
+        Probability of going from mode (row) to mode (column) in a step; positive, rows sum to 1.
+    """
+
+    models: tuple[Motion, ...]
+    transitions: NDArray[np.float64]
+
+    kind: ClassVar[str] = "interacting"
+
+    def __post_init__(self) -> None:
+        models = tuple(self.models)
+        M = len(models)
+        if M not in (2, 3):
+            raise ParameterError("models", "2 or 3 motion models", M)
+        first = models[0]
+        for model in models:
+            same = type(model) is type(first) and np.array_equal(model.H, first.H)
+            if not same or isinstance(model, InteractingMotions):
+                raise ParameterError("models", "motions of one kind", [m.kind for m in models])
+        transitions = check_array("transitions", self.transitions, (M, M))
+        if (transitions <= 0).any() or not np.allclose(transitions.sum(axis=1), 1, atol=1e-9):
+            raise ParameterError(
+                "transitions", "positive rows that sum to 1", transitions.tolist()
+            )
+        object.__setattr__(self, "models", models)
+        object.__setattr__(self, "transitions", transitions)
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, InteractingMotions)
+            and self.models == other.models
+            and np.array_equal(self.transitions, other.transitions)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.models, self.transitions.tobytes()))
+
+    @property
+    def H(self) -> NDArray[np.float64]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Observation of every mode, shape (n,)."""
+        return self.models[0].H
+
+    @property
+    def velocity_sigma(self) -> float | None:
+        """That of the first model, where it has one."""
+        return getattr(self.models[0], "velocity_sigma", None)
+
+    @property
+    def modes(self) -> tuple[Motion, ...]:
+        """The models."""
+        return self.models
+
+    @property
+    def mode_transitions(self) -> NDArray[np.float64]:
+        """Probability of going from mode to mode in a step, shape (M, M)."""
+        return self.transitions
+
+    def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
+        """F of the first mode."""
+        return self.models[0].transition(dt)
+
+    def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
+        """Q averaged over the modes by how much of the time each holds, shape (K, n, n)."""
+        share = np.linalg.matrix_power(self.transitions, 1 << 20)[0]
+        return np.tensordot(share, np.stack([m.process_noise(dt) for m in self.models]), axes=1)
+
+    def initial_covariance(self, noise_sigma: float, velocity_sigma: float) -> NDArray[np.float64]:
+        """That of the first model."""
+        return self.models[0].initial_covariance(noise_sigma, velocity_sigma)
+
+
 MOTIONS: dict[str, type[Motion]] = {
-    model.kind: model for model in (DWNA, RandomWalk, DWPA, LinearMotion)
+    model.kind: model for model in (DWNA, RandomWalk, DWPA, LinearMotion, InteractingMotions)
 }
 """Every motion model by its name in a model file."""

@@ -78,19 +78,7 @@ class TrackingModel:
     def to_dict(self) -> dict[str, dict[str, Any]]:
         """Give the model as nested plain values, as it stands in a TOML file."""
 
-        def plain(part: Any) -> dict[str, Any]:
-            values = {f.name: getattr(part, f.name) for f in dataclasses.fields(part)}
-            return {
-                name: value.tolist() if isinstance(value, np.ndarray) else value
-                for name, value in values.items()
-                if value is not None
-            }
-
-        return {
-            "motion": {"kind": self.motion.kind, **plain(self.motion)},
-            "sensor": plain(self.sensor),
-            "population": plain(self.population),
-        }
+        return {name: _to_plain(getattr(self, name)) for name in _TABLES}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -101,29 +89,12 @@ class TrackingModel:
         ParameterError
             At an unknown, missing or impossible value.
         """
-        check_fields("model", values, ("motion", "sensor", "population"))
-        tables: dict[str, dict[str, Any]] = {}
-        for name in ("motion", "sensor", "population"):
-            table = values.get(name)
-            if not isinstance(table, dict):
-                raise ParameterError(f"model.{name}", "a table", repr(table))
-            tables[name] = dict(table)
-        kind = tables["motion"].pop("kind", None)
-        if kind not in MOTIONS:
-            raise ParameterError("motion.kind", f"one of {', '.join(MOTIONS)}", repr(kind))
-        types: dict[str, type[Any]] = {
-            "motion": MOTIONS[kind], "sensor": Sensor, "population": Population
-        }  # fmt: skip
-        parts: dict[str, Any] = {}
-        for name, table in tables.items():
-            fields = dataclasses.fields(types[name])
-            check_fields(f"model.{name}", table, [f.name for f in fields])
-            for f in fields:
-                has_default = f.default is not dataclasses.MISSING
-                if f.name not in table and not has_default:
-                    raise ParameterError(f"model.{name}.{f.name}", "a value", "nothing")
-            parts[name] = types[name](**table)
-        return cls(**parts)
+        check_fields("model", values, _TABLES)
+        return cls(
+            motion=_motion("model.motion", values.get("motion")),
+            sensor=_part("model.sensor", Sensor, values.get("sensor")),
+            population=_part("model.population", Population, values.get("population")),
+        )
 
     def to_toml(self, path: str | Path | None = None) -> str:
         """Give the model as TOML text, and write it to `path` where one is given.
@@ -163,3 +134,46 @@ class TrackingModel:
             raise FormatError(path, "the file", "TOML", str(error)) from error
         except ParameterError as error:
             raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
+
+
+_TABLES = ("motion", "sensor", "population")
+
+
+def _to_plain(part: Any) -> dict[str, Any]:
+    """Give a part of the model as TOML can hold it."""
+    values: dict[str, Any] = {"kind": part.kind} if isinstance(part, Motion) else {}
+    for f in dataclasses.fields(part):
+        value = getattr(part, f.name)
+        if isinstance(value, np.ndarray):
+            value = value.tolist()
+        elif isinstance(value, tuple):
+            value = [_to_plain(item) for item in value]
+        if value is not None:
+            values[f.name] = value
+    return values
+
+
+def _part(name: str, kind: type[Any], table: object) -> Any:
+    if not isinstance(table, dict):
+        raise ParameterError(name, "a table", repr(table))
+    fields = dataclasses.fields(kind)
+    check_fields(name, table, [f.name for f in fields])
+    for f in fields:
+        if f.name not in table and f.default is dataclasses.MISSING:
+            raise ParameterError(f"{name}.{f.name}", "a value", "nothing")
+    return kind(**table)
+
+
+def _motion(name: str, table: object) -> Motion:
+    if not isinstance(table, dict):
+        raise ParameterError(name, "a table", repr(table))
+    values = dict(table)
+    kind = values.pop("kind", None)
+    if kind not in MOTIONS:
+        raise ParameterError(f"{name}.kind", f"one of {', '.join(MOTIONS)}", repr(kind))
+    if "models" in values:
+        models = values["models"]
+        if not isinstance(models, list):
+            raise ParameterError(f"{name}.models", "an array of tables", repr(models))
+        values["models"] = tuple(_motion(f"{name}.models[{i}]", m) for i, m in enumerate(models))
+    return _part(name, MOTIONS[kind], values)

@@ -1,0 +1,273 @@
+// Frame by frame: predict, gate, group, match, update; tracks are born, confirmed, coast and end.
+//
+// What differs between methods is how the candidates of a frame are matched (`Matcher`); all the
+// rest, the life of a track, is here once. The state is a plain value: copying it forks the run.
+//
+// The score of a track is the log odds of “these detections are one marker” against “they are
+// clutter”: log λ_b - log λ_f + log P_d at birth, then per frame log(1 - p_z) and either
+// log P_d N(y; ŷ, S) / λ_f or log(1 - P_d).
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "assignment.hpp"
+#include "deferred_acceptance.hpp"
+#include "filter_tracks.hpp"
+#include "gating.hpp"
+#include "groups.hpp"
+#include "modes.hpp"
+
+namespace asterism {
+
+enum class Matcher : std::int32_t {
+  assignment = 0,           // most likely joint pairing
+  marriage_by_tracks = 1,   // stable; best for the tracks
+  marriage_by_points = 2,   // stable; best for the detections
+};
+
+struct TrackerOptions {
+  Matcher matcher = Matcher::assignment;
+  double gate = 0;             // χ² bound on a pairing
+  double confirm_score = 0;    // log odds at which a tentative track is believed
+  double delete_drop = 0;      // a tentative track ends when its score falls so far below its best
+  std::int64_t max_candidates = 0;
+};
+
+struct LiveTrack {
+  std::int64_t id = -1;  // -1 while tentative
+  std::int32_t gap = 0;  // frames since the last detection
+  double score = 0, best_score = 0;
+  double last_time = 0;
+  Point last{};
+  MotionState state;
+  std::vector<std::int64_t> pending;  // detections of a tentative track
+
+  bool is_confirmed() const { return id >= 0; }
+};
+
+struct FrameStats {
+  std::int64_t n_candidates = 0, n_groups = 0, largest_group = 0;
+  std::int64_t n_confirmed = 0, n_tentative = 0;
+};
+
+class CandidateLimit {};  // thrown when a frame has more candidates than allowed
+
+// Working memory of one step, kept from step to step. A copied tracker starts with its own.
+struct FrameScratch {
+  FrameScratch() = default;
+  FrameScratch(const FrameScratch&) : FrameScratch() {}
+  FrameScratch& operator=(const FrameScratch&) { return *this; }
+
+  std::vector<Candidate> candidates;
+  std::vector<Prediction> predictions;
+  std::vector<Point> centers;
+  std::vector<double> radii;
+  std::vector<std::int32_t> match;
+  std::vector<char> is_taken;
+  PointGrid grid;
+  Assignment assignment;
+};
+
+class FrameTracker {
+ public:
+  FrameTracker(const MotionModel& model, const ScoreModel& score, const TrackerOptions& options)
+      : m_(model), sm_(score), opt_(options) {}
+
+  // Take the points of the next frame. Calls label(detection, track id) for every detection whose
+  // label is decided now: those of this frame in confirmed tracks and, when a track is confirmed,
+  // its earlier ones. Detections are numbered from 0 in order of arrival.
+  template <typename Label>
+  FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
+    FrameStats stats;
+    find_candidates(time, step, points);
+    s_.match.assign(tracks_.size(), -1);
+    const Groups groups = connected_groups(s_.candidates, static_cast<std::int32_t>(tracks_.size()),
+                                           static_cast<std::int32_t>(points.size()));
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      match(groups[g], points.size());
+      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
+    }
+    stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());
+    stats.n_groups = static_cast<std::int64_t>(groups.size());
+    update_tracks(time, points, label);
+    begin_tracks(time, points);
+    for (const LiveTrack& track : tracks_)
+      ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
+    n_seen_ += static_cast<std::int64_t>(points.size());
+    last_time_ = time;
+    ++n_frames_;
+    return stats;
+  }
+
+  std::int64_t n_frames() const { return n_frames_; }
+  std::int64_t n_seen() const { return n_seen_; }
+  std::int64_t n_ids() const { return next_id_; }
+  double last_time() const { return last_time_; }
+  const MotionModel& model() const { return m_; }
+  const std::vector<LiveTrack>& tracks() const { return tracks_; }
+
+ private:
+  // log(1 + eˣ)
+  static double softplus(double x) { return x > 30 ? x : std::log1p(std::exp(x)); }
+
+  double miss_gain() const { return sm_.log_survive + sm_.log_miss; }
+  double hit_gain() const { return sm_.log_survive + sm_.log_detect - sm_.log_clutter; }
+
+  void find_candidates(double time, const MotionStep& step, std::span<const Point> points) {
+    const int D = m_.axis.D;
+    s_.candidates.clear();
+    s_.predictions.resize(tracks_.size());
+    s_.centers.resize(tracks_.size());
+    s_.radii.resize(tracks_.size());
+    double sum_radii = 0;
+    // A believed track takes a point only if that beats missing it and leaving it to clutter.
+    const double least = sm_.log_miss + sm_.log_clutter - sm_.log_detect;
+    for (std::size_t i = 0; i < tracks_.size(); ++i) {
+      LiveTrack& track = tracks_[i];
+      predict(m_, step, track.state);
+      s_.predictions[i] = Prediction(m_, track.state);
+      s_.radii[i] = s_.predictions[i].ball(
+          opt_.gate, track.is_confirmed() ? least : -std::numeric_limits<double>::infinity(),
+          s_.centers[i]);
+      sum_radii += std::max(s_.radii[i], 0.0);
+    }
+    if (tracks_.empty() || points.empty()) return;
+    s_.grid.build(points, D, 2 * sum_radii / static_cast<double>(tracks_.size()));
+    for (std::size_t i = 0; i < tracks_.size(); ++i) {
+      if (s_.radii[i] < 0) continue;
+      const LiveTrack& track = tracks_[i];
+      const Prediction& prediction = s_.predictions[i];
+      const double reach = sm_.max_speed * (time - track.last_time) + sm_.speed_margin;
+      const double if_missed = softplus(track.score + miss_gain());
+      std::array<double, kMaxModes> each{};
+      s_.grid.within(s_.centers[i], s_.radii[i], [&](std::int32_t j, double distance2) {
+        if (squared_distance(points[j], track.last, D) > reach * reach) return;
+        if (!prediction.is_gated(points[j], opt_.gate)) return;
+        const double hit = hit_gain() + prediction.log_likelihood(points[j], each);
+        // How much likelier the frame becomes, whether or not the track is a marker at all.
+        const double gain = softplus(track.score + hit) - if_missed;
+        if (gain > 0) s_.candidates.push_back({static_cast<std::int32_t>(i), j, gain, distance2});
+      });
+      if (static_cast<std::int64_t>(s_.candidates.size()) > opt_.max_candidates)
+        throw CandidateLimit{};
+    }
+  }
+
+  void match(std::span<const Candidate> group, std::size_t n_points) {
+    if (group.size() == 1 || opt_.matcher == Matcher::assignment)
+      s_.assignment.solve(group, s_.match);
+    else
+      marry(group, n_points, opt_.matcher == Matcher::marriage_by_points);
+  }
+
+  // Tracks rank detections by predictive density, detections rank tracks by distance, nearest
+  // first; a confirmed track goes before any tentative one.
+  void marry(std::span<const Candidate> group, std::size_t n_points, bool by_points) {
+    double farthest = 0;
+    for (const Candidate& c : group) farthest = std::max(farthest, c.distance2);
+    const auto cost_for_point = [&](const Candidate& c) {
+      return tracks_[c.row].is_confirmed() ? c.distance2 : 2 * farthest + c.distance2;
+    };
+    struct Wish {
+      std::int32_t proposer, receiver;
+      double rank, cost;
+    };
+    std::vector<Wish> wishes;
+    for (const Candidate& c : group)
+      wishes.push_back(by_points ? Wish{c.column, c.row, cost_for_point(c), -c.gain}
+                                 : Wish{c.row, c.column, -c.gain, cost_for_point(c)});
+    std::sort(wishes.begin(), wishes.end(), [](const Wish& a, const Wish& b) {
+      if (a.proposer != b.proposer) return a.proposer < b.proposer;
+      if (a.rank != b.rank) return a.rank < b.rank;
+      return a.receiver < b.receiver;
+    });
+    std::vector<std::int32_t> proposers;
+    std::vector<std::int64_t> first;
+    std::vector<Proposal> lists;
+    for (const Wish& w : wishes) {
+      if (proposers.empty() || proposers.back() != w.proposer) {
+        proposers.push_back(w.proposer);
+        first.push_back(static_cast<std::int64_t>(lists.size()));
+      }
+      lists.push_back({w.receiver, w.cost});
+    }
+    first.push_back(static_cast<std::int64_t>(lists.size()));
+    std::vector<std::int32_t> partner(proposers.size());
+    const std::size_t n_receivers = by_points ? tracks_.size() : n_points;
+    deferred_acceptance(lists, first, static_cast<std::int32_t>(n_receivers), partner);
+    for (std::size_t p = 0; p < proposers.size(); ++p) {
+      if (partner[p] < 0) continue;
+      if (by_points)
+        s_.match[partner[p]] = proposers[p];
+      else
+        s_.match[proposers[p]] = partner[p];
+    }
+  }
+
+  template <typename Label>
+  void update_tracks(double time, std::span<const Point> points, Label&& label) {
+    s_.is_taken.assign(points.size(), 0);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < tracks_.size(); ++i) {
+      LiveTrack& track = tracks_[i];
+      const std::int32_t j = s_.match[i];
+      if (j >= 0) {
+        s_.is_taken[j] = 1;
+        track.score += hit_gain() + update(m_, s_.predictions[i], points[j], track.state);
+        track.last = points[j];
+        track.last_time = time;
+        track.gap = 0;
+        if (track.is_confirmed()) {
+          label(n_seen_ + j, track.id);
+        } else {
+          track.pending.push_back(n_seen_ + j);
+          if (track.score >= opt_.confirm_score) {
+            track.id = next_id_++;
+            for (const std::int64_t detection : track.pending) label(detection, track.id);
+            track.pending = {};
+          }
+        }
+      } else {
+        track.score += miss_gain();
+        ++track.gap;
+      }
+      track.best_score = std::max(track.best_score, track.score);
+      // A link spans at most max_gap frames; a tentative track also ends by its score.
+      const bool may_link = track.gap < sm_.max_gap;
+      const bool is_doubted =
+          !track.is_confirmed() && track.best_score - track.score > opt_.delete_drop;
+      if (!may_link || is_doubted) continue;
+      if (kept != i) tracks_[kept] = std::move(track);
+      ++kept;
+    }
+    tracks_.resize(kept);
+  }
+
+  void begin_tracks(double time, std::span<const Point> points) {
+    for (std::size_t j = 0; j < points.size(); ++j) {
+      if (s_.is_taken[j]) continue;
+      LiveTrack track;
+      track.score = track.best_score = sm_.log_birth + sm_.log_detect - sm_.log_clutter;
+      track.last_time = time;
+      track.last = points[j];
+      track.state = begin_state(m_, points[j]);
+      track.pending.push_back(n_seen_ + static_cast<std::int64_t>(j));
+      tracks_.push_back(std::move(track));
+    }
+  }
+
+  MotionModel m_;
+  ScoreModel sm_;
+  TrackerOptions opt_;
+  std::vector<LiveTrack> tracks_;
+  std::int64_t next_id_ = 0, n_seen_ = 0, n_frames_ = 0;
+  double last_time_ = -std::numeric_limits<double>::infinity();
+
+  FrameScratch s_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,20 @@
+"""Who is whom: one file a method, plus what they share."""
+
+from asterism.associate.gnn import GNN
+from asterism.associate.method import Method, Update
+from asterism.associate.model_from_clip import ModelEstimate, estimate_model
+from asterism.associate.registry import METHODS, method_by_name
+from asterism.associate.smp import SMP
+from asterism.associate.track import track
+
+__all__ = [
+    "GNN",
+    "METHODS",
+    "SMP",
+    "Method",
+    "ModelEstimate",
+    "Update",
+    "estimate_model",
+    "method_by_name",
+    "track",
+]

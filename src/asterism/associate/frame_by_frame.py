@@ -1,0 +1,190 @@
+"""What the methods that decide frame by frame share: gating, groups, and the life of a track.
+
+A track begins tentative at a detection that no track took. Its score, the log odds of marker
+against clutter, decides: above `confirm_probability` it is believed and gets the next identity,
+together with all its detections so far; far below its best it is clutter again. A believed track
+coasts through misses and ends when the gap exceeds the model's d̄. The loop is in the engine.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from asterism.associate.method import Method, Update, checked_frame
+from asterism.errors import SolverLimit, check_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism import _engine
+    from asterism.model import Detections, TrackingModel
+
+__all__ = ["FrameByFrame", "FrameState"]
+
+MAX_CANDIDATES = 50_000_000
+"""Pairs of track and detection within the gates of one frame (1.2 GB of them)."""
+
+FRAMES_A_CALL = 1000
+"""The engine is asked for so many frames at a time: often enough to show progress and be stopped."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FrameState:
+    """The state of a frame-by-frame method.
+
+    Parameters
+    ----------
+    model : TrackingModel
+        The model.
+    n_axes : int
+        2 or 3.
+    tracker : FrameTracker
+        The live tracks, in the engine.
+    """
+
+    model: TrackingModel
+    n_axes: int
+    tracker: _engine.FrameTracker
+
+    @property
+    def n_ids(self) -> int:
+        """Number of identities given so far."""
+        return self.tracker.n_ids
+
+    def live(self) -> dict[str, NDArray[Any]]:
+        """The believed tracks now: for a display, or for whoever needs positions in gaps.
+
+        Returns
+        -------
+        dict
+            ``ids (k,)``, ``gaps (k,)`` frames since the last detection, ``means (k, D, n)`` and
+            ``covariances (k, n, n)`` of the state, SI units.
+        """
+        ids, gaps, means, covariances = self.tracker.tracks()
+        return {"ids": ids, "gaps": gaps, "means": means, "covariances": covariances}
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameByFrame(Method[FrameState]):
+    """Options of every frame-by-frame method.
+
+    Parameters
+    ----------
+    gate_probability : float
+        Share of true detections that the gate may lose, were the model exact: the χ² level.
+    confirm_probability : float
+        A tentative track is believed from this probability on.
+    delete_odds : float
+        A tentative track ends when its odds fall by this factor from their best.
+    """
+
+    gate_probability: float = 1e-9
+    confirm_probability: float = 0.999
+    delete_odds: float = 300.0
+
+    _matcher: ClassVar[int]
+
+    def __post_init__(self) -> None:
+        check_number("gate_probability", self.gate_probability, above=0, below=1)
+        check_number("confirm_probability", self.confirm_probability, above=0.5, below=1)
+        check_number("delete_odds", self.delete_odds, above=1)
+
+    def _engine_matcher(self) -> int:
+        return self._matcher
+
+    def init(
+        self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None
+    ) -> FrameState:
+        """Make the state before the first frame; `seed` changes nothing, nothing is drawn."""
+        from scipy.special import chdtri
+
+        from asterism import _engine
+        from asterism.model.compiled import motion_model, score_model
+
+        p = self.confirm_probability
+        tracker = _engine.FrameTracker(
+            motion_model(model, n_axes),
+            score_model(model),
+            matcher=self._engine_matcher(),
+            gate=float(chdtri(n_axes, self.gate_probability)),
+            confirm_score=math.log(p / (1 - p)),
+            delete_drop=math.log(self.delete_odds),
+            max_candidates=MAX_CANDIDATES,
+        )
+        return FrameState(model=model, n_axes=n_axes, tracker=tracker)
+
+    def step(
+        self, state: FrameState, time: float, points: ArrayLike
+    ) -> tuple[FrameState, Update]:
+        """Take the next frame; see `Method.step`."""
+        from asterism.model.compiled import no_transition, transition
+
+        before = state.tracker
+        frame = checked_frame(time, before.last_time, points, state.n_axes)
+        # The first frame has no step before it, and no track that would take it.
+        dt = time - before.last_time if before.n_frames else None
+        motion = state.model.motion
+        F, Q = transition(motion, dt) if dt else no_transition(motion)
+        try:
+            tracker, labels, revised, revised_labels, stats = before.step(time, F, Q, frame)
+        except OverflowError as error:
+            raise _too_many() from error
+        info = {
+            "tracks": stats.n_confirmed,
+            "tentative": stats.n_tentative,
+            "candidates": stats.n_candidates,
+            "groups": stats.n_groups,
+            "largest_group": stats.largest_group,
+        }
+        update = Update(labels=labels, revised=revised, revised_labels=revised_labels, info=info)
+        return FrameState(model=state.model, n_axes=state.n_axes, tracker=tracker), update
+
+    def run(
+        self,
+        state: FrameState,
+        detections: Detections,
+        *,
+        progress: Callable[[int], Any] | None = None,
+    ) -> tuple[FrameState, NDArray[np.int64], None]:
+        """Take all frames in the engine; the same labels as the loop over `step`."""
+        from asterism.model.compiled import steps_of
+
+        tracker = state.tracker.copy()
+        times, offsets = detections.times, detections.offsets
+        start = tracker.n_seen
+        labels = np.full(start + detections.n_points, -1, dtype=np.int64)
+        if detections.n_frames:
+            checked_frame(float(times[0]), tracker.last_time, [], state.n_axes)
+        # A state that has seen frames before is led on from the last of them.
+        n_before = min(tracker.n_frames, 1)
+        known = np.concatenate([np.full(n_before, tracker.last_time), times])
+        kind, F, Q = steps_of(state.model.motion, known)
+        try:
+            for t in range(0, detections.n_frames, FRAMES_A_CALL):
+                end = min(t + FRAMES_A_CALL, detections.n_frames)
+                tracker.run(
+                    times[t:end], kind[n_before + t : n_before + end], F, Q,
+                    offsets[t : end + 1] - offsets[t],
+                    detections.points[offsets[t] : offsets[end]], labels,
+                )  # fmt: skip
+                if progress is not None:
+                    progress(end)
+        except OverflowError as error:
+            raise _too_many() from error
+        final = FrameState(model=state.model, n_axes=state.n_axes, tracker=tracker)
+        return final, labels[start:], None
+
+
+def _too_many() -> SolverLimit:
+    return SolverLimit(
+        "pairs of track and detection within the gates of one frame",
+        MAX_CANDIDATES + 1,
+        MAX_CANDIDATES,
+        "the model's maximal speed or noise is too large for points so dense",
+    )

@@ -1,0 +1,165 @@
+"""The contract of every method: `init` makes a state, `step` takes the next frame.
+
+A state is a value: `step` gives a new one and leaves the old one as it was, so a run can be forked
+or taken back. `run` is the same over many frames.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+
+from asterism.errors import ParameterError, check_array, check_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism.model import Detections, TrackingModel
+
+__all__ = ["Method", "Update", "checked_frame"]
+
+State = TypeVar("State")
+
+
+def _nothing() -> NDArray[np.int64]:
+    return np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Update:
+    """What one frame decided.
+
+    Parameters
+    ----------
+    labels : ndarray of int, shape (n,)
+        Track of each point of the frame as known now; -1 for clutter or not yet believed.
+    revised : ndarray of int, shape (r,)
+        Earlier detections whose label changes, numbered from 0 in order of arrival.
+    revised_labels : ndarray of int, shape (r,)
+        Their labels.
+    confidence : ndarray, shape (n,), or None
+        Probability that each label is right, from methods that know it.
+    info : mapping
+        Numbers about the step: counts of tracks, groups, candidates.
+    """
+
+    labels: NDArray[np.int64]
+    revised: NDArray[np.int64] = field(default_factory=_nothing)
+    revised_labels: NDArray[np.int64] = field(default_factory=_nothing)
+    confidence: NDArray[np.float64] | None = None
+    info: Mapping[str, float] = field(default_factory=dict[str, float])
+
+
+class Method(ABC, Generic[State]):
+    """A way of telling which detection is which marker."""
+
+    name: ClassVar[str]
+    """The method's name on the command line."""
+
+    @abstractmethod
+    def init(
+        self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None
+    ) -> State:
+        """Make the state before the first frame.
+
+        Parameters
+        ----------
+        model : TrackingModel
+            The model that is searched.
+        n_axes : int
+            2 or 3 coordinates.
+        seed : int, optional
+            For the methods that draw; the others give the same whatever it is.
+        """
+
+    @abstractmethod
+    def step(self, state: State, time: float, points: ArrayLike) -> tuple[State, Update]:
+        """Take the next frame.
+
+        Parameters
+        ----------
+        state : State
+            From `init` or the step before; it is not changed.
+        time : float
+            Seconds, later than the frame before.
+        points : array_like, shape (n, D)
+            Metres; may be empty.
+
+        Returns
+        -------
+        state, update
+            The next state and what was decided.
+
+        Raises
+        ------
+        ParameterError
+            If the time does not advance or the points are not finite numbers.
+        """
+
+    def run(
+        self,
+        state: State,
+        detections: Detections,
+        *,
+        progress: Callable[[int], Any] | None = None,
+    ) -> tuple[State, NDArray[np.int64], NDArray[np.float64] | None]:
+        """Take all frames of `detections`: the loop over `step`, with its revisions applied.
+
+        Parameters
+        ----------
+        state : State
+            From `init`.
+        detections : Detections
+            The frames.
+        progress : callable, optional
+            Called now and then with the number of frames done.
+
+        Returns
+        -------
+        state, labels, confidence
+            The last state, the label of every detection (N,), and the confidences if the method
+            has any.
+        """
+        labels = np.full(detections.n_points, -1, dtype=np.int64)
+        confidence: NDArray[np.float64] | None = None
+        for t, (time, points) in enumerate(detections):
+            state, update = self.step(state, time, points)
+            frame = slice(detections.offsets[t], detections.offsets[t + 1])
+            labels[frame] = update.labels
+            labels[update.revised] = update.revised_labels
+            if update.confidence is not None:
+                if confidence is None:
+                    confidence = np.zeros(detections.n_points)
+                confidence[frame] = update.confidence
+            if progress is not None:
+                progress(t + 1)
+        return state, labels, confidence
+
+
+def checked_frame(
+    time: float, last_time: float, points: ArrayLike, n_axes: int
+) -> NDArray[np.float64]:
+    """Check one frame of a stream and give its points as an (n, D) array.
+
+    Raises
+    ------
+    ParameterError
+        If the time does not advance or the points are not finite (n, D) numbers.
+    """
+    check_number("time", time)
+    if time <= last_time:
+        raise ParameterError(
+            "time",
+            f"later than the frame before ({last_time:g} s)",
+            f"{time:g} s",
+            "frames must come in order; drop repeated ones",
+        )
+    array = np.asarray(points)
+    if array.size == 0:
+        return np.empty((0, n_axes))
+    return check_array("points", array, ("n", n_axes))

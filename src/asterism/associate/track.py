@@ -1,0 +1,71 @@
+"""Detections in, tracks out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from asterism.associate.gnn import GNN
+from asterism.associate.method import Method
+from asterism.associate.model_from_clip import estimate_model
+from asterism.errors import ParameterError
+from asterism.model import Detections, TrackingModel, Tracks
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["track"]
+
+
+def track(
+    detections: Detections,
+    method: Method[Any] | None = None,
+    *,
+    model: TrackingModel | None = None,
+    seed: int | None = None,
+    progress: Callable[[int], Any] | None = None,
+) -> Tracks:
+    """Tell which detection is which marker.
+
+    Parameters
+    ----------
+    detections : Detections
+        Unnamed points; names that a `Capture` carries are not used.
+    method : Method, optional
+        The way of searching; `GNN` where none is given.
+    model : TrackingModel, optional
+        The model that is searched; estimated from the clip where none is given.
+    seed : int, optional
+        For the methods that draw.
+    progress : callable, optional
+        Called now and then with the number of frames done.
+
+    Returns
+    -------
+    Tracks
+        Labels for the same detections; tracks are numbered in the order in which they were
+        believed.
+
+    Raises
+    ------
+    ParameterError
+        If there is nothing from which to estimate a model, or an argument has the wrong type.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(seed=1)
+    >>> tracks = am.track(truth.detections, am.SMP())
+    """
+    if isinstance(detections, Tracks):
+        raise ParameterError("detections", "Detections", "Tracks", "pass tracks.detections")
+    if not isinstance(detections, Detections):
+        raise ParameterError("detections", "Detections", type(detections).__name__)
+    if method is None:
+        method = GNN()
+    elif not isinstance(method, Method):
+        raise ParameterError("method", "a method such as GNN()", repr(method))
+    if model is None:
+        model = estimate_model(detections).model
+    state = method.init(model, n_axes=detections.n_axes, seed=seed)
+    _, labels, confidence = method.run(state, detections, progress=progress)
+    return Tracks(detections=detections, labels=labels, confidence=confidence)
