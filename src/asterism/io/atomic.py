@@ -1,0 +1,70 @@
+"""Writing a file so that it is either there as a whole or not touched at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from asterism.errors import FormatError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = ["replacing"]
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[IO[bytes]]:
+    """Open a file to write that takes the place of `path` when the block ends well.
+
+    The bytes go to a temporary name in the same folder, are forced to the disk and renamed: who is
+    killed on the way leaves the old file as it was. On an error the temporary file is removed.
+
+    Parameters
+    ----------
+    path : Path
+        The file to make or replace.
+
+    Yields
+    ------
+    binary file
+
+    Raises
+    ------
+    FormatError
+        If the system refuses: no such folder, no permission, disk full.
+    """
+    try:
+        # A device or a pipe (/dev/stdout) cannot be renamed over: it is written as it stands.
+        if path.exists() and not path.is_file() and not path.is_dir():
+            with path.open("wb") as device:
+                yield device
+            return
+        target = path.resolve()  # a symbolic link stays one, and its target is replaced
+        if target.is_dir():
+            raise IsADirectoryError(0, "is a folder")
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+        temporary = Path(name)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            # mkstemp makes private files; a result has the rights of any new file, or of the old.
+            temporary.chmod(target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask())
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        what = error.strerror or str(error)
+        hint = "choose a folder that exists, may be written to and has room"
+        raise FormatError(path, "writing", "a file that can be written", what, hint) from error
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

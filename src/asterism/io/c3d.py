@@ -1,0 +1,152 @@
+"""Reading C3D, the binary file of biomechanics: which samples are points, and whose."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.io.c3d_layout import C3DFile, read_c3d
+from asterism.io.channels import identities
+from asterism.io.marker_names import find_modelled
+from asterism.io.units import PER_METRE, judge_unit, parse_unit
+from asterism.model import Capture
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+__all__ = ["CLUTTER", "UNNAMED", "channel_descriptions", "channel_names", "is_modelled", "is_seen", "read", "sniff"]
+
+# What a writer here puts in POINT:DESCRIPTIONS, so that reading gives back the very same tracks.
+UNNAMED, CLUTTER = "track without a name", "clutter"
+
+
+def read(path: Path) -> Capture:
+    """Read the optical points of a C3D file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Capture
+        Samples count as not seen if their residual is negative, or they are not finite, or lie
+        exactly at the origin. Computed points are left out and listed in `Capture.modelled`.
+
+    Raises
+    ------
+    FormatError
+        If the file is not C3D or is cut off.
+    """
+    file = read_c3d(path)
+    warnings = list(file.warnings)
+    names = channel_names(file)
+    modelled = is_modelled(file)
+    seen = is_seen(file)
+    n_origin = int((~seen & ~modelled & (file.points[..., 3] >= 0) & _at_origin(file)).sum())
+    if n_origin:
+        warnings.append(f"{n_origin} samples at exactly (0, 0, 0) are taken as not seen")
+    seen[:, modelled] = False
+    counts = seen.sum(axis=1)
+    frames, channels = (index.astype(np.int64) for index in np.nonzero(seen))
+    points = file.points[frames, channels, :3].astype(np.float64)
+    stated = " ".join(file.group("POINT").strings("UNITS")[:1])
+    unit = parse_unit(stated)
+    if unit is None:
+        unit = judge_unit(points)
+        warnings.append(f"POINT:UNITS is {stated!r}: by their size the coordinates are {unit}")
+    points /= PER_METRE[unit]
+    rate = file.rate
+    if not rate:
+        warnings.append("no frame rate is given: times count frames, one a second")
+
+    labels, identity_names = _labels(file, frames, channels, names, modelled)
+    return Capture(
+        times=np.arange(len(seen)) / (rate or 1.0),
+        offsets=np.concatenate([[0], np.cumsum(counts)]),
+        points=points,
+        path=path,
+        format="c3d",
+        rate=rate,
+        first_frame=file.first_frame,
+        units=unit,
+        channels=channels,
+        labels=labels,
+        names=identity_names,
+        modelled=tuple(name for name, gone in zip(names, modelled, strict=True) if gone),
+        warnings=tuple(warnings),
+    )
+
+
+def _overflowing(file: C3DFile, name: str) -> list[str]:
+    """Texts of a parameter and of its continuations: LABELS, LABELS2, LABELS3 …"""
+    point = file.group("POINT")
+    texts = point.strings(name)
+    number = 2
+    while f"{name}{number}" in point.parameters:
+        texts += point.strings(f"{name}{number}")
+        number += 1
+    n_points = file.points.shape[1]
+    return (texts + [""] * n_points)[:n_points]
+
+
+def channel_names(file: C3DFile) -> list[str]:
+    """Name of each channel, "" where the file has none."""
+    return _overflowing(file, "LABELS")
+
+
+def channel_descriptions(file: C3DFile) -> list[str]:
+    """Description of each channel, "" where the file has none."""
+    return _overflowing(file, "DESCRIPTIONS")
+
+
+def is_modelled(file: C3DFile) -> NDArray[np.bool_]:
+    """Which channels are computed and not seen, shape (K,)."""
+    point = file.group("POINT")
+    groups = {name: point.strings(name) for name in point.parameters}
+    return np.array(find_modelled(channel_names(file), groups), dtype=bool)
+
+
+def _at_origin(file: C3DFile) -> NDArray[np.bool_]:
+    x, y, z = (file.points[..., axis] == 0 for axis in range(3))
+    return x & y & z
+
+
+def is_seen(file: C3DFile) -> NDArray[np.bool_]:
+    """Which samples hold a point, shape (T, K)."""
+    seen = ~(file.points[..., 3] < 0)
+    for axis in range(3):
+        seen &= np.isfinite(file.points[..., axis])
+    return seen & ~_at_origin(file)
+
+
+def _labels(
+    file: C3DFile,
+    frames: NDArray[np.int64],
+    channels: NDArray[np.int64],
+    names: list[str],
+    modelled: NDArray[np.bool_],
+) -> tuple[NDArray[np.int64], tuple[str | None, ...]]:
+    """Identities of the channels that are kept, with the marks of our own writer heeded."""
+    descriptions = channel_descriptions(file)
+    is_clutter = np.array([text == CLUTTER for text in descriptions], dtype=bool)
+    kept = np.flatnonzero(~modelled & ~is_clutter)
+    column = np.full(len(names), -1)
+    column[kept] = np.arange(len(kept))
+    labels = np.full(len(channels), -1, dtype=np.int64)
+    member = column[channels] >= 0
+    labels[member], found = identities(
+        frames[member],
+        column[channels[member]],
+        [None if descriptions[c] == UNNAMED else names[c] for c in kept],
+    )
+    return labels, found
+
+
+def sniff(head: bytes) -> bool:
+    """Whether a file that begins so is C3D."""
+    return len(head) >= 512 and head[1] == 0x50 and head[0] > 1

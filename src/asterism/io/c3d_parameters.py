@@ -1,0 +1,235 @@
+"""The parameter section of a C3D file: groups of named values, read with care and built again.
+
+Values are kept as their bytes (in Intel order), so that what nobody understands survives a
+read and write unchanged.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from asterism.errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+__all__ = ["BLOCK", "DEC", "INTEL", "SGI", "Group", "Parameter", "build", "decode", "parse"]
+
+BLOCK = 512
+INTEL, DEC, SGI = 84, 85, 86
+_TEXT, _BYTE, _INTEGER, _REAL = -1, 1, 2, 4
+
+
+def decode(raw: bytes, kind: int, processor: int) -> NDArray[np.generic]:
+    """Turn the bytes of one of the three processor types into integers or reals.
+
+    Parameters
+    ----------
+    raw : bytes
+        The values as in the file.
+    kind : int
+        2 for 16-bit integers, 4 for 32-bit reals.
+    processor : int
+        84 Intel, 85 DEC (little-endian integers, VAX reals), 86 SGI/MIPS (big-endian).
+
+    Returns
+    -------
+    ndarray
+        int16 or float32; for Intel a view of `raw`.
+    """
+    order = ">" if processor == SGI else "<"
+    if kind == _INTEGER:
+        return np.frombuffer(raw, dtype=f"{order}i2").astype("<i2", copy=False)
+    if processor == DEC:
+        # VAX F: the two 16-bit words stand the other way round, and the exponent's bias is 2 more.
+        words = np.frombuffer(raw, dtype="<u2").reshape(-1, 2)[:, ::-1]
+        return np.ascontiguousarray(words).view("<f4").ravel() / np.float32(4)
+    return np.frombuffer(raw, dtype=f"{order}f4").astype("<f4", copy=False)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One named value: kind -1 text, 1 bytes, 2 integers, 4 reals; `data` in Intel order."""
+
+    kind: int
+    dims: tuple[int, ...]
+    data: bytes
+    description: bytes = b""
+    locked: bool = False
+
+    def strings(self) -> list[str]:
+        """Texts without the padding; UTF-8 where it is, else Latin-1. Empty if not text."""
+        if self.kind != _TEXT:
+            return []
+        width = self.dims[0] if self.dims else 1
+        n = math.prod(self.dims[1:])
+        return [_text(self.data[i * width : (i + 1) * width]) for i in range(n)]
+
+    def numbers(self) -> list[float]:
+        """Values as numbers, integers without their sign as counts are; empty if not numeric."""
+        if self.kind == _TEXT:
+            return []
+        kind = {_BYTE: "u1", _INTEGER: "<u2", _REAL: "<f4"}[self.kind]
+        return np.frombuffer(self.data, dtype=kind).astype(np.float64).tolist()
+
+    @classmethod
+    def of_strings(cls, texts: Sequence[str], like: Parameter | None = None) -> Self:
+        """Make a list of texts, at most 255 of at most 255 bytes."""
+        raw = [text.encode() for text in texts]
+        width = max(map(len, raw), default=0)
+        if width > 255:
+            longest = max(texts, key=lambda text: len(text.encode()))
+            raise ParameterError("names", "at most 255 bytes a name in a C3D", repr(longest))
+        data = b"".join(text.ljust(width) for text in raw)
+        old = like or cls(_TEXT, (), b"")
+        return cls(_TEXT, (width, len(raw)), data, old.description, old.locked)
+
+    @classmethod
+    def of_integers(cls, values: Sequence[int], like: Parameter | None = None) -> Self:
+        """Make one 16-bit integer, or a list of them."""
+        dims = () if len(values) == 1 else (len(values),)
+        old = like or cls(_INTEGER, (), b"")
+        data = np.array(values, dtype="<u2").tobytes()
+        return cls(_INTEGER, dims, data, old.description, old.locked)
+
+    @classmethod
+    def of_reals(cls, values: Sequence[float], like: Parameter | None = None) -> Self:
+        """Make one 32-bit real, or a list of them."""
+        dims = () if len(values) == 1 else (len(values),)
+        old = like or cls(_REAL, (), b"")
+        data = np.array(values, dtype="<f4").tobytes()
+        return cls(_REAL, dims, data, old.description, old.locked)
+
+
+@dataclass
+class Group:
+    """Parameters by name, in the order of the file."""
+
+    parameters: dict[str, Parameter] = field(default_factory=dict[str, Parameter])
+    description: bytes = b""
+    locked: bool = False
+
+    def strings(self, name: str) -> list[str]:
+        """Texts of a parameter, [] where there is none."""
+        return self.parameters[name].strings() if name in self.parameters else []
+
+    def numbers(self, name: str) -> list[float]:
+        """Numbers of a parameter, [] where there is none."""
+        return self.parameters[name].numbers() if name in self.parameters else []
+
+
+def _text(raw: bytes) -> str:
+    raw = raw.split(b"\0")[0].rstrip()
+    try:
+        return raw.decode()
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+def parse(section: bytes, processor: int) -> tuple[dict[str, Group], str]:
+    """Read groups and parameters as far as they make sense.
+
+    Parameters
+    ----------
+    section : bytes
+        The section without its four leading bytes.
+    processor : int
+        How its numbers are written, see `decode`.
+
+    Returns
+    -------
+    groups : dict of str to Group
+        By name.
+    problem : str
+        Where and why reading stopped early, "" where it did not.
+    """
+    groups: dict[int, tuple[str, Group]] = {}
+    parameters: list[tuple[int, str, Parameter]] = []
+    size, at = len(section), 0
+    problem = ""
+    order = "big" if processor == SGI else "little"
+    while at + 2 <= size:
+        n_name = int.from_bytes(section[at : at + 1], signed=True)
+        number = int.from_bytes(section[at + 1 : at + 2], signed=True)
+        if n_name == 0 or number == 0:
+            break
+        p = at + 2 + abs(n_name)
+        step = int.from_bytes(section[p : p + 2], order)
+        following = p + step if step else size
+        # A record without a successor may be any length up to the end of the section.
+        if p + 3 > size or following > size or 0 < step < 3:
+            problem = f"byte {at}: a record of {abs(n_name)} + {step} bytes in {size - at}"
+            break
+        name = section[at + 2 : p].decode("latin-1").strip().upper()
+        body = section[p + 2 : following]
+        if number < 0:
+            description = body[1 : 1 + body[0]]
+            groups[-number] = name, Group({}, description, n_name < 0)
+        else:
+            parameter = _parse_parameter(body, processor, n_name < 0)
+            if parameter is None:
+                problem = f"byte {at}: parameter {name} is larger than its record"
+            else:
+                parameters.append((number, name, parameter))
+        at = following
+    for number, name, parameter in parameters:
+        if number in groups:
+            groups[number][1].parameters[name] = parameter
+        else:
+            problem = problem or f"parameter {name} belongs to group {number}, which is not there"
+    return dict(groups.values()), problem
+
+
+def _parse_parameter(body: bytes, processor: int, locked: bool) -> Parameter | None:
+    kind = int.from_bytes(body[:1], signed=True)
+    n_dims = body[1] if len(body) > 1 else 0
+    dims = tuple(body[2 : 2 + n_dims])
+    start = 2 + n_dims
+    end = start + math.prod(dims) * abs(kind)
+    if kind not in (_TEXT, _BYTE, _INTEGER, _REAL) or len(dims) < n_dims or end > len(body):
+        return None
+    data = body[start:end]
+    if kind in (_INTEGER, _REAL) and processor != INTEL:
+        data = decode(data, kind, processor).tobytes()
+    n_description = body[end] if end < len(body) else 0
+    return Parameter(kind, dims, data, body[end + 1 : end + 1 + n_description], locked)
+
+
+def build(groups: dict[str, Group]) -> bytes:
+    """Make the whole section, its four leading bytes and the padding to full blocks included.
+
+    Raises
+    ------
+    ParameterError
+        If it is longer than the 255 blocks that the format can count.
+    """
+    records: list[bytes] = []
+    for number, (name, group) in enumerate(groups.items(), start=1):
+        body = bytes([len(group.description)]) + group.description
+        records.append(_record(name, -number, group.locked, body))
+        for key, p in group.parameters.items():
+            body = bytes([p.kind & 0xFF, len(p.dims), *p.dims])
+            body += p.data + bytes([len(p.description)]) + p.description
+            records.append(_record(key, number, p.locked, body))
+    # The terminator: a name of no characters.
+    section = b"".join(records) + b"\0\0"
+    n_blocks = -(-(len(section) + 4) // BLOCK)
+    if n_blocks > 255:
+        raise ParameterError(
+            "tracks", "names that fit the 130 kB that a C3D has for parameters",
+            f"{len(section) / 1000:.0f} kB of names and parameters",
+            "write CSV, or drop short tracks first",
+        )  # fmt: skip
+    return (bytes([1, 0x50, n_blocks, INTEL]) + section).ljust(n_blocks * BLOCK, b"\0")
+
+
+def _record(name: str, number: int, locked: bool, body: bytes) -> bytes:
+    raw = name.encode("latin-1")
+    head = bytes([(-len(raw) if locked else len(raw)) & 0xFF, number & 0xFF])
+    return head + raw + (len(body) + 2).to_bytes(2, "little") + body

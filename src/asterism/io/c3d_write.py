@@ -1,0 +1,207 @@
+"""Writing tracks as C3D: the points are new, all else is what the source file held."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import FormatError
+from asterism.io.c3d import (
+    CLUTTER,
+    UNNAMED,
+    channel_descriptions,
+    channel_names,
+    is_modelled,
+    is_seen,
+)
+from asterism.io.c3d_layout import C3DFile, read_c3d
+from asterism.io.c3d_parameters import BLOCK, Group, Parameter, build
+from asterism.io.channels import fill, to_channels
+from asterism.io.rates import fixed_rate
+from asterism.io.units import PER_METRE, from_metres
+from asterism.model import Capture
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import Detections, Tracks
+
+__all__ = ["write"]
+
+_CHUNK = 2048  # frames converted at a time: long captures need not fit the memory twice
+# Some programs take 0, 0, 0 for a gap whatever the residual says; this is as far from it as a
+# marker can be without being anywhere else.
+_NEAR_ORIGIN = np.float32(1e-30)
+
+
+def write(tracks: Tracks, file: IO[bytes]) -> None:
+    """Write tracks as C3D, one channel a track.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Over 3-D detections at a fixed rate.
+    file : binary file
+        Where to.
+
+    Raises
+    ------
+    ParameterError
+        If the detections are 2-D or the times irregular, or there are too many tracks.
+    FormatError
+        If the detections came from a C3D that is gone or no longer the same.
+
+    Notes
+    -----
+    Tracks without a name are called ``T000``, ``T001`` …, clutter goes to ``*0``, ``*1`` …, and
+    the descriptions of those channels say so, which gives back the same tracks on reading. If the
+    detections were read from a C3D its unit, analog channels, events, computed points and all
+    other parameters are kept, and so are the residuals and cameras of its points. A sample that
+    is not there is written as 0, 0, 0 with residual -1, which is what other programs expect.
+    """
+    d = tracks.detections
+    rate = fixed_rate(d, "C3D")
+    source = _source(d)
+    channels, names, n_clutter = to_channels(tracks)
+    descriptions = [UNNAMED if name is None else "" for name in tracks.names]
+    descriptions += [CLUTTER] * n_clutter
+    n_own = len(names)
+    computed = np.empty(0, dtype=np.int64)
+    unit, first_frame, header = "mm", 1, bytes(BLOCK)
+    groups: dict[str, Group] = {}
+    analog = np.empty((d.n_frames, 0), dtype=np.float32)
+    scale, n_samples = 1.0, 0
+    if isinstance(d, Capture):
+        unit, first_frame = d.units, d.first_frame
+    if source is not None:
+        old_names, old_texts = channel_names(source), channel_descriptions(source)
+        text_of = dict(zip(old_names, old_texts, strict=True))
+        descriptions = [
+            text or text_of.get(name, "") for text, name in zip(descriptions, names, strict=True)
+        ]
+        computed = np.flatnonzero(is_modelled(source))
+        names += [old_names[c] for c in computed]
+        descriptions += [old_texts[c] for c in computed]
+        header, groups, analog = source.header, source.groups, source.analog
+        scale, n_samples = source.scale, source.n_samples
+
+    last_frame = first_frame + d.n_frames - 1
+    _set_parameters(groups, names, descriptions, d.n_frames, first_frame, rate, unit, scale)
+    n_blocks = len(build(groups)) // BLOCK
+    groups["POINT"].parameters["DATA_START"] = Parameter.of_integers([2 + n_blocks])
+    words = np.frombuffer(header, "<u2").copy()
+    words[0] = 0x5002  # parameters in block 2, and the mark of a C3D
+    words[1:5] = len(names), analog.shape[1], min(first_frame, 0xFFFF), min(last_frame, 0xFFFF)
+    words[6:8] = np.array([-scale], "<f4").view("<u2")
+    words[8:10] = 2 + n_blocks, n_samples
+    words[10:12] = np.array([rate], "<f4").view("<u2")
+    file.write(words.tobytes())
+    file.write(build(groups))
+
+    row = np.zeros((_CHUNK, len(names), 4), dtype="<f4")
+    for begin in range(0, d.n_frames, _CHUNK):
+        rows = slice(begin, min(begin + _CHUNK, d.n_frames))
+        block = row[: rows.stop - begin]
+        dense = fill(tracks, channels, n_own, rows)
+        seen = ~np.isnan(dense[..., 0])
+        values = from_metres(dense, unit).astype("<f4")
+        values[~seen] = 0
+        values[seen & (values == 0).all(axis=-1), 0] = _NEAR_ORIGIN
+        block[:, :n_own, :3] = values
+        block[:, :n_own, 3] = np.where(seen, 0, -1)
+        if source is not None:
+            _keep_residuals(block, d, channels, rows, source)
+            block[:, n_own:] = source.points[rows][:, computed]
+        file.write(np.hstack([block.reshape(len(block), -1), analog[rows]]).tobytes())
+    file.write(bytes(-(d.n_frames * (4 * len(names) + analog.shape[1]) * 4) % BLOCK))
+
+
+def _source(d: Detections) -> C3DFile | None:
+    """File that the detections were read from, cut to their frames; None without one."""
+    if not isinstance(d, Capture) or d.format != "c3d":
+        return None
+    hint = "write to CSV, or put the source back where it was read from"
+    if not d.path.is_file():
+        got = "no such file"
+        raise FormatError(d.path, "the source", "the C3D that was read", got, hint)
+    source = read_c3d(d.path)
+    skipped = d.first_frame - source.first_frame
+    rows = slice(skipped, skipped + d.n_frames)
+    n_frames, n_channels, _ = source.points.shape
+    is_same = skipped >= 0 and rows.stop <= n_frames
+    is_same = is_same and (d.n_points == 0 or int(d.channels.max()) < n_channels)
+    if is_same:
+        source = C3DFile(
+            **{**vars(source), "points": source.points[rows], "analog": source.analog[rows]}
+        )
+        ours = d.channels >= 0
+        is_same = bool(is_seen(source)[d.frame_of[ours], d.channels[ours]].all())
+    if not is_same:
+        got = "another number of frames, channels or points"
+        raise FormatError(d.path, "the source", "the C3D that was read", got, hint)
+    return source
+
+
+def _keep_residuals(
+    block: NDArray[np.float32],
+    d: Detections,
+    channels: NDArray[np.int64],
+    rows: slice,
+    source: C3DFile,
+) -> None:
+    """Copy residual and cameras of the points that came from the source."""
+    if not isinstance(d, Capture):
+        return
+    mine = np.arange(d.offsets[rows.start], d.offsets[rows.stop])
+    mine = mine[d.channels[mine] >= 0]
+    frames = d.frame_of[mine]
+    words = source.points[frames, d.channels[mine], 3]
+    block[frames - rows.start, channels[mine], 3] = words
+
+
+def _set_parameters(
+    groups: dict[str, Group],
+    names: list[str],
+    descriptions: list[str],
+    n_frames: int,
+    first_frame: int,
+    rate: float,
+    unit: str,
+    scale: float,
+) -> None:
+    """Make the parameters say what the file holds, and leave the others alone."""
+    point = groups.setdefault("POINT", Group()).parameters
+    n_known = min(n_frames, 0xFFFF)
+    for key, value in (("USED", len(names)), ("FRAMES", n_known)):
+        point[key] = Parameter.of_integers([value], point.get(key))
+    for key, real in (("SCALE", -scale), ("RATE", rate)):
+        point[key] = Parameter.of_reals([real], point.get(key))
+    point["DATA_START"] = Parameter.of_integers([0], point.get("DATA_START"))
+    point["UNITS"] = Parameter.of_strings([unit], point.get("UNITS"))
+    for key, texts in (("LABELS", names), ("DESCRIPTIONS", descriptions)):
+        for old in [k for k in point if k.startswith(key) and k[len(key) :].isdecimal()]:
+            del point[old]
+        for i in range(0, max(len(texts), 1), 255):  # a dimension is one byte
+            number = "" if i == 0 else str(i // 255 + 1)
+            old = point.get(key)
+            point[f"{key}{number}"] = Parameter.of_strings(texts[i : i + 255], old)
+    # The 16-bit counts overflow: these are the ways round it of Qualisys and of Vicon.
+    if "LONG_FRAMES" in point or n_frames > 0xFFFF:
+        point["LONG_FRAMES"] = Parameter.of_reals([n_frames], point.get("LONG_FRAMES"))
+    trial = groups.get("TRIAL", Group()).parameters
+    last_frame = first_frame + n_frames - 1
+    if "ACTUAL_END_FIELD" in trial or last_frame > 0xFFFF:
+        trial = groups.setdefault("TRIAL", Group()).parameters
+        for key, frame in (("ACTUAL_START_FIELD", first_frame), ("ACTUAL_END_FIELD", last_frame)):
+            words = [frame & 0xFFFF, frame >> 16]
+            trial[key] = Parameter.of_integers(words, trial.get(key))
+    if "ANALOG" not in groups:
+        analog = groups["ANALOG"] = Group()
+        analog.parameters["USED"] = Parameter.of_integers([0])
+    if "MANUFACTURER" not in groups:
+        maker = groups["MANUFACTURER"] = Group()
+        version = importlib.metadata.version("asterism")
+        for key, text in (("SOFTWARE", "Asterism"), ("VERSION_LABEL", version)):
+            maker.parameters[key] = Parameter.of_strings([text])

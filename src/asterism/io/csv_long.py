@@ -1,0 +1,229 @@
+"""Asterism's own CSV: one row a detection, and nothing is lost.
+
+Columns ``frame, time_s, x_m, y_m, z_m, track, name, confidence``; ``z_m`` is absent in 2-D,
+``confidence`` where there is none. Clutter is track -1. A row without coordinates is a frame
+without points; a row without frame and time declares a track that has no detection. Floats are
+written with as many digits as give back the same bits.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from itertools import islice
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import FormatError
+from asterism.io.text_table import check_times, read_lines
+from asterism.model import Capture, Tracks
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+__all__ = ["read", "read_tracks", "sniff", "write"]
+
+_COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "track", "name", "confidence")
+_REQUIRED = ("frame", "time_s", "x_m", "y_m")
+_CHUNK = 65536
+_MOST_TRACKS = 10**6  # a number beyond it is a mistake, and would fill the memory
+
+
+def _cells(line: str) -> list[str]:
+    return [cell.strip() for cell in next(csv.reader([line]), [])]
+
+
+def sniff(head: bytes) -> bool:
+    """Whether a file that begins so is the CSV of this module."""
+    line = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")[0].decode("latin-1").strip()
+    return "x_m" in line.replace('"', "").replace(" ", "").split(",")
+
+
+def read(path: Path) -> Capture:
+    """Read the detections, with the tracks as their identities; see `read_tracks`."""
+    capture = read_tracks(path).detections
+    assert isinstance(capture, Capture)
+    return capture
+
+
+def read_tracks(path: Path) -> Tracks:
+    """Read tracks as `write` wrote them; columns may stand in any order.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Tracks
+        Over a `Capture` of the same file; without a column ``track`` all is clutter.
+
+    Raises
+    ------
+    FormatError
+        With the line that is not as it should be.
+    """
+    text = "\n".join(read_lines(path))
+    header = _cells(text.partition("\n")[0])
+    unknown = [name for name in header if name not in _COLUMNS]
+    missing = [name for name in _REQUIRED if name not in header]
+    if unknown or missing or len(set(header)) < len(header):
+        got = ", ".join(header)[:200]
+        raise FormatError(path, "line 1", f"the columns {', '.join(_COLUMNS)}", got)
+    numbers, names = _parse(path, text, header)
+    frame, time = numbers["frame"], numbers["time_s"]
+    track = _whole(path, "track", np.nan_to_num(numbers["track"], nan=-1.0), -1, _MOST_TRACKS)
+    points = np.stack([numbers[axis] for axis in header if axis in ("x_m", "y_m", "z_m")], axis=1)
+
+    n_given = np.isfinite(points).sum(axis=1)
+    is_declaration = np.isnan(frame) & np.isnan(time) & (n_given == 0)
+    bad = np.flatnonzero(
+        ~is_declaration & ~(np.isfinite(frame) & np.isfinite(time))
+        | (n_given > 0) & (n_given < points.shape[1])
+    )
+    if len(bad):
+        expected = "a frame, a time and all coordinates or none, all finite"
+        raise FormatError(path, f"line {bad[0] + 2}", expected, "a part of them")
+    rows = np.flatnonzero(~is_declaration)
+    rows = rows[np.argsort(frame[rows], kind="stable")]
+    begins = np.flatnonzero(np.diff(frame[rows], prepend=-np.inf) > 0)
+    index = np.repeat(np.arange(len(begins)), np.diff(np.append(begins, len(rows))))
+    times = time[rows[begins]]
+    bad = rows[time[rows] != times[index]]
+    if len(bad):
+        expected = f"the time of the other rows of frame {frame[bad[0]]:g}"
+        raise FormatError(path, f"line {bad[0] + 2}", expected, f"{time[bad[0]]:g}")
+    check_times(path, times, rows[begins] + 2)
+
+    is_point = n_given[rows] > 0
+    kept = rows[is_point]
+    counts = np.bincount(index[is_point], minlength=len(begins))
+    numbered = _whole(path, "frame", frame[rows[begins]], -(2**53), 2**53)
+    track_names = _names(path, track, names)
+    capture = Capture(
+        times=times,
+        offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+        points=points[kept],
+        path=path,
+        format="csv",
+        first_frame=int(numbered[0]) if len(numbered) else 1,
+        channels=np.full(len(kept), -1),
+        labels=track[kept],
+        names=track_names,
+    )
+    confidence = numbers["confidence"][kept] if "confidence" in header else None
+    return Tracks(
+        detections=capture, labels=track[kept], names=track_names, confidence=confidence
+    )
+
+
+def _parse(
+    path: Path, text: str, header: list[str]
+) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
+    """Columns of numbers by their name, NaN where blank, and the names of the tracks."""
+    reader = csv.reader(io.StringIO(text, newline=""))
+    parts: dict[str, list[NDArray[np.float64]]] = {c: [] for c in _COLUMNS if c != "name"}
+    names: list[str] = []
+    next(reader)
+    line = 2
+    try:
+        while rows := list(islice(reader, _CHUNK)):
+            if not rows[-1]:  # the file ends with a line end
+                rows.pop()
+            short = next((i for i, row in enumerate(rows) if len(row) != len(header)), None)
+            if short is not None:
+                expected = f"{len(header)} columns"
+                raise FormatError(path, f"line {line + short}", expected, len(rows[short]))
+            for column, cells in zip(header, zip(*rows, strict=True), strict=False):
+                if column == "name":
+                    names += cells
+                else:
+                    parts[column].append(_numbers(path, column, cells, line))
+            line += len(rows)
+    except csv.Error as error:
+        raise FormatError(path, f"line {line} or later", "CSV", str(error)) from error
+    n = line - 2
+    numbers = {c: np.concatenate(p) if p else np.full(n, np.nan) for c, p in parts.items()}
+    return numbers, names or [""] * n
+
+
+def _numbers(path: Path, column: str, cells: tuple[str, ...], line: int) -> NDArray[np.float64]:
+    try:
+        return np.array([cell or "nan" for cell in cells], dtype=np.float64)
+    except ValueError as error:
+        for i, cell in enumerate(cells):
+            try:
+                float(cell or "nan")
+            except ValueError:
+                place = f"line {line + i}, column {column}"
+                raise FormatError(path, place, "a number or nothing", repr(cell)) from error
+        raise
+
+
+def _whole(
+    path: Path, column: str, values: NDArray[np.float64], low: int, high: int
+) -> NDArray[np.int64]:
+    bad = np.flatnonzero(~((values >= low) & (values <= high) & (values == np.floor(values))))
+    if len(bad):
+        expected = f"whole numbers from {low} to {high}"
+        raise FormatError(path, f"column {column}", expected, f"{values[bad[0]]:g}")
+    return values.astype(np.int64)
+
+
+def _names(
+    path: Path, track: NDArray[np.int64], names: list[str]
+) -> tuple[str | None, ...]:
+    result: list[str | None] = [None] * (int(track.max(initial=-1)) + 1)
+    for i, (k, name) in enumerate(zip(track.tolist(), names, strict=True)):
+        if k >= 0 and name:
+            if result[k] not in (None, name):
+                expected = f"one name for track {k}, {result[k]!r}"
+                raise FormatError(path, f"line {i + 2}", expected, repr(name))
+            result[k] = name
+    return tuple(result)
+
+
+def write(tracks: Tracks, file: IO[bytes]) -> None:
+    """Write tracks; `read_tracks` gives back the same labels, names, confidence and points.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Over 2-D or 3-D detections at any times.
+    file : binary file
+        Where to.
+    """
+    d = tracks.detections
+    has_confidence = tracks.confidence is not None
+    header = [c for c in _COLUMNS if (c != "z_m" or d.n_axes == 3) and c != "confidence"]
+    header += ["confidence"] * has_confidence
+    file.write((",".join(header) + "\n").encode())
+    tails = [f"{k},{_quoted(name or '')}" for k, name in enumerate(tracks.names)] + ["-1,"]
+    first = d.first_frame if isinstance(d, Capture) else 1
+    lines: list[str] = []
+    for t, time in enumerate(d.times.tolist()):
+        begin, end = int(d.offsets[t]), int(d.offsets[t + 1])
+        start = f"{first + t},{time!r},"
+        if begin == end:
+            lines.append(start + "," * (len(header) - 3))
+        for i, (point, k) in enumerate(
+            zip(d.points[begin:end].tolist(), tracks.labels[begin:end].tolist(), strict=True)
+        ):
+            line = f"{start}{','.join(map(repr, point))},{tails[k]}"
+            lines.append(line if tracks.confidence is None else f"{line},{float(tracks.confidence[begin + i])!r}")
+        if len(lines) > _CHUNK:
+            file.write(("\n".join(lines) + "\n").encode())
+            lines.clear()
+    for k in np.flatnonzero(tracks.lengths == 0):
+        lines.append("," * (2 + d.n_axes) + tails[k] + "," * has_confidence)
+    file.write("".join(f"{line}\n" for line in lines).encode())
+
+
+def _quoted(name: str) -> str:
+    out = io.StringIO()
+    csv.writer(out, lineterminator="").writerow([name, "x"])
+    return out.getvalue().removesuffix(",x")

@@ -1,0 +1,93 @@
+"""CSV with one row a frame and three columns a marker: ``time_s, LASI_x, LASI_y, LASI_z, …``.
+
+Metres; gaps are blank fields. The suffixes make out the markers; 2-D files have no ``_z``.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import FormatError
+from asterism.io.text_table import (
+    capture_of, check_times, parse_rows, plain, read_lines, rows_of,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from asterism.model import Capture, Tracks
+
+__all__ = ["read", "sniff", "write"]
+
+
+def sniff(head: bytes) -> bool:
+    """Whether a file that begins so is the CSV of this module."""
+    line = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")[0].decode("latin-1").strip()
+    cells = [cell.strip() for cell in next(csv.reader([line]), [])]
+    # A long header may be cut off in the middle of a name.
+    return cells[:1] == ["time_s"] and (len(cells) == 1 or cells[1].endswith("_x"))
+
+
+def read(path: Path) -> Capture:
+    """Read a wide CSV.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Capture
+
+    Raises
+    ------
+    FormatError
+        With the line that is not as it should be.
+    """
+    lines = read_lines(path)
+    titles = [cell.strip() for cell in next(csv.reader(lines[:1]), [])]
+    axes = "xyz" if any(title.endswith("_z") for title in titles) else "xy"
+    names = [title[:-2] for title in titles[1 :: len(axes)]]
+    wanted = ["time_s"] + [f"{name}_{axis}" for name in names for axis in axes]
+    if titles != wanted:
+        odd = next((t for t, w in zip(titles, wanted, strict=False) if t != w), "")
+        expected = "'time_s', then NAME_x, NAME_y, NAME_z for each marker"
+        raise FormatError(path, "line 1", expected, f"{odd!r} out of step" if odd else "fewer")
+    values, numbers = parse_rows(path, lines, 1, len(titles), ",")
+    values = values.reshape(len(numbers), len(titles))
+    check_times(path, values[:, 0], numbers)
+    return capture_of(
+        path,
+        "csv-wide",
+        values[:, 0],
+        values[:, 1:].reshape(len(values), len(names), len(axes)),
+        names,
+        unit="m",
+        zero_is_gap=False,
+    )
+
+
+def write(tracks: Tracks, file: IO[bytes]) -> None:
+    """Write tracks as one row a frame.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Over 2-D or 3-D detections; tracks without a name are called ``T000`` …, clutter goes to
+        columns ``*0``, ``*1`` …
+    file : binary file
+        Where to.
+    """
+    names, rows = rows_of(tracks, "m", zero_is_gap=False)
+    axes = "xyz"[: tracks.detections.n_axes]
+    header = io.StringIO()
+    titles = ["time_s"] + [f"{plain(name)}_{axis}" for name in names for axis in axes]
+    csv.writer(header, lineterminator="\n").writerow(titles)
+    file.write(header.getvalue().encode())
+    for time, row in zip(tracks.detections.times.tolist(), rows, strict=True):
+        file.write((",".join([repr(time), *row]) + "\n").encode())

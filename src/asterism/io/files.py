@@ -1,0 +1,176 @@
+"""Reading and writing files of any known format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from asterism.errors import FormatError, ParameterError
+from asterism.io.atomic import replacing
+from asterism.io.formats import FORMATS, Format
+from asterism.model import Capture
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from asterism.model import Tracks
+
+__all__ = ["read", "read_tracks", "write"]
+
+Result = TypeVar("Result")
+
+_HEAD = 4096  # bytes that are enough to know a format by
+
+
+def read(path: str | Path, *, format: str | None = None) -> Capture:
+    """Read a capture from a file.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    format : str, optional
+        Key of `FORMATS`; by default it is told by the ending of the name and by the content.
+
+    Returns
+    -------
+    Capture
+        Detections in metres with the file's own identities; axes are those of the file.
+
+    Raises
+    ------
+    FormatError
+        If the file is not there, or is of no known format, or not what its format says.
+    ParameterError
+        If `format` is unknown.
+
+    Examples
+    --------
+    >>> read("nowhere.c3d")
+    Traceback (most recent call last):
+    ...
+    asterism.errors.FormatError: nowhere.c3d: opening: expected a file, got nothing of that name
+    """
+    path = Path(path)
+    return _guarded(path, _find(path, format).read)
+
+
+def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
+    """Read what a file says about who is whom.
+
+    Parameters
+    ----------
+    path, format
+        As in `read`.
+
+    Returns
+    -------
+    Tracks
+        Over a `Capture`. Asterism's own CSV gives back labels, names and confidence as they were
+        written; other formats the identities of their channels, as `Capture.tracks`.
+
+    Raises
+    ------
+    FormatError, ParameterError
+        As in `read`.
+    """
+    path = Path(path)
+    chosen = _find(path, format)
+    if chosen.read_tracks is None:
+        return _guarded(path, chosen.read).tracks
+    return _guarded(path, chosen.read_tracks)
+
+
+def write(
+    tracks: Tracks, path: str | Path, *, format: str | None = None, overwrite_input: bool = False
+) -> None:
+    """Write tracks to a file; it is there as a whole afterwards, or untouched.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        What to write: every detection, those that are clutter too.
+    path : path
+        The file. One that exists is replaced, except the one that the detections came from.
+    format : str, optional
+        Key of `FORMATS`; by default it is told by the ending of the name.
+    overwrite_input : bool
+        Allow `path` to be the file that the detections were read from.
+
+    Raises
+    ------
+    ParameterError
+        If `path` is the input and that was not allowed, its ending is unknown, or the format
+        cannot hold these tracks.
+    FormatError
+        If the file cannot be written, or its source cannot be read again.
+    """
+    path = Path(path)
+    known = [f for f in FORMATS.values() if f.write is not None]
+    if format is None:
+        endings = [f for f in known if path.suffix.lower() in f.extensions and path.suffix]
+        if not endings:
+            every = ", ".join(dict.fromkeys(e for f in known for e in f.extensions if e))
+            hint = "or name the format"
+            raise ParameterError("path", f"a name ending in {every}", repr(path.name), hint)
+        chosen = endings[0]
+    else:
+        chosen = _named(format)
+    if chosen.write is None:
+        names = ", ".join(f.name for f in known)
+        raise ParameterError("format", f"one that can be written: {names}", repr(format))
+    source = tracks.detections
+    if isinstance(source, Capture) and not overwrite_input and _is_same(source.path, path):
+        raise ParameterError(
+            "path", "another file than the one that was read", str(path),
+            "overwrite_input=True if you mean it",
+        )  # fmt: skip
+    with replacing(path) as file:
+        chosen.write(tracks, file)
+
+
+def _is_same(a: Path, b: Path) -> bool:
+    try:
+        return a.samefile(b)
+    except OSError:
+        return a.resolve() == b.resolve()
+
+
+def _named(name: str) -> Format:
+    if name not in FORMATS:
+        raise ParameterError("format", f"one of {', '.join(FORMATS)}", repr(name))
+    return FORMATS[name]
+
+
+def _find(path: Path, format: str | None) -> Format:
+    """Format of an existing file: as asked, or by its ending, or by its content."""
+    if not path.is_file():
+        got = "a folder" if path.is_dir() else "nothing of that name"
+        got = "a device or pipe" if path.exists() and not path.is_dir() else got
+        raise FormatError(path, "opening", "a file", got)
+    if format is not None:
+        return _named(format)
+    ending = path.suffix.lower()
+    candidates = [f for f in FORMATS.values() if ending in f.extensions] or list(FORMATS.values())
+    if len(candidates) == 1 and ending:
+        return candidates[0]
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError as error:
+        raise FormatError(path, "opening", "a readable file", error.strerror) from error
+    for candidate in (*candidates, *FORMATS.values()):
+        if candidate.sniff(head):
+            return candidate
+    names = ", ".join(f"{f.name} ({f.description})" for f in candidates)
+    raise FormatError(path, "its first bytes", f"one of: {names}", repr(head[:40]))
+
+
+def _guarded(path: Path, reader: Callable[[Path], Result]) -> Result:
+    """Read, and turn what the system or the data model refuses into an error about the file."""
+    try:
+        return reader(path)
+    except OSError as error:
+        raise FormatError(path, "reading", "a readable file", error.strerror) from error
+    except ParameterError as error:
+        raise FormatError(path, error.name, error.expected, error.got, error.hint) from error

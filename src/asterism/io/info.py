@@ -1,0 +1,222 @@
+"""What a capture holds, and how hard its markers are to tell apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from asterism.model import Capture
+
+__all__ = ["CaptureInfo", "describe"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaptureInfo:
+    """Figures of a capture; lengths in millimetres, NaN where there is nothing to measure.
+
+    Parameters
+    ----------
+    path, format, units, first_frame : Path, str, str, int
+        As in `Capture`.
+    rate : float
+        Frames a second, from the spacing of the times where the file does not state it.
+    n_frames : int
+        Frames.
+    duration : float
+        Seconds from the first frame to the last, and one frame more.
+    n_named : int
+        Named markers.
+    n_unlabelled : int
+        Channels without a name that hold detections.
+    n_pieces : int
+        Unbroken pieces of those.
+    n_modelled : int
+        Computed points that were left out.
+    points_min, points_mean, points_max : float
+        Points in a frame.
+    absent_percent : float
+        Samples missing among the named markers that are there at all.
+    n_gaps : int
+        Holes between detections of a named marker.
+    gap_median, gap_longest : float
+        Their lengths in frames.
+    step_median, step_99 : float
+        Displacement of an identity from one frame to the next, 50th and 99th percentile.
+    spacing_1, spacing_5, spacing_50 : float
+        Distance of a point to its nearest neighbour in its frame, percentiles.
+    confusion_percent : float
+        Points whose nearest point in the next frame is another identity, among those whose own
+        is there.
+    difficulty : str
+        "easy", "moderate", "hard", or "unknown" without identities or neighbours.
+    reason : str
+        Why.
+    warnings : tuple of str
+        As in `Capture`.
+    """
+
+    path: Path
+    format: str
+    units: str
+    first_frame: int
+    rate: float
+    n_frames: int
+    duration: float
+    n_named: int
+    n_unlabelled: int
+    n_pieces: int
+    n_modelled: int
+    points_min: int
+    points_mean: float
+    points_max: int
+    absent_percent: float
+    n_gaps: int
+    gap_median: float
+    gap_longest: int
+    step_median: float
+    step_99: float
+    spacing_1: float
+    spacing_5: float
+    spacing_50: float
+    confusion_percent: float
+    difficulty: str
+    reason: str
+    warnings: tuple[str, ...]
+
+
+def describe(capture: Capture) -> CaptureInfo:
+    """Measure a capture.
+
+    Parameters
+    ----------
+    capture : Capture
+        What to measure.
+
+    Returns
+    -------
+    CaptureInfo
+
+    Notes
+    -----
+    Where no marker is named, displacement and confusion are those of the recording system's own
+    pieces of trajectory, which end where following them was hard: they look easier than they are.
+    """
+    named = np.array([name is not None for name in capture.names], dtype=bool)
+    is_named = np.zeros(capture.n_points, dtype=bool)
+    has_label = capture.labels >= 0
+    is_named[has_label] = named[capture.labels[has_label]]
+    gaps, n_present, n_missing = _gaps(capture, is_named)
+    steps, spacing, n_confused, n_followed = _neighbours(capture)
+    confusion = 100 * n_confused / n_followed if n_followed else np.nan
+    rate = capture.rate or (1 / capture.step if capture.step else 0.0)
+    counts = capture.counts
+    difficulty, reason = _verdict(confusion, steps, spacing)
+    others = capture.channels[~is_named & (capture.channels >= 0)]
+    return CaptureInfo(
+        path=capture.path,
+        format=capture.format,
+        units=capture.units,
+        first_frame=capture.first_frame,
+        rate=rate,
+        n_frames=capture.n_frames,
+        duration=float(np.ptp(capture.times)) + capture.step if capture.n_frames else 0.0,
+        n_named=int(named.sum()),
+        n_unlabelled=len(np.unique(others)),
+        n_pieces=int((~named).sum()),
+        n_modelled=len(capture.modelled),
+        points_min=int(counts.min(initial=0)) if not len(counts) else int(counts.min()),
+        points_mean=float(counts.mean()) if len(counts) else 0.0,
+        points_max=int(counts.max(initial=0)),
+        absent_percent=100 * n_missing / n_present if n_present else np.nan,
+        n_gaps=len(gaps),
+        gap_median=float(np.median(gaps)) if len(gaps) else 0.0,
+        gap_longest=int(gaps.max(initial=0)),
+        step_median=_percentile(steps, 50),
+        step_99=_percentile(steps, 99),
+        spacing_1=_percentile(spacing, 1),
+        spacing_5=_percentile(spacing, 5),
+        spacing_50=_percentile(spacing, 50),
+        confusion_percent=float(confusion),
+        difficulty=difficulty,
+        reason=reason,
+        warnings=capture.warnings,
+    )
+
+
+def _percentile(metres: NDArray[np.float64], q: float) -> float:
+    return float(np.percentile(metres, q)) * 1000 if len(metres) else float("nan")
+
+
+def _gaps(
+    capture: Capture, is_named: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], int, int]:
+    """Lengths of the holes of named markers; their samples that could be there, and are not."""
+    label, frame = capture.labels[is_named], capture.frame_of[is_named]
+    order = np.argsort(label, kind="stable")
+    label, frame = label[order], frame[order]
+    hole = np.diff(frame) - 1
+    gaps = hole[(np.diff(label) == 0) & (hole > 0)]
+    n_possible = len(np.unique(label)) * capture.n_frames
+    return gaps, n_possible, n_possible - len(label)
+
+
+def _neighbours(
+    capture: Capture,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], int, int]:
+    """Displacements, distances to the nearest neighbour, and how often the nearest is another."""
+    from scipy.spatial import cKDTree
+
+    steps: list[NDArray[np.float64]] = []
+    spacing: list[NDArray[np.float64]] = []
+    n_confused = n_followed = 0
+    labels, offsets = capture.labels, capture.offsets
+    before: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None
+    for t in range(capture.n_frames):
+        points = capture.frame(t)
+        own = labels[offsets[t] : offsets[t + 1]]
+        if not len(points):
+            before = None
+            continue
+        tree = cKDTree(points)
+        if len(points) > 1:
+            spacing.append(tree.query(points, k=2)[0][:, 1])
+        if before is not None:
+            place = {int(k): i for i, k in enumerate(own) if k >= 0}
+            old = [i for i, k in enumerate(before[1]) if int(k) in place]
+            new = [place[int(before[1][i])] for i in old]
+            if old:
+                nearest = tree.query(before[0][old], k=1)[1]
+                n_confused += int((own[nearest] != own[new]).sum())
+                n_followed += len(old)
+                steps.append(np.linalg.norm(points[new] - before[0][old], axis=1))
+        before = points, own
+    nothing = np.empty(0)
+    return (
+        np.concatenate(steps) if steps else nothing,
+        np.concatenate(spacing) if spacing else nothing,
+        n_confused,
+        n_followed,
+    )
+
+
+def _verdict(
+    confusion: float, steps: NDArray[np.float64], spacing: NDArray[np.float64]
+) -> tuple[str, str]:
+    if np.isnan(confusion) or not len(spacing):
+        what = "the file has no identities to compare" if np.isnan(confusion) else "single points"
+        return "unknown", what
+    pace = _percentile(steps, 99) / _percentile(spacing, 5) if _percentile(spacing, 5) else np.inf
+    reason = (
+        f"for {confusion:.2g} % of the points the nearest in the next frame is another marker; "
+        f"fast ones move {pace:.2g} times the distance of close ones"
+    )
+    if confusion > 5:
+        return "hard", reason
+    return ("moderate" if confusion > 0.5 or pace > 1 else "easy"), reason

@@ -1,0 +1,100 @@
+"""What the name of a channel says: a marker, a point without a name, or something computed.
+
+Recording systems have their own words for points that nobody has named, and Plug-in-Gait and its
+relatives put joint centres, segment axes, angles and forces among the points. Those are not light.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+__all__ = ["find_modelled", "is_unlabelled"]
+
+# Vicon *12; Qualisys leaves the name empty; Motive Unlabeled 7, U_7; others 0001, New 0001, uname7.
+_UNLABELLED = re.compile(
+    r"|\*\d*|unlabell?ed\b.*|unlabell?ed[_\d].*|u_\d+|\d{4,}|new[ _]?\d+|uname.*|unnamed.*",
+    re.IGNORECASE,
+)
+# Parameters of the C3D group POINT that list channels of other kinds than optical points.
+_TYPE_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
+_COMPUTED = re.compile(
+    r"[LR]?\w*(Angles?|Forces?|Moments?|Powers?|NormalisedGRF)"
+    r"|[LR](HJC|KJC|AJC|SJC|EJC|WJC)"
+    r"|CentreOf(Mass|Pressure)(Floor)?|CenterOf(Mass|Pressure)(Floor)?"
+)
+# The Oxford Foot Model: names such as LTIB1 could be markers, so they count only beside LFOF0.
+_OXFORD = re.compile(r"([LR])(ArchHeight(Index)?|D1M0|FOF\d|HDF\d|HE1|HLX\d|PROXFF|TIB\d)")
+
+
+def _bare(name: str) -> str:
+    """Name without its subject, ``Subject:LASI`` -> ``LASI``."""
+    return name.rpartition(":")[2].strip()
+
+
+def is_unlabelled(name: str) -> bool:
+    """Whether a channel's name is a recording system's word for "nobody knows".
+
+    Examples
+    --------
+    >>> [is_unlabelled(n) for n in ("*12", "", "Unlabeled 3", "New 0001", "LASI", "Ann:T10")]
+    [True, True, True, True, False, False]
+    """
+    return _UNLABELLED.fullmatch(_bare(name)) is not None
+
+
+def find_modelled(names: Sequence[str], groups: Mapping[str, Iterable[str]]) -> list[bool]:
+    """Tell which channels are computed and not seen.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Name of each channel.
+    groups : mapping of str to iterable of str
+        Lists of channel names by kind, as the C3D parameters POINT:ANGLES, POINT:FORCES … give.
+
+    Returns
+    -------
+    list of bool
+        One for each name.
+
+    Notes
+    -----
+    Computed are the members of those lists, the names of Plug-in-Gait, and the axes of a segment:
+    four channels of one stem that end in O, A, L and P (origin, anterior, lateral, proximal).
+
+    Examples
+    --------
+    >>> find_modelled(["LASI", "LFEO", "LFEA", "LFEL", "LFEP", "LHipAngles"], {})
+    [False, True, True, True, True, True]
+    """
+    listed = {name for kind in _TYPE_GROUPS for name in groups.get(kind, ())}
+    stems = {(name[:-1], name[-1]) for name in names if name}
+
+    def is_axis(name: str) -> bool:
+        stem = name[:-1]
+        return (
+            len(_bare(stem)) >= 2
+            and name[-1] in "OALP"
+            and all((stem, letter) in stems for letter in "OALP")
+        )
+
+    def is_oxford(name: str) -> bool:
+        found = _OXFORD.fullmatch(_bare(name))
+        prefix = name[: len(name) - len(_bare(name))]
+        return found is not None and (f"{prefix}{found[1]}FOF", "0") in stems
+
+    return [
+        not is_unlabelled(name)
+        and (
+            name in listed
+            or _bare(name) in listed
+            or _COMPUTED.fullmatch(_bare(name)) is not None
+            or is_axis(name)
+            or is_oxford(name)
+        )
+        for name in names
+    ]

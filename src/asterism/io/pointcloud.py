@@ -1,0 +1,129 @@
+"""Binary logs of unlabelled point clouds, as librigidbodytracker keeps them.
+
+Repeated, little-endian: uint32 milliseconds, uint32 n, n × float32 x, y, z in metres.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import FormatError, ParameterError
+from asterism.model import Capture
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from asterism.model import Tracks
+
+__all__ = ["read", "sniff", "write"]
+
+_RECORD = struct.Struct("<II")
+_POINT = 12  # bytes
+_MOST_POINTS = 100_000  # in one frame; a text file read as a log claims far more
+
+
+def sniff(head: bytes) -> bool:
+    """Whether a file that begins so is a log: its first records follow each other in time."""
+    at, last, n_records = 0, -1, 0
+    while at + _RECORD.size <= len(head):
+        time, n = _RECORD.unpack_from(head, at)
+        if time < last or n > _MOST_POINTS or time - max(last, 0) > 86_400_000 * (last >= 0):
+            return False
+        at, last, n_records = at + _RECORD.size + _POINT * n, time, n_records + 1
+    return n_records > 0 and (at == len(head) or len(head) >= 4096)
+
+
+def read(path: Path) -> Capture:
+    """Read a log.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Capture
+        Without identities: all labels are -1. Times begin at the clock's own first value.
+
+    Raises
+    ------
+    FormatError
+        With the record that is cut off, or whose time does not follow that of the one before.
+    """
+    raw = path.read_bytes()
+    times: list[int] = []
+    counts: list[int] = []
+    starts: list[int] = []
+    at = 0
+    while at < len(raw):
+        place = f"record {len(times)}, byte {at}"
+        if at + _RECORD.size > len(raw):
+            raise FormatError(path, place, "8 bytes of time and count", f"{len(raw) - at}")
+        time, n = _RECORD.unpack_from(raw, at)
+        at += _RECORD.size
+        if n * _POINT > len(raw) - at:
+            raise FormatError(path, place, f"{n} points of 12 bytes", f"{len(raw) - at} bytes")
+        if times and time <= times[-1]:
+            raise FormatError(
+                path, place, f"a time after {times[-1]} ms", f"{time} ms",
+                "two recordings in one file, or a clock too coarse for the rate",
+            )  # fmt: skip
+        times.append(time)
+        counts.append(n)
+        starts.append(at)
+        at += n * _POINT
+    if not times:
+        raise FormatError(path, "record 0", "a time and a count", "an empty file")
+    blocks = [raw[start : start + n * _POINT] for start, n in zip(starts, counts, strict=True)]
+    points = np.frombuffer(b"".join(blocks), "<f4").reshape(-1, 3).astype(np.float64)
+    offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        frame = int(np.searchsorted(offsets, bad[0], side="right")) - 1
+        place = f"record {frame}, point {bad[0] - offsets[frame]}"
+        raise FormatError(path, place, "finite coordinates", points[bad[0]])
+    nobody = np.full(len(points), -1, dtype=np.int64)
+    return Capture(
+        times=np.array(times) / 1000,
+        offsets=offsets,
+        points=points,
+        path=path,
+        format="pointcloud",
+        channels=nobody,
+        labels=nobody,
+    )
+
+
+def write(tracks: Tracks, file: IO[bytes]) -> None:
+    """Write the points of some tracks as a log; identities have no place in it.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Over 3-D detections, at times of at least 0 that differ by a millisecond or more.
+    file : binary file
+        Where to.
+
+    Raises
+    ------
+    ParameterError
+        If the points are 2-D or the times do not fit whole milliseconds.
+    """
+    d = tracks.detections
+    if d.n_axes != 3:
+        hint = "write CSV, which takes 2-D points"
+        raise ParameterError("tracks", "3-D points, because the log holds no others", "2-D", hint)
+    milliseconds = np.round(d.times * 1000)
+    if len(d.times) and (
+        milliseconds[0] < 0 or milliseconds[-1] >= 2**32 or (np.diff(milliseconds) <= 0).any()
+    ):
+        expected = "times of at least 0 that differ by a millisecond or more"
+        raise ParameterError("times", expected, "others", "write CSV, which keeps any times")
+    points = d.points.astype("<f4")
+    for t, time in enumerate(milliseconds.astype(np.int64).tolist()):
+        begin, end = int(d.offsets[t]), int(d.offsets[t + 1])
+        file.write(_RECORD.pack(time, end - begin) + points[begin:end].tobytes())

@@ -1,0 +1,57 @@
+"""The one fixed rate that most formats know."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import ParameterError
+from asterism.model import Capture
+
+if TYPE_CHECKING:
+    from asterism.model import Detections
+
+__all__ = ["fixed_rate"]
+
+
+def fixed_rate(detections: Detections, format_name: str) -> float:
+    """Frames a second of detections that are evenly spaced in time.
+
+    Parameters
+    ----------
+    detections : Detections
+        T frames. For a `Capture` its stated rate is taken if every time agrees with it to half a
+        frame, because files round their times.
+    format_name : str
+        For the message.
+
+    Returns
+    -------
+    float
+        Frames a second; what the file stated (0 included) for a `Capture` that agrees with it,
+        else the mean, and 100 where there are fewer than two frames.
+
+    Raises
+    ------
+    ParameterError
+        If a spacing is more than 1 % from the mean.
+    """
+    times = detections.times
+    elapsed = times - times[:1]
+    if isinstance(detections, Capture):
+        stated = detections.rate
+        if len(times) < 2 or np.abs(elapsed * (stated or 1.0) - np.arange(len(times))).max() < 0.5:
+            return stated
+    if len(times) < 2:
+        return 100.0
+    mean = elapsed[-1] / (len(times) - 1)
+    spacing = np.diff(times)
+    worst = int(np.argmax(np.abs(spacing - mean)))
+    if abs(spacing[worst] - mean) > 0.01 * mean:
+        raise ParameterError(
+            "times", f"evenly spaced frames, because {format_name} has one fixed rate",
+            f"{spacing[worst]:g} s after frame {worst}, where the mean is {mean:g} s",
+            "write CSV, which keeps the times, or resample first",
+        )  # fmt: skip
+    return round(float(1 / mean), 6)

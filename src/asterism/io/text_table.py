@@ -1,0 +1,222 @@
+"""Tables of numbers in text: what TRC, TSV and the CSVs have in common."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import FormatError
+from asterism.io.channels import fill, identities, to_channels
+from asterism.io.units import PER_METRE, from_metres
+from asterism.model import Capture
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from asterism.model import Tracks
+
+__all__ = ["capture_of", "check_times", "parse_rows", "plain", "read_lines", "rows_of"]
+
+_CHUNK = 4096  # rows at a time, so that the fields as texts never fill the memory
+_GAPS = {"", "null", "nan", "none"}
+
+
+def read_lines(path: Path) -> list[str]:
+    """Lines of a text file: UTF-8, UTF-16 if it says so, else Latin-1; any line ends."""
+    raw = path.read_bytes()
+    for encoding in ("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig", "latin-1"):
+        try:
+            text = raw.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return []
+
+
+def parse_rows(
+    path: Path, lines: Sequence[str], first: int, n_columns: int, separator: str
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Parse lines of numbers.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    lines : sequence of str
+        All lines of the file.
+    first : int
+        Index of the first data line; blank lines are passed over.
+    n_columns : int
+        Numbers a line. Further fields must be blank; fewer are an error.
+    separator : str
+        Between fields.
+
+    Returns
+    -------
+    values : ndarray, shape (R, n_columns)
+        NaN for a blank field, NULL or NaN.
+    numbers : ndarray of int, shape (R,)
+        Line number of each row, from 1.
+    """
+    numbers = np.array(
+        [i + 1 for i in range(first, len(lines)) if lines[i].strip(separator + " ")], dtype=np.int64
+    )
+    # Checked before anything is allocated: the header of a hostile file may claim any width.
+    if len(numbers) and lines[numbers[0] - 1].count(separator) + 1 < n_columns:
+        _complain(path, lines[numbers[0] - 1], int(numbers[0]), n_columns, separator)
+    values = np.empty((len(numbers), n_columns if len(numbers) else 0))
+    for begin in range(0, len(numbers), _CHUNK):
+        fields: list[str] = []
+        chunk = numbers[begin : begin + _CHUNK]
+        for number in chunk:
+            row = lines[number - 1].split(separator)
+            if len(row) != n_columns:
+                if len(row) < n_columns or any(map(str.strip, row[n_columns:])):
+                    _complain(path, lines[number - 1], int(number), n_columns, separator)
+                del row[n_columns:]
+            fields += row
+        try:
+            flat = np.array([f or "nan" for f in fields], dtype=np.float64)
+        except ValueError:
+            flat = np.array([_number(path, chunk, i, f, n_columns) for i, f in enumerate(fields)])
+        values[begin : begin + len(chunk)] = flat.reshape(len(chunk), n_columns)
+    if np.isinf(values).any():
+        row, column = (int(i) for i in np.argwhere(np.isinf(values))[0])
+        place = f"line {numbers[row]}, column {column + 1}"
+        raise FormatError(path, place, "a finite number", values[row, column])
+    return values.reshape(len(numbers), n_columns) if len(numbers) else np.empty((0, 0)), numbers
+
+
+def _number(path: Path, chunk: NDArray[np.int64], i: int, text: str, n_columns: int) -> float:
+    text = text.strip()
+    if text.lower() in _GAPS:
+        return np.nan
+    try:
+        return float(text)
+    except ValueError as error:
+        place = f"line {chunk[i // n_columns]}, column {i % n_columns + 1}"
+        raise FormatError(path, place, "a number or nothing", repr(text)) from error
+
+
+def _complain(path: Path, line: str, number: int, n_columns: int, separator: str) -> None:
+    n = line.count(separator) + 1
+    hint = "the line is cut off or a column has no name"
+    raise FormatError(path, f"line {number}", f"{n_columns} columns", f"{n}", hint)
+
+
+def check_times(path: Path, times: NDArray[np.float64], numbers: NDArray[np.int64]) -> None:
+    """Raise at the first line whose time is missing or does not follow the one before."""
+    bad = np.flatnonzero(~np.isfinite(times))
+    if len(bad):
+        raise FormatError(path, f"line {numbers[bad[0]]}", "a time in seconds", "nothing")
+    bad = np.flatnonzero(np.diff(times) <= 0)
+    if len(bad):
+        i = int(bad[0])
+        raise FormatError(
+            path, f"line {numbers[i + 1]}", f"a time after {times[i]:g} s", f"{times[i + 1]:g} s",
+            "sort the rows by time, and keep one row a frame",
+        )  # fmt: skip
+
+
+def capture_of(
+    path: Path,
+    format: str,
+    times: NDArray[np.float64],
+    coordinates: NDArray[np.float64],
+    names: Sequence[str],
+    *,
+    unit: str,
+    rate: float = 0.0,
+    first_frame: int = 1,
+    zero_is_gap: bool,
+    modelled: Sequence[str] = (),
+    warnings: Sequence[str] = (),
+) -> Capture:
+    """Make a capture from one row a frame.
+
+    Parameters
+    ----------
+    path, format, unit, rate, first_frame, modelled, warnings
+        As in `Capture`.
+    times : ndarray, shape (T,)
+        Seconds.
+    coordinates : ndarray, shape (T, C, D)
+        In `unit`; NaN where a marker was not seen.
+    names : sequence of str
+        Of the C channels.
+    zero_is_gap : bool
+        Whether all zeros mean "not seen", as they do in files of recording systems.
+    """
+    seen = np.isfinite(coordinates).all(axis=2)
+    notes = list(warnings)
+    n_partial = int((np.isfinite(coordinates).any(axis=2) & ~seen).sum())
+    if n_partial:
+        notes.append(f"{n_partial} points with some of their coordinates are taken as not seen")
+    if zero_is_gap:
+        at_origin = (coordinates == 0).all(axis=2)
+        if at_origin.any():
+            notes.append(f"{at_origin.sum()} points at exactly the origin are taken as not seen")
+        seen &= ~at_origin
+    frames, channels = (index.astype(np.int64) for index in np.nonzero(seen))
+    labels, identity_names = identities(frames, channels, names)
+    points = coordinates[seen].reshape(-1, coordinates.shape[2])
+    return Capture(
+        times=times,
+        offsets=np.concatenate([[0], np.cumsum(seen.sum(axis=1))]),
+        points=points / PER_METRE[unit],
+        path=path,
+        format=format,
+        rate=rate,
+        first_frame=first_frame,
+        units=unit,
+        channels=channels,
+        labels=labels,
+        names=identity_names,
+        modelled=tuple(modelled),
+        warnings=tuple(notes),
+    )
+
+
+def plain(name: str) -> str:
+    """Name that fits one field of a table: no tabs, no line ends."""
+    return " ".join(name.split())
+
+
+def rows_of(
+    tracks: Tracks, unit: str, *, zero_is_gap: bool
+) -> tuple[list[str], Iterator[list[str]]]:
+    """Names of the channels of some tracks, and their coordinates as shortest exact texts.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        What to write.
+    unit : str
+        Unit of the texts.
+    zero_is_gap : bool
+        Keep a point at the very origin from being read as a gap, by 1e-30 of a unit.
+
+    Returns
+    -------
+    names : list of str
+        C channels: tracks, then clutter as ``*0`` …
+    rows : iterator of list of str
+        C·D texts a frame, blank where a marker was not seen.
+    """
+    channels, names, _ = to_channels(tracks)
+
+    def rows() -> Iterator[list[str]]:
+        for begin in range(0, tracks.detections.n_frames, _CHUNK):
+            end = min(begin + _CHUNK, tracks.detections.n_frames)
+            dense = fill(tracks, channels, len(names), slice(begin, end))
+            values = from_metres(dense, unit)
+            if zero_is_gap:
+                values[(values == 0).all(axis=2), 0] = 1e-30
+            for row in values.reshape(end - begin, -1).tolist():
+                yield ["" if x != x else repr(x) for x in row]
+
+    return names, rows()
