@@ -1,0 +1,99 @@
+"""What the scores share: checked label arrays, who overlaps whom, and who follows whom.
+
+Both label arrays speak of the same N detections, in the order of their frames, and hold at most one
+detection of a track (of a marker) in a frame, as `Tracks` guarantees.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from asterism.errors import ParameterError, check_array
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Overlap", "check_frames", "check_labels", "overlap", "ratio", "successions"]
+
+
+def check_labels(
+    labels: ArrayLike, truth_labels: ArrayLike
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Give both label arrays, shape (N,), or raise `ParameterError`."""
+    labels = check_array("labels", labels, ("N",), dtype=np.int64)
+    truth_labels = check_array("truth_labels", truth_labels, (len(labels),), dtype=np.int64)
+    for name, array in (("labels", labels), ("truth_labels", truth_labels)):
+        if array.size and array.min() < -1:
+            raise ParameterError(name, "numbers ≥ 0, or -1 for clutter", array.min())
+    return labels, truth_labels
+
+
+def check_frames(
+    frame_of: ArrayLike, n: int, n_frames: int | None
+) -> tuple[NDArray[np.int64], int]:
+    """Give the frames of `n` detections and the number of frames, or raise `ParameterError`."""
+    frame_of = check_array("frame_of", frame_of, (n,), dtype=np.int64)
+    if n and (frame_of[0] < 0 or (np.diff(frame_of) < 0).any()):
+        raise ParameterError("frame_of", "frames ≥ 0 that never decrease", "others")
+    least = int(frame_of[-1]) + 1 if n else 0
+    if n_frames is not None and n_frames < least:
+        raise ParameterError("n_frames", f"at least {least}", n_frames)
+    return frame_of, least if n_frames is None else n_frames
+
+
+class Overlap(NamedTuple):
+    """Which tracks and markers share detections.
+
+    Attributes
+    ----------
+    markers, tracks, counts : ndarray of int, shape (P,)
+        Marker and track of each pair that shares detections, and how many; by marker, then track.
+    marker_sizes, track_sizes : ndarray of int, shape (M,), (K,)
+        Detections of each marker and each track.
+    """
+
+    markers: NDArray[np.int64]
+    tracks: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    marker_sizes: NDArray[np.int64]
+    track_sizes: NDArray[np.int64]
+
+
+def overlap(labels: NDArray[np.int64], truth_labels: NDArray[np.int64]) -> Overlap:
+    """Count the detections that each pair of a marker and a track shares."""
+    from scipy.sparse import coo_array
+
+    track_sizes = np.bincount(labels[labels >= 0])
+    marker_sizes = np.bincount(truth_labels[truth_labels >= 0])
+    both = (labels >= 0) & (truth_labels >= 0)
+    ones = np.ones(np.count_nonzero(both), dtype=np.int64)
+    shape = (len(marker_sizes), len(track_sizes))
+    table = coo_array((ones, (truth_labels[both], labels[both])), shape=shape).tocsr()
+    table.sort_indices()  # the duplicates were summed on the way
+    return Overlap(
+        np.repeat(np.arange(len(marker_sizes)), np.diff(table.indptr)),
+        table.indices.astype(np.int64),
+        table.data,
+        marker_sizes,
+        track_sizes,
+    )
+
+
+def successions(labels: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Give each detection that has a predecessor in its track: (predecessors, successors)."""
+    members = np.flatnonzero(labels >= 0)
+    own = labels[members]
+    if own.size and own.max() < 2**16:
+        own = own.astype(np.uint16)  # NumPy sorts these by radix, several times faster
+    order = np.argsort(own, kind="stable")
+    members, own = members[order], own[order]
+    is_link = own[1:] == own[:-1]
+    return members[:-1][is_link], members[1:][is_link]
+
+
+def ratio(part: float | np.integer[Any], whole: float | np.integer[Any]) -> float:
+    """Give ``part / whole``, NaN where there is nothing to have a part of."""
+    return float(part) / float(whole) if whole else math.nan
