@@ -51,9 +51,7 @@ def read(path: Path) -> Capture:
     if n_origin:
         warnings.append(f"{n_origin} samples at exactly (0, 0, 0) are taken as not seen")
     seen[:, modelled] = False
-    counts = seen.sum(axis=1)
-    frames, channels = (index.astype(np.int64) for index in np.nonzero(seen))
-    points = file.points[frames, channels, :3].astype(np.float64)
+    points = file.points[..., :3][seen].astype(np.float64)
     stated = " ".join(file.group("POINT").strings("UNITS")[:1])
     unit = parse_unit(stated)
     if unit is None:
@@ -64,17 +62,17 @@ def read(path: Path) -> Capture:
     if not rate:
         warnings.append("no frame rate is given: times count frames, one a second")
 
-    labels, identity_names = _labels(file, frames, channels, names, modelled)
+    labels, identity_names = _labels(file, seen, modelled)
     return Capture(
         times=np.arange(len(seen)) / (rate or 1.0),
-        offsets=np.concatenate([[0], np.cumsum(counts)]),
+        offsets=np.concatenate([[0], np.cumsum(seen.sum(axis=1))]),
         points=points,
         path=path,
         format="c3d",
         rate=rate,
         first_frame=file.first_frame,
         units=unit,
-        channels=channels,
+        channels=np.nonzero(seen)[1],
         labels=labels,
         names=identity_names,
         modelled=tuple(name for name, gone in zip(names, modelled, strict=True) if gone),
@@ -125,24 +123,16 @@ def is_seen(file: C3DFile) -> NDArray[np.bool_]:
 
 
 def _labels(
-    file: C3DFile,
-    frames: NDArray[np.int64],
-    channels: NDArray[np.int64],
-    names: list[str],
-    modelled: NDArray[np.bool_],
+    file: C3DFile, seen: NDArray[np.bool_], modelled: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], tuple[str | None, ...]]:
-    """Identities of the channels that are kept, with the marks of our own writer heeded."""
-    descriptions = channel_descriptions(file)
+    """Identities of the channels that are not modelled, the marks of our own writer heeded."""
+    names, descriptions = channel_names(file), channel_descriptions(file)
     is_clutter = np.array([text == CLUTTER for text in descriptions], dtype=bool)
     kept = np.flatnonzero(~modelled & ~is_clutter)
-    column = np.full(len(names), -1)
-    column[kept] = np.arange(len(kept))
-    labels = np.full(len(channels), -1, dtype=np.int64)
-    member = column[channels] >= 0
-    labels[member], found = identities(
-        frames[member],
-        column[channels[member]],
-        [None if descriptions[c] == UNNAMED else names[c] for c in kept],
+    labels = np.full(int(seen.sum()), -1, dtype=np.int64)
+    channels = np.nonzero(seen)[1]
+    labels[~is_clutter[channels]], found = identities(
+        seen[:, kept], [None if descriptions[c] == UNNAMED else names[c] for c in kept]
     )
     return labels, found
 

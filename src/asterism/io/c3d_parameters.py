@@ -23,6 +23,8 @@ __all__ = ["BLOCK", "DEC", "INTEL", "SGI", "Group", "Parameter", "build", "decod
 
 BLOCK = 512
 INTEL, DEC, SGI = 84, 85, 86
+# The groups that are understood here: their names and their parameters' are told in capitals.
+_SPOKEN = ("POINT", "ANALOG", "TRIAL")
 _TEXT, _BYTE, _INTEGER, _REAL = -1, 1, 2, 4
 
 
@@ -166,9 +168,10 @@ def parse(section: bytes, processor: int) -> tuple[dict[str, Group], str]:
         if p + 3 > size or following > size or 0 < step < 3:
             problem = f"byte {at}: a record of {abs(n_name)} + {step} bytes in {size - at}"
             break
-        name = section[at + 2 : p].decode("latin-1").strip().upper()
+        name = section[at + 2 : p].decode("latin-1").strip()
         body = section[p + 2 : following]
         if number < 0:
+            name = name.upper() if name.upper() in _SPOKEN else name
             description = body[1 : 1 + body[0]]
             groups[-number] = name, Group({}, description, n_name < 0)
         else:
@@ -177,10 +180,13 @@ def parse(section: bytes, processor: int) -> tuple[dict[str, Group], str]:
                 problem = f"byte {at}: parameter {name} is larger than its record"
             else:
                 parameters.append((number, name, parameter))
+                if step and len(body) < 3 + len(parameter.dims) + len(parameter.data):
+                    problem = problem or f"byte {at}: {name} ends before its description"
         at = following
     for number, name, parameter in parameters:
         if number in groups:
-            groups[number][1].parameters[name] = parameter
+            group_name, group = groups[number]
+            group.parameters[name.upper() if group_name in _SPOKEN else name] = parameter
         else:
             problem = problem or f"parameter {name} belongs to group {number}, which is not there"
     return dict(groups.values()), problem

@@ -24,41 +24,37 @@ __all__ = ["fill", "identities", "to_channels"]
 
 
 def identities(
-    frames: NDArray[np.int64], channels: NDArray[np.int64], names: Sequence[str | None]
+    seen: NDArray[np.bool_], names: Sequence[str | None]
 ) -> tuple[NDArray[np.int64], tuple[str | None, ...]]:
     """Label detections by the channel that they came in.
 
     Parameters
     ----------
-    frames, channels : ndarray of int, shape (N,)
-        Frame and channel of each detection; frames rising.
+    seen : ndarray of bool, shape (T, C)
+        Which channels hold a detection, frame by frame.
     names : sequence of (str or None)
         Name of each channel; None for one identity without a name.
 
     Returns
     -------
     labels : ndarray of int, shape (N,)
+        Of the N detections, by frame and then by channel.
     names : tuple of str or None
         Of each identity, in the order of the channels. A named channel without any detection
         keeps its name; an unnamed one is no identity.
     """
-    unlabelled = np.array([name is not None and is_unlabelled(name) for name in names], dtype=bool)
-    order = np.argsort(channels, kind="stable")
-    c, f = channels[order], frames[order]
-    # A piece begins where the channel does, and after each gap of an unnamed channel.
-    begins = np.ones(len(c), dtype=bool)
-    begins[1:] = (c[1:] != c[:-1]) | (unlabelled[c[1:]] & (f[1:] > f[:-1] + 1))
-    n_pieces = np.bincount(c[begins], minlength=len(names))
-    n_identities = np.where(unlabelled, n_pieces, 1)
-    piece = np.cumsum(begins) - 1
-    # Named channels without a detection take a number too: shift by those that came before.
-    shift = np.cumsum(n_identities - n_pieces) - (n_identities - n_pieces)
-    labels = np.empty(len(channels), dtype=np.int64)
-    labels[order] = piece + shift[c]
+    table = np.empty(seen.shape, dtype=np.int32)
     found: list[str | None] = []
-    for name, is_pieces, n in zip(names, unlabelled, n_identities, strict=True):
-        found += [None] * int(n) if is_pieces else [name]
-    return labels, tuple(found)
+    for c, name in enumerate(names):
+        table[:, c] = len(found)
+        if name is None or not is_unlabelled(name):
+            found.append(name)
+            continue
+        begins = seen[:, c].copy()
+        begins[1:] &= ~seen[:-1, c]
+        table[:, c] += np.cumsum(begins, dtype=np.int32) - 1
+        found += [None] * int(begins.sum())
+    return table[seen].astype(np.int64), tuple(found)
 
 
 def to_channels(tracks: Tracks) -> tuple[NDArray[np.int64], list[str], int]:

@@ -161,8 +161,7 @@ def capture_of(
         if at_origin.any():
             notes.append(f"{at_origin.sum()} points at exactly the origin are taken as not seen")
         seen &= ~at_origin
-    frames, channels = (index.astype(np.int64) for index in np.nonzero(seen))
-    labels, identity_names = identities(frames, channels, names)
+    labels, identity_names = identities(seen, names)
     points = coordinates[seen].reshape(-1, coordinates.shape[2])
     return Capture(
         times=times,
@@ -173,7 +172,7 @@ def capture_of(
         rate=rate,
         first_frame=first_frame,
         units=unit,
-        channels=channels,
+        channels=np.nonzero(seen)[1],
         labels=labels,
         names=identity_names,
         modelled=tuple(modelled),
