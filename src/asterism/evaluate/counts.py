@@ -76,7 +76,7 @@ def overlap(labels: NDArray[np.int64], truth_labels: NDArray[np.int64]) -> Overl
     return Overlap(
         np.repeat(np.arange(len(marker_sizes)), np.diff(table.indptr)),
         table.indices.astype(np.int64),
-        table.data,
+        table.data.astype(np.int64),
         marker_sizes,
         track_sizes,
     )
