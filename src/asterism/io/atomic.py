@@ -11,13 +11,13 @@ from typing import IO, TYPE_CHECKING
 from asterism.errors import FormatError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator
 
 __all__ = ["replacing"]
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[IO[bytes]]:
+def replacing(path: Path) -> Generator[IO[bytes], None, None]:
     """Open a file to write that takes the place of `path` when the block ends well.
 
     The bytes go to a temporary name in the same folder, are forced to the disk and renamed: who is
@@ -46,7 +46,9 @@ def replacing(path: Path) -> Iterator[IO[bytes]]:
         target = path.resolve()  # a symbolic link stays one, and its target is replaced
         if target.is_dir():
             raise IsADirectoryError(0, "is a folder")
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+        handle, name = tempfile.mkstemp(
+            prefix=f".{target.name}.", suffix=".part", dir=target.parent
+        )
         temporary = Path(name)
         try:
             with os.fdopen(handle, "wb") as file:

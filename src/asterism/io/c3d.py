@@ -17,7 +17,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["CLUTTER", "UNNAMED", "channel_descriptions", "channel_names", "is_modelled", "is_seen", "read", "sniff"]
+__all__ = [
+    "CLUTTER",
+    "UNNAMED",
+    "channel_descriptions",
+    "channel_names",
+    "is_modelled",
+    "is_seen",
+    "read",
+    "sniff",
+]
 
 # What a writer here puts in POINT:DESCRIPTIONS, so that reading gives back the very same tracks.
 UNNAMED, CLUTTER = "track without a name", "clutter"
@@ -81,7 +90,7 @@ def read(path: Path) -> Capture:
 
 
 def _overflowing(file: C3DFile, name: str) -> list[str]:
-    """Texts of a parameter and of its continuations: LABELS, LABELS2, LABELS3 …"""
+    """Texts of a parameter that may overflow into others: LABELS, LABELS2, LABELS3."""
     point = file.group("POINT")
     texts = point.strings(name)
     number = 2
@@ -93,12 +102,12 @@ def _overflowing(file: C3DFile, name: str) -> list[str]:
 
 
 def channel_names(file: C3DFile) -> list[str]:
-    """Name of each channel, "" where the file has none."""
+    """Give the name of each channel, "" where the file has none."""
     return _overflowing(file, "LABELS")
 
 
 def channel_descriptions(file: C3DFile) -> list[str]:
-    """Description of each channel, "" where the file has none."""
+    """Give the description of each channel, "" where the file has none."""
     return _overflowing(file, "DESCRIPTIONS")
 
 

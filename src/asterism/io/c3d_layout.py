@@ -8,7 +8,7 @@ Format: the C3D user guide, https://www.c3d.org.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -94,7 +94,7 @@ def read_c3d(path: Path) -> C3DFile:
         end = (start - 1) * BLOCK if (start - 1) * BLOCK > at else len(raw)
         groups, problem = parse(raw[at + 4 : end], processor)
         if problem:
-            warnings.append(f"the parameter section is damaged and read as far as it goes: {problem}")
+            warnings.append(f"damaged parameter section, read as far as it goes: {problem}")
     else:
         processor = INTEL
         warnings.append("there is no parameter section where the header says")
@@ -108,7 +108,9 @@ def read_c3d(path: Path) -> C3DFile:
     point = groups.get("POINT", Group())
     stated = point.numbers("USED")
     if stated and int(stated[0]) != n_points:
-        warnings.append(f"POINT:USED, {int(stated[0])} points, is taken; the header says {n_points}")
+        warnings.append(
+            f"{int(stated[0])} points (POINT:USED) are taken; the header says {n_points}"
+        )
         n_points = int(stated[0])
     scale = next(iter(point.numbers("SCALE")), 0.0) or scale
     if not np.isfinite(scale) or scale == 0:
@@ -124,15 +126,17 @@ def read_c3d(path: Path) -> C3DFile:
     first, n_frames = _frames(path, groups, first, last, n_fit, warnings)
     n_values = n_frames * n_items
     if processor == INTEL:  # a view, because the file may be large
-        values = np.frombuffer(raw, f"<{'f' if item == 4 else 'i'}{item}", n_values, offset * (n_values > 0))
+        kind = "<f4" if item == 4 else "<i2"
+        values = np.frombuffer(raw, kind, n_values, offset if n_values else 0)
     else:
         values = decode(raw[offset : offset + n_values * item], item, processor)
     values = values.reshape(n_frames, n_items)
-    points = values[:, : 4 * n_points].reshape(n_frames, n_points, 4)
-    analog = values[:, 4 * n_points :]
+    points: NDArray[Any] = values[:, : 4 * n_points].reshape(n_frames, n_points, 4)
+    analog: NDArray[Any] = values[:, 4 * n_points :]
     if item == 2:
         points = points.astype(np.float32)
-        points[..., :3] *= np.float32(scale)
+        with np.errstate(over="ignore"):  # what overflows is not finite and so not seen
+            points[..., :3] *= np.float32(scale)
         is_unsigned = groups.get("ANALOG", Group()).strings("FORMAT")[:1] == ["UNSIGNED"]
         analog = (analog.view(np.uint16) if is_unsigned else analog).astype(np.float32)
     return C3DFile(
@@ -163,7 +167,7 @@ def _intel_header(header: bytes, processor: int) -> bytes:
 def _rate(in_header: float, groups: dict[str, Group], n_samples: int) -> float:
     """Frames a second: POINT:RATE, else the header's, else that of the analog channels; else 0."""
     analog = groups.get("ANALOG", Group()).numbers("RATE")
-    candidates = groups.get("POINT", Group()).numbers("RATE")[:1] + [in_header]
+    candidates = [*groups.get("POINT", Group()).numbers("RATE")[:1], in_header]
     candidates += [r / n_samples for r in analog[:1] if n_samples]
     return next((r for r in candidates if np.isfinite(r) and 1e-6 < r < 1e9), 0.0)
 

@@ -51,7 +51,8 @@ def decode(raw: bytes, kind: int, processor: int) -> NDArray[np.generic]:
     if processor == DEC:
         # VAX F: the two 16-bit words stand the other way round, and the exponent's bias is 2 more.
         words = np.frombuffer(raw, dtype="<u2").reshape(-1, 2)[:, ::-1]
-        return np.ascontiguousarray(words).view("<f4").ravel() / np.float32(4)
+        with np.errstate(invalid="ignore"):
+            return np.ascontiguousarray(words).view("<f4").ravel() / np.float32(4)
     return np.frombuffer(raw, dtype=f"{order}f4").astype("<f4", copy=False)
 
 
@@ -152,7 +153,7 @@ def parse(section: bytes, processor: int) -> tuple[dict[str, Group], str]:
         Where and why reading stopped early, "" where it did not.
     """
     groups: dict[int, tuple[str, Group]] = {}
-    parameters: list[tuple[int, str, Parameter]] = []
+    parameters: list[tuple[int, str, str, Parameter]] = []
     size, at = len(section), 0
     problem = ""
     order = "big" if processor == SGI else "little"
@@ -169,9 +170,10 @@ def parse(section: bytes, processor: int) -> tuple[dict[str, Group], str]:
             problem = f"byte {at}: a record of {abs(n_name)} + {step} bytes in {size - at}"
             break
         name = section[at + 2 : p].decode("latin-1").strip()
+        capitals = section[at + 2 : p].upper().decode("latin-1").strip()  # of ASCII letters only
         body = section[p + 2 : following]
         if number < 0:
-            name = name.upper() if name.upper() in _SPOKEN else name
+            name = capitals if capitals in _SPOKEN else name
             description = body[1 : 1 + body[0]]
             groups[-number] = name, Group({}, description, n_name < 0)
         else:
@@ -179,14 +181,14 @@ def parse(section: bytes, processor: int) -> tuple[dict[str, Group], str]:
             if parameter is None:
                 problem = f"byte {at}: parameter {name} is larger than its record"
             else:
-                parameters.append((number, name, parameter))
+                parameters.append((number, name, capitals, parameter))
                 if step and len(body) < 3 + len(parameter.dims) + len(parameter.data):
                     problem = problem or f"byte {at}: {name} ends before its description"
         at = following
-    for number, name, parameter in parameters:
+    for number, name, capitals, parameter in parameters:
         if number in groups:
             group_name, group = groups[number]
-            group.parameters[name.upper() if group_name in _SPOKEN else name] = parameter
+            group.parameters[capitals if group_name in _SPOKEN else name] = parameter
         else:
             problem = problem or f"parameter {name} belongs to group {number}, which is not there"
     return dict(groups.values()), problem

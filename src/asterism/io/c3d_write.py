@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+from dataclasses import replace
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ from asterism.io.c3d_layout import C3DFile, read_c3d
 from asterism.io.c3d_parameters import BLOCK, Group, Parameter, build
 from asterism.io.channels import fill, to_channels
 from asterism.io.rates import fixed_rate
-from asterism.io.units import PER_METRE, from_metres
+from asterism.io.units import from_metres, to_float32
 from asterism.model import Capture
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         block = row[: rows.stop - begin]
         dense = fill(tracks, channels, n_own, rows)
         seen = ~np.isnan(dense[..., 0])
-        values = from_metres(dense, unit).astype("<f4")
+        values = to_float32(from_metres(dense, unit))
         values[~seen] = 0
         values[seen & (values == 0).all(axis=-1), 0] = _NEAR_ORIGIN
         block[:, :n_own, :3] = values
@@ -133,9 +134,7 @@ def _source(d: Detections) -> C3DFile | None:
     is_same = skipped >= 0 and rows.stop <= n_frames
     is_same = is_same and (d.n_points == 0 or int(d.channels.max()) < n_channels)
     if is_same:
-        source = C3DFile(
-            **{**vars(source), "points": source.points[rows], "analog": source.analog[rows]}
-        )
+        source = replace(source, points=source.points[rows], analog=source.analog[rows])
         ours = d.channels >= 0
         is_same = bool(is_seen(source)[d.frame_of[ours], d.channels[ours]].all())
     if not is_same:
@@ -154,7 +153,7 @@ def _keep_residuals(
     """Copy residual and cameras of the points that came from the source."""
     if not isinstance(d, Capture):
         return
-    mine = np.arange(d.offsets[rows.start], d.offsets[rows.stop])
+    mine = np.arange(int(d.offsets[rows.start]), int(d.offsets[rows.stop]))
     mine = mine[d.channels[mine] >= 0]
     frames = d.frame_of[mine]
     words = source.points[frames, d.channels[mine], 3]

@@ -16,7 +16,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 
 from asterism.errors import FormatError
-from asterism.io.text_table import check_times, read_lines
+from asterism.io.text_table import cells_of, check_times, read_lines
 from asterism.model import Capture, Tracks
 
 if TYPE_CHECKING:
@@ -30,10 +30,6 @@ _COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "track", "name", "confidence
 _REQUIRED = ("frame", "time_s", "x_m", "y_m")
 _CHUNK = 65536
 _MOST_TRACKS = 10**6  # a number beyond it is a mistake, and would fill the memory
-
-
-def _cells(line: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([line]), [])]
 
 
 def sniff(head: bytes) -> bool:
@@ -68,7 +64,7 @@ def read_tracks(path: Path) -> Tracks:
         With the line that is not as it should be.
     """
     text = "\n".join(read_lines(path))
-    header = _cells(text.partition("\n")[0])
+    header = cells_of(text.partition("\n")[0])
     unknown = [name for name in header if name not in _COLUMNS]
     missing = [name for name in _REQUIRED if name not in header]
     if unknown or missing or len(set(header)) < len(header):
@@ -116,9 +112,7 @@ def read_tracks(path: Path) -> Tracks:
         names=track_names,
     )
     confidence = numbers["confidence"][kept] if "confidence" in header else None
-    return Tracks(
-        detections=capture, labels=track[kept], names=track_names, confidence=confidence
-    )
+    return Tracks(detections=capture, labels=track[kept], names=track_names, confidence=confidence)
 
 
 def _parse(
@@ -174,9 +168,7 @@ def _whole(
     return values.astype(np.int64)
 
 
-def _names(
-    path: Path, track: NDArray[np.int64], names: list[str]
-) -> tuple[str | None, ...]:
+def _names(path: Path, track: NDArray[np.int64], names: list[str]) -> tuple[str | None, ...]:
     result: list[str | None] = [None] * (int(track.max(initial=-1)) + 1)
     for i, (k, name) in enumerate(zip(track.tolist(), names, strict=True)):
         if k >= 0 and name:
@@ -214,12 +206,14 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
             zip(d.points[begin:end].tolist(), tracks.labels[begin:end].tolist(), strict=True)
         ):
             line = f"{start}{','.join(map(repr, point))},{tails[k]}"
-            lines.append(line if tracks.confidence is None else f"{line},{float(tracks.confidence[begin + i])!r}")
+            if tracks.confidence is not None:
+                line += f",{float(tracks.confidence[begin + i])!r}"
+            lines.append(line)
         if len(lines) > _CHUNK:
             file.write(("\n".join(lines) + "\n").encode())
             lines.clear()
-    for k in np.flatnonzero(tracks.lengths == 0):
-        lines.append("," * (2 + d.n_axes) + tails[k] + "," * has_confidence)
+    blank = "," * (2 + d.n_axes)
+    lines += [blank + tails[k] + "," * has_confidence for k in np.flatnonzero(tracks.lengths == 0)]
     file.write("".join(f"{line}\n" for line in lines).encode())
 
 

@@ -9,12 +9,16 @@ import csv
 import io
 from typing import IO, TYPE_CHECKING
 
-import numpy as np
-
 from asterism.errors import FormatError
 from asterism.io.text_table import (
-    capture_of, check_times, parse_rows, plain, read_lines, rows_of,
-)  # fmt: skip
+    capture_of,
+    cells_of,
+    check_times,
+    parse_rows,
+    plain,
+    read_lines,
+    rows_of,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,8 +30,7 @@ __all__ = ["read", "sniff", "write"]
 
 def sniff(head: bytes) -> bool:
     """Whether a file that begins so is the CSV of this module."""
-    line = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")[0].decode("latin-1").strip()
-    cells = [cell.strip() for cell in next(csv.reader([line]), [])]
+    cells = cells_of(head.removeprefix(b"\xef\xbb\xbf").split(b"\n")[0].decode("latin-1"))
     # A long header may be cut off in the middle of a name.
     return cells[:1] == ["time_s"] and (len(cells) == 1 or cells[1].endswith("_x"))
 
@@ -50,7 +53,7 @@ def read(path: Path) -> Capture:
         With the line that is not as it should be.
     """
     lines = read_lines(path)
-    titles = [cell.strip() for cell in next(csv.reader(lines[:1]), [])]
+    titles = cells_of(lines[0])
     axes = "xyz" if any(title.endswith("_z") for title in titles) else "xy"
     names = [title[:-2] for title in titles[1 :: len(axes)]]
     wanted = ["time_s"] + [f"{name}_{axis}" for name in names for axis in axes]

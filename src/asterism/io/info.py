@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["CaptureInfo", "describe"]
 
+_MOST_FRAMES = 10_000  # whose neighbours are looked up; of longer captures an even sample is taken
+
 
 @dataclass(frozen=True, kw_only=True)
 class CaptureInfo:
@@ -131,7 +133,7 @@ def describe(capture: Capture) -> CaptureInfo:
         n_unlabelled=len(np.unique(others)),
         n_pieces=int((~named).sum()),
         n_modelled=len(capture.modelled),
-        points_min=int(counts.min(initial=0)) if not len(counts) else int(counts.min()),
+        points_min=int(counts.min()) if len(counts) else 0,
         points_mean=float(counts.mean()) if len(counts) else 0.0,
         points_max=int(counts.max(initial=0)),
         absent_percent=100 * n_missing / n_present if n_present else np.nan,
@@ -154,9 +156,7 @@ def _percentile(metres: NDArray[np.float64], q: float) -> float:
     return float(np.percentile(metres, q)) * 1000 if len(metres) else float("nan")
 
 
-def _gaps(
-    capture: Capture, is_named: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], int, int]:
+def _gaps(capture: Capture, is_named: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int, int]:
     """Lengths of the holes of named markers; their samples that could be there, and are not."""
     label, frame = capture.labels[is_named], capture.frame_of[is_named]
     order = np.argsort(label, kind="stable")
@@ -167,43 +167,46 @@ def _gaps(
     return gaps, n_possible, n_possible - len(label)
 
 
+def _next_of_same(capture: Capture) -> NDArray[np.int64]:
+    """Index of the same identity's detection in the next frame, shape (N,), -1 where none."""
+    order = np.argsort(capture.labels, kind="stable")
+    label, frame = capture.labels[order], capture.frame_of[order]
+    follows = (np.diff(label) == 0) & (np.diff(frame) == 1) & (label[1:] >= 0)
+    following = np.full(capture.n_points, -1)
+    following[order[:-1][follows]] = order[1:][follows]
+    return following
+
+
 def _neighbours(
     capture: Capture,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int, int]:
     """Displacements, distances to the nearest neighbour, and how often the nearest is another."""
-    from scipy.spatial import cKDTree
+    from scipy import spatial
 
-    steps: list[NDArray[np.float64]] = []
+    following = _next_of_same(capture)
+    points, offsets = capture.points, capture.offsets
+    moved = following >= 0
+    with np.errstate(over="ignore"):
+        difference = points[following[moved]] - points[moved]
+        steps: NDArray[np.float64] = np.linalg.norm(difference, axis=1)
     spacing: list[NDArray[np.float64]] = []
     n_confused = n_followed = 0
-    labels, offsets = capture.labels, capture.offsets
-    before: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None
-    for t in range(capture.n_frames):
-        points = capture.frame(t)
-        own = labels[offsets[t] : offsets[t + 1]]
-        if not len(points):
-            before = None
+    stride = max(-(-capture.n_frames // _MOST_FRAMES), 1)
+    for t in range(0, capture.n_frames, stride):
+        here = slice(int(offsets[t]), int(offsets[t + 1]))
+        n = here.stop - here.start
+        if n == 0:
             continue
-        tree = cKDTree(points)
-        if len(points) > 1:
-            spacing.append(tree.query(points, k=2)[0][:, 1])
-        if before is not None:
-            place = {int(k): i for i, k in enumerate(own) if k >= 0}
-            old = [i for i, k in enumerate(before[1]) if int(k) in place]
-            new = [place[int(before[1][i])] for i in old]
-            if old:
-                nearest = tree.query(before[0][old], k=1)[1]
-                n_confused += int((own[nearest] != own[new]).sum())
-                n_followed += len(old)
-                steps.append(np.linalg.norm(points[new] - before[0][old], axis=1))
-        before = points, own
-    nothing = np.empty(0)
-    return (
-        np.concatenate(steps) if steps else nothing,
-        np.concatenate(spacing) if spacing else nothing,
-        n_confused,
-        n_followed,
-    )
+        tree = spatial.KDTree(points[here])
+        if n > 1:
+            spacing.append(tree.query(points[here], k=2)[0][:, 1])
+        before = slice(int(offsets[max(t - 1, 0)]), here.start)
+        old = before.start + np.flatnonzero(following[before] >= 0)
+        if len(old):
+            nearest = here.start + tree.query(points[old])[1]
+            n_confused += int((nearest != following[old]).sum())
+            n_followed += len(old)
+    return steps, np.concatenate([*spacing, np.empty(0)]), n_confused, n_followed
 
 
 def _verdict(

@@ -6,13 +6,12 @@ positions that their models predict, are computed.
 
 from __future__ import annotations
 
-import csv
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.errors import FormatError
-from asterism.io.text_table import capture_of, check_times, parse_rows, read_lines
+from asterism.io.text_table import capture_of, cells_of, check_times, parse_rows, read_lines
 from asterism.io.units import parse_unit
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ def read(path: Path) -> Capture:
         With the line that is not as it should be.
     """
     lines = read_lines(path)
-    rows = [[cell.strip() for cell in row] for row in csv.reader(lines[:_MOST_HEADER])]
+    rows = [cells_of(line) for line in lines[:_MOST_HEADER]]
     titles_at = next((i for i, row in enumerate(rows) if row[:1] == ["Frame"]), None)
     if not sniff(lines[0].encode()) or titles_at is None:
         expected = "'Format Version' in line 1 and 'Frame, Time (Seconds), X, Y, Z …' below"

@@ -11,6 +11,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 
 from asterism.errors import FormatError, ParameterError
+from asterism.io.units import to_float32
 from asterism.model import Capture
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def read(path: Path) -> Capture:
     if not times:
         raise FormatError(path, "record 0", "a time and a count", "an empty file")
     blocks = [raw[start : start + n * _POINT] for start, n in zip(starts, counts, strict=True)]
-    points = np.frombuffer(b"".join(blocks), "<f4").reshape(-1, 3).astype(np.float64)
+    points = np.frombuffer(b"".join(blocks), "<f4").reshape(-1, 3)
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
@@ -90,7 +91,7 @@ def read(path: Path) -> Capture:
     return Capture(
         times=np.array(times) / 1000,
         offsets=offsets,
-        points=points,
+        points=points.astype(np.float64),
         path=path,
         format="pointcloud",
         channels=nobody,
@@ -123,7 +124,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     ):
         expected = "times of at least 0 that differ by a millisecond or more"
         raise ParameterError("times", expected, "others", "write CSV, which keeps any times")
-    points = d.points.astype("<f4")
+    points = to_float32(d.points)
     for t, time in enumerate(milliseconds.astype(np.int64).tolist()):
         begin, end = int(d.offsets[t]), int(d.offsets[t + 1])
         file.write(_RECORD.pack(time, end - begin) + points[begin:end].tobytes())

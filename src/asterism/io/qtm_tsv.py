@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError
+from asterism.errors import FormatError
 from asterism.io.rates import fixed_rate
 from asterism.io.text_table import capture_of, check_times, parse_rows, plain, read_lines, rows_of
 from asterism.model import Capture
@@ -99,9 +99,7 @@ def read(path: Path) -> Capture:
     )
 
 
-def _number(
-    path: Path, header: dict[str, list[str]], key: str, default: float = 0.0
-) -> float:
+def _number(path: Path, header: dict[str, list[str]], key: str, default: float = 0.0) -> float:
     text = next(iter(header.get(key, [])), "")
     if not text:
         return default
@@ -131,9 +129,6 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         If the detections are 2-D or the times irregular.
     """
     d = tracks.detections
-    if d.n_axes != 3:
-        hint = "write CSV, which takes 2-D points"
-        raise ParameterError("tracks", "3-D points, because TSV holds no others", "2-D", hint)
     rate = fixed_rate(d, "TSV")
     first = d.first_frame if isinstance(d, Capture) else 1
     names, rows = rows_of(tracks, "mm", zero_is_gap=True)

@@ -1,4 +1,4 @@
-"""The one fixed rate that most formats know."""
+"""What most formats demand: 3-D points at one fixed rate."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["fixed_rate"]
 
 
 def fixed_rate(detections: Detections, format_name: str) -> float:
-    """Frames a second of detections that are evenly spaced in time.
+    """Check that detections fit a format of 3-D points at a fixed rate, and give that rate.
 
     Parameters
     ----------
@@ -35,8 +35,13 @@ def fixed_rate(detections: Detections, format_name: str) -> float:
     Raises
     ------
     ParameterError
-        If a spacing is more than 1 % from the mean.
+        If the points are 2-D, or a spacing is more than 1 % from the mean.
     """
+    if detections.n_axes != 3:
+        hint = "write CSV, which takes 2-D points"
+        raise ParameterError(
+            "tracks", f"3-D points, because {format_name} holds no others", "2-D", hint
+        )
     times = detections.times
     elapsed = times - times[:1]
     if isinstance(detections, Capture):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Tracks
 
-__all__ = ["capture_of", "check_times", "parse_rows", "plain", "read_lines", "rows_of"]
+__all__ = ["capture_of", "cells_of", "check_times", "parse_rows", "plain", "read_lines", "rows_of"]
 
 _CHUNK = 4096  # rows at a time, so that the fields as texts never fill the memory
 _GAPS = {"", "null", "nan", "none"}
@@ -37,8 +38,16 @@ def read_lines(path: Path) -> list[str]:
     return []
 
 
+def cells_of(line: str) -> list[str]:
+    """Cells of one line of CSV without the blanks round them; none if it is not CSV."""
+    try:
+        return [cell.strip() for cell in next(csv.reader([line.strip("\r\n")]), [])]
+    except csv.Error:
+        return []
+
+
 def parse_rows(
-    path: Path, lines: Sequence[str], first: int, n_columns: int, separator: str
+    path: Path, lines: list[str], first: int, n_columns: int, separator: str
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Parse lines of numbers.
 
@@ -46,7 +55,7 @@ def parse_rows(
     ----------
     path : Path
         For messages.
-    lines : sequence of str
+    lines : list of str
         All lines of the file.
     first : int
         Index of the first data line; blank lines are passed over.
@@ -151,13 +160,13 @@ def capture_of(
     zero_is_gap : bool
         Whether all zeros mean "not seen", as they do in files of recording systems.
     """
-    seen = np.isfinite(coordinates).all(axis=2)
+    seen: NDArray[np.bool_] = np.all(np.isfinite(coordinates), axis=2)
     notes = list(warnings)
     n_partial = int((np.isfinite(coordinates).any(axis=2) & ~seen).sum())
     if n_partial:
         notes.append(f"{n_partial} points with some of their coordinates are taken as not seen")
     if zero_is_gap:
-        at_origin = (coordinates == 0).all(axis=2)
+        at_origin: NDArray[np.bool_] = np.all(coordinates == 0, axis=2)
         if at_origin.any():
             notes.append(f"{at_origin.sum()} points at exactly the origin are taken as not seen")
         seen &= ~at_origin

@@ -9,7 +9,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError
+from asterism.errors import FormatError
 from asterism.io.rates import fixed_rate
 from asterism.io.text_table import capture_of, check_times, parse_rows, plain, read_lines, rows_of
 from asterism.io.units import judge_unit, parse_unit
@@ -21,6 +21,12 @@ if TYPE_CHECKING:
     from asterism.model import Tracks
 
 __all__ = ["read", "sniff", "write"]
+
+
+_KEYS = (
+    "DataRate", "CameraRate", "NumFrames", "NumMarkers",
+    "Units", "OrigDataRate", "OrigDataStartFrame", "OrigNumFrames",
+)  # fmt: skip
 
 
 def sniff(head: bytes) -> bool:
@@ -48,7 +54,8 @@ def read(path: Path) -> Capture:
     """
     lines = read_lines(path)
     if not sniff(lines[0].encode()) or len(lines) < 5:
-        raise FormatError(path, "line 1", "'PathFileType' and a header of 5 lines", repr(lines[0][:40]))
+        expected = "'PathFileType' and a header of 5 lines"
+        raise FormatError(path, "line 1", expected, repr(lines[0][:40]))
     keys, given = (line.strip("\t ").split("\t") for line in lines[1:3])
     header = dict(zip(map(str.strip, keys), map(str.strip, given), strict=False))
     titles = lines[3].rstrip("\t ").split("\t")
@@ -121,19 +128,15 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         If the detections are 2-D or the times irregular.
     """
     d = tracks.detections
-    if d.n_axes != 3:
-        hint = "write CSV, which takes 2-D points"
-        raise ParameterError("tracks", "3-D points, because TRC holds no others", "2-D", hint)
     rate = fixed_rate(d, "TRC")
     unit, first = (d.units, d.first_frame) if isinstance(d, Capture) else ("mm", 1)
     names, rows = rows_of(tracks, unit, zero_is_gap=True)
     axes = [f"{axis}{i + 1}" for i in range(len(names)) for axis in "XYZ"]
     spread = [text for name in names for text in (plain(name), "", "")]
     counts = [rate, rate, d.n_frames, len(names), unit, rate, first, d.n_frames]
-    keys = "DataRate CameraRate NumFrames NumMarkers Units OrigDataRate OrigDataStartFrame OrigNumFrames"
     header = [
         ["PathFileType", "4", "(X/Y/Z)", "tracks.trc"],
-        keys.split(),
+        list(_KEYS),
         [f"{c:.10g}" if isinstance(c, float) else str(c) for c in counts],
         ["Frame#", "Time", *spread],
         ["", "", *axes],

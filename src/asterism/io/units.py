@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.errors import ParameterError
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["PER_METRE", "from_metres", "judge_unit", "parse_unit"]
+__all__ = ["PER_METRE", "from_metres", "judge_unit", "parse_unit", "to_float32"]
 
 PER_METRE = {"mm": 1000.0, "cm": 100.0, "m": 1.0}
 _SPELLINGS = {
@@ -77,3 +79,19 @@ def from_metres(metres: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
         result[fits] = candidate[fits]
         is_open &= ~fits
     return result
+
+
+def to_float32(values: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Round to 32 bits, which hold 7 digits; NaN stays.
+
+    Raises
+    ------
+    ParameterError
+        At a number that 32 bits cannot hold.
+    """
+    with np.errstate(over="ignore"):
+        rounded = values.astype("<f4")
+    if np.isinf(rounded).any():
+        largest = np.nanmax(np.abs(values))
+        raise ParameterError("points", "coordinates that 32-bit floats can hold", f"{largest:g}")
+    return rounded
