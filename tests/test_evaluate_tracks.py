@@ -229,6 +229,7 @@ def test_true_positions_enter_motp():
     order = _shuffle(truth, 1)
     shuffled = evaluate(_moved(truth, order=order), truth, truth_positions=places)
     assert shuffled.motp_mm == pytest.approx(found.motp_mm)
+    assert evaluate(truth, truth, truth_positions=places, c=1e-6).gospa < 1e-5 < found.gospa
     with pytest.raises(ParameterError, match="truth_positions"):
         evaluate(truth, truth, truth_positions=places[1:])
 

@@ -83,8 +83,6 @@ def _best_total(pairs: Overlap) -> int:
     # row is matched exactly once, one more on all counts (zeros are no edges) costs nothing.
     markers, rows = np.unique(pairs.markers, return_inverse=True)
     tracks, columns = np.unique(pairs.tracks, return_inverse=True)
-    if len(markers) > len(tracks):
-        markers, rows, tracks, columns = tracks, columns, markers, rows
     n, own = len(markers), np.arange(len(markers))
     weights = np.concatenate([pairs.counts + 1.0, np.ones(n)])
     places = (np.concatenate([rows, own]), np.concatenate([columns, len(tracks) + own]))
