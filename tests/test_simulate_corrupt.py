@@ -231,7 +231,11 @@ def test_a_capture_stays_a_capture():
     result = corrupt(capture.tracks, stride=3, clutter=1.0)
     got = result.detections
     assert isinstance(got, Capture)
-    assert (got.path, got.format, got.units) == (capture.path, "c3d", "mm")
+    # At another rate, analog data and events of the file do not go with the points.
+    assert (got.path, got.format, got.units) == (capture.path, "", "mm")
+    whole = corrupt(capture.tracks).detections
+    assert isinstance(whole, Capture)
+    assert (whole.format, whole.first_frame, whole.rate) == ("c3d", 102, 100.0)
     assert np.isclose(got.rate, 100 / 3)
     assert got.first_frame == 34
     assert np.isclose((got.first_frame - 1) / got.rate, 0.99)  # less than a frame before 1.01 s

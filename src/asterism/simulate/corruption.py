@@ -74,7 +74,8 @@ def corrupt(
         Truth of the corrupted capture: `detections` holds its points in random order within each
         frame, `labels` the marker of each, or -1 for clutter and ghosts. Every marker stays in
         `names`, seen or not. If the source was a `Capture`, so are these detections, with the same
-        file and units, no channels, and rate and first frame as befits the stride.
+        file and units, no channels, and rate and first frame as befits the stride; where frames
+        are left out it has no format, because the rest of the file no longer goes with it.
 
     Raises
     ------
@@ -181,6 +182,9 @@ def _detections(
         times=times,
         offsets=offsets,
         points=mixed.points,
+        # The rest of the file (analog channels, events) goes by its own frames: at another rate a
+        # writer must not take it over.
+        format=source.format if stride == 1 else "",
         rate=source.rate / stride,
         # Frame n of a file stands for the time (n - 1) / rate.
         first_frame=(source.first_frame - 1) // stride + 1,
