@@ -85,7 +85,7 @@ def make_c3d(
     header[12:16] = reals([scale], processor)
     header[16:20] = integers([2 + n_blocks, n_samples], processor)
     header[20:24] = reals([rate], processor)
-    values = np.hstack([points.reshape(n_frames, -1), analog])
+    values = np.hstack([points.reshape(n_frames, 4 * n_points), analog])
     data = (reals if scale < 0 else integers)(values, processor)
     body = bytes(header) + section + data
     return body.ljust(-(-len(body) // 512) * 512, b"\0")

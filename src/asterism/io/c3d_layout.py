@@ -182,17 +182,19 @@ def _frames(
     """
     point, trial = groups.get("POINT", Group()), groups.get("TRIAL", Group())
     in_header = last - first + 1 if last >= first else 0
-    counts = [in_header]
     claimed = [int(n) for n in point.numbers("FRAMES")[:1] if 0 <= n < 2**31]
-    if last == 0xFFFF or claimed != [in_header]:
+    counts = [in_header]
+    if last == 0xFFFF or claimed != counts:
+        counts = [int(n) for n in point.numbers("LONG_FRAMES")[:1] if 0 < n < 2**31]
         ends = [trial.numbers(f"ACTUAL_{end}_FIELD") for end in ("START", "END")]
         if all(len(words) == 2 for words in ends):
             begin, stop = (int(low) + 65536 * int(high) for low, high in ends)
-            counts.insert(0, stop - begin + 1)
-            first = begin if counts[0] > 0 else first
-        long = [int(n) for n in point.numbers("LONG_FRAMES")[:1] if 0 <= n < 2**31]
-        counts += long + claimed
-        counts = [n for n in counts if n > 0] or [0]
+            if stop >= begin:
+                first, counts = begin, [stop - begin + 1, *counts]
+        if not counts and 0xFFFF in (*claimed, last) and n_fit > 0xFFFF + BLOCK:
+            warnings.append("the number of frames is told by the length of the file")
+            counts = [n_fit]
+        counts += [n for n in (*claimed, in_header) if n] or [0]
     n_frames = next((n for n in counts if n <= n_fit), None)
     if n_frames is None:
         raise FormatError(

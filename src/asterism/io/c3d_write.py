@@ -116,7 +116,9 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
             _keep_residuals(block, d, channels, rows, source)
             block[:, n_own:] = source.points[rows][:, computed]
         file.write(np.hstack([block.reshape(len(block), -1), analog[rows]]).tobytes())
-    file.write(bytes(-(d.n_frames * (4 * len(names) + analog.shape[1]) * 4) % BLOCK))
+    # Data fill whole blocks; but where the counts overflow some readers go by the file's length.
+    if d.n_frames <= 0xFFFF:
+        file.write(bytes(-(d.n_frames * (4 * len(names) + analog.shape[1]) * 4) % BLOCK))
 
 
 def _source(d: Detections) -> C3DFile | None:

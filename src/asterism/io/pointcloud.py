@@ -27,11 +27,11 @@ _MOST_POINTS = 100_000  # in one frame; a text file read as a log claims far mor
 
 
 def sniff(head: bytes) -> bool:
-    """Whether a file that begins so is a log: its first records follow each other in time."""
-    at, last, n_records = 0, -1, 0
+    """Whether a file that begins so is a log: records chain on, less than a day apart."""
+    at, last, n_records = 0, None, 0
     while at + _RECORD.size <= len(head):
         time, n = _RECORD.unpack_from(head, at)
-        if time < last or n > _MOST_POINTS or time - max(last, 0) > 86_400_000 * (last >= 0):
+        if n > _MOST_POINTS or (last is not None and abs(time - last) > 86_400_000):
             return False
         at, last, n_records = at + _RECORD.size + _POINT * n, time, n_records + 1
     return n_records > 0 and (at == len(head) or len(head) >= 4096)
