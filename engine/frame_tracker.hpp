@@ -115,6 +115,10 @@ class FrameTracker {
   static double softplus(double x) { return x > 30 ? x : std::log1p(std::exp(x)); }
 
   double miss_gain() const { return sm_.log_survive + sm_.log_miss; }
+  // A point that no track takes is clutter or a new marker, not clutter alone.
+  double leftover_gain() const {
+    return softplus(sm_.log_birth + sm_.log_detect - sm_.log_clutter);
+  }
   double hit_gain() const { return sm_.log_survive + sm_.log_detect - sm_.log_clutter; }
 
   void find_candidates(double time, const MotionStep& step, std::span<const Point> points) {
@@ -124,8 +128,8 @@ class FrameTracker {
     s_.centers.resize(tracks_.size());
     s_.radii.resize(tracks_.size());
     double sum_radii = 0;
-    // A believed track takes a point only if that beats missing it and leaving it to clutter.
-    const double least = sm_.log_miss + sm_.log_clutter - sm_.log_detect;
+    // A believed track takes a point only if that beats missing it and leaving the point over.
+    const double least = sm_.log_miss + sm_.log_clutter + leftover_gain() - sm_.log_detect;
     for (std::size_t i = 0; i < tracks_.size(); ++i) {
       LiveTrack& track = tracks_[i];
       predict(m_, step, track.state);
@@ -142,7 +146,7 @@ class FrameTracker {
       const LiveTrack& track = tracks_[i];
       const Prediction& prediction = s_.predictions[i];
       const double reach = sm_.max_speed * (time - track.last_time) + sm_.speed_margin;
-      const double if_missed = softplus(track.score + miss_gain());
+      const double if_missed = softplus(track.score + miss_gain()) + leftover_gain();
       std::array<double, kMaxModes> each{};
       s_.grid.within(s_.centers[i], s_.radii[i], [&](std::int32_t j, double distance2) {
         if (squared_distance(points[j], track.last, D) > reach * reach) return;

@@ -15,13 +15,36 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from asterism import simulate as simulate
+    from asterism.associate import GNN as GNN
+    from asterism.associate import METHODS as METHODS
+    from asterism.associate import Method as Method
+    from asterism.associate import ModelEstimate as ModelEstimate
+    from asterism.associate import SMP as SMP
+    from asterism.associate import Update as Update
+    from asterism.associate import estimate_model as estimate_model
+    from asterism.associate import method_by_name as method_by_name
+    from asterism.associate import track as track
     from asterism.errors import AsterismError as AsterismError
     from asterism.errors import FormatError as FormatError
     from asterism.errors import ParameterError as ParameterError
     from asterism.errors import SolverLimit as SolverLimit
+    from asterism.evaluate import Evaluation as Evaluation
+    from asterism.evaluate import calibration as calibration
+    from asterism.evaluate import evaluate as evaluate
+    from asterism.evaluate import floor as floor
+    from asterism.filter import States as States
+    from asterism.filter import filter_states as filter_states
+    from asterism.filter import smooth as smooth
+    from asterism.io import CaptureInfo as CaptureInfo
+    from asterism.io import FORMATS as FORMATS
+    from asterism.io import describe as describe
+    from asterism.io import read as read
+    from asterism.io import read_tracks as read_tracks
+    from asterism.io import write as write
+    from asterism.model import Capture as Capture
     from asterism.model import DWNA as DWNA
     from asterism.model import DWPA as DWPA
-    from asterism.model import Capture as Capture
     from asterism.model import Detections as Detections
     from asterism.model import InteractingMotions as InteractingMotions
     from asterism.model import LinearMotion as LinearMotion
@@ -31,26 +54,54 @@ if TYPE_CHECKING:
     from asterism.model import Sensor as Sensor
     from asterism.model import TrackingModel as TrackingModel
     from asterism.model import Tracks as Tracks
+    from asterism.model.posterior import log_posterior as log_posterior
+    from asterism.model.posterior import track_scores as track_scores
 
 __version__ = "0.1.0"
 
-# Public name -> module. Nothing is imported before its first use, so that `import asterism` and
-# `asterism --help` are instant.
-_HOME = {
-    **dict.fromkeys(("AsterismError", "FormatError", "ParameterError", "SolverLimit"), "errors"),
-    **dict.fromkeys(
-        (
-            "DWNA", "DWPA", "Capture", "Detections", "InteractingMotions", "LinearMotion", "Motion", "Population",
-            "RandomWalk", "Sensor", "TrackingModel", "Tracks",
-        ),
-        "model",
+# Where each public name lives. Nothing is imported before its first use, so that `import asterism`
+# and `asterism --help` are instant.
+_PUBLIC = {
+    "errors": ("AsterismError", "FormatError", "ParameterError", "SolverLimit"),
+    "model": (
+        "DWNA",
+        "DWPA",
+        "Capture",
+        "Detections",
+        "InteractingMotions",
+        "LinearMotion",
+        "Motion",
+        "Population",
+        "RandomWalk",
+        "Sensor",
+        "TrackingModel",
+        "Tracks",
     ),
-}  # fmt: skip
+    "model.posterior": ("log_posterior", "track_scores"),
+    "filter": ("States", "filter_states", "smooth"),
+    "associate": (
+        "GNN",
+        "METHODS",
+        "SMP",
+        "Method",
+        "ModelEstimate",
+        "Update",
+        "estimate_model",
+        "method_by_name",
+        "track",
+    ),
+    "evaluate": ("Evaluation", "calibration", "evaluate", "floor"),
+    "io": ("FORMATS", "CaptureInfo", "describe", "read", "read_tracks", "write"),
+}
+_HOME = {name: module for module, names in _PUBLIC.items() for name in names}
+_PACKAGES = ("simulate",)
 
-__all__ = ["__version__", *sorted(_HOME)]  # pyright: ignore[reportUnsupportedDunderAll]
+__all__ = ["__version__", *_PACKAGES, *sorted(_HOME)]  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> Any:
+    if name in _PACKAGES:
+        return importlib.import_module(f"asterism.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'asterism' has no attribute {name!r}")
     value = getattr(importlib.import_module(f"asterism.{_HOME[name]}"), name)
@@ -59,4 +110,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME})
+    return sorted({*globals(), *__all__})

@@ -98,9 +98,7 @@ class FrameByFrame(Method[FrameState]):
     def _engine_matcher(self) -> int:
         return self._matcher
 
-    def init(
-        self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None
-    ) -> FrameState:
+    def init(self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None) -> FrameState:
         """Make the state before the first frame; `seed` changes nothing, nothing is drawn."""
         from scipy.special import chdtri
 
@@ -119,9 +117,7 @@ class FrameByFrame(Method[FrameState]):
         )
         return FrameState(model=model, n_axes=n_axes, tracker=tracker)
 
-    def step(
-        self, state: FrameState, time: float, points: ArrayLike
-    ) -> tuple[FrameState, Update]:
+    def step(self, state: FrameState, time: float, points: ArrayLike) -> tuple[FrameState, Update]:
         """Take the next frame; see `Method.step`."""
         from asterism.model.compiled import no_transition, transition
 

@@ -62,9 +62,7 @@ class Method(ABC, Generic[State]):
     """The method's name on the command line."""
 
     @abstractmethod
-    def init(
-        self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None
-    ) -> State:
+    def init(self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None) -> State:
         """Make the state before the first frame.
 
         Parameters

@@ -323,9 +323,7 @@ class InteractingMotions(Motion):
                 raise ParameterError("models", "motions of one kind", [m.kind for m in models])
         transitions = check_array("transitions", self.transitions, (M, M))
         if (transitions <= 0).any() or not np.allclose(transitions.sum(axis=1), 1, atol=1e-9):
-            raise ParameterError(
-                "transitions", "positive rows that sum to 1", transitions.tolist()
-            )
+            raise ParameterError("transitions", "positive rows that sum to 1", transitions.tolist())
         object.__setattr__(self, "models", models)
         object.__setattr__(self, "transitions", transitions)
 

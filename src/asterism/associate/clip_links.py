@@ -1,0 +1,137 @@
+"""First scales of a clip, from links that admit no doubt.
+
+Mutual nearest neighbours in consecutive frames, much nearer than the second nearest, are taken for
+one marker. They favour slow markers; that is good enough to begin with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import ParameterError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import Detections
+
+__all__ = ["Scales", "first_scales"]
+
+MAX_FRAMES = 1500
+"""Pairs of consecutive frames that are looked at, spread over the clip."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scales:
+    """Rough sizes of things, SI units.
+
+    Parameters
+    ----------
+    step : float
+        Seconds from frame to frame.
+    noise, noise_floor : float
+        Standard deviation of a coordinate, and the least that is believed of it.
+    speed, top_speed : float
+        Of a velocity coordinate, root mean square; and the fastest link.
+    acceleration_low, acceleration_high : float
+        Of a coordinate in quiet and in busy moments.
+    spacing : float
+        Usual distance of a point from its nearest neighbour in the frame.
+    """
+
+    step: float
+    noise: float
+    noise_floor: float
+    speed: float
+    top_speed: float
+    acceleration_low: float
+    acceleration_high: float
+    spacing: float
+
+
+def first_scales(pieces: list[Detections]) -> Scales:
+    """Estimate the scales from runs of consecutive frames.
+
+    Raises
+    ------
+    ParameterError
+        If no point can be linked to the next frame without doubt.
+    """
+    steps: list[NDArray[np.float64]] = []
+    jolts: list[NDArray[np.float64]] = []
+    spacings: list[NDArray[np.float64]] = []
+    for piece in pieces:
+        stride = max(1, -(-piece.n_frames * len(pieces) // MAX_FRAMES))
+        for t in range(0, piece.n_frames - 2, stride):
+            a, b, c = piece.frame(t), piece.frame(t + 1), piece.frame(t + 2)
+            dt1, dt2 = np.diff(piece.times[t : t + 3])
+            forward, spacing = _sure_links(a, b)
+            spacings.append(spacing)
+            onward, _ = _sure_links(b, c)
+            i = np.flatnonzero(forward >= 0)
+            steps.append((b[forward[i]] - a[i]) / dt1)
+            i = i[onward[forward[i]] >= 0]
+            j = forward[i]
+            jolts.append((c[onward[j]] - b[j]) / dt2 - (b[j] - a[i]) / dt1)
+    step = float(np.median([p.step for p in pieces]))
+    velocities = np.concatenate(steps) if steps else np.empty((0, 3))
+    # Change of position against constant velocity, metres.
+    bends = np.abs(np.concatenate(jolts)).ravel() * step if jolts else np.empty(0)
+    if len(velocities) < 3 or not len(bends):
+        raise ParameterError(
+            "detections",
+            "points that can be followed from frame to frame, to estimate a model from",
+            "none that are nearer to their next position than to other points",
+            "give a model",
+        )
+    extent = max(float(np.ptp(p.points, axis=0).max()) for p in pieces)
+    floor = max(extent, 1e-3) * 1e-6
+    speeds = np.linalg.norm(velocities, axis=1)
+    quiet, busy = np.quantile(bends, [0.3, 0.99])
+    # White noise of σ bends a line by √6 σ; the median of |N(0, 1)| is 0.67, its 30 % point 0.39.
+    noise = max(float(quiet) / 0.39 / np.sqrt(6.0), floor)
+    low = max(float(np.median(bends)) / 0.67, noise) / step**2
+    known = np.concatenate(spacings)
+    known = known[np.isfinite(known)]
+    return Scales(
+        step=step,
+        noise=noise,
+        noise_floor=floor,
+        speed=max(float(np.sqrt((velocities**2).mean())), noise / step),
+        top_speed=max(float(speeds.max()), noise / step),
+        acceleration_low=low,
+        acceleration_high=max(float(busy) / step**2, 3 * low),
+        spacing=float(np.median(known)) if len(known) else max(extent, floor),
+    )
+
+
+def _sure_links(
+    a: NDArray[np.float64], b: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Link points to the next frame where there is no doubt.
+
+    Returns
+    -------
+    link : ndarray of int, shape (len(a),)
+        Index into `b`, -1 where in doubt.
+    spacing : ndarray, shape (len(a),)
+        Distance to the nearest other point of `a`, inf where there is none.
+    """
+    from scipy.spatial import cKDTree
+
+    link = np.full(len(a), -1, dtype=np.int64)
+    if not len(a) or not len(b):
+        return link, np.full(len(a), np.inf)
+    tree_a, tree_b = cKDTree(a), cKDTree(b)
+    # With k beyond the number of points, SciPy gives inf for the distance.
+    spacing = tree_a.query(a, k=[2])[0][:, 0]
+    distance, nearest = tree_b.query(a, k=[1, 2])
+    back = tree_a.query(b, k=1)[1]
+    is_mutual = back[nearest[:, 0]] == np.arange(len(a))
+    is_clear = (distance[:, 0] < 0.3 * distance[:, 1]) & (distance[:, 0] < 0.3 * spacing)
+    sure = is_mutual & is_clear
+    link[sure] = nearest[sure, 0]
+    return link, spacing

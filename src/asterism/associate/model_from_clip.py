@@ -1,0 +1,303 @@
+"""The model from the clip: what the detections themselves say of noise, motion, misses and clutter.
+
+Unambiguous links (mutual nearest neighbours far from any other choice) give the first scales. Then,
+a few times over: track with the model so far, and re-estimate each parameter from the tracks. The
+motion and the noise are those that make the tracks' detections most likely one step ahead.
+
+What this file is not: a fit to truth. Names in the capture are never looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.associate.clip_links import first_scales
+from asterism.associate.gnn import GNN
+from asterism.associate.motion_fit import FitBounds, MotionFit, fit_motion, simpler_motion
+from asterism.errors import ParameterError
+from asterism.model import DWNA, Detections, InteractingMotions, Population, Sensor
+from asterism.model import TrackingModel, Tracks
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from asterism.associate.clip_links import Scales
+
+__all__ = ["ModelEstimate", "estimate_model"]
+
+SAMPLE_POINTS = 120_000
+"""Longer captures are read in pieces, spread evenly, of so many detections in all."""
+N_PIECES = 8
+N_ROUNDS = 3
+WIDER = 3.0
+SAFE_SHARE = 1 / 6
+"""A jolt's σ may move a marker by this share of the points' spacing in a frame."""
+LONGEST_GAP_S = 1.0
+"""No gap longer than this is bridged from motion alone."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelEstimate:
+    """A model estimated from a clip, with the reason for each value.
+
+    Parameters
+    ----------
+    model : TrackingModel
+        The model.
+    reasons : tuple of (str, str, str)
+        Parameter, value with unit, and why.
+    """
+
+    model: TrackingModel
+    reasons: tuple[tuple[str, str, str], ...]
+
+    def __str__(self) -> str:
+        width = max(len(name) for name, _, _ in self.reasons)
+        value = max(len(text) for _, text, _ in self.reasons)
+        return "\n".join(f"{n:<{width}}  {v:<{value}}  {why}" for n, v, why in self.reasons)
+
+
+def estimate_model(detections: Detections) -> ModelEstimate:
+    """Estimate the generative model from unlabelled detections.
+
+    Parameters
+    ----------
+    detections : Detections
+        A capture of at least a few frames in which markers can be followed.
+
+    Returns
+    -------
+    ModelEstimate
+
+    Raises
+    ------
+    ParameterError
+        If there are too few detections, or none that can be linked from frame to frame.
+    """
+    if detections.n_frames < 3 or detections.n_points < 3:
+        raise ParameterError(
+            "detections",
+            "at least 3 frames with points, to estimate a model from",
+            f"{detections.n_frames} frames with {detections.n_points} points",
+            "give a model",
+        )
+    pieces = list(_pieces(detections))
+    scales = first_scales(pieces)
+    region = _Region.of(detections)
+    low, high = scales.acceleration_low, scales.acceleration_high
+    bounds = FitBounds(
+        least_noise=scales.noise_floor,
+        most_acceleration=2 * SAFE_SHARE * scales.spacing / scales.step**2,
+    )
+    fit = bounds.fit(
+        math.log(scales.noise), (math.log(low), math.log(low * high) / 2, math.log(high)), 0.95
+    )
+    model = _first_model(fit, scales, region)
+    evidence = _evidence(pieces, _wider(model))
+    for i in range(N_ROUNDS):
+        if evidence.n_links < 10:
+            break
+        fit = fit_motion(evidence.tracks, model, fit, bounds)
+        if i == N_ROUNDS - 1:
+            fit = simpler_motion(evidence.tracks, model, fit, bounds)
+        model = _model(fit, evidence, scales, region)
+        evidence = _evidence(pieces, _wider(model))
+    return ModelEstimate(model=model, reasons=_reasons(model, evidence, region))
+
+
+def _pieces(detections: Detections) -> Iterator[Detections]:
+    """Up to `N_PIECES` runs of consecutive frames with `SAMPLE_POINTS` detections in all."""
+    if detections.n_points <= SAMPLE_POINTS:
+        yield detections
+        return
+    T = detections.n_frames
+    length = max(T * SAMPLE_POINTS // detections.n_points // N_PIECES, min(T // N_PIECES, 30))
+    for start in np.linspace(0, T - length, N_PIECES).astype(int):
+        a, b = detections.offsets[start], detections.offsets[start + length]
+        yield Detections(
+            times=detections.times[start : start + length],
+            offsets=detections.offsets[start : start + length + 1] - a,
+            points=detections.points[a:b],
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Region:
+    """Where the points are, for the densities per volume."""
+
+    volume: float
+    points_a_frame: float
+    n_axes: int
+
+    @classmethod
+    def of(cls, detections: Detections) -> _Region:
+        # A bounding box, no axis thinner than a tenth of the longest: a flat volume would make
+        # every density of clutter enormous.
+        extent = np.ptp(detections.points, axis=0)
+        longest = max(float(extent.max()), 1e-3)
+        volume = float(np.prod(np.maximum(extent, 0.1 * longest)))
+        return cls(
+            volume=volume,
+            points_a_frame=detections.n_points / detections.n_frames,
+            n_axes=detections.n_axes,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Evidence:
+    """What tracking with a model found, over all pieces."""
+
+    tracks: list[Tracks]
+    n_misses: int
+    n_clutter: int
+    n_frames: int
+    speeds: NDArray[np.float64]
+    velocity_rms: float
+
+    @property
+    def n_links(self) -> int:
+        return len(self.speeds)
+
+
+def _first_model(fit: MotionFit, scales: Scales, region: _Region) -> TrackingModel:
+    density = region.points_a_frame / region.volume
+    return TrackingModel(
+        motion=fit.motion(scales.speed),
+        sensor=Sensor(noise_sigma=fit.noise, p_detection=0.9, clutter_density=0.1 * density),
+        population=Population(
+            birth_density=0.01 * density,
+            p_disappear=1e-3,
+            max_speed=3 * scales.top_speed,
+            max_gap=max(3, min(10, round(0.1 / scales.step))),
+        ),
+    )
+
+
+def _wider(model: TrackingModel) -> TrackingModel:
+    """Give a model whose strongest motion is stronger still.
+
+    Tracks found with a model hold no jolt that the model would have lost, and a model fitted to
+    them would lose more and more. Looking with a wider one than was fitted breaks the circle.
+    """
+    motion = model.motion
+    if isinstance(motion, DWNA):
+        strong = motion.acceleration_sigma * WIDER
+        return replace(model, motion=replace(motion, acceleration_sigma=strong))
+    if isinstance(motion, InteractingMotions) and isinstance(motion.models[-1], DWNA):
+        jolt = motion.models[-1]
+        wide = replace(jolt, acceleration_sigma=jolt.acceleration_sigma * WIDER)
+        return replace(model, motion=replace(motion, models=(*motion.models[:-1], wide)))
+    return model
+
+
+def _evidence(pieces: list[Detections], model: TrackingModel) -> _Evidence:
+    method = GNN()
+    tracks: list[Tracks] = []
+    misses = clutter = 0
+    speeds: list[NDArray[np.float64]] = []
+    squares: list[NDArray[np.float64]] = []
+    for piece in pieces:
+        state = method.init(model, n_axes=piece.n_axes)
+        found = Tracks(detections=piece, labels=method.run(state, piece)[1])
+        tracks.append(found)
+        order, _ = found.by_track
+        frame = piece.frame_of[order]
+        is_link = np.diff(found.labels[order]) == 0
+        dt = np.diff(piece.times[frame])[is_link]
+        moves = np.diff(piece.points[order], axis=0)[is_link]
+        misses += int((np.diff(frame)[is_link] - 1).sum())
+        clutter += int((found.labels < 0).sum())
+        speeds.append(np.linalg.norm(moves, axis=1) / dt)
+        squares.append(((moves / dt[:, None]) ** 2).mean(axis=1))
+    all_squares = np.concatenate(squares)
+    return _Evidence(
+        tracks=tracks,
+        n_misses=misses,
+        n_clutter=clutter,
+        n_frames=sum(piece.n_frames for piece in pieces),
+        speeds=np.concatenate(speeds),
+        velocity_rms=math.sqrt(float(all_squares.mean())) if len(all_squares) else 0.0,
+    )
+
+
+def _model(fit: MotionFit, evidence: _Evidence, scales: Scales, region: _Region) -> TrackingModel:
+    # Each rate with one event more than was seen: nothing is impossible after a finite clip. A
+    # marker that comes or goes for good looks like a track that broke, so the clip is taken to have
+    # one birth and one death, as most have.
+    cells = region.volume * evidence.n_frames
+    n_links = evidence.n_links
+    top = float(np.quantile(evidence.speeds, 0.9999))
+    p_detection = min((n_links + 1) / (n_links + evidence.n_misses + 2), 0.999)
+    return TrackingModel(
+        motion=fit.motion(max(evidence.velocity_rms, top / 4, 1e-9)),
+        sensor=Sensor(
+            noise_sigma=fit.noise,
+            p_detection=p_detection,
+            clutter_density=(evidence.n_clutter + 1) / cells,
+        ),
+        population=Population(
+            birth_density=1 / cells,
+            p_disappear=1 / (n_links + 2),
+            max_speed=2 * top + 4 * fit.noise / scales.step,
+            max_gap=_bridgeable(fit.levels, p_detection, scales),
+        ),
+    )
+
+
+def _bridgeable(levels: tuple[float, ...], p_detection: float, scales: Scales) -> int:
+    """Find d̄: how many frames a track can coast before it may be where its neighbour is.
+
+    The position of a marker that coasts for k frames is known to ``σ_a Δ² √(k³ / 3)`` (DWNA);
+    d̄ is where that reaches the spacing of the points, but long enough for all but one in 10⁵ runs
+    of independent misses, and never over `LONGEST_GAP_S`.
+    """
+    drift = levels[len(levels) // 2] * scales.step**2
+    reach = (3 * (scales.spacing / drift) ** 2) ** (1 / 3)
+    needed = math.log(1e-5) / math.log(1 - p_detection) + 1
+    longest = max(LONGEST_GAP_S / scales.step, 3.0)
+    return max(3, round(min(max(reach, needed), longest)))
+
+
+def _reasons(
+    model: TrackingModel, evidence: _Evidence, region: _Region
+) -> tuple[tuple[str, str, str], ...]:
+    sensor, population = model.sensor, model.population
+    levels = [
+        f"{mode.acceleration_sigma:.3g}" for mode in model.motion.modes if isinstance(mode, DWNA)
+    ]
+    unit = "m³" if region.n_axes == 3 else "m²"
+    links = f"{evidence.n_links} links"
+    one = "one motion explains them as well as three"
+    many = f"{len(levels)} motions that a marker changes between, together most likely"
+    return (
+        ("noise σ", f"{sensor.noise_sigma * 1e3:.3g} mm", f"most likely one step ahead, {links}"),
+        ("acceleration σ_a", f"{', '.join(levels)} m/s²", one if len(levels) == 1 else many),
+        (
+            "maximal speed v̄",
+            f"{population.max_speed:.3g} m/s",
+            "twice the speed that 1 link in 10 000 exceeds",
+        ),
+        (
+            "detection P_d",
+            f"{sensor.p_detection:.4f}",
+            f"{evidence.n_misses} misses inside tracks of {evidence.n_links} links",
+        ),
+        (
+            "clutter λ_f",
+            f"{sensor.clutter_density:.3g} /{unit}",
+            f"{evidence.n_clutter} points in no track, {evidence.n_frames} frames",
+        ),
+        ("births λ_b", f"{population.birth_density:.2g} /{unit}", "one in the clip"),
+        ("deaths p_z", f"{population.p_disappear:.2g}", "one in the clip"),
+        (
+            "maximal gap d̄",
+            f"{population.max_gap} frames",
+            "until a coasting marker may be as far off as its neighbour is",
+        ),
+    )
