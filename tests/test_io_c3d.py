@@ -5,12 +5,12 @@ from __future__ import annotations
 import ezc3d
 import numpy as np
 import pytest
-from c3d_bytes import DEC, INTEL, SGI, integers, make_c3d, reals, text
 
 from asterism.errors import FormatError, ParameterError
 from asterism.io import read, write
 from asterism.io.marker_names import find_modelled, is_unlabelled
 from asterism.model import Capture, Detections, Tracks
+from c3d_bytes import DEC, INTEL, SGI, integers, make_c3d, reals, text
 
 
 def grid(n_frames=4, n_points=3):

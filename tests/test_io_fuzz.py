@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from fuzz_readers import mutate, seeds, try_one
 
 KINDS = ("seed_c3d", "seed_float", "seed_integer", "seed_sgi", "seed_dec", "seed_trc", "seed_csv",

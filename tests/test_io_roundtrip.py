@@ -7,7 +7,6 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 import pytest
-from c3d_bytes import make_c3d
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -15,6 +14,7 @@ from hypothesis.extra import numpy as hnp
 from asterism.io import FORMATS, read, read_tracks, write
 from asterism.io.units import PER_METRE, from_metres
 from asterism.model import Detections, Tracks
+from c3d_bytes import make_c3d
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 LOGS = ("recording_000", "drone2", "marker3")

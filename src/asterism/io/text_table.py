@@ -191,7 +191,7 @@ def capture_of(
 
 def plain(name: str) -> str:
     """Name that fits one field of a table: no tabs, no line ends."""
-    return " ".join(name.split())
+    return name.translate({ord(c): " " for c in "\t\r\n"})
 
 
 def rows_of(
