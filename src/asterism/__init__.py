@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from asterism import simulate as simulate
     from asterism.associate import GNN as GNN
     from asterism.associate import METHODS as METHODS
+    from asterism.associate import SMP as SMP
     from asterism.associate import Method as Method
     from asterism.associate import ModelEstimate as ModelEstimate
-    from asterism.associate import SMP as SMP
     from asterism.associate import Update as Update
     from asterism.associate import estimate_model as estimate_model
     from asterism.associate import method_by_name as method_by_name
@@ -36,15 +36,15 @@ if TYPE_CHECKING:
     from asterism.filter import States as States
     from asterism.filter import filter_states as filter_states
     from asterism.filter import smooth as smooth
-    from asterism.io import CaptureInfo as CaptureInfo
     from asterism.io import FORMATS as FORMATS
+    from asterism.io import CaptureInfo as CaptureInfo
     from asterism.io import describe as describe
     from asterism.io import read as read
     from asterism.io import read_tracks as read_tracks
     from asterism.io import write as write
-    from asterism.model import Capture as Capture
     from asterism.model import DWNA as DWNA
     from asterism.model import DWPA as DWPA
+    from asterism.model import Capture as Capture
     from asterism.model import Detections as Detections
     from asterism.model import InteractingMotions as InteractingMotions
     from asterism.model import LinearMotion as LinearMotion

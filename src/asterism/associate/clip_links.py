@@ -7,7 +7,7 @@ one marker. They favour slow markers; that is good enough to begin with.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -120,16 +120,17 @@ def _sure_links(
     spacing : ndarray, shape (len(a),)
         Distance to the nearest other point of `a`, inf where there is none.
     """
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     link = np.full(len(a), -1, dtype=np.int64)
     if not len(a) or not len(b):
         return link, np.full(len(a), np.inf)
-    tree_a, tree_b = cKDTree(a), cKDTree(b)
-    # With k beyond the number of points, SciPy gives inf for the distance.
-    spacing = tree_a.query(a, k=[2])[0][:, 0]
-    distance, nearest = tree_b.query(a, k=[1, 2])
-    back = tree_a.query(b, k=1)[1]
+    # With fewer points than neighbours asked for, SciPy gives inf for the distance.
+    neighbours: Any = KDTree(b)
+    distance, nearest = neighbours.query(a, k=2)
+    own: Any = KDTree(a)
+    spacing = own.query(a, k=2)[0][:, 1]
+    back = own.query(b)[1]
     is_mutual = back[nearest[:, 0]] == np.arange(len(a))
     is_clear = (distance[:, 0] < 0.3 * distance[:, 1]) & (distance[:, 0] < 0.3 * spacing)
     sure = is_mutual & is_clear

@@ -31,7 +31,7 @@ MAX_CANDIDATES = 50_000_000
 """Pairs of track and detection within the gates of one frame (1.2 GB of them)."""
 
 FRAMES_A_CALL = 1000
-"""The engine is asked for so many frames at a time: often enough to show progress and be stopped."""
+"""The engine takes so many frames at a time: few enough to show progress and to be stopped."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,7 +58,7 @@ class FrameState:
         return self.tracker.n_ids
 
     def live(self) -> dict[str, NDArray[Any]]:
-        """The believed tracks now: for a display, or for whoever needs positions in gaps.
+        """Give the believed tracks as they are now: for a display, or for whoever needs positions in gaps.
 
         Returns
         -------

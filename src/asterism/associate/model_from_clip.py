@@ -19,8 +19,15 @@ from asterism.associate.clip_links import first_scales
 from asterism.associate.gnn import GNN
 from asterism.associate.motion_fit import FitBounds, MotionFit, fit_motion, simpler_motion
 from asterism.errors import ParameterError
-from asterism.model import DWNA, Detections, InteractingMotions, Population, Sensor
-from asterism.model import TrackingModel, Tracks
+from asterism.model import (
+    DWNA,
+    Detections,
+    InteractingMotions,
+    Population,
+    Sensor,
+    TrackingModel,
+    Tracks,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

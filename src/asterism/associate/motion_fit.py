@@ -159,8 +159,12 @@ def _search(
     from scipy.optimize import minimize
 
     samples = _samples(tracks)
+
+    def cost(x: NDArray[np.float64]) -> float:
+        return _cost(samples, model, unpack(x))
+
     found = minimize(
-        lambda x: _cost(samples, model, unpack(x)),
+        cost,
         np.array(first),
         method="Nelder-Mead",
         options={

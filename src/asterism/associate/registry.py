@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from asterism.associate.gnn import GNN
-from asterism.associate.method import Method
 from asterism.associate.smp import SMP
 from asterism.errors import check_fields
+
+if TYPE_CHECKING:
+    from asterism.associate.method import Method
 
 __all__ = ["METHODS", "method_by_name"]
 

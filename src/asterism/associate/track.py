@@ -56,16 +56,18 @@ def track(
     >>> truth = am.simulate.cube(seed=1)
     >>> tracks = am.track(truth.detections, am.SMP())
     """
-    if isinstance(detections, Tracks):
-        raise ParameterError("detections", "Detections", "Tracks", "pass tracks.detections")
-    if not isinstance(detections, Detections):
-        raise ParameterError("detections", "Detections", type(detections).__name__)
-    if method is None:
-        method = GNN()
-    elif not isinstance(method, Method):
-        raise ParameterError("method", "a method such as GNN()", repr(method))
+    _check_type(
+        "detections", detections, Detections, "tracks.detections, or Detections.from_frames"
+    )
+    method = GNN() if method is None else method
+    _check_type("method", method, Method, "GNN()")
     if model is None:
         model = estimate_model(detections).model
     state = method.init(model, n_axes=detections.n_axes, seed=seed)
     _, labels, confidence = method.run(state, detections, progress=progress)
     return Tracks(detections=detections, labels=labels, confidence=confidence)
+
+
+def _check_type(name: str, value: object, kind: type, hint: str) -> None:
+    if not isinstance(value, kind):
+        raise ParameterError(name, f"{kind.__name__} (try {hint})", type(value).__name__)

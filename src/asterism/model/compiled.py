@@ -34,10 +34,10 @@ SPEED_MARGIN_SIGMAS = 6.0
 
 @lru_cache(maxsize=64)
 def motion_model(model: TrackingModel, n_axes: int) -> _engine.MotionModel:
-    """The motion and noise of one axis, as the engine takes them."""
+    """Give the motion and noise of one axis, as the engine takes them."""
     return _engine.MotionModel.make(
         n_axes,
-        np.ascontiguousarray(model.motion.H, dtype=np.float64),
+        np.ascontiguousarray(model.motion.modes[0].observation),
         np.ascontiguousarray(model.initial_covariance(n_axes)),
         model.sensor.noise_sigma,
         np.ascontiguousarray(model.motion.mode_transitions),
@@ -46,7 +46,7 @@ def motion_model(model: TrackingModel, n_axes: int) -> _engine.MotionModel:
 
 @lru_cache(maxsize=64)
 def score_model(model: TrackingModel) -> _engine.ScoreModel:
-    """The parameters of s(τ), as the engine takes them."""
+    """Give the parameters of s(τ), as the engine takes them."""
     return _engine.ScoreModel(
         birth_density=model.population.birth_density,
         clutter_density=model.sensor.clutter_density,
@@ -74,7 +74,7 @@ def transition(motion: Motion, dt: float) -> tuple[NDArray[np.float64], NDArray[
 
 def no_transition(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """F and Q of the step before the first frame, which moves nothing."""
-    n, M = len(motion.H), len(motion.modes)
+    n, M = len(motion.modes[0].observation), len(motion.modes)
     return np.broadcast_to(np.eye(n), (M, n, n)).copy(), np.zeros((M, n, n))
 
 
@@ -89,7 +89,7 @@ def _of_modes(
 def steps_of(
     motion: Motion, times: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-    """Steps of a whole capture: which kind leads to each frame, and F and Q of each kind.
+    """List the steps of a whole capture: which kind leads to each frame, and F and Q of each kind.
 
     Returns
     -------
@@ -99,8 +99,8 @@ def steps_of(
         Of each kind, of which there is at least one.
     """
     if len(times) < 2:
-        F, Q = no_transition(motion)
-        return np.zeros(len(times), np.int32), F[None], Q[None]
+        still, quiet = no_transition(motion)
+        return np.zeros(len(times), np.int32), still[None], quiet[None]
     spacing, kind = np.unique(_to_nanosecond(np.diff(times)), return_inverse=True)
     F, Q = _of_modes(motion, spacing)
     return np.concatenate([[0], kind]).astype(np.int32), F, Q

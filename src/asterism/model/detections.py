@@ -172,7 +172,7 @@ class Detections:
 
     @property
     def step(self) -> float:
-        """Usual time from frame to frame: the median spacing in seconds, 0 with under two frames."""
+        """Usual time from frame to frame: the median spacing, seconds; 0 with under two frames."""
         return float(np.median(np.diff(self.times))) if self.n_frames > 1 else 0.0
 
     def frame(self, t: int) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ F, a process noise Q and an observation H. Symbols: Δ time from frame to frame 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -16,34 +17,65 @@ from asterism.errors import ParameterError, check_array, check_number
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["DWNA", "DWPA", "MOTIONS", "InteractingMotions", "LinearMotion", "Motion", "RandomWalk"]
+__all__ = [
+    "DWNA",
+    "DWPA",
+    "MOTIONS",
+    "InteractingMotions",
+    "LinearMotion",
+    "Motion",
+    "RandomWalk",
+    "SingleMotion",
+]
 
 
-class Motion:
-    """A linear motion model of one axis; see `DWNA`, `RandomWalk`, `DWPA`, `LinearMotion`."""
+class Motion(ABC):
+    """How a marker moves: one motion, or several among which it changes.
+
+    See `DWNA`, `RandomWalk`, `DWPA`, `LinearMotion`, `InteractingMotions`.
+    """
 
     kind: ClassVar[str]
-    H: NDArray[np.float64]
-    """Observation, shape (n,): position = H · state."""
+    """The motion's name in a model file."""
 
     @property
-    def modes(self) -> tuple[Motion, ...]:
-        """The models among which a marker may change; one, unless the motion is interacting."""
+    @abstractmethod
+    def modes(self) -> tuple[SingleMotion, ...]:
+        """The M motions among which a marker changes, of equal states and observation."""
+
+    @property
+    @abstractmethod
+    def mode_transitions(self) -> NDArray[np.float64]:
+        """Probability of going from mode (row) to mode (column) in a step, shape (M, M)."""
+
+
+class SingleMotion(Motion):
+    """One linear motion of one axis with n states."""
+
+    @property
+    def modes(self) -> tuple[SingleMotion, ...]:
+        """Itself alone."""
         return (self,)
 
     @property
     def mode_transitions(self) -> NDArray[np.float64]:
-        """Probability of going from mode to mode in a step, shape (M, M)."""
+        """``[[1]]``."""
         return np.ones((1, 1))
 
+    @property
+    @abstractmethod
+    def observation(self) -> NDArray[np.float64]:
+        """The row H, shape (n,): position = H · state."""
+
+    @abstractmethod
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
         """F for each Δ of `dt` (M,), shape (M, n, n)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
         """Q for each Δ of `dt` (M,), shape (M, n, n)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def initial_covariance(self, noise_sigma: float, velocity_sigma: float) -> NDArray[np.float64]:
         """Covariance of the state right after the first detection, shape (n, n).
 
@@ -55,7 +87,6 @@ class Motion:
             Prior standard deviation of a velocity coordinate, m/s, where the model leaves its own
             open.
         """
-        raise NotImplementedError
 
 
 def _steps(dt: ArrayLike) -> NDArray[np.float64]:
@@ -67,7 +98,7 @@ def _stack(rows: list[list[NDArray[np.float64]]]) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DWNA(Motion):
+class DWNA(SingleMotion):
     """Discrete white noise acceleration: constant velocity, shaken once a step.
 
     ``F = [1 Δ; 0 1]``, ``Q = σ_a² [Δ⁴/4 Δ³/2; Δ³/2 Δ²]``, ``H = [1 0]`` (Bar-Shalom, Li &
@@ -86,12 +117,16 @@ class DWNA(Motion):
     velocity_sigma: float | None = None
 
     kind: ClassVar[str] = "dwna"
-    H: ClassVar[NDArray[np.float64]] = np.array([1.0, 0.0])
 
     def __post_init__(self) -> None:
         check_number("acceleration_sigma", self.acceleration_sigma, above=0)
         if self.velocity_sigma is not None:
             check_number("velocity_sigma", self.velocity_sigma, above=0)
+
+    @property
+    def observation(self) -> NDArray[np.float64]:
+        """``H = [1 0]``."""
+        return np.array([1.0, 0.0])
 
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
         """F for each Δ of `dt` (M,), shape (M, 2, 2)."""
@@ -110,7 +145,7 @@ class DWNA(Motion):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RandomWalk(Motion):
+class RandomWalk(SingleMotion):
     """Random walk: one state, ``F = 1``, ``Q = σ_w² Δ``.
 
     Parameters
@@ -122,10 +157,14 @@ class RandomWalk(Motion):
     walk_sigma: float
 
     kind: ClassVar[str] = "random_walk"
-    H: ClassVar[NDArray[np.float64]] = np.array([1.0])
 
     def __post_init__(self) -> None:
         check_number("walk_sigma", self.walk_sigma, above=0)
+
+    @property
+    def observation(self) -> NDArray[np.float64]:
+        """``H = [1]``."""
+        return np.array([1.0])
 
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
         """Ones, shape (M, 1, 1)."""
@@ -141,7 +180,7 @@ class RandomWalk(Motion):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DWPA(Motion):
+class DWPA(SingleMotion):
     """Discrete Wiener process acceleration: the acceleration itself walks.
 
     ``F = [1 Δ Δ²/2; 0 1 Δ; 0 0 1]``, ``Q = σ_j² g gᵀ`` with ``g = (Δ²/2, Δ, 1)`` (Bar-Shalom, Li &
@@ -162,13 +201,17 @@ class DWPA(Motion):
     velocity_sigma: float | None = None
 
     kind: ClassVar[str] = "dwpa"
-    H: ClassVar[NDArray[np.float64]] = np.array([1.0, 0.0, 0.0])
 
     def __post_init__(self) -> None:
         check_number("increment_sigma", self.increment_sigma, above=0)
         check_number("acceleration_prior_sigma", self.acceleration_prior_sigma, above=0)
         if self.velocity_sigma is not None:
             check_number("velocity_sigma", self.velocity_sigma, above=0)
+
+    @property
+    def observation(self) -> NDArray[np.float64]:
+        """``H = [1 0 0]``."""
+        return np.array([1.0, 0.0, 0.0])
 
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
         """F for each Δ of `dt` (M,), shape (M, 3, 3)."""
@@ -194,7 +237,7 @@ class DWPA(Motion):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LinearMotion(Motion):
+class LinearMotion(SingleMotion):
     """Any linear model of one axis, by its matrices for one step.
 
     A step of ``k`` times `step` applies F ``k`` times; a spacing that is no multiple (within 2 %)
@@ -252,6 +295,11 @@ class LinearMotion(Motion):
     def __hash__(self) -> int:
         return hash((self.step, self.F.tobytes(), self.Q.tobytes(), self.H.tobytes()))
 
+    @property
+    def observation(self) -> NDArray[np.float64]:
+        """The given H."""
+        return self.H
+
     def _powers(self, dt: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         d = _steps(dt)
         k = np.rint(d / self.step).astype(np.int64)
@@ -300,13 +348,14 @@ class InteractingMotions(Motion):
 
     Parameters
     ----------
-    models : sequence of 2 or 3 Motion
-        Of one kind, differing in their noise. The first one's prior holds for new tracks.
+    models : sequence of 2 or 3 motions
+        Single ones of one kind, differing in their noise. The prior of the first holds for new
+        tracks.
     transitions : array_like, shape (M, M)
         Probability of going from mode (row) to mode (column) in a step; positive, rows sum to 1.
     """
 
-    models: tuple[Motion, ...]
+    models: tuple[SingleMotion, ...]
     transitions: NDArray[np.float64]
 
     kind: ClassVar[str] = "interacting"
@@ -316,11 +365,12 @@ class InteractingMotions(Motion):
         M = len(models)
         if M not in (2, 3):
             raise ParameterError("models", "2 or 3 motion models", M)
-        first = models[0]
-        for model in models:
-            same = type(model) is type(first) and np.array_equal(model.H, first.H)
-            if not same or isinstance(model, InteractingMotions):
-                raise ParameterError("models", "motions of one kind", [m.kind for m in models])
+        kinds = [model.kind for model in models]
+        if len(set(kinds)) > 1 or InteractingMotions.kind in kinds:
+            raise ParameterError("models", "single motions of one kind", kinds)
+        observations = np.stack([model.observation for model in models])
+        if not (observations == observations[0]).all():
+            raise ParameterError("models", "motions with the same H", observations.tolist())
         transitions = check_array("transitions", self.transitions, (M, M))
         if (transitions <= 0).any() or not np.allclose(transitions.sum(axis=1), 1, atol=1e-9):
             raise ParameterError("transitions", "positive rows that sum to 1", transitions.tolist())
@@ -338,17 +388,7 @@ class InteractingMotions(Motion):
         return hash((self.models, self.transitions.tobytes()))
 
     @property
-    def H(self) -> NDArray[np.float64]:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Observation of every mode, shape (n,)."""
-        return self.models[0].H
-
-    @property
-    def velocity_sigma(self) -> float | None:
-        """That of the first model, where it has one."""
-        return getattr(self.models[0], "velocity_sigma", None)
-
-    @property
-    def modes(self) -> tuple[Motion, ...]:
+    def modes(self) -> tuple[SingleMotion, ...]:
         """The models."""
         return self.models
 
@@ -356,19 +396,6 @@ class InteractingMotions(Motion):
     def mode_transitions(self) -> NDArray[np.float64]:
         """Probability of going from mode to mode in a step, shape (M, M)."""
         return self.transitions
-
-    def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """F of the first mode."""
-        return self.models[0].transition(dt)
-
-    def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """Q averaged over the modes by how much of the time each holds, shape (K, n, n)."""
-        share = np.linalg.matrix_power(self.transitions, 1 << 20)[0]
-        return np.tensordot(share, np.stack([m.process_noise(dt) for m in self.models]), axes=1)
-
-    def initial_covariance(self, noise_sigma: float, velocity_sigma: float) -> NDArray[np.float64]:
-        """That of the first model."""
-        return self.models[0].initial_covariance(noise_sigma, velocity_sigma)
 
 
 MOTIONS: dict[str, type[Motion]] = {

@@ -6,7 +6,7 @@ import dataclasses
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
@@ -68,16 +68,17 @@ class TrackingModel:
         n_axes : int
             D, 2 or 3.
         """
-        own = getattr(self.motion, "velocity_sigma", None)
+        own = getattr(self.motion.modes[0], "velocity_sigma", None)
         return float(own) if own else self.population.max_speed / (n_axes + 2) ** 0.5
 
     def initial_covariance(self, n_axes: int) -> NDArray[np.float64]:
         """Covariance of one axis' state after a first detection, shape (n, n)."""
-        return self.motion.initial_covariance(self.sensor.noise_sigma, self.velocity_sigma(n_axes))
+        return self.motion.modes[0].initial_covariance(
+            self.sensor.noise_sigma, self.velocity_sigma(n_axes)
+        )
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
         """Give the model as nested plain values, as it stands in a TOML file."""
-
         return {name: _to_plain(getattr(self, name)) for name in _TABLES}
 
     @classmethod
@@ -142,7 +143,7 @@ _TABLES = ("motion", "sensor", "population")
 def _to_plain(part: Any) -> dict[str, Any]:
     """Give a part of the model as TOML can hold it."""
     values: dict[str, Any] = {"kind": part.kind} if isinstance(part, Motion) else {}
-    for f in dataclasses.fields(part):
+    for f in dataclasses.fields(cast(Any, part)):
         value = getattr(part, f.name)
         if isinstance(value, np.ndarray):
             value = value.tolist()

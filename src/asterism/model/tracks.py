@@ -71,10 +71,10 @@ class Tracks:
         names += (None,) * (n_tracks - len(names))
         is_track = labels >= 0
         frames = self.detections.frame_of[is_track]
-        key = np.sort(frames * max(n_tracks, 1) + labels[is_track])
+        key: NDArray[np.int64] = np.sort(frames * max(n_tracks, 1) + labels[is_track])
         twice = np.flatnonzero(np.diff(key) == 0)
         if len(twice):
-            frame, track = divmod(int(key[twice[0]]), n_tracks)
+            frame, track = divmod(int(key[int(twice[0])]), n_tracks)
             raise ParameterError(
                 "labels", "at most one detection of a track in a frame",
                 f"two of track {track} in frame {frame}",
