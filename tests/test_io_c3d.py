@@ -257,6 +257,29 @@ def test_bad_files(tmp_path):
             read(path)
 
 
+def test_hostile_parameters(load):
+    """Found by thinking, not by the fuzzer: each would take all memory or end in a traceback."""
+    many = ("POINT", "LABELS", -1, (0, 255, 255, 255, 255), b"")
+    assert load(grid(), more=[many]).n_points == 12
+    for value in (np.nan, np.inf, -5, 3e9, 70_000):
+        more = [("POINT", "USED", 4, (), reals([value]))]
+        assert load(grid(), drop=["USED"], more=more).n_points == 12
+        words = ("TRIAL", "ACTUAL_START_FIELD", 4, (2,), reals([value, value]))
+        end = ("TRIAL", "ACTUAL_END_FIELD", 4, (2,), reals([value, value]))
+        frames = ("POINT", "FRAMES", 4, (), reals([value]))
+        long = ("POINT", "LONG_FRAMES", 4, (), reals([value]))
+        assert load(grid(), drop=["FRAMES"], more=[words, end, frames, long]).n_frames == 4
+    with pytest.raises(FormatError, match="SCALE"):
+        load(grid(), drop=["SCALE"], more=[("POINT", "SCALE", 4, (), reals([np.nan]))])
+
+
+def test_a_first_frame_that_no_c3d_can_count(tmp_path):
+    (tmp_path / "a.csv").write_text("frame,time_s,x_m,y_m,z_m\n-7,0,1,2,3\n-6,0.8,1,2,3\n")
+    write(read(tmp_path / "a.csv").tracks, tmp_path / "a.c3d")
+    capture = read(tmp_path / "a.c3d")
+    assert (capture.first_frame, capture.rate) == (1, 1.25)
+
+
 def with_everything():
     points = grid(4, 4)
     points[..., 3] = 513  # cameras 2, residual 1

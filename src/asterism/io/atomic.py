@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
 from contextlib import contextmanager
-from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from asterism.errors import FormatError
 
 if TYPE_CHECKING:
     from collections.abc import Generator
+    from pathlib import Path
 
 __all__ = ["replacing"]
 
@@ -46,17 +46,14 @@ def replacing(path: Path) -> Generator[IO[bytes], None, None]:
         target = path.resolve()  # a symbolic link stays one, and its target is replaced
         if target.is_dir():
             raise IsADirectoryError(0, "is a folder")
-        handle, name = tempfile.mkstemp(
-            prefix=f".{target.name}.", suffix=".part", dir=target.parent
-        )
-        temporary = Path(name)
+        temporary = target.with_name(f".{secrets.token_hex(8)}.part")
         try:
-            with os.fdopen(handle, "wb") as file:
+            with temporary.open("xb") as file:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())
-            # mkstemp makes private files; a result has the rights of any new file, or of the old.
-            temporary.chmod(target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask())
+            if target.exists():
+                temporary.chmod(target.stat().st_mode & 0o777)
             temporary.replace(target)
         finally:
             temporary.unlink(missing_ok=True)
@@ -64,9 +61,3 @@ def replacing(path: Path) -> Generator[IO[bytes], None, None]:
         what = error.strerror or str(error)
         hint = "choose a folder that exists, may be written to and has room"
         raise FormatError(path, "writing", "a file that can be written", what, hint) from error
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

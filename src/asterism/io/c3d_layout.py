@@ -106,12 +106,10 @@ def read_c3d(path: Path) -> C3DFile:
     n_points, n_analog, first, last = words[1:5]
     scale, rate = (float(np.frombuffer(header, "<f4", 1, byte)[0]) for byte in (12, 20))
     point = groups.get("POINT", Group())
-    stated = point.numbers("USED")
-    if stated and int(stated[0]) != n_points:
-        warnings.append(
-            f"{int(stated[0])} points (POINT:USED) are taken; the header says {n_points}"
-        )
-        n_points = int(stated[0])
+    stated = next((n for n in point.counts("USED") if n <= 0xFFFF), n_points)
+    if stated != n_points:
+        warnings.append(f"{stated} points (POINT:USED) are taken; the header says {n_points}")
+        n_points = stated
     scale = next(iter(point.numbers("SCALE")), 0.0) or scale
     if not np.isfinite(scale) or scale == 0:
         raise FormatError(path, "POINT:SCALE", "a number other than 0", scale)
@@ -182,13 +180,13 @@ def _frames(
     """
     point, trial = groups.get("POINT", Group()), groups.get("TRIAL", Group())
     in_header = last - first + 1 if last >= first else 0
-    claimed = [int(n) for n in point.numbers("FRAMES")[:1] if 0 <= n < 2**31]
+    claimed = point.counts("FRAMES")[:1]
     counts = [in_header]
     if last == 0xFFFF or claimed != counts:
-        counts = [int(n) for n in point.numbers("LONG_FRAMES")[:1] if 0 < n < 2**31]
-        ends = [trial.numbers(f"ACTUAL_{end}_FIELD") for end in ("START", "END")]
-        if all(len(words) == 2 for words in ends):
-            begin, stop = (int(low) + 65536 * int(high) for low, high in ends)
+        counts = [n for n in point.counts("LONG_FRAMES")[:1] if n]
+        ends = [trial.counts(f"ACTUAL_{end}_FIELD") for end in ("START", "END")]
+        if all(len(words) == 2 and max(words) <= 0xFFFF for words in ends):
+            begin, stop = (low + 65536 * high for low, high in ends)
             if stop >= begin:
                 first, counts = begin, [stop - begin + 1, *counts]
         if not counts and 0xFFFF in (*claimed, last) and n_fit > 0xFFFF + BLOCK:
@@ -201,7 +199,9 @@ def _frames(
             path, f"frame {first + n_fit}", f"{counts[0]} frames of data",
             f"the end of the file after {n_fit}", "the file is cut off: copy it again",
         )  # fmt: skip
-    if n_frames != in_header and last < 0xFFFF:
+    if n_frames != counts[0]:
+        warnings.append(f"{n_frames} frames are taken, for {counts[0]} the file is too short")
+    elif n_frames != in_header and last < 0xFFFF:
         warnings.append(f"{n_frames} frames are taken; the header says {in_header}")
     if n_frames == 0:
         warnings.append("the file has no frames")

@@ -71,7 +71,8 @@ class Parameter:
         if self.kind != _TEXT:
             return []
         width = self.dims[0] if self.dims else 1
-        n = math.prod(self.dims[1:])
+        # Texts of no length take no bytes: without a bound a few dimensions would claim billions.
+        n = math.prod(self.dims[1:]) if width else math.prod(self.dims[1:2])
         return [_text(self.data[i * width : (i + 1) * width]) for i in range(n)]
 
     def numbers(self) -> list[float]:
@@ -125,6 +126,10 @@ class Group:
     def numbers(self, name: str) -> list[float]:
         """Numbers of a parameter, [] where there is none."""
         return self.parameters[name].numbers() if name in self.parameters else []
+
+    def counts(self, name: str) -> list[int]:
+        """Whole numbers of a parameter, without those that can be no count."""
+        return [int(n) for n in self.numbers(name) if 0 <= n < 2**31]
 
 
 def _text(raw: bytes) -> str:
@@ -239,5 +244,8 @@ def build(groups: dict[str, Group]) -> bytes:
 
 def _record(name: str, number: int, locked: bool, body: bytes) -> bytes:
     raw = name.encode("latin-1")
+    if len(body) + 2 > 0xFFFF:
+        got = f"{len(body)} bytes"
+        raise ParameterError(f"the C3D parameter {name}", "at most 65 kB", got, "write CSV")
     head = bytes([(-len(raw) if locked else len(raw)) & 0xFF, number & 0xFF])
     return head + raw + (len(body) + 2).to_bytes(2, "little") + body

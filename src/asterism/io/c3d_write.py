@@ -75,7 +75,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     analog = np.empty((d.n_frames, 0), dtype=np.float32)
     scale, n_samples = 1.0, 0
     if isinstance(d, Capture):
-        unit, first_frame = d.units, d.first_frame
+        unit, first_frame = d.units, d.first_frame if 0 <= d.first_frame < 2**31 else 1
     if source is not None:
         old_names, old_texts = channel_names(source), channel_descriptions(source)
         text_of = dict(zip(old_names, old_texts, strict=True))
@@ -98,6 +98,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     words[6:8] = np.array([-scale], "<f4").view("<u2")
     words[8:10] = 2 + n_blocks, n_samples
     words[10:12] = np.array([rate], "<f4").view("<u2")
+    words[147:149] = 0  # a section of labels and ranges, which nobody uses, is not copied
     file.write(words.tobytes())
     file.write(build(groups))
 

@@ -41,9 +41,7 @@ def sniff(head: bytes) -> bool:
 
 def read(path: Path) -> Capture:
     """Read the detections, with the tracks as their identities; see `read_tracks`."""
-    capture = read_tracks(path).detections
-    assert isinstance(capture, Capture)
-    return capture
+    return _load(path)[0]
 
 
 def read_tracks(path: Path) -> Tracks:
@@ -64,6 +62,10 @@ def read_tracks(path: Path) -> Tracks:
     FormatError
         With the line that is not as it should be.
     """
+    return _load(path)[1]
+
+
+def _load(path: Path) -> tuple[Capture, Tracks]:
     lines = read_lines(path)
     while len(lines) > 1 and not lines[-1].strip():
         lines.pop()
@@ -115,7 +117,10 @@ def read_tracks(path: Path) -> Tracks:
         names=track_names,
     )
     confidence = numbers["confidence"][kept] if "confidence" in header else None
-    return Tracks(detections=capture, labels=track[kept], names=track_names, confidence=confidence)
+    tracks = Tracks(
+        detections=capture, labels=track[kept], names=track_names, confidence=confidence
+    )
+    return capture, tracks
 
 
 def _parse(

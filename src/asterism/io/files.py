@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from asterism.errors import FormatError, ParameterError
 from asterism.io.atomic import replacing
@@ -11,13 +12,11 @@ from asterism.io.formats import FORMATS, Format
 from asterism.model import Capture
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Generator
 
     from asterism.model import Tracks
 
 __all__ = ["read", "read_tracks", "write"]
-
-Result = TypeVar("Result")
 
 _HEAD = 4096  # bytes that are enough to know a format by
 
@@ -52,7 +51,9 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     asterism.errors.FormatError: nowhere.c3d: opening: expected a file, got nothing of that name
     """
     path = Path(path)
-    return _guarded(path, _find(path, format).read)
+    asked = None if format is None else _named(format)
+    with _about(path):
+        return _find(path, asked).read(path)
 
 
 def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
@@ -75,10 +76,10 @@ def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
         As in `read`.
     """
     path = Path(path)
-    chosen = _find(path, format)
-    if chosen.read_tracks is None:
-        return _guarded(path, chosen.read).tracks
-    return _guarded(path, chosen.read_tracks)
+    asked = None if format is None else _named(format)
+    with _about(path):
+        chosen = _find(path, asked)
+        return chosen.read(path).tracks if chosen.read_tracks is None else chosen.read_tracks(path)
 
 
 def write(
@@ -142,23 +143,20 @@ def _named(name: str) -> Format:
     return FORMATS[name]
 
 
-def _find(path: Path, format: str | None) -> Format:
+def _find(path: Path, asked: Format | None) -> Format:
     """Format of an existing file: as asked, or by its ending, or by its content."""
     if not path.is_file():
         got = "a folder" if path.is_dir() else "nothing of that name"
         got = "a device or pipe" if path.exists() and not path.is_dir() else got
         raise FormatError(path, "opening", "a file", got)
-    if format is not None:
-        return _named(format)
+    if asked is not None:
+        return asked
     ending = path.suffix.lower()
     candidates = [f for f in FORMATS.values() if ending in f.extensions] or list(FORMATS.values())
     if len(candidates) == 1 and ending:
         return candidates[0]
-    try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD)
-    except OSError as error:
-        raise FormatError(path, "opening", "a readable file", error.strerror) from error
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
     for candidate in (*candidates, *FORMATS.values()):
         if candidate.sniff(head):
             return candidate
@@ -166,10 +164,11 @@ def _find(path: Path, format: str | None) -> Format:
     raise FormatError(path, "its first bytes", f"one of: {names}", repr(head[:40]))
 
 
-def _guarded(path: Path, reader: Callable[[Path], Result]) -> Result:
-    """Read, and turn what the system or the data model refuses into an error about the file."""
+@contextmanager
+def _about(path: Path) -> Generator[None, None, None]:
+    """Turn what the system or the data model refuses into an error about the file."""
     try:
-        return reader(path)
+        yield
     except OSError as error:
         raise FormatError(path, "reading", "a readable file", error.strerror) from error
     except ParameterError as error:

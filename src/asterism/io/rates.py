@@ -29,8 +29,8 @@ def fixed_rate(detections: Detections, format_name: str) -> float:
     Returns
     -------
     float
-        Frames a second; what the file stated (0 included) for a `Capture` that agrees with it,
-        else the mean, and 100 where there are fewer than two frames.
+        Frames a second; what the file stated for a `Capture` that agrees with it, else the mean,
+        and 100 where there are fewer than two frames.
 
     Raises
     ------
@@ -44,10 +44,10 @@ def fixed_rate(detections: Detections, format_name: str) -> float:
         )
     times = detections.times
     elapsed = times - times[:1]
-    if isinstance(detections, Capture):
-        stated = detections.rate
-        if len(times) < 2 or np.abs(elapsed * (stated or 1.0) - np.arange(len(times))).max() < 0.5:
-            return stated
+    if isinstance(detections, Capture) and detections.rate > 0:
+        off = np.abs(elapsed * detections.rate - np.arange(len(times)))
+        if off.max(initial=0) < 0.5:
+            return detections.rate
     if len(times) < 2:
         return 100.0
     mean = elapsed[-1] / (len(times) - 1)

@@ -66,11 +66,10 @@ def read(path: Path) -> Capture:
     stray = [name for i, name in enumerate(titles[2:]) if i % 3 and name.strip()]
     if stray:
         raise FormatError(path, "line 4", "two tabs between names", f"{stray[0]!r} out of step")
-    n_stated = header.get("NumMarkers", "")
-    if n_stated.isdecimal() and int(n_stated[:6]) > len(names):
-        # Markers without a name at the end of the line: an exporter may trim its blanks.
-        axes = [axis for axis in lines[4].split("\t") if axis.strip()]
-        names += [""] * (min(int(n_stated[:6]), len(axes) // 3) - len(names))
+    # Markers without a name at the end of the line: an exporter may trim its blanks.
+    axes = [axis for axis in lines[4].split("\t") if axis.strip()]
+    n_markers = min(_count(header, "NumMarkers", len(names)), len(axes) // 3)
+    names += [""] * (n_markers - len(names))
     values, numbers = parse_rows(path, lines, 5, 2 + 3 * len(names), "\t")
     values = values.reshape(len(numbers), 2 + 3 * len(names))
     check_times(path, values[:, 1], numbers)
@@ -83,9 +82,9 @@ def read(path: Path) -> Capture:
         unit = judge_unit(coordinates[np.isfinite(coordinates).all(axis=2)])
         warnings.append(f"Units is {stated!r}: by their size the coordinates are {unit}")
     first = values[0, 0] if len(values) and np.isfinite(values[0, 0]) else 1
-    n_frames = header.get("NumFrames", "")
-    if n_frames.isdecimal() and int(n_frames[:12]) != len(values):
-        warnings.append(f"{len(values)} frames are there; the header says {n_frames[:12]}")
+    n_frames = _count(header, "NumFrames", len(values))
+    if n_frames != len(values):
+        warnings.append(f"{len(values)} frames are there; the header says {n_frames}")
     return capture_of(
         path,
         "trc",
@@ -98,6 +97,11 @@ def read(path: Path) -> Capture:
         zero_is_gap=True,
         warnings=warnings,
     )
+
+
+def _count(header: dict[str, str], key: str, default: int) -> int:
+    text = header.get(key, "")
+    return int(text) if text.isdecimal() and len(text) < 10 else default
 
 
 def _rate(header: dict[str, str]) -> float:
