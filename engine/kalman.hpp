@@ -14,6 +14,7 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <type_traits>
 
 namespace asterism {
 
@@ -41,6 +42,15 @@ struct AxisState {
   AxisMatrix P{};
 };
 
+// Calls f with the number of states as a constant, so that its loops unroll.
+template <typename F>
+decltype(auto) with_states(int n, F&& f) {
+  assert(n >= 1 && n <= kMaxStates);
+  if (n == 2) return f(std::integral_constant<int, 2>{});
+  if (n == 1) return f(std::integral_constant<int, 1>{});
+  return f(std::integral_constant<int, 3>{});
+}
+
 inline double squared_distance(const Point& a, const Point& b, int D) {
   double sum = 0;
   for (int d = 0; d < D; ++d) sum += (a[d] - b[d]) * (a[d] - b[d]);
@@ -59,37 +69,45 @@ inline AxisState begin_state(const AxisModel& m, const Point& y) {
 }
 
 inline void predict(const AxisModel& m, const AxisStep& step, AxisState& s) {
-  const int n = m.n;
-  for (int d = 0; d < m.D; ++d) {
-    AxisVector x{};
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) x[i] += step.F[i * n + j] * s.x[d][j];
-    s.x[d] = x;
-  }
-  AxisMatrix FP{}, P = step.Q;
-  for (int i = 0; i < n; ++i)
-    for (int k = 0; k < n; ++k) {
-      const double f = step.F[i * n + k];
-      for (int j = 0; j < n; ++j) FP[i * n + j] += f * s.P[k * n + j];
+  with_states(m.n, [&](auto n_states) {
+    constexpr int n = n_states;
+    for (int d = 0; d < m.D; ++d) {
+      AxisVector x{};
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) x[i] += step.F[i * n + j] * s.x[d][j];
+      s.x[d] = x;
     }
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-      for (int k = 0; k < n; ++k) P[i * n + j] += FP[i * n + k] * step.F[j * n + k];
-  s.P = P;
+    AxisMatrix FP{}, P = step.Q;
+    for (int i = 0; i < n; ++i)
+      for (int k = 0; k < n; ++k) {
+        const double f = step.F[i * n + k];
+        for (int j = 0; j < n; ++j) FP[i * n + j] += f * s.P[k * n + j];
+      }
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j)
+        for (int k = 0; k < n; ++k) P[i * n + j] += FP[i * n + k] * step.F[j * n + k];
+    s.P = P;
+  });
 }
 
 inline Point observed(const AxisModel& m, const AxisState& s) {
-  Point y{};
-  for (int d = 0; d < m.D; ++d)
-    for (int i = 0; i < m.n; ++i) y[d] += m.H[i] * s.x[d][i];
-  return y;
+  return with_states(m.n, [&](auto n_states) {
+    constexpr int n = n_states;
+    Point y{};
+    for (int d = 0; d < m.D; ++d)
+      for (int i = 0; i < n; ++i) y[d] += m.H[i] * s.x[d][i];
+    return y;
+  });
 }
 
 inline double innovation_variance(const AxisModel& m, const AxisState& s) {
-  double S = m.r;
-  for (int i = 0; i < m.n; ++i)
-    for (int j = 0; j < m.n; ++j) S += m.H[i] * s.P[i * m.n + j] * m.H[j];
-  return S;
+  return with_states(m.n, [&](auto n_states) {
+    constexpr int n = n_states;
+    double S = m.r;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) S += m.H[i] * s.P[i * n + j] * m.H[j];
+    return S;
+  });
 }
 
 // log N(y; ŷ, S I) from the squared distance of y and ŷ.
@@ -99,30 +117,32 @@ inline double log_density(int D, double S, double distance2) {
 
 // Joseph form: the covariance stays symmetric and positive over runs of any length.
 inline void update(const AxisModel& m, const Point& y, AxisState& s) {
-  const int n = m.n;
-  const double S = innovation_variance(m, s);
-  assert(S > 0);
-  const Point predicted = observed(m, s);
-  AxisVector K{};
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) K[i] += s.P[i * n + j] * m.H[j];
-    K[i] /= S;
-  }
-  for (int d = 0; d < m.D; ++d)
-    for (int i = 0; i < n; ++i) s.x[d][i] += K[i] * (y[d] - predicted[d]);
-  AxisMatrix A{}, AP{}, P{};
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) A[i * n + j] = (i == j ? 1.0 : 0.0) - K[i] * m.H[j];
-  for (int i = 0; i < n; ++i)
-    for (int k = 0; k < n; ++k)
-      for (int j = 0; j < n; ++j) AP[i * n + j] += A[i * n + k] * s.P[k * n + j];
-  for (int i = 0; i < n; ++i)
-    for (int j = i; j < n; ++j) {
-      double sum = K[i] * m.r * K[j];
-      for (int k = 0; k < n; ++k) sum += AP[i * n + k] * A[j * n + k];
-      P[i * n + j] = P[j * n + i] = sum;
+  with_states(m.n, [&](auto n_states) {
+    constexpr int n = n_states;
+    const double S = innovation_variance(m, s);
+    assert(S > 0);
+    const Point predicted = observed(m, s);
+    AxisVector K{};
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) K[i] += s.P[i * n + j] * m.H[j];
+      K[i] /= S;
     }
-  s.P = P;
+    for (int d = 0; d < m.D; ++d)
+      for (int i = 0; i < n; ++i) s.x[d][i] += K[i] * (y[d] - predicted[d]);
+    AxisMatrix A{}, AP{}, P{};
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) A[i * n + j] = (i == j ? 1.0 : 0.0) - K[i] * m.H[j];
+    for (int i = 0; i < n; ++i)
+      for (int k = 0; k < n; ++k)
+        for (int j = 0; j < n; ++j) AP[i * n + j] += A[i * n + k] * s.P[k * n + j];
+    for (int i = 0; i < n; ++i)
+      for (int j = i; j < n; ++j) {
+        double sum = K[i] * m.r * K[j];
+        for (int k = 0; k < n; ++k) sum += AP[i * n + k] * A[j * n + k];
+        P[i * n + j] = P[j * n + i] = sum;
+      }
+    s.P = P;
+  });
 }
 
 // Rauch–Tung–Striebel: carry what the future knows (next, smoothed) back to a filtered state.

@@ -58,20 +58,23 @@ inline MotionState begin_state(const MotionModel& m, const Point& y) {
 // Mean and covariance of a mixture of states.
 inline AxisState collapse(const AxisModel& m, const AxisState* states, const double* weights,
                           int M) {
-  AxisState s;
-  for (int a = 0; a < M; ++a)
-    for (int d = 0; d < m.D; ++d)
-      for (int i = 0; i < m.n; ++i) s.x[d][i] += weights[a] * states[a].x[d][i];
-  for (int a = 0; a < M; ++a)
-    for (int i = 0; i < m.n; ++i)
-      for (int j = 0; j < m.n; ++j) {
-        // The axes share one covariance, so what their means differ by is shared out evenly.
-        double spread = 0;
-        for (int d = 0; d < m.D; ++d)
-          spread += (states[a].x[d][i] - s.x[d][i]) * (states[a].x[d][j] - s.x[d][j]);
-        s.P[i * m.n + j] += weights[a] * (states[a].P[i * m.n + j] + spread / m.D);
-      }
-  return s;
+  return with_states(m.n, [&](auto n_states) {
+    constexpr int n = n_states;
+    AxisState s;
+    for (int a = 0; a < M; ++a)
+      for (int d = 0; d < m.D; ++d)
+        for (int i = 0; i < n; ++i) s.x[d][i] += weights[a] * states[a].x[d][i];
+    for (int a = 0; a < M; ++a)
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+          // The axes share one covariance, so what their means differ by is shared out evenly.
+          double spread = 0;
+          for (int d = 0; d < m.D; ++d)
+            spread += (states[a].x[d][i] - s.x[d][i]) * (states[a].x[d][j] - s.x[d][j]);
+          s.P[i * n + j] += weights[a] * (states[a].P[i * n + j] + spread / m.D);
+        }
+    return s;
+  });
 }
 
 inline AxisState collapse(const MotionModel& m, const MotionState& s) {

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Scales", "first_scales"]
 
-MAX_FRAMES = 1500
-"""Pairs of consecutive frames that are looked at, spread over the clip."""
+LINKED_POINTS = 40_000
+"""Points that are linked to the next frames, in frames spread over the clip."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +64,7 @@ def first_scales(pieces: list[Detections]) -> Scales:
     jolts: list[NDArray[np.float64]] = []
     spacings: list[NDArray[np.float64]] = []
     for piece in pieces:
-        stride = max(1, -(-piece.n_frames * len(pieces) // MAX_FRAMES))
+        stride = max(1, piece.n_points * len(pieces) // LINKED_POINTS)
         for t in range(0, piece.n_frames - 2, stride):
             a, b, c = piece.frame(t), piece.frame(t + 1), piece.frame(t + 2)
             dt1, dt2 = np.diff(piece.times[t : t + 3])

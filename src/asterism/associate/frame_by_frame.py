@@ -58,7 +58,7 @@ class FrameState:
         return self.tracker.n_ids
 
     def live(self) -> dict[str, NDArray[Any]]:
-        """Give the believed tracks as they are now: for a display, or for whoever needs positions in gaps.
+        """Give the believed tracks as they are now, for a display say.
 
         Returns
         -------

@@ -45,8 +45,8 @@ N_ROUNDS = 3
 WIDER = 3.0
 SAFE_SHARE = 1 / 6
 """A jolt's σ may move a marker by this share of the points' spacing in a frame."""
-LONGEST_GAP_S = 1.0
-"""No gap longer than this is bridged from motion alone."""
+LONGEST_GAP = 60
+"""Frames; a longer gap is not bridged for the motion's sake."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,7 +181,7 @@ def _first_model(fit: MotionFit, scales: Scales, region: _Region) -> TrackingMod
             birth_density=0.01 * density,
             p_disappear=1e-3,
             max_speed=3 * scales.top_speed,
-            max_gap=max(3, min(10, round(0.1 / scales.step))),
+            max_gap=10,
         ),
     )
 
@@ -252,23 +252,22 @@ def _model(fit: MotionFit, evidence: _Evidence, scales: Scales, region: _Region)
             birth_density=1 / cells,
             p_disappear=1 / (n_links + 2),
             max_speed=2 * top + 4 * fit.noise / scales.step,
-            max_gap=_bridgeable(fit.levels, p_detection, scales),
+            max_gap=_bridgeable(fit.levels, p_detection, n_links, scales),
         ),
     )
 
 
-def _bridgeable(levels: tuple[float, ...], p_detection: float, scales: Scales) -> int:
+def _bridgeable(levels: tuple[float, ...], p_detection: float, n_links: int, scales: Scales) -> int:
     """Find d̄: how many frames a track can coast before it may be where its neighbour is.
 
     The position of a marker that coasts for k frames is known to ``σ_a Δ² √(k³ / 3)`` (DWNA);
-    d̄ is where that reaches the spacing of the points, but long enough for all but one in 10⁵ runs
-    of independent misses, and never over `LONGEST_GAP_S`.
+    d̄ is where that reaches the spacing of the points, at most `LONGEST_GAP`, and long enough that
+    less than one run of independent misses in the clip is longer.
     """
     drift = levels[len(levels) // 2] * scales.step**2
     reach = (3 * (scales.spacing / drift) ** 2) ** (1 / 3)
-    needed = math.log(1e-5) / math.log(1 - p_detection) + 1
-    longest = max(LONGEST_GAP_S / scales.step, 3.0)
-    return max(3, round(min(max(reach, needed), longest)))
+    needed = 1 - math.log(2 * n_links) / math.log(1 - p_detection)
+    return max(3, round(max(min(reach, LONGEST_GAP), min(needed, 2 * LONGEST_GAP))))
 
 
 def _reasons(
