@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import ezc3d
 import numpy as np
 import pytest
 
 from asterism.errors import FormatError, ParameterError
 from asterism.io import read, write
+from asterism.io.c3d_layout import read_c3d
 from asterism.io.marker_names import find_modelled, is_unlabelled
 from asterism.model import Capture, Detections, Tracks
 from c3d_bytes import DEC, INTEL, SGI, integers, make_c3d, reals, text
@@ -342,6 +345,49 @@ def test_what_is_not_a_point_survives(tmp_path):
     np.testing.assert_array_equal(again.tracks.positions(), tracks.positions())
     assert again.names == tracks.names
     assert again.n_points == capture.n_points
+
+
+@pytest.mark.parametrize("processor", [INTEL, DEC, SGI])
+@pytest.mark.parametrize("kind", ["SIGNED", "UNSIGNED"])
+def test_integers_of_any_processor_become_reals_of_intel(tmp_path, processor, kind):
+    source, result = tmp_path / "source.c3d", tmp_path / "result.c3d"
+    analog = np.array([[1, 40_000], [-2, 3], [4, 5], [6, 65_535]])
+    more = [
+        ("ANALOG", "USED", 2, (), integers([1], processor)),
+        ("ANALOG", "FORMAT", -1, (len(kind),), kind.encode()),
+        ("ANALOG", "RATE", 4, (), reals([200], processor)),
+        ("ANALOG", "SCALE", 4, (1,), reals([1], processor)),
+        ("ANALOG", "GEN_SCALE", 4, (), reals([1], processor)),
+        ("ANALOG", "OFFSET", 2, (1,), integers([0], processor)),
+        ("EVENT", "TIMES", 4, (2, 1), reals([0, 1.5], processor)),
+    ]
+    source.write_bytes(
+        make_c3d(grid(), labels=["A", "B", "C"], scale=0.5, processor=processor, analog=analog,
+                 n_samples=2, more=more)
+    )  # fmt: skip
+    capture = read(source)
+    write(capture.tracks, result)
+    bits = 0 if kind == "SIGNED" else 65_536
+    expected = np.where(analog < 0, analog + bits, analog)
+    expected = np.where((expected > 32_767) & (bits == 0), expected - 65_536, expected)
+    np.testing.assert_array_equal(read_c3d(result).analog, expected)
+    theirs = ezc3d.c3d(str(result))
+    np.testing.assert_array_equal(theirs["data"]["points"][:3].T, grid()[..., :3] * 0.5)
+    np.testing.assert_array_equal(theirs["parameters"]["EVENT"]["TIMES"]["value"][1], [1.5])
+    np.testing.assert_array_equal(read(result).points, capture.points)
+
+
+def test_memory_stays_near_the_size_of_the_file(tmp_path):
+    path = tmp_path / "long.c3d"
+    rng = np.random.default_rng(4)
+    dense = rng.normal(size=(5000, 100, 3))
+    dense[rng.random((5000, 100)) < 0.05] = np.nan
+    write(Tracks.from_dense(np.arange(5000) / 120, dense, [f"M{i}" for i in range(100)]), path)
+    tracemalloc.start()
+    read(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 6 * path.stat().st_size
 
 
 def test_every_detection_is_in_the_file(tmp_path):

@@ -59,8 +59,8 @@ def from_metres(metres: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
 
     Examples
     --------
-    >>> 0.110406 * 1000, float(from_metres(np.array([0.110406]), "mm")[0])
-    (110.40599999999999, 110.406)
+    >>> 0.000123 * 1000, float(from_metres(np.array([0.000123]), "mm")[0])
+    (0.12300000000000001, 0.123)
     """
     per_metre = PER_METRE[unit]
     if per_metre == 1.0:
