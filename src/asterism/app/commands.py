@@ -1,0 +1,48 @@
+"""The list of commands."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+import asterism
+from asterism.app.corrupt import corrupt
+from asterism.app.estimate import estimate
+from asterism.app.evaluate import evaluate
+from asterism.app.info import info
+from asterism.app.methods import methods, scenes
+from asterism.app.simulate import simulate
+from asterism.app.track import track
+
+__all__ = ["app"]
+
+app = typer.Typer(
+    name="asterism",
+    help="Asterism: name the points of light. Tells which point of an optical motion capture is "
+    "which marker, over time.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"asterism {asterism.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(  # pyright: ignore[reportUnusedFunction]
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version.", callback=_version, is_eager=True),
+    ] = False,
+) -> None:
+    del version
+
+
+for _command in (track, evaluate, info, estimate, methods, corrupt, simulate, scenes):
+    app.command()(_command)

@@ -1,0 +1,108 @@
+"""``asterism corrupt``: a labelled capture becomes an experiment with known truth."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from asterism.app.console import Json, Quiet, print_json, print_table
+from asterism.errors import ParameterError
+
+_In = Annotated[Path, typer.Argument(metavar="IN", help="Labelled capture.")]
+_Out = Annotated[Path, typer.Option("--out", "-o", help="File for the points without names.")]
+_Truth = Annotated[Path, typer.Option(help="File for the same points with their true names.")]
+_Missing = Annotated[float, typer.Option(help="Probability that a detection is dropped.")]
+_Clutter = Annotated[float, typer.Option(help="False points a frame, as a share of the markers.")]
+_Noise = Annotated[float, typer.Option(help="Standard deviation of added noise, metres.")]
+_Burst = Annotated[
+    str | None,
+    typer.Option(
+        metavar="N[:MIN-MAX]",
+        help="Hide up to N markers at a time, for MIN to MAX frames.",
+        show_default=False,
+    ),
+]
+_Ghosts = Annotated[
+    str | None,
+    typer.Option(
+        metavar="N[:MIN-MAX]",
+        help="Add up to N false points at a time beside markers, for MIN to MAX frames.",
+        show_default=False,
+    ),
+]
+_Stride = Annotated[int, typer.Option(help="Keep every so many frames.")]
+_Seed = Annotated[int, typer.Option(help="Chooses everything that is random.")]
+
+
+def corrupt(
+    source: _In,
+    out: _Out,
+    truth: _Truth,
+    missing: _Missing = 0.0,
+    clutter: _Clutter = 0.0,
+    noise: _Noise = 0.0,
+    burst: _Burst = None,
+    ghosts: _Ghosts = None,
+    stride: _Stride = 1,
+    seed: _Seed = 0,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Make an experiment of a labelled capture: spoil it, shuffle it, and keep the truth.
+
+    Points that belong to no named marker are left out: nobody knows whose they are.
+
+    Examples:
+
+        asterism corrupt walk.c3d -o spoilt.c3d --truth truth.c3d
+
+        asterism corrupt walk.c3d -o a.csv --truth t.csv --missing 0.1 --clutter 0.1
+
+        asterism corrupt walk.c3d -o a.c3d --truth t.c3d --noise 0.0003 --burst 5:5-60
+    """
+    import numpy as np
+
+    import asterism as am
+    from asterism.app.files import check_outputs
+    from asterism.simulate import Burst, Ghosts
+
+    check_outputs({"--out": out, "--truth": truth}, [source])
+    hiding = None if burst is None else Burst(**_episodes("--burst", burst))
+    haunting = None if ghosts is None else Ghosts(**_episodes("--ghosts", ghosts))
+    known = am.read_tracks(source)
+    if not known.n_tracks:
+        expected = "a capture whose markers are labelled"
+        raise ParameterError("IN", expected, f"{source}, which has no labels")
+    spoilt = am.simulate.corrupt(
+        known, missing=missing, clutter=clutter, noise=noise, burst=hiding, ghosts=haunting,
+        stride=stride, seed=seed,
+    )  # fmt: skip
+    unnamed = am.Tracks(
+        detections=spoilt.detections, labels=np.full(spoilt.detections.n_points, -1)
+    )
+    am.write(spoilt, truth)
+    am.write(unnamed, out)
+    figures = {
+        "n_frames": spoilt.detections.n_frames,
+        "n_markers": spoilt.n_tracks,
+        "n_detections": spoilt.detections.n_points,
+        "n_dropped": int((known.labels >= 0).sum()) - int((spoilt.labels >= 0).sum()),
+        "n_clutter": int((spoilt.labels < 0).sum()),
+    }
+    if json:
+        print_json({"output": str(out), "truth": str(truth), **figures})
+    elif not quiet:
+        rows = [(name.removeprefix("n_"), n) for name, n in figures.items()]
+        print_table([*rows, ("without names", out), ("truth", truth)])
+
+
+def _episodes(option: str, text: str) -> dict[str, int]:
+    """Read ``N`` or ``N:MIN-MAX``."""
+    match = re.fullmatch(r"(\d+)(?::(\d+)-(\d+))?", text.strip())
+    if match is None:
+        raise ParameterError(option, "N or N:MIN-MAX, 5:5-60 say", repr(text))
+    names = ("n", "shortest", "longest")
+    return {name: int(n) for name, n in zip(names, match.groups(), strict=True) if n is not None}

@@ -1,0 +1,41 @@
+"""``asterism estimate``: the model from the clip."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from asterism.app.console import Json, Quiet, print_json, print_table, progress
+
+_In = Annotated[Path, typer.Argument(metavar="IN", help="Capture.")]
+_Out = Annotated[Path | None, typer.Option("--out", "-o", help="TOML file for the model.")]
+
+
+def estimate(source: _In, out: _Out = None, quiet: Quiet = False, json: Json = False) -> None:
+    """Estimate noise, motion, misses and clutter from the points themselves.
+
+    Examples:
+
+        asterism estimate trial.c3d
+
+        asterism estimate trial.c3d -o model.toml && asterism track trial.c3d --model model.toml
+    """
+    import asterism as am
+    from asterism.app.files import check_outputs
+    from asterism.app.run_folder import write_text
+
+    check_outputs({"--out": out}, [source])
+    capture = am.read(source)
+    with progress("estimating the model"):
+        found = am.estimate_model(capture)
+    if out is not None:
+        write_text(out, found.model.to_toml())
+    if json:
+        reasons = [{"parameter": p, "value": v, "why": why} for p, v, why in found.reasons]
+        print_json({"model": found.model.to_dict(), "reasons": reasons})
+    elif not quiet:
+        print_table(found.reasons, ("parameter", "value", "why"))
+        if out is not None:
+            print_table([("written", out)])

@@ -1,0 +1,57 @@
+"""``asterism evaluate``: how good labels are."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from asterism.app.console import Json, console, print_json
+
+if TYPE_CHECKING:
+    import asterism as am
+
+_Labels = Annotated[Path, typer.Argument(metavar="LABELS", help="What was found.")]
+_Truth = Annotated[Path, typer.Argument(metavar="TRUTH", help="What is so.")]
+_ByFrame = Annotated[
+    Path | None, typer.Option(metavar="FILE.csv", help="Write the scores frame by frame.")
+]
+
+
+def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Json = False) -> None:
+    """Score labels against the truth, detection by detection.
+
+    Both files must hold the same detections, whatever their formats: those at the same time and
+    place are the same. In the truth, points without a name are clutter.
+
+    Examples:
+
+        asterism evaluate spoilt.tracked.c3d truth.c3d
+
+        asterism evaluate tracks.csv truth.c3d --json --by-frame frames.csv
+    """
+    import asterism as am
+    from asterism.app.files import check_outputs
+
+    check_outputs({"--by-frame": by_frame}, [labels, truth])
+    scores = am.evaluate(am.read_tracks(labels), am.read_tracks(truth))
+    if by_frame is not None:
+        _write_by_frame(scores, by_frame)
+    if json:
+        print_json(scores.to_dict())
+    else:
+        console().print(str(scores), markup=False, soft_wrap=True)
+
+
+def _write_by_frame(scores: am.Evaluation, path: Path) -> None:
+    from asterism.app.run_folder import write_text
+
+    columns = scores.by_frame()
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    write_text(path, text.getvalue())

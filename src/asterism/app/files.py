@@ -1,0 +1,46 @@
+"""Where commands may write."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from asterism.errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+
+__all__ = ["check_outputs"]
+
+
+def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | None]) -> None:
+    """Raise if a file would be written that is read, or two into one.
+
+    Parameters
+    ----------
+    outputs : mapping
+        Files to write, by the option that names them.
+    inputs : iterable
+        Files that are read.
+
+    Raises
+    ------
+    ParameterError
+        With the option at fault.
+    """
+    seen = {_identity(path): f"the input {path}" for path in inputs if path is not None}
+    for option, path in outputs.items():
+        if path is None:
+            continue
+        identity = _identity(path)
+        if identity in seen:
+            raise ParameterError(option, "a file of its own", f"{path}, {seen[identity]}")
+        seen[identity] = f"which {option} names too"
+
+
+def _identity(path: Path) -> object:
+    """What two paths share if they are one file: two names of a file are one, links too."""
+    if path.exists() and path.is_file():
+        status = path.stat()
+        return status.st_dev, status.st_ino
+    return path.resolve()

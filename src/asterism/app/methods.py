@@ -1,0 +1,77 @@
+"""``asterism methods`` and ``asterism scenes``: what there is to choose from."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any
+
+from asterism.app.console import Json, print_json, print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from asterism.app.options import Option
+
+
+def methods(json: Json = False) -> None:
+    """List the methods and their options.
+
+    Examples:
+
+        asterism methods
+
+        asterism methods --json
+    """
+    import asterism as am
+    from asterism.app.options import method_options
+
+    _show(
+        {
+            name: (_first_line(method), method_options(method))
+            for name, method in am.METHODS.items()
+        },
+        json,
+    )
+
+
+def scenes(json: Json = False) -> None:
+    """List the scenes that can be simulated and their options.
+
+    Examples:
+
+        asterism scenes
+    """
+    import asterism as am
+    from asterism.app.options import scene_options
+
+    _show(
+        {
+            name: (scene.about, scene_options(scene.make))
+            for name, scene in am.simulate.SCENES.items()
+        },
+        json,
+    )
+
+
+def _show(things: Mapping[str, tuple[str, Mapping[str, Option]]], json: bool) -> None:
+    if json:
+        print_json({name: _plain(about, options) for name, (about, options) in things.items()})
+        return
+    for i, (name, (about, options)) in enumerate(things.items()):
+        rows = [(f"  {o.name}", o.type_text, str(o.default), o.about) for o in options.values()]
+        title = ("\n" if i else "") + f"{name}: {about}"
+        print_table(rows, ("  option", "type", "default", "meaning"), title=title)
+
+
+def _plain(about: str, options: Mapping[str, Option]) -> dict[str, Any]:
+    return {
+        "about": about,
+        "options": {
+            o.name: {"type": o.type_text, "default": o.default, "about": o.about}
+            for o in options.values()
+        },
+    }
+
+
+def _first_line(documented: object) -> str:
+    return inspect.cleandoc(documented.__doc__ or "").split("\n", 1)[0]

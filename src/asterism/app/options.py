@@ -1,0 +1,162 @@
+"""Options derived from the library: names, types, defaults and texts are those of the API."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+import types
+import typing
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, Union
+
+from asterism.errors import ParameterError, check_fields
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from asterism.associate import Method
+
+__all__ = ["Option", "method_options", "parsed", "scene_options"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """One option of a method or a scene.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    kind : object
+        Its type, as annotated.
+    default : object
+        Its default.
+    about : str
+        What the docstring says of it.
+    """
+
+    name: str
+    kind: Any
+    default: Any
+    about: str
+
+    @property
+    def type_text(self) -> str:
+        """The type as people write it."""
+        if typing.get_origin(self.kind) is Literal:
+            return "|".join(map(str, typing.get_args(self.kind)))
+        return getattr(self.kind, "__name__", str(self.kind))
+
+    def parse(self, text: str) -> Any:
+        """Read a value of this option.
+
+        Raises
+        ------
+        ParameterError
+            If the text is not of its type; its range is for the library to check.
+        """
+        return _parse(self.name, self.kind, text)
+
+
+def method_options(method: type[Method[Any]]) -> dict[str, Option]:
+    """Give the options of a method by name: the fields of its dataclass."""
+    if not dataclasses.is_dataclass(method):
+        return {}
+    kinds = typing.get_type_hints(method)
+    about: dict[str, str] = {}
+    for kind in method.__mro__:  # a subclass often only says where its base explains the option
+        about |= _about_parameters(kind)
+    return {
+        f.name: Option(
+            name=f.name, kind=kinds[f.name], default=f.default, about=about.get(f.name, "")
+        )
+        for f in dataclasses.fields(method)
+        if f.init
+    }
+
+
+def scene_options(scene: Callable[..., Any]) -> dict[str, Option]:
+    """Give the options of a scene by name: the arguments of its function."""
+    about = _about_parameters(scene)
+    kinds = typing.get_type_hints(scene)
+    arguments = inspect.signature(scene).parameters
+    return {
+        a.name: Option(
+            name=a.name,
+            kind=kinds[a.name],
+            default=a.default,
+            about=about.get(a.name, ""),
+        )
+        for a in arguments.values()
+    }
+
+
+def parsed(owner: str, texts: Sequence[str], known: dict[str, Option]) -> dict[str, Any]:
+    """Read ``NAME=VALUE`` texts.
+
+    Parameters
+    ----------
+    owner : str
+        Whose options they are, for the messages.
+    texts : sequence of str
+        As given on the command line; of one name the last counts.
+    known : dict
+        The options there are.
+
+    Returns
+    -------
+    dict
+        Values by name.
+
+    Raises
+    ------
+    ParameterError
+        At a text without ``=``, an unknown name, or a value of another type.
+    """
+    values: dict[str, Any] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        name = name.strip().replace("-", "_")
+        if not equals:
+            raise ParameterError("--option", "NAME=VALUE", repr(text))
+        if not known:
+            raise ParameterError(owner, "no options", repr(name))
+        check_fields(f"option of {owner}", [name], known)
+        values[name] = known[name].parse(value.strip())
+    return values
+
+
+def _parse(name: str, kind: Any, text: str) -> Any:
+    if kind is bool:
+        words = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+        if text.lower() not in words:
+            raise ParameterError(name, "true or false", repr(text))
+        return words[text.lower()]
+    if kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            what = "a whole number" if kind is int else "a number"
+            raise ParameterError(name, what, repr(text)) from None
+    if typing.get_origin(kind) in (Union, types.UnionType):
+        inner = [k for k in typing.get_args(kind) if k is not type(None)]
+        return None if text.lower() == "none" else _parse(name, inner[0], text)
+    if typing.get_origin(kind) is Literal:
+        choices = [str(choice) for choice in typing.get_args(kind)]
+        check_fields(name, [text], choices)
+        return typing.get_args(kind)[choices.index(text)]
+    return text
+
+
+def _about_parameters(documented: object) -> dict[str, str]:
+    """Read the section ``Parameters`` of a NumPy-style docstring."""
+    doc = inspect.cleandoc(getattr(documented, "__doc__", None) or "")
+    section = re.search(r"^Parameters\n-+\n(.*?)(?=^\S[^\n]*\n---|\Z)", doc, re.M | re.S)
+    about: dict[str, str] = {}
+    if section is None:
+        return about
+    for entry in re.finditer(r"^(\S[^\n]*?) : [^\n]*\n((?:[ \t]+[^\n]*\n?|\n)*)", section[1], re.M):
+        text = " ".join(entry[2].split())
+        about |= {name.strip(): text for name in entry[1].split(",")}
+    return about

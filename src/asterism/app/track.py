@@ -1,0 +1,175 @@
+"""``asterism track``: detections in, tracks out."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.errors import FormatError, ParameterError, check_number
+
+if TYPE_CHECKING:
+    import asterism as am
+
+log = logging.getLogger(__name__)
+
+_In = Annotated[Path | None, typer.Argument(metavar="IN", help="Capture to track.")]
+_Out = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", help="File to write; by default IN with .tracked in its name."),
+]
+_Format = Annotated[
+    str | None, typer.Option(help="Format of the result; by default told by its name.")
+]
+_Method = Annotated[
+    str | None, typer.Option(help="Method, one of `asterism methods`.", show_default="gnn")
+]
+_Options = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="NAME=VALUE", help="Option of the method; may be repeated."),
+]
+_Model = Annotated[
+    Path | None,
+    typer.Option(help="Model to use, TOML; by default it is estimated from the capture."),
+]
+_Seed = Annotated[int | None, typer.Option(help="For methods that draw.", show_default="0")]
+_Run = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Folder for the result and all that is needed to repeat it."),
+]
+_From = Annotated[
+    Path | None,
+    typer.Option(
+        "--from", metavar="RUN.TOML", help="Repeat a run; IN says where its input is now."
+    ),
+]
+_Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let DIR hold files already.")]
+
+
+def track(
+    source: _In = None,
+    out: _Out = None,
+    format: _Format = None,
+    method: _Method = None,
+    option: _Options = None,
+    model: _Model = None,
+    seed: _Seed = None,
+    run: _Run = None,
+    overwrite: _Overwrite = False,
+    repeat: _From = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Tell which detection is which marker, and write the tracks.
+
+    The model is estimated from the capture unless one is given; names in the capture play no part.
+    The same input, options and seed give the same bytes.
+
+    Examples:
+
+        asterism track trial.c3d
+
+        asterism track trial.c3d --method smp --option proposers=detections
+
+        asterism track trial.c3d -o tracks.csv --model model.toml
+
+        asterism track trial.c3d --run runs/first
+
+        asterism track --from runs/first/run.toml -o again.c3d
+    """
+    import asterism as am
+    from asterism.app.run_folder import Job, new_folder, sha256_of
+    from asterism.app.tracking import carry_out, default_output, output_format
+
+    estimate: am.ModelEstimate | None = None
+    if repeat is not None:
+        settings = {"--method": method, "--option": option, "--model": model, "--seed": seed}
+        job, capture = _repeated(repeat, source, [name for name in settings if settings[name]])
+        job = dataclasses.replace(job, format=output_format(capture, out, format or job.format))
+    else:
+        if source is None:
+            raise ParameterError("IN", "a capture to track", "nothing", "asterism track --help")
+        name, options = _method(method or "gnn", option or [])
+        check_number("--seed", seed or 0, above=0, closed=True, integer=True)
+        given = None if model is None else _read_model(model)
+        capture = am.read(source)
+        chosen_format = output_format(capture, out, format)
+        if given is None:
+            with progress("estimating the model"):
+                estimate = am.estimate_model(capture)
+            given = estimate.model
+        job = Job(
+            source=source, sha256=sha256_of(source), method=name, options=options,
+            model=given, seed=seed or 0, format=chosen_format,
+        )  # fmt: skip
+    if out is None:
+        out = default_output(job.source, job.format)
+        out = out if run is None else run / out.name
+    if run is not None:
+        new_folder(run, overwrite=overwrite)
+    talks = not (quiet or json)
+    if talks:
+        _print_capture(capture)
+        if estimate is not None:
+            print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
+    summary = carry_out(job, capture, out, run)
+    if talks:
+        print_table(summary.rows(), title=f"\nTracked with {job.method}")
+    if json:
+        print_json(summary.to_dict() | {"options": job.options, "model": job.model.to_dict()})
+
+
+def _method(name: str, texts: list[str]) -> tuple[str, dict[str, Any]]:
+    """Check a method and its options; give all of them, the defaults too."""
+    import asterism as am
+    from asterism.app.options import method_options, parsed
+    from asterism.errors import check_fields
+
+    check_fields("method", [name], am.METHODS)
+    known = method_options(am.METHODS[name])
+    given = parsed(f"method {name}", texts, known)
+    made = am.method_by_name(name, **given)
+    return name, {option: getattr(made, option) for option in known}
+
+
+def _read_model(path: Path) -> am.TrackingModel:
+    import asterism as am
+
+    try:
+        return am.TrackingModel.from_toml(path)
+    except OSError as error:
+        raise FormatError(path, "opening", "a model in TOML", error.strerror) from error
+
+
+def _repeated(path: Path, source: Path | None, settings: list[str]) -> tuple[Any, am.Capture]:
+    """Read a run and its capture, which must be the same byte for byte."""
+    import asterism as am
+    from asterism.app.run_folder import Job, sha256_of
+
+    if settings:
+        raise ParameterError("--from", "the settings of the run alone", ", ".join(settings))
+    job = Job.from_toml(path)
+    job = dataclasses.replace(job, source=source or job.source)
+    if not job.source.is_file():
+        hint = "say where it is now: asterism track IN --from RUN.TOML"
+        raise FormatError(job.source, "opening", "the input of the run", "nothing there", hint)
+    found = sha256_of(job.source)
+    if found != job.sha256:
+        raise FormatError(
+            job.source, "its SHA-256", f"{job.sha256}, as {path} says", found,
+            "a run can only be repeated with the same input",
+        )  # fmt: skip
+    return job, am.read(job.source)
+
+
+def _print_capture(capture: am.Capture) -> None:
+    rate = capture.rate or (1 / capture.step if capture.step else 0.0)
+    print_table(
+        [(capture.path, f"{capture.n_frames} frames, {capture.n_points} points, {rate:g} Hz")]
+    )
+    for warning in capture.warnings:
+        log.warning("%s: %s", capture.path, warning)
