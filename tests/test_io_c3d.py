@@ -202,8 +202,8 @@ def test_more_than_65535_frames(tmp_path):
     [
         [("POINT", "LONG_FRAMES", 4, (), reals([70_000]))],
         [
-            ("TRIAL", "ACTUAL_START_FIELD", 2, (2,), integers([1, 0])),
-            ("TRIAL", "ACTUAL_END_FIELD", 2, (2,), integers([70_000 - 65536, 1])),
+            ("TRIAL", "ACTUAL_START_FIELD", 2, (2,), integers([5, 1])),
+            ("TRIAL", "ACTUAL_END_FIELD", 2, (2,), integers([70_004 - 65_536, 2])),
         ],
     ],
 )
@@ -211,6 +211,7 @@ def test_long_files_of_other_makers(load, more):
     points = np.ones((70_000, 1, 4))
     capture = load(points, labels=["A"], frames=0xFFFF, header_last=0xFFFF, more=more)
     assert capture.n_frames == 70_000
+    assert capture.first_frame == (65_541 if more[0][0] == "TRIAL" else 1)
 
 
 def test_header_and_parameters_disagree(load):
