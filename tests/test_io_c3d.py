@@ -415,7 +415,12 @@ def test_names_do_not_collide(tmp_path):
     write(Tracks.from_dense([0, 1, 2], dense, ["T001", None, None, "T003"]), tmp_path / "a.c3d")
     labels = ezc3d.c3d(str(tmp_path / "a.c3d"))["parameters"]["POINT"]["LABELS"]["value"]
     assert labels == ["T001", "T001_", "T002", "T003"]
-    assert read(tmp_path / "a.c3d").names == ("T001", None, None, "T003")
+    capture = read(tmp_path / "a.c3d")
+    assert capture.names == ("T001", None, None, "T003")
+    # A name that is given later is a name, also where it is the one that was made up.
+    named = Tracks(detections=capture, labels=capture.labels, names=("A", "B", "T002", None))
+    write(named, tmp_path / "b.c3d")
+    assert read(tmp_path / "b.c3d").names == ("A", "B", "T002", None)
 
 
 def test_times_must_be_regular_and_points_3d(tmp_path):

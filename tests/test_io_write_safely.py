@@ -98,6 +98,18 @@ def test_an_error_on_the_way_leaves_nothing(tmp_path):
     assert names_in(tmp_path) == ["a.trc"]
 
 
+def test_the_old_file_is_replaced_and_not_written_over(tracks, tmp_path):
+    """Who has the old file open, or holds it by another link, keeps it as it was."""
+    path, held, link = (tmp_path / name for name in ("a.csv", "held", "link.csv"))
+    path.write_text("the old content")
+    held.hardlink_to(path)
+    link.symlink_to(path)
+    write(tracks, link)
+    assert held.read_text() == "the old content"
+    assert link.is_symlink()
+    assert read(path).n_points == 200
+
+
 def test_rights_are_those_of_any_new_file(tracks, tmp_path):
     write(tracks, tmp_path / "a.csv")
     (tmp_path / "plain").touch()

@@ -79,6 +79,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     if source is not None:
         old_names, old_texts = channel_names(source), channel_descriptions(source)
         text_of = dict(zip(old_names, old_texts, strict=True))
+        text_of = {name: t for name, t in text_of.items() if t not in (UNNAMED, CLUTTER)}
         descriptions = [
             text or text_of.get(name, "") for text, name in zip(descriptions, names, strict=True)
         ]
@@ -88,13 +89,13 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         header, groups, analog = source.header, source.groups, source.analog
         scale, n_samples = source.scale, source.n_samples
 
-    last_frame = first_frame + d.n_frames - 1
     _set_parameters(groups, names, descriptions, d.n_frames, first_frame, rate, unit, scale)
     n_blocks = len(build(groups)) // BLOCK
     groups["POINT"].parameters["DATA_START"] = Parameter.of_integers([2 + n_blocks])
-    words = np.frombuffer(header, "<u2").copy()
+    words = np.frombuffer(header, "<u2").copy()  # keeps the events that old programs put there
     words[0] = 0x5002  # parameters in block 2, and the mark of a C3D
-    words[1:5] = len(names), analog.shape[1], min(first_frame, 0xFFFF), min(last_frame, 0xFFFF)
+    words[1:3] = len(names), analog.shape[1]
+    words[3:5] = np.minimum([first_frame, first_frame + d.n_frames - 1], 0xFFFF)
     words[6:8] = np.array([-scale], "<f4").view("<u2")
     words[8:10] = 2 + n_blocks, n_samples
     words[10:12] = np.array([rate], "<f4").view("<u2")
