@@ -25,7 +25,7 @@ class Assignment {
   // alone are left untouched.
   void solve(std::span<const Candidate> group, std::span<std::int32_t> match) {
     if (group.size() == 1) {
-      match[group[0].row] = group[0].column;
+      if (group[0].gain > 0) match[group[0].row] = group[0].column;
       return;
     }
     compress(group);

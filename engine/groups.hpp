@@ -11,7 +11,7 @@ namespace asterism {
 // One possible pairing of a track (row) with a detection (column).
 struct Candidate {
   std::int32_t row = 0, column = 0;
-  double gain = 0;       // nats won by the pairing over leaving both alone; > 0
+  double gain = 0;       // nats won by the pairing over leaving both alone
   double distance2 = 0;  // squared distance of prediction and detection
 };
 

@@ -34,7 +34,8 @@ struct MotionState {
   std::array<double, kMaxModes> w{};
 };
 
-// Every mode begins alike; their first weights are the stationary ones, found by squaring T.
+// Every mode begins alike; their first weights are the stationary ones, found by squaring T. Its
+// rows are brought back to sum 1 each time: squaring doubles what rounding has added.
 inline MotionState begin_state(const MotionModel& m, const Point& y) {
   MotionState s;
   const AxisState first = begin_state(m.axis, y);
@@ -46,7 +47,11 @@ inline MotionState begin_state(const MotionModel& m, const Point& y) {
     for (int a = 0; a < m.M; ++a)
       for (int c = 0; c < m.M; ++c)
         for (int b = 0; b < m.M; ++b) next[a * m.M + b] += T[a * m.M + c] * T[c * m.M + b];
-    T = next;
+    for (int a = 0; a < m.M; ++a) {
+      double sum = 0;
+      for (int b = 0; b < m.M; ++b) sum += next[a * m.M + b];
+      for (int b = 0; b < m.M; ++b) T[a * m.M + b] = next[a * m.M + b] / sum;
+    }
   }
   for (int b = 0; b < m.M; ++b) {
     s.mode[b] = first;
