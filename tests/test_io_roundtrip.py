@@ -198,6 +198,26 @@ def _labels(c3d):
     return point["LABELS"]["value"] + point.get("LABELS2", {"value": []})["value"]
 
 
+@pytest.mark.parametrize("form", ["c3d", "trc", "csv", "csv-wide", "qtm", "pointcloud"])
+@pytest.mark.parametrize("n_frames", [0, 1, 3])
+@pytest.mark.parametrize("n_markers", [0, 1, 2])
+@pytest.mark.parametrize("seen", [True, False])
+def test_next_to_nothing(form, n_frames, n_markers, seen, tmp_path):
+    """No frames, no markers, nothing seen, or one of each."""
+    if form == "pointcloud" and n_frames == 0:
+        pytest.skip("a log without a record is an empty file, which is refused")
+    dense = np.full((n_frames, n_markers, 3), 1.5 if seen else np.nan)
+    tracks = Tracks.from_dense(np.arange(n_frames) / 100, dense, ["A", "B"][:n_markers])
+    write(tracks, tmp_path / "a", format=form)
+    again = read_tracks(tmp_path / "a", format=form)
+    np.testing.assert_array_equal(again.detections.points, tracks.detections.points)
+    np.testing.assert_array_equal(again.detections.times, tracks.detections.times)
+    if form != "pointcloud":
+        assert again.names == tracks.names
+    write(again, tmp_path / "b", format=form)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
 def test_every_written_format_has_its_round_trip():
     """A new format must find its way into the tests above."""
     assert [name for name, f in FORMATS.items() if f.write] == [

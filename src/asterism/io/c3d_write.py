@@ -75,7 +75,8 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     analog = np.empty((d.n_frames, 0), dtype=np.float32)
     scale, n_samples = 1.0, 0
     if isinstance(d, Capture):
-        unit, first_frame = d.units, d.first_frame if 0 <= d.first_frame < 2**31 else 1
+        unit = d.units
+        first_frame = d.first_frame if d.n_frames and 0 <= d.first_frame < 2**31 else 1
     if source is not None:
         old_names, old_texts = channel_names(source), channel_descriptions(source)
         text_of = dict(zip(old_names, old_texts, strict=True))

@@ -54,7 +54,8 @@ def read(path: Path) -> Capture:
     """
     lines = read_lines(path)
     titles = cells_of(lines[0])
-    axes = "xyz" if any(title.endswith("_z") for title in titles) else "xy"
+    is_flat = len(titles) > 1 and not any(title.endswith("_z") for title in titles)
+    axes = "xy" if is_flat else "xyz"
     names = [title[:-2] for title in titles[1 :: len(axes)]]
     wanted = ["time_s"] + [f"{name}_{axis}" for name in names for axis in axes]
     if titles != wanted:
