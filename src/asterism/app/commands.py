@@ -8,6 +8,7 @@ import typer
 
 import asterism
 from asterism.app.corrupt import corrupt
+from asterism.app.demo import demo
 from asterism.app.estimate import estimate
 from asterism.app.evaluate import evaluate
 from asterism.app.info import info
@@ -44,5 +45,5 @@ def _root(  # pyright: ignore[reportUnusedFunction]
     del version
 
 
-for _command in (track, evaluate, info, estimate, methods, corrupt, simulate, scenes):
+for _command in (track, evaluate, info, estimate, methods, corrupt, simulate, scenes, demo):
     app.command()(_command)

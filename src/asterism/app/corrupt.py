@@ -55,7 +55,7 @@ def corrupt(
 
     Points that belong to no named marker are left out: nobody knows whose they are.
 
-    Examples:
+    For example:
 
         asterism corrupt walk.c3d -o spoilt.c3d --truth truth.c3d
 

@@ -16,7 +16,7 @@ _Out = Annotated[Path | None, typer.Option("--out", "-o", help="TOML file for th
 def estimate(source: _In, out: _Out = None, quiet: Quiet = False, json: Json = False) -> None:
     """Estimate noise, motion, misses and clutter from the points themselves.
 
-    Examples:
+    For example:
 
         asterism estimate trial.c3d
 

@@ -27,7 +27,7 @@ def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Js
     Both files must hold the same detections, whatever their formats: those at the same time and
     place are the same. In the truth, points without a name are clutter.
 
-    Examples:
+    For example:
 
         asterism evaluate spoilt.tracked.c3d truth.c3d
 

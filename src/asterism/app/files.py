@@ -39,7 +39,7 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | No
 
 
 def _identity(path: Path) -> object:
-    """What two paths share if they are one file: two names of a file are one, links too."""
+    """Give what two paths share if they lead to one file, by other names or links too."""
     if path.exists() and path.is_file():
         status = path.stat()
         return status.st_dev, status.st_ino

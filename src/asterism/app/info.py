@@ -19,7 +19,7 @@ _File = Annotated[Path, typer.Argument(metavar="FILE", help="Capture to look at.
 def info(file: _File, json: Json = False) -> None:
     """Say what a capture holds, what is odd about it, and how hard its markers are to tell apart.
 
-    Examples:
+    For example:
 
         asterism info trial.c3d
 

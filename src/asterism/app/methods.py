@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def methods(json: Json = False) -> None:
     """List the methods and their options.
 
-    Examples:
+    For example:
 
         asterism methods
 
@@ -37,7 +37,7 @@ def methods(json: Json = False) -> None:
 def scenes(json: Json = False) -> None:
     """List the scenes that can be simulated and their options.
 
-    Examples:
+    For example:
 
         asterism scenes
     """

@@ -33,7 +33,7 @@ def simulate(
 ) -> None:
     """Simulate markers in motion and write them with their names; spoil them with `corrupt`.
 
-    Examples:
+    For example:
 
         asterism simulate crossing -o truth.c3d --rate 100
 

@@ -69,7 +69,7 @@ def track(
     The model is estimated from the capture unless one is given; names in the capture play no part.
     The same input, options and seed give the same bytes.
 
-    Examples:
+    For example:
 
         asterism track trial.c3d
 
@@ -88,12 +88,13 @@ def track(
     estimate: am.ModelEstimate | None = None
     if repeat is not None:
         settings = {"--method": method, "--option": option, "--model": model, "--seed": seed}
-        job, capture = _repeated(repeat, source, [name for name in settings if settings[name]])
+        given_too = [name for name, value in settings.items() if value not in (None, [])]
+        job, capture = _repeated(repeat, source, given_too)
         job = dataclasses.replace(job, format=output_format(capture, out, format or job.format))
     else:
         if source is None:
             raise ParameterError("IN", "a capture to track", "nothing", "asterism track --help")
-        name, options = _method(method or "gnn", option or [])
+        name, options = resolved_method(method or "gnn", option or [])
         check_number("--seed", seed or 0, above=0, closed=True, integer=True)
         given = None if model is None else _read_model(model)
         capture = am.read(source)
@@ -116,15 +117,15 @@ def track(
         _print_capture(capture)
         if estimate is not None:
             print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
-    summary = carry_out(job, capture, out, run)
+    _, summary = carry_out(job, capture, out, run)
     if talks:
         print_table(summary.rows(), title=f"\nTracked with {job.method}")
     if json:
         print_json(summary.to_dict() | {"options": job.options, "model": job.model.to_dict()})
 
 
-def _method(name: str, texts: list[str]) -> tuple[str, dict[str, Any]]:
-    """Check a method and its options; give all of them, the defaults too."""
+def resolved_method(name: str, texts: list[str]) -> tuple[str, dict[str, Any]]:
+    """Check the name of a method and its ``NAME=VALUE`` options; give all, the defaults too."""
     import asterism as am
     from asterism.app.options import method_options, parsed
     from asterism.errors import check_fields

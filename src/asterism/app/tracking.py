@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from asterism.app.run_folder import Job
 
-__all__ = ["Gap", "Summary", "carry_out", "output_format", "summarize"]
+__all__ = ["Gap", "Summary", "carry_out", "default_output", "output_format", "summarize"]
 
 log = logging.getLogger(__name__)
 
@@ -156,7 +156,9 @@ def default_output(source: Path, format: str) -> Path:
     return source.with_name(f"{source.stem}.tracked{ending}")
 
 
-def carry_out(job: Job, capture: am.Capture, out: Path, folder: Path | None) -> Summary:
+def carry_out(
+    job: Job, capture: am.Capture, out: Path, folder: Path | None
+) -> tuple[am.Tracks, Summary]:
     """Track, and write the result and, where a folder is given, the run's files.
 
     Parameters
@@ -172,15 +174,15 @@ def carry_out(job: Job, capture: am.Capture, out: Path, folder: Path | None) -> 
 
     Returns
     -------
-    Summary
+    Tracks, Summary
     """
     if folder is None:
-        return _carry_out(job, capture, out)[1]
+        return _carry_out(job, capture, out)
     with writing_log(folder):
         write_text(folder / CONFIG, job.to_toml())
-        summary = _carry_out(job, capture, out)[1]
+        tracks, summary = _carry_out(job, capture, out)
         write_text(folder / SUMMARY, to_json(summary.to_dict()) + "\n")
-        return summary
+        return tracks, summary
 
 
 def _carry_out(job: Job, capture: am.Capture, out: Path) -> tuple[am.Tracks, Summary]:

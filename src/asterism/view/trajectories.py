@@ -1,0 +1,86 @@
+"""Where the markers went."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asterism.view.style import CLUTTER, CYCLE, INK, new_axes, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from asterism.model import Tracks
+
+__all__ = ["plot_trajectories"]
+
+_MANY = 5000  # dots beyond which a vector file holds them as one image
+
+
+def plot_trajectories(tracks: Tracks, ax: Axes | None = None) -> Axes:
+    """Draw the path of every track, and clutter as grey dots.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        2-D or 3-D; a path is broken where its track was not seen.
+    ax : Axes, optional
+        Where to draw; three-dimensional for 3-D tracks. A new figure unless given.
+
+    Returns
+    -------
+    Axes
+        Metres on all axes, to one scale.
+    """
+    d = tracks.detections
+    is_solid = d.n_axes == 3
+    axes: Any = ax if ax is not None else new_axes(solid=is_solid, height=7.0)
+    clutter = d.points[tracks.labels < 0]
+    if len(clutter):
+        axes.scatter(
+            *clutter.T, s=5, c=CLUTTER, alpha=0.6, linewidths=0, label="clutter",
+            rasterized=len(clutter) > _MANY,
+        )  # fmt: skip
+    order, offsets = tracks.by_track
+    for k in range(tracks.n_tracks):
+        members = order[offsets[k] : offsets[k + 1]]
+        if not len(members):
+            continue
+        points, frames = d.points[members], d.frame_of[members]
+        holes = np.flatnonzero(np.diff(frames) > 1) + 1
+        path = np.insert(points, holes, np.nan, axis=0)
+        colour = CYCLE[k % len(CYCLE)]
+        axes.plot(*path.T, color=colour, linewidth=1.0)
+        axes.plot(*points[-1:].T, color=colour, marker="o", markersize=3.5, linestyle="none")
+    _to_scale(axes, d.points, is_solid)
+    n_clutter = f", {len(clutter)} points of clutter" if len(clutter) else ""
+    axes.set_title(f"{tracks.n_tracks} tracks{n_clutter}", fontsize=11, color=INK, loc="left")
+    return axes
+
+
+def _to_scale(axes: Any, points: np.ndarray[Any, Any], is_solid: bool) -> None:
+    for name in "xyz"[: points.shape[1]]:
+        getattr(axes, f"set_{name}label")(f"{name} [m]", color=INK)
+    if not is_solid:
+        axes.set_aspect("equal", adjustable="datalim")
+        tidy(axes)
+        return
+    axes.tick_params(colors=INK, labelsize=8)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.pane.set_facecolor("white")
+        axis.pane.set_edgecolor(CLUTTER)
+    if not len(points):
+        return
+    low, high = points.min(axis=0), points.max(axis=0)
+    # An axis on which hardly anything moves still gets room for its numbers.
+    extent = np.maximum(high - low, max(0.25 * float((high - low).max()), 1e-3))
+    middle = (low + high) / 2
+    for i, name in enumerate("xyz"):
+        half = 0.52 * float(extent[i])
+        getattr(axes, f"set_{name}lim")(float(middle[i]) - half, float(middle[i]) + half)
+        # Numbers every so often in metres, not on the pixel: a short axis has room for a few only.
+        getattr(axes, f"{name}axis").get_major_locator().set_params(
+            nbins=max(2, round(7 * float(extent[i] / extent.max())))
+        )
+    axes.set_box_aspect(extent, zoom=0.85)  # room for the names of the axes
