@@ -1,0 +1,185 @@
+"""A frame-by-frame tracker as one would write it on a blackboard: lists, dictionaries, SciPy.
+
+It shares nothing with the engine but the definitions: what a gain is, when a track is believed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.stats import chi2
+
+import asterism as am
+
+
+class OneTrack:
+    def __init__(self, model: am.TrackingModel, time: float, point, detection: int) -> None:
+        s, p = model.sensor, model.population
+        self.modes = model.motion.modes
+        self.T = np.asarray(model.motion.mode_transitions)
+        M = len(self.modes)
+        self.w = np.linalg.lstsq(
+            np.vstack([self.T.T - np.eye(M), np.ones(M)]), np.eye(M + 1)[M], rcond=None
+        )[0]
+        self.h, self.r = self.modes[0].observation, s.noise_sigma**2
+        self.x = [np.outer(point, self.h / (self.h @ self.h)) for _ in self.modes]
+        self.P = [model.initial_covariance(len(point)) for _ in self.modes]
+        self.score = math.log(p.birth_density * s.p_detection / s.clutter_density)
+        self.best = self.score
+        self.id, self.gap, self.last, self.last_time = -1, 0, np.array(point), time
+        self.pending = [detection]
+
+    def predict(self, dt: float) -> None:
+        D = len(self.x[0])
+        prior = self.w @ self.T
+        mixed_x, mixed_P = [], []
+        for b, mode in enumerate(self.modes):
+            share = self.w * self.T[:, b] / prior[b]
+            mean = sum(share[a] * self.x[a] for a in range(len(self.modes)))
+            P = sum(
+                share[a] * (self.P[a] + (self.x[a] - mean).T @ (self.x[a] - mean) / D)
+                for a in range(len(self.modes))
+            )
+            F, Q = mode.transition(dt)[0], mode.process_noise(dt)[0]
+            mixed_x.append(mean @ F.T)
+            mixed_P.append(F @ P @ F.T + Q)
+        self.x, self.P, self.w = mixed_x, mixed_P, prior
+        self.S = np.array([self.h @ P @ self.h + self.r for P in self.P])
+
+    def densities(self, y) -> np.ndarray:
+        D = len(y)
+        e2 = np.array([((y - x @ self.h) ** 2).sum() for x in self.x])
+        return self.w * np.exp(-0.5 * e2 / self.S) / (2 * np.pi * self.S) ** (D / 2)
+
+    def within(self, y, gate: float) -> bool:
+        e2 = np.array([((y - x @ self.h) ** 2).sum() for x in self.x])
+        return bool((e2 <= gate * self.S).any())
+
+    def distance(self, y) -> float:
+        widest = int(np.argmax(self.S))
+        return float(((y - self.x[widest] @ self.h) ** 2).sum())
+
+    def update(self, y) -> None:
+        each = self.densities(y)
+        for b in range(len(self.modes)):
+            K = self.P[b] @ self.h / self.S[b]
+            self.x[b] = self.x[b] + np.outer(y - self.x[b] @ self.h, K)
+            self.P[b] = self.P[b] - np.outer(K, K) * self.S[b]
+        self.w = each / each.sum()
+
+
+def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) -> np.ndarray:
+    """Labels of every detection, by the slow tracker."""
+    s, p = model.sensor, model.population
+    gate = chi2.isf(method.gate_probability, detections.n_axes)
+    survive = math.log1p(-p.p_disappear)
+    miss = survive + math.log1p(-s.p_detection)
+    hit = survive + math.log(s.p_detection / s.clutter_density)
+    leftover = math.log1p(p.birth_density * s.p_detection / s.clutter_density)
+    confirm = math.log(method.confirm_probability / (1 - method.confirm_probability))
+    labels = np.full(detections.n_points, -1)
+    tracks: list[OneTrack] = []
+    next_id = 0
+    for t in range(detections.n_frames):
+        now, points = detections.times[t], detections.frame(t)
+        gains = np.full((len(tracks), len(points)), -np.inf)
+        for i, track in enumerate(tracks):
+            track.predict(round(now - detections.times[t - 1], 9))
+            reach = p.max_speed * (now - track.last_time) + 6 * s.noise_sigma
+            missed = np.logaddexp(0, track.score + miss) + leftover
+            for j, y in enumerate(points):
+                if np.linalg.norm(y - track.last) > reach or not track.within(y, gate):
+                    continue
+                total = track.densities(y).sum()
+                if total <= 0:
+                    continue
+                gain = np.logaddexp(0, track.score + hit + math.log(total)) - missed
+                if gain > 0:
+                    gains[i, j] = gain
+        match = pair(tracks, points, gains, method)
+        for i, track in enumerate(tracks):
+            j = match.get(i)
+            if j is None:
+                track.score += miss
+                track.gap += 1
+                continue
+            y, detection = points[j], int(detections.offsets[t]) + j
+            track.score += hit + math.log(track.densities(y).sum())
+            track.update(y)
+            track.gap, track.last, track.last_time = 0, y, now
+            track.pending.append(detection)
+            if track.id < 0 and track.score >= confirm:
+                track.id, next_id = next_id, next_id + 1
+            if track.id >= 0:
+                labels[track.pending] = track.id
+                track.pending = []
+        for track in tracks:
+            track.best = max(track.best, track.score)
+        tracks = [
+            track
+            for track in tracks
+            if track.gap < p.max_gap
+            and (track.id >= 0 or track.best - track.score <= math.log(method.delete_odds))
+        ]
+        taken = set(match.values())
+        for j, y in enumerate(points):
+            if j not in taken:
+                tracks.append(OneTrack(model, now, y, int(detections.offsets[t]) + j))
+    return labels
+
+
+def pair(tracks, points, gains, method) -> dict[int, int]:
+    if isinstance(method, am.GNN):
+        n, m = gains.shape
+        padded = np.zeros((n + m, n + m))
+        padded[:n, :m] = np.where(np.isfinite(gains), -gains, 1e9)
+        rows, columns = linear_sum_assignment(padded)
+        return {int(i): int(j) for i, j in zip(rows, columns, strict=True) if i < n and j < m}
+    n, m = gains.shape
+    far = 1e6
+    for_point = {
+        (i, j): tracks[i].distance(points[j]) + (0 if tracks[i].id >= 0 else far)
+        for i in range(n)
+        for j in range(m)
+    }
+    if method.proposers == "tracks":
+        lists = [
+            sorted(np.flatnonzero(np.isfinite(gains[i])), key=lambda j: -gains[i, j])
+            for i in range(n)
+        ]
+        partners = propose(lists, for_point)
+        return {i: j for i, j in enumerate(partners) if j >= 0}
+    lists = [
+        sorted(np.flatnonzero(np.isfinite(gains[:, j])), key=lambda i: for_point[i, j])
+        for j in range(m)
+    ]
+    partners = propose(lists, {(j, i): -gains[i, j] for i in range(n) for j in range(m)})
+    return {i: j for j, i in enumerate(partners) if i >= 0}
+
+
+def propose(lists, costs) -> list[int]:
+    """Deferred acceptance in rounds: all the free propose at once (Gale & Shapley's own form)."""
+    lists = [[int(r) for r in wishes] for wishes in lists]
+    partner = [-1] * len(lists)
+    holder: dict[int, int] = {}
+    free = [p for p, wishes in enumerate(lists) if wishes]
+    while free:
+        again = []
+        for p in free:
+            if not lists[p]:
+                continue
+            r = lists[p].pop(0)
+            rival = holder.get(r)
+            if rival is None or (costs[p, r], p) < (costs[rival, r], rival):
+                holder[r], partner[p] = p, r
+                if rival is not None:
+                    partner[rival] = -1
+                    again.append(rival)
+            else:
+                again.append(p)
+        free = again
+    return partner
+
+
