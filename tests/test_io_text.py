@@ -230,6 +230,7 @@ def test_csv_by_others(load):
     )  # fmt: skip
     assert tracks.names == ("L, x", None)
     np.testing.assert_array_equal(tracks.labels, [0, 1, 0])
+    np.testing.assert_array_equal(tracks.detections.points, [[1, 2], [9, 8], [1, 2]])
     bare = load("frame,time_s,x_m,y_m\n1,0,1,2\n", "a.csv")
     np.testing.assert_array_equal(bare.labels, [-1])
     assert load("frame,time_s,x_m,y_m,z_m\n", "a.csv").n_frames == 0
@@ -239,9 +240,10 @@ def test_csv_by_others(load):
     ("old", "new", "place"),
     [
         ("1,0.0,4.0", "1,0.0", "line 3: expected 8 columns"),
-        ("4.0,5.0", "4.0,five", "line 3, column y_m: expected a number"),
+        ("4.0,5.0", "4.0,five", "line 3, column y_m: expected a finite number"),
         ("4.0,5.0", "4.0,", "line 3: expected a frame, a time and all coordinates"),
-        ("4.0,5.0", "4.0,inf", "line 3"),
+        ("4.0,5.0", "4.0,inf", "line 3, column y_m: expected a finite number"),
+        ("4.0,5.0,6.0", "inf,inf,inf", "line 3, column x_m: expected a finite number"),
         ("1,0.0,4.0", "1,0.1,4.0", "line 3: expected the time of the other rows of frame 1"),
         ("3,0.05", "3,0.005", "line 5: expected a time after 0.01 s"),
         ("3,0.05", "3,-0.05", "line 5: expected a time after 0.01 s"),

@@ -78,7 +78,8 @@ def _load(path: Path) -> tuple[Capture, Tracks]:
     numbers, names = _parse(path, lines, header)
     frame, time = numbers["frame"], numbers["time_s"]
     track = _whole(path, "track", np.nan_to_num(numbers["track"], nan=-1.0), -1, _MOST_TRACKS)
-    points = np.stack([numbers[axis] for axis in header if axis in ("x_m", "y_m", "z_m")], axis=1)
+    axes = [axis for axis in ("x_m", "y_m", "z_m") if axis in header]
+    points = np.stack([numbers[axis] for axis in axes], axis=1)
 
     n_given = np.isfinite(points).sum(axis=1)
     is_declaration = np.isnan(frame) & np.isnan(time) & (n_given == 0)
@@ -162,15 +163,21 @@ def _split(path: Path, line: str, number: int) -> list[str]:
 
 def _numbers(path: Path, column: str, cells: list[str], line: int) -> NDArray[np.float64]:
     try:
-        return np.array([cell or "nan" for cell in cells], dtype=np.float64)
-    except ValueError as error:
-        for i, cell in enumerate(cells):
-            try:
-                float(cell or "nan")
-            except ValueError:
-                place = f"line {line + i}, column {column}"
-                raise FormatError(path, place, "a number or nothing", repr(cell)) from error
-        raise
+        values = np.array([cell or "nan" for cell in cells], dtype=np.float64)
+    except ValueError:
+        values = np.array([_number_or_inf(cell) for cell in cells])
+    bad = np.flatnonzero(np.isinf(values))
+    if len(bad):
+        place = f"line {line + bad[0]}, column {column}"
+        raise FormatError(path, place, "a finite number or nothing", repr(cells[bad[0]]))
+    return values
+
+
+def _number_or_inf(cell: str) -> float:
+    try:
+        return float(cell.strip() or "nan")
+    except ValueError:
+        return np.inf
 
 
 def _whole(

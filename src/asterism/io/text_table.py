@@ -29,13 +29,11 @@ _GAPS = {"", "null", "nan", "none"}
 def read_lines(path: Path) -> list[str]:
     """Lines of a text file: UTF-8, UTF-16 if it says so, else Latin-1; any line ends."""
     raw = path.read_bytes()
-    for encoding in ("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig", "latin-1"):
-        try:
-            text = raw.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    return []
+    try:
+        text = raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def cells_of(line: str) -> list[str]:
