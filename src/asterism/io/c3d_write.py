@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from dataclasses import replace
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
+import asterism
 from asterism.errors import FormatError
 from asterism.io.c3d import (
     CLUTTER,
@@ -206,6 +206,5 @@ def _set_parameters(
         analog.parameters["USED"] = Parameter.of_integers([0])
     if "MANUFACTURER" not in groups:
         maker = groups["MANUFACTURER"] = Group()
-        version = importlib.metadata.version("asterism")
-        for key, text in (("SOFTWARE", "Asterism"), ("VERSION_LABEL", version)):
+        for key, text in (("SOFTWARE", "Asterism"), ("VERSION_LABEL", asterism.__version__)):
             maker.parameters[key] = Parameter.of_strings([text])
