@@ -21,7 +21,7 @@ from asterism.io.c3d_layout import C3DFile, read_c3d
 from asterism.io.c3d_parameters import BLOCK, Group, Parameter, build
 from asterism.io.channels import fill, to_channels
 from asterism.io.rates import fixed_rate
-from asterism.io.units import from_metres, to_float32
+from asterism.io.units import PER_METRE, to_float32
 from asterism.model import Capture
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         block = row[: rows.stop - begin]
         dense = fill(tracks, channels, n_own, rows)
         seen = ~np.isnan(dense[..., 0])
-        values = to_float32(from_metres(dense, unit))
+        values = to_float32(dense * PER_METRE[unit])  # 32 bits forgive the last bit of 64
         values[~seen] = 0
         values[seen & (values == 0).all(axis=-1), 0] = _NEAR_ORIGIN
         block[:, :n_own, :3] = values

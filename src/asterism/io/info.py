@@ -120,7 +120,8 @@ def describe(capture: Capture) -> CaptureInfo:
     confusion = 100 * n_confused / n_followed if n_followed else np.nan
     rate = capture.rate or (1 / capture.step if capture.step else 0.0)
     counts = capture.counts
-    difficulty, reason = _verdict(confusion, steps, spacing)
+    absent = 100 * n_missing / n_present if n_present else np.nan
+    difficulty, reason = _verdict(confusion, absent, steps, spacing)
     others = capture.channels[~is_named & (capture.channels >= 0)]
     return CaptureInfo(
         path=capture.path,
@@ -137,7 +138,7 @@ def describe(capture: Capture) -> CaptureInfo:
         points_min=int(counts.min()) if len(counts) else 0,
         points_mean=float(counts.mean()) if len(counts) else 0.0,
         points_max=int(counts.max(initial=0)),
-        absent_percent=100 * n_missing / n_present if n_present else np.nan,
+        absent_percent=float(absent),
         n_gaps=len(gaps),
         gap_median=float(np.median(gaps)) if len(gaps) else 0.0,
         gap_longest=int(gaps.max(initial=0)),
@@ -211,7 +212,10 @@ def _neighbours(
 
 
 def _verdict(
-    confusion: float, steps: NDArray[np.float64], spacing: NDArray[np.float64]
+    confusion: float,
+    absent: float,
+    steps: NDArray[np.float64],
+    spacing: NDArray[np.float64],
 ) -> tuple[str, str]:
     if np.isnan(confusion) or not len(spacing):
         what = "the file has no identities to compare" if np.isnan(confusion) else "single points"
@@ -221,6 +225,8 @@ def _verdict(
         f"for {confusion:.2g} % of the points the nearest in the next frame is another marker; "
         f"fast ones move {pace:.2g} times the distance of close ones"
     )
+    if absent > 10:
+        reason += f"; {absent:.2g} % of the samples are absent"
     if confusion > 5:
         return "hard", reason
-    return ("moderate" if confusion > 0.5 or pace > 1 else "easy"), reason
+    return ("moderate" if confusion > 0.5 or pace > 1 or absent > 10 else "easy"), reason
