@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import multivariate_normal
 
-from asterism.model import TrackingModel
+if TYPE_CHECKING:
+    from asterism.model import TrackingModel
 
 
 def kalman(model: TrackingModel, times, frames, points):
@@ -82,9 +84,7 @@ def imm_log_densities(model: TrackingModel, times, frames, points):
         for b in range(M):
             share = w * T[:, b] / prior[b]
             mean = sum(share[a] * x[a] for a in range(M))
-            spread = sum(
-                share[a] * (P[a] + (x[a] - mean).T @ (x[a] - mean) / D) for a in range(M)
-            )
+            spread = sum(share[a] * (P[a] + (x[a] - mean).T @ (x[a] - mean) / D) for a in range(M))
             F, Q = modes[b].transition(dt)[0], modes[b].process_noise(dt)[0]
             new_x.append(mean @ F.T)
             new_P.append(F @ spread @ F.T + Q)

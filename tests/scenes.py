@@ -40,9 +40,7 @@ def small_model(**changes) -> am.TrackingModel:
 
 def interacting() -> am.InteractingMotions:
     return am.InteractingMotions(
-        models=tuple(
-            am.DWNA(acceleration_sigma=a, velocity_sigma=0.8) for a in (0.3, 3.0, 30.0)
-        ),
+        models=tuple(am.DWNA(acceleration_sigma=a, velocity_sigma=0.8) for a in (0.3, 3.0, 30.0)),
         transitions=np.array([[0.9, 0.08, 0.02], [0.1, 0.85, 0.05], [0.2, 0.3, 0.5]]),
     )
 

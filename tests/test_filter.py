@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracles import imm_log_densities, kalman, rts
-from scenes import interacting, small_model, wanderers
 
 import asterism as am
+from oracles import imm_log_densities, kalman, rts
+from scenes import interacting, small_model, wanderers
 
 MOTIONS = {
     "dwna": am.DWNA(acceleration_sigma=2.0, velocity_sigma=0.8),

@@ -7,10 +7,10 @@ import itertools
 
 import numpy as np
 import pytest
-from frame_oracle import track_by_hand
-from scenes import interacting, small_model, wanderers
 
 import asterism as am
+from frame_oracle import track_by_hand
+from scenes import interacting, small_model, wanderers
 
 METHODS = {
     "gnn": am.GNN(),
@@ -33,9 +33,9 @@ def stream(method, model, detections, **options):
 def same_partition(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether two labellings group alike, whatever the numbers."""
     pairs = np.unique(np.stack([a, b]), axis=1)
-    return all(len(np.unique(side)) == pairs.shape[1] for side in pairs) and (
-        (a < 0) == (b < 0)
-    ).all()
+    return (
+        all(len(np.unique(side)) == pairs.shape[1] for side in pairs) and ((a < 0) == (b < 0)).all()
+    )
 
 
 def test_every_registered_method_is_in_the_table():
@@ -161,9 +161,7 @@ def test_clutter_alone_gives_no_track(method):
     rng = np.random.default_rng(8)
     frames = [rng.uniform(-2, 2, (3, 3)) for _ in range(200)]
     model = small_model(clutter_density=3 / 64, birth_density=1e-4)
-    tracks = am.track(
-        am.Detections.from_frames(np.arange(200) * 0.1, frames), method, model=model
-    )
+    tracks = am.track(am.Detections.from_frames(np.arange(200) * 0.1, frames), method, model=model)
     assert tracks.n_tracks == 0
     assert (tracks.labels == -1).all()
 

@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from oracles import imm_log_densities, kalman, track_score
-from scenes import interacting, small_model, wanderers
 
 import asterism as am
+from oracles import imm_log_densities, kalman, track_score
+from scenes import interacting, small_model, wanderers
 
 
 @pytest.mark.parametrize("termination", ["marginal", "last"])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import best_pairing, is_blocking, stable_matchings
 
 from asterism import _engine
+from oracles import best_pairing, is_blocking, stable_matchings
 
 
 def sparse(gains: np.ndarray):
@@ -95,7 +95,7 @@ def test_the_engine_refuses_what_would_corrupt_memory():
     good = (np.array([0, 1], np.int32), np.array([0, 1], np.int32), np.array([1.0, 1.0]))
     assert _engine.assign(2, 2, *good).tolist() == [0, 1]
     for rows, columns in (([0, 5], [0, 1]), ([0, 1], [0, -1]), ([1, 0], [0, 1])):
-        with pytest.raises(ValueError, match="indices|ordered"):
+        with pytest.raises(ValueError, match=r"indices|ordered"):
             _engine.assign(2, 2, np.array(rows, np.int32), np.array(columns, np.int32), good[2])
     with pytest.raises(ValueError, match="receivers"):
         _engine.marry(np.array([0, 1]), np.array([3], np.int32), np.array([0.0]), 2)

@@ -38,10 +38,11 @@ if TYPE_CHECKING:
 
 __all__ = ["ModelEstimate", "estimate_model"]
 
-SAMPLE_POINTS = 120_000
+SAMPLE_POINTS = 60_000
 """Longer captures are read in pieces, spread evenly, of so many detections in all."""
 N_PIECES = 8
 N_ROUNDS = 3
+LEAST_LINKS = 10
 WIDER = 3.0
 SAFE_SHARE = 1 / 6
 """A jolt's σ may move a marker by this share of the points' spacing in a frame."""
@@ -107,14 +108,14 @@ def estimate_model(detections: Detections) -> ModelEstimate:
     )
     model = _first_model(fit, scales, region)
     evidence = _evidence(pieces, _wider(model))
-    for i in range(N_ROUNDS):
-        if evidence.n_links < 10:
-            break
+    for _ in range(N_ROUNDS):
         fit = fit_motion(evidence.tracks, model, fit, bounds)
-        if i == N_ROUNDS - 1:
-            fit = simpler_motion(evidence.tracks, model, fit, bounds)
         model = _model(fit, evidence, scales, region)
         evidence = _evidence(pieces, _wider(model))
+    fit = simpler_motion(evidence.tracks, model, fit, bounds)
+    # Motion is learnt with a wider model, but the rates are those of the model itself.
+    evidence = _evidence(pieces, _model(fit, evidence, scales, region))
+    model = _model(fit, evidence, scales, region)
     return ModelEstimate(model=model, reasons=_reasons(model, evidence, region))
 
 
@@ -222,15 +223,24 @@ def _evidence(pieces: list[Detections], model: TrackingModel) -> _Evidence:
         clutter += int((found.labels < 0).sum())
         speeds.append(np.linalg.norm(moves, axis=1) / dt)
         squares.append(((moves / dt[:, None]) ** 2).mean(axis=1))
-    all_squares = np.concatenate(squares)
-    return _Evidence(
+    evidence = _Evidence(
         tracks=tracks,
         n_misses=misses,
         n_clutter=clutter,
         n_frames=sum(piece.n_frames for piece in pieces),
         speeds=np.concatenate(speeds),
-        velocity_rms=math.sqrt(float(all_squares.mean())) if len(all_squares) else 0.0,
+        velocity_rms=math.sqrt(float(np.concatenate(squares).mean()))
+        if any(map(len, squares))
+        else 0.0,
     )
+    if evidence.n_links < LEAST_LINKS:
+        raise ParameterError(
+            "detections",
+            f"tracks with at least {LEAST_LINKS} links in all, to estimate a model from",
+            f"{evidence.n_links}",
+            "give a model",
+        )
+    return evidence
 
 
 def _model(fit: MotionFit, evidence: _Evidence, scales: Scales, region: _Region) -> TrackingModel:

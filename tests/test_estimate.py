@@ -1,0 +1,104 @@
+"""The model from the clip: near the truth where there is one, sensible on whatever comes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import asterism as am
+from scenes import wanderers
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_scale_of_everything_is_found(seed):
+    rng = np.random.default_rng(seed)
+    truth = wanderers(rng, n_markers=12, n_frames=250, missing=0.15, clutter=2.0)
+    model = am.estimate_model(truth.detections).model
+    assert 0.8 < model.sensor.noise_sigma / 0.005 < 1.25
+    seen = (truth.labels >= 0).mean() * truth.detections.n_points / (12 * 250)
+    assert model.sensor.p_detection == pytest.approx(seen, abs=0.02)
+    volume = np.prod(np.ptp(truth.detections.points, axis=0))
+    clutter = (truth.labels < 0).sum() / 250
+    assert model.sensor.clutter_density * volume == pytest.approx(clutter, rel=0.15)
+    levels = [mode.acceleration_sigma for mode in model.motion.modes]
+    assert 0.6 < levels[len(levels) // 2] / 1.5 < 1.7
+    assert model.population.max_gap >= 4
+
+
+def test_two_kinds_of_motion_are_told_apart():
+    # Half of the markers rest; the others are shaken a hundred times as much as they tremble.
+    rng = np.random.default_rng(1)
+    n = 300
+    still = np.cumsum(rng.normal(0, 1e-5, (n, 10, 3)), axis=0)
+    shaken = np.cumsum(np.cumsum(rng.normal(0, 0.01, (n, 10, 3)), axis=0) * 0.1, axis=0)
+    positions = np.concatenate([still, shaken], axis=1) + rng.uniform(-5, 5, (20, 3))
+    positions += rng.normal(0, 1e-4, positions.shape)
+    truth = am.Tracks.from_dense(np.arange(n) * 0.1, positions)
+    estimate = am.estimate_model(truth.detections)
+    levels = [mode.acceleration_sigma for mode in estimate.model.motion.modes]
+    assert len(levels) == 3
+    assert levels[0] < 0.1 * levels[1]
+    assert am.evaluate(am.track(truth.detections, model=estimate.model), truth).idf1 > 0.99
+
+
+def test_names_and_order_are_not_looked_at():
+    rng = np.random.default_rng(2)
+    d = wanderers(rng, n_frames=60).detections
+    order = np.concatenate(
+        [rng.permutation(np.arange(a, b)) for a, b in zip(d.offsets, d.offsets[1:], strict=False)]
+    )
+    shuffled = am.Detections(times=d.times, offsets=d.offsets, points=d.points[order])
+    a, b = am.estimate_model(d).model, am.estimate_model(shuffled).model
+    assert a.sensor.noise_sigma == pytest.approx(b.sensor.noise_sigma, rel=1e-6)
+    assert a.population == b.population
+
+
+def test_the_same_clip_gives_the_same_model():
+    d = wanderers(np.random.default_rng(3), n_frames=60).detections
+    assert am.estimate_model(d).model == am.estimate_model(d).model
+
+
+def test_lengths_in_another_unit_scale_with_it():
+    d = wanderers(np.random.default_rng(4), n_frames=60).detections
+    double = am.Detections(times=d.times, offsets=d.offsets, points=d.points * 2)
+    a, b = am.estimate_model(d).model, am.estimate_model(double).model
+    assert b.sensor.noise_sigma == pytest.approx(2 * a.sensor.noise_sigma, rel=0.05)
+    assert b.population.max_speed == pytest.approx(2 * a.population.max_speed, rel=0.05)
+    assert b.sensor.clutter_density == pytest.approx(a.sensor.clutter_density / 8, rel=0.05)
+
+
+def test_reasons_name_every_parameter():
+    estimate = am.estimate_model(wanderers(np.random.default_rng(5)).detections)
+    text = str(estimate)
+    for symbol in ("σ", "σ_a", "v̄", "P_d", "λ_f", "λ_b", "p_z", "d̄"):
+        assert any(name.endswith(symbol) for name, _, _ in estimate.reasons), symbol
+        assert symbol in text
+
+
+@pytest.mark.parametrize(
+    ("frames", "message"),
+    [
+        ([], "at least 3 frames"),
+        ([[], [], []], "at least 3 frames"),
+        ([[[0.0, 0, 0]], [[0.0, 0, 0]]], "at least 3 frames"),
+        ([[[0.0, 0, 0]], [], [[0.0, 0, 0]], [], [[0.0, 0, 0]]], "followed from frame to frame"),
+    ],
+)
+def test_too_little_to_learn_from_is_said(frames, message):
+    d = am.Detections.from_frames(np.arange(len(frames)) * 0.1, frames)
+    with pytest.raises(am.ParameterError, match=message):
+        am.estimate_model(d)
+
+
+def test_points_that_never_move_and_are_never_missed():
+    positions = np.tile(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), (50, 1, 1))
+    truth = am.Tracks.from_dense(np.arange(50) * 0.01, positions)
+    tracks = am.track(truth.detections)
+    assert am.evaluate(tracks, truth).idf1 == 1.0
+
+
+def test_one_marker_in_the_plane():
+    t = np.arange(100) * 0.02
+    positions = np.stack([np.cos(t), np.sin(t)], axis=1)[:, None]
+    truth = am.Tracks.from_dense(t, positions)
+    assert am.evaluate(am.track(truth.detections), truth).idf1 == 1.0

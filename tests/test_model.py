@@ -1,0 +1,198 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+import asterism as am
+from scenes import interacting, small_model
+
+ONE = [[0.0, 0.0, 0.0]]
+
+
+@given(
+    hnp.arrays(
+        np.float64,
+        st.tuples(st.integers(0, 6), st.integers(0, 4), st.sampled_from([2, 3])),
+        elements=st.one_of(st.floats(-10, 10), st.just(np.nan)),
+    )
+)
+def test_dense_positions_come_back(positions):
+    times = np.arange(len(positions)) * 0.1
+    tracks = am.Tracks.from_dense(times, positions)
+    hidden = np.isnan(positions).any(axis=2)
+    expected = np.where(hidden[..., None], np.nan, positions)
+    assert np.array_equal(tracks.positions(), expected, equal_nan=True)
+    assert tracks.detections.n_points == (~hidden).sum()
+    assert [len(points) for _, points in tracks.detections] == (~hidden).sum(axis=1).tolist()
+
+
+def test_frames_come_back():
+    frames = [[[1, 2, 3]], [], [[4, 5, 6], [7, 8, 9]]]
+    d = am.Detections.from_frames([0, 1, 3], frames)
+    assert [points.tolist() for _, points in d] == frames
+    assert d.frame_of.tolist() == [0, 2, 2]
+    assert (d.n_frames, d.n_points, d.n_axes, len(d)) == (3, 3, 3, 3)
+    assert d.step == 1.5
+
+
+@pytest.mark.parametrize(
+    ("times", "frames", "message"),
+    [
+        ([0, 0], [ONE, ONE], "times: expected strictly increasing .* at frames 0 and 1"),
+        ([0, 2, 1], [ONE] * 3, "2 then 1 at frames 1 and 2"),
+        ([0, np.nan], [ONE, ONE], r"times: expected finite numbers, got nan at index \(1,\)"),
+        ([0], [ONE, ONE], "frames: expected 1 arrays"),
+        ([0, 1], [ONE, [[0.0, 0]]], r"frames\[1\]: expected an array of shape \(n, 3\)"),
+        ([0, 1], [ONE, [[0.0, 0, np.inf]]], r"frames\[1\]: expected finite numbers, got inf"),
+        ([0], [[[1.0]]], "points: expected 2 or 3 coordinates"),
+        ([0], [[["x", "y", "z"]]], "of numbers"),
+    ],
+)
+def test_bad_detections_say_what_and_where(times, frames, message):
+    with pytest.raises(am.ParameterError, match=message):
+        am.Detections.from_frames(times, frames)
+
+
+def test_detections_cannot_be_changed_from_outside():
+    d = am.Detections.from_frames([0], [ONE])
+    with pytest.raises(ValueError, match="read-only"):
+        d.points[0] = 1
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        d.points = np.zeros((1, 3))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"labels": [0]}, r"labels: expected an array of shape \(2,\)"),
+        ({"labels": [0, -2]}, "labels: expected track numbers"),
+        ({"labels": [0, 0]}, "at most one detection of a track in a frame, got two of track 0"),
+        ({"labels": [0.5, 1.0]}, "labels"),
+        ({"names": ("a",)}, "names: expected a name or None for each of 2"),
+        ({"confidence": [0.5, 1.5]}, r"confidence: expected probabilities in \[0, 1\], got 1.5"),
+    ],
+)
+def test_bad_tracks_say_what(changes, message):
+    d = am.Detections.from_frames([0], [[[0.0, 0, 0], [1, 0, 0]]])
+    with pytest.raises(am.ParameterError, match=message):
+        am.Tracks(**{"detections": d, "labels": [0, 1], **changes})
+
+
+def test_tracks_without_detections_are_kept():
+    d = am.Detections.from_frames([0], [ONE])
+    tracks = am.Tracks(detections=d, labels=[1], names=("unseen", "seen", None))
+    assert tracks.n_tracks == 3
+    assert tracks.lengths.tolist() == [0, 1, 0]
+    order, offsets = tracks.by_track
+    assert (order.tolist(), offsets.tolist()) == ([0], [0, 0, 1, 1])
+
+
+MODELS = {
+    "dwna": small_model(),
+    "random walk": small_model(motion=am.RandomWalk(walk_sigma=0.1), termination="last"),
+    "dwpa": small_model(motion=am.DWPA(increment_sigma=1.0, acceleration_prior_sigma=3.0)),
+    "interacting": small_model(motion=interacting()),
+    "linear": small_model(
+        motion=am.LinearMotion(
+            F=[[1, 0.1], [0, 0.9]], Q=np.eye(2) * 1e-3, H=[1, 0], step=0.1,
+            prior_covariance=np.eye(2),
+        )
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_toml_both_ways(model, tmp_path):
+    path = tmp_path / "model.toml"
+    text = model.to_toml(path)
+    assert path.read_text(encoding="utf-8") == text
+    again = am.TrackingModel.from_toml(path)
+    assert again == model
+    assert hash(again) == hash(model)
+    assert again.to_toml() == text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("noise_sigma", "noise_sgima", "did you mean 'noise_sigma'"),
+        ("[sensor]", "[sensro]", "did you mean 'sensor'"),
+        ('kind = "dwna"', 'kind = "magic"', "model.motion.kind: expected one of dwna"),
+        ("p_detection = 0.9", "p_detection = 1.5", r"p_detection: expected a number in \(0, 1\)"),
+        ("max_gap = 4", "max_gap = 2.5", "max_gap: expected a whole number"),
+        ("max_speed = 4.0", "", "model.population.max_speed: expected a value, got nothing"),
+        ("[motion]", "[motion", "expected TOML"),
+        ('termination = "marginal"', 'termination = "soon"', "termination: expected 'marginal'"),
+    ],
+)
+def test_a_bad_model_file_is_named_with_the_place(old, new, message, tmp_path):
+    path = tmp_path / "model.toml"
+    text = small_model().to_toml()
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(am.FormatError, match=message) as caught:
+        am.TrackingModel.from_toml(path)
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: am.DWNA(acceleration_sigma=0), "acceleration_sigma"),
+        (lambda: am.RandomWalk(walk_sigma=float("nan")), "walk_sigma"),
+        (lambda: am.DWNA(acceleration_sigma=True), "acceleration_sigma: expected a number"),
+        (
+            lambda: am.LinearMotion(F=np.eye(2), Q=-np.eye(2), H=[1, 0], step=1,
+                                    prior_covariance=np.eye(2)),
+            "Q: expected a positive semi-definite",
+        ),
+        (
+            lambda: am.LinearMotion(F=np.eye(2), Q=np.eye(2), H=[0, 0], step=1,
+                                    prior_covariance=np.eye(2)),
+            "H: expected a row that sees the state",
+        ),
+        (
+            lambda: am.InteractingMotions(
+                models=(am.DWNA(acceleration_sigma=1), am.RandomWalk(walk_sigma=1)),
+                transitions=[[0.5, 0.5], [0.5, 0.5]],
+            ),
+            "single motions of one kind",
+        ),
+        (
+            lambda: am.InteractingMotions(
+                models=(am.DWNA(acceleration_sigma=1),) * 2, transitions=[[0.5, 0.4], [0.5, 0.5]]
+            ),
+            "rows that sum to 1",
+        ),
+    ],
+)  # fmt: skip
+def test_bad_motions_say_what(make, message):
+    with pytest.raises(am.ParameterError, match=message):
+        make()
+
+
+def test_matrices_for_one_step_refuse_what_they_do_not_describe():
+    motion = MODELS["linear"].motion.modes[0]
+    F = motion.transition([0.1, 0.3])
+    assert np.allclose(F[1], np.linalg.matrix_power(F[0], 3))
+    Q = motion.process_noise([0.2])[0]
+    assert np.allclose(Q, F[0] @ motion.process_noise([0.1])[0] @ F[0].T + np.eye(2) * 1e-3)
+    with pytest.raises(am.ParameterError, match="multiple of the motion model's step"):
+        motion.transition([0.15])
+
+
+def test_errors_survive_a_process_boundary():
+    import pickle
+
+    for error in (
+        am.ParameterError("a", "b", "c", "d"),
+        am.FormatError("f.c3d", "byte 3", "x", "y", "z"),
+        am.SolverLimit("pairs", 3, 2, "less"),
+    ):
+        again = pickle.loads(pickle.dumps(error))
+        assert (type(again), str(again)) == (type(error), str(error))
