@@ -181,5 +181,3 @@ def propose(lists, costs) -> list[int]:
                 again.append(p)
         free = again
     return partner
-
-

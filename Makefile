@@ -1,0 +1,67 @@
+# Everything, on a machine with Python ≥ 3.11, make and a C++20 compiler. See CONTRIBUTING.md.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: demo test lint types contracts docs bench tables sanitize wheel clean
+
+demo: $(VENV)/.demo
+	$(BIN)/asterism demo --output demo
+
+test: $(VENV)/.test
+	$(BIN)/python -m pytest --doctest-modules --doctest-continue-on-failure
+
+lint: $(VENV)/.lint
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/codespell
+
+types: $(VENV)/.lint
+	$(BIN)/pyright
+
+contracts: $(VENV)/.lint
+	$(BIN)/lint-imports
+
+docs: $(VENV)/.docs
+	$(BIN)/mkdocs build --strict --quiet
+
+bench: $(VENV)/.bench
+	$(BIN)/python benchmarks/speed.py
+
+# The table of captures in the docs; needs the real captures beside the project.
+tables: $(VENV)/.bench
+	$(BIN)/python benchmarks/captures.py
+
+# The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
+# beside the package, never installed.
+sanitize: $(VENV)/.test
+	$(BIN)/python -m pip install --quiet cmake ninja nanobind
+	PATH="$(CURDIR)/$(BIN):$$PATH" cmake -S . -B build/sanitize -G Ninja \
+	  -DASTERISM_SANITIZE=ON -DASTERISM_WERROR=ON -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
+	  -Dnanobind_DIR="$$($(BIN)/python -m nanobind --cmake_dir)"
+	PATH="$(CURDIR)/$(BIN):$$PATH" cmake --build build/sanitize
+	$(BIN)/python tests/run_sanitized.py build/sanitize
+
+wheel: $(VENV)/.python
+	$(BIN)/python -m pip install --quiet build
+	$(BIN)/python -m build --outdir dist
+
+clean:
+	rm -rf $(VENV) build dist site demo
+
+# One stamp for each set of extras; a newer pyproject.toml or engine installs again.
+SOURCES := pyproject.toml CMakeLists.txt $(wildcard engine/*)
+
+$(VENV)/.python:
+	$(PYTHON) -c 'import sys; sys.exit("asterism needs Python 3.11 or newer: set PYTHON=python3.x") if sys.version_info < (3, 11) else None'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	touch $@
+
+$(VENV)/.demo: $(VENV)/.python $(SOURCES)
+	$(BIN)/python -m pip install --quiet -e .
+	touch $@
+
+$(VENV)/.%: $(VENV)/.python $(SOURCES)
+	$(BIN)/python -m pip install --quiet -e '.[$*]'
+	touch $@
