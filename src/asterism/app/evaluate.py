@@ -20,12 +20,15 @@ _ByFrame = Annotated[
     Path | None, typer.Option(metavar="FILE.csv", help="Write the scores frame by frame.")
 ]
 
+_MARKS_CLUTTER = ("c3d", "csv")  # as Asterism writes them
+
 
 def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Json = False) -> None:
     """Score labels against the truth, detection by detection.
 
     Both files must hold the same detections, whatever their formats: those at the same time and
-    place are the same. In the truth, points without a name are clutter.
+    place are the same. In the truth, points without a name are clutter; in the labels only where
+    the format has no other word for clutter (TRC, TSV, a row a frame).
 
     For example:
 
@@ -37,13 +40,29 @@ def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Js
     from asterism.app.files import check_outputs
 
     check_outputs({"--by-frame": by_frame}, [labels, truth])
-    scores = am.evaluate(am.read_tracks(labels), am.read_tracks(truth))
+    scores = am.evaluate(_read_labels(labels), am.read_tracks(truth))
     if by_frame is not None:
         _write_by_frame(scores, by_frame)
     if json:
         print_json(scores.to_dict())
     else:
         console().print(str(scores), markup=False, soft_wrap=True)
+
+
+def _read_labels(path: Path) -> am.Tracks:
+    """Read tracks; unnamed ones among named ones are clutter where the format cannot say so."""
+    import numpy as np
+
+    import asterism as am
+
+    tracks = am.read_tracks(path)
+    has_name = np.array([name is not None for name in tracks.names], dtype=bool)
+    source = tracks.detections
+    says_so = isinstance(source, am.Capture) and source.format in _MARKS_CLUTTER
+    if says_so or not has_name.any():
+        return tracks
+    number = np.append(np.where(has_name, np.arange(len(has_name)), -1), -1)
+    return am.Tracks(detections=source, labels=number[tracks.labels], names=tracks.names)
 
 
 def _write_by_frame(scores: am.Evaluation, path: Path) -> None:

@@ -14,7 +14,7 @@ __all__ = ["check_outputs"]
 
 
 def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | None]) -> None:
-    """Raise if a file would be written that is read, or two into one.
+    """Raise before any work if a file would be written that is read, two into one, or nowhere.
 
     Parameters
     ----------
@@ -36,6 +36,8 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | No
         if identity in seen:
             raise ParameterError(option, "a file of its own", f"{path}, {seen[identity]}")
         seen[identity] = f"which {option} names too"
+        if not path.resolve().parent.is_dir():
+            raise ParameterError(option, "a file in a folder that exists", path)
 
 
 def _identity(path: Path) -> object:

@@ -22,11 +22,21 @@ from asterism.io.atomic import replacing
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-__all__ = ["Job", "new_folder", "sha256_of", "write_text", "writing_log"]
+__all__ = [
+    "CONFIG",
+    "FILES",
+    "LOG",
+    "SUMMARY",
+    "Job",
+    "new_folder",
+    "sha256_of",
+    "write_text",
+    "writing_log",
+]
 
 log = logging.getLogger(__name__)
 
-CONFIG, LOG, SUMMARY = "run.toml", "log.txt", "summary.json"
+FILES = CONFIG, LOG, SUMMARY = "run.toml", "log.txt", "summary.json"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -39,7 +39,10 @@ _Model = Annotated[
 _Seed = Annotated[int | None, typer.Option(help="For methods that draw.", show_default="0")]
 _Run = Annotated[
     Path | None,
-    typer.Option(metavar="DIR", help="Folder for the result and all that is needed to repeat it."),
+    typer.Option(
+        metavar="DIR",
+        help="Folder for what repeats the run, and for the result unless -o says otherwise.",
+    ),
 ]
 _From = Annotated[
     Path | None,
@@ -82,9 +85,11 @@ def track(
         asterism track --from runs/first/run.toml -o again.c3d
     """
     import asterism as am
-    from asterism.app.run_folder import Job, new_folder, sha256_of
+    from asterism.app.files import check_outputs
+    from asterism.app.run_folder import FILES, Job, new_folder, sha256_of
     from asterism.app.tracking import carry_out, default_output, output_format
 
+    check_outputs({"-o": out}, [source, model, repeat])
     estimate: am.ModelEstimate | None = None
     if repeat is not None:
         settings = {"--method": method, "--option": option, "--model": model, "--seed": seed}
@@ -112,6 +117,9 @@ def track(
         out = out if run is None else run / out.name
     if run is not None:
         new_folder(run, overwrite=overwrite)
+        check_outputs(
+            {"--run": out} | {f"--run ({f})": run / f for f in FILES}, [job.source, model, repeat]
+        )
     talks = not (quiet or json)
     if talks:
         _print_capture(capture)
