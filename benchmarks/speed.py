@@ -1,0 +1,150 @@
+"""Speed of the frame-by-frame methods beside a SciPy + NumPy loop, in one process, on one core.
+
+Scene: `simulate.smooth`, 10 % missing, 10 % clutter, noise 0.005; model with one motion at the
+scene's own scale, and the same with three. Each figure is the best of several runs.
+
+    python benchmarks/speed.py [--markdown FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from peer import track_in_numpy
+
+import asterism as am
+
+SIZES = ((8, 20_000), (50, 4_000), (200, 1_000), (1000, 200))
+
+
+def model_of(capture: am.Tracks, motions: int) -> am.TrackingModel:
+    """The scene's own rates, and one or three motions around its acceleration."""
+    extent = float(np.prod(np.ptp(capture.detections.points, axis=0)))
+    n_frames = capture.detections.n_frames
+    levels = (0.006,) if motions == 1 else (0.003, 0.006, 0.06)
+    single = tuple(am.DWNA(acceleration_sigma=a, velocity_sigma=0.03) for a in levels)
+    motion: am.Motion = single[0]
+    if motions == 3:
+        motion = am.InteractingMotions(
+            models=single,
+            transitions=np.array([[0.95, 0.045, 0.005], [0.045, 0.95, 0.005], [0.25, 0.25, 0.5]]),
+        )
+    clutter = float((capture.labels < 0).sum()) / n_frames / extent
+    return am.TrackingModel(
+        motion=motion,
+        sensor=am.Sensor(noise_sigma=0.005, p_detection=0.9, clutter_density=clutter),
+        population=am.Population(
+            birth_density=1 / extent / n_frames, p_disappear=1e-5, max_speed=0.2, max_gap=8
+        ),
+    )
+
+
+def best_of(runs: int, work: Any) -> float:
+    """Least time of several runs, seconds."""
+    times: list[float] = []
+    for _ in range(runs):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def frames_a_second() -> list[list[str]]:
+    rows: list[list[str]] = []
+    for n_markers, n_frames in SIZES:
+        scene = am.simulate.smooth(n_markers=n_markers, frames=n_frames, seed=1)
+        capture = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.005, seed=2)
+        d = capture.detections
+        for motions in (1, 3):
+            model = model_of(capture, motions)
+            row = [str(n_markers), str(motions)]
+            for method in (am.GNN(), am.SMP()):
+                seconds = best_of(3, lambda m=method, w=model: am.track(d, m, model=w))
+                idf1 = am.evaluate(am.track(d, method, model=model), capture).idf1
+                row += [f"{n_frames / seconds:,.0f}", f"{idf1:.4f}"]
+            state = am.GNN().init(model)
+            taken: list[float] = []
+            for now, points in list(d)[: min(n_frames, 2000)]:
+                start = time.perf_counter()
+                state, _ = am.GNN().step(state, now, points)
+                taken.append(time.perf_counter() - start)
+            row += [f"{statistics.median(taken) * 1e3:.3f}", f"{np.quantile(taken, 0.99) * 1e3:.3f}"]
+            if motions == 1:
+                some = max(n_frames // 10, 20)
+                cut = am.Detections(
+                    times=d.times[:some],
+                    offsets=d.offsets[: some + 1],
+                    points=d.points[: d.offsets[some]],
+                )
+                seconds = best_of(2, lambda c=cut, w=model: track_in_numpy(c, w))
+                ours = best_of(3, lambda c=cut, w=model: am.track(c, am.GNN(), model=w))
+                labels = track_in_numpy(cut, model)
+                same = (labels == am.track(cut, am.GNN(), model=model).labels).mean()
+                row += [f"{some / seconds:,.0f}", f"{seconds / ours:.0f} ×", f"{100 * same:.2f} %"]
+            else:
+                row += ["", "", ""]
+            rows.append(row)
+    return rows
+
+
+def import_seconds(code: str) -> float:
+    """Time of a fresh interpreter that runs `code`, less that of an empty one; median of five."""
+
+    def run(text: str) -> float:
+        return statistics.median(
+            best_of(1, lambda: subprocess.run([sys.executable, "-c", text], check=True))
+            for _ in range(5)
+        )
+
+    return run(code) - run("pass")
+
+
+TEN_MINUTES = """
+import resource, asterism as am
+scene = am.simulate.smooth(n_markers=100, frames=72000, rate=120, seed=1)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+tracks = am.track(scene.detections, am.GNN())
+print(before, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, tracks.n_tracks)
+"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--markdown", type=Path)
+    options = parser.parse_args()
+    head = [
+        "markers", "motions", "GNN frames/s", "IDF1", "SMP frames/s", "IDF1",
+        "step ms (median)", "(99 %)", "NumPy loop frames/s", "GNN against it", "same labels",
+    ]  # fmt: skip
+    lines = ["| " + " | ".join(head) + " |", "|" + "---:|" * len(head)]
+    lines += ["| " + " | ".join(row) + " |" for row in frames_a_second()]
+    light = import_seconds("import asterism")
+    c3d = import_seconds("import asterism, ezc3d, asterism.io.c3d; asterism.read")
+    out = subprocess.run(
+        [sys.executable, "-c", TEN_MINUTES], check=True, capture_output=True, text=True
+    ).stdout.split()
+    lines += [
+        "",
+        f"`import asterism`: {light:.2f} s; with reading C3D: {c3d:.2f} s. Ten minutes of 100 "
+        f"markers at 120 Hz, model estimated and tracked: peak memory {int(out[1]) / 1e6:.2f} GB, "
+        f"of which {int(out[0]) / 1e6:.2f} GB were there with the capture alone; {out[2]} tracks.",
+        "",
+        f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, "
+        f"NumPy {np.__version__}, asterism {am.__version__}; one core.",
+    ]
+    text = "\n".join(lines)
+    print(text)
+    if options.markdown:
+        options.markdown.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
