@@ -62,7 +62,7 @@ struct FrameScratch {
   FrameScratch(const FrameScratch&) : FrameScratch() {}
   FrameScratch& operator=(const FrameScratch&) { return *this; }
 
-  std::vector<Candidate> candidates;
+  std::vector<Candidate> candidates, eligible;
   std::vector<Prediction> predictions;
   std::vector<Point> centers;
   std::vector<double> radii;
@@ -84,15 +84,13 @@ class FrameTracker {
   FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
     FrameStats stats;
     find_candidates(time, step, points);
-    s_.match.assign(tracks_.size(), -1);
-    const Groups groups = connected_groups(s_.candidates, static_cast<std::int32_t>(tracks_.size()),
-                                           static_cast<std::int32_t>(points.size()));
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      match(groups[g], points.size());
-      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
-    }
     stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());
-    stats.n_groups = static_cast<std::int64_t>(groups.size());
+    s_.match.assign(tracks_.size(), -1);
+    s_.is_taken.assign(points.size(), 0);
+    // Believed tracks first. A tentative one knows so little that it fits almost anything, and a
+    // single frame cannot see that the marker which it takes over would have to vanish for good.
+    match_all(true, points.size(), stats);
+    match_all(false, points.size(), stats);
     update_tracks(time, points, label);
     begin_tracks(time, points);
     for (const LiveTrack& track : tracks_)
@@ -161,29 +159,37 @@ class FrameTracker {
     }
   }
 
-  void match(std::span<const Candidate> group, std::size_t n_points) {
-    if (group.size() == 1 || opt_.matcher == Matcher::assignment)
-      s_.assignment.solve(group, s_.match);
-    else
-      marry(group, n_points, opt_.matcher == Matcher::marriage_by_points);
+  // Pairs the believed tracks, or the tentative ones, with points that are still free.
+  void match_all(bool confirmed, std::size_t n_points, FrameStats& stats) {
+    s_.eligible.clear();
+    for (const Candidate& c : s_.candidates)
+      if (tracks_[c.row].is_confirmed() == confirmed && !s_.is_taken[c.column])
+        s_.eligible.push_back(c);
+    const Groups groups =
+        connected_groups(s_.eligible, static_cast<std::int32_t>(tracks_.size()),
+                         static_cast<std::int32_t>(n_points));
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (groups[g].size() == 1 || opt_.matcher == Matcher::assignment)
+        s_.assignment.solve(groups[g], s_.match);
+      else
+        marry(groups[g], n_points, opt_.matcher == Matcher::marriage_by_points);
+      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
+    }
+    stats.n_groups += static_cast<std::int64_t>(groups.size());
+    for (const Candidate& c : s_.eligible)
+      if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
   }
 
-  // Tracks rank detections by predictive density, detections rank tracks by distance, nearest
-  // first; a confirmed track goes before any tentative one.
+  // Tracks rank detections by predictive density; detections rank tracks by distance.
   void marry(std::span<const Candidate> group, std::size_t n_points, bool by_points) {
-    double farthest = 0;
-    for (const Candidate& c : group) farthest = std::max(farthest, c.distance2);
-    const auto cost_for_point = [&](const Candidate& c) {
-      return tracks_[c.row].is_confirmed() ? c.distance2 : 2 * farthest + c.distance2;
-    };
     struct Wish {
       std::int32_t proposer, receiver;
       double rank, cost;
     };
     std::vector<Wish> wishes;
     for (const Candidate& c : group)
-      wishes.push_back(by_points ? Wish{c.column, c.row, cost_for_point(c), -c.gain}
-                                 : Wish{c.row, c.column, -c.gain, cost_for_point(c)});
+      wishes.push_back(by_points ? Wish{c.column, c.row, c.distance2, -c.gain}
+                                 : Wish{c.row, c.column, -c.gain, c.distance2});
     std::sort(wishes.begin(), wishes.end(), [](const Wish& a, const Wish& b) {
       if (a.proposer != b.proposer) return a.proposer < b.proposer;
       if (a.rank != b.rank) return a.rank < b.rank;
@@ -214,13 +220,11 @@ class FrameTracker {
 
   template <typename Label>
   void update_tracks(double time, std::span<const Point> points, Label&& label) {
-    s_.is_taken.assign(points.size(), 0);
     std::size_t kept = 0;
     for (std::size_t i = 0; i < tracks_.size(); ++i) {
       LiveTrack& track = tracks_[i];
       const std::int32_t j = s_.match[i];
       if (j >= 0) {
-        s_.is_taken[j] = 1;
         track.score += hit_gain() + update(m_, s_.predictions[i], points[j], track.state);
         track.last = points[j];
         track.last_time = time;

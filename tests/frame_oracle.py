@@ -98,7 +98,11 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
                 gain = np.logaddexp(0, track.score + hit + math.log(total)) - missed
                 if gain > 0:
                     gains[i, j] = gain
-        match = pair(tracks, points, gains, method)
+        believed = np.array([track.id >= 0 for track in tracks], dtype=bool)
+        match = pair(tracks, points, np.where(believed[:, None], gains, -np.inf), method)
+        free = np.array([j not in match.values() for j in range(len(points))], dtype=bool)
+        rest = np.where(~believed[:, None] & free, gains, -np.inf)
+        match |= pair(tracks, points, rest, method)
         for i, track in enumerate(tracks):
             j = match.get(i)
             if j is None:
@@ -138,12 +142,7 @@ def pair(tracks, points, gains, method) -> dict[int, int]:
         rows, columns = linear_sum_assignment(padded)
         return {int(i): int(j) for i, j in zip(rows, columns, strict=True) if i < n and j < m}
     n, m = gains.shape
-    far = 1e6
-    for_point = {
-        (i, j): tracks[i].distance(points[j]) + (0 if tracks[i].id >= 0 else far)
-        for i in range(n)
-        for j in range(m)
-    }
+    for_point = {(i, j): tracks[i].distance(points[j]) for i in range(n) for j in range(m)}
     if method.proposers == "tracks":
         lists = [
             sorted(np.flatnonzero(np.isfinite(gains[i])), key=lambda j: -gains[i, j])

@@ -2,8 +2,9 @@
 
 A track begins tentative at a detection that no track took. Its score, the log odds of marker
 against clutter, decides: above `confirm_probability` it is believed and gets the next identity,
-together with all its detections so far; far below its best it is clutter again. A believed track
-coasts through misses and ends when the gap exceeds the model's d̄. The loop is in the engine.
+together with all its detections so far; far below its best it is clutter again. Tentative tracks
+choose among the points that the believed ones leave over. A believed track coasts through misses
+and ends when the gap exceeds the model's d̄. The loop is in the engine.
 """
 
 from __future__ import annotations

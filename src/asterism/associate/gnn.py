@@ -17,10 +17,11 @@ __all__ = ["GNN"]
 class GNN(FrameByFrame):
     """Global nearest neighbour: each frame by one exact linear assignment.
 
-    A pairing of track and detection wins ``log P_d N(y; ŷ, S) / λ_f - log(1 - P_d)`` over a missed
-    detection and a point of clutter; for a tentative track the gain is weighed with the odds that
-    it is a marker at all. The pairing with the greatest sum is found exactly (shortest augmenting
-    paths, group by group).
+    A pairing of track and detection wins ``log P_d N(y; ŷ, S) / (λ_f + P_d λ_b) - log(1 - P_d)``
+    over a missed detection and a point left over as clutter or a new marker; for a tentative track
+    the gain is weighed with the odds that it is a marker at all. The pairing with the greatest sum
+    is found exactly (shortest augmenting paths, group by group): first for the believed tracks,
+    then for the tentative ones among the points that are still free.
 
     Parameters
     ----------

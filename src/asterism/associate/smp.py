@@ -16,9 +16,9 @@ class SMP(FrameByFrame):
     """Stable marriage: no track and detection would both rather have each other.
 
     Tracks (the report's men) rank the detections by their predictive density N(ŷ, S); detections
-    rank the tracks by distance, nearest first, believed ones before tentative ones. Whoever is
-    outside the gate is unacceptable, so numbers may differ: a track left alone is a missed
-    detection, a detection left alone a new track or clutter. Ties go to the lower index.
+    rank the tracks by distance, nearest first. Believed tracks marry before tentative ones.
+    Whoever is outside the gate is unacceptable, so numbers may differ: a track left alone is a
+    missed detection, a detection left alone a new track or clutter. Ties go to the lower index.
 
     Parameters
     ----------
