@@ -42,11 +42,12 @@ def demo(
         asterism demo -o /tmp/demo --seed 7
     """
     import asterism as am
-    from asterism.app.run_folder import Job, new_folder, sha256_of, write_text
+    from asterism.app.run_folder import Job, check_folder, sha256_of, write_text
     from asterism.app.track import resolved_method
     from asterism.app.tracking import carry_out
 
-    new_folder(out, overwrite=overwrite)
+    check_folder(out, overwrite=overwrite)
+    out.mkdir(parents=True, exist_ok=True)
     truth = _experiment(out, seed)
     capture = am.read(out / "capture.c3d")
     estimate = am.estimate_model(capture)
@@ -55,7 +56,7 @@ def demo(
     paces: dict[str, float] = {}
     for name in am.METHODS:
         folder = out / name
-        new_folder(folder, overwrite=overwrite)
+        folder.mkdir(exist_ok=True)
         job = Job(
             source=out / "capture.c3d", sha256=sha256_of(out / "capture.c3d"), method=name,
             options=resolved_method(name, [])[1], model=estimate.model, seed=seed, format="c3d",

@@ -28,7 +28,7 @@ __all__ = [
     "LOG",
     "SUMMARY",
     "Job",
-    "new_folder",
+    "check_folder",
     "sha256_of",
     "write_text",
     "writing_log",
@@ -114,6 +114,7 @@ class Job:
                 seed=_table(values, "method").get("seed", 0),
                 format=_text(values, "output", "format"),
             )
+            am.method_by_name(job.method, **job.options)
             check_number("method.seed", job.seed, above=0, closed=True, integer=True)
             check_fields("output.format", [job.format], am.FORMATS)
         except ParameterError as error:
@@ -154,8 +155,8 @@ def sha256_of(path: Path) -> str:
         raise FormatError(path, "opening", "a readable file", error.strerror) from error
 
 
-def new_folder(path: Path, *, overwrite: bool) -> None:
-    """Make a folder for results.
+def check_folder(path: Path, *, overwrite: bool) -> None:
+    """Raise unless a folder for results may be made or used.
 
     Raises
     ------
@@ -169,7 +170,6 @@ def new_folder(path: Path, *, overwrite: bool) -> None:
             "folder", "a new or an empty folder", f"{path}, which holds files",
             "--overwrite replaces those of the same names",
         )  # fmt: skip
-    path.mkdir(parents=True, exist_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:

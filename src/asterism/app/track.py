@@ -20,7 +20,11 @@ log = logging.getLogger(__name__)
 _In = Annotated[Path | None, typer.Argument(metavar="IN", help="Capture to track.")]
 _Out = Annotated[
     Path | None,
-    typer.Option("--out", "-o", help="File to write; by default IN with .tracked in its name."),
+    typer.Option(
+        "--out",
+        "-o",
+        help="File to write; by default IN with .tracked in its name.",
+    ),
 ]
 _Format = Annotated[
     str | None, typer.Option(help="Format of the result; by default told by its name.")
@@ -41,7 +45,7 @@ _Run = Annotated[
     Path | None,
     typer.Option(
         metavar="DIR",
-        help="Folder for what repeats the run, and for the result unless -o says otherwise.",
+        help="Folder for the result and for all that repeats the run.",
     ),
 ]
 _From = Annotated[
@@ -86,10 +90,12 @@ def track(
     """
     import asterism as am
     from asterism.app.files import check_outputs
-    from asterism.app.run_folder import FILES, Job, new_folder, sha256_of
+    from asterism.app.run_folder import FILES, Job, check_folder, sha256_of
     from asterism.app.tracking import carry_out, default_output, output_format
 
     check_outputs({"-o": out}, [source, model, repeat])
+    if run is not None:
+        check_folder(run, overwrite=overwrite)
     estimate: am.ModelEstimate | None = None
     if repeat is not None:
         settings = {"--method": method, "--option": option, "--model": model, "--seed": seed}
@@ -116,10 +122,9 @@ def track(
         out = default_output(job.source, job.format)
         out = out if run is None else run / out.name
     if run is not None:
-        new_folder(run, overwrite=overwrite)
-        check_outputs(
-            {"--run": out} | {f"--run ({f})": run / f for f in FILES}, [job.source, model, repeat]
-        )
+        run.mkdir(parents=True, exist_ok=True)
+        written = {"--run": out} | {f"--run ({name})": run / name for name in FILES}
+        check_outputs(written, [job.source, model, repeat])
     talks = not (quiet or json)
     if talks:
         _print_capture(capture)

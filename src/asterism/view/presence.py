@@ -145,8 +145,10 @@ def _draw_bars(
     order, _ = tracks.by_track
     track, frame = tracks.labels[order], d.frame_of[order]
     goes_on = (np.diff(track) == 0) & (np.diff(frame) == 1) & (colours[1:] == colours[:-1])
-    begins = np.flatnonzero(np.append(True, ~goes_on)) if len(order) else np.empty(0, np.int64)
-    ends = np.append(begins[1:], len(order)) - 1
+    is_first = np.ones(len(order), dtype=bool)
+    is_first[1:] = ~goes_on
+    begins = np.flatnonzero(is_first)
+    ends = np.append(begins[1:], len(order))[: len(begins)] - 1
     half = d.step / 2 or 0.5
     left, right = d.times[frame[begins]] - half, d.times[frame[ends]] + half
     row = rows[track[begins]]

@@ -54,8 +54,8 @@ def plot_trajectories(tracks: Tracks, ax: Axes | None = None) -> Axes:
         axes.plot(*path.T, color=colour, linewidth=1.0)
         axes.plot(*points[-1:].T, color=colour, marker="o", markersize=3.5, linestyle="none")
     _to_scale(axes, d.points, is_solid)
-    n_clutter = f", {len(clutter)} points of clutter" if len(clutter) else ""
-    axes.set_title(f"{tracks.n_tracks} tracks{n_clutter}", fontsize=11, color=INK, loc="left")
+    title = f"tracks: {np.count_nonzero(tracks.lengths)}, clutter: {len(clutter)}"
+    axes.set_title(title, fontsize=11, color=INK, loc="left")
     return axes
 
 

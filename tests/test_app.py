@@ -1,0 +1,331 @@
+"""The command line from the inside: what it writes, prints and refuses."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.app import main
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with a labelled scene, an experiment made of it, its truth, and its model."""
+    folder = tmp_path_factory.mktemp("made")
+    scene, spoilt, truth = (str(folder / f"{name}.csv") for name in ("scene", "in", "truth"))
+    spoil = "--missing 0.1 --clutter 0.1 --noise 0.0003 --seed 1 -q"
+    assert main(["simulate", "crossing", "-o", scene, "--rate=100", "--seed=3", "-q"]) == 0
+    assert main(["corrupt", scene, "-o", spoilt, "--truth", truth, *spoil.split()]) == 0
+    assert main(["estimate", spoilt, "-o", str(folder / "model.toml"), "-q"]) == 0
+    return folder
+
+
+@pytest.fixture
+def scene(made, tmp_path, monkeypatch):
+    """A copy of that folder, to work in."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(line, capsys):
+    """Run a command that must succeed; give what it printed."""
+    capsys.readouterr()
+    code = main(line.split())
+    out, err = capsys.readouterr()
+    assert code == 0, err
+    return out
+
+
+def refused(line, capsys):
+    """Run a command that the user can mend; give the one line that says how."""
+    capsys.readouterr()
+    code = main(line.split())
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert out == ""
+    assert "Traceback" not in err
+    return err
+
+
+def test_corrupt_forgets_every_name_and_keeps_every_point(scene):
+    unnamed, truth = am.read("in.csv"), am.read_tracks("truth.csv")
+    assert (unnamed.labels == -1).all()
+    assert set(truth.names) == {f"M{i:02d}" for i in range(16)}
+    np.testing.assert_array_equal(unnamed.points, truth.detections.points)
+    assert 0 < (truth.labels == -1).sum() < truth.detections.n_points
+    # The order of the points must not tell the markers: in the file of truth they would be sorted.
+    first = truth.labels[: truth.detections.offsets[1]]
+    assert (np.diff(first) < 0).any()
+
+
+@pytest.mark.parametrize("ending", ["c3d", "trc", "csv", "tsv"])
+def test_corrupt_track_evaluate_in_every_format(scene, capsys, ending):
+    spoil = "--missing 0.1 --clutter 0.1 --noise 0.0003 --seed 1 -q"
+    run(f"corrupt scene.csv -o a.{ending} --truth t.{ending} {spoil}", capsys)
+    run(f"track a.{ending}", capsys)
+    scores = json.loads(run(f"evaluate a.tracked.{ending} t.{ending} --json", capsys))
+    assert scores["idf1"] > 0.99
+    assert scores["n_markers"] == 16
+    # Formats that cannot mark clutter must not turn every point of it into a track.
+    assert scores["n_tracks"] <= 18
+    assert scores["clutter_labelled_percent"] < 5
+
+
+def test_track_says_what_it_did(scene, capsys):
+    text = run("track in.csv -o out.csv", capsys)
+    for word in ("noise σ", "most likely", "detections labelled", "longest gaps", "frames/s"):
+        assert word in text
+    tracks = am.read_tracks("out.csv")
+    assert f"tracks               {tracks.n_tracks}" in text
+    assert run("track in.csv -o out.csv --quiet", capsys) == ""
+
+
+def test_track_gives_the_same_as_the_library(scene, capsys):
+    run("track in.csv -o out.csv --method smp --option proposers=detections", capsys)
+    capture = am.read("in.csv")
+    expected = am.track(capture, am.SMP(proposers="detections"))
+    np.testing.assert_array_equal(am.read_tracks("out.csv").labels, expected.labels)
+
+
+def test_summary_as_json(scene, capsys):
+    summary = json.loads(run("track in.csv --model model.toml -o out.csv --json", capsys))
+    tracks = am.read_tracks("out.csv")
+    assert summary["n_tracks"] == tracks.n_tracks
+    assert summary["n_clutter"] == (tracks.labels == -1).sum()
+    assert summary["n_labelled"] + summary["n_clutter"] == summary["n_detections"]
+    assert am.TrackingModel.from_dict(summary["model"]).population.max_gap > 0
+    gap = summary["longest_gaps"][0]
+    frames = tracks.detections.frame_of[tracks.labels == gap["track"]] + 1
+    assert not np.isin(np.arange(gap["first"], gap["last"] + 1), frames).any()
+    assert np.isin([gap["first"] - 1, gap["last"] + 1], frames).all()
+
+
+def test_a_run_is_repeated_bit_for_bit(scene, capsys):
+    run("track in.csv --run first --method smp --option delete_odds=100 --seed 5", capsys)
+    names = sorted(path.name for path in (scene / "first").iterdir())
+    assert names == ["in.tracked.csv", "log.txt", "run.toml", "summary.json"]
+    run("track --from first/run.toml -o again.csv", capsys)
+    result = (scene / "first/in.tracked.csv").read_bytes()
+    assert (scene / "again.csv").read_bytes() == result
+    run("track --from first/run.toml --run second", capsys)
+    assert (scene / "second/in.tracked.csv").read_bytes() == result
+    first, second = (
+        tomllib.loads((scene / name / "run.toml").read_text()) for name in ("first", "second")
+    )
+    assert first == second
+    assert first["method"]["options"]["delete_odds"] == 100
+    assert first["method"]["seed"] == 5
+    assert {"asterism", "python", "numpy", "scipy", "platform"} <= set(first["versions"])
+    assert "tracking in.csv" in (scene / "first/log.txt").read_text()
+
+
+def test_the_model_file_gives_what_the_estimate_gave(scene, capsys):
+    run("track in.csv -o a.csv", capsys)
+    run("track in.csv -o b.csv --model model.toml", capsys)
+    assert (scene / "a.csv").read_bytes() == (scene / "b.csv").read_bytes()
+
+
+def test_a_run_is_only_repeated_with_its_input(scene, capsys):
+    run("track in.csv --model model.toml --run first", capsys)
+    (scene / "in.csv").rename("moved.csv")
+    assert "say where it is now" in refused("track --from first/run.toml", capsys)
+    run("track moved.csv --from first/run.toml -o again.csv", capsys)
+    assert (scene / "again.csv").read_bytes() == (scene / "first/in.tracked.csv").read_bytes()
+    with (scene / "moved.csv").open("a") as file:
+        file.write("\n")
+    assert "SHA-256" in refused("track moved.csv --from first/run.toml", capsys)
+    assert "--method" in refused("track moved.csv --from first/run.toml --method gnn", capsys)
+    assert "--seed" in refused("track moved.csv --from first/run.toml --seed 0", capsys)
+
+
+def test_other_versions_are_told(scene, capsys):
+    run("track in.csv --model model.toml --run first", capsys)
+    path = scene / "first/run.toml"
+    path.write_text(path.read_text().replace(f'asterism = "{am.__version__}"', 'asterism = "0"'))
+    assert main(["track", "--from", "first/run.toml", "-o", "again.csv", "-q"]) == 0
+    assert "made with asterism 0" in capsys.readouterr().err
+
+
+def test_a_full_folder_is_left_alone(scene, capsys):
+    run("track in.csv --model model.toml --run first", capsys)
+    before = (scene / "first/run.toml").stat().st_mtime_ns
+    assert "--overwrite" in refused("track in.csv --run first", capsys)
+    assert (scene / "first/run.toml").stat().st_mtime_ns == before
+    run("track in.csv --model model.toml --run first --overwrite", capsys)
+    assert (scene / "first/run.toml").stat().st_mtime_ns > before
+    assert "a folder" in refused("track in.csv --run in.csv", capsys)
+
+
+def test_no_input_is_written_to(scene, capsys):
+    (scene / "link.csv").symlink_to(scene / "in.csv")
+    (scene / "hard.csv").hardlink_to(scene / "in.csv")
+    run("track in.csv --model model.toml --run first", capsys)
+    kept = {path: path.read_bytes() for path in scene.rglob("*.*") if path.is_file()}
+    for line in (
+        "track in.csv -o in.csv",
+        "track in.csv -o link.csv",
+        "track in.csv -o hard.csv",
+        "track in.csv -o ./in.csv",
+        "track in.csv --model model.toml -o model.toml --format csv",
+        "track --from first/run.toml -o first/run.toml --format csv",
+        "track --from first/run.toml --run first --overwrite",
+        "estimate in.csv -o in.csv",
+        "corrupt truth.csv -o truth.csv --truth t.csv",
+        "corrupt truth.csv -o a.csv --truth truth.csv",
+        "corrupt truth.csv -o a.csv --truth a.csv",
+        "evaluate in.csv truth.csv --by-frame truth.csv",
+        "evaluate in.csv truth.csv --by-frame in.csv",
+    ):
+        refused(line, capsys)
+    assert {path: path.read_bytes() for path in kept} == kept
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("track nowhere.csv", "nowhere.csv: opening: expected a file"),
+        ("track", "IN: expected a capture"),
+        ("track in.csv --method gn", "did you mean 'gnn'?"),
+        ("track in.csv --option gate_probabilty=1e-6", "did you mean 'gate_probability'?"),
+        ("track in.csv --option proposers=tracks", "method gnn"),
+        ("track in.csv --option delete_odds", "NAME=VALUE"),
+        ("track in.csv --option delete_odds=many", "delete_odds: expected a number, got 'many'"),
+        ("track in.csv --option delete_odds=0.5", "delete_odds: expected a number > 1"),
+        ("track in.csv --method smp --option proposers=track", "did you mean 'tracks'?"),
+        ("track in.csv --seed -1", "--seed"),
+        ("track in.csv --format c3", "one that holds tracks"),
+        ("track in.csv -o out.log", "a name ending in .c3d, .trc, .csv, .tsv"),
+        ("track in.csv -o nowhere/out.csv", "a folder that exists"),
+        ("track in.csv --model nowhere.toml", "nowhere.toml"),
+        ("track in.csv --model in.csv", "in.csv: the file: expected TOML"),
+        ("track --from nowhere.toml", "nowhere.toml"),
+        ("track --from in.csv", "expected TOML"),
+        ("track in.csv --methd gnn", "No such option: --methd"),
+        ("trak in.csv", "Did you mean 'track'?"),
+        ("corrupt in.csv -o a.csv --truth t.csv", "has no labels"),
+        ("corrupt truth.csv -o a.csv --truth t.csv --missing 2", "missing: expected a number in"),
+        ("corrupt truth.csv -o a.csv --truth t.csv --burst 5:60", "--burst: expected N or N:MIN"),
+        ("corrupt truth.csv -o a.csv --truth t.csv --ghosts 5:9-3", "longest: expected"),
+        ("corrupt truth.csv -o a.csv", "--truth"),
+        ("evaluate in.csv nowhere.csv", "nowhere.csv"),
+        ("info nowhere.csv", "nowhere.csv"),
+        ("simulate cub -o a.csv", "did you mean 'cube'?"),
+        ("simulate cube -o a.csv --option sped=1", "did you mean 'speed'?"),
+        ("simulate cube -o a.csv --frames 0", "frames: expected a whole number"),
+        ("demo -o in.csv", "a folder"),
+    ],
+)
+def test_what_the_user_can_mend(scene, capsys, line, says):
+    before = sorted(scene.rglob("*"))
+    assert says in refused(line, capsys)
+    assert sorted(scene.rglob("*")) == before
+
+
+def test_damaged_run_files(scene, capsys):
+    run("track in.csv --model model.toml --run first", capsys)
+    good = (scene / "first/run.toml").read_text()
+    path = scene / "run.toml"
+    for old, new, says in (
+        ("seed = 0", "seed = -1", "method.seed"),
+        ('format = "csv"', 'format = "cvs"', "did you mean 'csv'?"),
+        ('name = "gnn"', "name = 3", "method.name: expected a text"),
+        ("[output]", "[outptu]", "did you mean 'output'?"),
+        ("p_detection", "p_detectoin", "did you mean 'p_detection'?"),
+        ("delete_odds = 300.0", "delete_odds = 0.1", "delete_odds"),
+        ("delete_odds = 300.0", "delet_odds = 300.0", "did you mean 'delete_odds'?"),
+    ):
+        assert good.count(old) == 1
+        path.write_text(good.replace(old, new))
+        assert says in refused("track --from run.toml -o a.csv", capsys)
+
+
+def test_formats_of_the_result(scene, capsys):
+    truth = am.read_tracks("truth.csv")
+    am.write(truth, "a.bin")
+    run("track a.bin --model model.toml", capsys)  # a log holds no tracks: CSV does
+    am.write(truth, "wide.csv", format="csv-wide")
+    run("track wide.csv --model model.toml", capsys)
+    assert am.read("wide.tracked.csv").format == "csv-wide"
+    run("track in.csv --model model.toml -o b.csv --format csv-wide", capsys)
+    assert am.read("b.csv").format == "csv-wide"
+    assert am.read_tracks("a.tracked.csv").n_tracks >= 16
+    run("track in.csv --model model.toml -o b.c3d", capsys)
+    assert am.read("b.c3d").n_points == truth.detections.n_points
+
+
+def test_evaluate_prints_what_the_library_says(scene, capsys):
+    run("track in.csv --model model.toml -o out.csv", capsys)
+    scores = am.evaluate(am.read_tracks("out.csv"), am.read_tracks("truth.csv"))
+    assert run("evaluate out.csv truth.csv --by-frame frames.csv", capsys) == f"{scores}\n"
+    as_json = json.loads(run("evaluate out.csv truth.csv --json", capsys))
+    assert as_json["idf1"] == scores.idf1
+    with (scene / "frames.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["wrong"]) for row in rows] == scores.by_frame()["wrong"].tolist()
+    assert [float(row["times"]) for row in rows] == scores.times.tolist()
+
+
+def test_info(scene, capsys):
+    text = run("info truth.csv", capsys)
+    assert "16" in text
+    found = json.loads(run("info in.csv --json", capsys))
+    assert found["n_frames"] == 60
+    assert found["step_median"] is None  # JSON has no NaN
+    am.write(am.read_tracks("truth.csv"), "t.c3d")
+    raw = bytearray((scene / "t.c3d").read_bytes())
+    raw[raw.find(b"POINT") + 0 : raw.find(b"POINT") + 5] = b"PAINT"
+    (scene / "odd.c3d").write_bytes(raw)
+    assert "warning" in run("info odd.c3d", capsys)
+
+
+def test_methods_and_scenes_are_those_of_the_library(capsys):
+    listed = json.loads(run("methods --json", capsys))
+    assert list(listed) == list(am.METHODS)
+    options = listed["smp"]["options"]
+    made = am.SMP()
+    assert {name: option["default"] for name, option in options.items()} == {
+        name: getattr(made, name)
+        for name in ("gate_probability", "confirm_probability", "delete_odds", "proposers")
+    }
+    assert all(option["about"] for option in options.values())
+    text = run("methods", capsys)
+    assert "tracks|detections" in text
+    assert "ends when its odds fall" in text
+    assert list(json.loads(run("scenes --json", capsys))) == list(am.simulate.SCENES)
+
+
+def test_simulate_takes_the_options_of_the_scene(scene, capsys):
+    run("simulate smooth -o s.csv --frames 20 --seed 4 --option n_markers=7", capsys)
+    expected = am.simulate.smooth(n_markers=7, frames=20, seed=4)
+    np.testing.assert_array_equal(am.read("s.csv").points, expected.detections.points)
+
+
+def test_help_and_version(capsys):
+    assert run("--version", capsys) == f"asterism {am.__version__}\n"
+    commands = ("track", "corrupt", "evaluate", "info", "methods", "estimate", "simulate")
+    for command in (*commands, "scenes", "demo"):
+        assert f"asterism {command}" in run(f"{command} --help", capsys)
+
+
+def test_demo(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = run("demo -o one", capsys)
+    assert "one/summary.md" in text
+    run("demo -o two -q", capsys)
+    names = sorted(str(p.relative_to(tmp_path / "one")) for p in (tmp_path / "one").rglob("*.*"))
+    assert "gnn/errors.png" in names
+    for name in names:
+        if name.endswith((".png", ".md", ".csv", ".c3d", "model.toml")):
+            one, two = ((tmp_path / folder / name).read_bytes() for folder in ("one", "two"))
+            assert one == two, name
+    run("track --from one/smp/run.toml -o again.c3d", capsys)
+    again = (tmp_path / "again.c3d").read_bytes()
+    assert again == (tmp_path / "one/smp/tracked.c3d").read_bytes()
+    assert "--overwrite" in refused("demo -o one", capsys)

@@ -1,0 +1,114 @@
+"""Options derived from dataclasses and functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import pytest
+
+import asterism as am
+from asterism.app.options import method_options, parsed, scene_options
+from asterism.errors import ParameterError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Base:
+    """A base.
+
+    Parameters
+    ----------
+    first, second : int
+        Two numbers,
+        on two lines.
+    third : {"a", "b"}
+        A choice.
+
+    Examples
+    --------
+    third : nothing
+        Not a parameter.
+    """
+
+    first: int = 1
+    second: int = 2
+    third: Literal["a", "b"] = "a"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Derived(Base):
+    """A method.
+
+    Parameters
+    ----------
+    first, second : int
+        See `Base`.
+    fourth : float or None
+        Its own.
+    """
+
+    fourth: float | None = None
+    fifth: bool = False
+    sixth: str = ""
+    name: ClassVar[str] = "derived"
+
+
+def test_fields_types_defaults_and_texts():
+    options = method_options(Derived)
+    assert list(options) == ["first", "second", "third", "fourth", "fifth", "sixth"]
+    assert options["second"].about == "Two numbers, on two lines."
+    assert options["third"].about == "A choice."
+    assert options["third"].type_text == "a|b"
+    assert options["fourth"].about == "Its own."
+    assert options["fourth"].type_text == "float | None"
+    assert options["first"].default == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("first=3", 3),
+        ("first=-3", -3),
+        (" first = 3 ", 3),
+        ("third=b", "b"),
+        ("fourth=1e-3", 1e-3),
+        ("fourth=none", None),
+        ("fifth=true", True),
+        ("fifth=no", False),
+        ("sixth=a=b", "a=b"),
+        ("sixth=", ""),
+    ],
+)
+def test_values(text, value):
+    (found,) = parsed("it", [text], method_options(Derived)).values()
+    assert found == value
+    assert type(found) is type(value)
+
+
+@pytest.mark.parametrize(
+    "text", ["first=1.5", "first=", "third=c", "fourth=x", "fifth=2", "seventh=1", "first", "=1"]
+)
+def test_refused_values(text):
+    with pytest.raises(ParameterError):
+        parsed("it", [text], method_options(Derived))
+
+
+def test_the_last_of_one_name_counts_and_dashes_will_do():
+    options = method_options(am.METHODS["gnn"])
+    assert parsed("gnn", ["delete-odds=5", "delete_odds=7"], options) == {"delete_odds": 7.0}
+
+
+@pytest.mark.parametrize("name", am.METHODS)
+def test_every_method_explains_every_option(name):
+    for option in method_options(am.METHODS[name]).values():
+        assert option.about
+        assert not option.about.startswith("See ")
+        text = "none" if option.default is None else str(option.default)
+        assert option.parse(text) == option.default
+
+
+@pytest.mark.parametrize("name", am.simulate.SCENES)
+def test_every_scene_takes_its_own_defaults(name):
+    options = scene_options(am.simulate.SCENES[name].make)
+    values = {option.name: option.parse(str(option.default)) for option in options.values()}
+    assert am.simulate.SCENES[name].make(**values).n_tracks > 0

@@ -1,0 +1,192 @@
+"""The command line from the outside: exit codes, signals, pipes, and what is left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import asterism as am
+
+ASTERISM = (sys.executable, "-m", "asterism.app")
+
+
+def run(*arguments, cwd, **options):
+    return subprocess.run(
+        [*ASTERISM, *arguments], cwd=cwd, capture_output=True, text=True, timeout=60, **options
+    )
+
+
+def start(*arguments, cwd):
+    # As a terminal would start it: a shell without job control lets its children ignore SIGINT.
+    return subprocess.Popen(
+        [*ASTERISM, *arguments], cwd=cwd, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL,
+        text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+
+
+def stopped(process, signum):
+    """Send a signal; give the exit code and what was said."""
+    process.send_signal(signum)
+    _, err = process.communicate(timeout=30)
+    return process.returncode, err
+
+
+def wait_for(condition, process, seconds=30):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+@pytest.fixture(scope="module")
+def long_capture(tmp_path_factory):
+    """A capture that takes seconds to track and to write, and a model for it."""
+    folder = tmp_path_factory.mktemp("long")
+    truth = am.simulate.smooth(n_markers=30, frames=6_000, rate=100, seed=1)
+    am.write(truth, folder / "in.csv")
+    model = am.TrackingModel(
+        motion=am.DWNA(acceleration_sigma=20),
+        sensor=am.Sensor(noise_sigma=1e-3, p_detection=0.99, clutter_density=1e-3),
+        population=am.Population(birth_density=1e-3, p_disappear=1e-3, max_speed=12, max_gap=5),
+    )
+    model.to_toml(folder / "model.toml")
+    return folder
+
+
+@pytest.fixture
+def folder(long_capture, tmp_path):
+    for name in ("in.csv", "model.toml"):
+        (tmp_path / name).symlink_to(long_capture / name)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["SIGINT", "SIGTERM"]
+)
+def test_stopped_while_tracking(folder, signum, code):
+    process = start("track", "in.csv", "--model", "model.toml", "--run", "run", cwd=folder)
+    wait_for((folder / "run" / "log.txt").exists, process)
+    assert stopped(process, signum) == (code, f"asterism: stopped by {signum.name}\n")
+    left = {path.name for path in (folder / "run").iterdir()}
+    assert left <= {"log.txt", "run.toml"}  # no result, no summary, no temporary file
+    assert f"Stopped: {signum.value}" in (folder / "run/log.txt").read_text()
+
+
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_stopped_while_writing(folder, signum):
+    (folder / "out.csv").write_text("the old result")
+    process = start("track", "in.csv", "--model", "model.toml", "-o", "out.csv", cwd=folder)
+    wait_for(lambda: any(folder.glob(".*.part")), process)
+    code, _ = stopped(process, signum)
+    assert code == (-signum if signum == signal.SIGKILL else 128 + signum)
+    assert (folder / "out.csv").read_text() == "the old result"
+    if signum != signal.SIGKILL:  # which leaves nobody to tidy up
+        assert sorted(p.name for p in folder.iterdir()) == ["in.csv", "model.toml", "out.csv"]
+
+
+def test_stopped_early(folder):
+    process = start("track", "in.csv", cwd=folder)
+    time.sleep(1.0)
+    assert stopped(process, signal.SIGINT) == (130, "asterism: stopped by SIGINT\n")
+    assert sorted(p.name for p in folder.iterdir()) == ["in.csv", "model.toml"]
+
+
+def test_an_ignored_signal_stays_ignored(tmp_path):
+    script = (
+        "import signal, sys, os\n"
+        "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+        "from asterism.app.endings import exit_code\n"
+        "sys.exit(exit_code(lambda: os.kill(os.getpid(), signal.SIGINT)))\n"
+    )
+    assert subprocess.run([sys.executable, "-c", script], timeout=30).returncode == 0
+
+
+def test_exit_codes(tmp_path):
+    done = run("simulate", "cube", "-o", "a.csv", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    for line in ("track nowhere.c3d", "track a.csv --method gn", "track a.csv --typo", "typo"):
+        done = run(*line.split(), cwd=tmp_path)
+        assert done.returncode == 2
+        assert done.stdout == ""
+        assert "Traceback" not in done.stderr
+    assert run(cwd=tmp_path).returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("what", "code", "says"),
+    [
+        ("raise MemoryError", 1, "asterism: the memory is too small for this"),
+        ("raise OSError(28, 'No space left on device', 'x')", 2, "x: No space left on device"),
+        ("raise ZeroDivisionError('inside')", 1, "ZeroDivisionError: inside"),
+    ],
+)
+def test_failures_inside(what, code, says):
+    script = f"""
+        import sys
+        import asterism.app.endings as endings
+        def command():
+            {what}
+        sys.exit(endings.exit_code(command))
+    """
+    import textwrap
+
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=30
+    )
+    assert done.returncode == code
+    assert says in done.stderr
+
+
+@pytest.mark.parametrize("line", ["scenes", "scenes --json", "methods", "--help", "track --help"])
+def test_nobody_reads_the_output(line):
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [*ASTERISM, *line.split()], stdout=write, stderr=subprocess.PIPE, text=True, timeout=30
+    )
+    os.close(write)
+    assert done.stderr == ""
+    assert done.returncode in (141, 1)
+
+
+def test_a_terminal_that_knows_no_greek(tmp_path):
+    am.write(am.simulate.cube(seed=1), tmp_path / "a.csv")
+    done = run("estimate", "a.csv", cwd=tmp_path, env=os.environ | {"PYTHONIOENCODING": "ascii"})
+    assert done.returncode == 0, done.stderr
+    assert "noise \\u03c3" in done.stdout
+
+
+def test_same_bytes_in_every_process(tmp_path):
+    truth = am.simulate.crossing(rate=100, seed=1)
+    am.write(am.simulate.corrupt(truth, missing=0.1, clutter=0.2, seed=1), tmp_path / "a.c3d")
+    results = []
+    for seed in ("1", "2"):  # of the hashes of texts, by which sets are ordered
+        env = os.environ | {"PYTHONHASHSEED": seed}
+        done = run("track", "a.c3d", "-o", f"b{seed}.c3d", cwd=tmp_path, env=env)
+        assert done.returncode == 0, done.stderr
+        assert done.stderr == ""  # no terminal, no progress
+        results.append((tmp_path / f"b{seed}.c3d").read_bytes())
+    assert results[0] == results[1]
+
+
+def test_help_is_instant():
+    script = (
+        "import sys\nfrom asterism.app import main\nmain(['--help'])\n"
+        "heavy = ('scipy', 'ezc3d', 'matplotlib', 'pandas', 'asterism._engine')\n"
+        "sys.exit(','.join(name for name in heavy if name in sys.modules) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    took = []
+    for _ in range(3):
+        start_time = time.perf_counter()
+        subprocess.run([*ASTERISM, "--help"], capture_output=True, check=True)
+        took.append(time.perf_counter() - start_time)
+    assert np.min(took) < 1.0  # half a second on a quiet machine
