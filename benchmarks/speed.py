@@ -18,15 +18,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from peer import track_in_numpy
 
 import asterism as am
+from peer import track_in_numpy
 
 SIZES = ((8, 20_000), (50, 4_000), (200, 1_000), (1000, 200))
 
 
 def model_of(capture: am.Tracks, motions: int) -> am.TrackingModel:
-    """The scene's own rates, and one or three motions around its acceleration."""
+    """Give the scene's own rates, and one or three motions around its acceleration."""
     extent = float(np.prod(np.ptp(capture.detections.points, axis=0)))
     n_frames = capture.detections.n_frames
     levels = (0.006,) if motions == 1 else (0.003, 0.006, 0.06)
@@ -57,41 +57,48 @@ def best_of(runs: int, work: Any) -> float:
     return min(times)
 
 
+def step_times(detections: am.Detections, model: am.TrackingModel) -> list[float]:
+    """Time of each streaming step, seconds."""
+    method = am.GNN()
+    state = method.init(model)
+    taken: list[float] = []
+    for now, points in list(detections)[:2000]:
+        start = time.perf_counter()
+        state, _ = method.step(state, now, points)
+        taken.append(time.perf_counter() - start)
+    return taken
+
+
+def beside_the_loop(d: am.Detections, model: am.TrackingModel) -> list[str]:
+    """Speed of the NumPy loop on the first frames, ours against it, and the share of equal labels."""
+    n = max(d.n_frames // 10, 20)
+    first = am.Detections(
+        times=d.times[:n], offsets=d.offsets[: n + 1], points=d.points[: d.offsets[n]]
+    )
+    ours = best_of(3, lambda: am.track(first, am.GNN(), model=model))
+    theirs = best_of(2, lambda: track_in_numpy(first, model))
+    same = track_in_numpy(first, model) == am.track(first, am.GNN(), model=model).labels
+    return [f"{n / theirs:,.0f}", f"{theirs / ours:.0f} ×", f"{100 * same.mean():.2f} %"]
+
+
+def row_of(capture: am.Tracks, n_markers: int, motions: int) -> list[str]:
+    d, model = capture.detections, model_of(capture, motions)
+    row = [str(n_markers), str(motions)]
+    for method in (am.GNN(), am.SMP()):
+        seconds = best_of(3, lambda m=method: am.track(d, m, model=model))
+        idf1 = am.evaluate(am.track(d, method, model=model), capture).idf1
+        row += [f"{d.n_frames / seconds:,.0f}", f"{idf1:.4f}"]
+    taken = step_times(d, model)
+    row += [f"{statistics.median(taken) * 1e3:.3f}", f"{np.quantile(taken, 0.99) * 1e3:.3f}"]
+    return row + (beside_the_loop(d, model) if motions == 1 else ["–"] * 3)
+
+
 def frames_a_second() -> list[list[str]]:
     rows: list[list[str]] = []
     for n_markers, n_frames in SIZES:
         scene = am.simulate.smooth(n_markers=n_markers, frames=n_frames, seed=1)
         capture = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.005, seed=2)
-        d = capture.detections
-        for motions in (1, 3):
-            model = model_of(capture, motions)
-            row = [str(n_markers), str(motions)]
-            for method in (am.GNN(), am.SMP()):
-                seconds = best_of(3, lambda m=method, w=model: am.track(d, m, model=w))
-                idf1 = am.evaluate(am.track(d, method, model=model), capture).idf1
-                row += [f"{n_frames / seconds:,.0f}", f"{idf1:.4f}"]
-            state = am.GNN().init(model)
-            taken: list[float] = []
-            for now, points in list(d)[: min(n_frames, 2000)]:
-                start = time.perf_counter()
-                state, _ = am.GNN().step(state, now, points)
-                taken.append(time.perf_counter() - start)
-            row += [f"{statistics.median(taken) * 1e3:.3f}", f"{np.quantile(taken, 0.99) * 1e3:.3f}"]
-            if motions == 1:
-                some = max(n_frames // 10, 20)
-                cut = am.Detections(
-                    times=d.times[:some],
-                    offsets=d.offsets[: some + 1],
-                    points=d.points[: d.offsets[some]],
-                )
-                seconds = best_of(2, lambda c=cut, w=model: track_in_numpy(c, w))
-                ours = best_of(3, lambda c=cut, w=model: am.track(c, am.GNN(), model=w))
-                labels = track_in_numpy(cut, model)
-                same = (labels == am.track(cut, am.GNN(), model=model).labels).mean()
-                row += [f"{some / seconds:,.0f}", f"{seconds / ours:.0f} ×", f"{100 * same:.2f} %"]
-            else:
-                row += ["", "", ""]
-            rows.append(row)
+        rows += [row_of(capture, n_markers, motions) for motions in (1, 3)]
     return rows
 
 

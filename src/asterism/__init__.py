@@ -56,6 +56,9 @@ if TYPE_CHECKING:
     from asterism.model import Tracks as Tracks
     from asterism.model.posterior import log_posterior as log_posterior
     from asterism.model.posterior import track_scores as track_scores
+    from asterism.view import plot_errors as plot_errors
+    from asterism.view import plot_presence as plot_presence
+    from asterism.view import plot_trajectories as plot_trajectories
 
 __version__ = "0.1.0"
 
@@ -92,6 +95,7 @@ _PUBLIC = {
     ),
     "evaluate": ("Evaluation", "calibration", "evaluate", "floor"),
     "io": ("FORMATS", "CaptureInfo", "describe", "read", "read_tracks", "write"),
+    "view": ("plot_errors", "plot_presence", "plot_trajectories"),
 }
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}
 _PACKAGES = ("simulate",)

@@ -1,0 +1,31 @@
+"""Points as they come, identities as they go: frame by frame, with revisions.
+
+A new marker gets its identity when it is believed, a few frames after it came; `revised` then says
+which of the earlier detections were its own.
+"""
+
+from __future__ import annotations
+
+import asterism as am
+
+
+def main() -> None:
+    scene = am.simulate.cube(seed=1, rate=100)
+    capture = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.001, seed=2).detections
+    model = am.estimate_model(capture).model  # of an earlier take, say
+
+    method = am.GNN()
+    state = method.init(model)
+    for time, points in capture:
+        state, update = method.step(state, time, points)
+        if len(update.revised):
+            print(f"{time:.2f} s: {len(update.revised)} earlier detections got their names")
+    live = state.live()
+    for identity, gap, mean in zip(live["ids"], live["gaps"], live["means"], strict=True):
+        x, y, z = mean[:, 0]
+        hidden = f", not seen for {gap} frames" if gap else ""
+        print(f"marker {identity} at ({x:.3f}, {y:.3f}, {z:.3f}) m{hidden}")
+
+
+if __name__ == "__main__":
+    main()
