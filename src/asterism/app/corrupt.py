@@ -59,9 +59,9 @@ def corrupt(
 
         asterism corrupt walk.c3d -o spoilt.c3d --truth truth.c3d
 
-        asterism corrupt walk.c3d -o a.csv --truth t.csv --missing 0.1 --clutter 0.1
+        asterism corrupt walk.c3d -o a.csv --truth t.csv --missing 0.1
 
-        asterism corrupt walk.c3d -o a.c3d --truth t.c3d --noise 0.0003 --burst 5:5-60
+        asterism corrupt walk.c3d -o a.csv --truth t.csv --burst 5:5-60
     """
     import numpy as np
 

@@ -20,7 +20,7 @@ def estimate(source: _In, out: _Out = None, quiet: Quiet = False, json: Json = F
 
         asterism estimate trial.c3d
 
-        asterism estimate trial.c3d -o model.toml && asterism track trial.c3d --model model.toml
+        asterism estimate trial.c3d -o model.toml
     """
     import asterism as am
     from asterism.app.files import check_outputs

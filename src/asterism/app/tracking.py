@@ -1,18 +1,15 @@
-"""From a capture and a job to a result file, its figures and, where asked for, a run folder."""
+"""From a capture and a job to a result file and, where asked for, a run folder."""
 
 from __future__ import annotations
 
-import dataclasses
 import logging
 import time
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 import asterism as am
 from asterism.app.console import progress, to_json
 from asterism.app.run_folder import CONFIG, SUMMARY, write_text, writing_log
+from asterism.app.summary import Summary, summarize
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -20,89 +17,12 @@ if TYPE_CHECKING:
 
     from asterism.app.run_folder import Job
 
-__all__ = ["Gap", "Summary", "carry_out", "default_output", "output_format", "summarize"]
+__all__ = ["carry_out", "default_output", "output_format"]
 
 log = logging.getLogger(__name__)
 
 # A log of point clouds has no place for identities.
 _WITHOUT_TRACKS = ("pointcloud",)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Gap:
-    """Frames in which a track was not seen, between two detections of it.
-
-    Parameters
-    ----------
-    track : int
-        The track.
-    first, last : int
-        First and last frame without it, as the file counts.
-    seconds : float
-        From the detection before to the one after.
-    """
-
-    track: int
-    first: int
-    last: int
-    seconds: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Summary:
-    """What a tracking did.
-
-    Parameters
-    ----------
-    input, output : str
-        The files.
-    method : str
-        The method.
-    n_frames, n_detections : int
-        Size of the capture.
-    n_tracks, n_labelled, n_clutter : int
-        Tracks, detections in them and detections in none.
-    n_gaps : int
-        Gaps within tracks.
-    longest_gaps : tuple of Gap
-        The longest of them, up to three.
-    seconds, frames_per_second : float
-        Time that the method took, and its pace.
-    """
-
-    input: str
-    output: str
-    method: str
-    n_frames: int
-    n_detections: int
-    n_tracks: int
-    n_labelled: int
-    n_clutter: int
-    n_gaps: int
-    longest_gaps: tuple[Gap, ...]
-    seconds: float
-    frames_per_second: float
-
-    def rows(self) -> list[tuple[str, str]]:
-        """Give the figures as people read them."""
-        gaps = [
-            f"track {g.track}, frames {g.first} to {g.last} ({g.seconds:.3g} s)"
-            for g in self.longest_gaps
-        ]
-        share = 100 * self.n_labelled / max(self.n_detections, 1)
-        return [
-            ("tracks", str(self.n_tracks)),
-            ("detections labelled", f"{self.n_labelled} of {self.n_detections} ({share:.1f} %)"),
-            ("clutter", str(self.n_clutter)),
-            ("gaps bridged", str(self.n_gaps)),
-            *((("longest gaps"), gap) if i == 0 else ("", gap) for i, gap in enumerate(gaps)),
-            ("time", f"{self.seconds:.3g} s, {self.frames_per_second:,.0f} frames/s"),
-            ("written", self.output),
-        ]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Give the figures as plain values."""
-        return dataclasses.asdict(self)
 
 
 def output_format(capture: am.Capture, out: Path | None, name: str | None) -> str:
@@ -200,49 +120,3 @@ def _carry_out(job: Job, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
     for name, text in summary.rows():
         log.info("%s %s", name, text)
     return tracks, summary
-
-
-def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> Summary:
-    """Count what a tracking did.
-
-    Parameters
-    ----------
-    tracks : Tracks
-        The result, over a `Capture`.
-    out : Path
-        The file it went to.
-    method : str
-        The method.
-    seconds : float
-        Time that it took.
-    """
-    d = tracks.detections
-    assert isinstance(d, am.Capture)
-    order, _ = tracks.by_track
-    frame, track = d.frame_of[order], tracks.labels[order]
-    is_gap = (np.diff(track) == 0) & (np.diff(frame) > 1)
-    before = np.flatnonzero(is_gap)
-    length = frame[before + 1] - frame[before]
-    n_labelled = len(order)
-    return Summary(
-        input=str(d.path),
-        output=str(out),
-        method=method,
-        n_frames=d.n_frames,
-        n_detections=d.n_points,
-        n_tracks=tracks.n_tracks,
-        n_labelled=n_labelled,
-        n_clutter=d.n_points - n_labelled,
-        n_gaps=len(before),
-        longest_gaps=tuple(
-            Gap(
-                track=int(track[i]),
-                first=d.first_frame + int(frame[i]) + 1,
-                last=d.first_frame + int(frame[i + 1]) - 1,
-                seconds=float(d.times[frame[i + 1]] - d.times[frame[i]]),
-            )
-            for i in before[np.argsort(-length, kind="stable")[:3]]
-        ),
-        seconds=seconds,
-        frames_per_second=d.n_frames / seconds if seconds else 0.0,
-    )
