@@ -70,7 +70,7 @@ def step_times(detections: am.Detections, model: am.TrackingModel) -> list[float
 
 
 def beside_the_loop(d: am.Detections, model: am.TrackingModel) -> list[str]:
-    """Speed of the NumPy loop on the first frames, ours against it, and the share of equal labels."""
+    """Time the NumPy loop on the first frames; ours against it, and the share of equal labels."""
     n = max(d.n_frames // 10, 20)
     first = am.Detections(
         times=d.times[:n], offsets=d.offsets[: n + 1], points=d.points[: d.offsets[n]]

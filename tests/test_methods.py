@@ -100,6 +100,26 @@ def test_the_engine_tracks_as_the_blackboard_does(method, motion, seed):
 
 
 @each_method
+@pytest.mark.parametrize("bound", ["gate", "speed", "odds"])
+@pytest.mark.parametrize("seed", range(3))
+def test_tight_bounds_are_those_of_the_blackboard(method, bound, seed):
+    # With bounds so tight that true links are lost, each of them decides.
+    rng = np.random.default_rng(100 + seed)
+    truth = wanderers(rng, n_markers=5, n_frames=30, clutter=1.5)
+    model = small_model(motion=interacting())
+    free = am.track(truth.detections, method, model=model).labels
+    if bound == "gate":
+        method = dataclasses.replace(method, gate_probability=0.97)
+    elif bound == "odds":  # believed late, doubted soon: what a track once scored decides
+        method = dataclasses.replace(method, confirm_probability=1 - 1e-12, delete_odds=1.5)
+    else:
+        model = small_model(motion=interacting(), max_speed=0.6)
+    labels = am.track(truth.detections, method, model=model).labels
+    assert (labels == track_by_hand(truth.detections, method, model)).all()
+    assert (labels != free).any()
+
+
+@each_method
 def test_many_points_are_tracked_as_few_are(method):
     # Two hundred points a frame take the grid; on the blackboard there is none.
     rng = np.random.default_rng(4)

@@ -115,8 +115,9 @@ class Tracks:
         Tracks
         """
         detections = Detections.from_dense(times, positions)
-        is_seen = np.isfinite(np.asarray(positions, dtype=np.float64)).all(axis=2)
-        n_markers = is_seen.shape[1]
+        dense = np.asarray(positions, dtype=np.float64)
+        is_seen = np.isfinite(dense).all(axis=2)
+        n_markers = dense.shape[1]
         labels = np.broadcast_to(np.arange(n_markers), is_seen.shape)[is_seen]
         return cls(
             detections=detections,
