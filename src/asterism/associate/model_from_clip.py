@@ -41,7 +41,7 @@ __all__ = ["ModelEstimate", "estimate_model"]
 SAMPLE_POINTS = 60_000
 """Longer captures are read in pieces, spread evenly, of so many detections in all."""
 N_PIECES = 8
-N_ROUNDS = 3
+N_ROUNDS = 2
 LEAST_LINKS = 10
 WIDER = 3.0
 SAFE_SHARE = 1 / 6
