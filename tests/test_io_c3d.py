@@ -478,3 +478,24 @@ def test_a_clip_of_a_capture_takes_its_part_of_the_source(tmp_path):
     analog = old["data"]["analogs"][:, :, 3:9]
     np.testing.assert_array_equal(new["data"]["analogs"], analog)
     np.testing.assert_array_equal(read(result).points, clip.points)
+
+
+def test_a_described_data_start_keeps_the_data_where_the_header_says(tmp_path):
+    # A description that was dropped after the blocks were counted moved the data by one block.
+    raw = make_c3d(np.ones((3, 1, 4)), labels=["A"])
+    at = raw.index(b"DATA_START") + len(b"DATA_START")
+    text = b"where the points begin, counted in blocks of 512"
+    offset = int.from_bytes(raw[at : at + 2], "little") + len(text)
+    start = 512 * (int.from_bytes(raw[16:18], "little") - 1)
+    record = raw[at + 2 : at + 6] + bytes([len(text)]) + text  # type, no dimensions, value, text
+    parameters = raw[:at] + offset.to_bytes(2, "little") + record + raw[at + 7 : start - len(text)]
+    assert not raw[start - len(text) : start].strip(b"\0")
+    path = tmp_path / "described.c3d"
+    path.write_bytes(parameters + raw[start:])
+    d = read(path)
+    assert d.n_frames == 3
+    for n in range(1, 120):
+        tracks = Tracks(detections=d, labels=[0, 0, 0], names=tuple(f"N{i}" for i in range(n)))
+        out = tmp_path / "out.c3d"
+        write(tracks, out)
+        assert read(out).n_frames == 3, n

@@ -92,7 +92,8 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
 
     _set_parameters(groups, names, descriptions, d.n_frames, first_frame, rate, unit, scale)
     n_blocks = len(build(groups)) // BLOCK
-    groups["POINT"].parameters["DATA_START"] = Parameter.of_integers([2 + n_blocks])
+    point = groups["POINT"].parameters  # the number of blocks is known now, and does not change
+    point["DATA_START"] = Parameter.of_integers([2 + n_blocks], point["DATA_START"])
     words = np.frombuffer(header, "<u2").copy()  # keeps the events that old programs put there
     words[0] = 0x5002  # parameters in block 2, and the mark of a C3D
     words[1:3] = len(names), analog.shape[1]

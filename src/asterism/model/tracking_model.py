@@ -114,7 +114,10 @@ class TrackingModel:
 
         text = tomli_w.dumps(self.to_dict())
         if path is not None:
-            Path(path).write_text(text, encoding="utf-8")
+            path = Path(path)
+            unfinished = path.with_name(f".{path.name}.part")
+            unfinished.write_text(text, encoding="utf-8")
+            unfinished.replace(path)
         return text
 
     @classmethod
@@ -129,6 +132,8 @@ class TrackingModel:
         path = Path(path)
         try:
             return cls.from_dict(tomllib.loads(path.read_text(encoding="utf-8")))
+        except OSError as error:
+            raise FormatError(path, "the file", "a model file", error.strerror) from error
         except UnicodeDecodeError as error:
             raise FormatError(path, f"byte {error.start}", "UTF-8 text", error.reason) from error
         except tomllib.TOMLDecodeError as error:

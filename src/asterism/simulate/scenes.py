@@ -34,8 +34,10 @@ def cube(
 
     Parameters
     ----------
-    frames, rate : int, float
-        Number of frames, and frames a second.
+    frames : int
+        Number of frames.
+    rate : float
+        Frames a second.
     seed : int
         Chooses the axis and the path.
     side : float
@@ -75,8 +77,10 @@ def crossing(*, frames: int = 60, rate: float = 1.0, seed: int = 0, side: float 
 
     Parameters
     ----------
-    frames, rate : int, float
-        Number of frames, and frames a second.
+    frames : int
+        Number of frames.
+    rate : float
+        Frames a second.
     seed : int
         Chooses the offset.
     side : float
@@ -120,8 +124,10 @@ def smooth(
     ----------
     n_markers : int
         Number of markers.
-    frames, rate : int, float
-        Number of frames, and frames a second.
+    frames : int
+        Number of frames.
+    rate : float
+        Frames a second.
     seed : int
         Chooses the centres, the paths and the drift.
     spacing : float
@@ -169,8 +175,10 @@ def walk(
     ----------
     n_markers : int
         Number of markers; they start at the corners of cubes of side 0.3, 0.6, 0.9 … m.
-    frames, rate : int, float
-        Number of frames, and frames a second.
+    frames : int
+        Number of frames.
+    rate : float
+        Frames a second.
     seed : int
         Chooses the steps.
     stride : float
@@ -202,7 +210,21 @@ def walk(
 
 
 def attracted(*, frames: int = 200, rate: float = 1.0, seed: int = 0) -> Tracks:
-    """Make 8 markers that walk at random and crowd about the origin: `walk` with a pull of 0.1."""
+    """Make 8 markers that walk at random and crowd about the origin: `walk` with a pull of 0.1.
+
+    Parameters
+    ----------
+    frames : int
+        Number of frames.
+    rate : float
+        Frames a second.
+    seed : int
+        Chooses the steps.
+
+    Returns
+    -------
+    Tracks
+    """
     return walk(frames=frames, rate=rate, seed=seed, pull=0.1)
 
 
