@@ -52,6 +52,7 @@ MotionModel motion_model(int n_axes, const In<double>& H, const In<double>& P0, 
   MotionModel m;
   m.M = static_cast<int>(T.shape(0));
   std::copy_n(T.data(), m.M * m.M, m.T.begin());
+  m.w0 = stationary(m.T, m.M);
   m.axis.n = n;
   m.axis.D = n_axes;
   std::copy_n(H.data(), n, m.axis.H.begin());

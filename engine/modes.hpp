@@ -23,6 +23,7 @@ struct MotionModel {
   AxisModel axis;
   int M = 1;
   std::array<double, kMaxModes * kMaxModes> T{1.0};  // row stride M
+  std::array<double, kMaxModes> w0{1.0};             // of a new track: the stationary ones
 };
 
 struct MotionStep {
@@ -34,68 +35,96 @@ struct MotionState {
   std::array<double, kMaxModes> w{};
 };
 
-// Every mode begins alike; their first weights are the stationary ones, found by squaring T. Its
-// rows are brought back to sum 1 each time: squaring doubles what rounding has added.
-inline MotionState begin_state(const MotionModel& m, const Point& y) {
-  MotionState s;
-  const AxisState first = begin_state(m.axis, y);
+// Stationary mode probabilities, by squaring T. Its rows are brought back to sum 1 each time, as
+// squaring doubles what rounding has added.
+inline std::array<double, kMaxModes> stationary(std::array<double, kMaxModes * kMaxModes> T,
+                                                int M) {
   std::array<double, kMaxModes> w{};
-  std::fill_n(w.begin(), m.M, 1.0 / m.M);
-  auto T = m.T;
-  for (int i = 0; i < 40 && m.M > 1; ++i) {
+  for (int i = 0; i < 40; ++i) {
     std::array<double, kMaxModes * kMaxModes> next{};
-    for (int a = 0; a < m.M; ++a)
-      for (int c = 0; c < m.M; ++c)
-        for (int b = 0; b < m.M; ++b) next[a * m.M + b] += T[a * m.M + c] * T[c * m.M + b];
-    for (int a = 0; a < m.M; ++a) {
+    for (int a = 0; a < M; ++a)
+      for (int c = 0; c < M; ++c)
+        for (int b = 0; b < M; ++b) next[a * M + b] += T[a * M + c] * T[c * M + b];
+    for (int a = 0; a < M; ++a) {
       double sum = 0;
-      for (int b = 0; b < m.M; ++b) sum += next[a * m.M + b];
-      for (int b = 0; b < m.M; ++b) T[a * m.M + b] = next[a * m.M + b] / sum;
+      for (int b = 0; b < M; ++b) sum += next[a * M + b];
+      for (int b = 0; b < M; ++b) T[a * M + b] = next[a * M + b] / sum;
     }
   }
-  for (int b = 0; b < m.M; ++b) {
-    s.mode[b] = first;
-    for (int a = 0; a < m.M; ++a) s.w[b] += w[a] * T[a * m.M + b];
-  }
+  for (int a = 0; a < M; ++a)
+    for (int b = 0; b < M; ++b) w[b] += T[a * M + b] / M;
+  return w;
+}
+
+// Every mode begins alike.
+inline MotionState begin_state(const MotionModel& m, const Point& y) {
+  MotionState s;
+  std::fill_n(s.mode.begin(), m.M, begin_state(m.axis, y));
+  s.w = m.w0;
   return s;
 }
 
-// Mean and covariance of a mixture of states.
-inline AxisState collapse(const AxisModel& m, const AxisState* states, const double* weights,
-                          int M) {
-  return with_states(m.n, [&](auto n_states) {
+// How far the modes of a state lie from the first: a mixture's spread needs no more of them.
+//
+//   e_a  mean of mode a less that of mode 0       E_a  e_a e_aᵀ, averaged over the axes
+//
+// The axes share one covariance, so what their means differ by is shared out evenly.
+struct ModeSpread {
+  std::array<std::array<AxisVector, kMaxAxes>, kMaxModes> e{};
+  std::array<AxisMatrix, kMaxModes> E{};
+
+  ModeSpread(const MotionModel& m, const MotionState& s) {
+    with_states(m.axis.n, [&](auto n_states) {
+      constexpr int n = n_states;
+      for (int a = 1; a < m.M; ++a) {
+        for (int d = 0; d < m.axis.D; ++d)
+          for (int i = 0; i < n; ++i) e[a][d][i] = s.mode[a].x[d][i] - s.mode[0].x[d][i];
+        for (int d = 0; d < m.axis.D; ++d)
+          for (int i = 0; i < n; ++i)
+            for (int j = 0; j < n; ++j) E[a][i * n + j] += e[a][d][i] * e[a][d][j] / m.axis.D;
+      }
+    });
+  }
+};
+
+// Mean and covariance of a mixture of the modes of a state, with weights that sum to 1.
+inline AxisState mix(const MotionModel& m, const MotionState& s, const ModeSpread& spread,
+                     const std::array<double, kMaxModes>& weights) {
+  return with_states(m.axis.n, [&](auto n_states) {
     constexpr int n = n_states;
-    AxisState s;
-    for (int a = 0; a < M; ++a)
-      for (int d = 0; d < m.D; ++d)
-        for (int i = 0; i < n; ++i) s.x[d][i] += weights[a] * states[a].x[d][i];
-    for (int a = 0; a < M; ++a)
-      for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j) {
-          // The axes share one covariance, so what their means differ by is shared out evenly.
-          double spread = 0;
-          for (int d = 0; d < m.D; ++d)
-            spread += (states[a].x[d][i] - s.x[d][i]) * (states[a].x[d][j] - s.x[d][j]);
-          s.P[i * n + j] += weights[a] * (states[a].P[i * n + j] + spread / m.D);
-        }
-    return s;
+    AxisState mixed = s.mode[0];
+    std::array<AxisVector, kMaxAxes> shift{};
+    for (int k = 0; k < n * n; ++k) mixed.P[k] *= weights[0];
+    for (int a = 1; a < m.M; ++a) {
+      for (int d = 0; d < m.axis.D; ++d)
+        for (int i = 0; i < n; ++i) shift[d][i] += weights[a] * spread.e[a][d][i];
+      for (int k = 0; k < n * n; ++k)
+        mixed.P[k] += weights[a] * (s.mode[a].P[k] + spread.E[a][k]);
+    }
+    for (int d = 0; d < m.axis.D; ++d)
+      for (int i = 0; i < n; ++i) {
+        mixed.x[d][i] += shift[d][i];
+        for (int j = 0; j < n; ++j) mixed.P[i * n + j] -= shift[d][i] * shift[d][j] / m.axis.D;
+      }
+    return mixed;
   });
 }
 
 inline AxisState collapse(const MotionModel& m, const MotionState& s) {
-  return m.M == 1 ? s.mode[0] : collapse(m.axis, s.mode.data(), s.w.data(), m.M);
+  return m.M == 1 ? s.mode[0] : mix(m, s, ModeSpread(m, s), s.w);
 }
 
 inline void predict(const MotionModel& m, const MotionStep& step, MotionState& s) {
   if (m.M > 1) {
     const MotionState before = s;
+    const ModeSpread spread(m, before);
     for (int b = 0; b < m.M; ++b) {
       std::array<double, kMaxModes> share{};
       double total = 0;
       for (int a = 0; a < m.M; ++a) total += share[a] = before.w[a] * m.T[a * m.M + b];
       for (int a = 0; a < m.M; ++a) share[a] /= total;
       s.w[b] = total;
-      s.mode[b] = collapse(m.axis, before.mode.data(), share.data(), m.M);
+      s.mode[b] = mix(m, before, spread, share);
     }
   }
   for (int b = 0; b < m.M; ++b) predict(m.axis, step.mode[b], s.mode[b]);
