@@ -26,11 +26,11 @@ docs: $(VENV)/.docs
 	$(BIN)/mkdocs build --strict --quiet
 
 bench: $(VENV)/.bench
-	$(BIN)/python benchmarks/speed.py
+	$(BIN)/python benchmarks/speed.py --markdown docs/tables/speed.md
 
 # The table of captures in the docs; needs the real captures beside the project.
 tables: $(VENV)/.bench
-	$(BIN)/python benchmarks/captures.py
+	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
 # beside the package, never installed.

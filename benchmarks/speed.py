@@ -134,7 +134,7 @@ def main() -> None:
     lines = ["| " + " | ".join(head) + " |", "|" + "---:|" * len(head)]
     lines += ["| " + " | ".join(row) + " |" for row in frames_a_second()]
     light = import_seconds("import asterism")
-    c3d = import_seconds("import asterism, ezc3d, asterism.io.c3d; asterism.read")
+    c3d = import_seconds("import asterism; asterism.read")
     out = subprocess.run(
         [sys.executable, "-c", TEN_MINUTES], check=True, capture_output=True, text=True
     ).stdout.split()
