@@ -12,12 +12,10 @@ import asterism as am
 
 
 def crossing(path: Path) -> None:
-    """What goes in and what comes out: a turning cube flies through a still one."""
+    """Draw what goes in and what comes out: a turning cube flies through a still one."""
     scene = am.simulate.crossing(seed=3, rate=100)
     truth = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.002, seed=4)
-    unnamed = am.Tracks(
-        detections=truth.detections, labels=np.full(truth.detections.n_points, -1)
-    )
+    unnamed = am.Tracks(detections=truth.detections, labels=np.full(truth.detections.n_points, -1))
     tracks = am.track(truth.detections, am.GNN())
     figure = Figure(figsize=(11, 4), layout="constrained", dpi=110)
     for i, (shown, title) in enumerate(
