@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -38,7 +39,9 @@ class PointGrid {
       size_[d] = 1;
       inverse_[d] = 0;
       if (d >= D || !(high[d] > low_[d])) continue;
-      const double edge = std::max(cell, (high[d] - low_[d]) / (2 * per_axis));
+      const double fitting = (high[d] - low_[d]) / (2 * per_axis);
+      const double edge = cell > fitting ? cell : fitting;  // also where `cell` is not a number
+      if (!std::isfinite(edge)) continue;
       inverse_[d] = 1 / edge;
       size_[d] = static_cast<std::int64_t>((high[d] - low_[d]) * inverse_[d]) + 1;
       n_cells *= size_[d];
@@ -88,7 +91,8 @@ class PointGrid {
  private:
   std::int64_t axis_cell(double x, int d) const {
     const double c = (x - low_[d]) * inverse_[d];
-    return static_cast<std::int64_t>(std::clamp(c, 0.0, static_cast<double>(size_[d] - 1)));
+    if (!(c > 0)) return 0;  // also where c is not a number
+    return static_cast<std::int64_t>(std::min(c, static_cast<double>(size_[d] - 1)));
   }
   std::int64_t cell_index(const Point& p) const {
     std::int64_t c = 0;

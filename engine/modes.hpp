@@ -142,6 +142,11 @@ struct Prediction {
       y[b] = observed(m.axis, s.mode[b]);
       S[b] = innovation_variance(m.axis, s.mode[b]);
       log_peak[b] = log_density(D, S[b], 0) + (M > 1 ? std::log(s.w[b]) : 0.0);
+      if (std::isfinite(log_peak[b])) continue;
+      // Numbers too large or small for the filter: this mode expects nothing, anywhere.
+      log_peak[b] = -std::numeric_limits<double>::infinity();
+      S[b] = 1;
+      y[b] = {};
     }
   }
 
@@ -152,7 +157,7 @@ struct Prediction {
       each[b] = log_peak[b] - 0.5 * squared_distance(point, y[b], D) / S[b];
       best = std::max(best, each[b]);
     }
-    if (M == 1) return best;
+    if (M == 1 || std::isinf(best)) return best;
     double sum = 0;
     for (int b = 0; b < M; ++b) sum += std::exp(each[b] - best);
     return best + std::log(sum);
@@ -190,7 +195,8 @@ inline double update(const MotionModel& m, const Prediction& p, const Point& y, 
   const double total = p.log_likelihood(y, each);
   for (int b = 0; b < m.M; ++b) {
     update(m.axis, y, s.mode[b]);
-    if (m.M > 1) s.w[b] = std::max(std::exp(each[b] - total), 1e-300);
+    const double w = std::exp(each[b] - total);
+    if (m.M > 1) s.w[b] = w > 1e-300 ? w : 1e-300;
   }
   return total;
 }

@@ -256,6 +256,34 @@ def test_points_too_dense_for_the_model_are_a_clear_limit(monkeypatch):
         am.track(d, am.GNN(), model=small_model())
 
 
+@each_method
+@pytest.mark.parametrize("motion", ["dwna", "interacting"])
+@pytest.mark.parametrize(
+    ("scale", "step", "changes"),
+    [
+        (1e200, 0.1, {}),
+        (1e307, 0.1, {}),
+        (1e-200, 0.1, {"noise_sigma": 1e-200}),
+        (1.0, 1e60, {}),
+        (1.0, 1e-9, {"max_speed": 1e300}),
+        (1.0, 0.1, {"noise_sigma": 1e-300, "clutter_density": 1e-300}),
+        (1.0, 0.1, {"p_detection": 1 - 1e-16, "p_disappear": 1e-300}),
+        (1.0, 0.1, {"clutter_density": 1e300, "birth_density": 1e-300}),
+    ],
+)
+def test_absurd_numbers_do_no_harm(method, motion, scale, step, changes):
+    # No label is promised, but neither a crash nor an index that was made of NaN.
+    rng = np.random.default_rng(1)
+    model = small_model(**changes)
+    if motion == "interacting":
+        model = dataclasses.replace(model, motion=interacting())
+    frames = [rng.uniform(-1, 1, (n, 3)) * scale for n in (80, 3, 0, 70, 90)]
+    d = am.Detections.from_frames(np.arange(5) * step, frames)
+    tracks = am.track(d, method, model=model)
+    assert (tracks.labels >= -1).all()
+    assert len(am.filter_states(tracks, model).log_densities) == d.n_points
+
+
 def test_a_hundred_thousand_points_in_a_frame():
     rng = np.random.default_rng(1)
     points = rng.uniform(-50, 50, (100_000, 3))
