@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.associate.clip_evidence import Region, gather_evidence
 from asterism.associate.clip_links import first_scales
-from asterism.associate.gnn import GNN
 from asterism.associate.motion_fit import FitBounds, MotionFit, fit_motion, simpler_motion
 from asterism.errors import ParameterError
 from asterism.model import (
@@ -26,14 +26,12 @@ from asterism.model import (
     Population,
     Sensor,
     TrackingModel,
-    Tracks,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from asterism.associate.clip_evidence import Evidence
     from asterism.associate.clip_links import Scales
 
 __all__ = ["ModelEstimate", "estimate_model"]
@@ -42,8 +40,8 @@ SAMPLE_POINTS = 60_000
 """Longer captures are read in pieces, spread evenly, of so many detections in all."""
 N_PIECES = 8
 N_ROUNDS = 2
-LEAST_LINKS = 10
 WIDER = 3.0
+"""Tracks to learn the motion from are found with the strongest motion so many times stronger."""
 SAFE_SHARE = 1 / 6
 """A jolt's σ may move a marker by this share of the points' spacing in a frame."""
 LONGEST_GAP = 60
@@ -97,7 +95,7 @@ def estimate_model(detections: Detections) -> ModelEstimate:
         )
     pieces = list(_pieces(detections))
     scales = first_scales(pieces)
-    region = _Region.of(detections)
+    region = Region.of(detections)
     low, high = scales.acceleration_low, scales.acceleration_high
     bounds = FitBounds(
         least_noise=scales.noise_floor,
@@ -107,14 +105,14 @@ def estimate_model(detections: Detections) -> ModelEstimate:
         math.log(scales.noise), (math.log(low), math.log(low * high) / 2, math.log(high)), 0.95
     )
     model = _first_model(fit, scales, region)
-    evidence = _evidence(pieces, _wider(model))
+    evidence = gather_evidence(pieces, _wider(model))
     for _ in range(N_ROUNDS):
         fit = fit_motion(evidence.tracks, model, fit, bounds)
         model = _model(fit, evidence, scales, region)
-        evidence = _evidence(pieces, _wider(model))
+        evidence = gather_evidence(pieces, _wider(model))
     fit = simpler_motion(evidence.tracks, model, fit, bounds)
     # Motion is learnt with a wider model, but the rates are those of the model itself.
-    evidence = _evidence(pieces, _model(fit, evidence, scales, region))
+    evidence = gather_evidence(pieces, _model(fit, evidence, scales, region))
     model = _model(fit, evidence, scales, region)
     return ModelEstimate(model=model, reasons=_reasons(model, evidence, region))
 
@@ -135,45 +133,7 @@ def _pieces(detections: Detections) -> Iterator[Detections]:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Region:
-    """Where the points are, for the densities per volume."""
-
-    volume: float
-    points_a_frame: float
-    n_axes: int
-
-    @classmethod
-    def of(cls, detections: Detections) -> _Region:
-        # A bounding box, no axis thinner than a tenth of the longest: a flat volume would make
-        # every density of clutter enormous.
-        extent = np.ptp(detections.points, axis=0)
-        longest = max(float(extent.max()), 1e-3)
-        volume = float(np.prod(np.maximum(extent, 0.1 * longest)))
-        return cls(
-            volume=volume,
-            points_a_frame=detections.n_points / detections.n_frames,
-            n_axes=detections.n_axes,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Evidence:
-    """What tracking with a model found, over all pieces."""
-
-    tracks: list[Tracks]
-    n_misses: int
-    n_clutter: int
-    n_frames: int
-    speeds: NDArray[np.float64]
-    velocity_rms: float
-
-    @property
-    def n_links(self) -> int:
-        return len(self.speeds)
-
-
-def _first_model(fit: MotionFit, scales: Scales, region: _Region) -> TrackingModel:
+def _first_model(fit: MotionFit, scales: Scales, region: Region) -> TrackingModel:
     density = region.points_a_frame / region.volume
     return TrackingModel(
         motion=fit.motion(scales.speed),
@@ -204,46 +164,7 @@ def _wider(model: TrackingModel) -> TrackingModel:
     return model
 
 
-def _evidence(pieces: list[Detections], model: TrackingModel) -> _Evidence:
-    method = GNN()
-    tracks: list[Tracks] = []
-    misses = clutter = 0
-    speeds: list[NDArray[np.float64]] = []
-    squares: list[NDArray[np.float64]] = []
-    for piece in pieces:
-        state = method.init(model, n_axes=piece.n_axes)
-        found = Tracks(detections=piece, labels=method.run(state, piece)[1])
-        tracks.append(found)
-        order, _ = found.by_track
-        frame = piece.frame_of[order]
-        is_link = np.diff(found.labels[order]) == 0
-        dt = np.diff(piece.times[frame])[is_link]
-        moves = np.diff(piece.points[order], axis=0)[is_link]
-        misses += int((np.diff(frame)[is_link] - 1).sum())
-        clutter += int((found.labels < 0).sum())
-        speeds.append(np.linalg.norm(moves, axis=1) / dt)
-        squares.append(((moves / dt[:, None]) ** 2).mean(axis=1))
-    evidence = _Evidence(
-        tracks=tracks,
-        n_misses=misses,
-        n_clutter=clutter,
-        n_frames=sum(piece.n_frames for piece in pieces),
-        speeds=np.concatenate(speeds),
-        velocity_rms=math.sqrt(float(np.concatenate(squares).mean()))
-        if any(map(len, squares))
-        else 0.0,
-    )
-    if evidence.n_links < LEAST_LINKS:
-        raise ParameterError(
-            "detections",
-            f"tracks with at least {LEAST_LINKS} links in all, to estimate a model from",
-            f"{evidence.n_links}",
-            "give a model",
-        )
-    return evidence
-
-
-def _model(fit: MotionFit, evidence: _Evidence, scales: Scales, region: _Region) -> TrackingModel:
+def _model(fit: MotionFit, evidence: Evidence, scales: Scales, region: Region) -> TrackingModel:
     # Each rate with one event more than was seen: nothing is impossible after a finite clip. A
     # marker that comes or goes for good looks like a track that broke, so the clip is taken to have
     # one birth and one death, as most have.
@@ -281,7 +202,7 @@ def _bridgeable(levels: tuple[float, ...], p_detection: float, n_links: int, sca
 
 
 def _reasons(
-    model: TrackingModel, evidence: _Evidence, region: _Region
+    model: TrackingModel, evidence: Evidence, region: Region
 ) -> tuple[tuple[str, str, str], ...]:
     sensor, population = model.sensor, model.population
     levels = [

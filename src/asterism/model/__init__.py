@@ -1,7 +1,10 @@
 """What things are: detections, tracks and the one generative model that every method searches."""
 
-from asterism.model.detections import Capture, Detections
-from asterism.model.motion import DWNA, DWPA, InteractingMotions, LinearMotion, Motion, RandomWalk
+from asterism.model.capture import Capture
+from asterism.model.detections import Detections
+from asterism.model.interacting_motions import InteractingMotions
+from asterism.model.linear_motion import LinearMotion
+from asterism.model.motion import DWNA, DWPA, Motion, RandomWalk, SingleMotion
 from asterism.model.population import Population
 from asterism.model.sensor import Sensor
 from asterism.model.tracking_model import TrackingModel
@@ -18,6 +21,7 @@ __all__ = [
     "Population",
     "RandomWalk",
     "Sensor",
+    "SingleMotion",
     "TrackingModel",
     "Tracks",
 ]

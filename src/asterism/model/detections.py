@@ -1,13 +1,12 @@
-"""What the cameras saw: points without names, frame by frame, and the file they came from.
+"""What the cameras saw: points without names, frame by frame.
 
 Nothing here says which point is which marker; that is a `Tracks`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -19,9 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from asterism.model.tracks import Tracks
-
-__all__ = ["Capture", "Detections"]
+__all__ = ["Detections"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -187,77 +184,10 @@ class Detections:
     def __len__(self) -> int:
         return self.n_frames
 
-    def _summary(self) -> str:
+    def summary(self) -> str:
+        """Say in a few words how much there is."""
         span = f", {self.times[0]:g} to {self.times[-1]:g} s" if self.n_frames else ""
         return f"{self.n_frames} frames, {self.n_points} points, {self.n_axes}-D{span}"
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self._summary()})"
-
-
-def _no_channels() -> NDArray[np.int64]:
-    return np.empty(0, dtype=np.int64)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Capture(Detections):
-    """Detections that were read from a file, with what else the file knew.
-
-    Parameters
-    ----------
-    path : Path
-        The file; writing a result in the same format takes from it all that is not a point.
-    format : str
-        Its format, a key of `asterism.io.FORMATS`.
-    rate : float
-        Frames a second as the file states it, 0 where it does not.
-    first_frame : int
-        The file's number of its first frame.
-    units : str
-        The unit of length in the file, "mm" or "m"; `points` are metres whatever it is.
-    channels : array_like of int, shape (N,)
-        The file's own channel (column, trajectory) of each detection, -1 where there is none.
-    labels : array_like of int, shape (N,)
-        The file's own identities: one for each named channel and one for each unbroken piece of
-        an unnamed channel, because recorders reuse those for other markers; -1 where none.
-    names : tuple of str or None
-        Name of each identity, None where it has none.
-    modelled : tuple of str
-        Names of computed points (joint centres, angles, forces) that were left out.
-    warnings : tuple of str
-        What was odd about the file and how it was taken.
-
-    See Also
-    --------
-    asterism.read : makes one.
-    """
-
-    path: Path = field(default_factory=Path)
-    format: str = ""
-    rate: float = 0.0
-    first_frame: int = 1
-    units: str = "m"
-    channels: NDArray[np.int64] = field(default_factory=_no_channels)
-    labels: NDArray[np.int64] = field(default_factory=_no_channels)
-    names: tuple[str | None, ...] = ()
-    modelled: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name in ("channels", "labels"):
-            array = check_array(name, getattr(self, name), (self.n_points,), dtype=np.int64)
-            view = array.view()
-            view.flags.writeable = False
-            object.__setattr__(self, name, view)
-
-    @property
-    def tracks(self) -> Tracks:
-        """The file's own identities as `Tracks`: truth, where the file is labelled."""
-        from asterism.model.tracks import Tracks
-
-        return Tracks(detections=self, labels=self.labels, names=self.names)
-
-    def __repr__(self) -> str:
-        n_named = sum(name is not None for name in self.names)
-        return f"Capture({self.path.name!r}, {self._summary()}, {n_named} named)"
+        return f"{type(self).__name__}({self.summary()})"

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, Self, cast
 import numpy as np
 
 from asterism.errors import FormatError, ParameterError, check_fields
-from asterism.model.motion import MOTIONS, Motion
+from asterism.model.interacting_motions import InteractingMotions
+from asterism.model.linear_motion import LinearMotion
+from asterism.model.motion import DWNA, DWPA, Motion, RandomWalk
 from asterism.model.population import Population
 from asterism.model.sensor import Sensor
 
@@ -20,7 +22,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["TrackingModel"]
+__all__ = ["MOTIONS", "TrackingModel"]
+
+MOTIONS: dict[str, type[Motion]] = {
+    motion.kind: motion for motion in (DWNA, RandomWalk, DWPA, LinearMotion, InteractingMotions)
+}
+"""Every motion by its name in a model file: the one place to register a new one."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,132 @@
+"""What tracking a clip with a model shows: where the points are, links, misses, clutter, speeds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.associate.gnn import GNN
+from asterism.errors import ParameterError
+from asterism.model import Detections, TrackingModel, Tracks
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["Evidence", "Region", "gather_evidence"]
+
+LEAST_LINKS = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """Where the points are, for the densities per volume.
+
+    Parameters
+    ----------
+    volume : float
+        m³, or m² in the plane.
+    points_a_frame : float
+        Their mean number.
+    n_axes : int
+        2 or 3.
+    """
+
+    volume: float
+    points_a_frame: float
+    n_axes: int
+
+    @classmethod
+    def of(cls, detections: Detections) -> Region:
+        """Take the bounding box of all points, no axis thinner than a tenth of the longest.
+
+        A flat volume would make every density of clutter enormous.
+        """
+        extent = np.ptp(detections.points, axis=0)
+        longest = max(float(extent.max()), 1e-3)
+        return cls(
+            volume=float(np.prod(np.maximum(extent, 0.1 * longest))),
+            points_a_frame=detections.n_points / detections.n_frames,
+            n_axes=detections.n_axes,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """What tracking found, over all pieces of a clip.
+
+    Parameters
+    ----------
+    tracks : list of Tracks
+        Those of each piece.
+    n_misses : int
+        Frames without a detection inside tracks.
+    n_clutter : int
+        Points in no track.
+    n_frames : int
+        Of all pieces.
+    speeds : ndarray, shape (L,)
+        Of each link, m/s.
+    velocity_rms : float
+        Of a velocity coordinate, m/s.
+    """
+
+    tracks: list[Tracks]
+    n_misses: int
+    n_clutter: int
+    n_frames: int
+    speeds: NDArray[np.float64]
+    velocity_rms: float
+
+    @property
+    def n_links(self) -> int:
+        """Number of pairs of consecutive detections in tracks."""
+        return len(self.speeds)
+
+
+def gather_evidence(pieces: list[Detections], model: TrackingModel) -> Evidence:
+    """Track the pieces of a clip and count.
+
+    Raises
+    ------
+    ParameterError
+        If hardly anything could be followed.
+    """
+    method = GNN()
+    tracks: list[Tracks] = []
+    misses = clutter = 0
+    speeds: list[NDArray[np.float64]] = []
+    squares: list[NDArray[np.float64]] = []
+    for piece in pieces:
+        state = method.init(model, n_axes=piece.n_axes)
+        found = Tracks(detections=piece, labels=method.run(state, piece)[1])
+        tracks.append(found)
+        order, _ = found.by_track
+        frame = piece.frame_of[order]
+        is_link = np.diff(found.labels[order]) == 0
+        dt = np.diff(piece.times[frame])[is_link]
+        moves = np.diff(piece.points[order], axis=0)[is_link]
+        misses += int((np.diff(frame)[is_link] - 1).sum())
+        clutter += int((found.labels < 0).sum())
+        speeds.append(np.linalg.norm(moves, axis=1) / dt)
+        squares.append(((moves / dt[:, None]) ** 2).mean(axis=1))
+    evidence = Evidence(
+        tracks=tracks,
+        n_misses=misses,
+        n_clutter=clutter,
+        n_frames=sum(piece.n_frames for piece in pieces),
+        speeds=np.concatenate(speeds),
+        velocity_rms=math.sqrt(float(np.concatenate(squares).mean()))
+        if any(map(len, squares))
+        else 0.0,
+    )
+    if evidence.n_links < LEAST_LINKS:
+        raise ParameterError(
+            "detections",
+            f"tracks with at least {LEAST_LINKS} links in all, to estimate a model from",
+            f"{evidence.n_links}",
+            "give a model",
+        )
+    return evidence

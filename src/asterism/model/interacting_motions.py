@@ -1,0 +1,76 @@
+"""A marker that changes between motions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from asterism.errors import ParameterError, check_array
+from asterism.model.motion import Motion, SingleMotion
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["InteractingMotions"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InteractingMotions(Motion):
+    """A marker that changes between motions: at rest, moving, thrown.
+
+    The filter keeps a state for each and mixes them (interacting multiple model, Blom &
+    Bar-Shalom 1988); a detection is weighed against the mixture of their predictions, which is an
+    approximation of the exact sum over all sequences of modes.
+
+    Parameters
+    ----------
+    models : sequence of 2 or 3 motions
+        Single ones of one kind, differing in their noise. The prior of the first holds for new
+        tracks.
+    transitions : array_like, shape (M, M)
+        Probability of going from mode (row) to mode (column) in a step; positive, rows sum to 1.
+    """
+
+    models: tuple[SingleMotion, ...]
+    transitions: NDArray[np.float64]
+
+    kind: ClassVar[str] = "interacting"
+
+    def __post_init__(self) -> None:
+        models = tuple(self.models)
+        M = len(models)
+        if M not in (2, 3):
+            raise ParameterError("models", "2 or 3 motion models", M)
+        kinds = [model.kind for model in models]
+        if len(set(kinds)) > 1 or InteractingMotions.kind in kinds:
+            raise ParameterError("models", "single motions of one kind", kinds)
+        observations = np.stack([model.observation for model in models])
+        if not (observations == observations[0]).all():
+            raise ParameterError("models", "motions with the same H", observations.tolist())
+        transitions = check_array("transitions", self.transitions, (M, M))
+        if (transitions <= 0).any() or not np.allclose(transitions.sum(axis=1), 1, atol=1e-9):
+            raise ParameterError("transitions", "positive rows that sum to 1", transitions.tolist())
+        object.__setattr__(self, "models", models)
+        object.__setattr__(self, "transitions", transitions)
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, InteractingMotions)
+            and self.models == other.models
+            and np.array_equal(self.transitions, other.transitions)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.models, self.transitions.tobytes()))
+
+    @property
+    def modes(self) -> tuple[SingleMotion, ...]:
+        """The models."""
+        return self.models
+
+    @property
+    def mode_transitions(self) -> NDArray[np.float64]:
+        """Probability of going from mode to mode in a step, shape (M, M)."""
+        return self.transitions

@@ -1,0 +1,118 @@
+"""Any linear motion of one axis, by its matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from asterism.errors import ParameterError, check_array, check_number
+from asterism.model.motion import SingleMotion
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["LinearMotion"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearMotion(SingleMotion):
+    """Any linear model of one axis, by its matrices for one step.
+
+    A step of ``k`` times `step` applies F ``k`` times; a spacing that is no multiple (within 2 %)
+    is refused, because the matrices do not say what happens in between.
+
+    Parameters
+    ----------
+    F, Q : array_like, shape (n, n)
+        Transition and process noise over `step`; n is 1, 2 or 3.
+    H : array_like, shape (n,)
+        Observation: position = H · state.
+    step : float
+        The spacing, seconds, for which F and Q hold.
+    prior_covariance : array_like, shape (n, n)
+        Covariance of the state when a track begins, given its position; the measurement noise is
+        added along H.
+    """
+
+    F: NDArray[np.float64]
+    Q: NDArray[np.float64]
+    H: NDArray[np.float64]
+    step: float
+    prior_covariance: NDArray[np.float64]
+
+    kind: ClassVar[str] = "linear"
+
+    def __post_init__(self) -> None:
+        n = len(np.atleast_1d(self.H))
+        if n not in (1, 2, 3):
+            raise ParameterError("H", "1 to 3 states an axis", n)
+        object.__setattr__(self, "H", check_array("H", self.H, (n,)))
+        for name in ("F", "Q", "prior_covariance"):
+            object.__setattr__(self, name, check_array(name, getattr(self, name), (n, n)))
+        check_number("step", self.step, above=0)
+        if not self.H.any():
+            raise ParameterError("H", "a row that sees the state", self.H)
+        for name in ("Q", "prior_covariance"):
+            matrix = getattr(self, name)
+            scale = np.abs(matrix).max() + 1e-300
+            if not np.allclose(matrix, matrix.T, rtol=0, atol=1e-12 * scale):
+                raise ParameterError(name, "a symmetric matrix", matrix.tolist())
+            if np.linalg.eigvalsh(matrix).min() < -1e-10 * scale:
+                raise ParameterError(name, "a positive semi-definite matrix", matrix.tolist())
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, LinearMotion)
+            and self.step == other.step
+            and all(
+                np.array_equal(getattr(self, name), getattr(other, name))
+                for name in ("F", "Q", "H", "prior_covariance")
+            )
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.step, self.F.tobytes(), self.Q.tobytes(), self.H.tobytes()))
+
+    @property
+    def observation(self) -> NDArray[np.float64]:
+        """The given H."""
+        return self.H
+
+    def _powers(self, dt: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        d = np.atleast_1d(np.asarray(dt, dtype=np.float64))
+        k = np.rint(d / self.step).astype(np.int64)
+        off = np.flatnonzero((np.abs(d - k * self.step) > 0.02 * self.step) | (k < 1))
+        if len(off):
+            raise ParameterError(
+                "times",
+                f"a spacing that is a multiple of the motion model's step of {self.step:g} s",
+                f"{d[off[0]]:g} s",
+                "give F and Q for the capture's own spacing",
+            )
+        return k, d
+
+    def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
+        """F to the power Δ / step for each Δ of `dt` (M,), shape (M, n, n)."""
+        k, _ = self._powers(dt)
+        unique, inverse = np.unique(k, return_inverse=True)
+        return np.stack([np.linalg.matrix_power(self.F, int(p)) for p in unique])[inverse]
+
+    def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
+        """Q accumulated over Δ / step steps for each Δ of `dt` (M,), shape (M, n, n)."""
+        k, _ = self._powers(dt)
+        unique, inverse = np.unique(k, return_inverse=True)
+        table: list[NDArray[np.float64]] = []
+        total, done = np.zeros_like(self.Q), 0
+        for p in unique:
+            for _ in range(int(p) - done):
+                total = self.F @ total @ self.F.T + self.Q
+            done = int(p)
+            table.append(total)
+        return np.stack(table)[inverse]
+
+    def initial_covariance(self, noise_sigma: float, velocity_sigma: float) -> NDArray[np.float64]:
+        """Prior covariance plus the measurement noise along H, shape (n, n)."""
+        along = self.H / (self.H @ self.H)
+        return self.prior_covariance + noise_sigma**2 * np.outer(along, along)
