@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 .PHONY: demo test lint types contracts docs bench tables sanitize wheel clean
 
 demo: $(VENV)/.demo
-	$(BIN)/asterism demo --out demo
+	$(BIN)/asterism demo --out demo --overwrite
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest --doctest-modules --doctest-continue-on-failure
