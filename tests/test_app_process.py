@@ -72,7 +72,8 @@ def folder(long_capture, tmp_path):
 )
 def test_stopped_while_tracking(folder, signum, code):
     process = start("track", "in.csv", "--model", "model.toml", "--run", "run", cwd=folder)
-    wait_for((folder / "run" / "log.txt").exists, process)
+    log = folder / "run" / "log.txt"
+    wait_for(lambda: log.exists() and log.stat().st_size > 0, process)
     assert stopped(process, signum) == (code, f"asterism: stopped by {signum.name}\n")
     left = {path.name for path in (folder / "run").iterdir()}
     assert left <= {"log.txt", "run.toml"}  # no result, no summary, no temporary file
