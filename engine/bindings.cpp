@@ -251,6 +251,7 @@ FrameStats tracker_run(FrameTracker& tracker, const In<double>& times, const In<
     total.largest_group = std::max(total.largest_group, s.largest_group);
     total.n_confirmed = s.n_confirmed;
     total.n_tentative = s.n_tentative;
+    total.n_pending = s.n_pending;
   }
   return total;
 }
@@ -356,7 +357,8 @@ NB_MODULE(_engine, module) {
       .def_ro("n_groups", &FrameStats::n_groups)
       .def_ro("largest_group", &FrameStats::largest_group)
       .def_ro("n_confirmed", &FrameStats::n_confirmed)
-      .def_ro("n_tentative", &FrameStats::n_tentative);
+      .def_ro("n_tentative", &FrameStats::n_tentative)
+      .def_ro("n_pending", &FrameStats::n_pending);
 
   nb::class_<FrameTracker>(module, "FrameTracker")
       .def(

@@ -52,6 +52,7 @@ struct LiveTrack {
 struct FrameStats {
   std::int64_t n_candidates = 0, n_groups = 0, largest_group = 0;
   std::int64_t n_confirmed = 0, n_tentative = 0;
+  std::int64_t n_pending = 0;  // detections that tentative tracks still hold
 };
 
 class CandidateLimit {};  // thrown when a frame has more candidates than allowed
@@ -64,7 +65,6 @@ struct FrameScratch {
 
   std::vector<Candidate> candidates, eligible;
   std::vector<Prediction> predictions;
-  std::vector<Point> centers;
   std::vector<double> radii;
   std::vector<std::int32_t> match;
   std::vector<char> is_taken;
@@ -93,8 +93,10 @@ class FrameTracker {
     match_all(false, points.size(), stats);
     update_tracks(time, points, label);
     begin_tracks(time, points);
-    for (const LiveTrack& track : tracks_)
+    for (const LiveTrack& track : tracks_) {
       ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
+      stats.n_pending += static_cast<std::int64_t>(track.pending.size());
+    }
     n_seen_ += static_cast<std::int64_t>(points.size());
     last_time_ = time;
     ++n_frames_;
@@ -112,6 +114,12 @@ class FrameTracker {
   // log(1 + eˣ)
   static double softplus(double x) { return x > 30 ? x : std::log1p(std::exp(x)); }
 
+  // How much likelier a frame becomes by a track's `gain`: by all of it for a believed track, and
+  // for a tentative one weighed with the odds that it is a marker at all.
+  double odds(const LiveTrack& track, double gain) const {
+    return track.is_confirmed() ? gain : softplus(track.score + gain);
+  }
+
   double miss_gain() const { return sm_.log_survive + sm_.log_miss; }
   // A point that no track takes is clutter or a new marker, not clutter alone.
   double leftover_gain() const {
@@ -123,7 +131,6 @@ class FrameTracker {
     const int D = m_.axis.D;
     s_.candidates.clear();
     s_.predictions.resize(tracks_.size());
-    s_.centers.resize(tracks_.size());
     s_.radii.resize(tracks_.size());
     double sum_radii = 0;
     // A believed track takes a point only if that beats missing it and leaving the point over.
@@ -132,9 +139,8 @@ class FrameTracker {
       LiveTrack& track = tracks_[i];
       predict(m_, step, track.state);
       s_.predictions[i] = Prediction(m_, track.state);
-      s_.radii[i] = s_.predictions[i].ball(
-          opt_.gate, track.is_confirmed() ? least : -std::numeric_limits<double>::infinity(),
-          s_.centers[i]);
+      s_.radii[i] = s_.predictions[i].radius(
+          opt_.gate, track.is_confirmed() ? least : -std::numeric_limits<double>::infinity());
       sum_radii += std::max(s_.radii[i], 0.0);
     }
     if (tracks_.empty() || points.empty()) return;
@@ -144,15 +150,14 @@ class FrameTracker {
       const LiveTrack& track = tracks_[i];
       const Prediction& prediction = s_.predictions[i];
       const double reach = sm_.max_speed * (time - track.last_time) + sm_.speed_margin;
-      const double if_missed = softplus(track.score + miss_gain()) + leftover_gain();
+      const double if_missed = odds(track, miss_gain()) + leftover_gain();
       std::array<double, kMaxModes> each{};
-      s_.grid.within(s_.centers[i], s_.radii[i], [&](std::int32_t j, double distance2) {
+      s_.grid.within(prediction.center, s_.radii[i], [&](std::int32_t j, double distance2) {
         if (squared_distance(points[j], track.last, D) > reach * reach) return;
         if (!prediction.is_gated(points[j], opt_.gate)) return;
         const double hit = hit_gain() + prediction.log_likelihood(points[j], each);
-        // How much likelier the frame becomes, whether or not the track is a marker at all.
-        const double gain = softplus(track.score + hit) - if_missed;
-        if (gain > 0) s_.candidates.push_back({static_cast<std::int32_t>(i), j, gain, distance2});
+        const double gain = odds(track, hit) - if_missed;
+        if (gain > 0 && std::isfinite(gain)) s_.candidates.push_back({static_cast<std::int32_t>(i), j, gain, distance2});
       });
       if (static_cast<std::int64_t>(s_.candidates.size()) > opt_.max_candidates)
         throw CandidateLimit{};

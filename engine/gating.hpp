@@ -41,7 +41,7 @@ class PointGrid {
       if (d >= D || !(high[d] > low_[d])) continue;
       const double fitting = (high[d] - low_[d]) / (2 * per_axis);
       const double edge = cell > fitting ? cell : fitting;  // also where `cell` is not a number
-      if (!std::isfinite(edge)) continue;
+      if (!std::isfinite(edge) || !std::isfinite(1 / edge)) continue;
       inverse_[d] = 1 / edge;
       size_[d] = static_cast<std::int64_t>((high[d] - low_[d]) * inverse_[d]) + 1;
       n_cells *= size_[d];

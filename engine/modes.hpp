@@ -132,6 +132,7 @@ inline void predict(const MotionModel& m, const MotionStep& step, MotionState& s
 
 // What a prediction says of the next detection: a Gaussian for each mode.
 struct Prediction {
+  Point center{};  // ŷ of the mixture
   std::array<Point, kMaxModes> y{};
   std::array<double, kMaxModes> S{}, log_peak{};  // log_peak: log w_m N(ŷ_m; ŷ_m, S_m)
   int M = 1, D = 3;
@@ -148,6 +149,8 @@ struct Prediction {
       S[b] = 1;
       y[b] = {};
     }
+    for (int b = 0; b < M; ++b)
+      for (int d = 0; d < D; ++d) center[d] += (M > 1 ? s.w[b] : 1.0) * y[b][d];
   }
 
   // Fills the log of w_m N(y; ŷ_m, S_m) of every mode; returns the log of their sum.
@@ -163,23 +166,19 @@ struct Prediction {
     return best + std::log(sum);
   }
 
-  // A ball that holds every point whose χ² is at most `gate` in some mode and whose log likelihood
-  // may exceed `least`: centre and radius, negative where there is none.
-  double ball(double gate, double least, Point& center) const {
-    int widest = 0;
-    for (int b = 1; b < M; ++b)
-      if (S[b] > S[widest]) widest = b;
-    center = y[widest];
-    double radius = -1;
+  // A ball about `center` that holds every point whose χ² is at most `gate` in some mode and whose
+  // log likelihood may exceed `least`: its radius, negative where there is none.
+  double radius(double gate, double least) const {
+    double widest = -1;
     for (int b = 0; b < M; ++b) {
       // Of M summands the largest is at least the sum over M.
       const double worth = 2 * (log_peak[b] + std::log(static_cast<double>(M)) - least);
       const double chi2 = std::min(gate, worth);
-      if (chi2 <= 0) continue;
-      radius = std::max(radius, std::sqrt(chi2 * S[b]) +
+      if (!(chi2 > 0)) continue;
+      widest = std::max(widest, std::sqrt(chi2 * S[b]) +
                                     std::sqrt(squared_distance(y[b], center, D)));
     }
-    return radius;
+    return widest;
   }
 
   bool is_gated(const Point& point, double gate) const {

@@ -48,6 +48,9 @@ class OneTrack:
         self.x, self.P, self.w = mixed_x, mixed_P, prior
         self.S = np.array([self.h @ P @ self.h + self.r for P in self.P])
 
+    def odds(self, gain: float) -> float:
+        return gain if self.id >= 0 else np.logaddexp(0, self.score + gain)
+
     def densities(self, y) -> np.ndarray:
         D = len(y)
         e2 = np.array([((y - x @ self.h) ** 2).sum() for x in self.x])
@@ -58,8 +61,8 @@ class OneTrack:
         return bool((e2 <= gate * self.S).any())
 
     def distance(self, y) -> float:
-        widest = int(np.argmax(self.S))
-        return float(((y - self.x[widest] @ self.h) ** 2).sum())
+        expected = sum(w * x @ self.h for w, x in zip(self.w, self.x, strict=True))
+        return float(((y - expected) ** 2).sum())
 
     def update(self, y) -> None:
         each = self.densities(y)
@@ -88,14 +91,15 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
         for i, track in enumerate(tracks):
             track.predict(round(now - detections.times[t - 1], 9))
             reach = p.max_speed * (now - track.last_time) + 6 * s.noise_sigma
-            missed = np.logaddexp(0, track.score + miss) + leftover
+            odds = track.odds
+            missed = odds(miss) + leftover
             for j, y in enumerate(points):
                 if np.linalg.norm(y - track.last) > reach or not track.within(y, gate):
                     continue
                 total = track.densities(y).sum()
                 if total <= 0:
                     continue
-                gain = np.logaddexp(0, track.score + hit + math.log(total)) - missed
+                gain = odds(hit + math.log(total)) - missed
                 if gain > 0:
                     gains[i, j] = gain
         believed = np.array([track.id >= 0 for track in tracks], dtype=bool)

@@ -41,7 +41,7 @@ def test_two_kinds_of_motion_are_told_apart():
     assert am.evaluate(am.track(truth.detections, model=estimate.model), truth).idf1 > 0.99
 
 
-def test_names_and_order_are_not_looked_at():
+def test_the_order_within_a_frame_changes_nothing():
     rng = np.random.default_rng(2)
     d = wanderers(rng, n_frames=60).detections
     order = np.concatenate(

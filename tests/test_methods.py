@@ -177,6 +177,21 @@ def test_empty_frames_and_endings(method):
 
 
 @each_method
+def test_a_believed_track_may_be_missed_as_long_as_the_model_bridges(method):
+    # Soon believed, then hidden for longer than its own detections could make up for.
+    model = small_model(
+        motion=am.RandomWalk(walk_sigma=0.02), noise_sigma=3e-4, p_detection=0.999,
+        clutter_density=0.05, birth_density=1e-3, max_gap=30,
+    )  # fmt: skip
+    seen = [0, 1, 2, *range(28, 33)]
+    frames = [[[1e-3 * t, 0, 0]] if t in seen else [] for t in range(33)]
+    tracks = am.track(
+        am.Detections.from_frames(np.arange(33) * 0.01, frames), method, model=model
+    )
+    assert tracks.labels.tolist() == [0] * 8
+
+
+@each_method
 def test_clutter_alone_gives_no_track(method):
     rng = np.random.default_rng(8)
     frames = [rng.uniform(-2, 2, (3, 3)) for _ in range(200)]
@@ -188,24 +203,18 @@ def test_clutter_alone_gives_no_track(method):
 
 @each_method
 def test_memory_of_an_endless_stream_is_bounded(method):
-    import tracemalloc
-
     rng = np.random.default_rng(9)
     model = small_model(clutter_density=1.0)
     state = method.init(model)
-    most = 0
-    tracemalloc.start()
+    most = held = 0
     for t in range(3000):
         points = np.vstack([[[0.0, 0, 0], [1, 0, 0]], rng.uniform(-2, 2, (4, 3))])
         state, update = method.step(state, t * 0.1, points)
         most = max(most, update.info["tentative"])
-        if t == 300:
-            before = tracemalloc.get_traced_memory()[0]
-    grown = tracemalloc.get_traced_memory()[0] - before
-    tracemalloc.stop()
-    assert most < 60
+        held = max(held, update.info["pending"])
+    assert 2 < most < 60
+    assert 2 < held < 120
     assert update.info["tracks"] >= 2
-    assert grown < 50_000
 
 
 @each_method

@@ -135,6 +135,7 @@ class FrameByFrame(Method[FrameState]):
         info = {
             "tracks": stats.n_confirmed,
             "tentative": stats.n_tentative,
+            "pending": stats.n_pending,
             "candidates": stats.n_candidates,
             "groups": stats.n_groups,
             "largest_group": stats.largest_group,
@@ -162,18 +163,17 @@ class FrameByFrame(Method[FrameState]):
         n_before = min(tracker.n_frames, 1)
         known = np.concatenate([np.full(n_before, tracker.last_time), times])
         kind, F, Q = steps_of(state.model.motion, known)
-        try:
-            for t in range(0, detections.n_frames, FRAMES_A_CALL):
-                end = min(t + FRAMES_A_CALL, detections.n_frames)
-                tracker.run(
-                    times[t:end], kind[n_before + t : n_before + end], F, Q,
-                    offsets[t : end + 1] - offsets[t],
-                    detections.points[offsets[t] : offsets[end]], labels,
-                )  # fmt: skip
-                if progress is not None:
-                    progress(end)
-        except OverflowError as error:
-            raise _too_many() from error
+        for t in range(0, detections.n_frames, FRAMES_A_CALL):
+            end = min(t + FRAMES_A_CALL, detections.n_frames)
+            some = detections.points[offsets[t] : offsets[end]]
+            starts = offsets[t : end + 1] - offsets[t]
+            kinds = kind[n_before + t : n_before + end]
+            try:
+                tracker.run(times[t:end], kinds, F, Q, starts, some, labels)
+            except OverflowError as error:
+                raise _too_many() from error
+            if progress is not None:
+                progress(end)
         final = FrameState(model=state.model, n_axes=state.n_axes, tracker=tracker)
         return final, labels[start:], None
 
