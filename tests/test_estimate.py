@@ -82,6 +82,7 @@ def test_reasons_name_every_parameter():
         ([[], [], []], "at least 3 frames"),
         ([[[0.0, 0, 0]], [[0.0, 0, 0]]], "at least 3 frames"),
         ([[[0.0, 0, 0]], [], [[0.0, 0, 0]], [], [[0.0, 0, 0]]], "followed from frame to frame"),
+        ([[[3.0 * (i % 2), i, 0]] for i in range(9)], "at least 10 links"),
     ],
 )
 def test_too_little_to_learn_from_is_said(frames, message):
@@ -95,6 +96,29 @@ def test_points_that_never_move_and_are_never_missed():
     truth = am.Tracks.from_dense(np.arange(50) * 0.01, positions)
     tracks = am.track(truth.detections)
     assert am.evaluate(tracks, truth).idf1 == 1.0
+
+
+@pytest.mark.parametrize(
+    ("n_frames", "n_markers", "n_empty"), [(20, 5000, 0), (5, 20_000, 0), (900, 100, 300)]
+)
+def test_dense_short_and_late_captures(n_frames, n_markers, n_empty):
+    rng = np.random.default_rng(6)
+    start = rng.uniform(0, 0.1 * n_markers ** (1 / 3), (n_markers, 3))
+    t = np.arange(n_frames) * 0.01
+    positions = start + 0.05 * np.sin(t[:, None, None] + np.arange(3))
+    positions += rng.normal(0, 1e-4, positions.shape)
+    positions[:n_empty] = np.nan
+    truth = am.Tracks.from_dense(t, positions)
+    assert am.evaluate(am.track(truth.detections), truth).idf1 > 0.95
+
+
+def test_every_other_frame_empty():
+    t = np.arange(120) * 0.01
+    positions = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)[:, None] + np.zeros((1, 4, 1))
+    positions = positions + 2.0 * np.arange(4)[:, None]
+    positions[1::2] = np.nan
+    truth = am.Tracks.from_dense(t, positions)
+    assert am.evaluate(am.track(truth.detections), truth).idf1 > 0.95
 
 
 def test_one_marker_in_the_plane():

@@ -185,9 +185,7 @@ def test_a_believed_track_may_be_missed_as_long_as_the_model_bridges(method):
     )  # fmt: skip
     seen = [0, 1, 2, *range(28, 33)]
     frames = [[[1e-3 * t, 0, 0]] if t in seen else [] for t in range(33)]
-    tracks = am.track(
-        am.Detections.from_frames(np.arange(33) * 0.01, frames), method, model=model
-    )
+    tracks = am.track(am.Detections.from_frames(np.arange(33) * 0.01, frames), method, model=model)
     assert tracks.labels.tolist() == [0] * 8
 
 

@@ -64,18 +64,20 @@ def first_scales(pieces: list[Detections]) -> Scales:
     jolts: list[NDArray[np.float64]] = []
     spacings: list[NDArray[np.float64]] = []
     for piece in pieces:
+        filled = np.flatnonzero(piece.counts)
         stride = max(1, piece.n_points * len(pieces) // LINKED_POINTS)
-        for t in range(0, piece.n_frames - 2, stride):
-            a, b, c = piece.frame(t), piece.frame(t + 1), piece.frame(t + 2)
-            dt1, dt2 = np.diff(piece.times[t : t + 3])
+        for i in range(0, len(filled) - 2, stride):
+            three = filled[i : i + 3]
+            a, b, c = (piece.frame(int(t)) for t in three)
+            dt1, dt2 = np.diff(piece.times[three])
             forward, spacing = _sure_links(a, b)
             spacings.append(spacing)
             onward, _ = _sure_links(b, c)
-            i = np.flatnonzero(forward >= 0)
-            steps.append((b[forward[i]] - a[i]) / dt1)
-            i = i[onward[forward[i]] >= 0]
-            j = forward[i]
-            jolts.append((c[onward[j]] - b[j]) / dt2 - (b[j] - a[i]) / dt1)
+            k = np.flatnonzero(forward >= 0)
+            steps.append((b[forward[k]] - a[k]) / dt1)
+            k = k[onward[forward[k]] >= 0]
+            j = forward[k]
+            jolts.append((c[onward[j]] - b[j]) / dt2 - (b[j] - a[k]) / dt1)
     step = float(np.median([p.step for p in pieces]))
     velocities = np.concatenate(steps) if steps else np.empty((0, 3))
     # Change of position against constant velocity, metres.

@@ -39,6 +39,7 @@ __all__ = ["ModelEstimate", "estimate_model"]
 SAMPLE_POINTS = 60_000
 """Longer captures are read in pieces, spread evenly, of so many detections in all."""
 N_PIECES = 8
+LEAST_FRAMES = 30
 N_ROUNDS = 2
 WIDER = 3.0
 """Tracks to learn the motion from are found with the strongest motion so many times stronger."""
@@ -122,9 +123,11 @@ def _pieces(detections: Detections) -> Iterator[Detections]:
     if detections.n_points <= SAMPLE_POINTS:
         yield detections
         return
-    T = detections.n_frames
-    length = max(T * SAMPLE_POINTS // detections.n_points // N_PIECES, min(T // N_PIECES, 30))
-    for start in np.linspace(0, T - length, N_PIECES).astype(int):
+    T, n = detections.n_frames, detections.n_points
+    length = max(T * SAMPLE_POINTS // n // N_PIECES, min(T, LEAST_FRAMES))
+    # Spread over the points, not over the frames, which may be empty for long.
+    seeds = np.linspace(0, n - 1, max(1, min(N_PIECES, T // length))).astype(int)
+    for start in np.unique(np.minimum(detections.frame_of[seeds], T - length)):
         a, b = detections.offsets[start], detections.offsets[start + length]
         yield Detections(
             times=detections.times[start : start + length],
