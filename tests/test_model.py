@@ -51,6 +51,7 @@ def test_frames_come_back():
         ([0, 1], [ONE, [[0.0, 0, np.inf]]], r"frames\[1\]: expected finite numbers, got inf"),
         ([0], [[[1.0]]], "points: expected 2 or 3 coordinates"),
         ([0], [[["x", "y", "z"]]], "of numbers"),
+        ([0], [[[1e200, 0, 0]]], "points: expected metres, within"),
     ],
 )
 def test_bad_detections_say_what_and_where(times, frames, message):
@@ -59,7 +60,12 @@ def test_bad_detections_say_what_and_where(times, frames, message):
 
 
 def test_detections_cannot_be_changed_from_outside():
-    d = am.Detections.from_frames([0], [ONE])
+    points, labels = np.zeros((2, 3)), np.array([0, 1])
+    d = am.Detections(times=[0], offsets=[0, 2], points=points)
+    tracks = am.Tracks(detections=d, labels=labels)
+    points[0], labels[:] = np.nan, 0
+    assert (d.points == 0).all()
+    assert tracks.labels.tolist() == [0, 1]
     with pytest.raises(ValueError, match="read-only"):
         d.points[0] = 1
     with pytest.raises(dataclasses.FrozenInstanceError):
@@ -70,8 +76,9 @@ def test_detections_cannot_be_changed_from_outside():
     ("changes", "message"),
     [
         ({"labels": [0]}, r"labels: expected an array of shape \(2,\)"),
-        ({"labels": [0, -2]}, "labels: expected track numbers"),
+        ({"labels": [0, -2]}, "labels: expected track numbers from 0 to 1"),
         ({"labels": [0, 0]}, "at most one detection of a track in a frame, got two of track 0"),
+        ({"labels": [0, 2**40]}, "labels: expected track numbers from 0 to 1"),
         ({"labels": [0.5, 1.0]}, "labels"),
         ({"names": ("a",)}, "names: expected a name or None for each of 2"),
         ({"confidence": [0.5, 1.5]}, r"confidence: expected probabilities in \[0, 1\], got 1.5"),
@@ -124,6 +131,9 @@ def test_toml_both_ways(model, tmp_path):
         ("[sensor]", "[sensro]", "did you mean 'sensor'"),
         ('kind = "dwna"', 'kind = "magic"', "model.motion.kind: expected one of dwna"),
         ("p_detection = 0.9", "p_detection = 1.5", r"p_detection: expected a number in \(0, 1\)"),
+        ('kind = "dwna"', 'kind = ["dwna"]', "model.motion.kind: expected one of dwna"),
+        ("max_gap = 4", "max_gap = 99999999999", "max_gap: expected a whole number"),
+        ("noise_sigma = 0.005", "noise_sigma = 1e-300", "noise_sigma: expected a number"),
         ("max_gap = 4", "max_gap = 2.5", "max_gap: expected a whole number"),
         ("max_speed = 4.0", "", "model.population.max_speed: expected a value, got nothing"),
         ("[motion]", "[motion", "expected TOML"),
@@ -182,7 +192,7 @@ def test_matrices_for_one_step_refuse_what_they_do_not_describe():
     assert np.allclose(F[1], np.linalg.matrix_power(F[0], 3))
     Q = motion.process_noise([0.2])[0]
     assert np.allclose(Q, F[0] @ motion.process_noise([0.1])[0] @ F[0].T + np.eye(2) * 1e-3)
-    with pytest.raises(am.ParameterError, match="multiple of the motion model's step"):
+    with pytest.raises(am.ParameterError, match="times the motion model's step"):
         motion.transition([0.15])
 
 

@@ -25,6 +25,7 @@ __all__ = [
     "check_array",
     "check_fields",
     "check_number",
+    "keep_array",
 ]
 
 
@@ -210,6 +211,28 @@ def check_array(
     if finite and array.dtype.kind == "f" and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ParameterError(name, "finite numbers", f"{array[place]} at index {place}")
+    return array
+
+
+def keep_array(
+    name: str, value: ArrayLike, shape: tuple[int | str, ...], *, dtype: type = np.float64
+) -> NDArray[Any]:
+    """Check an array as `check_array` does, for an object that keeps it and must not change.
+
+    Returns
+    -------
+    ndarray
+        Read-only. A copy, unless nobody else can write to the memory.
+
+    Raises
+    ------
+    ParameterError
+        If it does not fit.
+    """
+    array = check_array(name, value, shape, dtype=dtype)
+    if array.flags.writeable and np.may_share_memory(array, np.asarray(value)):
+        array = array.copy()
+    array.flags.writeable = False
     return array
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from asterism.associate.method import Method, Update, checked_frame
-from asterism.errors import SolverLimit, check_number
+from asterism.errors import ParameterError, SolverLimit, check_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -106,6 +106,8 @@ class FrameByFrame(Method[FrameState]):
         from asterism import _engine
         from asterism.model.compiled import motion_model, score_model
 
+        if n_axes not in (2, 3):
+            raise ParameterError("n_axes", "2 or 3", repr(n_axes))
         p = self.confirm_probability
         tracker = _engine.FrameTracker(
             motion_model(model, n_axes),

@@ -63,6 +63,7 @@ def track(
     _check_type("method", method, Method, "GNN()")
     if model is None:
         model = estimate_model(detections).model
+    _check_type("model", model, TrackingModel, "estimate_model(detections).model")
     state = method.init(model, n_axes=detections.n_axes, seed=seed)
     _, labels, confidence = method.run(state, detections, progress=progress)
     return Tracks(detections=detections, labels=labels, confidence=confidence)

@@ -72,6 +72,8 @@ def read(path: Path) -> Capture:
         warnings.append("no frame rate is given: times count frames, one a second")
 
     labels, identity_names = _labels(file, seen, modelled)
+    for array in (points, labels):
+        array.flags.writeable = False  # nobody else has them: no need to copy
     return Capture(
         times=np.arange(len(seen)) / (rate or 1.0),
         offsets=np.concatenate([[0], np.cumsum(seen.sum(axis=1))]),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import check_array
+from asterism.errors import keep_array
 from asterism.model.detections import Detections
 from asterism.model.tracks import Tracks
 
@@ -69,10 +69,8 @@ class Capture(Detections):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("channels", "labels"):
-            array = check_array(name, getattr(self, name), (self.n_points,), dtype=np.int64)
-            view = array.view()
-            view.flags.writeable = False
-            object.__setattr__(self, name, view)
+            array = keep_array(name, getattr(self, name), (self.n_points,), dtype=np.int64)
+            object.__setattr__(self, name, array)
 
     @property
     def tracks(self) -> Tracks:

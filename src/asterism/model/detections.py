@@ -11,14 +11,17 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_array
+from asterism.errors import ParameterError, check_array, keep_array
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Detections"]
+__all__ = ["FARTHEST", "Detections"]
+
+FARTHEST = 1e9
+"""Metres from the origin beyond which a coordinate is taken for a mistake."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -55,9 +58,14 @@ class Detections:
     points: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        times = check_array("times", self.times, ("T",))
-        offsets = check_array("offsets", self.offsets, (len(times) + 1,), dtype=np.int64)
-        points = check_array("points", self.points, ("N", "D"))
+        times = keep_array("times", self.times, ("T",))
+        offsets = keep_array("offsets", self.offsets, (len(times) + 1,), dtype=np.int64)
+        points = keep_array("points", self.points, ("N", "D"))
+        farthest = float(np.abs(points).max(initial=0.0))
+        if farthest > FARTHEST:
+            raise ParameterError(
+                "points", f"metres, within ±{FARTHEST:g}", f"{farthest:g}", "check the units"
+            )
         if points.shape[1] not in (2, 3):
             raise ParameterError("points", "2 or 3 coordinates a point", points.shape[1])
         backward = np.flatnonzero(np.diff(times) <= 0)
@@ -76,9 +84,7 @@ class Detections:
                 f"{offsets[0]} … {offsets[-1]}",
             )
         for name, array in (("times", times), ("offsets", offsets), ("points", points)):
-            view = array.view()
-            view.flags.writeable = False
-            object.__setattr__(self, name, view)
+            object.__setattr__(self, name, array)
 
     @classmethod
     def from_frames(cls, times: ArrayLike, frames: Sequence[ArrayLike]) -> Self:
@@ -118,6 +124,7 @@ class Detections:
             [np.empty((0, n_axes)), *(a.reshape(-1, n_axes) for a in arrays if a.size)]
         )
         offsets = np.concatenate([[0], np.cumsum([len(a) for a in arrays])]).astype(np.int64)
+        points.flags.writeable = False  # nobody else has it: no need to copy
         return cls(times=times, offsets=offsets, points=points)
 
     @classmethod
@@ -140,7 +147,9 @@ class Detections:
         dense = check_array("positions", positions, (len(times), "K", "D"), finite=False)
         is_seen = np.isfinite(dense).all(axis=2)
         offsets = np.concatenate([[0], np.cumsum(is_seen.sum(axis=1))]).astype(np.int64)
-        return cls(times=times, offsets=offsets, points=dense[is_seen])
+        points = dense[is_seen]
+        points.flags.writeable = False  # nobody else has it: no need to copy
+        return cls(times=times, offsets=offsets, points=points)
 
     @property
     def n_frames(self) -> int:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_array
+from asterism.errors import ParameterError, keep_array
+from asterism.model.linear_motion import LinearMotion
 from asterism.model.motion import Motion, SingleMotion
 
 if TYPE_CHECKING:
@@ -39,6 +40,11 @@ class InteractingMotions(Motion):
     kind: ClassVar[str] = "interacting"
 
     def __post_init__(self) -> None:
+        given: Any = self.models
+        if not isinstance(given, (tuple, list)) or not all(
+            isinstance(model, Motion) for model in cast("list[Any]", given)
+        ):
+            raise ParameterError("models", "2 or 3 motion models", repr(given))
         models = tuple(self.models)
         M = len(models)
         if M not in (2, 3):
@@ -46,10 +52,15 @@ class InteractingMotions(Motion):
         kinds = [model.kind for model in models]
         if len(set(kinds)) > 1 or InteractingMotions.kind in kinds:
             raise ParameterError("models", "single motions of one kind", kinds)
+        linear = [model for model in models if isinstance(model, LinearMotion)]
+        if any(m.step != linear[0].step or not np.array_equal(m.F, linear[0].F) for m in linear):
+            raise ParameterError(
+                "models", "motions with the same F and step", [m.F for m in linear]
+            )
         observations = np.stack([model.observation for model in models])
         if not (observations == observations[0]).all():
             raise ParameterError("models", "motions with the same H", observations.tolist())
-        transitions = check_array("transitions", self.transitions, (M, M))
+        transitions = keep_array("transitions", self.transitions, (M, M))
         if (transitions <= 0).any() or not np.allclose(transitions.sum(axis=1), 1, atol=1e-9):
             raise ParameterError("transitions", "positive rows that sum to 1", transitions.tolist())
         object.__setattr__(self, "models", models)

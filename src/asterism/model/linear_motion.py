@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_array, check_number
+from asterism.errors import ParameterError, check_number, keep_array
 from asterism.model.motion import SingleMotion
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["LinearMotion"]
+
+MOST_STEPS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,9 +50,9 @@ class LinearMotion(SingleMotion):
         n = len(np.atleast_1d(self.H))
         if n not in (1, 2, 3):
             raise ParameterError("H", "1 to 3 states an axis", n)
-        object.__setattr__(self, "H", check_array("H", self.H, (n,)))
+        object.__setattr__(self, "H", keep_array("H", self.H, (n,)))
         for name in ("F", "Q", "prior_covariance"):
-            object.__setattr__(self, name, check_array(name, getattr(self, name), (n, n)))
+            object.__setattr__(self, name, keep_array(name, getattr(self, name), (n, n)))
         check_number("step", self.step, above=0)
         if not self.H.any():
             raise ParameterError("H", "a row that sees the state", self.H)
@@ -83,11 +85,13 @@ class LinearMotion(SingleMotion):
     def _powers(self, dt: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         d = np.atleast_1d(np.asarray(dt, dtype=np.float64))
         k = np.rint(d / self.step).astype(np.int64)
-        off = np.flatnonzero((np.abs(d - k * self.step) > 0.02 * self.step) | (k < 1))
+        off = np.flatnonzero(
+            (np.abs(d - k * self.step) > 0.02 * self.step) | (k < 1) | (k > MOST_STEPS)
+        )
         if len(off):
             raise ParameterError(
                 "times",
-                f"a spacing that is a multiple of the motion model's step of {self.step:g} s",
+                f"a spacing of 1 to {MOST_STEPS} times the motion model's step of {self.step:g} s",
                 f"{d[off[0]]:g} s",
                 "give F and Q for the capture's own spacing",
             )

@@ -110,9 +110,9 @@ class DWNA(SingleMotion):
     kind: ClassVar[str] = "dwna"
 
     def __post_init__(self) -> None:
-        check_number("acceleration_sigma", self.acceleration_sigma, above=0)
+        check_number("acceleration_sigma", self.acceleration_sigma, above=0, below=1e12)
         if self.velocity_sigma is not None:
-            check_number("velocity_sigma", self.velocity_sigma, above=0)
+            check_number("velocity_sigma", self.velocity_sigma, above=0, below=1e12)
 
     @property
     def observation(self) -> NDArray[np.float64]:
@@ -150,7 +150,7 @@ class RandomWalk(SingleMotion):
     kind: ClassVar[str] = "random_walk"
 
     def __post_init__(self) -> None:
-        check_number("walk_sigma", self.walk_sigma, above=0)
+        check_number("walk_sigma", self.walk_sigma, above=0, below=1e12)
 
     @property
     def observation(self) -> NDArray[np.float64]:
@@ -194,10 +194,10 @@ class DWPA(SingleMotion):
     kind: ClassVar[str] = "dwpa"
 
     def __post_init__(self) -> None:
-        check_number("increment_sigma", self.increment_sigma, above=0)
-        check_number("acceleration_prior_sigma", self.acceleration_prior_sigma, above=0)
+        check_number("increment_sigma", self.increment_sigma, above=0, below=1e12)
+        check_number("acceleration_prior_sigma", self.acceleration_prior_sigma, above=0, below=1e12)
         if self.velocity_sigma is not None:
-            check_number("velocity_sigma", self.velocity_sigma, above=0)
+            check_number("velocity_sigma", self.velocity_sigma, above=0, below=1e12)
 
     @property
     def observation(self) -> NDArray[np.float64]:

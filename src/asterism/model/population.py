@@ -39,7 +39,8 @@ class Population:
     def __post_init__(self) -> None:
         check_number("birth_density", self.birth_density, above=0)
         check_number("p_disappear", self.p_disappear, above=0, below=1)
-        check_number("max_speed", self.max_speed, above=0)
-        check_number("max_gap", self.max_gap, above=1, closed=True, integer=True)
+        check_number("max_speed", self.max_speed, above=0, below=1e12)
+        check_number("max_gap", self.max_gap, above=1, below=1e6, closed=True, integer=True)
+        object.__setattr__(self, "max_gap", int(self.max_gap))
         if self.termination not in ("marginal", "last"):
             raise ParameterError("termination", "'marginal' or 'last'", repr(self.termination))

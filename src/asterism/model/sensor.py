@@ -28,7 +28,8 @@ class Sensor:
     clutter_density: float
 
     def __post_init__(self) -> None:
-        check_number("noise_sigma", self.noise_sigma, above=0)
+        # A picometre: far less and its square is no number that a filter can work with.
+        check_number("noise_sigma", self.noise_sigma, above=1e-12, below=1e12, closed=True)
         check_number(
             "p_detection",
             self.p_detection,

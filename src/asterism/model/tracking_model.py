@@ -97,7 +97,9 @@ class TrackingModel:
         ParameterError
             At an unknown, missing or impossible value.
         """
-        check_fields("model", values, _TABLES)
+        if not isinstance(values, dict):
+            raise ParameterError("model", "a table", repr(values))
+        check_fields("model", map(str, values), _TABLES)
         return cls(
             motion=_motion("model.motion", values.get("motion")),
             sensor=_part("model.sensor", Sensor, values.get("sensor")),
@@ -182,7 +184,7 @@ def _motion(name: str, table: object) -> Motion:
         raise ParameterError(name, "a table", repr(table))
     values = dict(table)
     kind = values.pop("kind", None)
-    if kind not in MOTIONS:
+    if not isinstance(kind, str) or kind not in MOTIONS:
         raise ParameterError(f"{name}.kind", f"one of {', '.join(MOTIONS)}", repr(kind))
     if "models" in values:
         models = values["models"]

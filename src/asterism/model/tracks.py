@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_array
+from asterism.errors import ParameterError, keep_array
 from asterism.model.detections import Detections
 
 if TYPE_CHECKING:
@@ -61,9 +61,13 @@ class Tracks:
 
     def __post_init__(self) -> None:
         n = self.detections.n_points
-        labels = check_array("labels", self.labels, (n,), dtype=np.int64)
-        if labels.size and labels.min() < -1:
-            raise ParameterError("labels", "track numbers ≥ 0, or -1 for clutter", labels.min())
+        labels = keep_array("labels", self.labels, (n,), dtype=np.int64)
+        most = max(n, len(self.names))  # a table of tracks must not outgrow what it speaks of
+        if labels.size and not -1 <= labels.min() <= labels.max() < most:
+            wrong = labels.min() if labels.min() < -1 else labels.max()
+            raise ParameterError(
+                "labels", f"track numbers from 0 to {most - 1}, or -1 for clutter", wrong
+            )
         n_tracks = int(labels.max()) + 1 if labels.size else 0
         names = tuple(self.names)
         if names and len(names) < n_tracks:
@@ -80,16 +84,13 @@ class Tracks:
                 f"two of track {track} in frame {frame}",
             )  # fmt: skip
         object.__setattr__(self, "names", names)
-        for name, array in (("labels", labels), ("confidence", self._checked_confidence(n))):
-            if array is not None:
-                array = array.view()
-                array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        object.__setattr__(self, "labels", labels)
+        object.__setattr__(self, "confidence", self._checked_confidence(n))
 
     def _checked_confidence(self, n: int) -> NDArray[np.float64] | None:
         if self.confidence is None:
             return None
-        confidence = check_array("confidence", self.confidence, (n,))
+        confidence = keep_array("confidence", self.confidence, (n,))
         if confidence.size and (confidence.min() < 0 or confidence.max() > 1):
             worst = confidence[np.argmax(np.abs(confidence - 0.5))]
             raise ParameterError("confidence", "probabilities in [0, 1]", worst)
