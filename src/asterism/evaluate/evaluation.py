@@ -66,7 +66,7 @@ class Evaluation(ClearScores, IdentityScores, HotaScores, GospaScores, Associati
             ("wrong associations", f"{self.wrong_percent:.3f} %"),
             ("… by a track's first marker", f"{self.wrong_first_percent:.3f} %"),
             ("missing labels", f"{self.missing_percent:.3f} %"),
-            ("clutter labelled", f"{self.clutter_labelled_percent:.3f} %"),
+            ("clutter labelled", _percent(self.clutter_labelled_percent)),
             ("tracks a marker", f"{self.tracks_per_marker:.3f}"),
             ("wrong links, broken links", f"{self.wrong_links}, {self.broken_links}"),
             ("frames by wrong ones", table),
@@ -159,3 +159,7 @@ def evaluate(
     for part in parts:
         scores |= vars(part)
     return Evaluation(times=both.times, **scores)
+
+
+def _percent(share: float) -> str:
+    return "–" if np.isnan(share) else f"{share:.3f} %"

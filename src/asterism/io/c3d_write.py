@@ -8,7 +8,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 
 import asterism
-from asterism.errors import FormatError
+from asterism.errors import FormatError, ParameterError
 from asterism.io.c3d import (
     CLUTTER,
     UNNAMED,
@@ -90,6 +90,10 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         header, groups, analog = source.header, source.groups, source.analog
         scale, n_samples = source.scale, source.n_samples
 
+    if len(names) > 0xFFFF:
+        raise ParameterError(
+            "tracks", f"at most {0xFFFF} channels in a C3D", len(names), "write CSV instead"
+        )
     _set_parameters(groups, names, descriptions, d.n_frames, first_frame, rate, unit, scale)
     n_blocks = len(build(groups)) // BLOCK
     point = groups["POINT"].parameters  # the number of blocks is known now, and does not change
