@@ -86,7 +86,8 @@ def test_labels_are_true_whatever_the_switches(
     assert again.detections.points.tobytes() == result.detections.points.tobytes()
     assert again.labels.tobytes() == result.labels.tobytes()
     other = corrupt(truth, **{**switches, "seed": seed + 1})
-    assert result.detections.n_points < 30 or not np.array_equal(other.labels, result.labels)
+    same = other.detections.points.tobytes() == result.detections.points.tobytes()
+    assert result.detections.n_points < 30 or not same
 
 
 def test_missing_drops_the_stated_share_independently():

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Tracks"]
+__all__ = ["MOST_TRACKS", "Tracks"]
+
+MOST_TRACKS = 10_000_000
+"""There is an entry for every track up to the largest number; a larger one is a mistake."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -62,11 +65,10 @@ class Tracks:
     def __post_init__(self) -> None:
         n = self.detections.n_points
         labels = keep_array("labels", self.labels, (n,), dtype=np.int64)
-        most = max(n, len(self.names))  # a table of tracks must not outgrow what it speaks of
-        if labels.size and not -1 <= labels.min() <= labels.max() < most:
+        if labels.size and not -1 <= labels.min() <= labels.max() < MOST_TRACKS:
             wrong = labels.min() if labels.min() < -1 else labels.max()
             raise ParameterError(
-                "labels", f"track numbers from 0 to {most - 1}, or -1 for clutter", wrong
+                "labels", f"track numbers from 0 to {MOST_TRACKS - 1}, or -1 for clutter", wrong
             )
         n_tracks = int(labels.max()) + 1 if labels.size else 0
         names = tuple(self.names)
