@@ -1,4 +1,4 @@
-"""Properties are tried on fresh examples by people, and on the same ones by the checks of a change."""
+"""Properties: people try them on fresh examples, the checks of a change always on the same."""
 
 from __future__ import annotations
 
