@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import shutil
 import tomllib
@@ -330,3 +331,14 @@ def test_demo(tmp_path, monkeypatch, capsys):
     again = (tmp_path / "again.c3d").read_bytes()
     assert again == (tmp_path / "one/smp/tracked.c3d").read_bytes()
     assert "--overwrite" in refused("demo -o one", capsys)
+
+
+def test_a_model_that_fits_nothing_is_told_of(scene, capsys):
+    model = am.TrackingModel.from_toml("model.toml")
+    slow = dataclasses.replace(model.population, max_speed=1e-6)
+    sharp = dataclasses.replace(model.sensor, noise_sigma=1e-9)
+    dataclasses.replace(model, population=slow, sensor=sharp).to_toml("other.toml")
+    assert main(["track", "in.csv", "-o", "out.csv", "--model", "other.toml"]) == 0
+    assert "no track was believed" in capsys.readouterr().err
+    assert main(["track", "in.csv", "-o", "out.csv", "--model", "model.toml"]) == 0
+    assert "no track was believed" not in capsys.readouterr().err

@@ -115,6 +115,11 @@ def _carry_out(job: Job, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
     with progress(f"tracking with {job.method}", capture.n_frames) as advance:
         tracks = am.track(capture, method, model=job.model, seed=job.seed, progress=advance)
     seconds = time.perf_counter() - start
+    if capture.n_points and not tracks.n_tracks:
+        log.warning(
+            "%s: no track was believed, all points are clutter; does the model fit the capture?",
+            capture.path,
+        )
     am.write(tracks, out, format=job.format)
     summary = summarize(tracks, out=out, method=job.method, seconds=seconds)
     for name, text in summary.rows():
