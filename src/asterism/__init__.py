@@ -25,6 +25,22 @@ if TYPE_CHECKING:
     from asterism.associate import estimate_model as estimate_model
     from asterism.associate import method_by_name as method_by_name
     from asterism.associate import track as track
+    from asterism.camera import BrownConrady as BrownConrady
+    from asterism.camera import Camera as Camera
+    from asterism.camera import Capsule as Capsule
+    from asterism.camera import Coverage as Coverage
+    from asterism.camera import Lens as Lens
+    from asterism.camera import Mesh as Mesh
+    from asterism.camera import Polygon as Polygon
+    from asterism.camera import Projection as Projection
+    from asterism.camera import QuadraticCorrection as QuadraticCorrection
+    from asterism.camera import Reason as Reason
+    from asterism.camera import ReportRadial as ReportRadial
+    from asterism.camera import Rig as Rig
+    from asterism.camera import Surface as Surface
+    from asterism.camera import ViconRadial as ViconRadial
+    from asterism.camera import intrinsics as intrinsics
+    from asterism.camera import volume_grid as volume_grid
     from asterism.errors import AsterismError as AsterismError
     from asterism.errors import FormatError as FormatError
     from asterism.errors import ParameterError as ParameterError
@@ -66,6 +82,24 @@ __version__ = "0.1.0"
 # and `asterism --help` are instant.
 _PUBLIC = {
     "errors": ("AsterismError", "FormatError", "ParameterError", "SolverLimit"),
+    "camera": (
+        "BrownConrady",
+        "Camera",
+        "Capsule",
+        "Coverage",
+        "Lens",
+        "Mesh",
+        "Polygon",
+        "Projection",
+        "QuadraticCorrection",
+        "Reason",
+        "ReportRadial",
+        "Rig",
+        "Surface",
+        "ViconRadial",
+        "intrinsics",
+        "volume_grid",
+    ),
     "model": (
         "DWNA",
         "DWPA",

@@ -1,5 +1,7 @@
 """The typed face of the compiled module; see engine/bindings.cpp."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -120,3 +122,54 @@ def marry(
     costs: NDArray[np.float64],
     n_receivers: int,
 ) -> tuple[NDArray[np.int32], int]: ...
+
+class Camera:
+    def __init__(
+        self,
+        *,
+        R: NDArray[np.float64],
+        t: NDArray[np.float64],
+        A: NDArray[np.float64],
+        B: NDArray[np.float64],
+        lens_kind: int,
+        is_backward: bool,
+        coefficients: NDArray[np.float64],
+        r_end: float,
+        q_table: float,
+        start: tuple[float, float],
+        near: float,
+        far: float,
+        width: int,
+        height: int,
+    ) -> None: ...
+    def undistort(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def distort(self, normalised: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def jacobian(self, points: NDArray[np.float64]) -> NDArray[np.float64]: ...
+
+class Surfaces:
+    def __init__(
+        self,
+        *,
+        vertices: NDArray[np.float64],
+        faces: NDArray[np.int32],
+        face_owners: NDArray[np.int32],
+        ends: NDArray[np.float64],
+        radii: NDArray[np.float64],
+        capsule_owners: NDArray[np.int32],
+    ) -> None: ...
+
+class RayGrid:
+    def __init__(self, camera: Camera) -> None: ...
+    def depth_image(
+        self, camera: Camera, surfaces: Sequence[Surfaces], moment: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]: ...
+    def paint(
+        self, corners: NDArray[np.float64], owners: NDArray[np.int32]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]: ...
+
+def project(
+    cameras: Sequence[Camera],
+    points: NDArray[np.float64],
+    surfaces: Sequence[Surfaces],
+    clearance: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8], NDArray[np.int32]]: ...

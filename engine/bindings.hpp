@@ -1,0 +1,7 @@
+// What each file that knows Python adds to the module.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+void bind_tracking(nanobind::module_& module);
+void bind_camera(nanobind::module_& module);

@@ -1,0 +1,233 @@
+"""Lenses: how a camera bends the ideal image, each in the direction in which its model is written.
+
+A model maps undistorted to distorted coordinates (Brown-Conrady) or the other way (the rest). The
+other direction is solved, to the last digit. Every model has a domain, the region about the centre
+in which it stretches by a thousandth at least; beyond it the polynomial would fold the image over,
+so nothing is seen there.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from scipy.optimize import brentq
+
+from asterism.errors import check_array, check_number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+__all__ = ["BrownConrady", "Lens", "QuadraticCorrection", "ReportRadial", "ViconRadial"]
+
+LEAST_STRETCH = 1e-3
+"""As kLeastStretch of engine/lens.hpp."""
+
+NO_LENS, RADIAL, QUADRATIC = 0, 1, 2
+"""As Lens::Kind of engine/lens.hpp."""
+
+
+class Lens(ABC):
+    """A lens model: `BrownConrady`, `ReportRadial`, `ViconRadial` or `QuadraticCorrection`."""
+
+    is_backward: ClassVar[bool] = True
+    """Whether the model maps distorted to undistorted coordinates."""
+    in_pixels: ClassVar[bool] = False
+    """Whether it works in pixels about the principal point, not in normalised coordinates."""
+    kind: ClassVar[int] = RADIAL
+
+    @property
+    @abstractmethod
+    def coefficients(self) -> NDArray[np.float64]:
+        """The numbers of the model as the engine takes them: k1, k2, k3, p1, p2, or ex and ey."""
+
+    @property
+    def radius(self) -> float:
+        """Where the model ends, in its own coordinates, on the side from which it maps.
+
+        Infinite where it never folds over. For radial and tangential terms, whose derivative is
+        symmetric, this is the largest disc in which both its eigenvalues exceed 0.001.
+        """
+        k, p = self.coefficients[:3], float(np.hypot(*self.coefficients[3:]))
+        return _end_of_disc(k, p)
+
+
+@dataclass(frozen=True)
+class BrownConrady(Lens):
+    """The common model, undistorted to distorted, as OpenCV has it.
+
+    ``x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²)``, and with x and y, p1 and p2
+    exchanged for y_d; normalised coordinates.
+
+    Parameters
+    ----------
+    k1, k2, p1, p2, k3 : float
+        Radial and tangential coefficients in OpenCV's order.
+
+    References
+    ----------
+    D. C. Brown, Decentering distortion of lenses, Photogrammetric Engineering 32 (1966).
+
+    Examples
+    --------
+    >>> round(BrownConrady(k1=-0.3).radius, 3)  # the fold of r - 0.3 r³, a thousandth before it
+    1.054
+    """
+
+    is_backward: ClassVar[bool] = False
+    k1: float = 0.0
+    k2: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    k3: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """``(k1, k2, k3, p1, p2)``."""
+        return np.array([self.k1, self.k2, self.k3, self.p1, self.p2])
+
+
+@dataclass(frozen=True)
+class ReportRadial(Lens):
+    """The radial model of the 2010 report (§3.2), distorted to undistorted.
+
+    ``x = x_d (1 + a1 r_d² + a2 r_d⁴)`` in normalised coordinates, so projecting solves for r_d.
+    ``a1 > 0`` is barrel, ``a1 < 0`` pincushion distortion. Coefficients for an image plane in
+    metres are to be multiplied by f² and f⁴.
+
+    Parameters
+    ----------
+    a1, a2 : float
+        Radial coefficients.
+    """
+
+    a1: float = 0.0
+    a2: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """``(a1, a2, 0, 0, 0)``."""
+        return np.array([self.a1, self.a2, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class ViconRadial(Lens):
+    """Vicon's radial model, measured to ideal pixels about the principal point.
+
+    ``u - u0 = (u_d - u0) (1 + k1 r² + k2 r⁴ + k3 r⁶)`` with r in pixels. Another centre than the
+    principal point is given by the camera's ``K_lens``.
+
+    Parameters
+    ----------
+    k1, k2, k3 : float
+        Radial coefficients, per pixel squared and so on.
+    """
+
+    in_pixels: ClassVar[bool] = True
+    k1: float = 0.0
+    k2: float = 0.0
+    k3: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """``(k1, k2, k3, 0, 0)``."""
+        return np.array([self.k1, self.k2, self.k3, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class QuadraticCorrection(Lens):
+    """A quadratic correction of each axis, measured to ideal, as MyPTV fits it.
+
+    ``x = u + ex · (u, v, u², v², u v)`` and ``y = v + ey · (u, v, u², v², u v)``.
+
+    Parameters
+    ----------
+    ex, ey : sequence of 5 float
+        Coefficients of each axis.
+    """
+
+    kind: ClassVar[int] = QUADRATIC
+    ex: tuple[float, float, float, float, float]
+    ey: tuple[float, float, float, float, float]
+
+    def __post_init__(self) -> None:
+        for name in ("ex", "ey"):
+            values = check_array(name, getattr(self, name), (5,))
+            object.__setattr__(self, name, tuple(float(v) for v in values))
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """The five of ex, the five of ey."""
+        return np.array([*self.ex, *self.ey])
+
+    @property
+    def radius(self) -> float:
+        """Infinite: the domain is no disc. See `reaches`."""
+        return float("inf")
+
+    def reaches(self, u: float, v: float) -> bool:
+        """Whether the point lies in the domain: the derivative's symmetric part exceeds 0.001."""
+        a, b = self.ex, self.ey
+        xx = 1 + a[0] + 2 * a[2] * u + a[4] * v
+        yy = 1 + b[1] + 2 * b[3] * v + b[4] * u
+        xy = (a[1] + 2 * a[3] * v + a[4] * u + b[0] + 2 * b[2] * u + b[4] * v) / 2
+        p, q = xx - LEAST_STRETCH, yy - LEAST_STRETCH
+        return p > 0 and p * q > xy * xy
+
+
+def _check(lens: BrownConrady | ReportRadial | ViconRadial) -> None:
+    for field in fields(lens):
+        value = getattr(lens, field.name)
+        check_number(field.name, value)
+        object.__setattr__(lens, field.name, float(value))
+
+
+def _end_of_disc(k: NDArray[np.float64], p: float) -> float:
+    """Radius to which the least eigenvalue of the map's derivative exceeds the least stretch.
+
+    With A and B the stretch along and across the radius less the least one, and Q = p r, the
+    determinant at angle φ to the tangential vector is
+    ``(A + 6 Q cos φ)(B + 2 Q cos φ) - 4 Q² sin² φ``: least at cos φ = -1, or in between where
+    A + 3 B < 16 Q.
+    """
+    along = np.array([1 - LEAST_STRETCH, -6 * p, 3 * k[0], 0, 5 * k[1], 0, 7 * k[2]])
+    across = np.array([1 - LEAST_STRETCH, -2 * p, k[0], 0, k[1], 0, k[2]])
+    ends = [_first_root(along), _first_root(across)]
+    if p > 0:
+
+        def least_between(r: float) -> float:
+            a, b = np.polyval(along[::-1], r) + 6 * p * r, np.polyval(across[::-1], r) + 2 * p * r
+            if a + 3 * b >= 16 * p * r:
+                return float(a * b)
+            return float(a * b - 4 * (p * r) ** 2 - (a + 3 * b) ** 2 / 16)
+
+        radii = np.geomspace(1e-3 / p, 1e3 / p, 6001)
+        below = np.flatnonzero([least_between(r) <= 0 for r in radii])
+        if len(below):
+            i = int(below[0])
+            ends.append(_zero(least_between, radii[i - 1], radii[i]) if i else 0.0)
+    return min(ends)
+
+
+def _zero(function: Callable[[float], float], low: float, high: float) -> float:
+    return float(brentq(function, low, high))  # pyright: ignore[reportArgumentType]
+
+
+def _first_root(coefficients: NDArray[np.float64]) -> float:
+    """Least positive real root of a polynomial, rising powers; infinity if there is none."""
+    roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients, "b"))
+    is_real = (np.abs(roots.imag) <= 1e-7 * np.abs(roots)) & (roots.real > 0)
+    return float(roots.real[is_real].min(initial=np.inf))

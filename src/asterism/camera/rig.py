@@ -1,0 +1,294 @@
+"""Several cameras that look at one volume."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self, overload
+
+import numpy as np
+
+from asterism.camera.camera import CLEARANCE, Camera, intrinsics, project_points
+from asterism.errors import ParameterError, check_array, check_number
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism.camera.projection import Projection
+    from asterism.camera.surfaces import Surface
+
+__all__ = ["Coverage", "Rig", "volume_grid"]
+
+SIZE_PX, FOCAL_PX = (1280, 1024), 900.0
+"""A usual motion-capture camera: 1.3 megapixels, 71° wide."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Coverage:
+    """How well a rig sees places.
+
+    Parameters
+    ----------
+    points : ndarray, shape (..., 3)
+        The places, world metres.
+    n_cameras : ndarray of int, shape (...)
+        How many cameras see each.
+    covariance : ndarray, shape (..., 3, 3)
+        Of a point triangulated there from all cameras that see it, m²: the inverse of the summed
+        information ``JᵀJ / σ²`` (the Cramér-Rao bound). NaN where under two cameras see it, or
+        where they and the place are on one line.
+    sigma_px : float
+        Standard deviation of an image point that was taken, pixels per axis.
+    """
+
+    points: NDArray[np.float64]
+    n_cameras: NDArray[np.int64]
+    covariance: NDArray[np.float64]
+    sigma_px: float
+
+    @property
+    def error(self) -> NDArray[np.float64]:
+        """Root mean square distance of a triangulated point from its place, metres, shape (...)."""
+        return np.sqrt(np.trace(self.covariance, axis1=-2, axis2=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """Cameras in one world; a sequence, by number or by name.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        At least one. Names, where given, are different.
+    warnings : tuple of str
+        What was odd in the file that it came from.
+
+    Examples
+    --------
+    >>> rig = Rig.ring(8, radius=4.0, height=2.5)
+    >>> rig.project([[0.0, 0.0, 1.0]]).pixels.shape
+    (8, 1, 2)
+    >>> int(rig.coverage([0.0, 0.0, 1.0]).n_cameras)
+    8
+    """
+
+    cameras: tuple[Camera, ...]
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        cameras = tuple(self.cameras)
+        if not cameras:
+            raise ParameterError("cameras", "at least one", "none")
+        for i, camera in enumerate(cameras):
+            if not isinstance(camera, Camera):  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise ParameterError(f"cameras[{i}]", "a Camera", type(camera).__name__)
+        names = [c.name for c in cameras if c.name]
+        for name in names:
+            if names.count(name) > 1:
+                raise ParameterError("cameras", "different names", f"{name!r} more than once")
+        object.__setattr__(self, "cameras", cameras)
+        object.__setattr__(self, "warnings", tuple(self.warnings))
+
+    @classmethod
+    def ring(
+        cls,
+        n: int,
+        *,
+        radius: float,
+        height: float,
+        target: ArrayLike = (0.0, 0.0, 1.0),
+        focal_px: float = FOCAL_PX,
+        size_px: tuple[int, int] = SIZE_PX,
+        **options: Any,
+    ) -> Self:
+        """Place cameras evenly on a circle, all looking at one place; z is up.
+
+        Parameters
+        ----------
+        n : int
+            Number of cameras, named ``cam1`` and so on; the first stands at +x of the target.
+        radius, height : float
+            Of the circle about the target's vertical; above the ground z = 0. Metres.
+        target : array_like, shape (3,)
+            Where they look, metres.
+        focal_px, size_px, **options
+            Of every camera: focal length in pixels, image size, and what `Camera` takes.
+        """
+        check_number("n", n, above=1, closed=True, integer=True)
+        check_number("radius", radius, above=0)
+        target = check_array("target", target, (3,))
+        angles = 2 * np.pi * np.arange(n) / n
+        places = np.stack(
+            [
+                target[0] + radius * np.cos(angles),
+                target[1] + radius * np.sin(angles),
+                np.full(n, float(height)),
+            ],
+            axis=1,
+        )
+        return cls._placed(places, target, focal_px, size_px, options)
+
+    @classmethod
+    def wall(
+        cls,
+        n: int,
+        *,
+        width: float,
+        height: float,
+        distance: float,
+        target: ArrayLike = (0.0, 0.0, 1.0),
+        focal_px: float = FOCAL_PX,
+        size_px: tuple[int, int] = SIZE_PX,
+        **options: Any,
+    ) -> Self:
+        """Place cameras in a row along a wall, all looking at one place; z is up.
+
+        Parameters
+        ----------
+        n : int
+            Number of cameras, named ``cam1`` and so on from left to right as seen from the target.
+        width : float
+            Of the row, metres; it runs along x, centred on the target.
+        height, distance : float
+            Above the ground; from the target, towards -y. Metres.
+        target, focal_px, size_px, **options
+            As for `ring`.
+        """
+        check_number("n", n, above=1, closed=True, integer=True)
+        check_number("width", width, above=0, closed=True)
+        check_number("distance", distance, above=0)
+        target = check_array("target", target, (3,))
+        x = target[0] + (np.linspace(0.5, -0.5, n) * width if n > 1 else np.zeros(1))
+        y, z = np.full(n, target[1] - distance), np.full(n, float(height))
+        return cls._placed(np.stack([x, y, z], axis=1), target, focal_px, size_px, options)
+
+    @classmethod
+    def _placed(
+        cls,
+        places: NDArray[np.float64],
+        target: NDArray[np.float64],
+        focal_px: float,
+        size_px: tuple[int, int],
+        options: dict[str, Any],
+    ) -> Self:
+        w, h = size_px
+        K = intrinsics(focal_length=focal_px, principal_point=((w - 1) / 2, (h - 1) / 2))
+        return cls(
+            tuple(
+                Camera.look_at(p, target, K=K, size_px=size_px, name=f"cam{i + 1}", **options)
+                for i, p in enumerate(places)
+            )
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each camera; its number from 1 where it has none."""
+        return tuple(c.name or str(i + 1) for i, c in enumerate(self.cameras))
+
+    def project(
+        self,
+        points: ArrayLike,
+        surfaces: Sequence[Surface] = (),
+        *,
+        clearance: float = CLEARANCE,
+    ) -> Projection:
+        r"""Say where points fall in every image, and why some are not seen.
+
+        Parameters
+        ----------
+        points, surfaces, clearance
+            As for `Camera.project`.
+
+        Returns
+        -------
+        Projection
+            Arrays of the shape (cameras, \*points).
+        """
+        return project_points(self.cameras, points, surfaces, clearance)
+
+    def coverage(
+        self, points: ArrayLike, surfaces: Sequence[Surface] = (), *, sigma_px: float = 0.3
+    ) -> Coverage:
+        """Say how many cameras see each place, and how exactly a point there is triangulated.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+            World metres; see `volume_grid`.
+        surfaces : sequence of Surface
+            What may hide them.
+        sigma_px : float
+            Standard deviation of an image point, pixels per axis.
+        """
+        check_number("sigma_px", sigma_px, above=0)
+        projection = self.project(points, surfaces)
+        places = np.asarray(points, dtype=np.float64)
+        information = np.zeros((*places.shape[:-1], 3, 3))
+        for camera, seen in zip(self.cameras, projection.visible, strict=True):
+            J = camera.jacobian(places[seen])
+            information[seen] += np.swapaxes(J, -1, -2) @ J / sigma_px**2
+        n_cameras = projection.visible.sum(axis=0)
+        covariance = np.full(information.shape, np.nan)
+        # Two rays along one line leave the depth open: the information is singular.
+        is_known = (n_cameras >= 2) & (np.linalg.cond(information) < 1e12)
+        covariance[is_known] = np.linalg.inv(information[is_known])
+        return Coverage(
+            points=places, n_cameras=n_cameras, covariance=covariance, sigma_px=sigma_px
+        )
+
+    def replace(self, **changes: Any) -> Self:
+        """Give the rig with some of its fields changed."""
+        return replace(self, **changes)
+
+    def __len__(self) -> int:
+        return len(self.cameras)
+
+    def __iter__(self) -> Iterator[Camera]:
+        return iter(self.cameras)
+
+    @overload
+    def __getitem__(self, key: int | str) -> Camera: ...
+    @overload
+    def __getitem__(self, key: slice) -> Self: ...
+    def __getitem__(self, key: int | str | slice) -> Camera | Self:
+        if isinstance(key, slice):
+            return type(self)(self.cameras[key], self.warnings)
+        if isinstance(key, str):
+            if key not in self.names:
+                raise ParameterError("camera", f"one of {', '.join(self.names)}", repr(key))
+            return self.cameras[self.names.index(key)]
+        return self.cameras[key]
+
+    def __repr__(self) -> str:
+        return f"Rig({len(self)} cameras: {', '.join(self.names)})"
+
+
+def volume_grid(low: ArrayLike, high: ArrayLike, spacing: float) -> NDArray[np.float64]:
+    """Give the places of an even grid in a box.
+
+    Parameters
+    ----------
+    low, high : array_like, shape (3,)
+        Corners of the box, metres; both belong to it as far as the spacing allows.
+    spacing : float
+        Between neighbours, metres.
+
+    Returns
+    -------
+    ndarray, shape (n_x, n_y, n_z, 3)
+
+    Examples
+    --------
+    >>> volume_grid((-1, -1, 0), (1, 1, 2), 0.5).shape
+    (5, 5, 5, 3)
+    """
+    low, high = check_array("low", low, (3,)), check_array("high", high, (3,))
+    check_number("spacing", spacing, above=0)
+    if (high < low).any():
+        raise ParameterError("high", f"a corner beyond {low.tolist()}", high.tolist())
+    n = np.floor((high - low) / spacing + 1e-9).astype(int) + 1
+    if n.prod(dtype=np.float64) > 1e8:
+        raise ParameterError("spacing", "under 100 million places", f"{n.prod(dtype=float):g}")
+    axes = [low[d] + spacing * np.arange(n[d]) for d in range(3)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)

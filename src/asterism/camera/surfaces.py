@@ -1,0 +1,204 @@
+"""Surfaces that hide points: polygons, meshes, capsules; standing still or moving with the scene.
+
+They are seen by nobody themselves: curtains of the 2010 report (§3.4). Both sides hide.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.camera.polygon import triangulate
+from asterism.errors import ParameterError, check_array, check_number
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism import _engine
+
+__all__ = ["Capsule", "Mesh", "Polygon", "Surface", "compile_surfaces"]
+
+
+class Surface(ABC):
+    """A surface that hides what lies behind it: `Polygon`, `Mesh` or `Capsule`."""
+
+    name: str
+
+    @property
+    @abstractmethod
+    def n_moments(self) -> int:
+        """1 for a surface that stands still, else the number of frames T."""
+
+
+def _points(name: str, value: ArrayLike, n: int | str) -> NDArray[np.float64]:
+    """Give ``(n, 3)`` or ``(T, n, 3)`` as a read-only ``(moments, n, 3)``."""
+    array = np.asarray(value)
+    if array.ndim == 2:
+        array = array[None]
+    array = check_array(name, array, ("T", n, 3)).copy()
+    if not len(array):
+        raise ParameterError(name, "at least one moment", "none")
+    array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Polygon(Surface):
+    """A planar polygon, convex or concave, without holes; a triangle has three corners.
+
+    Parameters
+    ----------
+    corners : array_like, shape (M, 3) or (T, M, 3)
+        In order along the edge, world metres; with T moments, one a frame.
+    name : str
+        For messages and pictures.
+
+    Raises
+    ------
+    ParameterError
+        If the corners do not lie in a plane, edges cross, or the polygon has no area; or if it
+        bends so much while moving that its triangles turn over.
+    """
+
+    corners: NDArray[np.float64]
+    name: str = ""
+    faces: NDArray[np.int32] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "corners", _points("corners", self.corners, "M"))
+        object.__setattr__(self, "faces", triangulate(self.corners))
+
+    @property
+    def n_moments(self) -> int:
+        """1, or the number of frames."""
+        return len(self.corners)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Mesh(Surface):
+    """Triangles that share corners.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (V, 3) or (T, V, 3)
+        World metres; with T moments, one a frame.
+    faces : array_like of int, shape (F, 3)
+        Three vertices a triangle.
+    name : str
+        For messages and pictures.
+
+    Raises
+    ------
+    ParameterError
+        If a face names a vertex that is not there.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        vertices = _points("vertices", self.vertices, "V")
+        faces = check_array("faces", self.faces, ("F", 3), dtype=np.int64)
+        bad = np.flatnonzero(((faces < 0) | (faces >= vertices.shape[1])).any(axis=1))
+        if len(bad):
+            i = int(bad[0])
+            raise ParameterError(
+                "faces",
+                f"vertices 0 to {vertices.shape[1] - 1}",
+                f"{faces[i].tolist()} at face {i}",
+            )
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces.astype(np.int32))
+
+    @property
+    def n_moments(self) -> int:
+        """1, or the number of frames."""
+        return len(self.vertices)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Capsule(Surface):
+    """All within a distance of a segment: a limb; a sphere where the ends are one.
+
+    Parameters
+    ----------
+    ends : array_like, shape (2, 3) or (T, 2, 3)
+        Ends of the axis, world metres; with T moments, one a frame.
+    radius : float
+        Metres.
+    name : str
+        For messages and pictures.
+    """
+
+    ends: NDArray[np.float64]
+    radius: float
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ends", _points("ends", self.ends, 2))
+        check_number("radius", self.radius, above=0)
+
+    @property
+    def n_moments(self) -> int:
+        """1, or the number of frames."""
+        return len(self.ends)
+
+
+def compile_surfaces(surfaces: Sequence[Surface], n_frames: int) -> list[_engine.Surfaces]:
+    """Hand surfaces to the engine: those that stand together, those that move together.
+
+    Raises
+    ------
+    ParameterError
+        If something else is among them, or a moving one has not `n_frames` moments.
+    """
+    for i, surface in enumerate(surfaces):
+        if not isinstance(surface, (Polygon, Mesh, Capsule)):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise ParameterError(
+                f"surfaces[{i}]", "a Polygon, Mesh or Capsule", type(surface).__name__
+            )
+        if surface.n_moments not in (1, n_frames):
+            raise ParameterError(
+                f"surfaces[{i}]", f"1 or {n_frames} moments, as the points", surface.n_moments
+            )
+    groups: list[_engine.Surfaces] = []
+    for moments in sorted({s.n_moments for s in surfaces}):
+        members = [(i, s) for i, s in enumerate(surfaces) if s.n_moments == moments]
+        groups.append(_compile(members, moments))
+    return groups
+
+
+def _compile(members: list[tuple[int, Surface]], moments: int) -> _engine.Surfaces:
+    from asterism import _engine
+
+    corners: list[NDArray[np.float64]] = [np.empty((moments, 0, 3))]
+    faces: list[NDArray[np.int32]] = [np.empty((0, 3), np.int32)]
+    owners: list[NDArray[np.int32]] = [np.empty(0, np.int32)]
+    capsules = [(i, s) for i, s in members if isinstance(s, Capsule)]
+    first = 0
+    for i, surface in members:
+        if isinstance(surface, Polygon):
+            points, triangles = surface.corners, surface.faces
+        elif isinstance(surface, Mesh):
+            points, triangles = surface.vertices, surface.faces
+        else:
+            continue
+        corners.append(points)
+        faces.append(triangles + np.int32(first))
+        owners.append(np.full(len(triangles), i, np.int32))
+        first += points.shape[1]
+    ends = [np.empty((moments, 0, 2, 3)), *(s.ends[:, None] for _, s in capsules)]
+    return _engine.Surfaces(
+        vertices=np.ascontiguousarray(np.concatenate(corners, axis=1)),
+        faces=np.concatenate(faces),
+        face_owners=np.concatenate(owners),
+        ends=np.ascontiguousarray(np.concatenate(ends, axis=1)),
+        radii=np.array([s.radius for _, s in capsules], dtype=np.float64),
+        capsule_owners=np.array([i for i, _ in capsules], dtype=np.int32),
+    )
