@@ -1,0 +1,126 @@
+"""TOML of anipose, freemocap and caliscope: OpenCV's camera, the rotation as a Rodrigues vector."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from asterism.camera import BrownConrady
+from asterism.errors import FormatError
+from asterism.io.calibration.limits import brown_coefficients, names_of
+from asterism.io.calibration.parts import (
+    as_array,
+    build_camera,
+    build_rig,
+    per_metre,
+    pose,
+    whole_size,
+)
+from asterism.io.calibration.toml_text import load, table
+from asterism.io.units import parse_unit
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from asterism.camera import Rig
+
+__all__ = ["read", "sniff", "write"]
+
+
+def sniff(head: bytes) -> bool:
+    """Tell whether the first bytes of a file look like this format."""
+    return b"matrix" in head and b"distortions" in head
+
+
+def read(path: Path, units: str | None) -> Rig:
+    """Read a rig.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    units : str or None
+        Its unit of length; else what its metadata says, else by the cameras' distances.
+
+    Returns
+    -------
+    Rig
+    """
+    warnings: list[str] = []
+    found: list[dict[str, Any]] = []
+    content = load(path)
+    metadata = content.get("metadata")
+    if units is None and isinstance(metadata, dict):
+        units = parse_unit(str(metadata.get("units", "")))
+    for key, entry in content.items():
+        if isinstance(entry, dict) and "matrix" in entry:
+            found.append(_camera(path, key, entry))
+        elif key != "metadata":
+            warnings.append(f"the entry {key!r} is no camera and is left out")
+    scale = 1.0
+    if found:
+        scale = per_metre(units, [-f["R"].T @ f["t"] for f in found], warnings)
+    cameras = [
+        build_camera(
+            path, f["place"], K=f["K"], T_camera_world=pose(f["R"], f["t"] / scale),
+            size_px=f["size"], name=f["name"], lens=f["lens"],
+        )
+        for f in found
+    ]  # fmt: skip
+    return build_rig(path, cameras, warnings)
+
+
+def _camera(path: Path, key: str, entry: dict[str, Any]) -> dict[str, Any]:
+    name = str(entry.get("name", key))
+    place = f"camera {name}"
+    if entry.get("fisheye"):
+        raise FormatError(
+            path, f"{place}, fisheye", "false", "true", "fisheye lenses are not modelled"
+        )
+    size = as_array(path, f"{place}, size", entry.get("size"), (2,))
+    distortions = as_array(path, f"{place}, distortions", entry.get("distortions", []))
+    if len(distortions) > 5 and distortions[5:].any():
+        expected = "k1, k2, p1, p2, k3, and nothing after them"
+        raise FormatError(path, f"{place}, distortions", expected, f"{len(distortions)} numbers")
+    k = np.zeros(5)
+    k[: len(distortions[:5])] = distortions[:5]
+    rotation = as_array(path, f"{place}, rotation", entry.get("rotation"), (3,))
+    return {
+        "place": place,
+        "name": name,
+        "size": whole_size(path, f"{place}, size", size[0], size[1]),
+        "K": as_array(path, f"{place}, matrix", entry["matrix"], (3, 3)),
+        "lens": BrownConrady(*k.tolist()) if k.any() else None,
+        "R": Rotation.from_rotvec(rotation).as_matrix(),
+        "t": as_array(path, f"{place}, translation", entry.get("translation"), (3,)),
+    }
+
+
+def write(rig: Rig) -> bytes:
+    """Write a rig in metres.
+
+    Parameters
+    ----------
+    rig : Rig
+        With lenses in the manner of OpenCV.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
+    """
+    text = ""
+    for i, (camera, name) in enumerate(zip(rig, names_of(rig), strict=True)):
+        values = {
+            "name": name,
+            "size": [int(n) for n in camera.size_px],
+            "matrix": camera.K,
+            "distortions": brown_coefficients(camera, "anipose"),
+            "rotation": Rotation.from_matrix(camera.T_camera_world[:3, :3]).as_rotvec(),
+            "translation": camera.T_camera_world[:3, 3],
+            "fisheye": False,
+        }
+        text += table(f"[cam_{i}]", values)
+    return (text + table("[metadata]", {"units": "metres"})).encode()

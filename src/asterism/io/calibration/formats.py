@@ -1,0 +1,127 @@
+"""The one list of calibration formats."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from asterism.io.calibration import anipose, flydra, myptv, opencv, qca, rig_toml, xcp
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from asterism.camera import Rig
+
+__all__ = ["CALIBRATIONS", "Calibration"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """A calibration format.
+
+    Parameters
+    ----------
+    name : str
+        Its key in `CALIBRATIONS`.
+    extensions : tuple of str
+        Endings of its files; none where a folder holds the rig.
+    description : str
+        One line for people.
+    lens : {"any", "BrownConrady", "ViconRadial", "QuadraticCorrection"}
+        The lens that it can hold, beside none at all.
+    read : callable
+        Path, and the unit of length that the caller knows, to `Rig`.
+    write : callable
+        `Rig` to the content of the file, or to the names and contents of a folder's files.
+    sniff : callable or None
+        Whether the first bytes of a file look like this format; None where it is never one file.
+    sniff_folder : callable or None
+        Whether a folder looks like this format; None where it never is one.
+    unit : {"mm", "m"} or None
+        The unit that all its files have; None where they do not say, or not all the same.
+    """
+
+    name: str
+    extensions: tuple[str, ...]
+    description: str
+    lens: str
+    read: Callable[[Path, str | None], Rig]
+    write: Callable[[Rig], bytes | dict[str, bytes]]
+    sniff: Callable[[bytes], bool] | None = None
+    sniff_folder: Callable[[Path], bool] | None = None
+    unit: str | None = None
+
+
+CALIBRATIONS: dict[str, Calibration] = {
+    c.name: c
+    for c in (
+        Calibration(
+            name="rig",
+            extensions=(".toml",),
+            description="TOML of Asterism; keeps everything",
+            lens="any",
+            read=rig_toml.read,
+            write=rig_toml.write,
+            sniff=rig_toml.sniff,
+            unit="m",
+        ),
+        Calibration(
+            name="anipose",
+            extensions=(".toml",),
+            description="TOML of anipose, freemocap and caliscope",
+            lens="BrownConrady",
+            read=anipose.read,
+            write=anipose.write,
+            sniff=anipose.sniff,
+        ),
+        Calibration(
+            name="opencv",
+            extensions=(".yml", ".yaml"),
+            description="YAML of OpenCV's FileStorage",
+            lens="BrownConrady",
+            read=opencv.read,
+            write=opencv.write,
+            sniff=opencv.sniff,
+        ),
+        Calibration(
+            name="qca",
+            extensions=(".qca.txt", ".qca"),
+            description="XML as Qualisys Track Manager exports it",
+            lens="BrownConrady",
+            read=qca.read,
+            write=qca.write,
+            sniff=qca.sniff,
+            unit="mm",
+        ),
+        Calibration(
+            name="xcp",
+            extensions=(".xcp",),
+            description="XML of Vicon",
+            lens="ViconRadial",
+            read=xcp.read,
+            write=xcp.write,
+            sniff=xcp.sniff,
+            unit="mm",
+        ),
+        Calibration(
+            name="flydra",
+            extensions=(),
+            description="folder of flydra and the Multi-Camera Self-Calibration toolbox",
+            lens="BrownConrady",
+            read=flydra.read,
+            write=flydra.write,
+            sniff_folder=flydra.sniff_folder,
+        ),
+        Calibration(
+            name="myptv",
+            extensions=(),
+            description="folder of MyPTV's Tsai camera files, or one of them",
+            lens="QuadraticCorrection",
+            read=myptv.read,
+            write=myptv.write,
+            sniff=myptv.sniff,
+            sniff_folder=myptv.sniff_folder,
+        ),
+    )
+}
