@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from asterism.camera import Coverage as Coverage
     from asterism.camera import Lens as Lens
     from asterism.camera import Mesh as Mesh
+    from asterism.camera import Observations as Observations
     from asterism.camera import Polygon as Polygon
     from asterism.camera import Projection as Projection
     from asterism.camera import QuadraticCorrection as QuadraticCorrection
@@ -89,6 +90,7 @@ _PUBLIC = {
         "Coverage",
         "Lens",
         "Mesh",
+        "Observations",
         "Polygon",
         "Projection",
         "QuadraticCorrection",

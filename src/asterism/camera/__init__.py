@@ -2,6 +2,7 @@
 
 from asterism.camera.camera import Camera, intrinsics
 from asterism.camera.lens import BrownConrady, Lens, QuadraticCorrection, ReportRadial, ViconRadial
+from asterism.camera.observations import Observations
 from asterism.camera.projection import Projection, Reason
 from asterism.camera.rig import Coverage, Rig, volume_grid
 from asterism.camera.surfaces import Capsule, Mesh, Polygon, Surface
@@ -13,6 +14,7 @@ __all__ = [
     "Coverage",
     "Lens",
     "Mesh",
+    "Observations",
     "Polygon",
     "Projection",
     "QuadraticCorrection",

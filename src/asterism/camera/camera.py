@@ -423,7 +423,7 @@ def project_points(
     n_frames = shape[0] if is_moving and shape else 1
     compiled = compile_surfaces(surfaces, n_frames) if len(surfaces) else []
     if not p.size:
-        n_frames = 1
+        n_frames, compiled = 1, []
     pixels, depth, reason, hidden_by = _engine.project(
         cameras=[c._engine for c in cameras],  # pyright: ignore[reportPrivateUsage]
         points=p.reshape(n_frames, -1, 3),

@@ -81,9 +81,9 @@ def triangulate(corners: NDArray[np.float64]) -> NDArray[np.int32]:
 def _flatten(points: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
     """Give coordinates in the plane, counter-clockwise about the normal."""
     axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    x: NDArray[np.float64] = np.cross(normal, axis)
+    x = np.asarray(np.cross(normal, axis), dtype=np.float64)
     x /= np.linalg.norm(x)
-    y: NDArray[np.float64] = np.cross(normal, x)
+    y = np.asarray(np.cross(normal, x), dtype=np.float64)
     return np.stack([points @ x, points @ y], axis=1)
 
 

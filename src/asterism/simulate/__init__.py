@@ -2,17 +2,20 @@
 
 from asterism.simulate.corruption import corrupt
 from asterism.simulate.episodes import Burst, Ghosts
+from asterism.simulate.film import Film, film
 from asterism.simulate.scenes import SCENES, Scene, attracted, crossing, cube, smooth, walk
 
 __all__ = [
     "SCENES",
     "Burst",
+    "Film",
     "Ghosts",
     "Scene",
     "attracted",
     "corrupt",
     "crossing",
     "cube",
+    "film",
     "smooth",
     "walk",
 ]
