@@ -29,9 +29,13 @@ if TYPE_CHECKING:
     from asterism.camera import Camera as Camera
     from asterism.camera import Capsule as Capsule
     from asterism.camera import Coverage as Coverage
+    from asterism.camera import DepthImage as DepthImage
+    from asterism.camera import Face as Face
     from asterism.camera import Lens as Lens
+    from asterism.camera import LensFit as LensFit
     from asterism.camera import Mesh as Mesh
     from asterism.camera import Observations as Observations
+    from asterism.camera import Painting as Painting
     from asterism.camera import Polygon as Polygon
     from asterism.camera import Projection as Projection
     from asterism.camera import QuadraticCorrection as QuadraticCorrection
@@ -88,9 +92,13 @@ _PUBLIC = {
         "Camera",
         "Capsule",
         "Coverage",
+        "DepthImage",
+        "Face",
         "Lens",
+        "LensFit",
         "Mesh",
         "Observations",
+        "Painting",
         "Polygon",
         "Projection",
         "QuadraticCorrection",

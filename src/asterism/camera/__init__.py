@@ -1,8 +1,12 @@
 """Cameras: lens, pin-hole, rig, the surfaces that hide points, and what is seen of all that."""
 
-from asterism.camera.camera import Camera, intrinsics
+from asterism.camera.camera import Camera
+from asterism.camera.depth_image import DepthImage
 from asterism.camera.lens import BrownConrady, Lens, QuadraticCorrection, ReportRadial, ViconRadial
+from asterism.camera.lens_fit import LensFit
+from asterism.camera.matrices import intrinsics
 from asterism.camera.observations import Observations
+from asterism.camera.painter import Face, Painting
 from asterism.camera.projection import Projection, Reason
 from asterism.camera.rig import Coverage, Rig, volume_grid
 from asterism.camera.surfaces import Capsule, Mesh, Polygon, Surface
@@ -12,9 +16,13 @@ __all__ = [
     "Camera",
     "Capsule",
     "Coverage",
+    "DepthImage",
+    "Face",
     "Lens",
+    "LensFit",
     "Mesh",
     "Observations",
+    "Painting",
     "Polygon",
     "Projection",
     "QuadraticCorrection",

@@ -7,69 +7,26 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from scipy.linalg import rq
 
 from asterism import _engine
+from asterism.camera.depth_image import DepthImage
 from asterism.camera.lens import NO_LENS, QUADRATIC, Lens, QuadraticCorrection
-from asterism.camera.projection import Projection
+from asterism.camera.matrices import checked_intrinsics, checked_pose, decomposed, looking_at
+from asterism.camera.painter import Painting, in_painters_order
+from asterism.camera.project import CLEARANCE, as_coordinates, project_points
 from asterism.camera.surfaces import compile_surfaces
-from asterism.errors import ParameterError, check_array, check_number, keep_array
+from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
+    from asterism.camera.lens_fit import LensFit
+    from asterism.camera.projection import Projection
     from asterism.camera.surfaces import Surface
 
-__all__ = ["CLEARANCE", "Camera", "intrinsics", "project_points"]
-
-CLEARANCE = 1e-6
-"""Metres before a point in which a surface does not hide it: a marker may lie on its surface."""
-
-ROTATION_TOLERANCE = 1e-6
-
-
-def intrinsics(
-    *,
-    focal_length: float,
-    principal_point: tuple[float, float],
-    pixels_per_metre: float | tuple[float, float] = 1.0,
-    skew: float = 0.0,
-) -> NDArray[np.float64]:
-    """Multiply the two intrinsic matrices of the 2010 report (§3.1, 3.2), ``K' F``.
-
-    Parameters
-    ----------
-    focal_length : float
-        f in metres; or in pixels, with one pixel "per metre".
-    principal_point : (u0, v0)
-        Pixels from the centre of the top left one.
-    pixels_per_metre : float or (k_u, k_v)
-        On the sensor. The report calls them width and height of a pixel; they are the reciprocals.
-    skew : float
-        s_w, in the same unit as ``pixels_per_metre``.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        The matrix K of a `Camera`.
-
-    Examples
-    --------
-    >>> intrinsics(focal_length=0.008, pixels_per_metre=1e5, principal_point=(639.5, 511.5))
-    array([[800. ,   0. , 639.5],
-           [  0. , 800. , 511.5],
-           [  0. ,   0. ,   1. ]])
-    """
-    check_number("focal_length", focal_length, above=0)
-    check_number("skew", skew)
-    ku, kv = check_array("pixels_per_metre", np.broadcast_to(pixels_per_metre, 2), (2,))
-    if ku <= 0 or kv <= 0:
-        raise ParameterError("pixels_per_metre", "numbers > 0", pixels_per_metre)
-    u0, v0 = check_array("principal_point", principal_point, (2,))
-    f = focal_length
-    return np.array([[f * ku, f * skew, u0], [0.0, f * kv, v0], [0.0, 0.0, 1.0]])
+__all__ = ["Camera"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -111,6 +68,7 @@ class Camera:
 
     Examples
     --------
+    >>> from asterism.camera import intrinsics
     >>> K = intrinsics(focal_length=800, principal_point=(639.5, 511.5))
     >>> camera = Camera.look_at((0, -4, 1), (0, 0, 1), K=K, size_px=(1280, 1024))
     >>> camera.project([[0, 0, 1], [0.5, 0, 1.5], [0, -5, 1]]).pixels
@@ -129,9 +87,8 @@ class Camera:
     name: str = ""
 
     def __post_init__(self) -> None:
-        K = _intrinsic("K", self.K)
-        T = keep_array("T_camera_world", self.T_camera_world, (4, 4))
-        _check_rigid(T)
+        K = checked_intrinsics("K", self.K)
+        T = checked_pose(self.T_camera_world)
         size = tuple(self.size_px)
         if len(size) != 2:
             raise ParameterError("size_px", "width and height", self.size_px)
@@ -148,7 +105,7 @@ class Camera:
         object.__setattr__(self, "T_camera_world", T)
         object.__setattr__(self, "size_px", (int(size[0]), int(size[1])))
         if self.K_lens is not None:
-            object.__setattr__(self, "K_lens", _intrinsic("K_lens", self.K_lens))
+            object.__setattr__(self, "K_lens", checked_intrinsics("K_lens", self.K_lens))
         if isinstance(self.lens, QuadraticCorrection) and not self.lens.reaches(*self._start):
             raise ParameterError("lens", "no fold at the centre of the image", self.lens)
 
@@ -179,21 +136,7 @@ class Camera:
         ParameterError
             If position and target are one, or `up` is the direction of sight.
         """
-        position, target, up = (
-            check_array(name, value, (3,))
-            for name, value in (("position", position), ("target", target), ("up", up))
-        )
-        z = target - position
-        x = np.cross(z, up)
-        if not np.linalg.norm(z) > 0:
-            raise ParameterError("target", "another place than the camera's", target.tolist())
-        if np.linalg.norm(x) <= 1e-9 * np.linalg.norm(z) * np.linalg.norm(up):
-            raise ParameterError("up", "not the direction of sight", up.tolist())
-        z /= np.linalg.norm(z)
-        x /= np.linalg.norm(x)
-        T = np.eye(4)
-        T[:3, :3] = np.stack([x, np.cross(z, x), z])
-        T[:3, 3] = -T[:3, :3] @ position
+        T = looking_at(position, target, up)
         return cls(K=np.asarray(K), T_camera_world=T, size_px=size_px, **options)
 
     @classmethod
@@ -216,17 +159,7 @@ class Camera:
         ----------
         R. Hartley, A. Zisserman, Multiple View Geometry (2004), §6.2.4.
         """
-        matrix = check_array("P", P, (3, 4))
-        if np.linalg.matrix_rank(matrix[:, :3]) < 3:
-            raise ParameterError("P", "a regular left 3 × 3 part", "a singular one")
-        matrix = matrix * np.sign(np.linalg.det(matrix[:, :3]))
-        K, R = (np.asarray(m, dtype=np.float64) for m in rq(matrix[:, :3]))
-        signs = np.sign(np.diag(K))
-        K, R = K * signs, signs[:, None] * R
-        T = np.eye(4)
-        T[:3, :3] = R
-        T[:3, 3] = np.linalg.solve(K, matrix[:, 3])
-        K = np.triu(K / K[2, 2])
+        K, T = decomposed(P)
         return cls(K=K, T_camera_world=T, size_px=size_px, **options)
 
     @property
@@ -267,7 +200,7 @@ class Camera:
         ParameterError
             If the points have another shape, or a moving surface another number of moments.
         """
-        return project_points([self], points, surfaces, clearance)[0]
+        return project_points([self.engine], points, surfaces, clearance)[0]
 
     def undistort(self, pixels: ArrayLike) -> NDArray[np.float64]:
         """Give the normalised coordinates ``(X / Z, Y / Z)`` of pixels, the lens undone.
@@ -281,8 +214,8 @@ class Camera:
         ndarray, shape (..., 2)
             NaN where no ray leads to the pixel: the lens model does not reach so far.
         """
-        p = _last_axis("pixels", pixels, 2)
-        return self._engine.undistort(p.reshape(-1, 2)).reshape(p.shape)
+        p = as_coordinates("pixels", pixels, 2)
+        return self.engine.undistort(p.reshape(-1, 2)).reshape(p.shape)
 
     def distort(self, normalised: ArrayLike) -> NDArray[np.float64]:
         """Give the pixels of normalised coordinates; the inverse of `undistort`.
@@ -297,8 +230,8 @@ class Camera:
         ndarray, shape (..., 2)
             Pixels, in the image or not; NaN beyond the lens model.
         """
-        p = _last_axis("normalised", normalised, 2)
-        return self._engine.distort(p.reshape(-1, 2)).reshape(p.shape)
+        p = as_coordinates("normalised", normalised, 2)
+        return self.engine.distort(p.reshape(-1, 2)).reshape(p.shape)
 
     def rays(self, pixels: ArrayLike) -> NDArray[np.float64]:
         """Give the direction in which each pixel looks, from `center`.
@@ -330,8 +263,89 @@ class Camera:
         ndarray, shape (..., 2, 3)
             Pixels per metre; NaN where a point has no pixel.
         """
-        p = _last_axis("points", points, 3)
-        return self._engine.jacobian(p.reshape(-1, 3)).reshape(*p.shape[:-1], 2, 3)
+        p = as_coordinates("points", points, 3)
+        return self.engine.jacobian(p.reshape(-1, 3)).reshape(*p.shape[:-1], 2, 3)
+
+    def depth_image(self, surfaces: Sequence[Surface], moment: int = 0) -> DepthImage:
+        """Draw surfaces into a z-buffer: at every pixel the nearest one on its ray.
+
+        Parameters
+        ----------
+        surfaces : sequence of Surface
+            What is drawn. Both sides are seen, at any depth before the camera.
+        moment : int
+            Which frame of those that move.
+
+        Returns
+        -------
+        DepthImage
+            Exact at the centre of each pixel, through the lens.
+        """
+        n = _check_moment(surfaces, moment)
+        depth, owner = self._ray_grid.depth_image(
+            self.engine, compile_surfaces(surfaces, n), moment
+        )
+        return DepthImage(depth=depth, surface=owner)
+
+    def paint(self, surfaces: Sequence[Surface], moment: int = 0) -> Painting:
+        """Draw surfaces by the painter's algorithm, the farthest first, and say where it fails.
+
+        Parameters
+        ----------
+        surfaces : sequence of Polygon or Mesh
+            What is painted; up to 2000 faces.
+        moment : int
+            Which frame of those that move.
+
+        Returns
+        -------
+        Painting
+            Equal to `depth_image` but where faces overlap in a circle; those are its `cycles`.
+
+        Raises
+        ------
+        ParameterError
+            If there is a capsule among them.
+        SolverLimit
+            If there are more faces.
+        """
+        _check_moment(surfaces, moment)
+        faces, order, cycles = in_painters_order(surfaces, moment, self.T_camera_world)
+        corners = [faces.triangles[i] for i in order]
+        owners = [np.full(len(faces.triangles[i]), faces.names[i].surface) for i in order]
+        depth, owner = self._ray_grid.paint(
+            np.ascontiguousarray(np.concatenate([np.empty((0, 3, 3)), *corners])),
+            np.concatenate([np.empty(0), *owners]).astype(np.int32),
+        )
+        return Painting(
+            depth=depth,
+            surface=owner,
+            order=tuple(faces.names[i] for i in order),
+            cycles=tuple(tuple(faces.names[i] for i in group) for group in cycles),
+        )
+
+    def with_lens(self, kind: type[Lens] | None, *, refit_camera: bool = False) -> LensFit:
+        """Give the camera another kind of lens, fitted to its own over the image.
+
+        There is no exact conversion: the models bend in different directions, and a changed sign is
+        right to first order only. So the new one is fitted, and what it leaves over is told.
+
+        Parameters
+        ----------
+        kind : type of Lens or None
+            `BrownConrady`, `ReportRadial`, `ViconRadial`, or None for a pin-hole.
+        refit_camera : bool
+            Whether K and the direction of sight may change too; the place never does. For a
+            camera with a `K_lens`, which the result has not.
+
+        Returns
+        -------
+        LensFit
+            The camera, and its distance from this one in pixels.
+        """
+        from asterism.camera.lens_fit import fit_lens
+
+        return fit_lens(self, kind, refit_camera=refit_camera)
 
     def replace(self, **changes: Any) -> Self:
         """Give the camera with some of its fields changed."""
@@ -354,7 +368,8 @@ class Camera:
         return np.asarray(np.linalg.solve(self.lens_matrix, middle)[:2], dtype=np.float64)
 
     @cached_property
-    def _engine(self) -> _engine.Camera:
+    def engine(self) -> _engine.Camera:
+        """The camera as the engine has it."""
         B = self.lens_matrix if self.lens is not None else self.K
         A = np.eye(3) if B is self.K else np.asarray(np.linalg.solve(B, self.K), np.float64)
         lens = self.lens
@@ -392,7 +407,7 @@ class Camera:
 
     @cached_property
     def _ray_grid(self) -> _engine.RayGrid:
-        return _engine.RayGrid(self._engine)
+        return _engine.RayGrid(self.engine)
 
     def __repr__(self) -> str:
         w, h = self.size_px
@@ -402,73 +417,7 @@ class Camera:
         return f"Camera({name}{w} × {h} px, f {self.K[0, 0]:.4g} px, at ({at}) m{lens})"
 
 
-def project_points(
-    cameras: Sequence[Camera],
-    points: ArrayLike,
-    surfaces: Sequence[Surface],
-    clearance: float,
-) -> Projection:
-    """Project points ``(..., 3)`` through several cameras; see `Camera.project`.
-
-    Returns
-    -------
-    Projection
-        With a leading axis of cameras.
-    """
-    p = _last_axis("points", points, 3)
-    check_number("clearance", clearance, above=0, closed=True)
-    shape: tuple[int, ...] = p.shape[:-1]
-    # Moving surfaces belong to the first axis of the points.
-    is_moving = len(shape) > 1 or any(s.n_moments > 1 for s in surfaces)
-    n_frames = shape[0] if is_moving and shape else 1
-    compiled = compile_surfaces(surfaces, n_frames) if len(surfaces) else []
-    if not p.size:
-        n_frames, compiled = 1, []
-    pixels, depth, reason, hidden_by = _engine.project(
-        cameras=[c._engine for c in cameras],  # pyright: ignore[reportPrivateUsage]
-        points=p.reshape(n_frames, -1, 3),
-        surfaces=compiled,
-        clearance=float(clearance),
-    )
-    C = len(cameras)
-    return Projection(
-        pixels=pixels.reshape(C, *shape, 2),
-        depth=depth.reshape(C, *shape),
-        reason=reason.reshape(C, *shape),
-        hidden_by=hidden_by.reshape(C, *shape),
-    )
-
-
-def _last_axis(name: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
-    array = np.asarray(value)
-    if array.dtype.kind not in "iuf" or array.ndim < 1 or array.shape[-1] != n:
-        got = f"shape {array.shape} of {array.dtype}"
-        raise ParameterError(name, f"an array of shape (..., {n}) of numbers", got)
-    return np.ascontiguousarray(array, dtype=np.float64)
-
-
-def _intrinsic(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    K = keep_array(name, value, (3, 3))
-    if K[0, 0] <= 0 or K[1, 1] <= 0:
-        raise ParameterError(
-            name, "focal lengths > 0 on the diagonal", f"{K[0, 0]:g} and {K[1, 1]:g}"
-        )
-    if K[1, 0] != 0 or (K[2] != (0.0, 0.0, 1.0)).any():
-        raise ParameterError(name, "[[f_u, s, u0], [0, f_v, v0], [0, 0, 1]]", K.tolist())
-    return K
-
-
-def _check_rigid(T: NDArray[np.float64]) -> None:
-    R = T[:3, :3]
-    if (T[3] != (0.0, 0.0, 0.0, 1.0)).any():
-        raise ParameterError("T_camera_world", "a last row of 0 0 0 1", T[3].tolist())
-    off = float(np.abs(R @ R.T - np.eye(3)).max())
-    if off > ROTATION_TOLERANCE:
-        raise ParameterError(
-            "T_camera_world",
-            "a rotation (R Rᵀ = 1)",
-            f"R Rᵀ off by {off:.3g}",
-            "is the matrix scaled?",
-        )
-    if np.linalg.det(R) < 0:
-        raise ParameterError("T_camera_world", "a rotation", "a reflection (determinant -1)")
+def _check_moment(surfaces: Sequence[Surface], moment: int) -> int:
+    n = max((s.n_moments for s in surfaces), default=1)
+    check_number("moment", moment, above=0, below=max(n - 1, 0), closed=True, integer=True)
+    return n

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
 
-from asterism.camera.camera import CLEARANCE, Camera, intrinsics, project_points
+from asterism.camera.camera import Camera
+from asterism.camera.matrices import intrinsics
+from asterism.camera.project import CLEARANCE, project_points
 from asterism.errors import ParameterError, check_array, check_number
 
 if TYPE_CHECKING:
@@ -205,7 +207,7 @@ class Rig:
         Projection
             Arrays of the shape (cameras, \*points).
         """
-        return project_points(self.cameras, points, surfaces, clearance)
+        return project_points([c.engine for c in self.cameras], points, surfaces, clearance)
 
     def coverage(
         self, points: ArrayLike, surfaces: Sequence[Surface] = (), *, sigma_px: float = 0.3
