@@ -49,6 +49,19 @@ _NAME = ("name", "cameraname")
 _MODEL = ("distortionmodel", "cameramodel", "cameratype", "modeltype")
 
 
+class _Loader(yaml.BaseLoader):
+    """Words, lists and mappings and nothing else, whatever the tags say; no node twice.
+
+    A list may hold itself by an alias, or many others many times over: no calibration does.
+    """
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark
+            raise yaml.MarkedYAMLError(problem="an alias", problem_mark=mark)
+        return super().compose_node(parent, index)
+
+
 def sniff(head: bytes) -> bool:
     """Tell whether the first bytes of a file look like this format."""
     return head.lstrip(b"\xef\xbb\xbf").startswith(b"%YAML") or b"opencv-matrix" in head
@@ -105,14 +118,13 @@ def _load(path: Path) -> dict[str, Any]:
         text = raw.decode("utf-8-sig")
         # OpenCV's first line is its own ("%YAML:1.0"), and its tags have no prefix in YAML 1.1.
         text = re.sub(r"\A\s*%YAML[^\n]*\n", "", text)
-        # BaseLoader makes words, lists and mappings and nothing else, whatever the tags say.
-        content = yaml.load(text, Loader=yaml.BaseLoader)
+        content = yaml.load(text, Loader=_Loader)
     except UnicodeDecodeError as error:
         raise FormatError(path, f"byte {error.start}", "text in UTF-8", error.reason) from error
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = "its text" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}"
-        raise FormatError(path, place, "YAML", error.problem or str(error)) from error
+        raise FormatError(path, place, "plain YAML", error.problem or str(error)) from error
     except (yaml.YAMLError, ValueError) as error:
         raise FormatError(path, "its text", "YAML", str(error).splitlines()[0]) from error
     except RecursionError:

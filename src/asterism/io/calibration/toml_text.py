@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["load", "table"]
 
 _LARGEST = 4 << 20  # bytes, some thousand cameras
+_MOST_PARTS = 100
 
 
 def load(path: Path) -> dict[str, Any]:
@@ -38,7 +40,9 @@ def load(path: Path) -> dict[str, Any]:
         If it is not TOML.
     """
     try:
-        return tomllib.loads(read_bytes(path, most=_LARGEST).decode("utf-8-sig"))
+        text = read_bytes(path, most=_LARGEST).decode("utf-8-sig")
+        _check_keys(path, text)
+        return tomllib.loads(text)
     except UnicodeDecodeError as error:
         raise FormatError(path, f"byte {error.start}", "text in UTF-8", error.reason) from error
     except RecursionError:
@@ -47,6 +51,14 @@ def load(path: Path) -> dict[str, Any]:
         ) from None
     except ValueError as error:  # TOMLDecodeError, and numbers of too many digits
         raise FormatError(path, "its text", "TOML", str(error)) from error
+
+
+def _check_keys(path: Path, text: str) -> None:
+    """Refuse keys of hundreds of parts, for which the parser takes the square of their number."""
+    bare = re.sub(r"\"[^\"\n]*\"|'[^'\n]*'", "", text)
+    longest = max(piece.count(".") for piece in re.split(r"[,=\[\]{}\n#]", bare))
+    if longest > _MOST_PARTS:
+        raise FormatError(path, "its keys", f"at most {_MOST_PARTS} parts in one", longest + 1)
 
 
 def table(header: str, values: Mapping[str, Any]) -> str:
