@@ -7,13 +7,26 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["CLUTTER", "CYCLE", "GRID", "INK", "MISSED", "RIGHT", "WRONG", "new_axes", "tidy"]
+__all__ = [
+    "CLUTTER",
+    "CYCLE",
+    "GRADIENT",
+    "GRID",
+    "INK",
+    "MISSED",
+    "RIGHT",
+    "WRONG",
+    "new_axes",
+    "tidy",
+]
 
 # Okabe & Ito (2008), told apart by colour-blind people and in grey; its black is kept for text and
 # its yellow, too pale on white, is darkened.
 CYCLE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#B8A800")
 RIGHT, WRONG, MISSED = "#0072B2", "#D55E00", "#E69F00"
 CLUTTER, INK, GRID = "#8C8C8C", "#333333", "#E6E6E6"
+GRADIENT = "viridis"
+"""The colour map of everything continuous: even in lightness, the same to colour-blind people."""
 
 
 def new_axes(*, solid: bool = False, height: float = 5.0) -> Axes:

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asterism.view.space import to_scale
 from asterism.view.style import CLUTTER, CYCLE, INK, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
     from asterism.model import Tracks
 
@@ -59,28 +61,11 @@ def plot_trajectories(tracks: Tracks, ax: Axes | None = None) -> Axes:
     return axes
 
 
-def _to_scale(axes: Any, points: np.ndarray[Any, Any], is_solid: bool) -> None:
-    for name in "xyz"[: points.shape[1]]:
+def _to_scale(axes: Any, points: NDArray[np.float64], is_solid: bool) -> None:
+    if is_solid:
+        to_scale(axes, points)
+        return
+    for name in "xy":
         getattr(axes, f"set_{name}label")(f"{name} [m]", color=INK)
-    if not is_solid:
-        axes.set_aspect("equal", adjustable="datalim")
-        tidy(axes)
-        return
-    axes.tick_params(colors=INK, labelsize=8)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.pane.set_facecolor("white")
-        axis.pane.set_edgecolor(CLUTTER)
-    if not len(points):
-        return
-    low, high = points.min(axis=0), points.max(axis=0)
-    # An axis on which hardly anything moves still gets room for its numbers.
-    extent = np.maximum(high - low, max(0.25 * float((high - low).max()), 1e-3))
-    middle = (low + high) / 2
-    for i, name in enumerate("xyz"):
-        half = 0.52 * float(extent[i])
-        getattr(axes, f"set_{name}lim")(float(middle[i]) - half, float(middle[i]) + half)
-        # Numbers every so often in metres, not on the pixel: a short axis has room for a few only.
-        getattr(axes, f"{name}axis").get_major_locator().set_params(
-            nbins=max(2, round(7 * float(extent[i] / extent.max())))
-        )
-    axes.set_box_aspect(extent, zoom=0.85)  # room for the names of the axes
+    axes.set_aspect("equal", adjustable="datalim")
+    tidy(axes)
