@@ -1,0 +1,135 @@
+"""Columns of a CSV with a header: numbers and texts, fast, and with the line of what is wrong."""
+
+from __future__ import annotations
+
+import csv
+from itertools import chain
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import FormatError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+__all__ = ["columns_of", "quoted", "whole"]
+
+_CHUNK = 4096  # lines at a time, so that the cells as texts never fill the memory
+_TO_QUOTE = frozenset(',"\r\n')
+
+
+def columns_of(
+    path: Path, lines: Sequence[str], header: Sequence[str], texts: Collection[str]
+) -> tuple[dict[str, NDArray[np.float64]], dict[str, list[str]]]:
+    """Parse the lines under a header.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    lines : sequence of str
+        All lines, the header first.
+    header : sequence of str
+        Names of the columns, all different.
+    texts : collection of str
+        Columns that hold text; the others hold finite numbers or nothing.
+
+    Returns
+    -------
+    numbers : dict of ndarray, shape (rows,)
+        By the name of their column; NaN where blank.
+    texts : dict of list of str
+        By the name of their column, blanks and all.
+
+    Raises
+    ------
+    FormatError
+        With the line and the column.
+    """
+    parts: dict[str, list[NDArray[np.float64]]] = {c: [] for c in header if c not in texts}
+    words: dict[str, list[str]] = {c: [] for c in header if c in texts}
+    width = len(header)
+    for begin in range(1, len(lines), _CHUNK):
+        chunk = lines[begin : begin + _CHUNK]
+        if any('"' in line for line in chunk):
+            rows = [_split(path, line, begin + i + 1) for i, line in enumerate(chunk)]
+            widths = [len(row) for row in rows]
+            cells = list(chain.from_iterable(rows))
+        else:  # many times faster
+            widths = [line.count(",") + 1 for line in chunk]
+            cells = ",".join(chunk).split(",")
+        wrong = next((i for i, n in enumerate(widths) if n != width), None)
+        if wrong is not None:
+            place = f"line {begin + wrong + 1}"
+            raise FormatError(path, place, f"{width} columns", widths[wrong])
+        for i, column in enumerate(header):
+            if column in texts:
+                words[column] += cells[i::width]
+            else:
+                parts[column].append(_numbers(path, column, cells[i::width], begin + 1))
+    return {c: np.concatenate(p) if p else np.empty(0) for c, p in parts.items()}, words
+
+
+def whole(
+    path: Path, column: str, values: NDArray[np.float64], lines: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Give numbers that must be whole as such.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    column : str
+        For messages.
+    values : ndarray, shape (n,)
+        The numbers.
+    lines : ndarray of int, shape (n,)
+        The line of each, for messages.
+
+    Raises
+    ------
+    FormatError
+        At the first that is not whole, or beyond what a float holds exactly.
+    """
+    bad = np.flatnonzero((values != np.floor(values)) | (np.abs(values) > 2**53))
+    if len(bad):
+        place = f"line {lines[bad[0]]}, column {column}"
+        raise FormatError(path, place, "a whole number", f"{values[bad[0]]:g}")
+    return values.astype(np.int64)
+
+
+def quoted(text: str) -> str:
+    """Give a text as a cell, in quotes where it needs them."""
+    if _TO_QUOTE.isdisjoint(text):
+        return text
+    return '"' + text.replace('"', '""') + '"'
+
+
+def _split(path: Path, line: str, number: int) -> list[str]:
+    try:
+        return next(csv.reader([line], strict=True), [])
+    except csv.Error as error:
+        raise FormatError(path, f"line {number}", "CSV", str(error)) from error
+
+
+def _numbers(path: Path, column: str, cells: list[str], line: int) -> NDArray[np.float64]:
+    try:
+        values = np.array([cell or "nan" for cell in cells], dtype=np.float64)
+    except ValueError:
+        values = np.array([_number_or_inf(cell) for cell in cells])
+    bad = np.flatnonzero(np.isinf(values))
+    if len(bad):
+        place = f"line {line + bad[0]}, column {column}"
+        raise FormatError(path, place, "a finite number or nothing", repr(cells[bad[0]]))
+    return values
+
+
+def _number_or_inf(cell: str) -> float:
+    try:
+        return float(cell.strip() or "nan")
+    except ValueError:
+        return np.inf
