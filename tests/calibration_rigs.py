@@ -23,6 +23,10 @@ LENSES = {
 }
 
 
+NAMES = {"rig": "a.toml", "anipose": "a.toml", "opencv": "a.yml", "qca": "a.qca.txt",
+         "xcp": "a.xcp", "flydra": "fly", "myptv": "ptv"}  # fmt: skip
+
+
 def target_points(n: int = 200) -> np.ndarray:
     """Places that the cameras of `rig_for` see, metres."""
     return np.random.default_rng(5).uniform([-0.7, -0.7, 0.4], [0.7, 0.7, 1.8], (n, 3))
@@ -34,7 +38,7 @@ def rig_for(format: str, *, bent: bool = True) -> Rig:
     places = [(3.3, 0.4, 2.2), (-1.5, 2.9, 1.4), (-1.1, -3.0, 3.1)]
     for i, place in enumerate(places):
         f, size = 905.3 + 31.7 * i, (1280, 1000 + 24 * i)
-        skew = 1.7 if format in ("rig", "flydra", "anipose", "opencv") and not bent else 0.0
+        skew = 1.7 if format in ("rig", "flydra") and not bent else 0.0
         fv = f * (1.0 if format == "myptv" else 1.0213)
         K = np.array([[f, skew, 641.7 - i], [0, fv, 511.3 + i], [0, 0, 1]])
         lens = K_lens = None
@@ -61,3 +65,13 @@ def rig_for(format: str, *, bent: bool = True) -> Rig:
             )
         )  # fmt: skip
     return Rig(tuple(cameras))
+
+
+def same_pixels(a: Rig, b: Rig, tolerance: float = 1e-9) -> None:
+    """Assert that two rigs see the same points at the same pixels."""
+    points = target_points()
+    ours, theirs = a.project(points), b.project(points)
+    assert np.isfinite(ours.pixels).all()
+    assert ours.visible.mean() > 0.5
+    np.testing.assert_allclose(theirs.pixels, ours.pixels, rtol=0, atol=tolerance)
+    assert (ours.reason == theirs.reason).mean() > 0.999

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 import asterism
+from asterism.app.camera import app as camera
 from asterism.app.corrupt import corrupt
 from asterism.app.demo import demo
 from asterism.app.estimate import estimate
@@ -47,3 +48,4 @@ def _root(  # pyright: ignore[reportUnusedFunction]
 
 for _command in (track, evaluate, info, estimate, methods, corrupt, simulate, scenes, demo):
     app.command()(_command)
+app.add_typer(camera)

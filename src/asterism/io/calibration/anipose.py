@@ -9,11 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from asterism.camera import BrownConrady
 from asterism.errors import FormatError
-from asterism.io.calibration.limits import brown_coefficients, names_of
+from asterism.io.calibration.limits import brown_coefficients, names_of, no_skew
 from asterism.io.calibration.parts import (
     as_array,
     build_camera,
     build_rig,
+    drop_skew,
     per_metre,
     pose,
     whole_size,
@@ -56,7 +57,7 @@ def read(path: Path, units: str | None) -> Rig:
         units = parse_unit(str(metadata.get("units", "")))
     for key, entry in content.items():
         if isinstance(entry, dict) and "matrix" in entry:
-            found.append(_camera(path, key, entry))
+            found.append(_camera(path, key, entry, warnings))
         elif key != "metadata":
             warnings.append(f"the entry {key!r} is no camera and is left out")
     scale = 1.0
@@ -72,7 +73,7 @@ def read(path: Path, units: str | None) -> Rig:
     return build_rig(path, cameras, warnings)
 
 
-def _camera(path: Path, key: str, entry: dict[str, Any]) -> dict[str, Any]:
+def _camera(path: Path, key: str, entry: dict[str, Any], warnings: list[str]) -> dict[str, Any]:
     name = str(entry.get("name", key))
     place = f"camera {name}"
     if entry.get("fisheye"):
@@ -86,12 +87,13 @@ def _camera(path: Path, key: str, entry: dict[str, Any]) -> dict[str, Any]:
         raise FormatError(path, f"{place}, distortions", expected, f"{len(distortions)} numbers")
     k = np.zeros(5)
     k[: len(distortions[:5])] = distortions[:5]
+    K = as_array(path, f"{place}, matrix", entry["matrix"], (3, 3))
     rotation = as_array(path, f"{place}, rotation", entry.get("rotation"), (3,))
     return {
         "place": place,
         "name": name,
         "size": whole_size(path, f"{place}, size", size[0], size[1]),
-        "K": as_array(path, f"{place}, matrix", entry["matrix"], (3, 3)),
+        "K": drop_skew(place, K, warnings),
         "lens": BrownConrady(*k.tolist()) if k.any() else None,
         "R": Rotation.from_rotvec(rotation).as_matrix(),
         "t": as_array(path, f"{place}, translation", entry.get("translation"), (3,)),
@@ -104,7 +106,7 @@ def write(rig: Rig) -> bytes:
     Parameters
     ----------
     rig : Rig
-        With lenses in the manner of OpenCV.
+        With lenses in the manner of OpenCV, and no skew.
 
     Returns
     -------
@@ -113,6 +115,7 @@ def write(rig: Rig) -> bytes:
     """
     text = ""
     for i, (camera, name) in enumerate(zip(rig, names_of(rig), strict=True)):
+        no_skew(camera, "anipose")
         values = {
             "name": name,
             "size": [int(n) for n in camera.size_px],

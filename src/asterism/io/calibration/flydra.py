@@ -79,6 +79,7 @@ def read(path: Path, units: str | None) -> Rig:
     centers = [_center(file, P) for file, P in zip(matrices.values(), projections, strict=True)]
     scale = per_metre(units, centers, warnings)
     cameras: list[Camera] = []
+    guessed: dict[tuple[int, int], list[str]] = {}
     for i, (number, P) in enumerate(zip(matrices, projections, strict=True)):
         file, lens, K_lens = matrices[number], None, None
         if number in lenses:
@@ -89,10 +90,7 @@ def read(path: Path, units: str | None) -> Rig:
             # The toolbox puts the centre of the lens at the centre of the image.
             width, height = (float(np.round(2 * c + 1)) for c in K_lens[:2, 2])
             size = whole_size(lenses[number], "K13 and K23", width, height)
-            warnings.append(
-                f"{names[i]}: no {_SIZES} tells the size of the image: {size[0]} × {size[1]} "
-                f"pixels, for the lens is centred at ({K_lens[0, 2]:g}, {K_lens[1, 2]:g})"
-            )
+            guessed.setdefault(size, []).append(names[i])
         else:
             hint = f"add {_SIZES}, a line with width and height for each camera"
             raise FormatError(path, f"camera {number}", "the size of its image", "nothing", hint)
@@ -101,6 +99,12 @@ def read(path: Path, units: str | None) -> Rig:
                 P * [scale, scale, scale, 1.0], size_px=size, name=names[i], lens=lens,
                 K_lens=None if lens is None else K_lens,
             ))  # fmt: skip
+    for (width, height), whose in guessed.items():
+        center = f"({(width - 1) / 2:g}, {(height - 1) / 2:g})"
+        warnings.append(
+            f"no {_SIZES} tells the size of the images: {width} × {height} pixels for "
+            f"{', '.join(whose)}, whose lenses are centred at {center}"
+        )
     return build_rig(path, cameras, warnings)
 
 

@@ -40,6 +40,8 @@ class Calibration:
         Whether a folder looks like this format; None where it never is one.
     unit : {"mm", "m"} or None
         The unit that all its files have; None where they do not say, or not all the same.
+    has_skew, has_k3 : bool
+        Whether it can hold a K with skew, and a `BrownConrady` lens with k3.
     """
 
     name: str
@@ -51,6 +53,8 @@ class Calibration:
     sniff: Callable[[bytes], bool] | None = None
     sniff_folder: Callable[[Path], bool] | None = None
     unit: str | None = None
+    has_skew: bool = True
+    has_k3: bool = True
 
 
 CALIBRATIONS: dict[str, Calibration] = {
@@ -74,6 +78,7 @@ CALIBRATIONS: dict[str, Calibration] = {
             read=anipose.read,
             write=anipose.write,
             sniff=anipose.sniff,
+            has_skew=False,
         ),
         Calibration(
             name="opencv",
@@ -83,6 +88,7 @@ CALIBRATIONS: dict[str, Calibration] = {
             read=opencv.read,
             write=opencv.write,
             sniff=opencv.sniff,
+            has_skew=False,
         ),
         Calibration(
             name="qca",
@@ -93,6 +99,7 @@ CALIBRATIONS: dict[str, Calibration] = {
             write=qca.write,
             sniff=qca.sniff,
             unit="mm",
+            has_skew=False,
         ),
         Calibration(
             name="xcp",
@@ -103,6 +110,7 @@ CALIBRATIONS: dict[str, Calibration] = {
             write=xcp.write,
             sniff=xcp.sniff,
             unit="mm",
+            has_skew=False,
         ),
         Calibration(
             name="flydra",
@@ -112,6 +120,8 @@ CALIBRATIONS: dict[str, Calibration] = {
             read=flydra.read,
             write=flydra.write,
             sniff_folder=flydra.sniff_folder,
+            has_skew=False,  # beside a lens
+            has_k3=False,
         ),
         Calibration(
             name="myptv",

@@ -54,7 +54,7 @@ def no_skew(camera: Camera, format: str) -> None:
     """Raise if the image axes are not at right angles, for a format that has no number for it."""
     if camera.K[0, 1] != 0:
         raise ParameterError(
-            f"K of camera {camera.name!r}", f"no skew, which {format} cannot hold",
+            f"K of camera {camera.name!r}", f"no skew, for which {format} has no place",
             f"{camera.K[0, 1]:g}",
         )  # fmt: skip
 

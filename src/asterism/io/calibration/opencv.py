@@ -11,11 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from asterism.camera import BrownConrady
 from asterism.errors import FormatError
-from asterism.io.calibration.limits import brown_coefficients, names_of
+from asterism.io.calibration.limits import brown_coefficients, names_of, no_skew
 from asterism.io.calibration.parts import (
     as_array,
     build_camera,
     build_rig,
+    drop_skew,
     nearest_rotation,
     per_metre,
     pose,
@@ -87,10 +88,12 @@ def read(path: Path, units: str | None) -> Rig:
     if units is None and isinstance(flat.get("units"), str):
         units = parse_unit(flat["units"])
     if _pick(flat, _K) is not None:
-        found = [_camera(path, path.stem, flat)]
+        found = [_camera(path, path.stem, flat, warnings)]
     else:
         tables = {key: _plain_keys(v) for key, v in content.items() if isinstance(v, dict)}
-        found = [_camera(path, k, v) for k, v in tables.items() if _pick(v, _K) is not None]
+        found = [
+            _camera(path, k, v, warnings) for k, v in tables.items() if _pick(v, _K) is not None
+        ]
     if not found:
         expected = "a camera_matrix, at the top or within named mappings"
         raise FormatError(path, "its entries", expected, ", ".join(map(str, content))[:60])
@@ -170,7 +173,7 @@ def _word(value: Any) -> str | None:
     return value if isinstance(value, str) else None
 
 
-def _camera(path: Path, key: str, entry: dict[str, Any]) -> dict[str, Any]:
+def _camera(path: Path, key: str, entry: dict[str, Any], warnings: list[str]) -> dict[str, Any]:
     name = _word(_pick(entry, _NAME)) or key
     place = f"camera {name}"
     model = str(_pick(entry, _MODEL) or "").lower()
@@ -201,7 +204,8 @@ def _camera(path: Path, key: str, entry: dict[str, Any]) -> dict[str, Any]:
         if t.size != 3:
             raise FormatError(path, f"{place}, translation", "3 numbers", f"{t.size}")
     return {
-        "place": place, "name": name, "size": _size(path, place, entry), "K": K.reshape(3, 3),
+        "place": place, "name": name, "size": _size(path, place, entry),
+        "K": drop_skew(place, K.reshape(3, 3), warnings),
         "lens": BrownConrady(*k.tolist()) if k.any() else None, "R": R, "t": t,
     }  # fmt: skip
 
@@ -236,7 +240,7 @@ def write(rig: Rig) -> bytes:
     Parameters
     ----------
     rig : Rig
-        With lenses in the manner of OpenCV.
+        With lenses in the manner of OpenCV, and no skew.
 
     Returns
     -------
@@ -245,6 +249,7 @@ def write(rig: Rig) -> bytes:
     """
     lines = ["%YAML:1.0", "---", 'units: "metres"']
     for i, (camera, name) in enumerate(zip(rig, names_of(rig), strict=True)):
+        no_skew(camera, "opencv")
         quoted = name.replace("\\", "\\\\").replace('"', '\\"')
         lines += [f"camera_{i}:", f'   name: "{quoted}"']
         for key, pixels in zip(("image_width", "image_height"), camera.size_px, strict=True):

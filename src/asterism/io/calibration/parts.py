@@ -27,6 +27,7 @@ __all__ = [
     "as_array",
     "build_camera",
     "build_rig",
+    "drop_skew",
     "faults_at",
     "nearest_rotation",
     "per_metre",
@@ -206,6 +207,29 @@ def nearest_rotation(
         return matrix
     left, _, right = np.linalg.svd(matrix)
     return left @ right
+
+
+def drop_skew(place: str, K: NDArray[np.float64], warnings: list[str]) -> NDArray[np.float64]:
+    """Take the skew out of a matrix of OpenCV's, which itself never looks at it.
+
+    Parameters
+    ----------
+    place : str
+        For the warning.
+    K : ndarray, shape (3, 3)
+        As the file has it.
+    warnings : list of str
+        Told where there was one.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+    """
+    if K[0, 1] != 0:
+        warnings.append(f"{place}: the skew {K[0, 1]:g} is left out, as OpenCV leaves it out")
+        K = K.copy()
+        K[0, 1] = 0.0
+    return K
 
 
 def pose(R: NDArray[np.float64], t: Iterable[float]) -> NDArray[np.float64]:
