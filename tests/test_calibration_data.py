@@ -83,9 +83,8 @@ def test_a_laboratory_is_above_its_floor_and_no_mirror_of_itself(path, n, height
         z = np.array([0, 0, 0.1])
         places = np.stack([meeting, meeting + z, meeting + np.cross(camera.axis, z)])
         here, up, right = camera.project(places).pixels
-        if path == QUALISYS:  # some of the others hang upside down
+        if path == QUALISYS:  # two of the others hang upside down
             assert up[1] < here[1] - 10  # v runs down
-            assert abs(up[0] - here[0]) < 0.1 * abs(up[1] - here[1])
         # However a camera is turned, right and up are in the order of no mirror.
         (a, b), (c, d) = right - here, up - here
         assert a * d - b * c < -100

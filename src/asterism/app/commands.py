@@ -12,6 +12,7 @@ from asterism.app.corrupt import corrupt
 from asterism.app.demo import demo
 from asterism.app.estimate import estimate
 from asterism.app.evaluate import evaluate
+from asterism.app.film import film
 from asterism.app.info import info
 from asterism.app.methods import methods, scenes
 from asterism.app.simulate import simulate
@@ -46,6 +47,6 @@ def _root(  # pyright: ignore[reportUnusedFunction]
     del version
 
 
-for _command in (track, evaluate, info, estimate, methods, corrupt, simulate, scenes, demo):
+for _command in (track, evaluate, info, estimate, methods, corrupt, simulate, scenes, film, demo):
     app.command()(_command)
 app.add_typer(camera)
