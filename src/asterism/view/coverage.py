@@ -85,8 +85,7 @@ def plot_coverage(
         if known.size:
             label = f"error [mm] at {coverage.sigma_px:g} px of noise"
             draw_bar(axes, drawn, label, ticks=np.geomspace(bottom, top, _N_TICKS), extend="max")
-        middle = f"median error {np.median(known):.3g} mm" if known.size else "no error known"
-        told = f"{middle}, of {100 * known.size / n.size:.3g} % of the cells"
+        told = f"median error {np.median(known):.3g} mm" if known.size else "no error known"
     _hatch(axes, edges, n < 2)
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlabel("x [m]", color=INK)
