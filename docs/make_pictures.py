@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import asterism as am
+from asterism.view import plot_coverage, plot_image, plot_lens, plot_rig
 
 
 def crossing(path: Path) -> None:
@@ -36,7 +37,98 @@ def crossing(path: Path) -> None:
     figure.savefig(path)
 
 
+# A person in the middle of a step towards +x: metres, left is +y.
+_BODY = {
+    "forehead": (0.10, 0.00, 1.68), "back of head": (-0.09, 0.00, 1.66), "neck": (0.00, 0.00, 1.48),
+    "left shoulder": (0.00, 0.19, 1.42), "left elbow": (-0.14, 0.23, 1.14),
+    "left wrist": (-0.06, 0.24, 0.90), "right shoulder": (0.00, -0.19, 1.42),
+    "right elbow": (0.10, -0.23, 1.13), "right wrist": (0.30, -0.22, 0.98),
+    "left hip": (0.00, 0.11, 0.95), "left knee": (0.22, 0.11, 0.55),
+    "left ankle": (0.27, 0.10, 0.10), "left toe": (0.45, 0.11, 0.06),
+    "right hip": (0.00, -0.11, 0.95), "right knee": (-0.06, -0.11, 0.52),
+    "right ankle": (-0.36, -0.10, 0.20), "right toe": (-0.24, -0.11, 0.05),
+}  # fmt: skip
+# Trunk, left and right in the first three colours.
+_LINKS = (
+    (("forehead", "back of head"), ("neck", "forehead"), ("neck", "back of head")),
+    (
+        ("neck", "left shoulder"), ("left shoulder", "left elbow"), ("left elbow", "left wrist"),
+        ("left shoulder", "left hip"), ("left hip", "right hip"), ("left hip", "left knee"),
+        ("left knee", "left ankle"), ("left ankle", "left toe"),
+    ),
+    (
+        ("neck", "right shoulder"), ("right shoulder", "right elbow"),
+        ("right elbow", "right wrist"), ("right shoulder", "right hip"),
+        ("right hip", "right knee"), ("right knee", "right ankle"), ("right ankle", "right toe"),
+    ),
+)  # fmt: skip
+_WALL = am.Polygon(
+    corners=[[0.7, -0.93, 0.0], [0.7, -0.93, 0.85], [-0.85, -0.93, 0.85], [-0.85, -0.93, 0.0]],
+    name="low wall",
+)
+
+
+def _person() -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    """Give the markers, shape (K, 3), and their connection matrix."""
+    names = list(_BODY)
+    connections = np.zeros((len(names), len(names)), dtype=int)
+    for colour, links in enumerate(_LINKS, 1):
+        for a, b in links:
+            i, j = names.index(a), names.index(b)
+            connections[i, j] = connections[j, i] = colour
+    return np.array(list(_BODY.values())), connections
+
+
+def lenses(path: Path) -> None:
+    """Draw a square grid through the two kinds of radial distortion."""
+    K = am.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
+    figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
+    kinds = (("barrel", 0.3), ("pincushion", -0.12))
+    for axes, (name, a1) in zip(figure.subplots(1, 2), kinds, strict=True):
+        camera = am.Camera.look_at(
+            (0, -4, 1), (0, 0, 1), K=K, size_px=(1280, 1024), lens=am.ReportRadial(a1=a1)
+        )
+        plot_lens(camera, ax=axes)
+        axes.set_title(f"{name}: a₁ = {a1:g}", fontsize=11, loc="left")
+    figure.savefig(path)
+
+
+def film(path: Path) -> None:
+    """Draw a person in two cameras, one of which looks over a low wall."""
+    points, connections = _person()
+    figure = Figure(figsize=(11, 4.9), dpi=110, layout="constrained")
+    K = am.intrinsics(focal_length=1500, principal_point=(639.5, 511.5))
+    places = (("in front", (3.0, 1.6, 1.5)), ("behind the wall", (0.9, -3.2, 1.3)))
+    for axes, (name, place) in zip(figure.subplots(1, 2), places, strict=True):
+        camera = am.Camera.look_at(
+            place, (0, 0, 0.85), K=K, size_px=(1280, 1024), name=name,
+            lens=am.BrownConrady(k1=-0.2),
+        )  # fmt: skip
+        seen = camera.project(points, [_WALL])
+        plot_image(
+            camera, seen, connections=connections, colours="#333333", surfaces=[_WALL], ax=axes
+        )
+    figure.savefig(path)
+
+
+def rig(path: Path) -> None:
+    """Draw eight cameras about a person and a wall, and what the wall takes from their sight."""
+    points, _ = _person()
+    cameras = am.Rig.ring(8, radius=3.2, height=2.0, target=(0, 0, 0.8))
+    figure = Figure(figsize=(12, 4.9), dpi=110)
+    # 3-D axes leave wide margins, which are let run out of their half.
+    solid = figure.add_axes((-0.05, -0.1, 0.58, 1.2), projection="3d")
+    plot_rig(cameras, points=points, surfaces=[_WALL], ax=solid)
+    solid.set_title("")
+    level = am.volume_grid((-3, -3, 0.4), (3, 3, 0.4), 0.06)
+    flat = figure.add_axes((0.61, 0.11, 0.36, 0.8))
+    plot_coverage(cameras.coverage(level, [_WALL]), ax=flat)
+    flat.set_title("how many cameras see a place 0.4 m above the ground", fontsize=11, loc="left")
+    figure.savefig(path)
+
+
 if __name__ == "__main__":
     images = Path(__file__).parent / "images"
     images.mkdir(exist_ok=True)
-    crossing(images / "crossing.png")
+    for picture in (crossing, lenses, film, rig):
+        picture(images / f"{picture.__name__}.png")

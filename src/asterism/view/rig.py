@@ -24,7 +24,7 @@ __all__ = ["plot_rig"]
 
 _SIDE = 8  # pieces of a side of the image, which a lens bends
 _LEAST = 0.3  # cosine to the axis: rays far from it would end anywhere
-_MANY = 5000  # dots beyond which a vector file holds them as one image
+_FEW, _MANY = 200, 5000  # dots that are drawn larger; beyond which a vector file has an image
 
 
 def plot_rig(
@@ -81,7 +81,7 @@ def plot_rig(
     axes.scatter(*places.T, s=9, c=INK, linewidths=0, depthshade=False)
     if len(dots):
         axes.scatter(
-            *dots.T, s=4, c=CYCLE[5], linewidths=0, depthshade=False,
+            *dots.T, s=4 if len(dots) > _FEW else 10, c=CYCLE[5], linewidths=0, depthshade=False,
             rasterized=len(dots) > _MANY,
         )  # fmt: skip
     for line in lines:
