@@ -124,9 +124,10 @@ nb::tuple give_image(const RayGrid& grid, const auto& draw) {
   Owned<std::int32_t> owner(w * h);
   {
     nb::gil_scoped_release release;
-    std::fill_n(depth.data.get(), w * h, Box::kInf);
-    std::fill_n(owner.data.get(), w * h, -1);
-    draw(DepthImage{{depth.data.get(), w * h}, {owner.data.get(), w * h}});
+    const DepthImage image{{depth.data.get(), w * h}, {owner.data.get(), w * h}};
+    image.begin();
+    draw(image);
+    image.end();
   }
   return nb::make_tuple(depth.give({h, w}), owner.give({h, w}));
 }

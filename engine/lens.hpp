@@ -144,28 +144,25 @@ class Lens {
       }
       return;
     }
-    // The table's guess and one Newton step reach the last digit nearly everywhere; where the
-    // step was not small, the slow way is taken.
-    const double k1 = k_[0], k2 = k_[1], k3 = k_[2], to_cell = to_cell_, cells = n_cells_;
-    for (std::size_t i = 0, n = x.size(); i < n; ++i) {
-      const double q = x[i] * x[i] + y[i] * y[i], at = q * to_cell;
-      double w;
-      if (at < cells) {
-        const auto j = static_cast<std::size_t>(at);
-        const double f = at - static_cast<double>(j);
-        const double* const c = table_.data() + 4 * j;
-        w = c[0] + f * (c[1] + f * (c[2] + f * c[3]));
-        const double u = q * w * w;
-        const double g = 1 + u * (k1 + u * (k2 + u * k3));
-        const double h = 1 + u * (3 * k1 + u * (5 * k2 + u * 7 * k3));
-        const double step = (w * g - 1) / h;
-        w -= step;
-        if (!(std::abs(step) < 1e-9)) w = solve_factor(q);
-      } else {
-        w = solve_factor(q);
-      }
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const double w = factor(x[i] * x[i] + y[i] * y[i]);
       x[i] *= w, y[i] *= w;
     }
+  }
+
+  // As `solve_factor`, fast: the table's guess and one Newton step reach the last digit nearly
+  // everywhere; where the step was not small, the slow way is taken.
+  double factor(double q) const {
+    const double at = q * to_cell_;
+    if (!(at < n_cells_)) return solve_factor(q);
+    const auto j = static_cast<std::size_t>(at);
+    const double f = at - static_cast<double>(j);
+    const double* const c = table_.data() + 4 * j;
+    const double w = c[0] + f * (c[1] + f * (c[2] + f * c[3]));
+    const double u = q * w * w;
+    const double h = 1 + u * (3 * k_[0] + u * (5 * k_[1] + u * 7 * k_[2]));
+    const double step = (w * stretch(u) - 1) / h;
+    return std::abs(step) < 1e-9 ? w - step : solve_factor(q);
   }
 
   // r / s with r (1 + k1 r^2 + ...) = s = sqrt(q) and r in the domain; NaN if there is none.
@@ -196,36 +193,34 @@ class Lens {
     if (!std::isfinite(b.x) || !std::isfinite(b.y)) return {kNaN, kNaN};
     Plane a{0, 0};
     if (kind_ == Kind::radial) {
-      const double w = solve_factor(b.x * b.x + b.y * b.y);
+      const double w = factor(b.x * b.x + b.y * b.y);
       if (std::isfinite(w)) a = {b.x * w, b.y * w};
       if (!reaches(a)) a = start_;
     } else {
       a = reaches(b) ? b : start_;
     }
-    auto residual = [&](Plane c) {
-      const Plane m = map(c);
-      return Plane{m.x - b.x, m.y - b.y};
-    };
-    Plane r = residual(a);
-    double size = std::hypot(r.x, r.y);
-    const double enough = 4e-16 * (std::abs(b.x) + std::abs(b.y));
+    Plane r = minus(map(a), b);
+    double size = squared(r);
+    const double scale = squared(b), enough = 1e-31 * scale;
     for (int i = 0; i < 100 && size > enough; ++i) {
       const Plane step = slope(a).solve(r);
       double part = 1;
       for (; part > 1e-12; part *= 0.5) {
         const Plane c{a.x - part * step.x, a.y - part * step.y};
         if (!reaches(c)) continue;
-        const Plane rc = residual(c);
-        const double sc = std::hypot(rc.x, rc.y);
-        if (sc < size) {
-          a = c, r = rc, size = sc;
+        const Plane rc = minus(map(c), b);
+        if (squared(rc) < size) {
+          a = c, r = rc, size = squared(rc);
           break;
         }
       }
       if (part <= 1e-12) break;  // at rounding, or against the edge of the domain
     }
-    return size <= 1e-12 * (1e-3 + std::abs(b.x) + std::abs(b.y)) ? a : Plane{kNaN, kNaN};
+    return size <= 1e-24 * (1e-6 + scale) ? a : Plane{kNaN, kNaN};
   }
+
+  static Plane minus(Plane a, Plane b) { return {a.x - b.x, a.y - b.y}; }
+  static double squared(Plane a) { return a.x * a.x + a.y * a.y; }
 
   // The factor r / s as a smooth function of q = s^2, in cubic pieces with the right slopes.
   void make_table(double q_table) {

@@ -14,6 +14,21 @@ namespace asterism {
 struct DepthImage {
   std::span<double> depth;        // row by row, infinity where nothing is seen
   std::span<std::int32_t> owner;  // -1 where nothing is seen
+
+  // While surfaces are drawn `depth` holds its inverse, which is linear in the image: no division.
+  void begin() const {
+    std::fill(depth.begin(), depth.end(), 0.0);
+    std::fill(owner.begin(), owner.end(), -1);
+  }
+  void end() const {
+    for (double& d : depth) d = 1 / d;
+  }
+  void see(std::size_t i, double inverse, std::int32_t who) const {
+    if (inverse > depth[i] || (inverse == depth[i] && who < owner[i])) put(i, inverse, who);
+  }
+  void put(std::size_t i, double inverse, std::int32_t who) const {
+    depth[i] = inverse, owner[i] = who;
+  }
 };
 
 class RayGrid {
@@ -36,7 +51,8 @@ class RayGrid {
   std::int32_t width() const { return w_; }
   std::int32_t height() const { return h_; }
 
-  // The nearest surface of every pixel. Triangles and capsules are in camera coordinates.
+  // The nearest surface of every pixel. Triangles and capsules are in camera coordinates; between
+  // `begin` and `end` of the image.
   void draw_nearest(std::span<const Triangle> triangles, std::span<const Capsule> capsules,
                     DepthImage image) const {
     for (const Triangle& t : triangles) draw<true>(t, image);
@@ -123,9 +139,10 @@ class RayGrid {
   void draw(const Triangle& t, DepthImage image) const {
     const Vec3 a = t.a, b = t.b, e = t.e;
     if (a.z <= 0 && b.z <= 0 && e.z <= 0) return;
-    const Vec3 n = cross(b - a, e - a);
-    const double volume = dot(a, n);
+    const Vec3 normal = cross(b - a, e - a);
+    const double volume = dot(a, normal);
     if (volume == 0) return;  // seen edge on
+    const Vec3 n = (1 / volume) * normal;  // n . (x, y, 1) is the inverse depth of the plane
     const double sign = volume > 0 ? 1 : -1;
     const Vec3 U = sign * cross(b, e), V = sign * cross(e, a), W = sign * cross(a, b);
     Extent extent{-Box::kInf, Box::kInf, -Box::kInf, Box::kInf};
@@ -143,17 +160,19 @@ class RayGrid {
     auto row = [&](std::size_t at, std::int32_t count) {
       const double* const x = x_.data() + at;
       const double* const y = y_.data() + at;
-      double* const depth = image.depth.data() + at;
-      std::int32_t* const owner = image.owner.data() + at;
+      // In two passes, the first without a branch: most pixels of most tiles are not inside.
+      std::array<double, kTile> least;
       for (std::int32_t i = 0; i < count; ++i) {
         const double u = x[i] * U.x + y[i] * U.y + U.z, v = x[i] * V.x + y[i] * V.y + V.z;
-        const double w = x[i] * W.x + y[i] * W.y + W.z;
-        const double along = x[i] * n.x + y[i] * n.y + n.z;
-        if (!(u >= 0 && v >= 0 && w >= 0) || along == 0) continue;
-        const double s = volume / along;
-        if (!(s > 0)) continue;
-        if (!kIsTested || s < depth[i] || (s == depth[i] && t.owner < owner[i]))
-          depth[i] = s, owner[i] = t.owner;
+        const double w = x[i] * W.x + y[i] * W.y + W.z, uv = u < v ? u : v;
+        least[static_cast<std::size_t>(i)] = uv < w ? uv : w;
+      }
+      for (std::int32_t i = 0; i < count; ++i) {
+        if (!(least[static_cast<std::size_t>(i)] >= 0)) continue;
+        const double inverse = x[i] * n.x + y[i] * n.y + n.z;
+        if (!(inverse > 0)) continue;
+        const std::size_t k = at + static_cast<std::size_t>(i);
+        kIsTested ? image.see(k, inverse, t.owner) : image.put(k, inverse, t.owner);
       }
     };
     visit(levels_.size() - 1, 0, 0, may_meet, row);
@@ -164,9 +183,7 @@ class RayGrid {
     auto row = [&](std::size_t at, std::int32_t count) {
       for (std::size_t i = at; i < at + static_cast<std::size_t>(count); ++i) {
         if (!std::isfinite(x_[i])) continue;
-        const double s = k.meet_seen(k.a, k.b, {x_[i], y_[i], 1});
-        if (s < image.depth[i] || (s == image.depth[i] && k.owner < image.owner[i]))
-          image.depth[i] = s, image.owner[i] = k.owner;
+        image.see(i, 1 / k.meet_seen(k.a, k.b, {x_[i], y_[i], 1}), k.owner);
       }
     };
     visit(levels_.size() - 1, 0, 0, [&](const Extent& x) { return extent.meets(x); }, row);

@@ -1,16 +1,16 @@
 // Surfaces that hide points: triangles and capsules, and a tree of boxes over them.
 //
 //   c, d      a ray c + s d; d leads from the camera to the point in question, so s = 1 there
-//   a, b, e   corners of a triangle as seen from c
 //   s         where the ray meets a surface
-//
-// A triangle is met if d lies on one side of the three planes through c and its edges. An edge
-// that two triangles share gives both the same number with opposite signs, so no ray slips through.
+//   a, b, e   corners of a triangle
+//   u, v, w   on which side of its edges the ray passes
 #pragma once
 
+#include <bit>
 #include <numeric>
 
 #include "camera.hpp"
+#include "float4.hpp"
 
 namespace asterism {
 
@@ -23,21 +23,56 @@ struct Hit {
   }
 };
 
+// A ray, and coordinates in which it is an axis: (x - Sx z, y - Sy z) with z the longest component
+// of its direction, relative to its origin.
+struct Ray {
+  Vec3 c, d;
+  std::int32_t axis;
+  double Sx, Sy, Sz;
+
+  Ray(Vec3 origin, Vec3 direction) : c(origin), d(direction) {
+    const double x = std::abs(d.x), y = std::abs(d.y), z = std::abs(d.z);
+    axis = x >= y && x >= z ? 0 : y >= z ? 1 : 2;
+    const Vec3 turned = axis == 0 ? turn<0>(d) : axis == 1 ? turn<1>(d) : turn<2>(d);
+    Sx = turned.x / turned.z, Sy = turned.y / turned.z, Sz = 1 / turned.z;
+  }
+  template <int kAxis>
+  static Vec3 turn(Vec3 p) {
+    if constexpr (kAxis == 0) return {p.y, p.z, p.x};
+    if constexpr (kAxis == 1) return {p.z, p.x, p.y};
+    return p;
+  }
+  template <int kAxis>
+  Vec3 place(Vec3 p) const {
+    const Vec3 q = turn<kAxis>(p - c);
+    return {q.x - Sx * q.z, q.y - Sy * q.z, q.z};
+  }
+};
+
 struct Triangle {
   Vec3 a, b, e;
   std::int32_t owner;
 
-  // Where the ray meets the triangle, infinity if it does not.
-  double meet(Vec3 c, Vec3 d) const { return meet_seen(a - c, b - c, e - c, d); }
+  // Where the ray meets the triangle, infinity if it does not. What two triangles say of a corner
+  // or an edge that they share rests on the same numbers, so no ray slips through a seam (S. Woop,
+  // C. Benthin, I. Wald, Watertight ray/triangle intersection, JCGT 2, 2013).
+  double meet(const Ray& ray) const {
+    return ray.axis == 0 ? meet<0>(ray) : ray.axis == 1 ? meet<1>(ray) : meet<2>(ray);
+  }
 
-  static double meet_seen(Vec3 a, Vec3 b, Vec3 e, Vec3 d) {
-    const Vec3 n = cross(b - a, e - a);
-    const double u = dot(d, cross(b, e)), v = dot(d, cross(e, a)), w = dot(d, cross(a, b));
+ private:
+  template <int kAxis>
+  double meet(const Ray& ray) const {
+    constexpr double kNo = std::numeric_limits<double>::infinity();
+    const Vec3 p = ray.place<kAxis>(a), q = ray.place<kAxis>(b), r = ray.place<kAxis>(e);
+    const double u = r.x * q.y - r.y * q.x, v = p.x * r.y - p.y * r.x;
+    if ((u > 0 && v < 0) || (u < 0 && v > 0)) return kNo;
+    const double w = q.x * p.y - q.y * p.x;
     const bool is_inside = (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
-    const double along = dot(d, n);
-    if (!is_inside || along == 0) return std::numeric_limits<double>::infinity();  // or edge on
-    const double s = dot(a, n) / along;
-    return s > 0 ? s : std::numeric_limits<double>::infinity();
+    const double all = u + v + w;
+    if (!is_inside || all == 0) return kNo;  // beside it, or edge on
+    const double s = ray.Sz * (u * p.z + v * q.z + w * r.z) / all;
+    return s > 0 ? s : kNo;
   }
 };
 
@@ -47,7 +82,7 @@ struct Capsule {
   std::int32_t owner;
 
   // The nearest crossing of its skin in front of the camera.
-  double meet(Vec3 c, Vec3 d) const { return meet_seen(a - c, b - c, d); }
+  double meet(const Ray& ray) const { return meet_seen(a - ray.c, b - ray.c, ray.d); }
 
   double meet_seen(Vec3 p, Vec3 q, Vec3 d) const {
     const Vec3 axis = q - p;
@@ -103,108 +138,163 @@ class Scene {
     std::iota(order_.begin(), order_.end(), 0);
     boxes_.resize(size());
     for (std::size_t i = 0; i < triangles.size(); ++i) {
-      Box b;
-      b.add(triangles[i].a), b.add(triangles[i].b), b.add(triangles[i].e);
-      boxes_[i] = b;
+      boxes_[i] = {};
+      for (const Vec3 p : {triangles[i].a, triangles[i].b, triangles[i].e}) boxes_[i].add(p);
     }
     for (std::size_t i = 0; i < capsules.size(); ++i) {
       const Capsule& k = capsules[i];
       const Vec3 r{k.r, k.r, k.r};
-      Box b;
-      b.add(k.a - r), b.add(k.a + r), b.add(k.b - r), b.add(k.b + r);
-      boxes_[triangles.size() + i] = b;
+      Box& box = boxes_[triangles.size() + i] = {};
+      for (const Vec3 p : {k.a - r, k.a + r, k.b - r, k.b + r}) box.add(p);
     }
+    Box all;
+    for (const Box& box : boxes_) all.add(box);
+    middle_ = all.middle();
+    radius_ = 0.5 * std::sqrt(dot(all.high - all.low, all.high - all.low));
     nodes_.clear();
-    if (size() > 0) split(0, static_cast<std::int32_t>(size()));
+    if (size() > 0) grow(0, size());
   }
 
   // The first surface on the way from `c` to c + s d, for s below `until`.
   Hit first_hit(Vec3 c, Vec3 d, double until) const {
-    Hit hit;
-    hit.s = until;
-    if (nodes_.empty()) return Hit{};
-    // A ray within a face of a box: 0 times something huge bounds rightly, 0 times infinity not.
-    auto inverted = [](double x) { return 1 / (x == 0 ? 1e-300 : x); };
-    const Vec3 inverse{inverted(d.x), inverted(d.y), inverted(d.z)};
-    std::array<std::int32_t, 64> stack;
+    if (nodes_.empty()) return {};
+    Hit hit{until, -1};
+    const Ray ray(c, d);
+    const Feeler feeler(c - middle_, d, radius_);
+    struct Visit {
+      std::int32_t node;
+      float from;
+    };
+    // A node leaves three children behind at most, and the tree is a quarter as deep as its size
+    // has bits.
+    std::array<Visit, 128> stack;
     std::size_t top = 0;
-    stack[top++] = 0;
+    stack[top++] = {0, 0};
     while (top > 0) {
-      const std::int32_t at = stack[--top];
-      const Node& node = nodes_[static_cast<std::size_t>(at)];
-      if (!enters(node.box, c, inverse, hit.s)) continue;
-      if (node.n == 0) {
-        const std::int32_t near = at + 1, far = node.first;
-        const bool is_swapped = component(d, node.axis) < 0;
-        stack[top++] = is_swapped ? near : far;
-        stack[top++] = is_swapped ? far : near;
-        continue;
+      const Visit at = stack[--top];
+      if (at.from > feeler.reach(hit.s)) continue;
+      const Node& node = nodes_[static_cast<std::size_t>(at.node)];
+      Float4 from;
+      const std::size_t first = top;
+      for (unsigned met = feeler.enters(node, hit.s, from); met != 0; met &= met - 1) {
+        const auto k = static_cast<std::size_t>(std::countr_zero(met));
+        for (std::int32_t i = 0; i < node.n[k]; ++i)
+          test(order_[static_cast<std::size_t>(node.first[k] + i)], ray, hit);
+        if (node.n[k] > 0) continue;
+        // The nearest child on top.
+        std::size_t place = top++;
+        for (; place > first && stack[place - 1].from < from[k]; --place)
+          stack[place] = stack[place - 1];
+        stack[place] = {node.first[k], from[k]};
       }
-      for (std::int32_t k = 0; k < node.n; ++k)
-        test(order_[static_cast<std::size_t>(node.first + k)], c, d, hit);
     }
     return hit.owner < 0 ? Hit{} : hit;
   }
 
  private:
+  // Four boxes, side by side, so that a ray is tried against all at once. In single precision,
+  // relative to the middle of the scene; a margin beyond the rounding costs a test now and then,
+  // and never a hit.
   struct Node {
-    Box box;
-    std::int32_t first;  // of its surfaces, or its second child: the first one follows it
-    std::int32_t n;      // of surfaces, 0 for a node with children
-    std::int32_t axis;
+    std::array<std::array<Float4, 3>, 2> bound;  // low and high, axis; four boxes
+    std::array<std::int32_t, 4> first;  // of its surfaces, or the node below
+    std::array<std::int32_t, 4> n;      // of surfaces, 0 for a node below, -1 for nothing
   };
 
-  static double component(Vec3 p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
+  // A ray as the boxes see it.
+  struct Feeler {
+    std::array<float, 3> c, inverse;
+    std::array<std::size_t, 3> is_backward;
+    float margin;
 
-  void test(std::int32_t i, Vec3 c, Vec3 d, Hit& hit) const {
+    // `origin` relative to the middle of a scene of a certain radius.
+    Feeler(Vec3 origin, Vec3 d, double radius)
+        : c{as_float(origin.x), as_float(origin.y), as_float(origin.z)},
+          margin(as_float(1e-6 * (1 + (radius + std::sqrt(dot(origin, origin))) / std::sqrt(dot(d, d))))) {
+      // Not infinite, since 0 times infinity would refuse what lies in a face of the box.
+      auto inverted = [](double x) { return as_float(1 / (std::abs(x) < 1e-30 ? 1e-30 : x)); };
+      inverse = {inverted(d.x), inverted(d.y), inverted(d.z)};
+      for (std::size_t k = 0; k < 3; ++k) is_backward[k] = inverse[k] < 0;
+    }
+    static float as_float(double x) { return static_cast<float>(x); }
+    float reach(double s) const { return as_float(std::min(s, 1e30)) * (1 + 1e-6F) + margin; }
+
+    // Where the ray enters each box; a bit of the result is set if before it leaves it.
+    unsigned enters(const Node& node, double until, Float4& from) const {
+      Float4 to = filled(reach(until));
+      from = filled(0);
+      for (std::size_t d = 0; d < 3; ++d) {
+        from = greatest(from, (node.bound[is_backward[d]][d] - c[d]) * inverse[d]);
+        to = least(to, (node.bound[1 - is_backward[d]][d] - c[d]) * inverse[d]);
+      }
+      return bits_not_above(from, to * (1 + 1e-6F) + margin);
+    }
+  };
+
+  static double component(Vec3 p, std::size_t axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }
+
+  void test(std::int32_t i, const Ray& ray, Hit& hit) const {
     const auto n = static_cast<std::int32_t>(triangles.size());
     if (i < n) {
       const Triangle& t = triangles[static_cast<std::size_t>(i)];
-      hit.keep(t.meet(c, d), t.owner);
+      hit.keep(t.meet(ray), t.owner);
     } else {
       const Capsule& k = capsules[static_cast<std::size_t>(i - n)];
-      hit.keep(k.meet(c, d), k.owner);
+      hit.keep(k.meet(ray), k.owner);
     }
   }
 
-  // Never refuses a box that the ray touches: the margin outweighs the rounding.
-  static bool enters(const Box& b, Vec3 c, Vec3 inverse, double until) {
-    double from = 0, to = until;
-    for (int k = 0; k < 3; ++k) {
-      const double o = component(c, k), i = component(inverse, k);
-      const double s = (component(b.low, k) - o) * i, t = (component(b.high, k) - o) * i;
-      from = std::max(from, std::min(s, t)), to = std::min(to, std::max(s, t));
-    }
-    return from <= to + 1e-12 * (1 + std::abs(to));
+  const Box& box_of(std::size_t place) const {
+    return boxes_[static_cast<std::size_t>(order_[place])];
   }
 
-  // Halves by the median of the longest axis of the middles; at most four surfaces in a leaf.
-  std::int32_t split(std::int32_t first, std::int32_t last) {
-    const auto at = static_cast<std::int32_t>(nodes_.size());
-    Box box, middles;
-    for (std::int32_t k = first; k < last; ++k) {
-      const Box& b = boxes_[static_cast<std::size_t>(order_[static_cast<std::size_t>(k)])];
-      box.add(b), middles.add(b.middle());
-    }
-    nodes_.push_back({box, first, last - first, 0});
-    if (last - first <= 4) return at;
+  // Puts the lower half along the longest axis of the middles first; where the halves meet.
+  std::size_t halve(std::size_t first, std::size_t last) {
+    Box middles;
+    for (std::size_t k = first; k < last; ++k) middles.add(box_of(k).middle());
     const Vec3 size = middles.high - middles.low;
-    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    const std::int32_t half = (first + last) / 2;
-    std::nth_element(order_.begin() + first, order_.begin() + half, order_.begin() + last,
-                     [&](std::int32_t i, std::int32_t j) {
-                       const double a = component(boxes_[static_cast<std::size_t>(i)].middle(), axis);
-                       const double b = component(boxes_[static_cast<std::size_t>(j)].middle(), axis);
-                       return a < b || (a == b && i < j);
-                     });
-    split(first, half);
-    const std::int32_t second = split(half, last);
-    nodes_[static_cast<std::size_t>(at)].first = second;
-    nodes_[static_cast<std::size_t>(at)].n = 0;
-    nodes_[static_cast<std::size_t>(at)].axis = axis;
-    return at;
+    const std::size_t axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    const std::size_t half = (first + last) / 2;
+    auto at = [&](std::size_t place) { return order_.begin() + static_cast<std::ptrdiff_t>(place); };
+    std::nth_element(at(first), at(half), at(last), [&](std::int32_t i, std::int32_t j) {
+      const double a = component(boxes_[static_cast<std::size_t>(i)].middle(), axis);
+      const double b = component(boxes_[static_cast<std::size_t>(j)].middle(), axis);
+      return a < b || (a == b && i < j);
+    });
+    return half;
   }
 
+  std::int32_t grow(std::size_t first, std::size_t last) {
+    const std::size_t at = nodes_.size();
+    nodes_.emplace_back();
+    std::array<std::size_t, 5> cut{first, last, last, last, last};
+    if (last - first > kLeaf) {
+      const std::size_t half = halve(first, last);
+      cut = {first, half, half, last, last};
+      if (half - first > 1) cut[1] = halve(first, half);
+      if (last - half > 1) cut[3] = halve(half, last);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      Box box;
+      for (std::size_t i = cut[k]; i < cut[k + 1]; ++i) box.add(box_of(i));
+      const std::size_t n = cut[k + 1] - cut[k];
+      const std::int32_t child = n > kLeaf ? grow(cut[k], cut[k + 1]) : static_cast<std::int32_t>(cut[k]);
+      Node& node = nodes_[at];
+      for (std::size_t d = 0; d < 3; ++d) {
+        node.bound[0][d][k] = Feeler::as_float(component(box.low, d) - component(middle_, d));
+        node.bound[1][d][k] = Feeler::as_float(component(box.high, d) - component(middle_, d));
+      }
+      node.first[k] = child;
+      node.n[k] = n == 0 ? -1 : n > kLeaf ? 0 : static_cast<std::int32_t>(n);
+      if (n == 0)  // no ray enters
+        for (std::size_t d = 0; d < 3; ++d) node.bound[0][d][k] = node.bound[1][d][k] = 1e30F;
+    }
+    return static_cast<std::int32_t>(at);
+  }
+
+  static constexpr std::size_t kLeaf = 2;
+  Vec3 middle_{0, 0, 0};
+  double radius_ = 0;
   std::vector<std::int32_t> order_;
   std::vector<Box> boxes_;
   std::vector<Node> nodes_;

@@ -13,7 +13,15 @@ import sys
 import tempfile
 from pathlib import Path
 
-TESTS = ("test_filter.py", "test_posterior.py", "test_solvers.py", "test_methods.py")
+TESTS = (
+    "test_filter.py",
+    "test_posterior.py",
+    "test_solvers.py",
+    "test_methods.py",
+    "test_camera.py",
+    "test_camera_lens.py",
+    "test_surfaces.py",
+)
 LEFT_OUT = "hundred_thousand or memory"
 """Too slow, or measuring memory that the sanitizers inflate."""
 

@@ -14,7 +14,7 @@ from asterism.camera.lens import NO_LENS, QUADRATIC, Lens, QuadraticCorrection
 from asterism.camera.matrices import checked_intrinsics, checked_pose, decomposed, looking_at
 from asterism.camera.painter import Painting, in_painters_order
 from asterism.camera.project import CLEARANCE, as_coordinates, project_points
-from asterism.camera.surfaces import compile_surfaces
+from asterism.camera.surfaces import check_surfaces, compile_surfaces
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -418,6 +418,7 @@ class Camera:
 
 
 def _check_moment(surfaces: Sequence[Surface], moment: int) -> int:
+    check_surfaces(surfaces)
     n = max((s.n_moments for s in surfaces), default=1)
     check_number("moment", moment, above=0, below=max(n - 1, 0), closed=True, integer=True)
     return n

@@ -53,7 +53,9 @@ class Lens(ABC):
         symmetric, this is the largest disc in which both its eigenvalues exceed 0.001.
         """
         k, p = self.coefficients[:3], float(np.hypot(*self.coefficients[3:]))
-        return _end_of_disc(k, p)
+        # What changes nothing within a billion pixels, let alone units, is left out.
+        k = np.where(np.abs(k) * 1e18 ** np.arange(1, 4) < 1e-6, 0.0, k)
+        return _end_of_disc(k, p if p > 1e-15 else 0.0)
 
 
 @dataclass(frozen=True)
@@ -208,26 +210,48 @@ def _end_of_disc(k: NDArray[np.float64], p: float) -> float:
     ends = [_first_root(along), _first_root(across)]
     if p > 0:
 
-        def least_between(r: float) -> float:
-            a, b = np.polyval(along[::-1], r) + 6 * p * r, np.polyval(across[::-1], r) + 2 * p * r
-            if a + 3 * b >= 16 * p * r:
-                return float(a * b)
-            return float(a * b - 4 * (p * r) ** 2 - (a + 3 * b) ** 2 / 16)
+        def least_between(r: NDArray[np.float64]) -> NDArray[np.float64]:
+            Q = p * r
+            a = np.polynomial.polynomial.polyval(r, along) + 6 * Q
+            b = np.polynomial.polynomial.polyval(r, across) + 2 * Q
+            between = a * b - 4 * Q**2 - (a + 3 * b) ** 2 / 16
+            return np.where(a + 3 * b < 16 * Q, between, a * b)
 
         radii = np.geomspace(1e-3 / p, 1e3 / p, 6001)
-        below = np.flatnonzero([least_between(r) <= 0 for r in radii])
+        radii = radii[radii < min(ends)]
+        below = np.flatnonzero(least_between(radii) <= 0)
         if len(below):
             i = int(below[0])
             ends.append(_zero(least_between, radii[i - 1], radii[i]) if i else 0.0)
     return min(ends)
 
 
-def _zero(function: Callable[[float], float], low: float, high: float) -> float:
-    return float(brentq(function, low, high))  # pyright: ignore[reportArgumentType]
+def _zero(
+    function: Callable[[NDArray[np.float64]], NDArray[np.float64]], low: float, high: float
+) -> float:
+    def of_one(r: float) -> float:
+        return float(function(np.array(r)))
+
+    return float(brentq(of_one, low, high))  # pyright: ignore[reportArgumentType]
 
 
 def _first_root(coefficients: NDArray[np.float64]) -> float:
-    """Least positive real root of a polynomial, rising powers; infinity if there is none."""
-    roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients, "b"))
-    is_real = (np.abs(roots.imag) <= 1e-7 * np.abs(roots)) & (roots.real > 0)
-    return float(roots.real[is_real].min(initial=np.inf))
+    """Least positive real root of a polynomial, rising powers, the first above zero.
+
+    Infinity if there is none, or none within ten powers of ten of the least that could be.
+    """
+    powers = np.arange(1, len(coefficients))
+    ratios = np.abs(coefficients[1:] / coefficients[0])
+    powers, ratios = powers[ratios > 0], ratios[ratios > 0]
+    if not len(powers):
+        return float("inf")
+    # In units of the least size that a root can have no coefficient exceeds the constant one. Of
+    # the inverse roots the largest is sought, which is the one that is found exactly.
+    scale = float(np.exp(np.min(-np.log(ratios) / powers)))
+    with np.errstate(under="ignore"):
+        scaled = coefficients / coefficients[0] * scale ** np.arange(len(coefficients), dtype=float)
+    scaled[np.abs(scaled) < 1e-40] = 0.0
+    inverse = np.roots(np.trim_zeros(scaled, "b"))
+    is_real = (np.abs(inverse.imag) <= 1e-7 * np.abs(inverse)) & (inverse.real > 0)
+    largest = float(inverse.real[is_real].max(initial=0.0))
+    return scale / largest if largest > 0 else float("inf")

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["LensFit", "fit_lens"]
 
-SIDE = 31
-"""Pixels along the longer side of the image at which two lenses are compared."""
+FITTED, JUDGED = 31, 151
+"""Pixels along the longer side of the image at which two lenses are fitted, and compared."""
 
 _NUMBERS = {"k1": 2, "k2": 4, "k3": 6, "a1": 2, "a2": 4, "p1": 1, "p2": 1}
 """Power of the radius that each coefficient comes with."""
@@ -48,14 +48,7 @@ def fit_lens(camera: Camera, kind: type[Lens] | None, *, refit_camera: bool = Fa
     """Fit a lens of another kind to the one that a camera has; see `Camera.with_lens`."""
     if kind not in (BrownConrady, ReportRadial, ViconRadial, None):
         raise ParameterError("kind", "BrownConrady, ReportRadial, ViconRadial or None", kind)
-    w, h = camera.size_px
-    step = (max(w, h) - 1) / (SIDE - 1)
-    grid = np.meshgrid(np.linspace(0, w - 1, max(2, round((w - 1) / step) + 1)),
-                       np.linspace(0, h - 1, max(2, round((h - 1) / step) + 1)))  # fmt: skip
-    pixels = np.stack(grid, axis=-1).reshape(-1, 2)
-    rays = camera.undistort(pixels)
-    reached = np.isfinite(rays).all(axis=1)
-    pixels, rays = pixels[reached], rays[reached]
+    pixels, rays = _image(camera, FITTED)
     free = _Free(camera, kind, refit_camera, rays)
     start = free.first_guess(pixels, rays)
 
@@ -73,12 +66,26 @@ def fit_lens(camera: Camera, kind: type[Lens] | None, *, refit_camera: bool = Fa
     # Where a lens that bends at all would not reach the corners, a straight one may be better.
     tries = (fitted, np.zeros(len(start)))
     best = tries[int(np.argmin([np.sum(residual(x) ** 2) for x in tries]))]
+    pixels, rays = _image(camera, JUDGED)
     distance = np.linalg.norm(residual(best).reshape(-1, 2), axis=1)
     return LensFit(
         camera=free.camera(best),
         rms_px=float(np.sqrt(np.mean(distance**2))),
         max_px=float(distance.max()),
     )
+
+
+def _image(camera: Camera, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give pixels all over the image that the lens reaches, and their normalised coordinates."""
+    w, h = camera.size_px
+    step = (max(w, h) - 1) / (n - 1)
+    across, down = (
+        np.linspace(0, side - 1, max(2, round((side - 1) / step) + 1)) for side in (w, h)
+    )
+    pixels = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
+    rays = camera.undistort(pixels)
+    is_reached = np.isfinite(rays).all(axis=1)
+    return pixels[is_reached], rays[is_reached]
 
 
 class _Free:

@@ -8,7 +8,7 @@ import numpy as np
 
 from asterism import _engine
 from asterism.camera.projection import Projection
-from asterism.camera.surfaces import compile_surfaces
+from asterism.camera.surfaces import check_surfaces, compile_surfaces
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ def project_points(
     p = as_coordinates("points", points, 3)
     check_number("clearance", clearance, above=0, closed=True)
     shape: tuple[int, ...] = p.shape[:-1]
+    check_surfaces(surfaces)
     # Moving surfaces belong to the first axis of the points.
     is_moving = len(shape) > 1 or any(s.n_moments > 1 for s in surfaces)
     n_frames = shape[0] if is_moving and shape else 1

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from asterism import _engine
 
-__all__ = ["Capsule", "Mesh", "Polygon", "Surface", "compile_surfaces"]
+__all__ = ["Capsule", "Mesh", "Polygon", "Surface", "check_surfaces", "compile_surfaces"]
 
 
 class Surface(ABC):
@@ -150,19 +150,24 @@ class Capsule(Surface):
         return len(self.ends)
 
 
+def check_surfaces(surfaces: Sequence[Surface]) -> None:
+    """Raise a ParameterError if something else is among the surfaces."""
+    for i, surface in enumerate(surfaces):
+        if not isinstance(surface, (Polygon, Mesh, Capsule)):
+            raise ParameterError(
+                f"surfaces[{i}]", "a Polygon, Mesh or Capsule", type(surface).__name__
+            )
+
+
 def compile_surfaces(surfaces: Sequence[Surface], n_frames: int) -> list[_engine.Surfaces]:
     """Hand surfaces to the engine: those that stand together, those that move together.
 
     Raises
     ------
     ParameterError
-        If something else is among them, or a moving one has not `n_frames` moments.
+        If a moving one has not `n_frames` moments.
     """
     for i, surface in enumerate(surfaces):
-        if not isinstance(surface, (Polygon, Mesh, Capsule)):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise ParameterError(
-                f"surfaces[{i}]", "a Polygon, Mesh or Capsule", type(surface).__name__
-            )
         if surface.n_moments not in (1, n_frames):
             raise ParameterError(
                 f"surfaces[{i}]", f"1 or {n_frames} moments, as the points", surface.n_moments
