@@ -49,11 +49,12 @@ def here(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def gappy():
-    """A scene with gaps, clutter, an empty frame and a track without a name."""
+    """A scene with gaps, clutter, an empty frame, a nameless track, and some that come late."""
     scene = am.simulate.crossing(seed=3, rate=100)
     spoilt = am.simulate.corrupt(scene, missing=0.2, clutter=0.2, seed=4)
     d = spoilt.detections
-    is_kept = d.frame_of != 30
+    is_late = (spoilt.labels % 2 == 0) & (spoilt.labels >= 0)
+    is_kept = (d.frame_of != 30) & ~(is_late & (d.frame_of < 10))
     counts = np.bincount(d.frame_of[is_kept], minlength=d.n_frames)
     return am.Tracks(
         detections=am.Detections(
