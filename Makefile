@@ -27,6 +27,7 @@ docs: $(VENV)/.docs
 
 bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/speed.py --markdown docs/tables/speed.md
+	$(BIN)/python benchmarks/cameras.py --markdown docs/tables/cameras.md
 
 # The table of captures in the docs; needs the real captures beside the project.
 tables: $(VENV)/.bench

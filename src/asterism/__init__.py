@@ -63,6 +63,11 @@ if TYPE_CHECKING:
     from asterism.io import read as read
     from asterism.io import read_tracks as read_tracks
     from asterism.io import write as write
+    from asterism.io.calibration import CALIBRATIONS as CALIBRATIONS
+    from asterism.io.calibration import read_rig as read_rig
+    from asterism.io.calibration import write_rig as write_rig
+    from asterism.io.observations import read_observations as read_observations
+    from asterism.io.observations import write_observations as write_observations
     from asterism.model import DWNA as DWNA
     from asterism.model import DWPA as DWPA
     from asterism.model import Capture as Capture
@@ -77,8 +82,13 @@ if TYPE_CHECKING:
     from asterism.model import Tracks as Tracks
     from asterism.model.posterior import log_posterior as log_posterior
     from asterism.model.posterior import track_scores as track_scores
+    from asterism.view import plot_coverage as plot_coverage
+    from asterism.view import plot_depth as plot_depth
     from asterism.view import plot_errors as plot_errors
+    from asterism.view import plot_image as plot_image
+    from asterism.view import plot_lens as plot_lens
     from asterism.view import plot_presence as plot_presence
+    from asterism.view import plot_rig as plot_rig
     from asterism.view import plot_trajectories as plot_trajectories
 
 __version__ = "0.1.0"
@@ -139,7 +149,18 @@ _PUBLIC = {
     ),
     "evaluate": ("Evaluation", "calibration", "evaluate", "floor"),
     "io": ("FORMATS", "CaptureInfo", "describe", "read", "read_tracks", "write"),
-    "view": ("plot_errors", "plot_presence", "plot_trajectories"),
+    "io.calibration": ("CALIBRATIONS", "read_rig", "write_rig"),
+    "io.observations": ("read_observations", "write_observations"),
+    "view": (
+        "plot_coverage",
+        "plot_depth",
+        "plot_errors",
+        "plot_image",
+        "plot_lens",
+        "plot_presence",
+        "plot_rig",
+        "plot_trajectories",
+    ),
 }
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}
 _PACKAGES = ("simulate",)
