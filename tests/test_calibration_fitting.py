@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from asterism.camera import BrownConrady, QuadraticCorrection, ReportRadial, ViconRadial
+from asterism.errors import ParameterError
 from asterism.io.calibration import CALIBRATIONS
 from asterism.io.calibration.fitting import fit_kind, fit_to_format
 from calibration_rigs import LENSES, rig_for
@@ -55,6 +56,12 @@ def test_a_lens_that_would_fold_is_not_taken():
         fit = fit_kind(camera, kind)
         assert fit.rms_px < 100
         assert np.isfinite(fit.max_px)
+
+
+def test_a_lens_that_reaches_next_to_nothing_is_not_fitted():
+    camera = rig_for("myptv", bent=False)[0].replace(lens=BrownConrady(k1=-1e4))
+    with pytest.raises(ParameterError, match="reaches"):
+        fit_kind(camera, ViconRadial)
 
 
 def test_what_fits_is_left_as_it_is():

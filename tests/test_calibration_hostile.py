@@ -17,6 +17,8 @@ from asterism.camera import (
     ReportRadial,
     ViconRadial,
 )
+from asterism.app.camera_check import check_rig
+from asterism.app.camera_info import describe_rig
 from asterism.errors import AsterismError, FormatError
 from asterism.io.calibration import read_rig, write_rig
 from calibration_rigs import LENSES, NAMES, rig_for
@@ -114,6 +116,8 @@ def test_damaged_files_are_read_or_refused(tmp_path, format):
         for camera in again:  # what was read is sound
             assert np.isfinite(camera.T_camera_world).all()
             assert np.isfinite(camera.K).all()
+        describe_rig(again)  # whatever it is, it can be looked at
+        check_rig(again)
         with contextlib.suppress(AsterismError):
             write_rig(again, tmp_path / f"again{i}.toml")
             read_rig(tmp_path / f"again{i}.toml")

@@ -155,6 +155,10 @@ adjusted = false
         (("[640, 480]", "[640, 0]"), "size", "whole pixels"),
         (("[500.0, 0.0", "[-500.0, 0.0"), "K", "focal lengths > 0"),
         (("[500.0, 0.0", "[nan, 0.0"), "matrix", "finite"),
+        (("[500.0, 0.0", "[1e-300, 0.0"), "K", "focal lengths over"),
+        (("[500.0, 0.0", "[1e300, 0.0"), "K", "under 1e+09"),
+        (("[0.1, 0.0", "[1e300, 0.0"), "the lens", "under 1e+09"),
+        (("[1.0, 2.0, 3.0]", "[1.0, 2.0, -1e200]"), "T_camera_world", "under 1e+09"),
         (("rotation = [0.1, 0.2, 0.3]\n", ""), "rotation", "nothing"),
         (("rotation = [0.1, ", "rotation = ["), "rotation", "3 numbers"),
         (("translation = [1.0", "translation = ['a'"), "translation", "3 numbers"),
@@ -168,6 +172,37 @@ def test_anipose_that_is_broken(tmp_path, change, place, expected):
     with pytest.raises(FormatError, match=re.escape(expected)) as error:
         read_rig(path, format="anipose")
     assert place in error.value.place
+
+
+CALISCOPE = """[cameras.1]
+cam_id = 1
+rotation_count = 0
+exposure = "null"
+size = [640, 480]
+matrix = [[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]]
+distortions = [0.1, 0.0, 0.0, 0.0, 0.0]
+rotation = [0.1, 0.2, 0.3]
+translation = [1.0, 2.0, 3.0]
+
+[cameras.2]
+size = [640, 480]
+matrix = [[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]]
+distortions = [0.1, 0.0, 0.0, 0.0, 0.0]
+rotation = "null"
+translation = "null"
+"""
+
+
+def test_cameras_as_caliscope_nests_them(tmp_path):
+    (tmp_path / "a.toml").write_text(ANIPOSE)
+    (tmp_path / "c.toml").write_text(CALISCOPE)
+    anipose, caliscope = (read_rig(tmp_path / f"{c}.toml", units="m") for c in "ac")
+    assert anipose.names == ("cam1",)
+    assert caliscope.names == ("cam_1",)
+    np.testing.assert_array_equal(caliscope[0].T_camera_world, anipose[0].T_camera_world)
+    assert caliscope.warnings == ("camera cam_2 has no pose and is left out",)
+    (tmp_path / "c.toml").write_text("cameras = 3\n" + ANIPOSE)
+    assert read_rig(tmp_path / "c.toml", units="m").names == ("cam1",)
 
 
 def test_two_cameras_of_one_name(tmp_path):

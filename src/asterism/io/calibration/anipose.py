@@ -55,11 +55,17 @@ def read(path: Path, units: str | None) -> Rig:
     metadata = content.get("metadata")
     if units is None and isinstance(metadata, dict):
         units = parse_unit(str(metadata.get("units", "")))
+    nested = content.pop("cameras", {})  # where caliscope has them
+    if isinstance(nested, dict):
+        content |= {f"cam_{key}": entry for key, entry in nested.items()}
     for key, entry in content.items():
-        if isinstance(entry, dict) and "matrix" in entry:
+        if not isinstance(entry, dict) or "matrix" not in entry:
+            if key != "metadata":
+                warnings.append(f"the entry {key!r} is no camera and is left out")
+        elif all(entry.get(k, "null") == "null" for k in ("rotation", "translation")):
+            warnings.append(f"camera {entry.get('name', key)} has no pose and is left out")
+        else:
             found.append(_camera(path, key, entry, warnings))
-        elif key != "metadata":
-            warnings.append(f"the entry {key!r} is no camera and is left out")
     scale = 1.0
     if found:
         scale = per_metre(units, [-f["R"].T @ f["t"] for f in found], warnings)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["fit_kind", "fit_to_format"]
 
 _SIDE = 31  # pixels along the longer side of the image at which two cameras are compared
+_FEWEST = 25  # of these, or there is nothing to fit a lens to
 _KINDS: dict[str, type[Lens]] = {
     "BrownConrady": BrownConrady,
     "ViconRadial": ViconRadial,
@@ -108,6 +109,9 @@ def _grid(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     pixels = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
     normalised = camera.undistort(pixels)
     is_reached = np.isfinite(normalised).all(axis=1)
+    if is_reached.sum() < _FEWEST or not np.abs(normalised[is_reached]).max() > 0:
+        expected = "one that reaches a part of the image, to fit another to"
+        raise ParameterError(f"the lens of camera {camera.name!r}", expected, camera.lens)
     return pixels[is_reached], np.insert(normalised[is_reached], 2, 1.0, axis=1)
 
 

@@ -39,6 +39,7 @@ __all__ = [
 
 _LARGEST = 64 << 20  # bytes; a thousand cameras with all their thresholds take less
 _SLACK = 5e-3  # how far RᵀR may be from one: what a rotation written with three decimals keeps to
+_SMALLEST, _GREATEST = 1e-3, 1e9  # focal length; anything: far beyond what a camera can have
 _MOST_PIXELS = 100_000  # along an edge, as `Camera` has it
 
 
@@ -320,5 +321,22 @@ def build_rig(path: Path, cameras: Sequence[Camera], warnings: Sequence[str] = (
     for i, name in enumerate(names):
         if name and name in names[:i]:
             raise FormatError(path, f"camera {i + 1}", "a name of its own", repr(name))
+    for i, camera in enumerate(cameras):
+        _check_magnitudes(path, f"camera {camera.name or i + 1}", camera)
     with faults_at(path, "the rig"):
         return Rig(cameras=tuple(cameras), warnings=tuple(warnings))
+
+
+def _check_magnitudes(path: Path, place: str, camera: Camera) -> None:
+    """Refuse numbers of no real camera, whose squares would leave the range of numbers."""
+    numbers = {"K": camera.K, "T_camera_world": camera.T_camera_world}
+    if camera.lens is not None:
+        numbers |= {"K_lens": camera.lens_matrix, "the lens": camera.lens.coefficients}
+    for what, matrix in numbers.items():
+        most = float(np.abs(matrix).max())
+        if most > _GREATEST:
+            raise FormatError(path, f"{place}, {what}", f"numbers under {_GREATEST:g}", f"{most:g}")
+    focal = min(float(m[i, i]) for m in (camera.K, camera.lens_matrix) for i in (0, 1))
+    if focal < _SMALLEST:
+        expected = f"focal lengths over {_SMALLEST:g} pixels"
+        raise FormatError(path, f"{place}, K", expected, f"{focal:g}")
