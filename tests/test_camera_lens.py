@@ -30,6 +30,7 @@ LENSES = [
     am.ViconRadial(k1=3.5e-8, k2=-2e-14),
     am.ViconRadial(k1=-2e-7, k2=1e-14, k3=1e-20),
     am.QuadraticCorrection(ex=(0.01, 0.02, 0.03, -0.02, 0.01), ey=(-0.01, 0.0, 0.05, 0.03, 0.02)),
+    am.QuadraticCorrection(ex=(0.0, 0.0, 0.9, 0.1, 0.2), ey=(0.0, 0.0, 0.0, 0.6, -0.1)),
 ]
 
 

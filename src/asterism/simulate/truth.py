@@ -29,7 +29,7 @@ def _nobody() -> NDArray[np.int64]:
     return np.zeros(0, dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Truth(Tracks):
     """Ground truth: tracks, with the lines and colours of pictures and the surfaces that hide.
 
