@@ -10,6 +10,8 @@ import time
 import numpy as np
 import pytest
 
+from asterism.app.camera_check import check_rig
+from asterism.app.camera_info import describe_rig
 from asterism.camera import (
     BrownConrady,
     Camera,
@@ -17,8 +19,6 @@ from asterism.camera import (
     ReportRadial,
     ViconRadial,
 )
-from asterism.app.camera_check import check_rig
-from asterism.app.camera_info import describe_rig
 from asterism.errors import AsterismError, FormatError
 from asterism.io.calibration import read_rig, write_rig
 from calibration_rigs import LENSES, NAMES, rig_for

@@ -41,7 +41,7 @@ _LensOption = Annotated[
     typer.Option(
         "--lens",
         metavar="auto|brown|vicon|report|none",
-        help="Lens to fit; auto: none, but where the format cannot hold the one there is.",
+        help="Lens to fit; auto: as it is, unless the format cannot hold it.",
     ),
 ]
 _Points = Annotated[
