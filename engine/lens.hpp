@@ -22,7 +22,7 @@
 
 namespace asterism {
 
-inline constexpr double kLeastStretch = 1e-3;
+inline constexpr double kLeastStretch = 1e-2;
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 struct Plane {

@@ -201,12 +201,12 @@ def test_the_domain_is_where_the_derivative_stretches(seed):
         np.testing.assert_allclose(J[:, 0, 1], J[:, 1, 0], atol=1e-9 * np.nanmax(np.abs(J)))
         return np.linalg.eigvalsh((J + np.swapaxes(J, 1, 2)) / 2)[:, 0].min()
 
-    assert least_eigenvalue(0.999 * end) > 1e-3 - 1e-9
+    assert least_eigenvalue(0.999 * end) > 1e-2 - 1e-9
     if end < 30:
         x = 1.001 * end * np.column_stack([np.cos(angles), np.sin(angles)])
         assert np.isnan(camera.distort(x)).all()
         # and a little inside, the stretch comes down to its least
-        assert least_eigenvalue(end * (1 - 1e-9)) < 1e-3 + 1e-4 * (1 + abs(lens.k1) * 100)
+        assert least_eigenvalue(end * (1 - 1e-9)) < 1e-2 + 1e-4 * (1 + abs(lens.k1) * 100)
 
 
 def test_barrel_and_pincushion_have_their_signs():

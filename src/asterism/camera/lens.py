@@ -2,7 +2,7 @@
 
 A model maps undistorted to distorted coordinates (Brown-Conrady) or the other way (the rest). The
 other direction is solved, to the last digit. Every model has a domain, the region about the centre
-in which it stretches by a thousandth at least; beyond it the polynomial would fold the image over,
+in which it stretches by a hundredth at least; beyond it the polynomial would fold the image over,
 so nothing is seen there.
 """
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BrownConrady", "Lens", "QuadraticCorrection", "ReportRadial", "ViconRadial"]
 
-LEAST_STRETCH = 1e-3
+LEAST_STRETCH = 1e-2
 """As kLeastStretch of engine/lens.hpp."""
 
 NO_LENS, RADIAL, QUADRATIC = 0, 1, 2
@@ -50,7 +50,7 @@ class Lens(ABC):
         """Where the model ends, in its own coordinates, on the side from which it maps.
 
         Infinite where it never folds over. For radial and tangential terms, whose derivative is
-        symmetric, this is the largest disc in which both its eigenvalues exceed 0.001.
+        symmetric, this is the largest disc in which both its eigenvalues exceed 0.01.
         """
         k, p = self.coefficients[:3], float(np.hypot(*self.coefficients[3:]))
         # What changes nothing within a billion pixels, let alone units, is left out.
@@ -76,8 +76,8 @@ class BrownConrady(Lens):
 
     Examples
     --------
-    >>> round(BrownConrady(k1=-0.3).radius, 3)  # the fold of r - 0.3 r³, a thousandth before it
-    1.054
+    >>> round(BrownConrady(k1=-0.3).radius, 3)  # the fold of r - 0.3 r³, a little before it
+    1.049
     """
 
     is_backward: ClassVar[bool] = False
@@ -181,7 +181,7 @@ class QuadraticCorrection(Lens):
         return float("inf")
 
     def reaches(self, u: float, v: float) -> bool:
-        """Whether the point lies in the domain: the derivative's symmetric part exceeds 0.001."""
+        """Whether the point lies in the domain: the derivative's symmetric part exceeds 0.01."""
         a, b = self.ex, self.ey
         xx = 1 + a[0] + 2 * a[2] * u + a[4] * v
         yy = 1 + b[1] + 2 * b[3] * v + b[4] * u
