@@ -183,7 +183,7 @@ def _fitted(camera: Any, lens: str, chosen: Calibration) -> LensFit | None:
     is_there = camera.lens is None if kind is None else isinstance(camera.lens, kind)
     if is_there and fit_to_format(camera, chosen) is None:
         return None
-    return fit_kind(camera, kind, has_skew=chosen.has_skew, has_k3=chosen.has_k3)
+    return fit_kind(camera, kind, chosen)
 
 
 @app.command()

@@ -59,17 +59,17 @@ def check_rig(rig: Rig) -> list[Check]:
     list of Check
     """
     return [
-        _worst(rig, "rotations", _rotation, "R Rᵀ off by", (1e-9, 1e-6)),
-        _worst(rig, "focal lengths along u and v", _focal, "differ by %", (5.0, 25.0)),
-        _worst(rig, "principal points", _principal, "% of the image off its middle", (25.0, 50.0)),
-        _worst(rig, "lenses reach the image", _unreached, "% of it beyond the model", (0.0, 5.0)),
-        _worst(rig, "pixel to ray and back", _round_trip, "off by px", (1e-9, 1e-6)),
+        _worst(rig, "rotations", _rotation, "R Rᵀ off by at most {}", (1e-9, 1e-6)),
+        _worst(rig, "focal lengths along u and v", _focal, "differ by at most {} %", (5.0, 25.0)),
+        _worst(rig, "principal points", _principal, "at most {} % of the image off its middle", (25.0, 50.0)),
+        _worst(rig, "lenses reach the image", _unreached, "at most {} % of it beyond the model", (0.0, 5.0)),
+        _worst(rig, "pixel to ray and back", _round_trip, "off by at most {} px", (1e-9, 1e-6)),
         _apart(rig),
         _common(rig),
     ]  # fmt: skip
 
 
-def _worst(rig: Rig, name: str, figure: Any, unit: str, limits: tuple[float, float]) -> Check:
+def _worst(rig: Rig, name: str, figure: Any, text: str, limits: tuple[float, float]) -> Check:
     """Judge each camera by a figure that is odd above one limit and wrong above another."""
     values = [float(figure(camera)) for camera in rig]
     status = PASSES
@@ -79,7 +79,7 @@ def _worst(rig: Rig, name: str, figure: Any, unit: str, limits: tuple[float, flo
     top = int(np.argmax(np.nan_to_num(values, nan=np.inf)))
     limit = limits[0] if status != FAILS else limits[1]
     which = [n for n, value in zip(rig.names, values, strict=True) if not value <= limit]
-    detail = f"{unit} {values[top]:.3g} at most"
+    detail = text.format(f"{values[top]:.3g}")
     return Check(
         name=name, status=status, detail=f"{detail}: {', '.join(which)}" if which else detail
     )
@@ -186,7 +186,7 @@ def check_points(
     bad = [e["camera"] for e in errors
            if not e["median_px"] <= most or 2 * e["n_unseen"] > e["n_points"]]  # fmt: skip
     top = max(errors, key=lambda e: np.nan_to_num(e["median_px"], nan=np.inf))
-    detail = f"median {top['median_px']:.3g} px at most ({top['camera']}); {most:g} passes"
+    detail = f"median {top['median_px']:.3g} px at most ({top['camera']}), where {most:g} may be"
     if bad:
         detail += f"; not {', '.join(bad)}"
     check = Check(name="known points", status=FAILS if bad else PASSES, detail=detail)

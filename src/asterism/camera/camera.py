@@ -18,7 +18,7 @@ from asterism.camera.surfaces import check_surfaces, compile_surfaces
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -324,7 +324,13 @@ class Camera:
             cycles=tuple(tuple(faces.names[i] for i in group) for group in cycles),
         )
 
-    def with_lens(self, kind: type[Lens] | None, *, refit_camera: bool = False) -> LensFit:
+    def with_lens(
+        self,
+        kind: type[Lens] | None,
+        *,
+        refit_camera: bool = False,
+        without: Collection[str] = (),
+    ) -> LensFit:
         """Give the camera another kind of lens, fitted to its own over the image.
 
         There is no exact conversion: the models bend in different directions, and a changed sign is
@@ -333,10 +339,14 @@ class Camera:
         Parameters
         ----------
         kind : type of Lens or None
-            `BrownConrady`, `ReportRadial`, `ViconRadial`, or None for a pin-hole.
+            `BrownConrady`, `ReportRadial`, `ViconRadial`, None for a pin-hole; or
+            `QuadraticCorrection`, which will be one of raw pixels and may shift the principal
+            point.
         refit_camera : bool
             Whether K and the direction of sight may change too; the place never does. For a
-            camera with a `K_lens`, which the result has not.
+            camera with a `K_lens`, which the result has not, or a skew that is left out.
+        without : collection of str
+            Coefficients that stay zero, "skew" among them.
 
         Returns
         -------
@@ -345,7 +355,7 @@ class Camera:
         """
         from asterism.camera.lens_fit import fit_lens
 
-        return fit_lens(self, kind, refit_camera=refit_camera)
+        return fit_lens(self, kind, refit_camera=refit_camera, without=without)
 
     def replace(self, **changes: Any) -> Self:
         """Give the camera with some of its fields changed."""

@@ -9,21 +9,27 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from asterism.camera.lens import BrownConrady, Lens, ReportRadial, ViconRadial
-from asterism.errors import ParameterError
+from asterism.camera.lens import BrownConrady, QuadraticCorrection, ReportRadial, ViconRadial
+from asterism.errors import ParameterError, check_fields
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from asterism.camera.camera import Camera
+    from asterism.camera.lens import Lens
 
 __all__ = ["LensFit", "fit_lens"]
 
 FITTED, JUDGED = 31, 151
 """Pixels along the longer side of the image at which two lenses are fitted, and compared."""
 
-_NUMBERS = {"k1": 2, "k2": 4, "k3": 6, "a1": 2, "a2": 4, "p1": 1, "p2": 1}
-"""Power of the radius that each coefficient comes with."""
+FEWEST = 25
+"""Of the fitted pixels that the old lens must reach, or there is nothing to fit to."""
+
+_POWERS = {"k1": 2, "k2": 4, "k3": 6, "a1": 2, "a2": 4, "p1": 1, "p2": 1}
+"""Power of the radius that each coefficient comes with, beyond the first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +42,7 @@ class LensFit:
         The camera with the fitted lens.
     rms_px, max_px : float
         Root mean square and greatest distance between where the two see the same ray, over the
-        image, pixels.
+        image, pixels. A ray that the new lens does not reach counts as far as the image is wide.
     """
 
     camera: Camera
@@ -44,21 +50,29 @@ class LensFit:
     max_px: float
 
 
-def fit_lens(camera: Camera, kind: type[Lens] | None, *, refit_camera: bool = False) -> LensFit:
+def fit_lens(
+    camera: Camera,
+    kind: type[Lens] | None,
+    *,
+    refit_camera: bool = False,
+    without: Collection[str] = (),
+) -> LensFit:
     """Fit a lens of another kind to the one that a camera has; see `Camera.with_lens`."""
-    if kind not in (BrownConrady, ReportRadial, ViconRadial, None):
-        raise ParameterError("kind", "BrownConrady, ReportRadial, ViconRadial or None", kind)
+    if kind not in (BrownConrady, ReportRadial, ViconRadial, QuadraticCorrection, None):
+        expected = "BrownConrady, ReportRadial, ViconRadial, QuadraticCorrection or None"
+        raise ParameterError("kind", expected, kind)
+    check_fields("without", without, ("skew", *_POWERS))
     pixels, rays = _image(camera, FITTED)
-    free = _Free(camera, kind, refit_camera, rays)
+    if len(pixels) < FEWEST:
+        expected = "a lens that reaches a part of the image, to fit another to"
+        raise ParameterError(f"camera {camera.name!r}", expected, camera.lens)
+    if kind is QuadraticCorrection:
+        return _judged(camera, _quadratic(camera, pixels, rays))
+    free = _Free(camera, kind, refit_camera, without, rays)
     start = free.first_guess(pixels, rays)
 
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        try:
-            trial = free.camera(x)
-        except ParameterError:  # a focal length below zero, say: far from anything
-            return np.full(pixels.size, 1e3)
-        seen = trial.distort(free.turned(x, rays))
-        return np.nan_to_num(seen - pixels, nan=1e3).ravel()
+        return _apart(camera, free.camera(x), pixels, rays).ravel()
 
     fitted = start
     if len(start):
@@ -66,19 +80,13 @@ def fit_lens(camera: Camera, kind: type[Lens] | None, *, refit_camera: bool = Fa
     # Where a lens that bends at all would not reach the corners, a straight one may be better.
     tries = (fitted, np.zeros(len(start)))
     best = tries[int(np.argmin([np.sum(residual(x) ** 2) for x in tries]))]
-    pixels, rays = _image(camera, JUDGED)
-    distance = np.linalg.norm(residual(best).reshape(-1, 2), axis=1)
-    return LensFit(
-        camera=free.camera(best),
-        rms_px=float(np.sqrt(np.mean(distance**2))),
-        max_px=float(distance.max()),
-    )
+    return _judged(camera, free.camera(best))
 
 
 def _image(camera: Camera, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Give pixels all over the image that the lens reaches, and their normalised coordinates."""
     w, h = camera.size_px
-    step = (max(w, h) - 1) / (n - 1)
+    step = max((max(w, h) - 1) / (n - 1), 1e-9)
     across, down = (
         np.linspace(0, side - 1, max(2, round((side - 1) / step) + 1)) for side in (w, h)
     )
@@ -88,34 +96,83 @@ def _image(camera: Camera, n: int) -> tuple[NDArray[np.float64], NDArray[np.floa
     return pixels[is_reached], rays[is_reached]
 
 
+def _apart(
+    old: Camera, new: Camera, pixels: NDArray[np.float64], rays: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Where the new camera sees the rays of the old one, less where that saw them, shape (n, 2)."""
+    turned = np.column_stack([rays, np.ones(len(rays))]) @ (
+        old.T_camera_world[:3, :3] @ new.T_camera_world[:3, :3].T
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        seen = new.distort(turned[:, :2] / turned[:, 2:])
+    return np.nan_to_num(seen - pixels, nan=float(max(old.size_px)) / np.sqrt(2))
+
+
+def _judged(old: Camera, new: Camera) -> LensFit:
+    distance = np.linalg.norm(_apart(old, new, *_image(old, JUDGED)), axis=1)
+    return LensFit(
+        camera=new,
+        rms_px=float(np.sqrt(np.mean(distance**2))),
+        max_px=float(distance.max()),
+    )
+
+
+def _quadratic(camera: Camera, pixels: NDArray[np.float64], rays: NDArray[np.float64]) -> Camera:
+    """Fit a correction of raw pixels; linear in its coefficients and in the principal point."""
+    u, v = pixels.T
+    size = float(max(camera.size_px))
+    scale = np.array([size, size, size**2, size**2, size**2, 1.0])
+    terms = np.stack([u, v, u * u, v * v, u * v, np.ones(len(u))], axis=1) / scale
+    ideal = rays @ camera.K[:2, :2].T + camera.K[:2, 2]
+    solved = np.linalg.lstsq(terms, ideal - pixels)[0].T / scale
+    K = camera.K.copy()
+    K[:2, 2] -= solved[:, 5]
+    ex, ey = ((float(a), float(b), float(c), float(d), float(e)) for a, b, c, d, e, _ in solved)
+    return camera.replace(K=K, K_lens=np.eye(3), lens=QuadraticCorrection(ex=ex, ey=ey))
+
+
 class _Free:
     """What may change: the coefficients, and on request K and the direction of sight.
 
-    A coefficient is counted by what it does at the corner of the image, so that all are alike.
+    A coefficient is counted by what it does at the corner of the image, so that all are alike; then
+    come the logarithms of the focal lengths, the principal point and the skew in focal lengths, and
+    a rotation vector.
     """
 
     def __init__(
-        self, camera: Camera, kind: type[Lens] | None, refit: bool, rays: NDArray[np.float64]
+        self,
+        camera: Camera,
+        kind: type[Lens] | None,
+        refit: bool,
+        without: Collection[str],
+        rays: NDArray[np.float64],
     ) -> None:
-        self.old, self.kind, self.refit = camera, kind, refit
-        self.names = [] if kind is None else [field.name for field in fields(kind)]  # pyright: ignore[reportArgumentType]
+        self.old, self.kind = camera, kind
+        self.names: list[str] = []
+        if kind is not None:
+            self.names = [field.name for field in fields(kind)]  # pyright: ignore[reportArgumentType]
+        self.names = [name for name in self.names if name not in without]
         radius = float(np.linalg.norm(rays, axis=1).max())
         if kind is not None and kind.in_pixels:
             radius *= float(camera.K[0, 0])
-        self.scale = np.array([radius ** -_NUMBERS[name] for name in self.names])
-        self.focal = float(camera.K[0, 0])
+        self.scale = np.array([radius ** -_POWERS[name] for name in self.names])
+        self.K = camera.K.copy()
+        if "skew" in without:
+            self.K[0, 1] = 0.0
+        # Entries of K that move, and how many numbers are free besides the coefficients.
+        self.moving = ([0, 1], [2, 2]) if "skew" in without else ([0, 1, 0], [2, 2, 1])
+        self.n_camera = 2 + len(self.moving[0]) + 3 if refit else 0
 
     def first_guess(
         self, pixels: NDArray[np.float64], rays: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Solve for the coefficients in lens coordinates, in which every model is linear."""
-        n_free = len(self.names) + (8 if self.refit else 0)
         if self.kind is None:
-            return np.zeros(n_free)
-        matrix = self.old.replace(K_lens=None, lens=self.kind()).lens_matrix
+            return np.zeros(self.n_camera)
+        matrix = self.old.replace(K=self.K, K_lens=None, lens=self.kind()).lens_matrix
         bent, ideal = (
             (np.column_stack([p, np.ones(len(p))]) @ np.linalg.solve(matrix, M).T)[:, :2]
-            for p, M in ((pixels, np.eye(3)), (rays, self.old.K))
+            for p, M in ((pixels, np.eye(3)), (rays, self.K))
         )
         source, target = (bent, ideal) if self.kind.is_backward else (ideal, bent)
         x, y = source.T
@@ -127,33 +184,20 @@ class _Free:
             elif name == "p2":
                 column = np.stack([q + 2 * x**2, 2 * x * y], axis=1)
             else:
-                column = source * (q ** (_NUMBERS[name] / 2))[:, None]
+                column = source * (q ** (_POWERS[name] / 2))[:, None]
             basis.append(scale * column.ravel())
         solved = np.linalg.lstsq(np.stack(basis, axis=1), (target - source).ravel())[0]
-        return np.concatenate([solved, np.zeros(n_free - len(solved))]).astype(np.float64)
+        return np.concatenate([solved, np.zeros(self.n_camera)]).astype(np.float64)
 
     def camera(self, x: NDArray[np.float64]) -> Camera:
         n = len(self.names)
-        values: dict[str, Any] = dict(
-            zip(self.names, (float(v) for v in x[:n] * self.scale), strict=True)
-        )
-        changes: dict[str, Any] = {"lens": None if self.kind is None else self.kind(**values)}
-        if self.refit:
-            K = self.old.K.copy()
-            K[0, 0] *= np.exp(x[n])
-            K[1, 1] *= np.exp(x[n + 1])
-            K[[0, 0, 1], [1, 2, 2]] += x[n + 2 : n + 5] * self.focal
-            T = self.old.T_camera_world.copy()
-            T[:3] = self._turn(x) @ T[:3]
-            changes |= {"K": K, "T_camera_world": T}
-        return self.old.replace(K_lens=None, **changes)
-
-    def turned(self, x: NDArray[np.float64], rays: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Give the old camera's normalised coordinates in the new camera's frame."""
-        if not self.refit:
-            return rays
-        d = np.column_stack([rays, np.ones(len(rays))]) @ self._turn(x).T
-        return d[:, :2] / d[:, 2:]
-
-    def _turn(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(Rotation.from_rotvec(x[-3:]).as_matrix(), dtype=np.float64)
+        values = (float(v) for v in x[:n] * self.scale)
+        coefficients: dict[str, Any] = dict(zip(self.names, values, strict=True))
+        K, T = self.K.copy(), self.old.T_camera_world
+        if self.n_camera:
+            K[[0, 1], [0, 1]] *= np.exp(np.clip(x[n : n + 2], -5, 5))
+            K[self.moving] += x[n + 2 : -3] * self.K[0, 0]
+            T = T.copy()
+            T[:3] = Rotation.from_rotvec(x[-3:]).as_matrix() @ T[:3]
+        lens = None if self.kind is None else self.kind(**coefficients)
+        return self.old.replace(K=K, T_camera_world=T, K_lens=None, lens=lens)
