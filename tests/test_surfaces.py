@@ -299,6 +299,29 @@ def test_the_painter_is_right_wherever_there_is_an_order(seed, n):
         np.testing.assert_array_equal(painting.surface, truth.surface)
 
 
+def test_what_stands_behind_the_camera_hides_nothing():
+    behind = am.Polygon(corners=[[-9, -5, -9], [9, -5, -9], [0, -5, 9]])
+    before = am.Polygon(corners=[[0.5, -5, 0], [0.5, 3, 0], [0.5, 3, 2]])
+    for surfaces in ([behind], [behind, before]):
+        found = camera().project([[0, 0, 1], [-0.5, 1, 0.5]], surfaces)
+        assert found.visible.all()
+        assert (camera().depth_image(surfaces).surface != 0).all()
+
+
+def test_of_two_surfaces_at_one_place_the_first_is_named():
+    rng = np.random.default_rng(8)
+    wall = am.Polygon(corners=[[-1, 0, 0], [1, 0, 0], [0, 0, 2.0]])
+    ball = am.Capsule(ends=[[0, 2, 1], [0, 2, 1]], radius=0.5)
+    others = [am.Polygon(corners=t + np.array([0, 9, 0])) for t in triangles_of(rng, 20)]
+    surfaces = [*others[:10], wall, wall, ball, ball, *others[10:], wall, ball]
+    points = [[0.1, 0.5, 1], [0.0, 4, 1.0]]
+    assert camera().project(points, surfaces).hidden_by.tolist() == [10, 10]
+    without = [s for s in surfaces if s is not wall]
+    assert camera().project(points, without).hidden_by.tolist() == [-1, 10]
+    named = np.unique(camera().depth_image(surfaces).surface)
+    assert not set(named) & {11, 13, 24, 25}
+
+
 def test_a_surface_around_the_camera_hides_everything():
     c = camera()
     ball = am.Capsule(ends=np.tile(c.center, (2, 1)), radius=0.1)

@@ -61,8 +61,8 @@ def check_rig(rig: Rig) -> list[Check]:
     return [
         _worst(rig, "rotations", _rotation, "R Rᵀ off by at most {}", (1e-9, 1e-6)),
         _worst(rig, "focal lengths along u and v", _focal, "differ by at most {} %", (5.0, 25.0)),
-        _worst(rig, "principal points", _principal, "at most {} % of the image off its middle", (25.0, 50.0)),
-        _worst(rig, "lenses reach the image", _unreached, "at most {} % of it beyond the model", (0.0, 5.0)),
+        _worst(rig, "principal points", _principal, "at most {} % of the image off", (25.0, 50.0)),
+        _worst(rig, "lenses reach the image", _unreached, "at most {} % of it is not", (0.0, 5.0)),
         _worst(rig, "pixel to ray and back", _round_trip, "off by at most {} px", (1e-9, 1e-6)),
         _apart(rig),
         _common(rig),
