@@ -275,7 +275,7 @@ class Scene {
       if (last - half > 1) cut[3] = halve(half, last);
     }
     for (std::size_t k = 0; k < 4; ++k) {
-      Box box;
+      Box box;  // inside out while nothing is in it: no ray enters
       for (std::size_t i = cut[k]; i < cut[k + 1]; ++i) box.add(box_of(i));
       const std::size_t n = cut[k + 1] - cut[k];
       const std::int32_t child = n > kLeaf ? grow(cut[k], cut[k + 1]) : static_cast<std::int32_t>(cut[k]);
@@ -286,8 +286,6 @@ class Scene {
       }
       node.first[k] = child;
       node.n[k] = n == 0 ? -1 : n > kLeaf ? 0 : static_cast<std::int32_t>(n);
-      if (n == 0)  // no ray enters
-        for (std::size_t d = 0; d < 3; ++d) node.bound[0][d][k] = node.bound[1][d][k] = 1e30F;
     }
     return static_cast<std::int32_t>(at);
   }
