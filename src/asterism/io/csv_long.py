@@ -9,14 +9,12 @@ blanks.
 
 from __future__ import annotations
 
-import csv
-import io
-from itertools import chain
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
 from asterism.errors import FormatError
+from asterism.io.csv_columns import columns_of, quoted
 from asterism.io.text_table import cells_of, check_times, plain, read_lines
 from asterism.model import Capture, Tracks
 
@@ -75,7 +73,10 @@ def _load(path: Path) -> tuple[Capture, Tracks]:
     if unknown or missing or len(set(header)) < len(header):
         got = ", ".join(header)[:200]
         raise FormatError(path, "line 1", f"the columns {', '.join(_COLUMNS)}", got)
-    numbers, names = _parse(path, lines, header)
+    numbers, texts = columns_of(path, lines, header, ("name",))
+    nothing = np.full(len(lines) - 1, np.nan)
+    numbers = dict.fromkeys(("track", "confidence"), nothing) | numbers
+    names = texts.get("name", [""] * len(nothing))
     frame, time = numbers["frame"], numbers["time_s"]
     track = _whole(path, "track", np.nan_to_num(numbers["track"], nan=-1.0), -1, _MOST_TRACKS)
     axes = [axis for axis in ("x_m", "y_m", "z_m") if axis in header]
@@ -124,62 +125,6 @@ def _load(path: Path) -> tuple[Capture, Tracks]:
     return capture, tracks
 
 
-def _parse(
-    path: Path, lines: list[str], header: list[str]
-) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
-    """Columns of numbers by their name, NaN where blank, and the names of the tracks."""
-    parts: dict[str, list[NDArray[np.float64]]] = {c: [] for c in _COLUMNS if c != "name"}
-    names: list[str] = []
-    width = len(header)
-    for begin in range(1, len(lines), _CHUNK):
-        chunk = lines[begin : begin + _CHUNK]
-        if any('"' in line for line in chunk):
-            rows = [_split(path, line, begin + i + 1) for i, line in enumerate(chunk)]
-            widths = [len(row) for row in rows]
-            cells = list(chain.from_iterable(rows))
-        else:  # many times faster
-            widths = [line.count(",") + 1 for line in chunk]
-            cells = ",".join(chunk).split(",")
-        wrong = next((i for i, n in enumerate(widths) if n != width), None)
-        if wrong is not None:
-            line = f"line {begin + wrong + 1}"
-            raise FormatError(path, line, f"{width} columns", widths[wrong])
-        for i, column in enumerate(header):
-            if column == "name":
-                names += cells[i::width]
-            else:
-                parts[column].append(_numbers(path, column, cells[i::width], begin + 1))
-    n = len(lines) - 1
-    numbers = {c: np.concatenate(p) if p else np.full(n, np.nan) for c, p in parts.items()}
-    return numbers, names or [""] * n
-
-
-def _split(path: Path, line: str, number: int) -> list[str]:
-    try:
-        return next(csv.reader([line], strict=True), [])
-    except csv.Error as error:
-        raise FormatError(path, f"line {number}", "CSV", str(error)) from error
-
-
-def _numbers(path: Path, column: str, cells: list[str], line: int) -> NDArray[np.float64]:
-    try:
-        values = np.array([cell or "nan" for cell in cells], dtype=np.float64)
-    except ValueError:
-        values = np.array([_number_or_inf(cell) for cell in cells])
-    bad = np.flatnonzero(np.isinf(values))
-    if len(bad):
-        place = f"line {line + bad[0]}, column {column}"
-        raise FormatError(path, place, "a finite number or nothing", repr(cells[bad[0]]))
-    return values
-
-
-def _number_or_inf(cell: str) -> float:
-    try:
-        return float(cell.strip() or "nan")
-    except ValueError:
-        return np.inf
-
-
 def _whole(
     path: Path, column: str, values: NDArray[np.float64], low: int, high: int
 ) -> NDArray[np.int64]:
@@ -217,7 +162,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     header = [c for c in _COLUMNS if (c != "z_m" or d.n_axes == 3) and c != "confidence"]
     header += ["confidence"] * has_confidence
     file.write((",".join(header) + "\n").encode())
-    tails = [f"{k},{_quoted(name or '')}" for k, name in enumerate(tracks.names)] + ["-1,"]
+    tails = [f"{k},{quoted(plain(name or ''))}" for k, name in enumerate(tracks.names)] + ["-1,"]
     first = d.first_frame if isinstance(d, Capture) else 1
     starts = [f"{first + t},{time!r}" for t, time in enumerate(d.times.tolist())]
     blank = "," * (len(header) - 2)
@@ -237,9 +182,3 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     for k in np.flatnonzero(tracks.lengths == 0):
         line = "," * (2 + d.n_axes) + tails[k] + "," * has_confidence
         file.write(f"{line}\n".encode())
-
-
-def _quoted(name: str) -> str:
-    out = io.StringIO()
-    csv.writer(out, lineterminator="").writerow([plain(name), "x"])
-    return out.getvalue().removesuffix(",x")
