@@ -1,0 +1,150 @@
+"""Walking, running and turning round: a pose at every moment of a clip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.simulate.people.gait import (
+    Carriage,
+    Style,
+    bounce,
+    running,
+    upright,
+    walking,
+)
+from asterism.simulate.people.steps import (
+    Course,
+    Feet,
+    Gait,
+    carried,
+    feet_on,
+    reached,
+    swings_of,
+)
+
+if TYPE_CHECKING:
+    from asterism.simulate.people.curves import Array
+    from asterism.simulate.people.skeleton import Body, Pose
+
+__all__ = ["Walker", "run", "turn", "walk"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Walker:
+    """Somebody on a course.
+
+    Parameters
+    ----------
+    body, style, gait, course
+        Who, how and where.
+    swings : dict of ndarray, shape (n, 2)
+        When the feet are in the air.
+    is_run : bool
+        Whether the body flies between the steps.
+    """
+
+    body: Body
+    style: Style
+    gait: Gait
+    course: Course
+    swings: dict[str, Array]
+    is_run: bool = False
+
+    def carriage(self, t: Array) -> Carriage:
+        """Give pelvis, trunk, head and arms at times (T,)."""
+        phase = t * self.gait.cadence + self.style.phase
+        heading, vigour = self.course.heading(t), self.course.vigour(t)
+        return upright(phase, heading, vigour, self.style, is_run=self.is_run)
+
+    def feet(self, t: Array) -> Feet:
+        """Give the feet at times (T,)."""
+        return feet_on(t, self.body, self.course, self.gait, self.swings)
+
+    def root(self, t: Array, carriage: Carriage) -> Array:
+        """Give the middle of the hip joints, (T, 3)."""
+        root = self._flat(t, carriage)
+        highest = reached(self.course, self.body, self._hips, self.feet)
+        if not self.is_run:
+            root[:, 2] = carried(t, self.course, highest)
+            return root
+        grid = self.course.times
+        is_in = (grid > -0.1) & (grid < self.course.duration + 0.1)
+        room = highest - self._bounce(grid)
+        root[:, 2] = self._bounce(t) + room[is_in].min() - 0.004 * self.body.height
+        return root
+
+    def pose(self, t: Array) -> Pose:
+        """Give the pose at times (T,)."""
+        c, feet = self.carriage(t), self.feet(t)
+        return self.body.pose(
+            root=self.root(t, c), pelvis=c.pelvis, trunk=c.trunk, head=c.head,
+            ankles=feet.ankles, feet=feet.turns, arms=c.arms,
+        )  # fmt: skip
+
+    def _bounce(self, t: Array) -> Array:
+        return bounce(t * self.gait.cadence + self.style.phase, self.gait)
+
+    def _flat(self, t: Array, carriage: Carriage) -> Array:
+        heading = self.course.heading(t)
+        left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+        ground = self.course.place(t) + carriage.sway[:, None] * left
+        return np.column_stack([ground, np.zeros(len(t))])
+
+    def _hips(self, t: Array) -> dict[str, Array]:
+        carriage = self.carriage(t)
+        return self.body.hips(self._flat(t, carriage), carriage.pelvis)
+
+
+def walk(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
+    """Walk straight on, through the origin at half time."""
+    return _straight(t, body, style, rng, is_run=False)
+
+
+def run(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
+    """Run straight on, through the origin at half time."""
+    return _straight(t, body, style, rng, is_run=True)
+
+
+def _straight(
+    t: Array, body: Body, style: Style, rng: np.random.Generator, *, is_run: bool
+) -> Pose:
+    gait, speed = (running if is_run else walking)(body.height, style)
+    direction = rng.uniform(-np.pi, np.pi)
+    course = Course(
+        duration=float(t[-1]),
+        speed=lambda x: np.full(x.shape, speed),
+        heading=lambda x: np.full(x.shape, direction),
+        usual=speed,
+    )
+    swings = swings_of(course, gait, style.phase)
+    walker = Walker(
+        body=body, style=style, gait=gait, course=course, swings=swings, is_run=is_run
+    )
+    return walker.pose(t)
+
+
+def turn(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
+    """Walk on a circle, turn round at half time, and walk back on a circle."""
+    gait, usual = walking(body.height, style)
+    direction, side = rng.uniform(-np.pi, np.pi), rng.choice([-1.0, 1.0])
+    duration, radius, about = float(t[-1]), rng.uniform(1.8, 2.4), 1.3
+    bend = side * 0.8 * usual / radius
+
+    def passage(x: Array) -> Array:  # from -1 to 1 over the turn, with constant rate in its middle
+        s = np.clip((x - duration / 2) / about, -1, 1)
+        return s * (15 - 10 * s**2 + 3 * s**4) / 8
+
+    def speed(x: Array) -> Array:
+        s = np.clip(np.abs(x - duration / 2) / about, 0, 1)
+        return usual * (0.30 + 0.55 * s**3 * (10 - 15 * s + 6 * s**2))
+
+    def heading(x: Array) -> Array:
+        return direction + bend * (x - duration / 2) + side * np.pi / 2 * passage(x)
+
+    course = Course(duration=duration, speed=speed, heading=heading, usual=usual)
+    swings = swings_of(course, gait, style.phase)
+    walker = Walker(body=body, style=style, gait=gait, course=course, swings=swings)
+    return walker.pose(t)

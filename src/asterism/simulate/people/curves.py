@@ -1,0 +1,114 @@
+"""Smooth curves in time and turns in space, of which people's motion is put together."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from scipy.interpolate import BPoly
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Array: TypeAlias = NDArray[np.float64]
+    Knot: TypeAlias = tuple[float, ArrayLike, ArrayLike, ArrayLike]
+
+__all__ = ["about_x", "about_y", "about_z", "blend", "harmonics", "through", "unit"]
+
+
+def through(t: Array, knots: Sequence[Knot], *, derivatives: int = 0) -> Array:
+    """Go through knots on quintics: position, velocity and acceleration are continuous.
+
+    Parameters
+    ----------
+    t : ndarray, shape (T,)
+        Seconds; before the first knot and after the last the value stays that of the knot.
+    knots : sequence of (time, value, rate, acceleration)
+        In order of time, at least two; values are numbers or vectors of D.
+    derivatives : int
+        How many derivatives to give beside the value, on a last axis, if any.
+
+    Returns
+    -------
+    ndarray, shape (T,) or (T, D), or (T, 1 + derivatives)
+    """
+    times = [knot[0] for knot in knots]
+    given = [[np.asarray(x, dtype=np.float64) for x in knot[1:]] for knot in knots]
+    curve = BPoly.from_derivatives(times, given)
+    inside = np.clip(t, times[0], times[-1])
+    values = [np.asarray(curve(inside, nu), dtype=np.float64) for nu in range(derivatives + 1)]
+    return np.stack(values, axis=-1) if derivatives else values[0]
+
+
+def blend(t: Array, *turns: float) -> Array:
+    """Go from 0 to 1 between two times, back to 0 between the next two, and so on.
+
+    Parameters
+    ----------
+    t : ndarray, shape (T,)
+        Seconds.
+    *turns : float
+        Pairs of times, rising: each pair begins and ends a passage, which starts and stops
+        with neither velocity nor acceleration.
+
+    Returns
+    -------
+    ndarray, shape (T,)
+        In [0, 1].
+    """
+    total = np.zeros_like(t)
+    for i in range(0, len(turns), 2):
+        s = np.clip((t - turns[i]) / (turns[i + 1] - turns[i]), 0.0, 1.0)
+        total += (1 - i % 4) * s**3 * (10 - 15 * s + 6 * s**2)
+    return total
+
+
+def harmonics(phase: Array, mean: float, *terms: tuple[float, float]) -> Array:
+    """Sum the harmonics of a cycle: ``mean + Σ a_k cos(2π k (phase - p_k))``.
+
+    Parameters
+    ----------
+    phase : ndarray, shape (T,)
+        In cycles.
+    mean : float
+        Mean over the cycle.
+    *terms : (amplitude, phase of the peak)
+        Of the first, the second … harmonic.
+    """
+    total = np.full(phase.shape, float(mean))
+    for k, (amplitude, peak) in enumerate(terms, start=1):
+        total += amplitude * np.cos(2 * np.pi * k * (phase - peak))
+    return total
+
+
+def about_x(angle: ArrayLike) -> Array:
+    """Turn about x, from y to z: matrices (…, 3, 3) from angles (…) in degrees."""
+    return _about(0, angle)
+
+
+def about_y(angle: ArrayLike) -> Array:
+    """Turn about y, from z to x: matrices (…, 3, 3) from angles (…) in degrees."""
+    return _about(1, angle)
+
+
+def about_z(angle: ArrayLike) -> Array:
+    """Turn about z, from x to y: matrices (…, 3, 3) from angles (…) in degrees."""
+    return _about(2, angle)
+
+
+def _about(axis: int, angle: ArrayLike) -> Array:
+    a = np.radians(np.asarray(angle, dtype=np.float64))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turn = np.zeros((*a.shape, 3, 3))
+    turn[..., axis, axis] = 1.0
+    turn[..., i, i] = turn[..., j, j] = np.cos(a)
+    turn[..., j, i] = np.sin(a)
+    turn[..., i, j] = -turn[..., j, i]
+    return turn
+
+
+def unit(vectors: Array) -> Array:
+    """Scale vectors (…, 3) to length 1."""
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

@@ -1,0 +1,159 @@
+"""A jump on the spot: crouch, push and swing of the arms, flight on a parabola, landing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.simulate.people.curves import about_y, about_z, through
+from asterism.simulate.people.gait import GRAVITY, arm_turns
+from asterism.simulate.people.skeleton import SIDES
+from asterism.simulate.people.steps import REACH, rolled
+
+if TYPE_CHECKING:
+    from asterism.simulate.people.curves import Array, Knot
+    from asterism.simulate.people.gait import Style
+    from asterism.simulate.people.skeleton import Body, Pose
+
+__all__ = ["jump"]
+
+_PERIOD = 3.0  # seconds a jump, at least
+_DIP, _PUSH, _SINK, _RISE = 0.62, 0.30, 0.26, 0.75  # seconds before and after the flight
+
+
+def jump(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
+    """Jump on the spot: once in the middle of the clip, or once in every three seconds of it."""
+    facing, rise = rng.uniform(-180, 180), rng.uniform(0.26, 0.42) * body.height / 1.75
+    depth = rng.uniform(0.14, 0.17) * body.height
+    duration = float(t[-1])
+    n = max(1, int((duration + 1e-9) // _PERIOD))
+    slot = duration / n
+    i = np.clip(np.floor(t / slot), 0, n - 1) if slot else np.zeros(len(t))
+    one = _Jump(body=body, style=style, rise=rise, depth=depth)
+    return one.pose(t - (i + 0.5) * slot, about_z(np.full(len(t), facing)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Jump:
+    """One jump; time 0 is the top of the flight."""
+
+    body: Body
+    style: Style
+    rise: float
+    depth: float
+
+    @property
+    def half(self) -> float:
+        """Half the time of flight."""
+        return float(np.sqrt(2 * self.rise / GRAVITY))
+
+    def pose(self, t: Array, facing: Array) -> Pose:
+        """Give the pose; `facing` (T, 3, 3) turns the person to the world."""
+        def turned(local: Array) -> Array:
+            return np.einsum("tij,tj->ti", facing, local)
+
+        root, ankles = self.root(t), self.ankles(t)
+        trunk = facing @ about_y(self._along(t, 2.0, 38.0, 0.0, 2.0, 26.0))
+        swing = self._along(t, 0.0, -48.0, 118.0, 62.0, 25.0)
+        bend = self._along(t, 16.0, 22.0, 30.0, 34.0, 40.0) + self.style.elbows
+        return self.body.pose(
+            root=turned(root),
+            pelvis=facing @ about_y(self._along(t, 1.0, 20.0, -2.0, 3.0, 14.0)),
+            trunk=trunk,
+            head=facing @ about_y(self._along(t, 1.0, 14.0, -10.0, 8.0, 14.0)),
+            ankles={s: turned(ankles[s]) for s in SIDES},
+            feet={
+                s: facing @ about_z(np.full(len(t), sign * 5.0)) @ about_y(-self._pitch(t)[:, 0])
+                for s, sign in SIDES.items()
+            },
+            arms={
+                s: arm_turns(
+                    trunk, sign, swing * self.style.arms**0.5 * (1 + sign * self.style.asymmetry),
+                    13.0, 4.0, bend,
+                )
+                for s, sign in SIDES.items()
+            },
+        )  # fmt: skip
+
+    def root(self, t: Array) -> Array:
+        """Middle of the hips in the person's frame, (T, 3): a parabola in flight."""
+        up, leg = GRAVITY * self.half, self.body["thigh"] + self.body["shank"]
+        stand = self.body["ankle"] + REACH * leg - 0.005 * self.body.height
+        edge = self._standing(np.array([-self.half, self.half]))[0][:, 1] + 0.95 * leg
+        # The landing is on less stretched feet, so lower than the leaving: later by as much.
+        low = stand - 0.62 * self.depth
+        knots: list[Knot] = [
+            (-self.half - _PUSH - _DIP, stand, 0, 0),
+            (-self.half - _PUSH, stand - self.depth, 0, 9.0),
+            (-self.half, edge[0], up, -GRAVITY),
+            (self.half, edge[0], -up, -GRAVITY),
+            (self.half + _SINK, low, 0, 7.0),
+            (self.half + _SINK + _RISE, stand, 0, 0),
+        ]
+        back = self._along(t, 0.0, -0.055, 0.012, 0.0, -0.040) * self.body.height
+        return np.column_stack([back, np.zeros(len(t)), through(t, knots)])
+
+    def ankles(self, t: Array) -> dict[str, Array]:
+        """Ankle joints in the person's frame, (T, 3) each; the legs hang from the hips in flight."""
+        flat = self._standing(t)[0]
+        in_air = np.abs(t) < self.half
+        if in_air.any():
+            flat[in_air] = self._hanging(t[in_air])
+        return {
+            s: np.column_stack([flat[:, 0], np.full(len(t), sign * 0.062 * self.body.height), flat[:, 1]])
+            for s, sign in SIDES.items()
+        }
+
+    def _standing(self, t: Array) -> tuple[Array, Array, Array]:
+        """Ankle over the planted foot and its derivatives, forward and up, (T, 2) each."""
+        return rolled(self._pitch(t), self.body.height)
+
+    def _hanging(self, t: Array) -> Array:
+        """Ankle in flight, forward and up, (T, 2): length and angle of the leg go on smoothly."""
+        leg = self.body["thigh"] + self.body["shank"]
+        knots: list[tuple[float, Array, Array, Array]] = []
+        for edge in (-self.half, self.half):
+            e = 1e-3
+            near = edge + e * np.arange(-2, 3)
+            across = self._standing(near)[0] - self.root(near)[:, [0, 2]]
+            polar = np.column_stack(
+                [np.linalg.norm(across, axis=1), np.arctan2(across[:, 0], -across[:, 1])]
+            )
+            rate = np.array([1, -8, 0, 8, -1]) @ polar / (12 * e)
+            bend = np.array([-1, 16, -30, 16, -1]) @ polar / (12 * e**2)
+            knots.append((edge, polar[2], rate, bend))
+        long, rest = np.array([0.985 * leg, 0.02]), np.zeros(2)
+        inner = [(-self.half + 0.09, long, rest, rest), (self.half - 0.09, long, rest, rest)]
+        polar = through(t, [knots[0], *inner, knots[1]])
+        across = polar[:, :1] * np.column_stack([np.sin(polar[:, 1]), -np.cos(polar[:, 1])])
+        return self.root(t)[:, [0, 2]] + across
+
+    def _pitch(self, t: Array) -> Array:
+        """Pitch of the feet, its rate and acceleration, degrees, toes up: (T, 3)."""
+        h = self.half
+        knots: list[Knot] = [
+            (-h - 0.20, 0, 0, 0),
+            (-h, -48, -330, 0),
+            (-h + 0.09, -62, 0, 0),
+            (h - 0.09, -50, 0, 0),
+            (h, -42, 240, 0),
+            (h + 0.16, 0, 0, 0),
+        ]
+        return through(t, knots, derivatives=2)
+
+    def _along(
+        self, t: Array, rest: float, crouch: float, leave: float, land: float, sink: float
+    ) -> Array:
+        """Go through values at rest, crouching, leaving, landing and sinking, and back to rest."""
+        h = self.half
+        knots: list[Knot] = [
+            (-h - _PUSH - _DIP, rest, 0, 0),
+            (-h - _PUSH, crouch, 0, 0),
+            (-h + 0.06, leave, 0, 0),
+            (h, land, 0, 0),
+            (h + _SINK + 0.05, sink, 0, 0),
+            (h + _SINK + _RISE + 0.1, rest, 0, 0),
+        ]
+        return through(t, knots)

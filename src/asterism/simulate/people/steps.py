@@ -1,0 +1,320 @@
+"""Feet that stand still on the ground, step by step, and the height at which they carry a body.
+
+A `Course` says where a person goes; a `Gait` how. Each foot is planted where the pelvis passes
+over it, rolls over its heel and its ball without sliding, and swings to the next place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import convolve1d, minimum_filter1d
+
+from asterism.simulate.people.curves import about_y, about_z, through
+from asterism.simulate.people.skeleton import FLESH, LENGTHS, SIDES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from asterism.simulate.people.curves import Array, Knot
+    from asterism.simulate.people.skeleton import Body
+
+__all__ = ["REACH", "Course", "Feet", "Gait", "carried", "feet_on", "reached", "rolled", "swings_of"]
+
+REACH = 0.988  # share of the length of a leg that it stretches to: the knee keeps 18°
+_STEP = 0.01  # seconds between samples of what is integrated or filtered
+_PAD = 1.5  # seconds of it before and after the clip
+_HEEL, _BALL = (np.array(end)[[0, 2]] for end in FLESH["foot"][0][:2])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gait:
+    """How somebody walks or runs.
+
+    Parameters
+    ----------
+    cadence : float
+        Cycles (two steps) a second.
+    stance : float
+        Share of the cycle that a foot is on the ground.
+    under : float
+        Share of the stance after which the ankle is under the hip.
+    landing, leaving : (angle, rate)
+        Pitch of the foot as it lands and leaves, toes up positive: degrees, degrees a second.
+    flat : (float, float)
+        Shares of the stance between which the sole lies flat.
+    lift : float
+        How much higher than the straight way between both ends a foot swings, metres.
+    width : float
+        Distance of the lines on which the feet are planted, metres.
+    toe_out : float
+        How far the feet point outwards, degrees.
+    """
+
+    cadence: float
+    stance: float
+    under: float
+    landing: tuple[float, float]
+    leaving: tuple[float, float]
+    flat: tuple[float, float]
+    lift: float
+    width: float
+    toe_out: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Course:
+    """Where somebody goes.
+
+    Parameters
+    ----------
+    duration : float
+        Of the clip, seconds.
+    speed, heading : callable
+        Of times (T,): forward speed, m/s, and direction, radians.
+    middle : (float, float)
+        Where the course is at half the clip, metres.
+    usual : float
+        The speed that the gait is made for, m/s.
+    """
+
+    duration: float
+    speed: Callable[[Array], Array]
+    heading: Callable[[Array], Array]
+    middle: tuple[float, float] = (0.0, 0.0)
+    usual: float
+    times: Array = field(init=False, repr=False)
+    _curve: CubicSpline = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        n = int(np.ceil((self.duration + 2 * _PAD) / _STEP)) + 1
+        times = -_PAD + _STEP * np.arange(n)
+        way = CubicSpline(times, self.velocity(times)).antiderivative()
+        middle = np.asarray(way(self.duration / 2)) - self.middle
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "_curve", CubicSpline(times, np.asarray(way(times)) - middle))
+
+    def velocity(self, t: Array) -> Array:
+        """Velocity over ground, (T, 2)."""
+        heading = self.heading(t)
+        return self.speed(t)[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+
+    def place(self, t: Array) -> Array:
+        """Place on the ground, (T, 2)."""
+        inside = np.clip(t, self.times[0], self.times[-1])
+        return np.asarray(self._curve(inside), dtype=np.float64)
+
+    def vigour(self, t: Array) -> Array:
+        """How the speed compares with the usual one, between 0 and 1; 0 also backwards."""
+        return np.clip(self.speed(t) / self.usual, 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Feet:
+    """Where the feet are, by side.
+
+    Attributes
+    ----------
+    ankles : dict of ndarray, shape (T, 3)
+        Ankle joints, world metres.
+    turns : dict of ndarray, shape (T, 3, 3)
+        From the foot to the world.
+    """
+
+    ankles: dict[str, Array]
+    turns: dict[str, Array]
+
+
+def swings_of(course: Course, gait: Gait, phase: float) -> dict[str, Array]:
+    """Give the swings of a steady gait, by side: times of leaving and landing, (n, 2).
+
+    Parameters
+    ----------
+    course, gait
+        Where and how.
+    phase : float
+        Of the cycle at time 0, in cycles; 0 as the left foot lands.
+    """
+    span = 1.5 / gait.cadence
+    swings = {}
+    for side, offset in (("L", 0.0), ("R", 0.5)):
+        first, last = (
+            (t * gait.cadence + phase - offset) for t in (-span, course.duration + span)
+        )
+        landings = (np.arange(np.floor(first), np.ceil(last) + 1) + offset - phase) / gait.cadence
+        swings[side] = np.stack([landings - (1 - gait.stance) / gait.cadence, landings], axis=-1)
+    return swings
+
+
+def feet_on(
+    t: Array, body: Body, course: Course, gait: Gait, swings: dict[str, Array]
+) -> Feet:
+    """Move the feet along a course.
+
+    Parameters
+    ----------
+    t : ndarray, shape (T,)
+        Seconds.
+    body, course, gait
+        Who, where and how.
+    swings : dict of ndarray, shape (n, 2)
+        When each foot leaves the ground and lands, in order of time; outside it stands.
+    """
+    ankles, turns = {}, {}
+    for side in SIDES:
+        plan = _Plan(body, course, gait, swings[side], SIDES[side])
+        pitch, yaw = plan.pitch(t), plan.yaw(t)
+        turns[side] = about_z(np.degrees(yaw)) @ about_y(-pitch[:, 0])
+        ankles[side] = plan.ankle(t, pitch)
+    return Feet(ankles=ankles, turns=turns)
+
+
+class _Plan:
+    """The stances of one foot between its swings, and the motion that follows from them."""
+
+    def __init__(
+        self, body: Body, course: Course, gait: Gait, swings: Array, sign: float
+    ) -> None:
+        self.gait, self.height = gait, body.height
+        self.leave, self.land = swings.T
+        length = gait.stance / gait.cadence
+        start = np.concatenate([[-np.inf], self.land])  # of stance i, which ends with swing i
+        end = np.concatenate([self.leave, [np.inf]])
+        is_long = end - start > 1.3 * length  # a stand: it is over neither end that the pelvis is
+        edges = np.clip([start, end], *course.times[[0, -1]])
+        passing = np.where(is_long, edges.mean(axis=0), start + gait.under * length)
+        yaw = course.heading(passing)
+        aside = sign * gait.width / 2
+        left = np.stack([-np.sin(yaw), np.cos(yaw)], axis=-1)
+        self.places = course.place(passing) + aside * left
+        self.yaws = yaw + np.radians(sign * gait.toe_out)
+        self.vigour_land = course.vigour(self.land)
+        self.vigour_leave = course.vigour(self.leave)
+
+    def yaw(self, t: Array) -> Array:
+        """Direction of the foot, radians (T,)."""
+        knots: list[Knot] = [(-1e3, self.yaws[0], 0, 0)]
+        for i, (leave, land) in enumerate(zip(self.leave, self.land, strict=True)):
+            knots += [(leave, self.yaws[i], 0, 0), (land, self.yaws[i + 1], 0, 0)]
+        return through(t, knots if len(knots) > 1 else [*knots, (1e3, self.yaws[0], 0, 0)])
+
+    def pitch(self, t: Array) -> Array:
+        """Pitch of the foot, its rate and acceleration, degrees, toes up: (T, 3)."""
+        gait, length = self.gait, self.gait.stance / self.gait.cadence
+        knots: list[Knot] = [(-1e3, 0, 0, 0)]
+        for i, (leave, land) in enumerate(zip(self.leave, self.land, strict=True)):
+            off, on = self.vigour_leave[i], self.vigour_land[i]
+            knots += [
+                (leave - (1 - gait.flat[1]) * length, 0, 0, 0),
+                (leave, gait.leaving[0] * off, gait.leaving[1] * off, 0),
+                (land, gait.landing[0] * on, gait.landing[1] * on, 0),
+                (land + gait.flat[0] * length, 0, 0, 0),
+            ]
+        return through(t, [*knots, (1e4, 0, 0, 0)], derivatives=2)
+
+    def ankle(self, t: Array, pitch: Array) -> Array:
+        """Ankle joint, world metres (T, 3): `pitch` as `pitch` gives it."""
+        stance = np.searchsorted(self.land, t, side="right")
+        value = self._standing(stance, pitch)[0]
+        for i, (leave, land) in enumerate(zip(self.leave, self.land, strict=True)):
+            is_in = (t > leave) & (t < land)
+            if not is_in.any():
+                continue
+            ends = self.pitch(np.array([leave, land]))
+            states = self._standing(np.array([i, i + 1]), ends)
+            knots: list[Knot] = [
+                (when, *(x[k] for x in states)) for k, when in enumerate((leave, land))
+            ]
+            value[is_in] = through(t[is_in], knots)
+            s = (t[is_in] - leave) / (land - leave)
+            value[is_in, 2] += self.gait.lift * 64 * (s * (1 - s)) ** 3
+        return value
+
+    def _standing(self, stance: NDArray[np.int64], pitch: Array) -> tuple[Array, ...]:
+        """Position, velocity and acceleration of the ankle over a planted foot, (T, 3) each."""
+        yaw = self.yaws[stance]
+        ahead = np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
+        moves = [
+            np.concatenate([move[:, :1] * ahead, move[:, 1:]], axis=-1)
+            for move in rolled(pitch, self.height)
+        ]
+        moves[0][:, :2] += self.places[stance]
+        return tuple(moves)
+
+
+def rolled(pitch: Array, height: float) -> tuple[Array, Array, Array]:
+    """Roll a planted foot over its heel or its ball, which stays where it is.
+
+    Parameters
+    ----------
+    pitch : ndarray, shape (T, 3)
+        Angle, its rate and acceleration, degrees, toes up.
+    height : float
+        Of the person, metres.
+
+    Returns
+    -------
+    tuple of ndarray, shape (T, 2)
+        Ankle forward of its place over the flat foot and above the ground, velocity, acceleration.
+    """
+    angle, rate, bend = (np.radians(pitch[:, k, None]) for k in range(3))
+    lever = -height * np.where(angle > 0, _HEEL, _BALL)  # from the pivot to the ankle
+    across = np.stack([-lever[:, 1], lever[:, 0]], axis=-1)
+    cos, sin = np.cos(angle), np.sin(angle)
+    along, aside = lever * cos + across * sin, across * cos - lever * sin
+    place = along - lever + [0.0, LENGTHS["ankle"] * height]
+    return place, rate * aside, bend * aside - rate**2 * along
+
+
+def reached(
+    course: Course,
+    body: Body,
+    hips_at: Callable[[Array], dict[str, Array]],
+    feet_at: Callable[[Array], Feet],
+) -> Array:
+    """Give the greatest height of the hips at which both legs reach the feet, at `course.times`.
+
+    Parameters
+    ----------
+    course, body
+        Where and who.
+    hips_at : callable
+        Gives the hip joints by side at times (T,) for a root at height 0: (T, 3).
+    feet_at : callable
+        Gives the feet at times (T,).
+    """
+    hips, feet = hips_at(course.times), feet_at(course.times)
+    leg = REACH * (body["thigh"] + body["shank"])
+    highest = np.full(len(course.times), np.inf)
+    for side in SIDES:
+        across = feet.ankles[side] - hips[side]
+        flat = np.minimum((across[:, :2] ** 2).sum(axis=1), 0.9 * leg**2)
+        highest = np.minimum(highest, across[:, 2] + np.sqrt(leg**2 - flat))
+    return highest
+
+
+def carried(t: Array, course: Course, highest: Array, smoothing: float = 0.2) -> Array:
+    """Give the height that legs carry the hips at, (T,): smooth and never out of their reach.
+
+    Parameters
+    ----------
+    t : ndarray, shape (T,)
+        Seconds.
+    course
+        Where.
+    highest : ndarray
+        What `reached` gives.
+    smoothing : float
+        Seconds over which the height is evened out.
+    """
+    # A mean over a window, of minima over the same window, is under each of its values.
+    box = np.ones(2 * round(smoothing / 6 / _STEP) + 1)
+    kernel = np.convolve(np.convolve(box, box), box)
+    lowest = minimum_filter1d(highest, len(kernel), mode="nearest")
+    even = convolve1d(lowest, kernel / kernel.sum(), mode="nearest")
+    return np.asarray(CubicSpline(course.times, even)(t), dtype=np.float64)
