@@ -73,7 +73,7 @@ def test_a_lens_that_does_not_fit_is_refused_by_name(tmp_path, format, lens):
         return
     with pytest.raises(ParameterError, match=camera.name) as error:
         write_rig(Rig((camera,)), path, format=format)
-    assert "with_lens(am." in str(error.value)
+    assert "fit_lens(camera, am." in str(error.value)
     assert "asterism camera convert" in str(error.value)
     assert not path.exists()
 

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from asterism.camera import Rig as Rig
     from asterism.camera import Surface as Surface
     from asterism.camera import ViconRadial as ViconRadial
+    from asterism.camera import fit_lens as fit_lens
     from asterism.camera import intrinsics as intrinsics
     from asterism.camera import volume_grid as volume_grid
     from asterism.errors import AsterismError as AsterismError
@@ -117,6 +118,7 @@ _PUBLIC = {
         "Rig",
         "Surface",
         "ViconRadial",
+        "fit_lens",
         "intrinsics",
         "volume_grid",
     ),

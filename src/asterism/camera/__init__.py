@@ -3,7 +3,7 @@
 from asterism.camera.camera import Camera
 from asterism.camera.depth_image import DepthImage
 from asterism.camera.lens import BrownConrady, Lens, QuadraticCorrection, ReportRadial, ViconRadial
-from asterism.camera.lens_fit import LensFit
+from asterism.camera.lens_fit import LensFit, fit_lens
 from asterism.camera.matrices import intrinsics
 from asterism.camera.observations import Observations
 from asterism.camera.painter import Face, Painting
@@ -31,6 +31,7 @@ __all__ = [
     "Rig",
     "Surface",
     "ViconRadial",
+    "fit_lens",
     "intrinsics",
     "volume_grid",
 ]

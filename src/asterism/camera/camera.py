@@ -18,11 +18,10 @@ from asterism.camera.surfaces import check_surfaces, compile_surfaces
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from asterism.camera.lens_fit import LensFit
     from asterism.camera.projection import Projection
     from asterism.camera.surfaces import Surface
 
@@ -323,39 +322,6 @@ class Camera:
             order=tuple(faces.names[i] for i in order),
             cycles=tuple(tuple(faces.names[i] for i in group) for group in cycles),
         )
-
-    def with_lens(
-        self,
-        kind: type[Lens] | None,
-        *,
-        refit_camera: bool = False,
-        without: Collection[str] = (),
-    ) -> LensFit:
-        """Give the camera another kind of lens, fitted to its own over the image.
-
-        There is no exact conversion: the models bend in different directions, and a changed sign is
-        right to first order only. So the new one is fitted, and what it leaves over is told.
-
-        Parameters
-        ----------
-        kind : type of Lens or None
-            `BrownConrady`, `ReportRadial`, `ViconRadial`, None for a pin-hole; or
-            `QuadraticCorrection`, which will be one of raw pixels and may shift the principal
-            point.
-        refit_camera : bool
-            Whether K and the direction of sight may change too; the place never does. For a
-            camera with a `K_lens`, which the result has not, or a skew that is left out.
-        without : collection of str
-            Coefficients that stay zero, "skew" among them.
-
-        Returns
-        -------
-        LensFit
-            The camera, and its distance from this one in pixels.
-        """
-        from asterism.camera.lens_fit import fit_lens
-
-        return fit_lens(self, kind, refit_camera=refit_camera, without=without)
 
     def replace(self, **changes: Any) -> Self:
         """Give the camera with some of its fields changed."""

@@ -57,7 +57,34 @@ def fit_lens(
     refit_camera: bool = False,
     without: Collection[str] = (),
 ) -> LensFit:
-    """Fit a lens of another kind to the one that a camera has; see `Camera.with_lens`."""
+    """Give a camera another kind of lens, fitted to its own over the image.
+
+    There is no exact conversion: the models bend in different directions, and a changed sign is
+    right to first order only. So the new one is fitted, and what it leaves over is told.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    kind : type of Lens or None
+        `BrownConrady`, `ReportRadial`, `ViconRadial`, None for a pin-hole; or
+        `QuadraticCorrection`, which will be one of raw pixels and may shift the principal point.
+    refit_camera : bool
+        Whether K and the direction of sight may change too; the place never does. For a camera
+        with a `K_lens`, which the result has not, or a skew that is left out.
+    without : collection of str
+        Coefficients that stay zero, "skew" among them.
+
+    Returns
+    -------
+    LensFit
+        The camera, and its distance from the given one in pixels.
+
+    Raises
+    ------
+    ParameterError
+        If the kind is another, or the old lens reaches next to nothing of the image.
+    """
     if kind not in (BrownConrady, ReportRadial, ViconRadial, QuadraticCorrection, None):
         expected = "BrownConrady, ReportRadial, ViconRadial, QuadraticCorrection or None"
         raise ParameterError("kind", expected, kind)

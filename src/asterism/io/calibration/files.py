@@ -83,7 +83,7 @@ def write_rig(rig: Rig, path: str | Path, *, format: str | None = None) -> None:
     Raises
     ------
     ParameterError
-        If the format is unknown or cannot hold a camera as it is: then `Camera.with_lens` gives
+        If the format is unknown or cannot hold a camera as it is: then `fit_lens` gives
         the nearest that it can, and says how near. Or if the folder is not empty.
     FormatError
         If the file cannot be written.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from asterism.camera import BrownConrady, QuadraticCorrection, Rig, ViconRadial
+from asterism.camera import BrownConrady, QuadraticCorrection, Rig, ViconRadial, fit_lens
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -64,6 +64,6 @@ def fit_kind(camera: Camera, kind: type[Lens] | None, format: Calibration) -> Le
     """
     without = [n for n, has in (("skew", format.has_skew), ("k3", format.has_k3)) if not has]
     drops_skew = not format.has_skew and camera.K[0, 1] != 0
-    return camera.with_lens(
-        kind, refit_camera=camera.K_lens is not None or drops_skew, without=without
+    return fit_lens(
+        camera, kind, refit_camera=camera.K_lens is not None or drops_skew, without=without
     )

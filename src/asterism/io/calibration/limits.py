@@ -42,7 +42,7 @@ def refuse_lens(camera: Camera, format: str, wanted: str, got: str, kind: str) -
         The class of lens that would fit.
     """
     hint = (
-        f"camera.with_lens(am.{kind}) fits one and says how many pixels it is off; "
+        f"am.fit_lens(camera, am.{kind}) fits one and says how many pixels it is off; "
         "`asterism camera convert` does that for a whole file"
     )
     raise ParameterError(
