@@ -111,13 +111,13 @@ def run(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
 def _straight(
     t: Array, body: Body, style: Style, rng: np.random.Generator, *, is_run: bool
 ) -> Pose:
-    gait, speed = (running if is_run else walking)(body.height, style)
+    gait = (running if is_run else walking)(body.height, style)
     direction = rng.uniform(-np.pi, np.pi)
     course = Course(
         duration=float(t[-1]),
-        speed=lambda x: np.full(x.shape, speed),
+        speed=lambda x: np.full(x.shape, gait.speed),
         heading=lambda x: np.full(x.shape, direction),
-        usual=speed,
+        usual=gait.speed,
     )
     swings = swings_of(course, gait, style.phase)
     walker = Walker(
@@ -128,9 +128,10 @@ def _straight(
 
 def turn(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
     """Walk on a circle, turn round at half time, and walk back on a circle."""
-    gait, usual = walking(body.height, style)
+    gait = walking(body.height, style)
+    usual = gait.speed
     direction, side = rng.uniform(-np.pi, np.pi), rng.choice([-1.0, 1.0])
-    duration, radius, about = float(t[-1]), rng.uniform(1.8, 2.4), 1.3
+    duration, radius, about = float(t[-1]), rng.uniform(1.8, 2.4), 1.7
     bend = side * 0.8 * usual / radius
 
     def passage(x: Array) -> Array:  # from -1 to 1 over the turn, with constant rate in its middle
@@ -139,7 +140,7 @@ def turn(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
 
     def speed(x: Array) -> Array:
         s = np.clip(np.abs(x - duration / 2) / about, 0, 1)
-        return usual * (0.30 + 0.55 * s**3 * (10 - 15 * s + 6 * s**2))
+        return usual * (0.35 + 0.50 * s**3 * (10 - 15 * s + 6 * s**2))
 
     def heading(x: Array) -> Array:
         return direction + bend * (x - duration / 2) + side * np.pi / 2 * passage(x)

@@ -87,46 +87,48 @@ class Carriage:
     sway: Array
 
 
-def walking(height: float, style: Style) -> tuple[Gait, float]:
-    """Give the gait of a walk, and its speed in m/s.
+def walking(height: float, style: Style) -> Gait:
+    """Give the gait of a walk.
 
     Steps of 0.41 of the height at 112 a minute are a man's free walk (Murray 1964: 78 cm and 117 at
     1.76 m; Perry: 1.36 m/s). Time goes with the square root of the length.
     """
     cadence = 56 / 60 * style.pace * np.sqrt(1.75 / height)
-    gait = Gait(
+    return Gait(
         cadence=cadence,
         stance=0.61,
-        under=0.41,
-        landing=(19.0, -130.0),
-        leaving=(-58.0, -190.0),
-        flat=(0.17, 0.50),
-        lift=0.012 * height,
+        under=0.345,
+        landing=(18.0, -60.0),
+        leaving=(-58.0, -330.0),
+        flat=(0.17, 0.45),
+        swing=((0.26, 9.0, 60.0), (0.54, 25.0, 48.0), (0.80, 27.0, 18.0)),
+        hips=0.515 * height,
+        speed=0.82 * height * style.length * cadence,
         width=0.055 * height,
         toe_out=6.0,
     )
-    return gait, 0.82 * height * style.length * cadence
 
 
-def running(height: float, style: Style) -> tuple[Gait, float]:
-    """Give the gait of a run, and its speed in m/s.
+def running(height: float, style: Style) -> Gait:
+    """Give the gait of a run.
 
     About 3.2 m/s at 164 steps a minute with the foot on the ground for a third of the cycle
     (Novacheck 1998).
     """
     cadence = 82 / 60 * style.pace * np.sqrt(1.75 / height)
-    gait = Gait(
+    return Gait(
         cadence=cadence,
         stance=0.35,
-        under=0.43,
-        landing=(8.0, -120.0),
-        leaving=(-52.0, -420.0),
+        under=0.36,
+        landing=(8.0, -60.0),
+        leaving=(-60.0, -680.0),
         flat=(0.16, 0.45),
-        lift=0.145 * height,
-        width=0.03 * height,
+        swing=((0.15, -10.0, 46.0), (0.46, 26.0, 100.0), (0.72, 46.0, 78.0), (0.89, 38.0, 38.0)),
+        hips=0.485 * height,
+        speed=1.28 * height * style.length * cadence,
+        width=0.064 * height,
         toe_out=4.0,
     )
-    return gait, 1.34 * height * style.length * cadence
 
 
 def upright(

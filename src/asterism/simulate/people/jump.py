@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["jump"]
 
 _PERIOD = 3.0  # seconds a jump, at least
-_DIP, _PUSH, _SINK, _RISE = 0.62, 0.30, 0.26, 0.75  # seconds before and after the flight
+_DIP, _PUSH, _SINK, _RISE = 0.62, 0.32, 0.26, 0.75  # seconds before and after the flight
+_LEAVE, _LAND = (-48.0, -360.0), (-34.0, 200.0)  # pitch of the feet and its rate, degrees
 
 
 def jump(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
@@ -45,9 +46,28 @@ class _Jump:
     depth: float
 
     @property
-    def half(self) -> float:
-        """Half the time of flight."""
+    def up(self) -> float:
+        """Time from leaving the ground to the top of the flight."""
         return float(np.sqrt(2 * self.rise / GRAVITY))
+
+    @property
+    def down(self) -> float:
+        """Time from the top to the ground, which legs meet less stretched, so later."""
+        leave, land = self._edges
+        return float(np.sqrt(2 * (self.rise + leave - land) / GRAVITY))
+
+    @property
+    def _edges(self) -> tuple[float, float]:
+        """Heights of the root as the balls of the feet leave the ground and meet it."""
+        ankle = [
+            float(rolled(np.array([[pitch, 0.0, 0.0]]), self.body.height)[0][0, 1])
+            for pitch in (_LEAVE[0], _LAND[0])
+        ]
+        return ankle[0] + 0.93 * self._leg, ankle[1] + 0.91 * self._leg
+
+    @property
+    def _leg(self) -> float:
+        return self.body["thigh"] + self.body["shank"]
 
     def pose(self, t: Array, facing: Array) -> Pose:
         """Give the pose; `facing` (T, 3, 3) turns the person to the world."""
@@ -56,7 +76,7 @@ class _Jump:
 
         root, ankles = self.root(t), self.ankles(t)
         trunk = facing @ about_y(self._along(t, 2.0, 38.0, 0.0, 2.0, 26.0))
-        swing = self._along(t, 0.0, -48.0, 118.0, 62.0, 25.0)
+        swing = self._along(t, 0.0, -44.0, 112.0, 66.0, 25.0, ahead=0.16)
         bend = self._along(t, 16.0, 22.0, 30.0, 34.0, 40.0) + self.style.elbows
         return self.body.pose(
             root=turned(root),
@@ -79,18 +99,15 @@ class _Jump:
 
     def root(self, t: Array) -> Array:
         """Middle of the hips in the person's frame, (T, 3): a parabola in flight."""
-        up, leg = GRAVITY * self.half, self.body["thigh"] + self.body["shank"]
-        stand = self.body["ankle"] + REACH * leg - 0.005 * self.body.height
-        edge = self._standing(np.array([-self.half, self.half]))[0][:, 1] + 0.95 * leg
-        # The landing is on less stretched feet, so lower than the leaving: later by as much.
-        low = stand - 0.62 * self.depth
+        stand = self.body["ankle"] + REACH * self._leg - 0.005 * self.body.height
+        leave, land = self._edges
         knots: list[Knot] = [
-            (-self.half - _PUSH - _DIP, stand, 0, 0),
-            (-self.half - _PUSH, stand - self.depth, 0, 9.0),
-            (-self.half, edge[0], up, -GRAVITY),
-            (self.half, edge[0], -up, -GRAVITY),
-            (self.half + _SINK, low, 0, 7.0),
-            (self.half + _SINK + _RISE, stand, 0, 0),
+            (-self.up - _PUSH - _DIP, stand, 0, 0),
+            (-self.up - _PUSH, stand - self.depth, 0, 9.0),
+            (-self.up, leave, GRAVITY * self.up, -GRAVITY),
+            (self.down, land, -GRAVITY * self.down, -GRAVITY),
+            (self.down + _SINK, stand - 0.62 * self.depth, 0, 7.0),
+            (self.down + _SINK + _RISE, stand, 0, 0),
         ]
         back = self._along(t, 0.0, -0.055, 0.012, 0.0, -0.040) * self.body.height
         return np.column_stack([back, np.zeros(len(t)), through(t, knots)])
@@ -98,7 +115,7 @@ class _Jump:
     def ankles(self, t: Array) -> dict[str, Array]:
         """Ankle joints in the person's frame, (T, 3) each; the legs hang from the hips in flight."""
         flat = self._standing(t)[0]
-        in_air = np.abs(t) < self.half
+        in_air = (t > -self.up) & (t < self.down)
         if in_air.any():
             flat[in_air] = self._hanging(t[in_air])
         return {
@@ -112,9 +129,8 @@ class _Jump:
 
     def _hanging(self, t: Array) -> Array:
         """Ankle in flight, forward and up, (T, 2): length and angle of the leg go on smoothly."""
-        leg = self.body["thigh"] + self.body["shank"]
         knots: list[tuple[float, Array, Array, Array]] = []
-        for edge in (-self.half, self.half):
+        for edge in (-self.up, self.down):
             e = 1e-3
             near = edge + e * np.arange(-2, 3)
             across = self._standing(near)[0] - self.root(near)[:, [0, 2]]
@@ -124,36 +140,44 @@ class _Jump:
             rate = np.array([1, -8, 0, 8, -1]) @ polar / (12 * e)
             bend = np.array([-1, 16, -30, 16, -1]) @ polar / (12 * e**2)
             knots.append((edge, polar[2], rate, bend))
-        long, rest = np.array([0.985 * leg, 0.02]), np.zeros(2)
-        inner = [(-self.half + 0.09, long, rest, rest), (self.half - 0.09, long, rest, rest)]
+        long, rest = np.array([0.985 * self._leg, 0.02]), np.zeros(2)
+        inner = [(-self.up + 0.08, long, rest, rest), (self.down - 0.09, long, rest, rest)]
         polar = through(t, [knots[0], *inner, knots[1]])
         across = polar[:, :1] * np.column_stack([np.sin(polar[:, 1]), -np.cos(polar[:, 1])])
         return self.root(t)[:, [0, 2]] + across
 
     def _pitch(self, t: Array) -> Array:
         """Pitch of the feet, its rate and acceleration, degrees, toes up: (T, 3)."""
-        h = self.half
         knots: list[Knot] = [
-            (-h - 0.20, 0, 0, 0),
-            (-h, -48, -330, 0),
-            (-h + 0.09, -62, 0, 0),
-            (h - 0.09, -50, 0, 0),
-            (h, -42, 240, 0),
-            (h + 0.16, 0, 0, 0),
+            (-self.up - 0.20, 0, 0, 0),
+            (-self.up, *_LEAVE, 0),
+            (-self.up + 0.09, -62, 0, 0),
+            (self.down - 0.09, -44, 0, 0),
+            (self.down, *_LAND, 0),
+            (self.down + 0.14, 0, 0, 0),
         ]
         return through(t, knots, derivatives=2)
 
     def _along(
-        self, t: Array, rest: float, crouch: float, leave: float, land: float, sink: float
+        self,
+        t: Array,
+        rest: float,
+        crouch: float,
+        leave: float,
+        land: float,
+        sink: float,
+        ahead: float = 0.0,
     ) -> Array:
-        """Go through values at rest, crouching, leaving, landing and sinking, and back to rest."""
-        h = self.half
+        """Go through values at rest, crouching, leaving, landing and sinking, and back to rest.
+
+        The crouch is reached `ahead` seconds before the legs reach it.
+        """
         knots: list[Knot] = [
-            (-h - _PUSH - _DIP, rest, 0, 0),
-            (-h - _PUSH, crouch, 0, 0),
-            (-h + 0.06, leave, 0, 0),
-            (h, land, 0, 0),
-            (h + _SINK + 0.05, sink, 0, 0),
-            (h + _SINK + _RISE + 0.1, rest, 0, 0),
+            (-self.up - _PUSH - _DIP - ahead, rest, 0, 0),
+            (-self.up - _PUSH - ahead, crouch, 0, 0),
+            (-self.up + 0.06, leave, 0, 0),
+            (self.down, land, 0, 0),
+            (self.down + _SINK + 0.05, sink, 0, 0),
+            (self.down + _SINK + _RISE + 0.1, rest, 0, 0),
         ]
         return through(t, knots)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 from scipy.ndimage import convolve1d, minimum_filter1d
 
 from asterism.simulate.people.curves import about_y, about_z, through
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["REACH", "Course", "Feet", "Gait", "carried", "feet_on", "reached", "rolled", "swings_of"]
 
-REACH = 0.988  # share of the length of a leg that it stretches to: the knee keeps 18°
+REACH = 0.994  # share of the length of a leg that it stretches to: the knee keeps 13°
 _STEP = 0.01  # seconds between samples of what is integrated or filtered
 _PAD = 1.5  # seconds of it before and after the clip
 _HEEL, _BALL = (np.array(end)[[0, 2]] for end in FLESH["foot"][0][:2])
@@ -48,8 +48,12 @@ class Gait:
         Pitch of the foot as it lands and leaves, toes up positive: degrees, degrees a second.
     flat : (float, float)
         Shares of the stance between which the sole lies flat.
-    lift : float
-        How much higher than the straight way between both ends a foot swings, metres.
+    swing : tuple of (share, hip, knee)
+        Flexion of the joints at shares of the swing, degrees.
+    hips : float
+        Usual height of the hips, metres.
+    speed : float
+        Usual speed, m/s.
     width : float
         Distance of the lines on which the feet are planted, metres.
     toe_out : float
@@ -62,9 +66,25 @@ class Gait:
     landing: tuple[float, float]
     leaving: tuple[float, float]
     flat: tuple[float, float]
-    lift: float
+    swing: tuple[tuple[float, float, float], ...]
+    hips: float
+    speed: float
     width: float
     toe_out: float
+
+    def way(self, body: Body) -> Array:
+        """Where the ankle passes as it swings at the usual speed, (n, 3).
+
+        Columns are the share of the swing, the share of the way from place to place, and the
+        height above the ground in metres.
+        """
+        share, hip, knee = np.array(self.swing).T
+        hip, shank = np.radians(hip), np.radians(hip - knee)
+        thighs, shanks = body["thigh"], body["shank"]
+        ahead = thighs * np.sin(hip) + shanks * np.sin(shank)
+        down = thighs * np.cos(hip) + shanks * np.cos(shank)
+        passed = self.stance * (1 - self.under) + (1 - self.stance) * share  # by the hips, in cycles
+        return np.column_stack([share, passed + ahead * self.cadence / self.speed, self.hips - down])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -80,7 +100,7 @@ class Course:
     middle : (float, float)
         Where the course is at half the clip, metres.
     usual : float
-        The speed that the gait is made for, m/s.
+        Speed at which the gait has its full vigour, m/s.
     """
 
     duration: float
@@ -180,7 +200,8 @@ class _Plan:
     def __init__(
         self, body: Body, course: Course, gait: Gait, swings: Array, sign: float
     ) -> None:
-        self.gait, self.height = gait, body.height
+        self.gait, self.height, self.way = gait, body.height, gait.way(body)
+        self.sign = sign
         self.leave, self.land = swings.T
         length = gait.stance / gait.cadence
         start = np.concatenate([[-np.inf], self.land])  # of stance i, which ends with swing i
@@ -189,7 +210,10 @@ class _Plan:
         edges = np.clip([start, end], *course.times[[0, -1]])
         passing = np.where(is_long, edges.mean(axis=0), start + gait.under * length)
         yaw = course.heading(passing)
-        aside = sign * gait.width / 2
+        # Who turns sets the feet wider apart, or they would meet.
+        turning = np.abs(course.heading(passing + 0.05) - course.heading(passing - 0.05)) / 0.1
+        spread = 0.055 * body.height * np.clip(turning / 1.2, 0.0, 1.0)
+        aside = sign * (gait.width / 2 + spread)[:, None]
         left = np.stack([-np.sin(yaw), np.cos(yaw)], axis=-1)
         self.places = course.place(passing) + aside * left
         self.yaws = yaw + np.radians(sign * gait.toe_out)
@@ -221,18 +245,28 @@ class _Plan:
         """Ankle joint, world metres (T, 3): `pitch` as `pitch` gives it."""
         stance = np.searchsorted(self.land, t, side="right")
         value = self._standing(stance, pitch)[0]
+        share, along, height = self.way.T
+        rest = LENGTHS["ankle"] * self.height
         for i, (leave, land) in enumerate(zip(self.leave, self.land, strict=True)):
             is_in = (t > leave) & (t < land)
             if not is_in.any():
                 continue
-            ends = self.pitch(np.array([leave, land]))
-            states = self._standing(np.array([i, i + 1]), ends)
-            knots: list[Knot] = [
-                (when, *(x[k] for x in states)) for k, when in enumerate((leave, land))
-            ]
-            value[is_in] = through(t[is_in], knots)
-            s = (t[is_in] - leave) / (land - leave)
-            value[is_in, 2] += self.gait.lift * 64 * (s * (1 - s)) ** 3
+            ends = self._standing(np.array([i, i + 1]), self.pitch(np.array([leave, land])))
+            vigour = 0.3 + 0.35 * (self.vigour_leave[i] + self.vigour_land[i])
+            step = self.places[i + 1] - self.places[i]
+            ground = self.places[i] + along[:, None] * step
+            # A foot that turns goes round the other, not straight through it.
+            bend, middle = self.yaws[i + 1] - self.yaws[i], self.yaws[i : i + 2].mean()
+            round_it = 0.16 * self.height * np.sin(np.pi * share) ** 2 * (1 - np.cos(bend / 2))
+            ground += self.sign * round_it[:, None] * [-np.sin(middle), np.cos(middle)]
+            passed = np.column_stack([ground, rest + vigour * (height - rest)])
+            curve = make_interp_spline(
+                np.concatenate([[leave], leave + share * (land - leave), [land]]),
+                np.concatenate([ends[0][:1], passed, ends[0][1:]]),
+                k=5,
+                bc_type=tuple([(1, ends[1][k]), (2, ends[2][k])] for k in (0, 1)),
+            )
+            value[is_in] = curve(t[is_in])
         return value
 
     def _standing(self, stance: NDArray[np.int64], pitch: Array) -> tuple[Array, ...]:
@@ -298,7 +332,7 @@ def reached(
     return highest
 
 
-def carried(t: Array, course: Course, highest: Array, smoothing: float = 0.2) -> Array:
+def carried(t: Array, course: Course, highest: Array, smoothing: float = 0.15) -> Array:
     """Give the height that legs carry the hips at, (T,): smooth and never out of their reach.
 
     Parameters
