@@ -28,12 +28,12 @@ def captures(folder: Path) -> list[Path]:
 
 def named_only(truth: am.Tracks) -> am.Tracks:
     """Leave out the unnamed points, of which nothing is known; all else stays as recorded."""
-    return am.simulate.corrupt(truth)
+    return am.simulate.sense(truth)
 
 
 def corrupted(truth: am.Tracks) -> am.Tracks:
     """10 % of the detections missing, 10 % clutter, 0.3 mm of noise."""
-    return am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1)
+    return am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1)
 
 
 def row_of(

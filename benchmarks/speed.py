@@ -97,7 +97,7 @@ def frames_a_second() -> list[list[str]]:
     rows: list[list[str]] = []
     for n_markers, n_frames in SIZES:
         scene = am.simulate.smooth(n_markers=n_markers, frames=n_frames, seed=1)
-        capture = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.005, seed=2)
+        capture = am.simulate.sense(scene, missing=0.1, clutter=0.1, noise=0.005, seed=2)
         rows += [row_of(capture, n_markers, motions) for motions in (1, 3)]
     return rows
 

@@ -15,7 +15,7 @@ from asterism.view import plot_coverage, plot_image, plot_lens, plot_rig
 def crossing(path: Path) -> None:
     """Draw what goes in and what comes out: a turning cube flies through a still one."""
     scene = am.simulate.crossing(seed=3, rate=100)
-    truth = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.002, seed=4)
+    truth = am.simulate.sense(scene, missing=0.1, clutter=0.1, noise=0.002, seed=4)
     unnamed = am.Tracks(detections=truth.detections, labels=np.full(truth.detections.n_points, -1))
     tracks = am.track(truth.detections, am.GNN())
     figure = Figure(figsize=(11, 3.6), dpi=110)

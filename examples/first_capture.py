@@ -13,7 +13,7 @@ import asterism as am
 
 def main(folder: Path) -> None:
     scene = am.simulate.crossing(seed=3, rate=100)
-    truth = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.002, seed=4)
+    truth = am.simulate.sense(scene, missing=0.1, clutter=0.1, noise=0.002, seed=4)
     capture = truth.detections  # points without names
 
     estimate = am.estimate_model(capture)

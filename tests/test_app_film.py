@@ -51,7 +51,7 @@ def here(tmp_path, monkeypatch):
 def gappy():
     """A scene with gaps, clutter, an empty frame, a nameless track, and some that come late."""
     scene = am.simulate.crossing(seed=3, rate=100)
-    spoilt = am.simulate.corrupt(scene, missing=0.2, clutter=0.2, seed=4)
+    spoilt = am.simulate.sense(scene, missing=0.2, clutter=0.2, seed=4)
     d = spoilt.detections
     is_late = (spoilt.labels % 2 == 0) & (spoilt.labels >= 0)
     is_kept = (d.frame_of != 30) & ~(is_late & (d.frame_of < 10))

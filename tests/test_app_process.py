@@ -166,7 +166,7 @@ def test_a_terminal_that_knows_no_greek(tmp_path):
 
 def test_same_bytes_in_every_process(tmp_path):
     truth = am.simulate.crossing(rate=100, seed=1)
-    am.write(am.simulate.corrupt(truth, missing=0.1, clutter=0.2, seed=1), tmp_path / "a.c3d")
+    am.write(am.simulate.sense(truth, missing=0.1, clutter=0.2, seed=1), tmp_path / "a.c3d")
     results = []
     for seed in ("1", "2"):  # of the hashes of texts, by which sets are ordered
         env = os.environ | {"PYTHONHASHSEED": seed}

@@ -26,7 +26,7 @@ def test_truth_survives_its_file(name, kind, stride, tmp_path):
     path = DATA / name
     if not path.is_file():
         pytest.skip(f"no {path}")
-    truth = corrupt(
+    truth = sense(
         read(path).tracks, missing=0.1, clutter=0.1, noise=3e-4, burst=Burst(), ghosts=Ghosts(),
         stride=stride, seed=1,
     )  # fmt: skip

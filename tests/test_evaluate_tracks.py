@@ -15,12 +15,12 @@ from asterism.errors import ParameterError
 from asterism.evaluate import align, evaluate, floor
 from asterism.evaluate.matching import same_detections
 from asterism.model import Detections, Tracks
-from asterism.simulate import Burst, corrupt, cube, smooth
+from asterism.simulate import Burst, cube, sense, smooth
 
 
 def _truth(seed=0, **switches):
     truth = smooth(n_markers=8, frames=60, rate=100, seed=seed)
-    return corrupt(truth, **{"missing": 0.1, "clutter": 0.1, "noise": 0.001, **switches}, seed=seed)
+    return sense(truth, **{"missing": 0.1, "clutter": 0.1, "noise": 0.001, **switches}, seed=seed)
 
 
 def _result(truth, seed=0):
@@ -120,7 +120,7 @@ def test_detections_of_one_side_are_missed_or_false():
 
 def test_frames_of_one_side_are_kept_in_the_order_of_time():
     truth = _truth(missing=0.0, clutter=0.0)
-    half = corrupt(truth, stride=2)
+    half = sense(truth, stride=2)
     found = evaluate(half, truth)
     assert len(found.times) == 60
     assert found.missing_percent == 50
@@ -217,7 +217,7 @@ def test_names_of_the_result_do_not_matter():
 
 def test_true_positions_enter_motp():
     exact = smooth(n_markers=8, frames=60, rate=100)
-    truth = corrupt(exact, noise=0.002, missing=0.1, clutter=0.2, seed=3)
+    truth = sense(exact, noise=0.002, missing=0.1, clutter=0.2, seed=3)
     places = np.full(truth.detections.points.shape, np.nan)
     is_true = truth.labels >= 0
     dense = exact.positions()
@@ -314,7 +314,7 @@ def test_floor_of_the_reference_scene():
     def mean(max_gap):
         found = []
         for seed in range(40):
-            truth = corrupt(cube(seed=seed), missing=0.1, clutter=0.1, noise=0.005, seed=seed)
+            truth = sense(cube(seed=seed), missing=0.1, clutter=0.1, noise=0.005, seed=seed)
             scores = evaluate(floor(truth, max_gap), truth)
             found.append([100 * (1 - scores.idp), scores.n_tracks])
         return np.mean(found, axis=0)

@@ -76,7 +76,7 @@ def corrupt(
     if not known.n_tracks:
         expected = "a capture whose markers are labelled"
         raise ParameterError("IN", expected, f"{source}, which has no labels")
-    spoilt = am.simulate.corrupt(
+    spoilt = am.simulate.sense(
         known, missing=missing, clutter=clutter, noise=noise, burst=hiding, ghosts=haunting,
         stride=stride, seed=seed,
     )  # fmt: skip

@@ -79,10 +79,10 @@ def _experiment(out: Path, seed: int) -> am.Tracks:
     import numpy as np
 
     import asterism as am
-    from asterism.simulate import Burst, corrupt, smooth
+    from asterism.simulate import Burst, sense, smooth
 
     scene = smooth(n_markers=_N_MARKERS, frames=_N_FRAMES, rate=_RATE, seed=seed)
-    truth = corrupt(
+    truth = sense(
         scene, missing=0.1, clutter=0.1, noise=3e-4, burst=Burst(n=2, shortest=3, longest=10),
         seed=seed,
     )  # fmt: skip

@@ -6,8 +6,8 @@ They are seen by nobody themselves: curtains of the 2010 report (§3.4). Both si
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -33,6 +33,10 @@ class Surface(ABC):
     @abstractmethod
     def n_moments(self) -> int:
         """1 for a surface that stands still, else the number of frames T."""
+
+    @abstractmethod
+    def during(self, frames: NDArray[np.int64]) -> Self:
+        """Give the surface in some of its frames, shape (n,); itself where it stands still."""
 
 
 def _points(name: str, value: ArrayLike, n: int | str) -> NDArray[np.float64]:
@@ -78,6 +82,10 @@ class Polygon(Surface):
         """1, or the number of frames."""
         return len(self.corners)
 
+    def during(self, frames: NDArray[np.int64]) -> Self:
+        """Give the polygon in some of its frames."""
+        return self if self.n_moments == 1 else replace(self, corners=self.corners[frames])
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Mesh(Surface):
@@ -121,6 +129,10 @@ class Mesh(Surface):
         """1, or the number of frames."""
         return len(self.vertices)
 
+    def during(self, frames: NDArray[np.int64]) -> Self:
+        """Give the mesh in some of its frames."""
+        return self if self.n_moments == 1 else replace(self, vertices=self.vertices[frames])
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Capsule(Surface):
@@ -148,6 +160,10 @@ class Capsule(Surface):
     def n_moments(self) -> int:
         """1, or the number of frames."""
         return len(self.ends)
+
+    def during(self, frames: NDArray[np.int64]) -> Self:
+        """Give the capsule in some of its frames."""
+        return self if self.n_moments == 1 else replace(self, ends=self.ends[frames])
 
 
 def check_surfaces(surfaces: Sequence[Surface]) -> None:

@@ -164,6 +164,6 @@ class Tracks:
     def __repr__(self) -> str:
         n_clutter = int((self.labels < 0).sum())
         return (
-            f"Tracks({self.n_tracks} tracks, {len(self.labels) - n_clutter} detections in them, "
-            f"{n_clutter} clutter, {self.detections.n_frames} frames)"
+            f"{type(self).__name__}({self.n_tracks} tracks, {len(self.labels) - n_clutter} "
+            f"detections in them, {n_clutter} clutter, {self.detections.n_frames} frames)"
         )

@@ -1,9 +1,10 @@
 """Captures whose truth is known: scenes in motion, and what goes wrong when one is recorded."""
 
-from asterism.simulate.corruption import corrupt
-from asterism.simulate.episodes import Burst, Ghosts
+from asterism.simulate.episodes import Burst, Ghosts, Visits
 from asterism.simulate.film import Film, film
 from asterism.simulate.scenes import SCENES, Scene, attracted, crossing, cube, smooth, walk
+from asterism.simulate.sensing import sense
+from asterism.simulate.truth import Truth
 
 __all__ = [
     "SCENES",
@@ -11,11 +12,13 @@ __all__ = [
     "Film",
     "Ghosts",
     "Scene",
+    "Truth",
+    "Visits",
     "attracted",
-    "corrupt",
     "crossing",
     "cube",
     "film",
+    "sense",
     "smooth",
     "walk",
 ]

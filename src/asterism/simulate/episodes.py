@@ -1,4 +1,4 @@
-"""What comes and goes in a recording: hidden markers and ghosts, and when."""
+"""What comes and goes in a recording: hidden markers, ghosts, visitors; and when."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from asterism.errors import check_number
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Burst", "Ghosts", "episodes"]
+__all__ = ["Burst", "Ghosts", "Visits", "episodes", "stays"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +74,56 @@ class Ghosts:
         check_number("shortest", self.shortest, above=1, closed=True, integer=True)
         check_number("longest", self.longest, above=self.shortest, closed=True, integer=True)
         check_number("within", self.within, above=0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Visits:
+    """Markers that enter and leave; one that comes again is another marker.
+
+    Parameters
+    ----------
+    shortest, longest : int
+        Frames that one stays; half as many on average are between its leaving and the next one's
+        coming. Those of the result where frames are left out.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range.
+    """
+
+    shortest: int = 50
+    longest: int = 200
+
+    def __post_init__(self) -> None:
+        check_number("shortest", self.shortest, above=1, closed=True, integer=True)
+        check_number("longest", self.longest, above=self.shortest, closed=True, integer=True)
+
+
+def stays(rng: np.random.Generator, visits: Visits, n_frames: int) -> NDArray[np.int64]:
+    """Draw when the visitors of one place are there.
+
+    Parameters
+    ----------
+    rng : Generator
+        Random numbers.
+    visits : Visits
+        How long.
+    n_frames : int
+        Frames of the capture.
+
+    Returns
+    -------
+    ndarray of int, shape (M, 2)
+        First frame of each visit and the frame after its last; the first is under way at the
+        beginning.
+    """
+    n = n_frames // visits.shortest + 2
+    there = rng.integers(visits.shortest, visits.longest, n, endpoint=True)
+    away = rng.integers(1, visits.longest, n, endpoint=True) // 2 + 1
+    begins = np.cumsum(there + away) - (there + away) - rng.integers(0, there[0])
+    both = np.stack([np.maximum(begins, 0), np.minimum(begins + there, n_frames)], axis=1)
+    return both[both[:, 0] < both[:, 1]]
 
 
 def episodes(rng: np.random.Generator, timing: Burst | Ghosts, n_frames: int) -> NDArray[np.int64]:

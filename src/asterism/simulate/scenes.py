@@ -3,7 +3,7 @@
 A scene is a function of keyword-only arguments, among them `frames`, `rate` and `seed`, that gives
 `Tracks`. Motion is laid down per frame and `rate` only says how long a frame lasts, so a scene is
 equally hard at every rate: what moves 0.1 m a frame moves ``0.1 * rate`` m/s. Noise, misses and
-clutter come afterwards, from `asterism.simulate.corrupt`.
+clutter come afterwards, from `asterism.simulate.sense`.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -44,6 +44,8 @@ class Truth(Tracks):
         Colour of each marker, 1 for the first; all 1 by default.
     surfaces : tuple of Surface
         What hides markers: of one moment, or of T.
+    record : dict
+        How it was made, in words and numbers.
 
     Raises
     ------
@@ -54,6 +56,7 @@ class Truth(Tracks):
     connections: NDArray[np.int64] = field(default_factory=_none)
     colours: NDArray[np.int64] = field(default_factory=_nobody)
     surfaces: tuple[Surface, ...] = ()
+    record: dict[str, Any] = field(default_factory=dict[str, Any])
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -1,0 +1,108 @@
+"""What of the markers a recording does not show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.simulate.episodes import episodes, stays
+from asterism.simulate.sensed_points import Points
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from asterism.camera import Rig, Surface
+    from asterism.simulate.episodes import Burst, Visits
+
+__all__ = ["come_and_go", "merge", "seen_by_rig", "shadowed"]
+
+
+def shadowed(
+    rng: np.random.Generator, burst: Burst, points: Points, n_frames: int, n_markers: int
+) -> NDArray[np.bool_]:
+    """Say which points fall into the shadows of a burst."""
+    is_dark = np.zeros((n_frames, n_markers), dtype=bool)
+    for start, stop in episodes(rng, burst, n_frames):
+        is_dark[start:stop, rng.integers(n_markers)] = True
+    is_marker = points.markers >= 0
+    result = np.zeros(len(is_marker), dtype=bool)
+    result[is_marker] = is_dark[points.frames[is_marker], points.markers[is_marker]]
+    return result
+
+
+def seen_by_rig(
+    points: Points, rig: Rig, views: int, surfaces: Sequence[Surface], n_frames: int
+) -> NDArray[np.bool_]:
+    """Say which points so many cameras see, past the surfaces."""
+    is_marker = points.markers >= 0
+    n_markers = int(points.markers.max(initial=-1)) + 1
+    result = ~is_marker
+    if not n_markers:
+        return result
+    dense = np.full((n_frames, n_markers, 3), np.nan)
+    at = points.frames[is_marker], points.markers[is_marker]
+    dense[at] = points.places[is_marker]
+    seen = np.zeros((n_frames, n_markers), dtype=np.int64)
+    for camera in rig:  # one at a time: all at once would fill the memory
+        seen += camera.project(dense, surfaces).visible
+    result[is_marker] = seen[at] >= views
+    return result
+
+
+def come_and_go(
+    rng: np.random.Generator, visits: Visits, points: Points, n_frames: int, n_markers: int
+) -> tuple[Points, NDArray[np.int64]]:
+    """Let markers leave and others come in their place.
+
+    Returns
+    -------
+    Points
+        Without those of absent markers; the markers numbered anew.
+    ndarray of int, shape (markers,)
+        Which of the old markers each new one goes on.
+    """
+    number = np.full((n_frames, n_markers), -1)
+    origin: list[int] = []
+    for k in range(n_markers):
+        for start, stop in stays(rng, visits, n_frames):
+            number[start:stop, k] = len(origin)
+            origin.append(k)
+    is_marker = points.markers >= 0
+    markers = np.full(len(is_marker), -1)
+    markers[is_marker] = number[points.frames[is_marker], points.markers[is_marker]]
+    there = ~is_marker | (markers >= 0)
+    return points._replace(markers=markers).where(there), np.array(origin, dtype=np.int64)
+
+
+def merge(points: Points, distance: float) -> Points:
+    """Make one point of points of a frame that are nearer to each other than a distance.
+
+    Groups are followed from neighbour to neighbour. The point lies in the middle of its group and
+    is of the marker with the lowest number in it.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
+    n = len(points.frames)
+    if not n:
+        return points
+    # Frames far apart along an axis of their own, so that one tree does for all.
+    tree = KDTree(np.column_stack([points.places, points.frames * (4.0 * distance)]))
+    pairs = tree.query_pairs(distance, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    n_groups, group = connected_components(graph, directed=False)
+    size = np.bincount(group, minlength=n_groups)
+    places = np.stack(
+        [np.bincount(group, axis, n_groups) / size for axis in points.places.T], axis=1
+    )
+    order = np.lexsort(
+        (np.where(points.markers < 0, np.iinfo(np.int64).max, points.markers), group)
+    )
+    first = order[np.unique(group[order], return_index=True)[1]]
+    alone = size[group[first]] == 1
+    places[group[first[alone]]] = points.places[first[alone]]  # to the last bit
+    return Points(points.frames[first], places[group[first]], points.markers[first])
