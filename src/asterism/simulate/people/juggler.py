@@ -181,7 +181,10 @@ class _Cascade:
     def _ends(self) -> tuple[Array, Array, Array]:
         """Throw and catch of the left hand, and the velocity of its throw."""
         h = self.body.height
-        throw, catch = np.array([0.200, 0.065, 0.150]) * h, np.array([0.190, 0.165, 0.150]) * h
+        # The deeper the scoop between catch and throw, the higher both, or arms would not reach it.
+        scoop = 3 / 16 * GRAVITY * self.flight / 2 * self.held
+        up = 0.150 * h + max(0.0, scoop - 0.110 * h)
+        throw, catch = np.array([0.200 * h, 0.065 * h, up]), np.array([0.190 * h, 0.165 * h, up])
         velocity = (catch * [1, -1, 1] - throw) / self.flight
         velocity[2] = GRAVITY * self.flight / 2
         return throw, catch, velocity

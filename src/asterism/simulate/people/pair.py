@@ -1,0 +1,276 @@
+"""Scenes with two people: they walk past each other, or meet, hug and part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import ParameterError
+from asterism.simulate.people.activities import Walker
+from asterism.simulate.people.curves import about_x, about_y, about_z, blend, unit
+from asterism.simulate.people.gait import Style, walking
+from asterism.simulate.people.marker_set import MarkerSet, lines_between
+from asterism.simulate.people.person import check_person, clock
+from asterism.simulate.people.skeleton import SIDES, Body, Limb, two_bones
+from asterism.simulate.people.steps import Course, swings_of
+from asterism.simulate.truth import Truth
+
+if TYPE_CHECKING:
+    from asterism.camera import Capsule
+    from asterism.simulate.people.curves import Array
+    from asterism.simulate.people.skeleton import Pose
+
+__all__ = ["PAIR_ACTIVITIES", "two_people"]
+
+
+def two_people(
+    *,
+    activity: str = "cross",
+    frames: int = 600,
+    rate: float = 100.0,
+    seed: int = 0,
+    n_markers: int = 53,
+    heights: tuple[float, float] = (1.66, 1.82),
+) -> Truth:
+    """Make two people who walk past each other, or who meet, hug and part.
+
+    They meet at the origin at half time. In ``cross`` they pass with a hand's breadth between
+    their arms. In ``hug`` they stop in front of each other, the taller lays the arms over the
+    shoulders of the other, who takes the taller round the waist; they let go, step back, turn round
+    and leave. The whole takes 6 s; a longer clip hugs longer. No marker is inside a body.
+
+    Parameters
+    ----------
+    activity : str
+        ``cross`` or ``hug``.
+    frames : int
+        Number of frames.
+    rate : float
+        Frames a second.
+    seed : int
+        Chooses both persons' styles, their phases and the direction.
+    n_markers : int
+        On each person, 40 to 90.
+    heights : (float, float)
+        Of the persons, metres, 1.2 to 2.2, not more than a fifth apart.
+
+    Returns
+    -------
+    Truth
+        ``A:LFHD`` …, then ``B:LFHD`` …; metres, z up. Colours 1 to 3 are the left, the right and
+        the middle of A, 4 to 6 those of B.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range or the activity unknown.
+
+    Examples
+    --------
+    >>> two_people(activity="hug", frames=10, n_markers=40).n_tracks
+    80
+    """
+    t = clock(frames, rate, seed)
+    if np.shape(heights) != (2,):
+        raise ParameterError("heights", "two heights", repr(heights))
+    for i, height in enumerate(heights):
+        check_person(n_markers, **{f"heights[{i}]": height})
+    if max(heights) > 1.2 * min(heights):
+        raise ParameterError("heights", "heights not more than a fifth apart", repr(heights))
+    if activity not in PAIR_ACTIVITIES:
+        raise ParameterError("activity", f"one of {', '.join(PAIR_ACTIVITIES)}", repr(activity))
+    rng = np.random.default_rng(seed)
+    bodies = [Body(height=float(height)) for height in heights]
+    poses = PAIR_ACTIVITIES[activity](t, bodies, rng)
+    names: list[str] = []
+    colours: list[int] = []
+    lines: list[tuple[int, int, int]] = []
+    surfaces: list[Capsule] = []
+    positions: list[Array] = []
+    for i, (body, pose) in enumerate(zip(bodies, poses, strict=True)):
+        markers = MarkerSet(body=body, n_markers=int(n_markers))
+        first = len(names)
+        lines += [(a + first, b + first, c + 3 * i) for a, b, c in lines_between(markers.names)]
+        names += ["AB"[i] + ":" + name for name in markers.names]
+        colours += [c + 3 * i for c in markers.colours]
+        surfaces += body.capsules(pose, "AB"[i] + ":")
+        positions.append(markers.at(pose))
+    return Truth.of(
+        t,
+        np.concatenate(positions, axis=1),
+        names,
+        lines=lines,
+        colours=colours,
+        surfaces=surfaces,
+    )
+
+
+def _cross(t: Array, bodies: list[Body], rng: np.random.Generator) -> list[Pose]:
+    """Pass each other, left side to left side."""
+    direction = rng.uniform(-np.pi, np.pi)
+    apart = 0.36 * (bodies[0].height + bodies[1].height) / 2 + rng.uniform(0.04, 0.10)
+    poses: list[Pose] = []
+    for i, body in enumerate(bodies):
+        style = Style.drawn(rng)
+        gait = walking(body.height, style)
+        heading = direction + i * np.pi
+        course = Course(
+            duration=float(t[-1]),
+            speed=lambda x, v=gait.speed: np.full(x.shape, v),
+            heading=lambda x, h=heading: np.full(x.shape, h),
+            middle=(apart / 2 * np.sin(heading), -apart / 2 * np.cos(heading)),
+            usual=gait.speed,
+        )
+        swings = swings_of(course, gait, style.phase)
+        walker = Walker(body=body, style=style, gait=gait, course=course, swings=swings)
+        poses.append(walker.pose(t))
+    return poses
+
+
+def _hug(t: Array, bodies: list[Body], rng: np.random.Generator) -> list[Pose]:
+    """Meet, hug and part."""
+    direction, duration = rng.uniform(-np.pi, np.pi), float(t[-1])
+    mean = (bodies[0].height + bodies[1].height) / 2
+    between, aside = 0.235 * mean, 0.030 * mean
+    times = _Times.of(duration)
+    parts: list[_Part] = []
+    for i, body in enumerate(bodies):
+        heading = direction + i * np.pi
+        ahead = np.array([np.cos(heading), np.sin(heading)])
+        left = np.array([-ahead[1], ahead[0]])
+        x, y = (-between / 2 * ahead + aside * left).tolist()
+        parts.append(_Part.of(t, body, Style.drawn(rng), times, heading, (x, y)))
+    return [
+        part.pose(t, times, parts[1 - i], is_over=body_is_taller(bodies, i))
+        for i, part in enumerate(parts)
+    ]
+
+
+def body_is_taller(bodies: list[Body], i: int) -> bool:
+    """Whether a person is the taller of two; the second one if they are the same."""
+    return bodies[i].height > bodies[1 - i].height or (
+        i == 1 and bodies[0].height == bodies[1].height
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Times:
+    """When they stop and when they go, seconds."""
+
+    stop: float
+    go: float
+
+    @classmethod
+    def of(cls, duration: float) -> _Times:
+        half = duration / 2
+        hold = 1.0 + max(0.0, 0.15 * (duration - 6.0))
+        return cls(stop=half - hold, go=half + hold)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Part:
+    """One of two who hug: what there is of the pose before the arms are laid around the other."""
+
+    body: Body
+    walker: Walker
+    root: Array
+    pelvis: Array
+    trunk: Array
+    head: Array
+    arms: dict[str, Limb]
+
+    @classmethod
+    def of(
+        cls,
+        t: Array,
+        body: Body,
+        style: Style,
+        times: _Times,
+        heading: float,
+        middle: tuple[float, float],
+    ) -> _Part:
+        gait = walking(body.height, style)
+        # A foot lands as they stop.
+        style = replace(style, phase=-times.stop * gait.cadence)
+        stop, go = times.stop, times.go
+
+        def speed(x: Array) -> Array:
+            walks = 1 - blend(x, stop - 1.0, stop + 0.15)
+            backs = blend(x, go, go + 0.5, go + 0.8, go + 1.3)
+            leaves = blend(x, go + 1.5, go + 2.6)
+            return gait.speed * (walks + 0.95 * leaves) - 0.50 * backs
+
+        def turned(x: Array) -> Array:
+            return heading - np.pi * blend(x, go + 0.75, go + 2.75)
+
+        course = Course(
+            duration=float(t[-1]), speed=speed, heading=turned, middle=middle, usual=gait.speed
+        )
+        swings = {
+            side: steady[(steady[:, 1] < stop + 0.01) | (steady[:, 0] > go)]
+            for side, steady in swings_of(course, gait, style.phase).items()
+        }
+        walker = Walker(body=body, style=style, gait=gait, course=course, swings=swings)
+        c = walker.carriage(t)
+        close = blend(t, stop - 0.4, stop + 0.4, go - 0.5, go + 0.3)
+        root = walker.root(t, c)
+        return cls(
+            body=body,
+            walker=walker,
+            root=root,
+            pelvis=c.pelvis,
+            trunk=c.trunk @ about_y(6.0 * close) @ about_z(-6.0 * close),
+            head=c.head @ about_z(-12.0 * close) @ about_x(-5.0 * close),
+            arms=c.arms,
+        )
+
+    def pose(self, t: Array, times: _Times, other: _Part, *, is_over: bool) -> Pose:
+        """Lay the arms around the other, over the shoulders or round the waist."""
+        stop, go, h, of = times.stop, times.go, self.body.height, other.body.height
+        # The taller raise their arms before and drop them after the other's pass.
+        early = 0.15 if is_over else 0.0
+        up = blend(t, stop - 1.1 - early, stop - 0.2 - early, go - 0.05 + early, go + 0.75 + early)
+        close = blend(t, stop - 0.25, stop + 0.5, go - 0.85, go - 0.05)
+        shoulders = self.body.shoulders(self.root, self.pelvis, self.trunk)
+        feet = self.walker.feet(t)
+        own = self.root + self.body["waist"] * self.pelvis[:, :, 2]
+        theirs = other.root + other.body["waist"] * other.pelvis[:, :, 2]
+        arms: dict[str, Limb] = {}
+        for side, sign in SIDES.items():
+            opened = np.array([0.26, 0.20 * sign, 0.285] if is_over else [0.24, 0.21 * sign, 0.12])
+            wrapped = (
+                np.array([-0.062 * of - 0.020 * h, -0.045 * sign * of, 0.272 * of])
+                if is_over
+                else np.array([-0.064 * of - 0.026 * h, -0.050 * sign * of, 0.095 * of])
+            )
+            outside = own + np.einsum("tij,j->ti", self.trunk, opened * h)
+            around = theirs + np.einsum("tij,j->ti", other.trunk, wrapped)
+            target = outside + close[:, None] * (around - outside)
+            elbow = np.array([0.1, 0.9 * sign, -0.15] if is_over else [-0.1, 0.8 * sign, -0.45])
+            pole = -np.einsum("tij,j->ti", self.trunk, elbow)
+            arms[side] = _laid(
+                self.body, self.arms[side], shoulders[side], target, pole, up[:, None]
+            )
+        return self.body.pose(
+            root=self.root, pelvis=self.pelvis, trunk=self.trunk, head=self.head,
+            ankles=feet.ankles, feet=feet.turns, arms=arms,
+        )  # fmt: skip
+
+
+def _laid(
+    body: Body, hanging: Limb, shoulder: Array, target: Array, pole: Array, share: Array
+) -> Limb:
+    """Move the wrist of a hanging arm to a target by a share (T, 1) of the way."""
+    wrist = shoulder - body["arm"] * hanging.arm[:, :, 2] - body["forearm"] * hanging.forearm[:, :, 2]
+    front = unit((1 - share) * hanging.arm[:, :, 0] + share * pole)
+    arm, forearm = two_bones(
+        shoulder, wrist + share * (target - wrist), body["arm"], body["forearm"], front, -1.0
+    )
+    hand = forearm @ np.swapaxes(hanging.forearm, 1, 2) @ hanging.hand
+    return Limb(arm=arm, forearm=forearm, hand=hand)
+
+
+PAIR_ACTIVITIES = {"cross": _cross, "hug": _hug}
+"""What two people can do."""
