@@ -3,7 +3,10 @@
 // safe.
 #include "bindings.hpp"
 
+namespace nb = nanobind;
+
 NB_MODULE(_engine, module) {
+  nb::set_leak_warnings(false);  // what is alive at exit is nobody's loss
   bind_tracking(module);
   bind_camera(module);
 }

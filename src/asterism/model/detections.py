@@ -61,7 +61,7 @@ class Detections:
         times = keep_array("times", self.times, ("T",))
         offsets = keep_array("offsets", self.offsets, (len(times) + 1,), dtype=np.int64)
         points = keep_array("points", self.points, ("N", "D"))
-        farthest = float(np.abs(points).max(initial=0.0))
+        farthest = float(max(points.max(initial=0.0), -points.min(initial=0.0)))
         if farthest > FARTHEST:
             raise ParameterError(
                 "points", f"metres, within ±{FARTHEST:g}", f"{farthest:g}", "check the units"
@@ -147,8 +147,11 @@ class Detections:
         dense = check_array("positions", positions, (len(times), "K", "D"), finite=False)
         is_seen = np.isfinite(dense).all(axis=2)
         offsets = np.concatenate([[0], np.cumsum(is_seen.sum(axis=1))]).astype(np.int64)
-        points = dense[is_seen]
-        points.flags.writeable = False  # nobody else has it: no need to copy
+        if is_seen.all():
+            points = dense.reshape(-1, dense.shape[2])
+        else:
+            points = dense[is_seen]
+            points.flags.writeable = False  # nobody else has it: no need to copy
         return cls(times=times, offsets=offsets, points=points)
 
     @property

@@ -75,15 +75,11 @@ class Tracks:
         if names and len(names) < n_tracks:
             raise ParameterError("names", f"a name or None for each of {n_tracks} tracks", names)
         names += (None,) * (n_tracks - len(names))
-        is_track = labels >= 0
-        frames = self.detections.frame_of[is_track]
-        key: NDArray[np.int64] = np.sort(frames * max(n_tracks, 1) + labels[is_track])
-        twice = np.flatnonzero(np.diff(key) == 0)
-        if len(twice):
-            frame, track = divmod(int(key[int(twice[0])]), n_tracks)
+        twice = _first_twice(self.detections.frame_of, labels, n_tracks)
+        if twice is not None:
             raise ParameterError(
                 "labels", "at most one detection of a track in a frame",
-                f"two of track {track} in frame {frame}",
+                f"two of track {twice[1]} in frame {twice[0]}",
             )  # fmt: skip
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "labels", labels)
@@ -118,10 +114,13 @@ class Tracks:
         Tracks
         """
         detections = Detections.from_dense(times, positions)
-        dense = np.asarray(positions, dtype=np.float64)
-        is_seen = np.isfinite(dense).all(axis=2)
-        n_markers = dense.shape[1]
-        labels = np.broadcast_to(np.arange(n_markers), is_seen.shape)[is_seen]
+        n_frames, n_markers = np.shape(positions)[:2]
+        if detections.n_points == n_frames * n_markers:
+            labels = np.tile(np.arange(n_markers, dtype=np.int64), n_frames)
+        else:
+            is_seen = np.isfinite(np.asarray(positions, dtype=np.float64)).all(axis=2)
+            labels = np.broadcast_to(np.arange(n_markers), is_seen.shape)[is_seen]
+        labels.flags.writeable = False  # nobody else has it: no need to copy
         return cls(
             detections=detections,
             labels=labels,
@@ -167,3 +166,27 @@ class Tracks:
             f"{type(self).__name__}({self.n_tracks} tracks, {len(self.labels) - n_clutter} "
             f"detections in them, {n_clutter} clutter, {self.detections.n_frames} frames)"
         )
+
+
+def _first_twice(
+    frames: NDArray[np.int64], labels: NDArray[np.int64], n_tracks: int
+) -> tuple[int, int] | None:
+    """Give a frame and a track that has two detections in it, if there are any."""
+    if labels.size and labels.min() < 0:
+        frames, labels = frames[labels >= 0], labels[labels >= 0]
+    if not labels.size:
+        return None
+    key = frames * n_tracks
+    key += labels
+    n_cells = (int(frames[-1]) + 1) * n_tracks
+    if n_cells <= 16 * len(key):  # a mark for each frame and track, far faster than to sort
+        is_taken = np.zeros(n_cells, dtype=bool)
+        is_taken[key] = True
+        if np.count_nonzero(is_taken) == len(key):
+            return None
+    key.sort()
+    twice = np.flatnonzero(key[1:] == key[:-1])
+    if not len(twice):
+        return None
+    frame, track = divmod(int(key[int(twice[0])]), n_tracks)
+    return frame, track

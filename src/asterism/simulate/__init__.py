@@ -3,6 +3,7 @@
 from asterism.simulate.episodes import Burst, Ghosts, Visits
 from asterism.simulate.film import Film, film
 from asterism.simulate.scenes import SCENES, Scene, attracted, crossing, cube, smooth, walk
+from asterism.simulate.seeing import Seeing
 from asterism.simulate.sensing import sense
 from asterism.simulate.truth import Truth
 
@@ -12,6 +13,7 @@ __all__ = [
     "Film",
     "Ghosts",
     "Scene",
+    "Seeing",
     "Truth",
     "Visits",
     "attracted",

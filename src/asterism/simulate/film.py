@@ -8,13 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Observations
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_number
+from asterism.simulate.seeing import Blobs, see
+from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from asterism.camera import Projection, Rig, Surface
     from asterism.model import Tracks
+    from asterism.simulate.seeing import Seeing
 
 __all__ = ["Film", "film"]
 
@@ -26,17 +31,30 @@ class Film:
     Parameters
     ----------
     observations : Observations
-        The image points that are seen, with the truth of which marker each is.
+        The image points, with the truth of which marker each is (the largest one in it).
     projection : Projection
         Every marker in every image, seen or not and why: arrays of shape (C, T, K).
+    blob_of : ndarray of int, shape (C, T, K)
+        The image point that holds each marker, -1 if none does; merged markers share one.
+    share : ndarray, shape (C, T, K)
+        Share of each marker that the camera sees.
     """
 
     observations: Observations
     projection: Projection
+    blob_of: NDArray[np.int64]
+    share: NDArray[np.float64]
 
 
-def film(truth: Tracks, rig: Rig, surfaces: Sequence[Surface] = ()) -> Film:
-    """Film markers with ideal cameras: no noise, every visible point is one image point.
+def film(
+    truth: Tracks,
+    rig: Rig,
+    surfaces: Sequence[Surface] | None = None,
+    *,
+    seeing: Seeing | None = None,
+    seed: int = 0,
+) -> Film:
+    """Film markers.
 
     Parameters
     ----------
@@ -44,13 +62,17 @@ def film(truth: Tracks, rig: Rig, surfaces: Sequence[Surface] = ()) -> Film:
         3-D, metres. Where a marker has no detection, no camera sees it; clutter is not filmed.
     rig : Rig
         The cameras.
-    surfaces : sequence of Surface
-        What hides markers; one moment, or one for every frame.
+    surfaces : sequence of Surface, optional
+        What hides markers; one moment, or one for every frame. By default those of the scene.
+    seeing : Seeing, optional
+        What the cameras make of what is before them. By default they are ideal: every visible
+        point is one image point where it belongs, in the order of the markers.
+    seed : int
+        Chooses everything that is random.
 
     Returns
     -------
     Film
-        The points of a camera in a frame are in the order of the markers.
 
     Raises
     ------
@@ -61,23 +83,52 @@ def film(truth: Tracks, rig: Rig, surfaces: Sequence[Surface] = ()) -> Film:
     --------
     >>> import asterism as am
     >>> scene = am.simulate.cube(seed=1, frames=10)
-    >>> film(scene, am.Rig.ring(4, radius=3, height=2, target=(0, 0, 0))).observations
+    >>> rig = am.Rig.ring(4, radius=3, height=2, target=(0, 0, 0))
+    >>> film(scene, rig).observations
     Observations(4 cameras, 10 frames, 320 points)
+    >>> film(scene, rig, seeing=am.simulate.Seeing(missing=0.1), seed=1).observations
+    Observations(4 cameras, 10 frames, 293 points)
     """
     detections = truth.detections
     if detections.n_axes != 3:
         raise ParameterError("truth", "3-D detections", f"{detections.n_axes}-D ones")
-    projection = rig.project(truth.positions(), surfaces)
-    is_seen = np.swapaxes(projection.visible, 0, 1)  # frames, cameras, markers
-    counts = is_seen.sum(axis=2).ravel()
+    check_number("seed", seed, above=0, closed=True, integer=True)
+    if surfaces is None:
+        surfaces = truth.surfaces if isinstance(truth, Truth) else ()
+    positions = truth.positions()
+    projection = rig.project(positions, surfaces)
+    if seeing is None:
+        blobs = _ideal(projection)
+    else:
+        blobs = see(detections.times, positions, rig, surfaces, seeing, seed)
+    counts = np.bincount(blobs.cell, minlength=detections.n_frames * len(rig))
     observations = Observations(
         times=detections.times,
         cameras=rig.names,
         offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        pixels=np.swapaxes(projection.pixels, 0, 1)[is_seen],
-        markers=np.nonzero(is_seen)[2].astype(np.int64),
+        pixels=blobs.pixels,
+        markers=blobs.markers,
         marker_names=tuple(
             name if name is not None else str(k) for k, name in enumerate(truth.names)
         ),
     )
-    return Film(observations=observations, projection=projection)
+    return Film(
+        observations=observations,
+        projection=projection,
+        blob_of=blobs.blob_of,
+        share=blobs.share,
+    )
+
+
+def _ideal(projection: Projection) -> Blobs:
+    is_seen = np.swapaxes(projection.visible, 0, 1)  # frames, cameras, markers
+    frames, cameras, markers = np.nonzero(is_seen)
+    blob_of = np.full(is_seen.shape, -1)
+    blob_of[is_seen] = np.arange(len(frames))
+    return Blobs(
+        frames * is_seen.shape[1] + cameras,
+        np.swapaxes(projection.pixels, 0, 1)[is_seen],
+        markers,
+        np.ascontiguousarray(np.swapaxes(blob_of, 0, 1)),
+        projection.visible.astype(np.float64),
+    )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.simulate.episodes import episodes, stays
-from asterism.simulate.sensed_points import Points
+from asterism.simulate.sensed_points import Points, touching
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,18 +83,10 @@ def merge(points: Points, distance: float) -> Points:
     Groups are followed from neighbour to neighbour. The point lies in the middle of its group and
     is of the marker with the lowest number in it.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import KDTree
-
-    n = len(points.frames)
-    if not n:
+    if not len(points.frames):
         return points
-    # Frames far apart along an axis of their own, so that one tree does for all.
-    tree = KDTree(np.column_stack([points.places, points.frames * (4.0 * distance)]))
-    pairs = tree.query_pairs(distance, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    n_groups, group = connected_components(graph, directed=False)
+    group = touching(points.places, points.frames, np.full(len(points.frames), distance / 2))
+    n_groups = int(group.max()) + 1
     size = np.bincount(group, minlength=n_groups)
     places = np.stack(
         [np.bincount(group, axis, n_groups) / size for axis in points.places.T], axis=1

@@ -153,8 +153,14 @@ def smooth(
     phase = rng.uniform(0, 2 * math.pi, shape)
     heading = rng.uniform(0, 2 * math.pi)
     drift = 0.01 * np.array([math.cos(heading), math.sin(heading), 0.0])
-    swing = amplitude * np.sin(t[:, None, None] * omega + phase)
-    return _named(rate, centre + swing + (t[:, None] * drift)[:, None, :])
+    positions = np.empty((frames, *shape))
+    for now, place in zip(t, positions, strict=True):  # in place: there may be very many
+        np.multiply(omega, now, out=place)
+        place += phase
+        np.sin(place, out=place)
+        place *= amplitude
+        place += centre + now * drift
+    return _named(rate, positions)
 
 
 def walk(
@@ -239,6 +245,7 @@ def _clock(frames: int, rate: float, seed: int) -> NDArray[np.float64]:
 def _named(rate: float, positions: NDArray[np.float64]) -> Tracks:
     n_frames, n_markers, _ = positions.shape
     names = [f"M{i:02d}" for i in range(n_markers)]
+    positions.flags.writeable = False  # nobody else has them: no need to copy
     return Tracks.from_dense(np.arange(n_frames) / rate, positions, names)
 
 

@@ -163,9 +163,12 @@ def sense(
     factor = np.append(np.exp(noise_spread * rng_spread.standard_normal(n_markers)), 1.0)
     noisy = clean
     if noise:
-        error = rng_noise.normal(0.0, noise, clean.places.shape) * factor[clean.markers, None]
-        noisy = clean._replace(places=clean.places + error)
-    seen = noisy.where(is_kept)
+        places = rng_noise.normal(0.0, noise, clean.places.shape)
+        if noise_spread:
+            places *= factor[clean.markers, None]
+        places += clean.places
+        noisy = clean._replace(places=places)
+    seen = noisy if is_kept.all() else noisy.where(is_kept)
     if merged:
         seen = merge(seen, merged)
 
@@ -233,6 +236,7 @@ def _shuffled(rng: np.random.Generator, parts: list[Points]) -> Points:
     # One integer key sorts by frame and shuffles within it, several times faster than two keys.
     dice = rng.integers(2**32, size=len(frames))
     order = np.argsort((frames << 32) | dice, kind="stable")
+    del dice
     return Points(
         frames[order],
         np.concatenate([part.places for part in parts])[order],
@@ -254,8 +258,8 @@ def _markers(
     is_in = frames >= 0
     if not keep_unnamed:
         is_in &= markers >= 0
-    points = Points(frames[is_in], truth.detections.points[is_in], markers[is_in])
-    return points, np.flatnonzero(has_name)
+    points = Points(frames, truth.detections.points, markers)
+    return points if is_in.all() else points.where(is_in), np.flatnonzero(has_name)
 
 
 def _names(truth: Tracks, origin: NDArray[np.int64], *, is_anew: bool) -> tuple[str | None, ...]:

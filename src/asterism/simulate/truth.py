@@ -9,7 +9,7 @@ import numpy as np
 
 from asterism.camera import Capsule, Mesh, Polygon
 from asterism.errors import ParameterError, keep_array
-from asterism.model import Detections, Tracks
+from asterism.model import Tracks
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -112,7 +112,7 @@ class Truth(Tracks):
         for i, j, colour in lines:
             connections[i, j] = connections[j, i] = colour
         return cls(
-            detections=Detections.from_dense(times, positions),
+            detections=tracks.detections,
             labels=tracks.labels,
             names=tracks.names,
             connections=connections,
