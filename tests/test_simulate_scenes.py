@@ -6,9 +6,22 @@ import numpy as np
 import pytest
 
 from asterism.errors import ParameterError
-from asterism.simulate import SCENES, attracted, crossing, cube, smooth, walk
+from asterism.model import Detections, Tracks
+from asterism.simulate import (
+    SCENES,
+    attracted,
+    crossing,
+    cube,
+    film,
+    from_capture,
+    smooth,
+    swarm,
+    walk,
+    wander,
+)
 
 EVERY = pytest.mark.parametrize("name", sorted(SCENES))
+PER_FRAME = {"attracted", "crossing", "cube", "smooth", "walk", "wander"}
 
 
 def _steps(positions):
@@ -23,7 +36,8 @@ def _distances(positions):
 def test_every_marker_is_seen_in_every_frame(name):
     truth = SCENES[name].make(frames=37, seed=4)
     k = truth.n_tracks
-    assert truth.names[:3] == ("M00", "M01", "M02")
+    assert len(set(truth.names)) == k
+    assert truth.connections.shape == (k, k)
     assert (truth.lengths == 37).all()
     assert (truth.labels.reshape(37, k) == np.arange(k)).all()
     assert np.isfinite(truth.positions()).all()
@@ -38,12 +52,34 @@ def test_same_seed_same_bytes_and_another_seed_another_scene(name):
     assert not np.allclose(first, other)
 
 
-@EVERY
+@pytest.mark.parametrize("name", sorted(PER_FRAME))
 def test_rate_changes_the_times_and_nothing_else(name):
     slow, fast = (SCENES[name].make(frames=20, rate=rate) for rate in (1.0, 200.0))
     assert np.array_equal(slow.detections.points, fast.detections.points)
     assert np.array_equal(slow.detections.times, np.arange(20))
     assert np.allclose(fast.detections.times, np.arange(20) / 200)
+
+
+@pytest.mark.parametrize("name", sorted(set(SCENES) - PER_FRAME))
+def test_scenes_in_seconds_are_the_same_at_every_rate(name):
+    slow, fast = (SCENES[name].make(frames=n, rate=rate) for n, rate in ((30, 50.0), (59, 100.0)))
+    np.testing.assert_allclose(fast.detections.times[::2], slow.detections.times, atol=1e-12)
+    apart = np.linalg.norm(fast.positions()[::2] - slow.positions(), axis=2)
+    assert apart.max() < (0.01 if name == "swarm" else 1e-9)  # whose motion is integrated
+
+
+@EVERY
+def test_every_scene_can_be_filmed(name):
+    import asterism as am
+
+    truth = SCENES[name].make(frames=3)
+    places = truth.positions().reshape(-1, 3)
+    middle, size = places.mean(axis=0), np.ptp(places, axis=0).max() + 1.0
+    rig = am.Rig.ring(3, radius=3 * size, height=middle[2] + size, target=middle)
+    shot = film(truth, rig)
+    assert (shot.projection.reason <= am.Reason.HIDDEN).all()
+    assert shot.observations.n_points > 0
+    assert all(s.n_moments in (1, 3) for s in truth.surfaces)
 
 
 @EVERY
@@ -146,3 +182,47 @@ def test_attracted_markers_crowd():
 def test_own_options_are_checked(make, wrong):
     with pytest.raises(ParameterError, match=next(iter(wrong))):
         make(**wrong)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_wanderers_change_speed_and_direction_within_bounds(seed):
+    truth = wander(n_markers=20, frames=600, speed=0.05, seed=seed)
+    steps = np.diff(truth.positions(), axis=0)
+    size = np.linalg.norm(steps, axis=2)
+    assert size.max() <= 0.05 * (1 + 1e-12)
+    assert size.std(axis=0).min() > 0.1 * 0.05
+    cosine = (steps[1:] * steps[:-1]).sum(axis=2) / (size[1:] * size[:-1])
+    assert 0.6 < np.median(cosine) < 0.99
+    reach = np.linalg.norm(truth.positions(), axis=2)
+    assert reach.max() < 12 * 0.3 * 20 ** (1 / 3)  # drawn back: it does not run away
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_drones_bunch_up_and_never_touch(seed):
+    truth = swarm(n_drones=25, frames=1200, seed=seed, apart=0.2)
+    places = truth.positions()
+    gaps = _distances(places)
+    gaps[:, range(25), range(25)] = np.inf
+    nearest = gaps.min(axis=2)
+    assert nearest.min() > 0.9 * 0.2
+    assert np.median(nearest[250:300]) > 0.7  # spread
+    assert np.median(nearest[550:600]) < 0.35  # bunched up
+    order = [np.argsort(gaps[t, 0])[:5].tolist() for t in (299, 899)]
+    assert order[0] != order[1]  # they changed places
+    assert _steps(places).max() * 100 < 6.0
+    assert places[..., 2].min() > 0
+
+
+def test_a_labelled_capture_is_a_scene():
+    d = Detections.from_frames(
+        [0.0, 0.1], [[[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 0, 1], [9, 0, 1]]]
+    )
+    tracks = Tracks(detections=d, labels=[0, 1, 2, 0, -1], names=("A", None, "C"))
+    truth = from_capture(tracks)
+    assert truth.names == ("A", "C")
+    assert truth.detections.n_points == 3
+    assert np.isnan(truth.positions()[1, 1]).all()
+    unnamed = from_capture(Tracks(detections=d, labels=[0, 1, 2, 0, 1]))
+    assert unnamed.names == ("T000", "T001", "T002")
+    with pytest.raises(ParameterError, match="labelled"):
+        from_capture(Tracks(detections=d, labels=[-1] * 5))

@@ -2,9 +2,15 @@
 
 from asterism.simulate.episodes import Burst, Ghosts, Visits
 from asterism.simulate.film import Film, film
-from asterism.simulate.scenes import SCENES, Scene, attracted, crossing, cube, smooth, walk
+from asterism.simulate.people.hand import fingers
+from asterism.simulate.people.juggler import juggler
+from asterism.simulate.people.pair import two_people
+from asterism.simulate.people.person import person
+from asterism.simulate.points import attracted, crossing, cube, smooth, walk, wander
+from asterism.simulate.scenes import SCENES, Scene, from_capture
 from asterism.simulate.seeing import Seeing
 from asterism.simulate.sensing import sense
+from asterism.simulate.swarm import swarm
 from asterism.simulate.truth import Truth
 
 __all__ = [
@@ -20,7 +26,14 @@ __all__ = [
     "crossing",
     "cube",
     "film",
+    "fingers",
+    "from_capture",
+    "juggler",
+    "person",
     "sense",
     "smooth",
+    "swarm",
+    "two_people",
     "walk",
+    "wander",
 ]

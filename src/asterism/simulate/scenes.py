@@ -1,265 +1,30 @@
-"""Scenes in motion: ground truth in which every marker is seen in every frame.
+"""The one list of scenes: truth in motion, in which every marker is seen in every frame.
 
 A scene is a function of keyword-only arguments, among them `frames`, `rate` and `seed`, that gives
-`Tracks`. Motion is laid down per frame and `rate` only says how long a frame lasts, so a scene is
-equally hard at every rate: what moves 0.1 m a frame moves ``0.1 * rate`` m/s. Noise, misses and
-clutter come afterwards, from `asterism.simulate.sense`.
+a `Truth`. Noise, misses and clutter come afterwards, from `asterism.simulate.sense`; cameras from
+`asterism.simulate.film`.
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from asterism.errors import check_number
-from asterism.model import Tracks
+from asterism.errors import ParameterError
+from asterism.model import Capture, Tracks
+from asterism.simulate.people.hand import fingers
+from asterism.simulate.people.juggler import juggler
+from asterism.simulate.people.pair import two_people
+from asterism.simulate.people.person import person
+from asterism.simulate.points import attracted, crossing, cube, smooth, walk, wander
+from asterism.simulate.swarm import swarm
+from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-__all__ = ["SCENES", "Scene", "attracted", "crossing", "cube", "smooth", "walk"]
-
-# Corners of a cube with side 1 about the origin, shape (8, 3).
-_CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-
-
-def cube(
-    *, frames: int = 100, rate: float = 1.0, seed: int = 0, side: float = 0.3, speed: float = 0.1
-) -> Tracks:
-    """Make a cube that turns steadily while its centre follows a Lissajous path.
-
-    Parameters
-    ----------
-    frames : int
-        Number of frames.
-    rate : float
-        Frames a second.
-    seed : int
-        Chooses the axis and the path.
-    side : float
-        Edge of the cube, metres.
-    speed : float
-        No marker moves more than this from one frame to the next, metres. Three fifths of it go
-        to the centre and two to the turning.
-
-    Returns
-    -------
-    Tracks
-        8 markers, M00 … M07, at the corners.
-
-    Raises
-    ------
-    ParameterError
-        If a number is out of range.
-    """
-    check_number("side", side, above=0)
-    check_number("speed", speed, above=0, closed=True)
-    t = _clock(frames, rate, seed)
-    rng = np.random.default_rng(seed)
-    omega = rng.uniform(0.04, 0.08, 3)  # rad a frame: a hundred frames are about one round
-    amplitude = 0.6 * speed / math.sqrt(3) / omega
-    centre = amplitude * np.sin(t[:, None] * omega + rng.uniform(0, 2 * math.pi, 3))
-    spin = 0.4 * speed / (side * math.sqrt(3) / 2)
-    turn = _rotations(rng.standard_normal(3), spin * t)
-    return _named(rate, centre[:, None, :] + _turned(turn, side * _CORNERS))
-
-
-def crossing(*, frames: int = 60, rate: float = 1.0, seed: int = 0, side: float = 0.25) -> Tracks:
-    """Make a turning cube that flies through one that stands still.
-
-    It moves 0.02 m a frame along x and turns 0.08 rad a frame about z and half that about y. In
-    the middle of the scene both centres would coincide, but for an offset drawn from a normal
-    distribution with a standard deviation of 0.025 m an axis.
-
-    Parameters
-    ----------
-    frames : int
-        Number of frames.
-    rate : float
-        Frames a second.
-    seed : int
-        Chooses the offset.
-    side : float
-        Edge of both cubes, metres.
-
-    Returns
-    -------
-    Tracks
-        16 markers: M00 … M07 stand, M08 … M15 fly.
-
-    Raises
-    ------
-    ParameterError
-        If a number is out of range.
-    """
-    check_number("side", side, above=0)
-    t = _clock(frames, rate, seed)
-    offset = np.random.default_rng(seed).normal(0.0, 0.025, 3)
-    centre = offset + np.outer(t - (frames - 1) / 2, [0.02, 0.0, 0.0])
-    turn = _rotations(np.array([0, 0, 1.0]), 0.08 * t) @ _rotations(np.array([0, 1.0, 0]), 0.04 * t)
-    flying = centre[:, None, :] + _turned(turn, side * _CORNERS)
-    standing = np.broadcast_to(side * _CORNERS, flying.shape)
-    return _named(rate, np.concatenate([standing, flying], axis=1))
-
-
-def smooth(
-    *,
-    n_markers: int = 50,
-    frames: int = 100,
-    rate: float = 1.0,
-    seed: int = 0,
-    spacing: float = 0.34,
-) -> Tracks:
-    """Make any number of markers on Lissajous paths, at a density that does not depend on it.
-
-    On each axis a marker swings by 0.1 to 0.3 m at 0.08 to 0.18 rad a frame about a centre of its
-    own, so it moves by less than 0.1 m a frame; all drift together by 0.01 m a frame. The centres
-    are spread evenly over a cube with ``spacing³`` of room for each.
-
-    Parameters
-    ----------
-    n_markers : int
-        Number of markers.
-    frames : int
-        Number of frames.
-    rate : float
-        Frames a second.
-    seed : int
-        Chooses the centres, the paths and the drift.
-    spacing : float
-        Usual distance between neighbouring centres, metres; smaller is denser and harder.
-
-    Returns
-    -------
-    Tracks
-        `n_markers` markers.
-
-    Raises
-    ------
-    ParameterError
-        If a number is out of range.
-    """
-    check_number("n_markers", n_markers, above=1, closed=True, integer=True)
-    check_number("spacing", spacing, above=0)
-    t = _clock(frames, rate, seed)
-    rng = np.random.default_rng(seed)
-    shape = (n_markers, 3)
-    centre = rng.uniform(0.0, spacing * n_markers ** (1 / 3), shape)
-    amplitude, omega = rng.uniform(0.1, 0.3, shape), rng.uniform(0.08, 0.18, shape)
-    phase = rng.uniform(0, 2 * math.pi, shape)
-    heading = rng.uniform(0, 2 * math.pi)
-    drift = 0.01 * np.array([math.cos(heading), math.sin(heading), 0.0])
-    positions = np.empty((frames, *shape))
-    for now, place in zip(t, positions, strict=True):  # in place: there may be very many
-        np.multiply(omega, now, out=place)
-        place += phase
-        np.sin(place, out=place)
-        place *= amplitude
-        place += centre + now * drift
-    return _named(rate, positions)
-
-
-def walk(
-    *,
-    n_markers: int = 8,
-    frames: int = 200,
-    rate: float = 1.0,
-    seed: int = 0,
-    stride: float = 0.02,
-    pull: float = 0.0,
-) -> Tracks:
-    """Make markers that walk at random, towards the origin if they are pulled.
-
-    Each frame a marker keeps ``1 - pull`` of its position and takes a normal step. It has no
-    velocity to predict from, and the pull brings all of them to one place.
-
-    Parameters
-    ----------
-    n_markers : int
-        Number of markers; they start at the corners of cubes of side 0.3, 0.6, 0.9 … m.
-    frames : int
-        Number of frames.
-    rate : float
-        Frames a second.
-    seed : int
-        Chooses the steps.
-    stride : float
-        Standard deviation of a step on each axis, metres.
-    pull : float
-        Share of its way to the origin that a marker is drawn back each frame, in [0, 1].
-
-    Returns
-    -------
-    Tracks
-        `n_markers` markers.
-
-    Raises
-    ------
-    ParameterError
-        If a number is out of range.
-    """
-    check_number("n_markers", n_markers, above=1, closed=True, integer=True)
-    check_number("stride", stride, above=0, closed=True)
-    check_number("pull", pull, above=0, below=1, closed=True)
-    t = _clock(frames, rate, seed)
-    i = np.arange(n_markers)
-    positions = np.empty((len(t), n_markers, 3))
-    positions[:1] = _CORNERS[i % 8] * 0.3 * (i // 8 + 1)[:, None]
-    steps = np.random.default_rng(seed).normal(0.0, stride, positions.shape)
-    for k in range(1, frames):
-        positions[k] = (1 - pull) * positions[k - 1] + steps[k]
-    return _named(rate, positions)
-
-
-def attracted(*, frames: int = 200, rate: float = 1.0, seed: int = 0) -> Tracks:
-    """Make 8 markers that walk at random and crowd about the origin: `walk` with a pull of 0.1.
-
-    Parameters
-    ----------
-    frames : int
-        Number of frames.
-    rate : float
-        Frames a second.
-    seed : int
-        Chooses the steps.
-
-    Returns
-    -------
-    Tracks
-    """
-    return walk(frames=frames, rate=rate, seed=seed, pull=0.1)
-
-
-def _clock(frames: int, rate: float, seed: int) -> NDArray[np.float64]:
-    """Check what all scenes share and give the number of each frame, shape (T,)."""
-    check_number("frames", frames, above=1, closed=True, integer=True)
-    check_number("rate", rate, above=0)
-    check_number("seed", seed, above=0, closed=True, integer=True)
-    return np.arange(frames, dtype=np.float64)
-
-
-def _named(rate: float, positions: NDArray[np.float64]) -> Tracks:
-    n_frames, n_markers, _ = positions.shape
-    names = [f"M{i:02d}" for i in range(n_markers)]
-    positions.flags.writeable = False  # nobody else has them: no need to copy
-    return Tracks.from_dense(np.arange(n_frames) / rate, positions, names)
-
-
-def _rotations(axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotation matrices about one axis (Rodrigues), shape (T, 3, 3), from angles (T,)."""
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    return np.eye(3) + s * cross + (1 - c) * (cross @ cross)
-
-
-def _turned(turn: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turn K points (K, 3) by T rotations (T, 3, 3): shape (T, K, 3)."""
-    return np.einsum("tij,kj->tki", turn, points)
+__all__ = ["SCENES", "Scene", "from_capture"]
 
 
 class Scene(NamedTuple):
@@ -273,15 +38,52 @@ class Scene(NamedTuple):
         One line on what is in it.
     """
 
-    make: Callable[..., Tracks]
+    make: Callable[..., Truth]
     about: str
 
 
 SCENES: dict[str, Scene] = {
     "cube": Scene(cube, "8 markers on a cube that turns and travels"),
     "crossing": Scene(crossing, "16 markers: a turning cube flies through a still one"),
-    "smooth": Scene(smooth, "any number of markers on smooth paths, at constant density"),
+    "wander": Scene(wander, "markers that change speed and direction all the time"),
     "walk": Scene(walk, "markers that walk at random, with no velocity to predict from"),
     "attracted": Scene(attracted, "8 markers that walk at random and crowd about the origin"),
+    "smooth": Scene(smooth, "any number of markers on smooth paths, at constant density"),
+    "swarm": Scene(swarm, "drones that spread out, bunch up and change places"),
+    "person": Scene(person, "a person who walks, runs, jumps or turns, with limbs that hide"),
+    "two_people": Scene(two_people, "two people who pass each other closely, or hug"),
+    "fingers": Scene(fingers, "a hand whose fingers bend and open"),
+    "juggler": Scene(juggler, "a person who juggles balls"),
 }
 """Every scene by name."""
+
+
+def from_capture(capture: Capture | Tracks) -> Truth:
+    """Make a scene of a labelled capture: its named markers, where they were seen.
+
+    Parameters
+    ----------
+    capture : Capture or Tracks
+        From a file, or its tracks. If any track has a name, the named ones are the markers.
+
+    Returns
+    -------
+    Truth
+        Without clutter and without tracks that have no name among named ones.
+
+    Raises
+    ------
+    ParameterError
+        If nothing is labelled.
+    """
+    tracks = capture.tracks if isinstance(capture, Capture) else capture
+    if not tracks.n_tracks:
+        raise ParameterError("capture", "a labelled one", "one without tracks")
+    named = np.array([name is not None for name in tracks.names])
+    if not named.any():
+        named[:] = True
+    chosen = np.flatnonzero(named)
+    positions = tracks.positions()[:, chosen]
+    positions.flags.writeable = False
+    names = [tracks.names[k] or f"T{k:03d}" for k in chosen]
+    return Truth.of(tracks.detections.times, positions, names)
