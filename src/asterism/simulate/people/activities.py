@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.simulate.people.course import Course
 from asterism.simulate.people.gait import (
     Carriage,
     Style,
@@ -16,7 +17,6 @@ from asterism.simulate.people.gait import (
     walking,
 )
 from asterism.simulate.people.steps import (
-    Course,
     Feet,
     Gait,
     carried,
@@ -120,9 +120,7 @@ def _straight(
         usual=gait.speed,
     )
     swings = swings_of(course, gait, style.phase)
-    walker = Walker(
-        body=body, style=style, gait=gait, course=course, swings=swings, is_run=is_run
-    )
+    walker = Walker(body=body, style=style, gait=gait, course=course, swings=swings, is_run=is_run)
     return walker.pose(t)
 
 
@@ -131,7 +129,8 @@ def turn(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
     gait = walking(body.height, style)
     usual = gait.speed
     direction, side = rng.uniform(-np.pi, np.pi), rng.choice([-1.0, 1.0])
-    duration, radius, about = float(t[-1]), rng.uniform(1.8, 2.4), 1.7
+    duration, radius = float(t[-1]), rng.uniform(1.8, 2.4)
+    about = 1.7 * np.sqrt(body.height / 1.75)  # longer legs take longer steps
     bend = side * 0.8 * usual / radius
 
     def passage(x: Array) -> Array:  # from -1 to 1 over the turn, with constant rate in its middle

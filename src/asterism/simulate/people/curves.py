@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from scipy.interpolate import BPoly
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,6 +33,8 @@ def through(t: Array, knots: Sequence[Knot], *, derivatives: int = 0) -> Array:
     -------
     ndarray, shape (T,) or (T, D), or (T, 1 + derivatives)
     """
+    from scipy.interpolate import BPoly
+
     times = [knot[0] for knot in knots]
     given = [[np.asarray(x, dtype=np.float64) for x in knot[1:]] for knot in knots]
     curve = BPoly.from_derivatives(times, given)

@@ -82,12 +82,12 @@ _ON_PALM = {
 
 
 def fingers(*, frames: int = 300, rate: float = 100.0, seed: int = 0) -> Truth:
-    """Make a hand with 23 markers, millimetres apart from its skin, that plays with its fingers.
+    """Make a right hand with 23 markers that plays with its fingers.
 
     Four markers are on the back of each finger (``T1`` … ``T4`` on the thumb, ``I`` index, ``M``
     middle, ``R`` ring, ``L`` little finger): on its knuckle and near the end of each bone. Two
     are on the wrist and one on the back of the hand. Fingers bend 0.5 to 1.1 times a second and
-    spread meanwhile; the wrist moves by some centimetres and turns. Phalanges and palm are capsules.
+    spread meanwhile; the wrist moves by some centimetres and turns. Bones and palm are capsules.
 
     Parameters
     ----------
@@ -143,9 +143,7 @@ def _moving(t: Array, size: float, rng: np.random.Generator) -> Pose:
         pace, first = rng.uniform(0.5, 1.1), rng.uniform(0, 1)
         bend = 0.5 - 0.5 * np.cos(2 * np.pi * (pace * t + first))
         spread = np.sin(2 * np.pi * (rng.uniform(0.25, 0.5) * t + rng.uniform(0, 1)))
-        angles = [
-            a + (b - a) * bend for a, b in zip(finger.stretched, finger.bent, strict=True)
-        ]
+        angles = [a + (b - a) * bend for a, b in zip(finger.stretched, finger.bent, strict=True)]
         # Bent fingers do not spread.
         aside = finger.aside * (1 + 0.35 * spread) * (1 - 0.75 * bend)
         if name == "T":  # points to the side and the palm, and bends towards the fingers

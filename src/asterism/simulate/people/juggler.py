@@ -9,12 +9,12 @@ import numpy as np
 
 from asterism.errors import ParameterError, check_number
 from asterism.simulate.people.activities import Walker
+from asterism.simulate.people.course import Course
 from asterism.simulate.people.curves import about_x, about_y, about_z, through, unit
 from asterism.simulate.people.gait import GRAVITY, Style, walking
 from asterism.simulate.people.marker_set import MarkerSet, lines_between
 from asterism.simulate.people.person import check_person, clock
 from asterism.simulate.people.skeleton import SIDES, Body, Limb, two_bones
-from asterism.simulate.people.steps import Course
 from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def juggler(
     none = np.zeros((0, 2))
     walker = Walker(
         body=body, style=style, gait=walking(body.height, style), course=course,
-        swings={side: none for side in SIDES},
+        swings=dict.fromkeys(SIDES, none),
     )  # fmt: skip
     carriage, feet = walker.carriage(t), walker.feet(t)
     root = walker.root(t, carriage) - [0, 0, 0.012 * body.height]
@@ -106,7 +106,9 @@ def juggler(
     centre = np.array([0.0, 0.0, float(root[:, 2].mean())])
     shoulders = body.shoulders(root, carriage.pelvis, trunk)
     arms = {
-        side: _reaching(body, shoulders[side], centre + pattern.hand(t, side) @ world.T, world, sign)
+        side: _reaching(
+            body, shoulders[side], centre + pattern.hand(t, side) @ world.T, world, sign
+        )
         for side, sign in SIDES.items()
     }
     # The eyes follow the balls up a little.
@@ -154,7 +156,7 @@ class _Cascade:
         beats = (t / self.beat + self.start - 2 * k) % (2 * n)  # ball k is thrown at beat 2k
         sign = np.where(beats < n, 1.0, -1.0)  # of the hand that threw it last
         since = (beats % n) * self.beat
-        throw, catch, velocity = self._ends()
+        throw, _, velocity = self._ends()
         mirror = np.stack([np.ones_like(sign), sign, np.ones_like(sign)], axis=-1)
         s = np.minimum(since, self.flight)[:, None]
         air = throw + velocity * s - [0, 0, GRAVITY / 2] * s**2

@@ -71,6 +71,7 @@ class _Jump:
 
     def pose(self, t: Array, facing: Array) -> Pose:
         """Give the pose; `facing` (T, 3, 3) turns the person to the world."""
+
         def turned(local: Array) -> Array:
             return np.einsum("tij,tj->ti", facing, local)
 
@@ -113,13 +114,15 @@ class _Jump:
         return np.column_stack([back, np.zeros(len(t)), through(t, knots)])
 
     def ankles(self, t: Array) -> dict[str, Array]:
-        """Ankle joints in the person's frame, (T, 3) each; the legs hang from the hips in flight."""
+        """Ankle joints in the person's frame, (T, 3) each; in flight legs hang."""
         flat = self._standing(t)[0]
         in_air = (t > -self.up) & (t < self.down)
         if in_air.any():
             flat[in_air] = self._hanging(t[in_air])
         return {
-            s: np.column_stack([flat[:, 0], np.full(len(t), sign * 0.062 * self.body.height), flat[:, 1]])
+            s: np.column_stack(
+                [flat[:, 0], np.full(len(t), sign * 0.062 * self.body.height), flat[:, 1]]
+            )
             for s, sign in SIDES.items()
         }
 
@@ -132,7 +135,7 @@ class _Jump:
         knots: list[tuple[float, Array, Array, Array]] = []
         for edge in (-self.up, self.down):
             e = 1e-3
-            near = edge + e * np.arange(-2, 3)
+            near = np.array([edge + e * k for k in (-2, -1, 0, 1, 2)])
             across = self._standing(near)[0] - self.root(near)[:, [0, 2]]
             polar = np.column_stack(
                 [np.linalg.norm(across, axis=1), np.arctan2(across[:, 0], -across[:, 1])]

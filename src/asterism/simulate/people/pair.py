@@ -9,12 +9,13 @@ import numpy as np
 
 from asterism.errors import ParameterError
 from asterism.simulate.people.activities import Walker
+from asterism.simulate.people.course import Course
 from asterism.simulate.people.curves import about_x, about_y, about_z, blend, unit
 from asterism.simulate.people.gait import Style, walking
 from asterism.simulate.people.marker_set import MarkerSet, lines_between
 from asterism.simulate.people.person import check_person, clock
 from asterism.simulate.people.skeleton import SIDES, Body, Limb, two_bones
-from asterism.simulate.people.steps import Course, swings_of
+from asterism.simulate.people.steps import swings_of
 from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def two_people(
         raise ParameterError("heights", "two heights", repr(heights))
     for i, height in enumerate(heights):
         check_person(n_markers, **{f"heights[{i}]": height})
-    if max(heights) > 1.2 * min(heights):
+    if max(heights) > 1.2 * min(heights) + 1e-9:
         raise ParameterError("heights", "heights not more than a fifth apart", repr(heights))
     if activity not in PAIR_ACTIVITIES:
         raise ParameterError("activity", f"one of {', '.join(PAIR_ACTIVITIES)}", repr(activity))
@@ -143,12 +144,12 @@ def _hug(t: Array, bodies: list[Body], rng: np.random.Generator) -> list[Pose]:
         x, y = (-between / 2 * ahead + aside * left).tolist()
         parts.append(_Part.of(t, body, Style.drawn(rng), times, heading, (x, y)))
     return [
-        part.pose(t, times, parts[1 - i], is_over=body_is_taller(bodies, i))
+        part.pose(t, times, parts[1 - i], is_over=_is_taller(bodies, i))
         for i, part in enumerate(parts)
     ]
 
 
-def body_is_taller(bodies: list[Body], i: int) -> bool:
+def _is_taller(bodies: list[Body], i: int) -> bool:
     """Whether a person is the taller of two; the second one if they are the same."""
     return bodies[i].height > bodies[1 - i].height or (
         i == 1 and bodies[0].height == bodies[1].height
@@ -196,6 +197,8 @@ class _Part:
         style = replace(style, phase=-times.stop * gait.cadence)
         stop, go = times.stop, times.go
 
+        slow = np.sqrt(body.height / 1.75)  # longer legs take longer steps
+
         def speed(x: Array) -> Array:
             walks = 1 - blend(x, stop - 1.0, stop + 0.15)
             backs = blend(x, go, go + 0.5, go + 0.8, go + 1.3)
@@ -203,7 +206,7 @@ class _Part:
             return gait.speed * (walks + 0.95 * leaves) - 0.50 * backs
 
         def turned(x: Array) -> Array:
-            return heading - np.pi * blend(x, go + 0.75, go + 2.75)
+            return heading - np.pi * blend(x, go + 0.7, go + 0.7 + 2.3 * slow)
 
         course = Course(
             duration=float(t[-1]), speed=speed, heading=turned, middle=middle, usual=gait.speed
@@ -231,7 +234,7 @@ class _Part:
         stop, go, h, of = times.stop, times.go, self.body.height, other.body.height
         # The taller raise their arms before and drop them after the other's pass.
         early = 0.15 if is_over else 0.0
-        up = blend(t, stop - 1.1 - early, stop - 0.2 - early, go - 0.05 + early, go + 0.75 + early)
+        up = blend(t, stop - 1.1 - early, stop - 0.2 - early, go + 0.3 + early, go + 1.2 + early)
         close = blend(t, stop - 0.25, stop + 0.5, go - 0.85, go - 0.05)
         shoulders = self.body.shoulders(self.root, self.pelvis, self.trunk)
         feet = self.walker.feet(t)
@@ -239,16 +242,18 @@ class _Part:
         theirs = other.root + other.body["waist"] * other.pelvis[:, :, 2]
         arms: dict[str, Limb] = {}
         for side, sign in SIDES.items():
-            opened = np.array([0.26, 0.20 * sign, 0.285] if is_over else [0.24, 0.21 * sign, 0.12])
-            wrapped = (
-                np.array([-0.062 * of - 0.020 * h, -0.045 * sign * of, 0.272 * of])
-                if is_over
-                else np.array([-0.064 * of - 0.026 * h, -0.050 * sign * of, 0.095 * of])
-            )
+            # One hand lies above the other.
+            step = 0.022 * sign * of
+            if is_over:
+                opened = np.array([0.26, 0.20 * sign, 0.285])
+                wrapped = np.array([-0.072 * of - 0.020 * h, -0.060 * sign * of, 0.275 * of + step])
+            else:
+                opened = np.array([0.24, 0.21 * sign, 0.12])
+                wrapped = np.array([-0.060 * of - 0.026 * h, -0.080 * sign * of, 0.105 * of + step])
             outside = own + np.einsum("tij,j->ti", self.trunk, opened * h)
             around = theirs + np.einsum("tij,j->ti", other.trunk, wrapped)
             target = outside + close[:, None] * (around - outside)
-            elbow = np.array([0.1, 0.9 * sign, -0.15] if is_over else [-0.1, 0.8 * sign, -0.45])
+            elbow = np.array([0.1, 0.9 * sign, 0.1] if is_over else [-0.1, 0.75 * sign, -0.6])
             pole = -np.einsum("tij,j->ti", self.trunk, elbow)
             arms[side] = _laid(
                 self.body, self.arms[side], shoulders[side], target, pole, up[:, None]
@@ -263,7 +268,9 @@ def _laid(
     body: Body, hanging: Limb, shoulder: Array, target: Array, pole: Array, share: Array
 ) -> Limb:
     """Move the wrist of a hanging arm to a target by a share (T, 1) of the way."""
-    wrist = shoulder - body["arm"] * hanging.arm[:, :, 2] - body["forearm"] * hanging.forearm[:, :, 2]
+    wrist = (
+        shoulder - body["arm"] * hanging.arm[:, :, 2] - body["forearm"] * hanging.forearm[:, :, 2]
+    )
     front = unit((1 - share) * hanging.arm[:, :, 0] + share * pole)
     arm, forearm = two_bones(
         shoulder, wrist + share * (target - wrist), body["arm"], body["forearm"], front, -1.0

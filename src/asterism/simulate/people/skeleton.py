@@ -137,7 +137,9 @@ class Body:
         """Give the shoulder joints, (T, 3) each."""
         waist = root + self["waist"] * pelvis[:, :, 2]
         middle = waist + self["shoulder"] * trunk[:, :, 2]
-        return {s: middle + sign * self["shoulder_half"] * trunk[:, :, 1] for s, sign in SIDES.items()}
+        return {
+            s: middle + sign * self["shoulder_half"] * trunk[:, :, 1] for s, sign in SIDES.items()
+        }
 
     def pose(
         self,
@@ -226,7 +228,7 @@ def two_bones(
     forward = np.cross(hinge, up)
     along = (distance**2 + upper**2 - lower**2) / (2 * distance)
     aside = bend * np.sqrt(np.maximum(upper**2 - along**2, 0.0))
-    first = (up * along - forward * aside) / upper
-    second = (up * (distance - along) + forward * aside) / lower
-    turned = [np.stack([np.cross(hinge, z), hinge, z], axis=-1) for z in (first, second)]
-    return turned[0], turned[1]
+    first: Array = (up * along - forward * aside) / upper
+    second: Array = (up * (distance - along) + forward * aside) / lower
+    ahead, then = np.cross(hinge, first), np.cross(hinge, second)
+    return np.stack([ahead, hinge, first], axis=-1), np.stack([then, hinge, second], axis=-1)

@@ -1,18 +1,17 @@
 """Feet that stand still on the ground, step by step, and the height at which they carry a body.
 
-A `Course` says where a person goes; a `Gait` how. Each foot is planted where the pelvis passes
+A `Course` says where a person goes, a `Gait` how. Each foot is planted where the pelvis passes
 over it, rolls over its heel and its ball without sliding, and swings to the next place.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_interp_spline
-from scipy.ndimage import convolve1d, minimum_filter1d
 
+from asterism.simulate.people.course import STEP
 from asterism.simulate.people.curves import about_y, about_z, through
 from asterism.simulate.people.skeleton import FLESH, LENGTHS, SIDES
 
@@ -21,14 +20,22 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from asterism.simulate.people.course import Course
     from asterism.simulate.people.curves import Array, Knot
     from asterism.simulate.people.skeleton import Body
 
-__all__ = ["REACH", "Course", "Feet", "Gait", "carried", "feet_on", "reached", "rolled", "swings_of"]
+__all__ = [
+    "REACH",
+    "Feet",
+    "Gait",
+    "carried",
+    "feet_on",
+    "reached",
+    "rolled",
+    "swings_of",
+]
 
 REACH = 0.994  # share of the length of a leg that it stretches to: the knee keeps 13°
-_STEP = 0.01  # seconds between samples of what is integrated or filtered
-_PAD = 1.5  # seconds of it before and after the clip
 _HEEL, _BALL = (np.array(end)[[0, 2]] for end in FLESH["foot"][0][:2])
 
 
@@ -83,55 +90,12 @@ class Gait:
         thighs, shanks = body["thigh"], body["shank"]
         ahead = thighs * np.sin(hip) + shanks * np.sin(shank)
         down = thighs * np.cos(hip) + shanks * np.cos(shank)
-        passed = self.stance * (1 - self.under) + (1 - self.stance) * share  # by the hips, in cycles
-        return np.column_stack([share, passed + ahead * self.cadence / self.speed, self.hips - down])
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Course:
-    """Where somebody goes.
-
-    Parameters
-    ----------
-    duration : float
-        Of the clip, seconds.
-    speed, heading : callable
-        Of times (T,): forward speed, m/s, and direction, radians.
-    middle : (float, float)
-        Where the course is at half the clip, metres.
-    usual : float
-        Speed at which the gait has its full vigour, m/s.
-    """
-
-    duration: float
-    speed: Callable[[Array], Array]
-    heading: Callable[[Array], Array]
-    middle: tuple[float, float] = (0.0, 0.0)
-    usual: float
-    times: Array = field(init=False, repr=False)
-    _curve: CubicSpline = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        n = int(np.ceil((self.duration + 2 * _PAD) / _STEP)) + 1
-        times = -_PAD + _STEP * np.arange(n)
-        way = CubicSpline(times, self.velocity(times)).antiderivative()
-        middle = np.asarray(way(self.duration / 2)) - self.middle
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "_curve", CubicSpline(times, np.asarray(way(times)) - middle))
-
-    def velocity(self, t: Array) -> Array:
-        """Velocity over ground, (T, 2)."""
-        heading = self.heading(t)
-        return self.speed(t)[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-
-    def place(self, t: Array) -> Array:
-        """Place on the ground, (T, 2)."""
-        inside = np.clip(t, self.times[0], self.times[-1])
-        return np.asarray(self._curve(inside), dtype=np.float64)
-
-    def vigour(self, t: Array) -> Array:
-        """How the speed compares with the usual one, between 0 and 1; 0 also backwards."""
-        return np.clip(self.speed(t) / self.usual, 0.0, 1.0)
+        passed = (
+            self.stance * (1 - self.under) + (1 - self.stance) * share
+        )  # by the hips, in cycles
+        return np.column_stack(
+            [share, passed + ahead * self.cadence / self.speed, self.hips - down]
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -163,17 +127,13 @@ def swings_of(course: Course, gait: Gait, phase: float) -> dict[str, Array]:
     span = 1.5 / gait.cadence
     swings = {}
     for side, offset in (("L", 0.0), ("R", 0.5)):
-        first, last = (
-            (t * gait.cadence + phase - offset) for t in (-span, course.duration + span)
-        )
+        first, last = ((t * gait.cadence + phase - offset) for t in (-span, course.duration + span))
         landings = (np.arange(np.floor(first), np.ceil(last) + 1) + offset - phase) / gait.cadence
         swings[side] = np.stack([landings - (1 - gait.stance) / gait.cadence, landings], axis=-1)
     return swings
 
 
-def feet_on(
-    t: Array, body: Body, course: Course, gait: Gait, swings: dict[str, Array]
-) -> Feet:
+def feet_on(t: Array, body: Body, course: Course, gait: Gait, swings: dict[str, Array]) -> Feet:
     """Move the feet along a course.
 
     Parameters
@@ -197,9 +157,7 @@ def feet_on(
 class _Plan:
     """The stances of one foot between its swings, and the motion that follows from them."""
 
-    def __init__(
-        self, body: Body, course: Course, gait: Gait, swings: Array, sign: float
-    ) -> None:
+    def __init__(self, body: Body, course: Course, gait: Gait, swings: Array, sign: float) -> None:
         self.gait, self.height, self.way = gait, body.height, gait.way(body)
         self.sign = sign
         self.leave, self.land = swings.T
@@ -243,6 +201,8 @@ class _Plan:
 
     def ankle(self, t: Array, pitch: Array) -> Array:
         """Ankle joint, world metres (T, 3): `pitch` as `pitch` gives it."""
+        from scipy.interpolate import make_interp_spline
+
         stance = np.searchsorted(self.land, t, side="right")
         value = self._standing(stance, pitch)[0]
         share, along, height = self.way.T
@@ -346,8 +306,11 @@ def carried(t: Array, course: Course, highest: Array, smoothing: float = 0.15) -
     smoothing : float
         Seconds over which the height is evened out.
     """
+    from scipy.interpolate import CubicSpline
+    from scipy.ndimage import convolve1d, minimum_filter1d
+
     # A mean over a window, of minima over the same window, is under each of its values.
-    box = np.ones(2 * round(smoothing / 6 / _STEP) + 1)
+    box = np.ones(2 * round(smoothing / 6 / STEP) + 1)
     kernel = np.convolve(np.convolve(box, box), box)
     lowest = minimum_filter1d(highest, len(kernel), mode="nearest")
     even = convolve1d(lowest, kernel / kernel.sum(), mode="nearest")

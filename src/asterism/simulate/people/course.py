@@ -1,0 +1,71 @@
+"""Where somebody goes: speed and heading over time, and the place on the ground that they give."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from scipy.interpolate import CubicSpline
+
+    from asterism.simulate.people.curves import Array
+
+__all__ = ["STEP", "Course"]
+
+STEP = 0.01
+"""Seconds between samples of what is integrated or filtered."""
+
+_PAD = 1.5  # seconds of it before and after the clip
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Course:
+    """Where somebody goes.
+
+    Parameters
+    ----------
+    duration : float
+        Of the clip, seconds.
+    speed, heading : callable
+        Of times (T,): forward speed, m/s, and direction, radians.
+    middle : (float, float)
+        Where the course is at half the clip, metres.
+    usual : float
+        Speed at which the gait has its full vigour, m/s.
+    """
+
+    duration: float
+    speed: Callable[[Array], Array]
+    heading: Callable[[Array], Array]
+    middle: tuple[float, float] = (0.0, 0.0)
+    usual: float
+    times: Array = field(init=False, repr=False)
+    _curve: CubicSpline = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        from scipy.interpolate import CubicSpline
+
+        n = int(np.ceil((self.duration + 2 * _PAD) / STEP)) + 1
+        times = np.asarray(-_PAD + STEP * np.arange(n), dtype=np.float64)
+        way = CubicSpline(times, self.velocity(times)).antiderivative()
+        middle = np.asarray(way(self.duration / 2)) - self.middle
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "_curve", CubicSpline(times, np.asarray(way(times)) - middle))
+
+    def velocity(self, t: Array) -> Array:
+        """Velocity over ground, (T, 2)."""
+        heading = self.heading(t)
+        return self.speed(t)[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+
+    def place(self, t: Array) -> Array:
+        """Place on the ground, (T, 2)."""
+        inside = np.clip(t, self.times[0], self.times[-1])
+        return np.asarray(self._curve(inside), dtype=np.float64)
+
+    def vigour(self, t: Array) -> Array:
+        """How the speed compares with the usual one, between 0 and 1; 0 also backwards."""
+        return np.clip(self.speed(t) / self.usual, 0.0, 1.0)
