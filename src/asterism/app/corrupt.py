@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -34,6 +33,15 @@ _Ghosts = Annotated[
     ),
 ]
 _Stride = Annotated[int, typer.Option(help="Keep every so many frames.")]
+_Sense = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--sense",
+        metavar="NAME=VALUE",
+        help="What else goes wrong (noise_spread, visits, nearby, doubled, merged, dropped, jitter "
+        "…); may be repeated.",
+    ),
+]
 _Seed = Annotated[int, typer.Option(help="Chooses everything that is random.")]
 
 
@@ -47,6 +55,7 @@ def corrupt(
     burst: _Burst = None,
     ghosts: _Ghosts = None,
     stride: _Stride = 1,
+    sense: _Sense = None,
     seed: _Seed = 0,
     quiet: Quiet = False,
     json: Json = False,
@@ -67,19 +76,26 @@ def corrupt(
 
     import asterism as am
     from asterism.app.files import check_outputs
+    from asterism.app.recording import episode, switches_from
     from asterism.simulate import Burst, Ghosts
 
     check_outputs({"--out": out, "--truth": truth}, [source])
-    hiding = None if burst is None else Burst(**_episodes("--burst", burst))
-    haunting = None if ghosts is None else Ghosts(**_episodes("--ghosts", ghosts))
+    hiding = None if burst is None else Burst(**episode("--burst", burst))
+    haunting = None if ghosts is None else Ghosts(**episode("--ghosts", ghosts))
     known = am.read_tracks(source)
     if not known.n_tracks:
         expected = "a capture whose markers are labelled"
         raise ParameterError("IN", expected, f"{source}, which has no labels")
-    spoilt = am.simulate.sense(
-        known, missing=missing, clutter=clutter, noise=noise, burst=hiding, ghosts=haunting,
-        stride=stride, seed=seed,
-    )  # fmt: skip
+    switches: dict[str, Any] = {
+        "missing": missing,
+        "clutter": clutter,
+        "noise": noise,
+        "burst": hiding,
+        "ghosts": haunting,
+        "stride": stride,
+    }
+    switches |= switches_from(sense or [])
+    spoilt = am.simulate.sense(known, **switches, seed=seed)
     unnamed = am.Tracks(
         detections=spoilt.detections, labels=np.full(spoilt.detections.n_points, -1)
     )
@@ -93,16 +109,8 @@ def corrupt(
         "n_clutter": int((spoilt.labels < 0).sum()),
     }
     if json:
-        print_json({"output": str(out), "truth": str(truth), **figures})
+        record = spoilt.record
+        print_json({"output": str(out), "truth": str(truth), "sense": record, **figures})
     elif not quiet:
         rows = [(name.removeprefix("n_"), n) for name, n in figures.items()]
         print_table([*rows, ("without names", out), ("truth", truth)])
-
-
-def _episodes(option: str, text: str) -> dict[str, int]:
-    """Read ``N`` or ``N:MIN-MAX``."""
-    match = re.fullmatch(r"(\d+)(?::(\d+)-(\d+))?", text.strip())
-    if match is None:
-        raise ParameterError(option, "N or N:MIN-MAX, 5:5-60 say", repr(text))
-    names = ("n", "shortest", "longest")
-    return {name: int(n) for name, n in zip(names, match.groups(), strict=True) if n is not None}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import shlex
 from pathlib import Path
@@ -39,7 +40,21 @@ _Rate = Annotated[
     float | None, typer.Option(help="Frames a second of a scene.", show_default="the scene's")
 ]
 _Seed = Annotated[
-    int | None, typer.Option(help="Chooses all that is random in a scene.", show_default="0")
+    int | None,
+    typer.Option(help="Chooses all that is random in a scene and in --seeing.", show_default="0"),
+]
+_Options = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="NAME=VALUE", help="Option of a scene; may be repeated."),
+]
+_Seeing = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--seeing",
+        metavar="NAME=VALUE",
+        help="What the cameras make of markers (marker_radius, smallest_share, merge, noise_px, "
+        "missing, false, quantum_px, timing); may be repeated. Ideal without it.",
+    ),
 ]
 _Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let DIR hold files already.")]
 
@@ -56,13 +71,16 @@ def film(
     frames: _Frames = None,
     rate: _Rate = None,
     seed: _Seed = None,
+    option: _Options = None,
+    seeing: _Seeing = None,
     overwrite: _Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Film markers with ideal cameras: what each sees of them, without noise.
+    """Film markers: what each camera sees of them.
 
-    Every tracked point of the capture, named or not, is one image point wherever a camera sees it.
+    Every tracked point of the capture, named or not, is one image point wherever an ideal camera
+    sees it; with --seeing cameras report blobs. The limbs of people hide what is behind them.
     DIR gets the image points with their truth (observations.csv), the cameras (rig.toml), pictures
     of what each camera sees, of the rig and of how well it sees, and a summary (film.json).
 
@@ -70,7 +88,9 @@ def film(
 
         asterism film walk.c3d --rig walk.xcp -o film
 
-        asterism film crossing --rig ring8 -o film --rate 100 --pictures 10
+        asterism film person --rig ring8 -o film --option activity=jump --pictures 10
+
+        asterism film crossing --rig wall4 -o film --seeing noise_px=0.2 --seeing false=0.5
     """
     from asterism.app.console import to_json
     from asterism.app.files import check_outputs
@@ -81,6 +101,7 @@ def film(
         save,
     )
     from asterism.app.filming import film_all, frames_between
+    from asterism.app.recording import rig_from, seeing_from
     from asterism.app.run_folder import check_folder, versions, write_text
     from asterism.io.calibration import write_rig
     from asterism.io.observations import write_observations
@@ -89,21 +110,22 @@ def film(
     check_folder(out, overwrite=overwrite)
     given = {"frames": frames, "rate": rate, "seed": seed}
     given = {name: value for name, value in given.items() if value is not None}
-    truth, first_frame = _truth(source, given)
+    truth, first_frame = _truth(source, given, option or [], is_seeing=bool(seeing))
+    eyes = seeing_from(seeing or [])
     points = truth.detections.points[truth.labels >= 0]
     if not len(points):
         hint = "asterism track makes tracks of points without names"
         raise ParameterError("CAPTURE", "points in tracks", f"{source}, which has none", hint)
     if points.shape[1] != 3:
         raise ParameterError("CAPTURE", "points in 3-D", f"{source}, in {points.shape[1]}-D")
-    cameras, about = _rig(rig, points)
+    cameras, about = rig_from(rig, points)
 
     out.mkdir(parents=True, exist_ok=True)
     names = (POINTS, RIG, SUMMARY, RIG_PICTURE, COVERAGE_PICTURE)
     inputs = [Path(text) for text in (source, rig) if Path(text).exists()]
     check_outputs({f"-o ({name})": out / name for name in names}, inputs)
     with progress("filming", truth.detections.n_frames) as advance:
-        footage = film_all(truth, cameras, advance)
+        footage = film_all(truth, cameras, advance, eyes, seed or 0)
     write_observations(footage.observations, out / POINTS, first_frame=first_frame)
     write_rig(cameras, out / RIG)
 
@@ -122,6 +144,8 @@ def film(
         save(coverage_picture(truth, cameras), out / COVERAGE_PICTURE)
 
     options = [f"--{name}={value}" for name, value in given.items()]
+    options += [f"--option={text}" for text in option or []]
+    options += [f"--seeing={text}" for text in seeing or []]
     arguments = ["film", source, "--rig", rig, "-o", str(out), f"--pictures={pictures}", *options]
     summary = {
         "command": shlex.join(["asterism", *arguments]),
@@ -129,6 +153,7 @@ def film(
         "rig": rig,
         "about_rig": about,
         "seed": given.get("seed", 0),
+        "seeing": None if eyes is None else dataclasses.asdict(eyes),
         "first_frame": first_frame,
         "n_frames": truth.detections.n_frames,
         "n_tracks": truth.n_tracks,
@@ -149,18 +174,23 @@ def film(
         _print(out, summary)
 
 
-def _truth(source: str, given: dict[str, Any]) -> tuple[am.Tracks, int]:
+def _truth(
+    source: str, given: dict[str, Any], texts: list[str], *, is_seeing: bool
+) -> tuple[am.Tracks, int]:
     """Make the scene or read the capture; give its tracks and the number of its first frame."""
     import asterism as am
+    from asterism.app.recording import made_scene
 
     path = Path(source)
     if source in am.simulate.SCENES and not path.exists():
-        return am.simulate.SCENES[source].make(**given), 1
+        return made_scene(source, given, texts)[0], 1
     if not path.exists():
         expected = f"a capture, or a scene: {', '.join(am.simulate.SCENES)}"
         raise ParameterError("CAPTURE", expected, f"{source!r}, which is neither")
-    if given:
-        options = ", ".join(f"--{name}" for name in given)
+    idle = [f"--{name}" for name in given if not (name == "seed" and is_seeing)]
+    idle += ["--option"] * bool(texts)
+    if idle:
+        options = ", ".join(idle)
         raise ParameterError("CAPTURE", f"a scene, as {options} is given", f"the file {source}")
     tracks = am.read_tracks(path)
     capture = tracks.detections
@@ -171,22 +201,6 @@ def _truth(source: str, given: dict[str, Any]) -> tuple[am.Tracks, int]:
     if n_clutter and tracks.n_tracks:
         log.warning("%s: %d points that are in no track are not filmed", path, n_clutter)
     return tracks, capture.first_frame
-
-
-def _rig(text: str, points: Any) -> tuple[am.Rig, str]:
-    """Read a calibration, or place the cameras of a preset about the points."""
-    from asterism.app.rig_presets import is_preset, place_preset
-    from asterism.io.calibration import read_rig
-
-    if is_preset(text) and not Path(text).exists():
-        return place_preset(text, points.min(axis=0), points.max(axis=0))
-    if not Path(text).exists():
-        expected = "a calibration, or ring or wall and a number of cameras: ring8"
-        raise ParameterError("--rig", expected, f"{text!r}, which is neither")
-    rig = read_rig(text)
-    for warning in rig.warnings:
-        log.warning("%s: %s", text, warning)
-    return rig, f"{len(rig)} cameras of {text}"
 
 
 def _figures(footage: Footage) -> dict[str, Any]:

@@ -9,13 +9,14 @@ import numpy as np
 
 from asterism.io.atomic import replacing
 from asterism.model import Detections, Tracks
+from asterism.simulate import Truth
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.figure import Figure
 
-    from asterism.camera import Rig
+    from asterism.camera import Rig, Surface
 
 __all__ = ["contact_sheet", "coverage_picture", "rig_picture", "save"]
 
@@ -39,6 +40,7 @@ def contact_sheet(truth: Tracks, rig: Rig, t: int, title: str) -> Figure:
     title : str
         Of the whole.
     """
+    from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
 
     from asterism.view import plot_image
@@ -48,8 +50,16 @@ def contact_sheet(truth: Tracks, rig: Rig, t: int, title: str) -> Figure:
     rows = np.arange(d.offsets[t], d.offsets[t + 1])
     rows = rows[truth.labels[rows] >= 0]
     rows = rows[np.argsort(truth.labels[rows])]
-    projection = rig.project(d.points[rows])
-    colours = [CYCLE[k % len(CYCLE)] for k in truth.labels[rows].tolist()]
+    shown = truth.labels[rows]
+    surfaces: tuple[Surface, ...] = ()
+    connections = None
+    colours = [CYCLE[k % len(CYCLE)] for k in shown.tolist()]
+    if isinstance(truth, Truth):
+        surfaces = tuple(s.during(np.array([t])) for s in truth.surfaces)
+        connections = truth.connections[np.ix_(shown, shown)]
+        if connections.any():
+            colours = [CYCLE[(k - 1) % len(CYCLE)] for k in truth.colours[shown].tolist()]
+    projection = rig.project(d.points[rows], surfaces)
     n_columns = math.ceil(math.sqrt(len(rig)))
     n_rows = math.ceil(len(rig) / n_columns)
     width = min(max(15.0 / n_columns, 1.8), 7.0)
@@ -61,12 +71,20 @@ def contact_sheet(truth: Tracks, rig: Rig, t: int, title: str) -> Figure:
     for i, camera in enumerate(rig):
         axes = figure.add_subplot(n_rows, n_columns, i + 1)
         named = camera.replace(name=rig.names[i])
-        plot_image(named, projection[i], colours=colours, ax=axes)
+        plot_image(
+            named,
+            projection[i],
+            connections=connections,
+            colours=colours,
+            surfaces=surfaces,
+            ax=axes,
+        )
         axes.set_title(axes.get_title(loc="left"), fontsize=8, loc="left", parse_math=False)
         axes.set(xlabel="", ylabel="")
         axes.tick_params(labelsize=6)
         for dots in axes.collections:
-            dots.set(sizes=[_DOT])
+            if isinstance(dots, PathCollection):
+                dots.set(sizes=[_DOT])
     return figure
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from asterism.camera import Observations, Reason
 from asterism.io.text_table import plain
-from asterism.model import Detections, Tracks
-from asterism.simulate import film
+from asterism.model import Detections
+from asterism.simulate import Truth, film
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism.camera import Rig
+    from asterism.model import Tracks
+    from asterism.simulate import Seeing
 
 __all__ = ["Footage", "film_all", "frames_between", "names_apart"]
 
@@ -52,7 +54,13 @@ class Footage:
         return float(self.n_cameras[least:].sum()) / max(self.n_samples, 1)
 
 
-def film_all(truth: Tracks, rig: Rig, advance: Callable[[int], None]) -> Footage:
+def film_all(
+    truth: Tracks,
+    rig: Rig,
+    advance: Callable[[int], None],
+    seeing: Seeing | None = None,
+    seed: int = 0,
+) -> Footage:
     """Film tracks in pieces, so that the memory does not depend on their length.
 
     Parameters
@@ -63,6 +71,10 @@ def film_all(truth: Tracks, rig: Rig, advance: Callable[[int], None]) -> Footage
         The cameras.
     advance : callable
         Told the number of frames that are done.
+    seeing : Seeing, optional
+        What the cameras make of the markers; ideal by default.
+    seed : int
+        Chooses what is random in that. Each piece draws anew, but for how late the cameras are.
 
     Returns
     -------
@@ -84,12 +96,12 @@ def film_all(truth: Tracks, rig: Rig, advance: Callable[[int], None]) -> Footage
     for begin in range(0, d.n_frames, step):
         end = min(begin + step, d.n_frames)
         numbers, piece = _piece(truth, begin, end)
-        shot = film(piece, rig)
+        shot = film(piece, rig, seeing=seeing, seed=seed, part=begin)
         seen = shot.observations
         assert seen.markers is not None
         cells.append(np.diff(seen.offsets))
         pixels.append(seen.pixels)
-        markers.append(numbers[seen.markers])
+        markers.append(np.append(numbers, -1)[seen.markers])
         is_there = shot.projection.reason != Reason.ABSENT
         for reason in Reason:
             if reason != Reason.ABSENT:
@@ -120,7 +132,15 @@ def _piece(truth: Tracks, begin: int, end: int) -> tuple[NDArray[np.int64], Trac
     is_track = labels >= 0
     numbers, labels[is_track] = np.unique(labels[is_track], return_inverse=True)
     cut = Detections(times=d.times[begin:end], offsets=offsets - offsets[0], points=d.points[rows])
-    return numbers, Tracks(detections=cut, labels=labels, names=(None,) * len(numbers))
+    surfaces = truth.surfaces if isinstance(truth, Truth) else ()
+    frames = np.arange(begin, end)
+    piece = Truth(
+        detections=cut,
+        labels=labels,
+        names=(None,) * len(numbers),
+        surfaces=tuple(s.during(frames) for s in surfaces),
+    )
+    return numbers, piece
 
 
 def names_apart(names: Sequence[str | None]) -> tuple[str, ...]:

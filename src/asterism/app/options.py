@@ -142,6 +142,12 @@ def _parse(name: str, kind: Any, text: str) -> Any:
     if typing.get_origin(kind) in (Union, types.UnionType):
         inner = [k for k in typing.get_args(kind) if k is not type(None)]
         return None if text.lower() == "none" else _parse(name, inner[0], text)
+    if typing.get_origin(kind) is tuple:
+        parts = [part.strip() for part in text.strip("() ").split(",")]
+        inner = typing.get_args(kind)
+        if Ellipsis not in inner and len(parts) != len(inner):
+            raise ParameterError(name, f"{len(inner)} values with commas between", repr(text))
+        return tuple(_parse(name, inner[0], part) for part in parts)
     if typing.get_origin(kind) is Literal:
         choices = [str(choice) for choice in typing.get_args(kind)]
         check_fields(name, [text], choices)

@@ -1,59 +1,120 @@
-"""``asterism simulate``: scenes in motion whose truth is known."""
+"""``asterism simulate``: scenes in motion whose truth is known, and recordings of them."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from asterism.app.console import Json, Quiet, print_json, print_table
-from asterism.errors import check_fields
+from asterism.errors import ParameterError
 
 _Scene = Annotated[str, typer.Argument(metavar="SCENE", help="One of `asterism scenes`.")]
-_Out = Annotated[Path, typer.Option("--out", "-o", help="File for the named markers.")]
+_Out = Annotated[
+    Path,
+    typer.Option(
+        "--out", "-o", help="File for the named markers; with --truth, for points without names."
+    ),
+]
+_Truth = Annotated[
+    Path | None,
+    typer.Option(help="File for the same points with their true names.", show_default=False),
+]
 _Frames = Annotated[int | None, typer.Option(help="Number of frames.", show_default="the scene's")]
 _Rate = Annotated[float | None, typer.Option(help="Frames a second.", show_default="the scene's")]
+_Markers = Annotated[
+    int | None, typer.Option(help="Number of markers.", show_default="the scene's")
+]
 _Seed = Annotated[int, typer.Option(help="Chooses everything that is random.")]
 _Options = Annotated[
     list[str] | None,
     typer.Option("--option", metavar="NAME=VALUE", help="Option of the scene; may be repeated."),
+]
+_Sense = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--sense",
+        metavar="NAME=VALUE",
+        help="What goes wrong in the recording (missing, clutter, noise, burst, ghosts, visits, "
+        "nearby, doubled, merged, dropped, jitter …); may be repeated.",
+    ),
+]
+_Rig = Annotated[
+    str | None,
+    typer.Option(
+        "--rig",
+        metavar="RIG",
+        help="Leave out what fewer than two of these cameras see: a calibration, or ring8, wall4 "
+        "and the like.",
+        show_default=False,
+    ),
 ]
 
 
 def simulate(
     scene: _Scene,
     out: _Out,
+    truth: _Truth = None,
     frames: _Frames = None,
     rate: _Rate = None,
+    markers: _Markers = None,
     seed: _Seed = 0,
     option: _Options = None,
+    sense: _Sense = None,
+    rig: _Rig = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Simulate markers in motion and write them with their names; spoil them with `corrupt`.
+    r"""Simulate markers in motion and write them; spoilt, if asked, with the truth beside.
 
     For example:
 
-        asterism simulate crossing -o truth.c3d --rate 100
+        asterism simulate person -o walk.c3d --option activity=walk --markers 60
 
-        asterism simulate smooth -o truth.csv --frames 300 --option n_markers=20
+        asterism simulate crossing -o a.c3d --truth t.c3d --rate 100 --sense missing=0.1 \
+            --sense clutter=0.1 --sense burst=5:5-60
+
+        asterism simulate two_people -o hug.csv --truth t.csv --option activity=hug --rig ring8
     """
-    import asterism as am
-    from asterism.app.options import parsed, scene_options
+    import numpy as np
 
-    scenes = am.simulate.SCENES
-    check_fields("scene", [scene], scenes)
-    make = scenes[scene].make
-    values = parsed(f"scene {scene}", option or [], scene_options(make))
-    given = {"frames": frames, "rate": rate, "seed": seed}
-    values |= {name: value for name, value in given.items() if value is not None}
-    truth = make(**values)
-    am.write(truth, out)
-    d = truth.detections
+    import asterism as am
+    from asterism.app.files import check_outputs
+    from asterism.app.recording import made_scene, rig_from, switches_from
+
+    if (sense or rig) and truth is None:
+        expected = "a file for the truth, as --sense or --rig is given"
+        raise ParameterError("--truth", expected, "none", "without it nobody knows who is whom")
+    check_outputs({"--out": out, **({} if truth is None else {"--truth": truth})}, [])
+    given = {"frames": frames, "rate": rate, "seed": seed, "markers": markers}
+    made, values = made_scene(scene, given, option or [])
+    switches: dict[str, Any] = switches_from(sense or [])
+    result: am.Tracks = made
+    about = ""
+    if truth is not None:
+        if rig is not None:
+            switches["rig"], about = rig_from(rig, made.detections.points)
+        sensed = am.simulate.sense(made, **switches, seed=seed)
+        values |= {"sense": sensed.record}
+        d = sensed.detections
+        am.write(sensed, truth)
+        result = am.Tracks(detections=d, labels=np.full(d.n_points, -1))
+    am.write(result, out)
+    figures = {
+        "n_frames": result.detections.n_frames,
+        "n_markers": made.n_tracks,
+        "n_detections": result.detections.n_points,
+    }
     if json:
-        figures = {"n_frames": d.n_frames, "n_markers": truth.n_tracks, "n_detections": d.n_points}
-        print_json({"output": str(out), "scene": scene, "options": values, **figures})
+        files = {"output": str(out), **({} if truth is None else {"truth": str(truth)})}
+        print_json({**files, "scene": scene, "options": values, **figures})
     elif not quiet:
-        size = f"{truth.n_tracks} markers, {d.n_frames} frames, {d.n_points} detections"
-        print_table([(scene, size), ("written", out)])
+        size = "{n_markers} markers, {n_frames} frames, {n_detections} detections".format(**figures)
+        rows: list[tuple[str, object]] = [(scene, size)]
+        if about:
+            rows.append(("rig", about))
+        if truth is not None:
+            record = ", ".join(f"{k}={v}" for k, v in values["sense"].items() if k != "rig")
+            rows += [("sensed", record), ("truth", truth)]
+        print_table([*rows, ("written", out)])

@@ -53,6 +53,7 @@ def film(
     *,
     seeing: Seeing | None = None,
     seed: int = 0,
+    part: int = 0,
 ) -> Film:
     """Film markers.
 
@@ -69,6 +70,9 @@ def film(
         point is one image point where it belongs, in the order of the markers.
     seed : int
         Chooses everything that is random.
+    part : int
+        Which piece of a longer film this is: pieces differ in all that is random but in how late
+        each camera is.
 
     Returns
     -------
@@ -87,7 +91,7 @@ def film(
     >>> film(scene, rig).observations
     Observations(4 cameras, 10 frames, 320 points)
     >>> film(scene, rig, seeing=am.simulate.Seeing(missing=0.1), seed=1).observations
-    Observations(4 cameras, 10 frames, 293 points)
+    Observations(4 cameras, 10 frames, 292 points)
     """
     detections = truth.detections
     if detections.n_axes != 3:
@@ -100,7 +104,7 @@ def film(
     if seeing is None:
         blobs = _ideal(projection)
     else:
-        blobs = see(detections.times, positions, rig, surfaces, seeing, seed)
+        blobs = see(detections.times, positions, rig, surfaces, seeing, (seed, part))
     counts = np.bincount(blobs.cell, minlength=detections.n_frames * len(rig))
     observations = Observations(
         times=detections.times,

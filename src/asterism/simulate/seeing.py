@@ -101,7 +101,7 @@ def see(
     rig: Rig,
     surfaces: Sequence[Surface],
     seeing: Seeing,
-    seed: int,
+    seed: tuple[int, int],
 ) -> Blobs:
     """Look at markers through every camera.
 
@@ -117,11 +117,13 @@ def see(
         What hides markers.
     seeing : Seeing
         What the cameras make of them.
-    seed : int
-        Chooses everything that is random; each switch has a stream of its own.
+    seed : (int, int)
+        Seed and piece of a longer film: they choose everything that is random, the piece all but
+        how late the cameras are. Each switch has a stream of its own.
     """
-    streams = np.random.SeedSequence(seed).spawn(5)
-    rng_timing, rng_missing, rng_noise, rng_false, rng_order = map(np.random.default_rng, streams)
+    rng_timing = np.random.default_rng(np.random.SeedSequence(seed[0]))
+    streams = np.random.SeedSequence(seed[0], spawn_key=(seed[1],)).spawn(4)
+    rng_missing, rng_noise, rng_false, rng_order = map(np.random.default_rng, streams)
     T, K = positions.shape[:2]
     C = len(rig)
     late = seeing.timing * rng_timing.standard_normal(C)

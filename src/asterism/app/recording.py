@@ -1,0 +1,137 @@
+"""What commands that simulate have in common: scenes, rigs and switches from their options."""
+
+from __future__ import annotations
+
+import logging
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from asterism.errors import ParameterError, check_fields
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import asterism as am
+
+__all__ = ["episode", "made_scene", "rig_from", "seeing_from", "switches_from"]
+
+log = logging.getLogger(__name__)
+
+
+def made_scene(
+    name: str, given: dict[str, Any], texts: Sequence[str]
+) -> tuple[am.simulate.Truth, dict[str, Any]]:
+    """Make a scene.
+
+    Parameters
+    ----------
+    name : str
+        One of the scenes.
+    given : dict
+        Values of the options that every scene has, None where not given; ``markers`` for the
+        scene's own number of them.
+    texts : sequence of str
+        ``NAME=VALUE`` for its other options.
+
+    Returns
+    -------
+    truth : Truth
+    options : dict
+        All values that were given.
+
+    Raises
+    ------
+    ParameterError
+        If the scene or an option is unknown, or it has no number of markers to choose.
+    """
+    import asterism as am
+    from asterism.app.options import parsed, scene_options
+
+    scenes = am.simulate.SCENES
+    check_fields("scene", [name], scenes)
+    known = scene_options(scenes[name].make)
+    values = parsed(f"scene {name}", texts, known)
+    given = {key: value for key, value in given.items() if value is not None}
+    if "markers" in given:
+        number = next((n for n in ("n_markers", "n_drones") if n in known), None)
+        if number is None:
+            raise ParameterError(
+                "--markers", f"nothing: {name} has its own number", given["markers"]
+            )
+        given[number] = given.pop("markers")
+    values |= given
+    return scenes[name].make(**values), values
+
+
+def rig_from(text: str, points: Any) -> tuple[am.Rig, str]:
+    """Read a calibration, or place the cameras of a preset about points, shape (N, 3).
+
+    Returns
+    -------
+    rig : Rig
+    about : str
+        What it is, for people.
+
+    Raises
+    ------
+    ParameterError
+        If the text is neither.
+    """
+    from asterism.app.rig_presets import is_preset, place_preset
+    from asterism.io.calibration import read_rig
+
+    if is_preset(text) and not Path(text).exists():
+        return place_preset(text, points.min(axis=0), points.max(axis=0))
+    if not Path(text).exists():
+        expected = "a calibration, or ring or wall and a number of cameras: ring8"
+        raise ParameterError("--rig", expected, f"{text!r}, which is neither")
+    rig = read_rig(text)
+    for warning in rig.warnings:
+        log.warning("%s: %s", text, warning)
+    return rig, f"{len(rig)} cameras of {text}"
+
+
+def switches_from(texts: Sequence[str]) -> dict[str, Any]:
+    """Read ``NAME=VALUE`` switches of `asterism.simulate.sense`.
+
+    Numbers as they are; ``burst`` and ``ghosts`` as ``N[:MIN-MAX]``, ``visits`` as ``MIN-MAX``.
+    """
+    from asterism.app.options import Option, parsed
+    from asterism.simulate import Burst, Ghosts, Visits, sense
+
+    defaults: dict[str, Any] = sense.__kwdefaults__ or {}
+    known = {
+        name: Option(
+            name=name, kind=str if default is None else type(default), default=default, about=""
+        )
+        for name, default in defaults.items()
+        if name not in ("rig", "seed", "keep_unnamed")
+    }
+    values = parsed("sensing", texts, known)
+    for name, kind in (("burst", Burst), ("ghosts", Ghosts)):
+        if name in values:
+            values[name] = kind(**episode(name, values[name]))
+    if "visits" in values:
+        match = re.fullmatch(r"(\d+)-(\d+)", values["visits"])
+        if match is None:
+            raise ParameterError("visits", "MIN-MAX, 50-200 say", repr(values["visits"]))
+        values["visits"] = Visits(shortest=int(match[1]), longest=int(match[2]))
+    return values
+
+
+def seeing_from(texts: Sequence[str]) -> am.simulate.Seeing | None:
+    """Read ``NAME=VALUE`` fields of `asterism.simulate.Seeing`; None without any."""
+    from asterism.app.options import method_options, parsed
+    from asterism.simulate import Seeing
+
+    return Seeing(**parsed("seeing", texts, method_options(Seeing))) if texts else None  # pyright: ignore[reportArgumentType]
+
+
+def episode(option: str, text: str) -> dict[str, int]:
+    """Read ``N`` or ``N:MIN-MAX``."""
+    match = re.fullmatch(r"(\d+)(?::(\d+)-(\d+))?", text.strip())
+    if match is None:
+        raise ParameterError(option, "N or N:MIN-MAX, 5:5-60 say", repr(text))
+    names = ("n", "shortest", "longest")
+    return {name: int(n) for name, n in zip(names, match.groups(), strict=True) if n is not None}
