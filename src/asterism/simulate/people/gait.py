@@ -90,7 +90,7 @@ class Carriage:
 def walking(height: float, style: Style) -> Gait:
     """Give the gait of a walk.
 
-    Steps of 0.41 of the height at 112 a minute are a man's free walk (Murray 1964: 78 cm and 117 at
+    Steps of 0.40 of the height at 112 a minute are a man's free walk (Murray 1964: 78 cm and 117 at
     1.76 m; Perry: 1.36 m/s). Time goes with the square root of the length.
     """
     cadence = 56 / 60 * style.pace * np.sqrt(1.75 / height)
@@ -101,9 +101,9 @@ def walking(height: float, style: Style) -> Gait:
         landing=(18.0, -60.0),
         leaving=(-58.0, -330.0),
         flat=(0.17, 0.45),
-        swing=((0.26, 9.0, 60.0), (0.54, 25.0, 48.0), (0.80, 27.0, 18.0)),
+        swing=((0.27, 9.0, 62.0), (0.55, 25.0, 55.0), (0.80, 25.0, 18.0)),
         hips=0.515 * height,
-        speed=0.82 * height * style.length * cadence,
+        speed=0.80 * height * style.length * cadence,
         width=0.055 * height,
         toe_out=6.0,
     )

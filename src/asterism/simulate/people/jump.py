@@ -21,6 +21,7 @@ __all__ = ["jump"]
 
 _PERIOD = 3.0  # seconds a jump, at least
 _DIP, _PUSH, _SINK, _RISE = 0.62, 0.32, 0.26, 0.75  # seconds before and after the flight
+_TOE_OUT = 5.0  # degrees
 _LEAVE, _LAND = (-48.0, -360.0), (-34.0, 200.0)  # pitch of the feet and its rate, degrees
 
 
@@ -86,7 +87,7 @@ class _Jump:
             head=facing @ about_y(self._along(t, 1.0, 14.0, -10.0, 8.0, 14.0)),
             ankles={s: turned(ankles[s]) for s in SIDES},
             feet={
-                s: facing @ about_z(np.full(len(t), sign * 5.0)) @ about_y(-self._pitch(t)[:, 0])
+                s: facing @ about_z(np.full(len(t), sign * _TOE_OUT)) @ about_y(-self._pitch(t)[:, 0])
                 for s, sign in SIDES.items()
             },
             arms={
@@ -119,10 +120,10 @@ class _Jump:
         in_air = (t > -self.up) & (t < self.down)
         if in_air.any():
             flat[in_air] = self._hanging(t[in_air])
+        along, up = flat.T
+        out, width = np.radians(_TOE_OUT), 0.062 * self.body.height
         return {
-            s: np.column_stack(
-                [flat[:, 0], np.full(len(t), sign * 0.062 * self.body.height), flat[:, 1]]
-            )
+            s: np.column_stack([along * np.cos(out), sign * (width + along * np.sin(out)), up])
             for s, sign in SIDES.items()
         }
 

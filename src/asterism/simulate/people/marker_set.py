@@ -8,6 +8,7 @@ place is where a ray from inside the segment leaves its flesh.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -135,17 +136,7 @@ class MarkerSet:
     @property
     def places(self) -> Array:
         """Places of the markers in the frames of their segments, shape (K, 3)."""
-        rays = (_both(_CORE) + _both(_MORE))[: self.n_markers]
-        return np.array(
-            [
-                on_skin(
-                    self.body.tubes(segment),
-                    np.array(start) * self.body.height,
-                    np.array(towards, dtype=np.float64),
-                )
-                for _, segment, start, towards in rays
-            ]
-        )
+        return _places(self.body)[: self.n_markers]
 
     @property
     def colours(self) -> list[int]:
@@ -201,6 +192,23 @@ def on_skin(tubes: Sequence[tuple[Array, float]], start: Array, towards: Array) 
         i = int(np.flatnonzero(above(s) < 0)[-1])
         s = np.linspace(s[i], s[i + 1], 101)
     return start + s[50] * direction
+
+
+@lru_cache(maxsize=16)
+def _places(body: Body) -> Array:
+    """Places of all markers on a body, in the frames of their segments, shape (90, 3)."""
+    places = np.array(
+        [
+            on_skin(
+                body.tubes(segment),
+                np.array(start) * body.height,
+                np.array(towards, dtype=np.float64),
+            )
+            for _, segment, start, towards in _both(_CORE) + _both(_MORE)
+        ]
+    )
+    places.flags.writeable = False
+    return places
 
 
 def _side(name: str) -> str:
