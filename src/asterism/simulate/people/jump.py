@@ -87,7 +87,7 @@ class _Jump:
             head=facing @ about_y(self._along(t, 1.0, 14.0, -10.0, 8.0, 14.0)),
             ankles={s: turned(ankles[s]) for s in SIDES},
             feet={
-                s: facing @ about_z(np.full(len(t), sign * _TOE_OUT)) @ about_y(-self._pitch(t)[:, 0])
+                s: facing @ about_z(sign * _TOE_OUT) @ about_y(-self._pitch(t)[:, 0])
                 for s, sign in SIDES.items()
             },
             arms={
