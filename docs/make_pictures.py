@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 import asterism as am
 from asterism.view import plot_coverage, plot_image, plot_lens, plot_rig
+from asterism.view.style import CYCLE
 
 
 def crossing(path: Path) -> None:
@@ -129,8 +130,59 @@ def rig(path: Path) -> None:
     figure.savefig(path)
 
 
+# Of each scene: options, the frame that is shown, how many frames before it leave a trail.
+SCENES: dict[str, tuple[dict[str, Any], int, int]] = {
+    "cube": ({}, 60, 12),
+    "crossing": ({}, 20, 8),
+    "wander": ({"frames": 100}, 80, 25),
+    "walk": ({"frames": 60}, 50, 8),
+    "attracted": ({"frames": 60}, 20, 6),
+    "smooth": ({"n_markers": 40, "frames": 60}, 50, 10),
+    "swarm": ({"frames": 700}, 470, 40),
+    "person": ({"activity": "run"}, 130, 0),
+    "person, jumping": ({"activity": "jump"}, 170, 0),
+    "two_people": ({"activity": "hug"}, 330, 0),
+    "fingers": ({}, 60, 0),
+    "juggler": ({"frames": 400}, 250, 30),
+}
+
+
+def scenes(path: Path) -> None:
+    """Draw every scene: one moment of it, the way that led there, and what hides."""
+    figure = Figure(figsize=(13, 10.5), dpi=90, layout="constrained")
+    for i, (title, (options, t, trail)) in enumerate(SCENES.items()):
+        name = title.split(",")[0]
+        truth = am.simulate.SCENES[name].make(seed=2, **options)
+        places = truth.positions()
+        shown = places[max(0, t - trail) : t + 1]
+        middle = (np.nanmin(shown, axis=(0, 1)) + np.nanmax(shown, axis=(0, 1))) / 2
+        size = float(np.ptp(shown.reshape(-1, 3), axis=0).max()) + 0.05
+        stand = middle + size * np.array([2.2, -2.6, 0.9])
+        K = am.intrinsics(focal_length=2000, principal_point=(1000.0, 1000.0))
+        camera = am.Camera.look_at(stand, middle, K=K, size_px=(2001, 2001))
+        surfaces = [s.during(np.array([t])) for s in truth.surfaces]
+        ways = camera.project(shown).pixels
+        axes = figure.add_subplot(3, 4, i + 1)
+        for k in range(truth.n_tracks * bool(trail)):
+            axes.plot(*ways[:, k].T, color="#BBBBBB", linewidth=0.8, zorder=0)
+        plot_image(
+            camera,
+            camera.project(places[t], surfaces),
+            connections=truth.connections,
+            colours=[CYCLE[(c - 1) % len(CYCLE)] for c in truth.colours],
+            surfaces=surfaces,
+            ax=axes,
+        )
+        low, high = np.nanmin(ways, axis=(0, 1)), np.nanmax(ways, axis=(0, 1))
+        (u, v), half = (low + high) / 2, 0.6 * float((high - low).max())
+        axes.set(xlim=(u - half, u + half), ylim=(v + half, v - half))
+        axes.set_axis_off()
+        axes.set_title(title.replace("_", " "), fontsize=11, loc="left")
+    figure.savefig(path)
+
+
 if __name__ == "__main__":
     images = Path(__file__).parent / "images"
     images.mkdir(exist_ok=True)
-    for picture in (crossing, lenses, film, rig):
+    for picture in (crossing, lenses, film, rig, scenes):
         picture(images / f"{picture.__name__}.png")

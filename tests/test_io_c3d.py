@@ -499,3 +499,23 @@ def test_a_described_data_start_keeps_the_data_where_the_header_says(tmp_path):
         out = tmp_path / "out.c3d"
         write(tracks, out)
         assert read(out).n_frames == 3, n
+
+
+def test_cameras_and_residuals(tmp_path):
+    d = Detections(
+        times=[0.0, 0.01], offsets=[0, 2, 3], points=[[0, 0, 1], [1, 0, 0], [0, 0, 2]],
+        cameras=[0b1011, 0b11, 0b100000010], residuals=[0.00012, 0.0, 0.01],
+    )  # fmt: skip
+    path = tmp_path / "seen.c3d"
+    write(Tracks(detections=d, labels=[0, 1, 0], names=("a", "b")), path)
+    # The high byte has the cameras, the low one the residual; 0 would say that it was computed.
+    words = read_c3d(path).points[..., 3]
+    assert words.tolist() == [[0b1011 * 256 + 12, 0b11 * 256 + 1], [0b10 * 256 + 255, -1]]
+    back = read(path)
+    assert back.cameras.tolist() == [0b1011, 0b11, 0b10]  # C3D has room for seven
+    np.testing.assert_allclose(back.residuals, [0.00012, 0.00001, 0.00255], atol=1e-9)
+    theirs = ezc3d.c3d(str(path))["data"]["points"]
+    np.testing.assert_allclose(theirs[:3, 0, 0], [0, 0, 1000])
+    again = tmp_path / "again.c3d"
+    write(back.tracks, again)
+    np.testing.assert_array_equal(read_c3d(again).points[..., 3], words)

@@ -424,3 +424,20 @@ def test_the_record_says_what_was_on():
         "seed": 7,
     }
     assert sense(cube()).record == {"seed": 0}
+
+
+def test_points_know_their_cameras_and_false_ones_pretend():
+    truth = cube(frames=60, seed=1)
+    rig = Rig.ring(6, radius=3, height=1, target=(0, 0, 0), focal_px=2000)
+    sensed = sense(truth, rig=rig, noise=0.002, clutter=0.5, seed=4)
+    d = sensed.detections
+    seen = rig.project(truth.positions()).visible
+    expected = (seen * (1 << np.arange(6))[:, None, None]).sum(axis=0)
+    true = sensed.labels >= 0
+    np.testing.assert_array_equal(d.cameras[true], expected[d.frame_of[true], sensed.labels[true]])
+    assert len(np.unique(d.cameras)) > 5
+    assert np.isin(d.cameras[~true], d.cameras[true]).all()
+    off = d.points[true] - truth.positions()[d.frame_of[true], sensed.labels[true]]
+    np.testing.assert_allclose(d.residuals[true], np.linalg.norm(off, axis=1))
+    assert 0.5 < d.residuals[~true].mean() / d.residuals[true].mean() < 2
+    assert sense(truth).detections.cameras is None

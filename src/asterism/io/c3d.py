@@ -74,6 +74,7 @@ def read(path: Path) -> Capture:
     labels, identity_names = _labels(file, seen, modelled)
     for array in (points, labels):
         array.flags.writeable = False  # nobody else has them: no need to copy
+    cameras, residuals = _seen_by(file, seen, PER_METRE[unit])
     return Capture(
         times=np.arange(len(seen)) / (rate or 1.0),
         offsets=np.concatenate([[0], np.cumsum(seen.sum(axis=1))]),
@@ -84,6 +85,8 @@ def read(path: Path) -> Capture:
         first_frame=file.first_frame,
         units=unit,
         channels=np.nonzero(seen)[1],
+        cameras=cameras,
+        residuals=residuals,
         labels=labels,
         names=identity_names,
         modelled=tuple(name for name, gone in zip(names, modelled, strict=True) if gone),
@@ -131,6 +134,19 @@ def is_seen(file: C3DFile) -> NDArray[np.bool_]:
     for axis in range(3):
         seen &= np.isfinite(file.points[..., axis])
     return seen & ~_at_origin(file)
+
+
+def _seen_by(
+    file: C3DFile, seen: NDArray[np.bool_], per_metre: float
+) -> tuple[NDArray[np.int64] | None, NDArray[np.float64] | None]:
+    """Cameras and residuals of the points; None where the file says nothing of them."""
+    words = file.points[..., 3][seen]
+    if not np.isfinite(words).all() or words.max(initial=0) > 0x7FFF:
+        return None, None  # not as the format has it: some programs keep other things there
+    whole = words.astype(np.int64)
+    cameras: NDArray[np.int64] = whole >> 8
+    residuals: NDArray[np.float64] = (whole & 0xFF).astype(np.float64) * (file.scale / per_metre)
+    return cameras if cameras.any() else None, residuals if residuals.any() else None
 
 
 def _labels(

@@ -60,7 +60,8 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     the descriptions of those channels say so, which gives back the same tracks on reading. If the
     detections were read from a C3D its unit, analog channels, events, computed points and all
     other parameters are kept, and so are the residuals and cameras of its points. A sample that
-    is not there is written as 0, 0, 0 with residual -1, which is what other programs expect.
+    is not there is written as 0, 0, 0 with residual -1, which is what other programs expect. Of
+    the cameras that saw a point C3D has room for the first seven.
     """
     d = tracks.detections
     rate = fixed_rate(d, "C3D")
@@ -73,7 +74,8 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     unit, first_frame, header = "mm", 1, bytes(BLOCK)
     groups: dict[str, Group] = {}
     analog = np.empty((d.n_frames, 0), dtype=np.float32)
-    scale, n_samples = 1.0, 0
+    # Where residuals are known, in steps of a hundredth: they fill 8 bits.
+    scale, n_samples = 0.01 if d.residuals is not None else 1.0, 0
     if isinstance(d, Capture):
         unit = d.units
         first_frame = d.first_frame if d.n_frames and 0 <= d.first_frame < 2**31 else 1
@@ -120,6 +122,10 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         values[seen & (values == 0).all(axis=-1), 0] = _NEAR_ORIGIN
         block[:, :n_own, :3] = values
         block[:, :n_own, 3] = np.where(seen, 0, -1)
+        if d.cameras is not None or d.residuals is not None:
+            mine = np.arange(int(d.offsets[rows.start]), int(d.offsets[rows.stop]))
+            words = _words(d, mine, scale / PER_METRE[unit])
+            block[d.frame_of[mine] - rows.start, channels[mine], 3] = words
         if source is not None:
             _keep_residuals(block, d, channels, rows, source)
             block[:, n_own:] = source.points[rows][:, computed]
@@ -151,6 +157,16 @@ def _source(d: Detections) -> C3DFile | None:
         got = "another number of frames, channels or points"
         raise FormatError(d.path, "the source", "the C3D that was read", got, hint)
     return source
+
+
+def _words(d: Detections, rows: NDArray[np.int64], step: float) -> NDArray[np.float64]:
+    """Give cameras and residual of some detections as C3D has them: 7 bits and 8 bits."""
+    words = np.zeros(len(rows))
+    if d.cameras is not None:
+        words += 256 * (d.cameras[rows] & 0x7F)
+    if d.residuals is not None:
+        words += np.clip(np.rint(d.residuals[rows] / step), 1, 255)  # 0 says: not measured
+    return words
 
 
 def _keep_residuals(

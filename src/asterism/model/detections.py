@@ -38,6 +38,10 @@ class Detections:
         Frame ``t`` holds the points ``offsets[t]:offsets[t + 1]``. Frames may be empty.
     points : array_like, shape (N, D)
         Positions in metres, D = 2 or 3, all finite.
+    cameras : array_like of int, shape (N,), optional
+        Which cameras saw each point, where known: bit i for camera i, up to 62.
+    residuals : array_like, shape (N,), optional
+        How far their rays pass by each point, where known, metres.
 
     Raises
     ------
@@ -56,6 +60,8 @@ class Detections:
     times: NDArray[np.float64]
     offsets: NDArray[np.int64]
     points: NDArray[np.float64]
+    cameras: NDArray[np.int64] | None = None
+    residuals: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         times = keep_array("times", self.times, ("T",))
@@ -85,6 +91,12 @@ class Detections:
             )
         for name, array in (("times", times), ("offsets", offsets), ("points", points)):
             object.__setattr__(self, name, array)
+        for name, kind in (("cameras", np.int64), ("residuals", np.float64)):
+            if getattr(self, name) is not None:
+                array = keep_array(name, getattr(self, name), (len(points),), dtype=kind)
+                if array.size and array.min() < 0:
+                    raise ParameterError(name, "numbers ≥ 0", array.min())
+                object.__setattr__(self, name, array)
 
     @classmethod
     def from_frames(cls, times: ArrayLike, frames: Sequence[ArrayLike]) -> Self:

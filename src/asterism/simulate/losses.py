@@ -34,21 +34,19 @@ def shadowed(
 
 
 def seen_by_rig(
-    points: Points, rig: Rig, views: int, surfaces: Sequence[Surface], n_frames: int
-) -> NDArray[np.bool_]:
-    """Say which points so many cameras see, past the surfaces."""
+    points: Points, rig: Rig, surfaces: Sequence[Surface], n_frames: int
+) -> NDArray[np.int64]:
+    """Say which cameras see each marker past the surfaces: bit i for camera i, shape (N,)."""
     is_marker = points.markers >= 0
     n_markers = int(points.markers.max(initial=-1)) + 1
-    result = ~is_marker
+    result = np.zeros(len(is_marker), dtype=np.int64)
     if not n_markers:
         return result
     dense = np.full((n_frames, n_markers, 3), np.nan)
     at = points.frames[is_marker], points.markers[is_marker]
     dense[at] = points.places[is_marker]
-    seen = np.zeros((n_frames, n_markers), dtype=np.int64)
-    for camera in rig:  # one at a time: all at once would fill the memory
-        seen += camera.project(dense, surfaces).visible
-    result[is_marker] = seen[at] >= views
+    for i, camera in enumerate(rig):  # one at a time: all at once would fill the memory
+        result[is_marker] |= camera.project(dense, surfaces).visible[at].astype(np.int64) << i
     return result
 
 

@@ -116,7 +116,8 @@ def sense(
     Truth
         Truth of the recording: `detections` holds its points in random order within each frame,
         `labels` the marker of each, or -1 for what is false. Every marker stays in `names`, seen or
-        not. `record` says which switches were on. If the source was a `Capture`, so are these
+        not. `record` says which switches were on. With a rig, the detections know which cameras
+        saw them. If the source was a `Capture`, so are these
         detections, with the same file and units, no channels, and rate and first frame as befits
         the stride; where frames are left out or shaken it has no format, because the rest of the
         file no longer goes with it.
@@ -139,8 +140,8 @@ def sense(
     _check(truth, switches)
     (
         rng_missing, rng_burst, rng_noise, rng_clutter, rng_ghosts, rng_order,
-        rng_spread, rng_visits, rng_nearby, rng_doubled, rng_dropped, rng_jitter,
-    ) = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(12))  # fmt: skip
+        rng_spread, rng_visits, rng_nearby, rng_doubled, rng_dropped, rng_jitter, rng_views,
+    ) = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(13))  # fmt: skip
 
     chosen = kept_frames(rng_dropped, truth.detections.n_frames, stride, dropped)
     whole, origin = _markers(truth, chosen, keep_unnamed)
@@ -154,8 +155,11 @@ def sense(
     is_kept = (whole.markers < 0) | (rng_missing.random(len(whole.markers)) >= missing)
     if burst is not None and n_markers:
         is_kept &= ~shadowed(rng_burst, burst, whole, n_frames, n_markers)
+    by_cameras = None
     if rig is not None:
-        is_kept &= seen_by_rig(whole, rig, views, surfaces, n_frames)
+        by_cameras = seen_by_rig(whole, rig, surfaces, n_frames)
+        n_views = sum((by_cameras >> i) & 1 for i in range(len(rig)))
+        is_kept &= (whole.markers < 0) | (n_views >= views)
     clean = whole
     if jitter:
         times, places = shaken(rng_jitter, jitter, times, whole)
@@ -187,7 +191,10 @@ def sense(
     names = _names(truth, origin, is_anew=visits is not None)
     lines = truth.connections[np.ix_(origin, origin)] if isinstance(truth, Truth) else ()
     return Truth(
-        detections=_detections(truth.detections, chosen, times, mixed, names, stride, switches),
+        detections=replace(
+            _detections(truth.detections, chosen, times, mixed, names, stride, switches),
+            **_views(rng_views, mixed, clean, by_cameras),
+        ),
         labels=mixed.markers,
         names=names,
         connections=np.asarray(lines, dtype=np.int64),
@@ -212,6 +219,8 @@ def _check(truth: Tracks, switches: dict[str, Any]) -> None:
     check_number("seed", switches["seed"], above=0, closed=True, integer=True)
     if switches["rig"] is not None and truth.detections.n_axes != 3:
         raise ParameterError("rig", "a 3-D scene", f"{truth.detections.n_axes}-D")
+    if switches["rig"] is not None and len(switches["rig"]) > 62:
+        raise ParameterError("rig", "at most 62 cameras", len(switches["rig"]))
 
 
 def _record(switches: dict[str, Any]) -> dict[str, Any]:
@@ -229,6 +238,28 @@ def _record(switches: dict[str, Any]) -> dict[str, Any]:
     if "rig" in record:
         record["rig"] = list(record["rig"].names)
     return record
+
+
+def _views(
+    rng: np.random.Generator, mixed: Points, clean: Points, by_cameras: NDArray[np.int64] | None
+) -> dict[str, Any]:
+    """Say which cameras saw each point, and how far their rays pass by it.
+
+    A false point has what a true one has, drawn at random: it gives nothing away.
+    """
+    if by_cameras is None or not len(clean.frames):
+        return {"cameras": None, "residuals": None}
+    index = np.full((int(clean.frames.max()) + 1, int(clean.markers.max()) + 2), -1)
+    index[clean.frames, clean.markers] = np.arange(len(clean.frames))
+    index[:, -1] = -1  # where clutter of the original went
+    at = index[np.minimum(mixed.frames, len(index) - 1), mixed.markers]
+    cameras, residuals = by_cameras[at], np.linalg.norm(mixed.places - clean.places[at], axis=1)
+    is_false = np.flatnonzero(at < 0)
+    if len(is_false) == len(at):
+        return {"cameras": None, "residuals": None}
+    like = rng.choice(np.flatnonzero(at >= 0), len(is_false))
+    cameras[is_false], residuals[is_false] = cameras[like], residuals[like]
+    return {"cameras": cameras, "residuals": residuals}
 
 
 def _shuffled(rng: np.random.Generator, parts: list[Points]) -> Points:
@@ -294,6 +325,8 @@ def _detections(
         times=times,
         offsets=offsets,
         points=mixed.places,
+        cameras=None,
+        residuals=None,
         # The rest of the file (analog channels, events) goes by its own frames: at another rate a
         # writer must not take it over.
         format=source.format if is_whole else "",
