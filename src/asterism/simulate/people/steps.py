@@ -200,18 +200,19 @@ class _Plan:
         return through(t, [*knots, (1e4, 0, 0, 0)], derivatives=2)
 
     def ankle(self, t: Array, pitch: Array) -> Array:
-        """Ankle joint, world metres (T, 3): `pitch` as `pitch` gives it."""
+        """Ankle joint, world metres (T, 3), at rising times: `pitch` as `pitch` gives it."""
         from scipy.interpolate import make_interp_spline
 
         stance = np.searchsorted(self.land, t, side="right")
         value = self._standing(stance, pitch)[0]
         share, along, height = self.way.T
         rest = LENGTHS["ankle"] * self.height
-        for i, (leave, land) in enumerate(zip(self.leave, self.land, strict=True)):
-            is_in = (t > leave) & (t < land)
-            if not is_in.any():
-                continue
-            ends = self._standing(np.array([i, i + 1]), self.pitch(np.array([leave, land])))
+        swing = np.arange(len(self.leave))
+        first = self._standing(swing, self.pitch(self.leave))
+        last = self._standing(swing + 1, self.pitch(self.land))
+        start, stop = np.searchsorted(t, self.leave, side="right"), np.searchsorted(t, self.land)
+        for i in np.flatnonzero(stop > start).tolist():
+            leave, land, inside = self.leave[i], self.land[i], slice(start[i], stop[i])
             vigour = 0.3 + 0.35 * (self.vigour_leave[i] + self.vigour_land[i])
             step = self.places[i + 1] - self.places[i]
             ground = self.places[i] + along[:, None] * step
@@ -222,11 +223,11 @@ class _Plan:
             passed = np.column_stack([ground, rest + vigour * (height - rest)])
             curve = make_interp_spline(
                 np.concatenate([[leave], leave + share * (land - leave), [land]]),
-                np.concatenate([ends[0][:1], passed, ends[0][1:]]),
+                np.concatenate([first[0][[i]], passed, last[0][[i]]]),
                 k=5,
-                bc_type=tuple([(1, ends[1][k]), (2, ends[2][k])] for k in (0, 1)),
+                bc_type=tuple([(1, end[1][i]), (2, end[2][i])] for end in (first, last)),
             )
-            value[is_in] = curve(t[is_in])
+            value[inside] = curve(t[inside])
         return value
 
     def _standing(self, stance: NDArray[np.int64], pitch: Array) -> tuple[Array, ...]:
