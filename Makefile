@@ -29,8 +29,10 @@ bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/speed.py --markdown docs/tables/speed.md
 	$(BIN)/python benchmarks/cameras.py --markdown docs/tables/cameras.md
 
-# The table of captures in the docs; needs the real captures beside the project.
+# The tables of scenes and of captures in the docs; the second needs the real captures beside the
+# project.
 tables: $(VENV)/.bench
+	$(BIN)/python benchmarks/scenes.py --seeds 5 --markdown docs/tables/scenes.md
 	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built

@@ -7,6 +7,7 @@ import dataclasses
 import json
 import shutil
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -306,6 +307,45 @@ def test_simulate_takes_the_options_of_the_scene(scene, capsys):
     run("simulate smooth -o s.csv --frames 20 --seed 4 --option n_markers=7", capsys)
     expected = am.simulate.smooth(n_markers=7, frames=20, seed=4)
     np.testing.assert_array_equal(am.read("s.csv").points, expected.detections.points)
+
+
+def test_a_recording_of_a_scene_with_its_truth(capsys):
+    given = "--sense missing=0.2 --sense clutter=0.3 --sense burst=2:3-6 --sense visits=10-20"
+    run(
+        f"simulate crossing -o in.csv --truth t.csv --frames 40 --rate 100 --seed 3 {given}", capsys
+    )
+    sensing = {"missing": 0.2, "clutter": 0.3}
+    scene = am.simulate.crossing(frames=40, rate=100, seed=3)
+    expected = am.simulate.sense(
+        scene, **sensing, burst=am.simulate.Burst(n=2, shortest=3, longest=6),
+        visits=am.simulate.Visits(shortest=10, longest=20), seed=3,
+    )  # fmt: skip
+    points, truth = am.read("in.csv"), am.read_tracks("t.csv")
+    np.testing.assert_array_equal(points.points, expected.detections.points)
+    np.testing.assert_array_equal(truth.labels, expected.labels)
+    assert not any(points.names)
+    run("simulate cube -o a.csv --truth b.csv --rig ring4 --json", capsys)
+    assert am.read("a.csv").n_points == 800
+    for wrong in (
+        "simulate cube -o c.csv --sense missing=0.1",
+        "simulate cube -o c.csv --truth d.csv --sense mising=0.1",
+        "simulate cube -o c.csv --truth d.csv --sense missing=2",
+        "simulate cube -o c.csv --truth d.csv --sense visits=5",
+        "simulate cube -o c.csv --truth d.csv --rig nothing.xcp",
+        "simulate cube -o c.csv --markers 9",
+        "simulate cube -o c.csv --truth c.csv",
+    ):
+        assert main(wrong.split()) == 2
+        assert not Path("c.csv").exists()
+
+
+def test_scenes_are_listed_a_line_each(capsys):
+    lines = run("scenes", capsys).strip().splitlines()
+    assert [line.split()[0] for line in lines] == list(am.simulate.SCENES)
+    assert "activity" in run("scenes person", capsys)
+    assert main(["scenes", "persn"]) == 2
+    run("simulate swarm -o s.csv --frames 5 --markers 7", capsys)
+    assert am.read_tracks("s.csv").n_tracks == 7
 
 
 def test_help_and_version(capsys):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from asterism.app.console import Json, print_json, print_table
 
@@ -11,6 +13,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from asterism.app.options import Option
+
+
+_Scene = Annotated[
+    str | None, typer.Argument(metavar="[SCENE]", help="Show the options of this one.")
+]
 
 
 def methods(json: Json = False) -> None:
@@ -34,23 +41,27 @@ def methods(json: Json = False) -> None:
     )
 
 
-def scenes(json: Json = False) -> None:
-    """List the scenes that can be simulated and their options.
+def scenes(scene: _Scene = None, json: Json = False) -> None:
+    """List the scenes that can be simulated, or the options of one.
 
     For example:
 
         asterism scenes
+
+        asterism scenes person
     """
     import asterism as am
     from asterism.app.options import scene_options
+    from asterism.errors import check_fields
 
-    _show(
-        {
-            name: (scene.about, scene_options(scene.make))
-            for name, scene in am.simulate.SCENES.items()
-        },
-        json,
-    )
+    known = am.simulate.SCENES
+    if scene is not None:
+        check_fields("scene", [scene], known)
+    if scene is None and not json:
+        print_table([(name, s.about) for name, s in known.items()])
+        return
+    chosen = known if scene is None else {scene: known[scene]}
+    _show({name: (s.about, scene_options(s.make)) for name, s in chosen.items()}, json)
 
 
 def _show(things: Mapping[str, tuple[str, Mapping[str, Option]]], json: bool) -> None:
