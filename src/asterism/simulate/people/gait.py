@@ -7,8 +7,8 @@ References
 ----------
 M. P. Murray, A. B. Drought, R. C. Kory, *Walking patterns of normal men*, J. Bone Joint Surg. 46-A,
 1964; M. P. Murray, S. B. Sepic, E. J. Barnard, *Patterns of sagittal rotation of the upper limbs in
-walking*, Phys. Ther. 47, 1967; J. Perry, *Gait Analysis*, 1992; T. F. Novacheck, *The biomechanics
-of running*, Gait & Posture 7, 1998.
+walking*, Physical Therapy 47, 1967; J. Perry, *Gait Analysis*, 1992; T. F. Novacheck, *The
+biomechanics of running*, Gait & Posture 7, 1998.
 """
 
 from __future__ import annotations
@@ -90,8 +90,8 @@ class Carriage:
 def walking(height: float, style: Style) -> Gait:
     """Give the gait of a walk.
 
-    Steps of 0.40 of the height at 112 a minute are a man's free walk (Murray 1964: 78 cm and 117 at
-    1.76 m; Perry: 1.36 m/s). Time goes with the square root of the length.
+    Steps of 0.40 of the height, 112 a minute (Perry 1992: strides of 1.41 m, 113 steps a minute,
+    1.36 m/s). Time goes with the square root of the length.
     """
     cadence = 56 / 60 * style.pace * np.sqrt(1.75 / height)
     return Gait(
@@ -112,8 +112,8 @@ def walking(height: float, style: Style) -> Gait:
 def running(height: float, style: Style) -> Gait:
     """Give the gait of a run.
 
-    About 3 m/s at 172 steps a minute with the foot on the ground for 36 % of the cycle
-    (Novacheck 1998).
+    About 3 m/s at 172 steps a minute, with a foot on the ground for 36 % of the cycle (Novacheck
+    1998: 3.2 m/s, and under 40 %).
     """
     cadence = 86 / 60 * style.pace * np.sqrt(1.75 / height)
     return Gait(

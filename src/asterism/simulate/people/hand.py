@@ -39,7 +39,7 @@ class _Finger:
     bent: tuple[float, float, float]
 
 
-# Lengths of the bones: means of 66 hands, A. Buryanov & V. Kotiuk, *Proportions of hand segments*,
+# Lengths of the bones: means of A. Buryanov & V. Kotiuk, *Proportions of hand segments*,
 # Int. J. Morphol. 28(3), 2010; the last with 4 mm of pulp.
 _FINGERS = {
     "T": _Finger(

@@ -40,7 +40,8 @@ def two_people(
     They meet at the origin at half time. In ``cross`` they pass with a hand's breadth between
     their arms. In ``hug`` they stop in front of each other, the taller lays the arms over the
     shoulders of the other, who takes the taller round the waist; they let go, step back, turn round
-    and leave. The whole takes 6 s; a longer clip hugs longer. No marker is inside a body.
+    and leave. The whole takes 6 s: a shorter clip shows its middle, a longer one hugs longer. No
+    marker is inside a body.
 
     Parameters
     ----------
