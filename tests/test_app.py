@@ -309,7 +309,8 @@ def test_simulate_takes_the_options_of_the_scene(scene, capsys):
     np.testing.assert_array_equal(am.read("s.csv").points, expected.detections.points)
 
 
-def test_a_recording_of_a_scene_with_its_truth(capsys):
+def test_a_recording_of_a_scene_with_its_truth(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     given = "--sense missing=0.2 --sense clutter=0.3 --sense burst=2:3-6 --sense visits=10-20"
     run(
         f"simulate crossing -o in.csv --truth t.csv --frames 40 --rate 100 --seed 3 {given}", capsys
@@ -339,7 +340,8 @@ def test_a_recording_of_a_scene_with_its_truth(capsys):
         assert not Path("c.csv").exists()
 
 
-def test_scenes_are_listed_a_line_each(capsys):
+def test_scenes_are_listed_a_line_each(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     lines = run("scenes", capsys).strip().splitlines()
     assert [line.split()[0] for line in lines] == list(am.simulate.SCENES)
     assert "activity" in run("scenes person", capsys)
