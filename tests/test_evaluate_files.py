@@ -8,7 +8,7 @@ import pytest
 
 from asterism.evaluate import evaluate, floor
 from asterism.io import read, write
-from asterism.simulate import Burst, Ghosts, corrupt
+from asterism.simulate import Burst, Ghosts, sense
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 CAPTURES = [
