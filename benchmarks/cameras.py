@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import cv2
+import cv2  # pyright: ignore[reportMissingImports]  # an extra of the benchmarks
 import numpy as np
 
 import asterism as am
