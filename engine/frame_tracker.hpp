@@ -35,6 +35,9 @@ struct TrackerOptions {
   double confirm_score = 0;    // log odds at which a tentative track is believed
   double delete_drop = 0;      // a tentative track ends when its score falls so far below its best
   std::int64_t max_candidates = 0;
+  // The 2010 report's own method: the points of the first frame are the tracks, every pair is a
+  // candidate, and no track begins, coasts or ends. Every frame has as many points as the first.
+  bool is_strict = false;
 };
 
 struct LiveTrack {
@@ -92,7 +95,10 @@ class FrameTracker {
     match_all(true, points.size(), stats);
     match_all(false, points.size(), stats);
     update_tracks(time, points, label);
-    begin_tracks(time, points);
+    if (!opt_.is_strict)
+      begin_tracks(time, points);
+    else if (n_frames_ == 0)
+      begin_strictly(time, points, label);
     for (const LiveTrack& track : tracks_) {
       ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
       stats.n_pending += static_cast<std::int64_t>(track.pending.size());
@@ -144,6 +150,7 @@ class FrameTracker {
       sum_radii += std::max(s_.radii[i], 0.0);
     }
     if (tracks_.empty() || points.empty()) return;
+    if (opt_.is_strict) return pair_all(points);
     s_.grid.build(points, D, 2 * sum_radii / static_cast<double>(tracks_.size()));
     for (std::size_t i = 0; i < tracks_.size(); ++i) {
       if (s_.radii[i] < 0) continue;
@@ -164,6 +171,18 @@ class FrameTracker {
     }
   }
 
+  void pair_all(std::span<const Point> points) {
+    std::array<double, kMaxModes> each{};
+    for (std::size_t i = 0; i < tracks_.size(); ++i)
+      for (std::size_t j = 0; j < points.size(); ++j) {
+        const Prediction& prediction = s_.predictions[i];
+        const double gain = prediction.log_likelihood(points[j], each);
+        const double distance2 = squared_distance(points[j], prediction.center, m_.axis.D);
+        s_.candidates.push_back(
+            {static_cast<std::int32_t>(i), static_cast<std::int32_t>(j), gain, distance2});
+      }
+  }
+
   // Pairs the believed tracks, or the tentative ones, with points that are still free.
   void match_all(bool confirmed, std::size_t n_points, FrameStats& stats) {
     s_.eligible.clear();
@@ -174,7 +193,8 @@ class FrameTracker {
         connected_groups(s_.eligible, static_cast<std::int32_t>(tracks_.size()),
                          static_cast<std::int32_t>(n_points));
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      if (groups[g].size() == 1 || opt_.matcher == Matcher::assignment)
+      const bool is_alone = groups[g].size() == 1 && !opt_.is_strict;
+      if (is_alone || opt_.matcher == Matcher::assignment)
         s_.assignment.solve(groups[g], s_.match);
       else
         marry(groups[g], n_points, opt_.matcher == Matcher::marriage_by_points);
@@ -220,6 +240,19 @@ class FrameTracker {
         s_.match[partner[p]] = proposers[p];
       else
         s_.match[proposers[p]] = partner[p];
+    }
+  }
+
+  template <typename Label>
+  void begin_strictly(double time, std::span<const Point> points, Label&& label) {
+    for (std::size_t j = 0; j < points.size(); ++j) {
+      LiveTrack track;
+      track.id = next_id_++;
+      track.last_time = time;
+      track.last = points[j];
+      track.state = begin_state(m_, points[j]);
+      label(n_seen_ + static_cast<std::int64_t>(j), track.id);
+      tracks_.push_back(std::move(track));
     }
   }
 

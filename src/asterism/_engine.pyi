@@ -54,6 +54,7 @@ class FrameTracker:
         confirm_score: float,
         delete_drop: float,
         max_candidates: int,
+        is_strict: bool,
     ) -> None: ...
     def step(
         self,

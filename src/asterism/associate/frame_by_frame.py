@@ -99,6 +99,9 @@ class FrameByFrame(Method[FrameState]):
     def _engine_matcher(self) -> int:
         return self._matcher
 
+    def _is_strict(self) -> bool:
+        return False
+
     def init(self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None) -> FrameState:
         """Make the state before the first frame; `seed` changes nothing, nothing is drawn."""
         from scipy.special import chdtri
@@ -117,6 +120,7 @@ class FrameByFrame(Method[FrameState]):
             confirm_score=math.log(p / (1 - p)),
             delete_drop=math.log(self.delete_odds),
             max_candidates=MAX_CANDIDATES,
+            is_strict=self._is_strict(),
         )
         return FrameState(model=model, n_axes=n_axes, tracker=tracker)
 

@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from asterism.associate.frame_by_frame import FrameByFrame
+import numpy as np
+
+from asterism.associate.frame_by_frame import FrameByFrame, FrameState
 from asterism.errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism.associate.method import Update
+    from asterism.model import Detections
 
 __all__ = ["SMP"]
 
@@ -24,11 +34,15 @@ class SMP(FrameByFrame):
     ----------
     proposers : {"tracks", "detections"}
         Who proposes, and so for whom the matching is best among the stable ones.
+    strict : bool
+        The report's own method: as many detections in every frame as in the first, all of markers;
+        everyone ranks everyone, without a gate. It refuses a frame with another number.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
     """
 
     proposers: Literal["tracks", "detections"] = "tracks"
+    strict: bool = False
 
     name: ClassVar[str] = "smp"
 
@@ -37,5 +51,45 @@ class SMP(FrameByFrame):
         if self.proposers not in ("tracks", "detections"):
             raise ParameterError("proposers", "'tracks' or 'detections'", repr(self.proposers))
 
+        if not isinstance(self.strict, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise ParameterError("strict", "True or False", repr(self.strict))
+
     def _engine_matcher(self) -> int:
         return 1 if self.proposers == "tracks" else 2
+
+    def _is_strict(self) -> bool:
+        return self.strict
+
+    def step(self, state: FrameState, time: float, points: ArrayLike) -> tuple[FrameState, Update]:
+        """Take the next frame; see `Method.step`.
+
+        Raises
+        ------
+        ParameterError
+            If `strict` and the number of points is not that of the first frame.
+        """
+        if self.strict and state.tracker.n_frames:
+            _check_number(len(np.asarray(points)), state.n_ids, f"in the frame at {time:g} s")
+        return super().step(state, time, points)
+
+    def run(
+        self,
+        state: FrameState,
+        detections: Detections,
+        *,
+        progress: Callable[[int], Any] | None = None,
+    ) -> tuple[FrameState, NDArray[np.int64], None]:
+        """Take all frames in the engine; the same labels as the loop over `step`."""
+        if self.strict and detections.n_frames:
+            wanted = state.n_ids if state.tracker.n_frames else int(detections.counts[0])
+            for t in np.flatnonzero(detections.counts != wanted):
+                _check_number(int(detections.counts[t]), wanted, f"in frame {t}")
+        return super().run(state, detections, progress=progress)
+
+
+def _check_number(n: int, wanted: int, where: str) -> None:
+    if n != wanted:
+        raise ParameterError(
+            "points", f"{wanted} {where}, as many as in the first (strict=True)", n,
+            "strict=False knows misses, clutter, and markers that come and go",
+        )  # fmt: skip
