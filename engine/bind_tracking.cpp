@@ -338,14 +338,18 @@ void bind_tracking(nb::module_& module) {
           "__init__",
           [](FrameTracker* self, const MotionModel& model, const ScoreModel& score,
              std::int32_t matcher, double gate, double confirm_score, double delete_drop,
-             std::int64_t max_candidates, bool is_strict) {
+             std::int64_t max_candidates, bool is_strict, std::int32_t capacity,
+             double merged_within) {
+            require(capacity >= 1 && capacity <= 64, "capacity: 1 to 64");
             require(matcher >= 0 && matcher <= 2, "matcher: 0, 1 or 2");
             new (self) FrameTracker(model, score,
                                     {static_cast<Matcher>(matcher), gate, confirm_score,
-                                     delete_drop, max_candidates, is_strict});
+                                     delete_drop, max_candidates, is_strict, capacity,
+                                     merged_within});
           },
           "model"_a, "score"_a, nb::kw_only(), "matcher"_a, "gate"_a, "confirm_score"_a,
-          "delete_drop"_a, "max_candidates"_a, "is_strict"_a)
+          "delete_drop"_a, "max_candidates"_a, "is_strict"_a,
+          "capacity"_a, "merged_within"_a)
       .def("step", &tracker_step, "time"_a, "F"_a, "Q"_a, "points"_a)
       .def("run", &tracker_run, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a, "points"_a,
            "labels"_a.noconvert())

@@ -38,6 +38,10 @@ struct TrackerOptions {
   // The 2010 report's own method: the points of the first frame are the tracks, every pair is a
   // candidate, and no track begins, coasts or ends. Every frame has as many points as the first.
   bool is_strict = false;
+  // Hospitals and residents: so many detections may marry one track, those beyond its favourite
+  // within a distance of it; they are merged by their likelihood.
+  std::int32_t capacity = 1;
+  double merged_within = 0;
 };
 
 struct LiveTrack {
@@ -70,6 +74,7 @@ struct FrameScratch {
   std::vector<Prediction> predictions;
   std::vector<double> radii;
   std::vector<std::int32_t> match;
+  std::vector<std::pair<std::int32_t, std::int32_t>> extras;  // further detections of a track
   std::vector<char> is_taken;
   PointGrid grid;
   Assignment assignment;
@@ -90,10 +95,11 @@ class FrameTracker {
     stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());
     s_.match.assign(tracks_.size(), -1);
     s_.is_taken.assign(points.size(), 0);
+    s_.extras.clear();
     // Believed tracks first. A tentative one knows so little that it fits almost anything, and a
     // single frame cannot see that the marker which it takes over would have to vanish for good.
-    match_all(true, points.size(), stats);
-    match_all(false, points.size(), stats);
+    match_all(true, points, stats);
+    match_all(false, points, stats);
     update_tracks(time, points, label);
     if (!opt_.is_strict)
       begin_tracks(time, points);
@@ -184,37 +190,56 @@ class FrameTracker {
   }
 
   // Pairs the believed tracks, or the tentative ones, with points that are still free.
-  void match_all(bool confirmed, std::size_t n_points, FrameStats& stats) {
+  void match_all(bool confirmed, std::span<const Point> points, FrameStats& stats) {
     s_.eligible.clear();
     for (const Candidate& c : s_.candidates)
       if (tracks_[c.row].is_confirmed() == confirmed && !s_.is_taken[c.column])
         s_.eligible.push_back(c);
     const Groups groups =
         connected_groups(s_.eligible, static_cast<std::int32_t>(tracks_.size()),
-                         static_cast<std::int32_t>(n_points));
+                         static_cast<std::int32_t>(points.size()));
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const bool is_alone = groups[g].size() == 1 && !opt_.is_strict;
       if (is_alone || opt_.matcher == Matcher::assignment)
         s_.assignment.solve(groups[g], s_.match);
       else
-        marry(groups[g], n_points, opt_.matcher == Matcher::marriage_by_points);
+        marry(groups[g], points, opt_.matcher == Matcher::marriage_by_points);
       stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
     }
     stats.n_groups += static_cast<std::int64_t>(groups.size());
     for (const Candidate& c : s_.eligible)
       if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
+    for (const auto& [row, column] : s_.extras) s_.is_taken[column] = 1;
   }
 
-  // Tracks rank detections by predictive density; detections rank tracks by distance.
-  void marry(std::span<const Candidate> group, std::size_t n_points, bool by_points) {
+  // Tracks rank detections by predictive density; detections rank tracks by distance. A track that
+  // may have several detections stands in the market as often, its copies in their order.
+  void marry(std::span<const Candidate> group, std::span<const Point> points, bool by_points) {
     struct Wish {
       std::int32_t proposer, receiver;
       double rank, cost;
     };
+    const std::int32_t q = opt_.capacity;
     std::vector<Wish> wishes;
-    for (const Candidate& c : group)
-      wishes.push_back(by_points ? Wish{c.column, c.row, c.distance2, -c.gain}
-                                 : Wish{c.row, c.column, -c.gain, c.distance2});
+    auto wish = [&](const Candidate& c, std::int32_t copy) {
+      const std::int32_t track = c.row * q + copy;
+      wishes.push_back(by_points ? Wish{c.column, track, c.distance2, -c.gain}
+                                 : Wish{track, c.column, -c.gain, c.distance2});
+    };
+    for (const Candidate& c : group) wish(c, 0);
+    if (q > 1) {
+      const double within2 = opt_.merged_within * opt_.merged_within;
+      std::vector<std::int32_t> favourite(tracks_.size(), -1);
+      for (std::size_t e = 0; e < group.size(); ++e) {
+        std::int32_t& best = favourite[group[e].row];
+        if (best < 0 || group[e].gain > group[best].gain) best = static_cast<std::int32_t>(e);
+      }
+      for (const Candidate& c : group) {
+        const Point& first = points[group[favourite[c.row]].column];
+        if (squared_distance(points[c.column], first, m_.axis.D) <= within2)
+          for (std::int32_t copy = 1; copy < q; ++copy) wish(c, copy);
+      }
+    }
     std::sort(wishes.begin(), wishes.end(), [](const Wish& a, const Wish& b) {
       if (a.proposer != b.proposer) return a.proposer < b.proposer;
       if (a.rank != b.rank) return a.rank < b.rank;
@@ -232,15 +257,59 @@ class FrameTracker {
     }
     first.push_back(static_cast<std::int64_t>(lists.size()));
     std::vector<std::int32_t> partner(proposers.size());
-    const std::size_t n_receivers = by_points ? tracks_.size() : n_points;
+    const std::size_t n_receivers = by_points ? tracks_.size() * static_cast<std::size_t>(q) : points.size();
     deferred_acceptance(lists, first, static_cast<std::int32_t>(n_receivers), partner);
+    std::vector<std::pair<std::int32_t, std::int32_t>> pairs;  // track, detection
     for (std::size_t p = 0; p < proposers.size(); ++p) {
       if (partner[p] < 0) continue;
-      if (by_points)
-        s_.match[partner[p]] = proposers[p];
-      else
-        s_.match[proposers[p]] = partner[p];
+      by_points ? pairs.emplace_back(partner[p] / q, proposers[p])
+                : pairs.emplace_back(proposers[p] / q, partner[p]);
     }
+    keep_pairs(group, pairs);
+  }
+
+  // The likeliest detection of a track is its own, the others are extras.
+  void keep_pairs(std::span<const Candidate> group,
+                  std::vector<std::pair<std::int32_t, std::int32_t>>& pairs) {
+    if (opt_.capacity == 1) {
+      for (const auto& [row, column] : pairs) s_.match[row] = column;
+      return;
+    }
+    auto gain = [&](const std::pair<std::int32_t, std::int32_t>& pair) {
+      for (const Candidate& c : group)
+        if (c.row == pair.first && c.column == pair.second) return c.gain;
+      return -std::numeric_limits<double>::infinity();
+    };
+    std::sort(pairs.begin(), pairs.end(), [&](const auto& a, const auto& b) {
+      if (a.first != b.first) return a.first < b.first;
+      const double ga = gain(a), gb = gain(b);
+      return ga != gb ? ga > gb : a.second < b.second;
+    });
+    for (const auto& pair : pairs) {
+      if (s_.match[pair.first] < 0)
+        s_.match[pair.first] = pair.second;
+      else
+        s_.extras.push_back(pair);
+    }
+  }
+
+  // What a track takes for its measurement: its detection, or the mean of several by likelihood.
+  Point measured(std::size_t i, std::span<const Point> points) const {
+    const Point& own = points[s_.match[i]];
+    std::array<double, kMaxModes> each{};
+    const Prediction& prediction = s_.predictions[i];
+    double total = 1;
+    Point sum = own;
+    const double log_own = s_.extras.empty() ? 0 : prediction.log_likelihood(own, each);
+    for (const auto& [row, column] : s_.extras) {
+      if (row != static_cast<std::int32_t>(i)) continue;
+      const double weight = std::exp(prediction.log_likelihood(points[column], each) - log_own);
+      total += weight;
+      for (int d = 0; d < m_.axis.D; ++d) sum[d] += weight * points[column][d];
+    }
+    if (total == 1) return own;
+    for (int d = 0; d < m_.axis.D; ++d) sum[d] /= total;
+    return sum;
   }
 
   template <typename Label>
@@ -263,8 +332,9 @@ class FrameTracker {
       LiveTrack& track = tracks_[i];
       const std::int32_t j = s_.match[i];
       if (j >= 0) {
-        track.score += hit_gain() + update(m_, s_.predictions[i], points[j], track.state);
-        track.last = points[j];
+        const Point y = measured(i, points);
+        track.score += hit_gain() + update(m_, s_.predictions[i], y, track.state);
+        track.last = y;
         track.last_time = time;
         track.gap = 0;
         if (track.is_confirmed()) {

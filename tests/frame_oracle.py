@@ -104,16 +104,19 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
                     gains[i, j] = gain
         believed = np.array([track.id >= 0 for track in tracks], dtype=bool)
         match = pair(tracks, points, np.where(believed[:, None], gains, -np.inf), method)
-        free = np.array([j not in match.values() for j in range(len(points))], dtype=bool)
+        taken = {j for several in match.values() for j in several}
+        free = np.array([j not in taken for j in range(len(points))], dtype=bool)
         rest = np.where(~believed[:, None] & free, gains, -np.inf)
         match |= pair(tracks, points, rest, method)
         for i, track in enumerate(tracks):
-            j = match.get(i)
-            if j is None:
+            if i not in match:
                 track.score += miss
                 track.gap += 1
                 continue
-            y, detection = points[j], int(detections.offsets[t]) + j
+            several = sorted(match[i], key=lambda j, i=i: -gains[i, j])
+            weights = np.array([track.densities(points[j]).sum() for j in several])
+            y = weights @ points[several] / weights.sum()
+            detection = int(detections.offsets[t]) + several[0]
             track.score += hit + math.log(track.densities(y).sum())
             track.update(y)
             track.gap, track.last, track.last_time = 0, y, now
@@ -131,35 +134,54 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
             if track.gap < p.max_gap
             and (track.id >= 0 or track.best - track.score <= math.log(method.delete_odds))
         ]
-        taken = set(match.values())
+        taken = {j for several in match.values() for j in several}
         for j, y in enumerate(points):
             if j not in taken:
                 tracks.append(OneTrack(model, now, y, int(detections.offsets[t]) + j))
     return labels
 
 
-def pair(tracks, points, gains, method) -> dict[int, int]:
+def pair(tracks, points, gains, method) -> dict[int, list[int]]:
     if isinstance(method, am.GNN):
         n, m = gains.shape
         padded = np.zeros((n + m, n + m))
         padded[:n, :m] = np.where(np.isfinite(gains), -gains, 1e9)
         rows, columns = linear_sum_assignment(padded)
-        return {int(i): int(j) for i, j in zip(rows, columns, strict=True) if i < n and j < m}
+        return {int(i): [int(j)] for i, j in zip(rows, columns, strict=True) if i < n and j < m}
     n, m = gains.shape
-    for_point = {(i, j): tracks[i].distance(points[j]) for i in range(n) for j in range(m)}
+    q = method.capacity
+    near = {(i, j): tracks[i].distance(points[j]) for i in range(n) for j in range(m)}
+    # Every track stands in the market q times; its further copies look near its favourite only.
+    wanted: dict[tuple[int, int], list[int]] = {}
+    for i in range(n):
+        likes = sorted(np.flatnonzero(np.isfinite(gains[i])), key=lambda j, i=i: -gains[i, j])
+        for copy in range(q):
+            wanted[i, copy] = [
+                j for j in likes
+                if not copy or np.linalg.norm(points[j] - points[likes[0]]) <= method.merged_within
+            ]  # fmt: skip
+    copies = list(wanted)
     if method.proposers == "tracks":
+        partners = propose(
+            list(wanted.values()),
+            {(p, j): near[i, j] for p, (i, _) in enumerate(copies) for j in range(m)},
+        )
+        pairs = [(copies[p][0], j) for p, j in enumerate(partners) if j >= 0]
+    else:
         lists = [
-            sorted(np.flatnonzero(np.isfinite(gains[i])), key=lambda j: -gains[i, j])
-            for i in range(n)
+            sorted(
+                (p for p, key in enumerate(copies) if j in wanted[key]),
+                key=lambda p, j=j: (near[copies[p][0], j], p),
+            )
+            for j in range(m)
         ]
-        partners = propose(lists, for_point)
-        return {i: j for i, j in enumerate(partners) if j >= 0}
-    lists = [
-        sorted(np.flatnonzero(np.isfinite(gains[:, j])), key=lambda i: for_point[i, j])
-        for j in range(m)
-    ]
-    partners = propose(lists, {(j, i): -gains[i, j] for i in range(n) for j in range(m)})
-    return {i: j for j, i in enumerate(partners) if i >= 0}
+        costs = {(j, p): -gains[i, j] for p, (i, _) in enumerate(copies) for j in range(m)}
+        partners = propose(lists, costs)
+        pairs = [(copies[p][0], j) for j, p in enumerate(partners) if p >= 0]
+    match: dict[int, list[int]] = {}
+    for i, j in pairs:
+        match.setdefault(i, []).append(int(j))
+    return match
 
 
 def propose(lists, costs) -> list[int]:

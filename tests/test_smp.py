@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import asterism as am
-from frame_oracle import OneTrack, propose
+from frame_oracle import OneTrack, propose, track_by_hand
 from scenes import small_model
 from test_solvers import marry, random_market
 
@@ -122,3 +122,57 @@ def test_proposals_grow_like_n_log_n():
         spread = np.std(counts) / np.sqrt(len(counts))
         assert abs(np.mean(counts) - expected) < 4 * spread + 0.06 * expected
         assert max(counts) <= n * n
+
+
+@pytest.mark.parametrize("proposers", ["tracks", "detections"])
+@pytest.mark.parametrize("capacity", [2, 3])
+@pytest.mark.parametrize("seed", range(5))
+def test_hospitals_and_residents_equal_the_blackboard(proposers, capacity, seed):
+    scene = am.simulate.walk(n_markers=5, frames=25, rate=10, stride=0.03, seed=seed)
+    d = am.simulate.sense(
+        scene, noise=0.004, missing=0.1, clutter=0.2, doubled=0.4, doubled_apart=0.012, seed=seed
+    ).detections
+    model = small_model(motion=am.DWNA(acceleration_sigma=5.0, velocity_sigma=0.8))
+    method = am.SMP(capacity=capacity, proposers=proposers, merged_within=0.02)
+    labels = am.track(d, method, model=model).labels
+    by_hand = track_by_hand(d, method, model)
+    np.testing.assert_array_equal(labels, by_hand)
+
+
+def test_a_marker_seen_as_two_blobs_is_one_track():
+    scene = am.simulate.smooth(n_markers=10, frames=150, seed=1)
+    sensed = am.simulate.sense(scene, noise=0.003, doubled=0.7, doubled_apart=0.01, seed=2)
+    model = small_model(
+        motion=am.DWNA(acceleration_sigma=0.006, velocity_sigma=0.03), max_speed=0.2
+    )
+    alone, merged = (
+        am.evaluate(am.track(sensed.detections, am.SMP(capacity=q), model=model), sensed)
+        for q in (1, 2)
+    )
+    assert merged.n_tracks == 10
+    assert alone.n_tracks > 13  # the second blobs become tracks of their own
+    assert merged.clutter_labelled_percent < alone.clutter_labelled_percent
+
+
+def test_merged_blobs_are_measured_between_them():
+    # Two blobs as likely as each other: the track goes on between them.
+    frames = [[[0.0, 0, 0]], [[0.0, 0, 0]], [[0.0, 0, 0]], [[0.004, 0, 0], [-0.004, 0, 0]]]
+    d = am.Detections.from_frames([0.0, 0.1, 0.2, 0.3], frames)
+    model = small_model(motion=am.DWNA(acceleration_sigma=0.1, velocity_sigma=0.1))
+    for capacity in (1, 2):
+        method = am.SMP(capacity=capacity)
+        state = method.init(model)
+        for time, points in d:
+            state, update = method.step(state, time, points)
+        assert sorted(update.labels.tolist()) == [-1, 0]
+        x = state.live()["means"][0, 0, 0]
+        assert (abs(x) < 1e-12) == (capacity == 2)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"capacity": 0}, {"capacity": 1.5}, {"merged_within": 0}, {"capacity": 2, "strict": True}],
+)
+def test_capacities_that_make_no_sense(wrong):
+    with pytest.raises(am.ParameterError, match=next(iter(wrong))):
+        am.SMP(**wrong)

@@ -55,6 +55,8 @@ class FrameTracker:
         delete_drop: float,
         max_candidates: int,
         is_strict: bool,
+        capacity: int,
+        merged_within: float,
     ) -> None: ...
     def step(
         self,

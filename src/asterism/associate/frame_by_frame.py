@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypedDict
 
 import numpy as np
 
@@ -26,10 +26,19 @@ if TYPE_CHECKING:
     from asterism import _engine
     from asterism.model import Detections, TrackingModel
 
-__all__ = ["FrameByFrame", "FrameState"]
+__all__ = ["FrameByFrame", "FrameState", "Market"]
 
 MAX_CANDIDATES = 50_000_000
 """Pairs of track and detection within the gates of one frame (1.2 GB of them)."""
+
+
+class Market(TypedDict):
+    """How tracks and detections come together, as the engine takes it."""
+
+    is_strict: bool
+    capacity: int
+    merged_within: float
+
 
 FRAMES_A_CALL = 1000
 """The engine takes so many frames at a time: few enough to show progress and to be stopped."""
@@ -99,8 +108,9 @@ class FrameByFrame(Method[FrameState]):
     def _engine_matcher(self) -> int:
         return self._matcher
 
-    def _is_strict(self) -> bool:
-        return False
+    def _market(self) -> Market:
+        """Say how tracks and detections come together, beyond the matcher."""
+        return {"is_strict": False, "capacity": 1, "merged_within": 0.0}
 
     def init(self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None) -> FrameState:
         """Make the state before the first frame; `seed` changes nothing, nothing is drawn."""
@@ -120,7 +130,7 @@ class FrameByFrame(Method[FrameState]):
             confirm_score=math.log(p / (1 - p)),
             delete_drop=math.log(self.delete_odds),
             max_candidates=MAX_CANDIDATES,
-            is_strict=self._is_strict(),
+            **self._market(),
         )
         return FrameState(model=model, n_axes=n_axes, tracker=tracker)
 

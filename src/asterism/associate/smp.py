@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from asterism.associate.frame_by_frame import FrameByFrame, FrameState
-from asterism.errors import ParameterError
+from asterism.associate.frame_by_frame import FrameByFrame, FrameState, Market
+from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,12 +37,20 @@ class SMP(FrameByFrame):
     strict : bool
         The report's own method: as many detections in every frame as in the first, all of markers;
         everyone ranks everyone, without a gate. It refuses a frame with another number.
+    capacity : int
+        So many detections may marry one track (hospitals and residents, §5.6): a marker seen as
+        two blobs. They are merged by their likelihood; the likeliest bears the label.
+    merged_within : float
+        With a capacity above 1, greatest distance of a further detection from the one that the
+        track likes best, metres.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
     """
 
     proposers: Literal["tracks", "detections"] = "tracks"
     strict: bool = False
+    capacity: int = 1
+    merged_within: float = 0.02
 
     name: ClassVar[str] = "smp"
 
@@ -53,12 +61,20 @@ class SMP(FrameByFrame):
 
         if not isinstance(self.strict, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise ParameterError("strict", "True or False", repr(self.strict))
+        check_number("capacity", self.capacity, above=1, below=64, closed=True, integer=True)
+        check_number("merged_within", self.merged_within, above=0)
+        if self.strict and self.capacity > 1:
+            raise ParameterError("capacity", "1, as strict=True is given", self.capacity)
 
     def _engine_matcher(self) -> int:
         return 1 if self.proposers == "tracks" else 2
 
-    def _is_strict(self) -> bool:
-        return self.strict
+    def _market(self) -> Market:
+        return {
+            "is_strict": self.strict,
+            "capacity": self.capacity,
+            "merged_within": self.merged_within,
+        }
 
     def step(self, state: FrameState, time: float, points: ArrayLike) -> tuple[FrameState, Update]:
         """Take the next frame; see `Method.step`.
