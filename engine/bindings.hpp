@@ -5,3 +5,4 @@
 
 void bind_tracking(nanobind::module_& module);
 void bind_camera(nanobind::module_& module);
+void bind_solvers(nanobind::module_& module);

@@ -119,6 +119,9 @@ def assign(
     columns: NDArray[np.int32],
     gains: NDArray[np.float64],
 ) -> NDArray[np.int32]: ...
+def joint_marginals(
+    log_weights: NDArray[np.float64], log_miss: NDArray[np.float64], max_states: int
+) -> tuple[NDArray[np.float64], float, NDArray[np.int32], float, int]: ...
 def marry(
     first: NDArray[np.int64],
     receivers: NDArray[np.int32],

@@ -1,0 +1,162 @@
+// In which order to sum the vertices of a graph out of its weighted matchings.
+//
+//   Z = Σ over matchings  Π_{matched edges} weight_e · Π_{unmatched vertices} alone_v
+//
+// A vertex is summed out by choosing its partner among the neighbours that are left, or none. What
+// must be remembered between two steps is which of the *frontier*, the vertices left that have a
+// neighbour already gone, are used: a set of at most 2^frontier states. Both sides of the graph are
+// treated alike, so three tracks with forty detections cost 2^3 states and not 2^40.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+namespace asterism {
+
+struct Link {
+  std::int32_t to = 0, edge = 0;
+};
+
+struct MatchingGraph {
+  std::vector<std::vector<Link>> links;  // of each vertex
+  std::vector<double> weight;            // of each edge
+  std::vector<double> alone;             // of each vertex
+
+  std::int32_t size() const { return static_cast<std::int32_t>(links.size()); }
+};
+
+struct EliminationStep {
+  std::int32_t vertex = 0;
+  bool is_active = false;              // in the frontier before the step
+  std::vector<Link> links;             // to the vertices left, whose bits the step may set
+  std::vector<std::int32_t> entering;  // vertices that the step adds to the frontier
+};
+
+struct Elimination {
+  std::vector<EliminationStep> steps;
+  std::int32_t peak = 0;  // largest frontier
+  double work = 0;        // multiplications of one pass
+};
+
+class EliminationOrder {
+ public:
+  explicit EliminationOrder(const MatchingGraph& graph) : graph_(graph) {}
+
+  // The cheapest of several greedy orders, one from each promising first vertex.
+  Elimination best() {
+    Elimination best;
+    for (const std::int32_t start : starts()) {
+      Elimination e = greedy(start);
+      if (best.steps.empty() || e.work < best.work) best = std::move(e);
+      if (best.peak <= kSmallFrontier) break;  // looking further costs more than it saves
+    }
+    return best;
+  }
+
+ private:
+  static constexpr std::int32_t kSmallFrontier = 6, kManyStarts = 16;
+
+  // Where a narrow graph ends, then vertices of few neighbours, of both sides if there are two kinds.
+  std::vector<std::int32_t> starts() const {
+    std::vector<std::int32_t> all(graph_.size());
+    std::iota(all.begin(), all.end(), 0);
+    std::stable_sort(all.begin(), all.end(), [&](std::int32_t a, std::int32_t b) {
+      return graph_.links[a].size() < graph_.links[b].size();
+    });
+    all.insert(all.begin(), farthest(farthest(0)));
+    const std::int32_t last = all.back();
+    if (static_cast<std::int32_t>(all.size()) > kManyStarts) {
+      all.resize(kManyStarts);
+      all.push_back(last);
+    }
+    return all;
+  }
+
+  // The last vertex that a breadth-first search reaches.
+  std::int32_t farthest(std::int32_t from) const {
+    std::vector<std::int32_t> queue{from};
+    std::vector<char> is_seen(graph_.size(), 0);
+    is_seen[from] = 1;
+    for (std::size_t k = 0; k < queue.size(); ++k)
+      for (const Link& l : graph_.links[queue[k]])
+        if (!is_seen[l.to]) {
+          is_seen[l.to] = 1;
+          queue.push_back(l.to);
+        }
+    return queue.back();
+  }
+
+  // Always the vertex that leaves the smallest frontier; of equals the one met first.
+  Elimination greedy(std::int32_t start) {
+    const std::int32_t n = graph_.size();
+    is_gone_.assign(n, 0);
+    is_active_.assign(n, 0);
+    is_near_.assign(n, 0);
+    fresh_.resize(n);
+    for (std::int32_t v = 0; v < n; ++v) fresh_[v] = static_cast<std::int32_t>(graph_.links[v].size());
+    near_.clear();
+    Elimination e;
+    std::int32_t frontier = 0, v = start;
+    for (;;) {
+      EliminationStep step;
+      step.vertex = v;
+      step.is_active = is_active_[v];
+      for (const Link& l : graph_.links[v]) {
+        if (is_gone_[l.to]) continue;
+        step.links.push_back(l);
+        if (!is_active_[l.to]) step.entering.push_back(l.to);
+      }
+      is_gone_[v] = 1;
+      if (!is_active_[v]) enter(v);  // for the counts of its neighbours only
+      for (const std::int32_t u : step.entering) enter(u);
+      frontier += static_cast<std::int32_t>(step.entering.size()) - step.is_active;
+      e.peak = std::max(e.peak, frontier);
+      e.work += std::ldexp(static_cast<double>(step.links.size() + 1), std::min(frontier, 900));
+      e.steps.push_back(std::move(step));
+      if (static_cast<std::int32_t>(e.steps.size()) == n) return e;
+      v = next();
+    }
+  }
+
+  void enter(std::int32_t u) {
+    is_active_[u] = 1;
+    if (!is_near_[u]) {
+      is_near_[u] = 1;
+      near_.push_back(u);
+    }
+    for (const Link& l : graph_.links[u]) {
+      --fresh_[l.to];
+      if (!is_near_[l.to]) {
+        is_near_[l.to] = 1;
+        near_.push_back(l.to);
+      }
+    }
+  }
+
+  // The graph is connected, so while vertices are left, some are near.
+  std::int32_t next() {
+    std::size_t kept = 0;
+    std::int32_t best = -1, least = 0;
+    for (const std::int32_t u : near_) {
+      if (is_gone_[u]) continue;
+      near_[kept++] = u;
+      const std::int32_t growth = fresh_[u] - is_active_[u];
+      if (best < 0 || growth < least) {
+        best = u;
+        least = growth;
+      }
+    }
+    near_.resize(kept);
+    return best;
+  }
+
+  const MatchingGraph& graph_;
+  std::vector<char> is_gone_, is_active_, is_near_;
+  std::vector<std::int32_t> fresh_;  // neighbours that are not in the frontier, nor gone
+  std::vector<std::int32_t> near_;   // candidates: the frontier and its neighbours
+};
+
+}  // namespace asterism

@@ -1,0 +1,193 @@
+// Joint association events of tracks and detections: marginals, total weight and the best event.
+//
+//   w_ij  track i has detection j, w_i0 a miss;  event: every track one of them, no detection twice
+//   g_ij = log w_ij - log w_i0   the gain of a pairing over a miss
+//   u_i + p_j ≥ log w_ij, u_i ≥ log w_i0, p_j ≥ 0   prices; equal on what the best event takes
+//
+// Divided by the prices every factor is at most 1 and the best event weighs exactly 1, so that plain
+// doubles do: what underflows is nothing against the total.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "assignment.hpp"
+#include "elimination.hpp"
+#include "groups.hpp"
+#include "joint_beam.hpp"
+#include "joint_exact.hpp"
+
+namespace asterism {
+
+struct FrontierLimit : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+struct JointSummary {
+  double log_total = 0, bound = 0;
+  std::int64_t n_states = 1;
+};
+
+class JointEvents {
+ public:
+  // Row-major weights (n, m). `marginals` has a row of m + 1 a track, the miss last; `best` is
+  // filled with the detection of each track, -1 for a miss.
+  JointEvents(std::span<const double> log_weights, std::span<const double> log_miss,
+              std::int64_t max_states, std::span<double> marginals, std::span<std::int32_t> best)
+      : log_weights_(log_weights),
+        log_miss_(log_miss),
+        max_states_(max_states),
+        n_(static_cast<std::int32_t>(log_miss.size())),
+        m_(n_ == 0 ? 0 : static_cast<std::int32_t>(log_weights.size() / log_miss.size())),
+        marginals_(marginals),
+        best_(best) {}
+
+  JointSummary solve() {
+    std::vector<Candidate> candidates;
+    for (std::int32_t i = 0; i < n_; ++i) {
+      best_[i] = -1;
+      const std::size_t before = candidates.size();
+      for (std::int32_t j = 0; j < m_; ++j)
+        if (log_weight(i, j) > -std::numeric_limits<double>::infinity())
+          candidates.push_back({i, j, log_weight(i, j) - log_miss_[i], 0});
+      if (candidates.size() > before) continue;
+      marginal(i, m_) = 1;
+      summary_.log_total += log_miss_[i];
+    }
+    const Groups groups = connected_groups(candidates, n_, m_);
+    Assignment assignment;
+    double log_exact = 0;  // of the share of events that were summed
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      assignment.solve(groups[g], best_);
+      const double bound = solve_group(groups[g]);
+      log_exact += std::log1p(-bound);
+    }
+    if (log_exact < 0) summary_.bound = -std::expm1(log_exact);
+    return summary_;
+  }
+
+ private:
+  double log_weight(std::int32_t i, std::int32_t j) const {
+    return log_weights_[static_cast<std::size_t>(i) * m_ + j];
+  }
+  double& marginal(std::int32_t i, std::int32_t j) {
+    return marginals_[static_cast<std::size_t>(i) * (m_ + 1) + j];
+  }
+
+  // Prices on a grid: sums of two are exact, and so is their difference to a weight near them.
+  static double snap(double x) {
+    constexpr double grid = 1 << 20;
+    return std::abs(x) < grid * grid ? std::nearbyint(x * grid) / grid : x;
+  }
+
+  double solve_group(std::span<const Candidate> group) {
+    std::vector<std::int32_t> rows, columns, row_of(group.size()), column_of(group.size());
+    number(group, rows, columns, row_of, column_of);
+    const auto n = static_cast<std::int32_t>(rows.size()), m = static_cast<std::int32_t>(columns.size());
+    std::vector<std::int32_t> partner(n + m, -1);
+    for (std::size_t e = 0; e < group.size(); ++e)
+      if (best_[group[e].row] == group[e].column) {
+        partner[row_of[e]] = n + column_of[e];
+        partner[n + column_of[e]] = row_of[e];
+      }
+    std::vector<double> u(n), p(m);
+    price(group, row_of, column_of, partner, u, p);
+
+    MatchingGraph graph;
+    graph.links.resize(n + m);
+    graph.alone.resize(n + m);
+    graph.weight.resize(group.size());
+    double log_scale = 0;
+    for (std::int32_t i = 0; i < n; ++i) {
+      u[i] = snap(log_miss_[rows[i]] + u[i]);
+      graph.alone[i] = std::exp(log_miss_[rows[i]] - u[i]);
+      log_scale += u[i];
+    }
+    for (std::int32_t j = 0; j < m; ++j) {
+      p[j] = snap(p[j]);
+      graph.alone[n + j] = std::exp(-p[j]);
+      log_scale += p[j];
+    }
+    for (std::size_t e = 0; e < group.size(); ++e) {
+      const std::int32_t i = row_of[e], j = column_of[e], edge = static_cast<std::int32_t>(e);
+      graph.weight[e] = std::exp(log_weight(group[e].row, group[e].column) - (u[i] + p[j]));
+      graph.links[i].push_back({n + j, edge});
+      graph.links[n + j].push_back({i, edge});
+    }
+
+    const MatchingMarginals result = sum(graph, n, partner);
+    for (std::size_t e = 0; e < group.size(); ++e)
+      marginal(group[e].row, group[e].column) = result.edge[e];
+    for (std::int32_t i = 0; i < n; ++i) marginal(rows[i], m_) = result.alone[i];
+    summary_.log_total += result.log_total + log_scale;
+    summary_.n_states = std::max(summary_.n_states, result.n_states);
+    return result.bound;
+  }
+
+  MatchingMarginals sum(const MatchingGraph& graph, std::int32_t n,
+                        std::span<const std::int32_t> partner) const {
+    const Elimination elimination = EliminationOrder(graph).best();
+    if (elimination.peak < 62 && std::int64_t{1} << elimination.peak <= max_states_)
+      return JointExact(graph, elimination).solve();
+    if (elimination.peak <= 64)
+      return JointBeam<1>(graph, elimination, n, partner, max_states_).solve();
+    if (elimination.peak <= 1024)
+      return JointBeam<16>(graph, elimination, n, partner, max_states_).solve();
+    throw FrontierLimit("more than 1024 tracks or detections compete at once");
+  }
+
+  // Small consecutive numbers for the rows and columns of a group.
+  static void number(std::span<const Candidate> group, std::vector<std::int32_t>& rows,
+                     std::vector<std::int32_t>& columns, std::span<std::int32_t> row_of,
+                     std::span<std::int32_t> column_of) {
+    for (const Candidate& c : group) columns.push_back(c.column);
+    std::sort(columns.begin(), columns.end());
+    columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
+    for (std::size_t e = 0; e < group.size(); ++e) {
+      if (rows.empty() || rows.back() != group[e].row) rows.push_back(group[e].row);
+      row_of[e] = static_cast<std::int32_t>(rows.size()) - 1;
+      const auto at = std::lower_bound(columns.begin(), columns.end(), group[e].column);
+      column_of[e] = static_cast<std::int32_t>(at - columns.begin());
+    }
+  }
+
+  // The least prices p ≥ 0 at which everyone is content with the best event, and what is then left
+  // to each track. They rise from 0 and, as the event is the best, come to rest.
+  static void price(std::span<const Candidate> group, std::span<const std::int32_t> row_of,
+                    std::span<const std::int32_t> column_of, std::span<const std::int32_t> partner,
+                    std::span<double> left, std::span<double> p) {
+    const auto n = static_cast<std::int32_t>(left.size());
+    std::vector<std::size_t> own(n, 0);
+    for (std::size_t e = 0; e < group.size(); ++e)
+      if (partner[row_of[e]] == n + column_of[e]) own[row_of[e]] = e;
+    const auto content = [&](std::int32_t i) {
+      left[i] = partner[i] < 0 ? 0 : group[own[i]].gain - p[partner[i] - n];
+    };
+    for (std::int32_t i = 0; i < n; ++i) content(i);
+    // Rounding may keep ties rising by nothing at all: any prices do, so the rounds are counted.
+    bool is_rising = true;
+    for (std::int32_t round = 0; round <= n && is_rising; ++round) {
+      is_rising = false;
+      for (std::size_t e = 0; e < group.size(); ++e) {
+        const std::int32_t i = row_of[e], j = column_of[e], holder = partner[n + j];
+        if (holder < 0 || holder == i || group[e].gain - left[i] <= p[j]) continue;
+        p[j] = group[e].gain - left[i];
+        content(holder);
+        is_rising = true;
+      }
+    }
+  }
+
+  std::span<const double> log_weights_, log_miss_;
+  std::int64_t max_states_;
+  std::int32_t n_, m_;
+  std::span<double> marginals_;
+  std::span<std::int32_t> best_;
+  JointSummary summary_;
+};
+
+}  // namespace asterism
