@@ -59,7 +59,7 @@ class EliminationOrder {
  private:
   static constexpr std::int32_t kSmallFrontier = 6, kManyStarts = 16;
 
-  // Where a narrow graph ends, then vertices of few neighbours, of both sides if there are two kinds.
+  // Where a narrow graph ends, vertices of few neighbours, and one of many.
   std::vector<std::int32_t> starts() const {
     std::vector<std::int32_t> all(graph_.size());
     std::iota(all.begin(), all.end(), 0);
@@ -96,7 +96,8 @@ class EliminationOrder {
     is_active_.assign(n, 0);
     is_near_.assign(n, 0);
     fresh_.resize(n);
-    for (std::int32_t v = 0; v < n; ++v) fresh_[v] = static_cast<std::int32_t>(graph_.links[v].size());
+    for (std::int32_t v = 0; v < n; ++v)
+      fresh_[v] = static_cast<std::int32_t>(graph_.links[v].size());
     near_.clear();
     Elimination e;
     std::int32_t frontier = 0, v = start;

@@ -2,8 +2,8 @@
 // sum over the heaviest states alone, with a proof of how much is missing.
 //
 //   F(s) ≤ what the kept states lead to at s;  B(s) ≤ U(s);  dropped mass D ≤ Σ_dropped F(s) U(s)
-//   the kept events have mass Z, all have Z + D, and so the distribution over the kept is off by
-//   a total variation of D / (Z + D)
+//   the kept events have mass Z, all have Z + D, and so the distribution over the kept is off by a
+//   total variation of D / (Z + D)
 //
 // U comes from a backward pass that follows the use of some vertices and forgets that of the others,
 // taking for a forgotten one the better of both cases whenever it is summed out. It is tight when
@@ -12,69 +12,19 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "elimination.hpp"
 #include "joint_exact.hpp"
+#include "used_sets.hpp"
 
 namespace asterism {
-
-// The used vertices of the frontier, by slot.
-template <std::size_t W>
-struct UsedSet {
-  std::array<std::uint64_t, W> words{};
-
-  bool has(std::int32_t slot) const { return words[slot >> 6] >> (slot & 63) & 1; }
-  void flip(std::int32_t slot) { words[slot >> 6] ^= std::uint64_t{1} << (slot & 63); }
-  bool operator==(const UsedSet&) const = default;
-  auto operator<=>(const UsedSet&) const = default;
-  std::size_t hash() const {
-    std::uint64_t h = 0;
-    for (const std::uint64_t word : words) {
-      h = (h ^ word) * 0x9e3779b97f4a7c15u;
-      h ^= h >> 32;
-    }
-    return static_cast<std::size_t>(h);
-  }
-};
-
-// Sets in the order of their coming, each found by its value (open addressing).
-template <std::size_t W>
-class SetIndex {
- public:
-  void reset(std::vector<UsedSet<W>>& sets) {
-    sets_ = &sets;
-    table_.assign(std::bit_ceil(std::max<std::size_t>(2 * sets.size(), 16)), -1);
-    for (std::size_t i = 0; i < sets.size(); ++i) table_[place(sets[i])] = static_cast<std::int32_t>(i);
-  }
-  std::int32_t find(const UsedSet<W>& set) const { return table_[place(set)]; }
-  std::int32_t find_or_add(const UsedSet<W>& set) {
-    const std::size_t at = place(set);
-    if (table_[at] >= 0) return table_[at];
-    const auto i = static_cast<std::int32_t>(sets_->size());
-    sets_->push_back(set);
-    table_[at] = i;
-    if (2 * sets_->size() > table_.size()) reset(*sets_);
-    return i;
-  }
-
- private:
-  std::size_t place(const UsedSet<W>& set) const {
-    std::size_t at = set.hash() & (table_.size() - 1);
-    while (table_[at] >= 0 && (*sets_)[table_[at]] != set) at = (at + 1) & (table_.size() - 1);
-    return at;
-  }
-
-  std::vector<UsedSet<W>>* sets_ = nullptr;
-  std::vector<std::int32_t> table_;
-};
 
 template <std::size_t W>
 class JointBeam {
@@ -96,21 +46,26 @@ class JointBeam {
     const std::size_t n = steps_.size();
     layers_.resize(n + 1);
     layers_[0] = {{Set{}}, {1.0}, 0};
-    Set best;  // what the best matching uses
+    best_.assign(1, Set{});
+    std::int64_t n_all_dropped = 0;
+    double log_all_dropped = -std::numeric_limits<double>::infinity();
+    // Some layers are kept and the others made again, as in joint_exact.hpp.
+    const auto stride = static_cast<std::size_t>(std::sqrt(static_cast<double>(n)));
     for (std::size_t t = 0; t < n; ++t) {
-      prune(t, best);
+      const auto [log_dropped, n_dropped] = prune(t);
+      n_all_dropped += n_dropped;
+      log_all_dropped = log_sum(log_all_dropped, log_dropped);
       forward(t);
       out.n_states = std::max(out.n_states, static_cast<std::int64_t>(layers_[t + 1].sets.size()));
-      advance(t, best);
+      advance(t);
+      if (t % stride != 0) layers_[t] = {};
     }
     const double log_kept = log_of(layers_[n].values[0], layers_[n].exponent);
     out.log_total = log_kept + log_scale_;
     backward(out);
-    if (n_dropped_ > 0) {
-      // Rounding, and weights too small for a double, are far less than what is added here.
-      const double share = 1 / (1 + std::exp(log_kept - log_dropped_));
-      out.bound = std::min(1.0, share * (1 + 1e-9) + 1e-14);
-    }
+    const double share = 1 / (1 + std::exp(log_kept - log_all_dropped));
+    if (n_all_dropped > 0 || share > kNothing)
+      out.bound = std::min(1.0, share * (1 + kRounding) + kRounding * kRounding);
     return out;
   }
 
@@ -123,9 +78,25 @@ class JointBeam {
   };
 
   static constexpr std::int32_t kMostFollowed = 16, kBalanceRounds = 200;
+  static constexpr double kNothing = 1e-17;  // an error far below rounding
+  static constexpr double kRounding = 1e-7;  // far above the rounding of a log of a mass
 
   static double log_of(double value, std::int64_t exponent) {
     return std::log(value) + static_cast<double>(exponent) * std::log(2.0);
+  }
+
+  static double log_sum(double a, double b) {
+    const double high = std::max(a, b);
+    return std::isinf(high) ? high : high + std::log(std::exp(a - high) + std::exp(b - high));
+  }
+
+  // The power of two that brings the largest value near 1, taken out of all.
+  static std::int64_t scale(std::vector<double>& values) {
+    const double largest = *std::max_element(values.begin(), values.end());
+    if (largest == 0) return 0;
+    const int exponent = std::ilogb(largest);
+    for (double& x : values) x = std::ldexp(x, -exponent);
+    return exponent;
   }
 
   // Scale every track's options to sum to 1, and every detection's to sum to 1 unless it is the
@@ -189,13 +160,14 @@ class JointBeam {
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(),
                      [&](std::int32_t a, std::int32_t b) { return conflict[a] > conflict[b]; });
-    const auto log2_limit = static_cast<std::int32_t>(std::bit_width(static_cast<std::uint64_t>(max_states_))) - 1;
-    const std::int32_t room = std::min(kMostFollowed, log2_limit);
+    std::int32_t room = 0;
+    while (room < kMostFollowed && std::int64_t{2} << room <= max_states_) ++room;
     std::vector<std::int32_t> n_followed(n + 1, 0);  // in the layer before each step
     is_followed_.assign(n, 0);
     for (const std::int32_t v : order) {
       if (slot_[v] < 0) continue;
-      const auto from = n_followed.begin() + enters_[v] + 1, to = n_followed.begin() + leaves_[v] + 1;
+      const auto from = n_followed.begin() + enters_[v] + 1;
+      const auto to = n_followed.begin() + leaves_[v] + 1;
       if (std::any_of(from, to, [&](std::int32_t k) { return k >= room; })) continue;
       std::for_each(from, to, [](std::int32_t& k) { ++k; });
       is_followed_[v] = 1;
@@ -243,7 +215,6 @@ class JointBeam {
         image.push_back(u == step.vertex ? 0 : std::size_t{1} << position(t + 1, u));
       }
       const bool is_forgotten = step.is_active && own == 0;
-      double largest = 0;
       for (std::size_t s = 0; s < before.size(); ++s) {
         std::size_t next = 0;
         for (std::size_t k = 0; k < image.size(); ++k)
@@ -256,21 +227,26 @@ class JointBeam {
           value = is_forgotten ? std::max(value, sum) : sum;
         }
         before[s] = value;
-        largest = std::max(largest, value);
       }
-      const int exponent = std::ilogb(largest);
+      completion_exponent_[t] = completion_exponent_[t + 1] + scale(before);
       // What is too small for a double still counts for something.
-      for (double& x : before) x = std::max(std::ldexp(x, -exponent), std::numeric_limits<double>::min());
-      completion_exponent_[t] = completion_exponent_[t + 1] + exponent;
+      for (double& x : before) x = std::max(x, std::numeric_limits<double>::min());
     }
   }
 
-  // Keep so many states of layer t that their successors are no more than max_states.
-  void prune(std::size_t t, const Set& best) {
+  // Keep so many states of layer t that their successors are no more than max_states. Gives the log
+  // of a bound of the mass dropped and the number of states.
+  std::pair<double, std::int64_t> prune(std::size_t t) {
+    const Set& best = best_[t];
     Layer& layer = layers_[t];
+    const std::size_t n_next = steps_[t].links.size() + 1;
     const std::size_t room =
-        std::max<std::size_t>(1, static_cast<std::size_t>(max_states_) / (steps_[t].links.size() + 1));
-    if (layer.sets.size() <= room) return;
+        std::max<std::size_t>(1, static_cast<std::size_t>(max_states_) / n_next);
+    // What underflow may lose in this step: F and U are at most about 1.
+    const auto n_lost = static_cast<double>(layer.sets.size() * (n_next + 1));
+    double dropped = 4 * n_lost * std::numeric_limits<double>::min();
+    const std::int64_t exponent = layer.exponent + completion_exponent_[t];
+    if (layer.sets.size() <= room) return {log_of(dropped, exponent), 0};
     struct Scored {
       double score;
       std::int32_t at;
@@ -290,16 +266,11 @@ class JointBeam {
     };
     const auto end = order.begin() + static_cast<std::ptrdiff_t>(room);
     std::nth_element(order.begin(), end, order.end(), is_better);
-    double dropped = 0;
     for (auto it = end; it != order.end(); ++it) dropped += it->score;
-    n_dropped_ += order.end() - end;
-    if (dropped > 0) {
-      const double more = log_of(dropped, layer.exponent + completion_exponent_[t]);
-      const double high = std::max(more, log_dropped_);
-      log_dropped_ = high + std::log(std::exp(more - high) + std::exp(log_dropped_ - high));
-    }
+    const std::int64_t n_dropped = order.end() - end;
     order.resize(room);
-    std::sort(order.begin(), order.end(), [](const Scored& a, const Scored& b) { return a.at < b.at; });
+    std::sort(order.begin(), order.end(),
+              [](const Scored& a, const Scored& b) { return a.at < b.at; });
     Layer kept{{}, {}, layer.exponent};
     kept.sets.reserve(room);
     kept.values.reserve(room);
@@ -308,6 +279,7 @@ class JointBeam {
       kept.values.push_back(layer.values[o.at]);
     }
     layer = std::move(kept);
+    return {log_of(dropped, exponent), n_dropped};
   }
 
   void forward(std::size_t t) {
@@ -322,14 +294,18 @@ class JointBeam {
     each_choice(t, [&](std::size_t i, const Set& next, double weight, std::int32_t) {
       put(next, in.values[i] * weight);
     });
-    const int exponent = std::ilogb(*std::max_element(out.values.begin(), out.values.end()));
-    for (double& x : out.values) x = std::ldexp(x, -exponent);
-    out.exponent = in.exponent + exponent;
+    out.exponent = in.exponent + scale(out.values);
   }
 
   void backward(MatchingMarginals& out) {
     std::vector<double> after{1.0}, before, sums;
     for (std::size_t t = steps_.size(); t-- > 0;) {
+      std::size_t made = t;
+      while (layers_[made].sets.empty()) --made;
+      for (; made < t; ++made) {
+        forward(made);
+        prune(made + 1);
+      }
       const Layer& in = layers_[t];
       index_.reset(layers_[t + 1].sets);
       before.assign(in.sets.size(), 0);
@@ -344,8 +320,7 @@ class JointBeam {
       out.alone[steps_[t].vertex] = sums[1] / total;
       for (std::size_t k = 0; k < steps_[t].links.size(); ++k)
         out.edge[steps_[t].links[k].edge] = sums[k + 2] / total;
-      const int exponent = std::ilogb(*std::max_element(before.begin(), before.end()));
-      for (double& x : before) x = std::ldexp(x, -exponent);
+      scale(before);
       std::swap(before, after);
       layers_[t + 1] = {};
     }
@@ -376,27 +351,29 @@ class JointBeam {
   }
 
   // What the best matching uses after step t.
-  void advance(std::size_t t, Set& best) const {
+  void advance(std::size_t t) {
     const EliminationStep& step = steps_[t];
-    if (step.is_active && best.has(slot_[step.vertex])) {
+    Set best = best_[t];
+    if (step.is_active && best.has(slot_[step.vertex]))
       best.flip(slot_[step.vertex]);
-      return;
-    }
-    for (const Link& l : step.links)
-      if (l.to == partner_[step.vertex]) best.flip(slot_[l.to]);
+    else
+      for (const Link& l : step.links)
+        if (l.to == partner_[step.vertex]) best.flip(slot_[l.to]);
+    best_.push_back(best);
   }
 
   MatchingGraph graph_;
   const std::vector<EliminationStep>& steps_;
   std::span<const std::int32_t> partner_;
-  std::int64_t max_states_ = 1, n_dropped_ = 0;
-  double log_scale_ = 0, log_dropped_ = -std::numeric_limits<double>::infinity();
+  std::int64_t max_states_ = 1;
+  double log_scale_ = 0;
   std::vector<std::int32_t> slot_, enters_, leaves_;
   std::vector<char> is_followed_;
   std::vector<std::vector<std::int32_t>> followed_;  // in the layer before each step
   std::vector<std::vector<double>> completion_;
   std::vector<std::int64_t> completion_exponent_;
   std::vector<Layer> layers_;
+  std::vector<Set> best_;  // in the layer before each step
   SetIndex<W> index_;
 };
 

@@ -8,6 +8,7 @@
 // doubles do: what underflows is nothing against the total.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -87,7 +88,8 @@ class JointEvents {
   double solve_group(std::span<const Candidate> group) {
     std::vector<std::int32_t> rows, columns, row_of(group.size()), column_of(group.size());
     number(group, rows, columns, row_of, column_of);
-    const auto n = static_cast<std::int32_t>(rows.size()), m = static_cast<std::int32_t>(columns.size());
+    const auto n = static_cast<std::int32_t>(rows.size());
+    const auto m = static_cast<std::int32_t>(columns.size());
     std::vector<std::int32_t> partner(n + m, -1);
     for (std::size_t e = 0; e < group.size(); ++e)
       if (best_[group[e].row] == group[e].column) {
@@ -113,13 +115,15 @@ class JointEvents {
       log_scale += p[j];
     }
     for (std::size_t e = 0; e < group.size(); ++e) {
-      const std::int32_t i = row_of[e], j = column_of[e], edge = static_cast<std::int32_t>(e);
+      const std::int32_t i = row_of[e], j = column_of[e];
+      const auto edge = static_cast<std::int32_t>(e);
       graph.weight[e] = std::exp(log_weight(group[e].row, group[e].column) - (u[i] + p[j]));
       graph.links[i].push_back({n + j, edge});
       graph.links[n + j].push_back({i, edge});
     }
 
-    const MatchingMarginals result = sum(graph, n, partner);
+    MatchingMarginals result = sum(graph, n, partner);
+    if (!is_finite(result)) result = only_best(graph, n, partner);
     for (std::size_t e = 0; e < group.size(); ++e)
       marginal(group[e].row, group[e].column) = result.edge[e];
     for (std::int32_t i = 0; i < n; ++i) marginal(rows[i], m_) = result.alone[i];
@@ -138,6 +142,29 @@ class JointEvents {
     if (elimination.peak <= 1024)
       return JointBeam<16>(graph, elimination, n, partner, max_states_).solve();
     throw FrontierLimit("more than 1024 tracks or detections compete at once");
+  }
+
+  static bool is_finite(const MatchingMarginals& result) {
+    const auto finite = [](double x) { return std::isfinite(x); };
+    return std::isfinite(result.log_total) &&
+           std::all_of(result.edge.begin(), result.edge.end(), finite) &&
+           std::all_of(result.alone.begin(), result.alone.end(), finite);
+  }
+
+  // Where the range of doubles does not do after all, which takes hundreds of tracks in one group:
+  // the best event alone, which weighs 1. It is nobody's approximation, and the bound says so.
+  static MatchingMarginals only_best(const MatchingGraph& graph, std::int32_t n,
+                                     std::span<const std::int32_t> partner) {
+    MatchingMarginals out;
+    out.edge.assign(graph.weight.size(), 0);
+    out.alone.assign(graph.size(), 0);
+    for (std::int32_t v = 0; v < graph.size(); ++v) {
+      out.alone[v] = partner[v] < 0;
+      if (v < n)
+        for (const Link& l : graph.links[v]) out.edge[l.edge] = l.to == partner[v];
+    }
+    out.bound = 1;
+    return out;
   }
 
   // Small consecutive numbers for the rows and columns of a group.

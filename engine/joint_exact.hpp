@@ -184,7 +184,8 @@ class JointExact {
         else if (bit >= tile) {
           if (at & bit) add(out + at, free + (at ^ bit), w, tile);
         } else
-          for (std::size_t s = at; s < at + tile; s += 2 * bit) add(out + s + bit, free + s, w, bit);
+          for (std::size_t s = at; s < at + tile; s += 2 * bit)
+            add(out + s + bit, free + s, w, bit);
       }
     }
     return scale(layers_[t + 1]);
@@ -213,8 +214,9 @@ class JointExact {
       for (std::size_t k = 0; k < step.options.size(); ++k) {
         const std::size_t bit = std::size_t{1} << step.options[k].bit;
         const double w = graph_.weight[step.options[k].edge];
-        if (bit >= size || bit >= tile) {
-          if (!(at & bit)) sums_[k] += add(rest + at, after.data() + (at | bit), w, free + at, tile);
+        if (bit >= tile) {
+          if (!(at & bit))
+            sums_[k] += add(rest + at, after.data() + (at | bit), w, free + at, tile);
         } else
           for (std::size_t s = at; s < at + tile; s += 2 * bit)
             sums_[k] += add(rest + s, after.data() + s + bit, w, free + s, bit);

@@ -1,0 +1,73 @@
+"""Joint events by plain enumeration and, of a chain, by transfer matrices."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+
+def every_event(log_weights, log_miss):
+    """All joint events of any weight: detection of each track, -1 for a miss; and their logs."""
+    n, m = log_weights.shape
+    events, logs = [], []
+    for event in itertools.product(range(-1, m), repeat=n):
+        taken = [j for j in event if j >= 0]
+        if len(set(taken)) < len(taken):
+            continue
+        terms = [log_miss[i] if j < 0 else log_weights[i, j] for i, j in enumerate(event)]
+        if -math.inf not in terms:
+            events.append(event)
+            logs.append(math.fsum(terms))
+    return events, np.array(logs)
+
+
+def enumerate_events(log_weights, log_miss):
+    """Marginals with the miss last, log of the total weight, log of the greatest weight."""
+    n, m = log_weights.shape
+    events, logs = every_event(log_weights, log_miss)
+    top = logs.max()
+    weights = np.exp(logs - top)
+    total = math.fsum(weights)
+    marginals = np.zeros((n, m + 1))
+    for event, weight in zip(events, weights, strict=True):
+        for i, j in enumerate(event):
+            marginals[i, j] += weight / total
+    return marginals, top + math.log(total), top
+
+
+def chain_events(left, right, log_miss):
+    """A chain: track i may have detection i (log weight left[i]) or i + 1 (right[i]).
+
+    Two-state transfer in logs: whether detection i + 1 is used after track i. Returns marginals
+    (n, 3) of left, right and miss, and the log of the total weight.
+    """
+    n = len(left)
+    none = -np.inf
+    # step[i][a, b]: detection i was used (a) and i + 1 is (b); choices listed apart.
+    choices = [
+        {
+            "left": np.array([[left[i], none], [none, none]]),
+            "right": np.array([[none, right[i]], [none, right[i]]]),
+            "miss": np.array([[log_miss[i], none], [log_miss[i], none]]),
+        }
+        for i in range(n)
+    ]
+    steps = [np.logaddexp.reduce(list(c.values())) for c in choices]
+    forward = [np.array([0.0, none])]
+    for step in steps:
+        forward.append(np.logaddexp.reduce(forward[-1][:, None] + step, axis=0))
+    backward = [np.zeros(2)]
+    for step in reversed(steps):
+        backward.append(np.logaddexp.reduce(step + backward[-1], axis=1))
+    backward.reverse()
+    log_total = float(np.logaddexp.reduce(forward[-1]))
+    marginals = np.array([
+        [
+            np.exp(np.logaddexp.reduce(f[:, None] + c[kind] + b, axis=None) - log_total)
+            for kind in ("left", "right", "miss")
+        ]
+        for f, c, b in zip(forward, choices, backward[1:], strict=False)
+    ])  # fmt: skip
+    return marginals, log_total
