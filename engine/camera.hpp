@@ -44,6 +44,8 @@ class Camera {
         height_(height), is_plain_(A.a == 1 && A.b == 0 && A.c == 0 && A.d == 0 && A.e == 1 && A.f == 0) {
     std::copy_n(R.begin(), 9, R_.begin());
     std::copy_n(t.begin(), 3, t_.begin());
+    // Nearer than rounding can tell is not before the camera.
+    z_least_ = 1e-14 * std::sqrt(t_[0] * t_[0] + t_[1] * t_[1] + t_[2] * t_[2]);
   }
 
   std::int32_t width() const { return width_; }
@@ -86,7 +88,7 @@ class Camera {
         const double u = B_.a * x[i] + B_.b * y[i] + B_.c, v = B_.d * x[i] + B_.e * y[i] + B_.f;
         out[2 * i] = u, out[2 * i + 1] = v;
         const bool inside = (u >= -0.5) & (u < right) & (v >= -0.5) & (v < bottom);
-        const bool in_range = (z[i] > 0) & (z[i] >= near_) & (z[i] <= far_);
+        const bool in_range = (z[i] > z_least_) & (z[i] >= near_) & (z[i] <= far_);
         why[i] = inside & in_range ? Reason::visible : Reason::outside;
       }
       for (std::size_t i = 0; i < n; ++i)
@@ -119,7 +121,7 @@ class Camera {
     const Vec3 c = to_camera(point);
     std::array<double, 6> J;
     J.fill(kNaN);
-    if (!(c.z > 0)) return J;
+    if (!(c.z > z_least_)) return J;
     const Plane n{c.x / c.z, c.y / c.z}, ideal = A_(n);
     Plane bent = ideal;
     lens_.distort({&bent.x, 1}, {&bent.y, 1});
@@ -150,7 +152,7 @@ class Camera {
     Reason why = Reason::outside;
     if (!std::isfinite(z))
       why = Reason::absent;
-    else if (z <= 0)
+    else if (z <= z_least_)
       why = Reason::behind;
     else if (!std::isfinite(pixel[0]) || !std::isfinite(pixel[1]))
       why = Reason::lens;
@@ -166,7 +168,7 @@ class Camera {
   std::array<double, 3> t_;
   Affine2 A_, B_;
   Lens lens_;
-  double near_, far_;
+  double near_, far_, z_least_ = 0;
   std::int32_t width_, height_;
   bool is_plain_;
 };

@@ -293,9 +293,9 @@ def test_methods_and_scenes_are_those_of_the_library(capsys):
     options = listed["smp"]["options"]
     made = am.SMP()
     assert {name: option["default"] for name, option in options.items()} == {
-        name: getattr(made, name)
-        for name in ("gate_probability", "confirm_probability", "delete_odds", "proposers")
+        field.name: getattr(made, field.name) for field in dataclasses.fields(made)
     }
+    assert {"gate_probability", "proposers", "strict", "capacity"} < options.keys()
     assert all(option["about"] for option in options.values())
     text = run("methods", capsys)
     assert "tracks|detections" in text
@@ -334,6 +334,8 @@ def test_a_recording_of_a_scene_with_its_truth(tmp_path, monkeypatch, capsys):
         "simulate cube -o c.csv --truth d.csv --sense visits=5",
         "simulate cube -o c.csv --truth d.csv --rig nothing.xcp",
         "simulate cube -o c.csv --markers 9",
+        "simulate cube -o c.csv --seed 1 --option seed=4",
+        "simulate smooth -o c.csv --markers 9 --option n_markers=8",
         "simulate cube -o c.csv --truth c.csv",
     ):
         assert main(wrong.split()) == 2

@@ -292,3 +292,54 @@ def test_a_camera_does_not_change_with_the_arrays_it_was_made_from():
     assert c.T_camera_world[0, 3] == 0.0
     with pytest.raises(ValueError, match="read-only"):
         c.K[0, 0] = 1.0
+
+
+def test_the_optical_centre_is_never_seen():
+    rng = np.random.default_rng(1)
+    for _ in range(500):
+        place, target = rng.normal(size=(2, 3)) * rng.choice([0.1, 1.0, 1000.0])
+        c = am.Camera.look_at(place, target, K=K, size_px=SIZE, up=rng.normal(size=3))
+        assert c.project(c.center).reason == am.Reason.BEHIND
+        assert c.project(c.center + 1e-3 * c.axis).visible
+
+
+def test_masked_points_are_absent_and_ragged_ones_refused():
+    points = np.ma.array([[0.0, 0, 1], [9999.0] * 3], mask=[[0] * 3, [1] * 3])
+    assert camera().project(points).reason.tolist() == [am.Reason.VISIBLE, am.Reason.ABSENT]
+    with pytest.raises(am.ParameterError, match="points"):
+        camera().project([[0, 0, 1], [0, 0]])
+
+
+def test_rigs_are_pickled_and_copied_before_and_after_their_first_use():
+    import copy
+    import pickle
+
+    rig = am.Rig.ring(3, radius=3, height=2, lens=am.BrownConrady(k1=-0.1))
+    points = np.random.default_rng(0).normal(size=(20, 3))
+    expected = rig.project(points).pixels
+    rig[0].depth_image([])
+    for other in (pickle.loads(pickle.dumps(rig)), copy.deepcopy(rig)):
+        np.testing.assert_array_equal(other.project(points).pixels, expected)
+
+
+@pytest.mark.parametrize(
+    ("make", "word"),
+    [
+        (lambda: am.Rig((good(name="2"), good())), "more than once"),
+        (lambda: good(name=5), "name"),
+        (lambda: good(far="x"), "far"),
+        (lambda: good(size_px=None), "size_px"),
+        (lambda: am.Rig.ring(2, radius=1, height="x"), "height"),
+        (lambda: am.Rig.ring(2, radius=1, height=1, size_px=1280), "size_px"),
+        (lambda: am.Rig.ring(2, radius=1, height=1, name="x"), "name"),
+        (lambda: good().project([0, 0, 1], None), "surfaces"),
+        (lambda: am.Camera.look_at((0, 0, 1), (0, 0, 0), K=K, size_px=SIZE, up=(0, 0, 0)), "up"),
+    ],
+)
+def test_wrong_kinds_of_arguments_are_told(make, word):
+    with pytest.raises(am.ParameterError, match=word):
+        make()
+
+
+def test_whole_numbers_may_come_as_floats():
+    assert len(am.Rig.ring(3.0, radius=1, height=1)) == 3

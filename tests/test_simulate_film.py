@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from asterism.camera import Camera, Polygon, Reason, Rig, intrinsics
+from asterism.camera import Camera, Capsule, Polygon, Reason, Rig, intrinsics
 from asterism.errors import ParameterError
 from asterism.model import Tracks
-from asterism.simulate import Seeing, Truth, cube, film, smooth
+from asterism.simulate import Seeing, Truth, cube, film, fingers, smooth
 
 SHARP = {"noise_px": 0.0, "merge": False}
 RIG = Rig.ring(4, radius=3, height=2, target=(0, 0, 0))
@@ -195,3 +195,61 @@ def test_flat_scenes_are_refused():
     flat = Tracks.from_dense([0.0], [[[0.0, 1.0]]], ["a"])
     with pytest.raises(ParameterError, match="3-D"):
         film(flat, RIG)
+
+
+@pytest.mark.parametrize("behind", [0.002, 0.005, 0.02, 0.1])
+def test_markers_are_not_seen_through_what_they_do_not_sit_on(behind):
+    sheet = Polygon(corners=[[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]])
+    shot = film(still([0, behind, 0]), one_camera(), [sheet], seeing=Seeing(**SHARP))
+    assert shot.share[0, 0, 0] == 0
+    rod = Capsule(ends=[[-1, 0, 0], [1, 0, 0]], radius=0.008)
+    beyond = film(still([0, 0.008 + behind, 0]), one_camera(), [rod], seeing=Seeing(**SHARP))
+    assert beyond.share[0, 0, 0] <= 0.5
+
+
+def test_seeing_sees_about_as_much_as_the_eye():
+    truth = fingers(frames=40, seed=2)
+    middle = truth.positions().mean(axis=(0, 1))
+    rig = Rig.ring(8, radius=0.8, height=middle[2] + 0.5, target=middle)
+    ideal = film(truth, rig).projection.visible
+    shot = film(truth, rig, seeing=Seeing(marker_radius=0.003, merge=False, noise_px=0))
+    seen = shot.blob_of >= 0
+    assert (ideal & ~seen).mean() < 0.03
+    assert (seen & ~ideal).mean() < 0.08  # a rim that looks past the edge
+
+
+def test_a_surface_far_away_changes_nothing():
+    K = intrinsics(focal_length=1000.0, principal_point=(639.5, 511.5))
+    rig = Rig((Camera.look_at((0, -1, 0), (0, 0, 0), K=K, size_px=(1280, 1024)),))
+    far = Capsule(ends=[[50, 50, 0], [50, 50, 1]], radius=0.01)
+    for x in (0.6, 0.6399, 0.645):  # at the right edge of the image, and beyond it
+        a, b = (
+            film(still([x, 0, 0]), rig, s, seeing=Seeing(marker_radius=0.02, **SHARP))
+            for s in ([], [far])
+        )
+        np.testing.assert_array_equal(a.observations.pixels, b.observations.pixels)
+        np.testing.assert_array_equal(a.share, b.share)
+
+
+def test_late_cameras_do_not_repeat_the_scene():
+    scene = np.random.default_rng(5).standard_normal(3)
+    t = np.arange(5) / 100
+    truth = Tracks.from_dense(t, np.stack([t, 0 * t, 0 * t], axis=1)[:, None], ["a"])
+    rig = Rig(tuple(one_camera()[0].replace(name=n) for n in "abc"))
+    shot = film(truth, rig, seeing=Seeing(timing=0.01, **SHARP), seed=5)
+    shift = shot.observations.pixels[shot.blob_of[..., 0], 0] - shot.projection.pixels[:, :, 0, 0]
+    late = shift[:, 2] / 250 / 0.01
+    assert np.abs(late - scene).min() > 1e-3
+
+
+@pytest.mark.parametrize("wrong", [{"merge": "no"}, {"false": 1e30}])
+def test_kinds_of_switches(wrong):
+    with pytest.raises(ParameterError, match=next(iter(wrong))):
+        Seeing(**wrong)
+
+
+def test_what_is_no_truth_or_no_rig():
+    with pytest.raises(ParameterError, match="rig"):
+        film(cube(frames=2), RIG[0])
+    with pytest.raises(ParameterError, match="truth"):
+        film(cube(frames=2).detections, RIG)

@@ -437,7 +437,30 @@ def test_points_know_their_cameras_and_false_ones_pretend():
     np.testing.assert_array_equal(d.cameras[true], expected[d.frame_of[true], sensed.labels[true]])
     assert len(np.unique(d.cameras)) > 5
     assert np.isin(d.cameras[~true], d.cameras[true]).all()
+    # The misfit of n rays: 2 n - 3 degrees of freedom, and nothing of the point's own error.
+    n = np.array([int(c).bit_count() for c in d.cameras])
+    expected = 0.002 * np.sqrt((2 * n - 3) / n)
+    assert np.sqrt(np.mean((d.residuals / expected) ** 2)) == pytest.approx(1, abs=0.1)
     off = d.points[true] - truth.positions()[d.frame_of[true], sensed.labels[true]]
-    np.testing.assert_allclose(d.residuals[true], np.linalg.norm(off, axis=1))
-    assert 0.5 < d.residuals[~true].mean() / d.residuals[true].mean() < 2
+    assert abs(np.corrcoef(np.linalg.norm(off, axis=1), d.residuals[true])[0, 1]) < 0.15
+    assert 0.8 < d.residuals[~true].mean() / d.residuals[true].mean() < 1.25
     assert sense(truth).detections.cameras is None
+
+
+def test_no_frame_left_is_an_empty_recording():
+    from asterism.simulate import person
+
+    for truth in (cube(frames=10), person(frames=10)):
+        assert sense(truth, dropped=1.0).detections.n_frames == 0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"views": 3}, {"rig": "ring8"}, {"burst": 5}, {"clutter": 1e19},
+     {"views": 9, "rig": Rig.ring(8, radius=3, height=1)}],
+)  # fmt: skip
+def test_switches_that_would_do_nothing_or_are_of_another_kind(wrong):
+    with pytest.raises(ParameterError, match=next(iter(wrong))):
+        sense(cube(frames=3), **wrong)
+    with pytest.raises(ParameterError, match="truth"):
+        sense(cube(frames=3).positions())  # type: ignore[arg-type]

@@ -391,7 +391,7 @@ BAD = [
     ),
     (
         lambda: camera().project(np.zeros(3), [MOVING]),
-        "moments",
+        "one moment",
     ),
     (lambda: camera().depth_image([am.Polygon(corners=SQUARE)], moment=1), "moment"),
     (lambda: camera().paint([am.Capsule(ends=SQUARE[:2], radius=0.1)]), "flat faces"),

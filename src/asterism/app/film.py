@@ -80,7 +80,8 @@ def film(
     """Film markers: what each camera sees of them.
 
     Every tracked point of the capture, named or not, is one image point wherever an ideal camera
-    sees it; with --seeing cameras report blobs. The limbs of people hide what is behind them.
+    sees it; with --seeing cameras report blobs. In scenes the limbs of people hide what is behind
+    them; a file has no limbs.
     DIR gets the image points with their truth (observations.csv), the cameras (rig.toml), pictures
     of what each camera sees, of the rig and of how well it sees, and a summary (film.json).
 
@@ -157,6 +158,7 @@ def film(
         "first_frame": first_frame,
         "n_frames": truth.detections.n_frames,
         "n_tracks": truth.n_tracks,
+        "n_surfaces": len(getattr(truth, "surfaces", ())),
         "n_named": sum(name is not None for name in truth.names),
         **_figures(footage),
         "pictures": files,
@@ -211,6 +213,7 @@ def _figures(footage: Footage) -> dict[str, Any]:
     return {
         "n_samples": footage.n_samples,
         "n_image_points": observations.n_points,
+        "n_false": int((observations.markers < 0).sum()) if observations.markers is not None else 0,
         "seen_by_one_percent": 100 * footage.share_seen_by(1),
         "seen_by_two_percent": 100 * footage.share_seen_by(2),
         "cameras": {
@@ -220,10 +223,18 @@ def _figures(footage: Footage) -> dict[str, Any]:
     }
 
 
+def _image_points(summary: dict[str, Any]) -> str:
+    n, n_false = summary["n_image_points"], summary["n_false"]
+    return f"{n}, {n_false} of them false" if n_false else str(n)
+
+
 def _print(out: Path, summary: dict[str, Any]) -> None:
     tracks = f"{summary['n_tracks']} tracks, {summary['n_named']} of them named"
     size = f"{tracks}, {summary['n_frames']} frames"
-    print_table([(summary["capture"], size), ("rig", summary["about_rig"])])
+    hides = f"{summary['n_surfaces']} surfaces" if summary["n_surfaces"] else "nothing: no surfaces"
+    print_table(
+        [(summary["capture"], size), ("rig", summary["about_rig"]), ("hides markers", hides)]
+    )
     cameras: dict[str, dict[str, int]] = summary["cameras"]
     met = [kind for kind in next(iter(cameras.values())) if any(c[kind] for c in cameras.values())]
     kinds = ["visible", *(kind for kind in met if kind != "visible")]
@@ -232,7 +243,10 @@ def _print(out: Path, summary: dict[str, Any]) -> None:
         (name, *(str(counts[kind]) for kind in kinds), f"{100 * counts['visible'] / n:.1f} %")
         for name, counts in cameras.items()
     ]
-    print_table(rows, ("camera", *kinds, "share seen"), title="\nPoints in the images")
+    title = "\nMarkers in the images"
+    if summary["seeing"] is not None:
+        title += ", as ideal cameras would see them"
+    print_table(rows, ("camera", *kinds, "share seen"), title=title)
     pictures = summary["pictures"]
     print_table(
         [
@@ -241,7 +255,7 @@ def _print(out: Path, summary: dict[str, Any]) -> None:
                 "by two or more, as a place in 3-D needs",
                 f"{summary['seen_by_two_percent']:.1f} %",
             ),
-            ("image points in all", str(summary["n_image_points"])),
+            ("image points in all", _image_points(summary)),
         ],
         title="\nAll cameras",
     )

@@ -39,6 +39,10 @@ def contact_sheet(truth: Tracks, rig: Rig, t: int, title: str) -> Figure:
         The frame.
     title : str
         Of the whole.
+
+    Notes
+    -----
+    What ideal cameras see: noise and false blobs are not drawn.
     """
     from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
@@ -119,10 +123,20 @@ def coverage_picture(truth: Tracks, rig: Rig) -> Figure:
     first, last = first - _AROUND * side, last + _AROUND * side
     first[2] = last[2] = (low[2] + high[2]) / 2
     coverage = rig.coverage(volume_grid(first, last, (1 + 2 * _AROUND) * side / _CELLS))
+    among = rig.coverage(volume_grid(low, high, max(float((high - low).max()), 1e-3) / 12))
+    known = 1e3 * among.error[np.isfinite(among.error)]
+    error = f"median error {np.median(known):.3g} mm" if known.size else "no error known"
+    level = f"z = {first[2]:.3g} m"
+    told = {
+        "cameras": f"{level}, among the markers: {100 * (among.n_cameras >= 2).mean():.3g} % of "
+        "the places seen by two or more",
+        "error": f"{level}, among the markers: {error}",
+    }
     shape = (last - first)[1] / (last - first)[0]
     figure = Figure(figsize=(14, min(max(5.5 * shape + 1, 3), 9)), layout="constrained", dpi=110)
     for axes, what in zip(figure.subplots(1, 2), ("cameras", "error"), strict=True):
         plot_coverage(coverage, what=what, ax=axes)
+        axes.set_title(told[what], fontsize=11, color=INK, loc="left")
         box = Rectangle(
             (low[0], low[1]), high[0] - low[0], high[1] - low[1], fill=False, edgecolor=WRONG,
             linewidth=1.6, label="markers",
@@ -144,7 +158,7 @@ def coverage_picture(truth: Tracks, rig: Rig) -> Figure:
 def save(figure: Figure, path: Path) -> None:
     """Write a picture as a whole or not at all; the same picture is the same file."""
     with replacing(path) as file:
-        figure.savefig(file, format="png", metadata={"Software": None})
+        figure.savefig(file, format="png", metadata={"Software": None}, bbox_inches="tight")
 
 
 def _thinned(truth: Tracks) -> Tracks:

@@ -74,7 +74,8 @@ def film_all(
     seeing : Seeing, optional
         What the cameras make of the markers; ideal by default.
     seed : int
-        Chooses what is random in that. Each piece draws anew, but for how late the cameras are.
+        Chooses what is random in that. With `seeing` the film is one piece, as all that is random
+        belongs to the whole.
 
     Returns
     -------
@@ -88,6 +89,8 @@ def film_all(
     d = truth.detections
     most = max(int(d.counts.max(initial=0)), 1) * len(rig)
     step = int(np.clip(_MOST_SAMPLES // most, 1, _MOST_FRAMES))
+    if seeing is not None:
+        step = max(d.n_frames, 1)
     counts = np.zeros((len(rig), len(Reason)), dtype=np.int64)
     n_cameras = np.zeros(len(rig) + 1, dtype=np.int64)
     cells: list[NDArray[np.int64]] = []
@@ -96,7 +99,7 @@ def film_all(
     for begin in range(0, d.n_frames, step):
         end = min(begin + step, d.n_frames)
         numbers, piece = _piece(truth, begin, end)
-        shot = film(piece, rig, seeing=seeing, seed=seed, part=begin)
+        shot = film(piece, rig, seeing=seeing, seed=seed)
         seen = shot.observations
         assert seen.markers is not None
         cells.append(np.diff(seen.offsets))

@@ -119,7 +119,7 @@ def parsed(owner: str, texts: Sequence[str], known: dict[str, Option]) -> dict[s
         name, equals, value = text.partition("=")
         name = name.strip().replace("-", "_")
         if not equals:
-            raise ParameterError("--option", "NAME=VALUE", repr(text))
+            raise ParameterError(f"option of {owner}", "NAME=VALUE", repr(text))
         if not known:
             raise ParameterError(owner, "no options", repr(name))
         check_fields(f"option of {owner}", [name], known)

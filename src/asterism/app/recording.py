@@ -60,7 +60,10 @@ def made_scene(
                 "--markers", f"nothing: {name} has its own number", given["markers"]
             )
         given[number] = given.pop("markers")
+    for twice in values.keys() & given.keys():
+        raise ParameterError(twice, "one value", f"{values[twice]} by --option and {given[twice]}")
     values |= given
+    values.setdefault("seed", 0)
     return scenes[name].make(**values), values
 
 

@@ -26,7 +26,9 @@ _Rate = Annotated[float | None, typer.Option(help="Frames a second.", show_defau
 _Markers = Annotated[
     int | None, typer.Option(help="Number of markers.", show_default="the scene's")
 ]
-_Seed = Annotated[int, typer.Option(help="Chooses everything that is random.")]
+_Seed = Annotated[
+    int | None, typer.Option(help="Chooses everything that is random.", show_default="0")
+]
 _Options = Annotated[
     list[str] | None,
     typer.Option("--option", metavar="NAME=VALUE", help="Option of the scene; may be repeated."),
@@ -59,7 +61,7 @@ def simulate(
     frames: _Frames = None,
     rate: _Rate = None,
     markers: _Markers = None,
-    seed: _Seed = 0,
+    seed: _Seed = None,
     option: _Options = None,
     sense: _Sense = None,
     rig: _Rig = None,
@@ -95,7 +97,7 @@ def simulate(
     if truth is not None:
         if rig is not None:
             switches["rig"], about = rig_from(rig, made.detections.points)
-        sensed = am.simulate.sense(made, **switches, seed=seed)
+        sensed = am.simulate.sense(made, **switches, seed=values["seed"])
         values |= {"sense": sensed.record}
         d = sensed.detections
         am.write(sensed, truth)

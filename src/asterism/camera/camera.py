@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -88,9 +88,9 @@ class Camera:
     def __post_init__(self) -> None:
         K = checked_intrinsics("K", self.K)
         T = checked_pose(self.T_camera_world)
-        size = tuple(self.size_px)
-        if len(size) != 2:
+        if not isinstance(self.size_px, (tuple, list)) or len(self.size_px) != 2:  # pyright: ignore[reportUnnecessaryIsInstance]
             raise ParameterError("size_px", "width and height", self.size_px)
+        size = self.size_px
         for side, pixels in zip(("width", "height"), size, strict=True):
             check_number(
                 f"size_px ({side})", pixels, above=1, below=100_000, closed=True, integer=True
@@ -98,6 +98,10 @@ class Camera:
         if self.lens is not None and not isinstance(self.lens, Lens):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise ParameterError("lens", "a Lens or None", type(self.lens).__name__)
         check_number("near", self.near, above=0, closed=True)
+        if not isinstance(self.name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise ParameterError("name", "a text", repr(self.name))
+        if self.far != float("inf"):
+            check_number("far", self.far)
         if not self.far > self.near:
             raise ParameterError("far", f"a number > near ({self.near:g})", self.far)
         object.__setattr__(self, "K", K)
@@ -384,6 +388,10 @@ class Camera:
     @cached_property
     def _ray_grid(self) -> _engine.RayGrid:
         return _engine.RayGrid(self.engine)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What the engine has of a camera is made again where it is needed.
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def __repr__(self) -> str:
         w, h = self.size_px

@@ -100,6 +100,8 @@ def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> NDArray
     x = np.cross(z, up)
     if not np.linalg.norm(z) > 0:
         raise ParameterError("target", "another place than the camera's", target.tolist())
+    if not np.linalg.norm(up) > 0:
+        raise ParameterError("up", "a direction", up.tolist())
     if np.linalg.norm(x) <= 1e-9 * np.linalg.norm(z) * np.linalg.norm(up):
         raise ParameterError("up", "not the direction of sight", up.tolist())
     z /= np.linalg.norm(z)

@@ -64,7 +64,12 @@ def project_points(
 
 def as_coordinates(name: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
     """Give an array of shape (..., n), or raise. NaN passes: there is no such point."""
-    array = np.asarray(value)
+    try:
+        array = np.asarray(value)
+    except ValueError as error:  # rows of different lengths
+        raise ParameterError(name, f"an array of shape (..., {n})", str(error)) from error
+    if isinstance(value, np.ma.MaskedArray):
+        array = np.where(np.ma.getmaskarray(value), np.nan, array)
     if array.dtype.kind not in "iuf" or array.ndim < 1 or array.shape[-1] != n:
         got = f"shape {array.shape} of {array.dtype}"
         raise ParameterError(name, f"an array of shape (..., {n}) of numbers", got)

@@ -62,7 +62,7 @@ class Rig:
     Parameters
     ----------
     cameras : sequence of Camera
-        At least one. Names, where given, are different.
+        At least one. Their names are different; one without a name goes by its number.
     warnings : tuple of str
         What was odd in the file that it came from.
 
@@ -85,7 +85,7 @@ class Rig:
         for i, camera in enumerate(cameras):
             if not isinstance(camera, Camera):  # pyright: ignore[reportUnnecessaryIsInstance]
                 raise ParameterError(f"cameras[{i}]", "a Camera", type(camera).__name__)
-        names = [c.name for c in cameras if c.name]
+        names = [c.name or str(i + 1) for i, c in enumerate(cameras)]
         for name in names:
             if names.count(name) > 1:
                 raise ParameterError("cameras", "different names", f"{name!r} more than once")
@@ -120,6 +120,8 @@ class Rig:
         check_number("n", n, above=1, closed=True, integer=True)
         check_number("radius", radius, above=0)
         target = check_array("target", target, (3,))
+        check_number("height", height)
+        n = int(n)
         angles = 2 * np.pi * np.arange(n) / n
         places = np.stack(
             [
@@ -161,6 +163,8 @@ class Rig:
         check_number("width", width, above=0, closed=True)
         check_number("distance", distance, above=0)
         target = check_array("target", target, (3,))
+        check_number("height", height)
+        n = int(n)
         x = target[0] + (np.linspace(0.5, -0.5, n) * width if n > 1 else np.zeros(1))
         y, z = np.full(n, target[1] - distance), np.full(n, float(height))
         return cls._placed(np.stack([x, y, z], axis=1), target, focal_px, size_px, options)
@@ -174,6 +178,9 @@ class Rig:
         size_px: tuple[int, int],
         options: dict[str, Any],
     ) -> Self:
+        if len(np.shape(size_px)) != 1 or len(size_px) != 2 or "name" in options:
+            expected = "width and height" if "name" not in options else "no name: cam1, cam2 …"
+            raise ParameterError("size_px" if "name" not in options else "name", expected, size_px)
         w, h = size_px
         K = intrinsics(focal_length=focal_px, principal_point=((w - 1) / 2, (h - 1) / 2))
         return cls(

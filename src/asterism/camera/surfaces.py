@@ -168,6 +168,8 @@ class Capsule(Surface):
 
 def check_surfaces(surfaces: Sequence[Surface]) -> None:
     """Raise a ParameterError if something else is among the surfaces."""
+    if not isinstance(surfaces, (list, tuple)):
+        raise ParameterError("surfaces", "a list or tuple of surfaces", type(surfaces).__name__)
     for i, surface in enumerate(surfaces):
         if not isinstance(surface, (Polygon, Mesh, Capsule)):
             raise ParameterError(
@@ -185,9 +187,8 @@ def compile_surfaces(surfaces: Sequence[Surface], n_frames: int) -> list[_engine
     """
     for i, surface in enumerate(surfaces):
         if surface.n_moments not in (1, n_frames):
-            raise ParameterError(
-                f"surfaces[{i}]", f"1 or {n_frames} moments, as the points", surface.n_moments
-            )
+            expected = "one moment" if n_frames == 1 else f"1 or {n_frames} moments, as the points"
+            raise ParameterError(f"surfaces[{i}]", expected, surface.n_moments)
     groups: list[_engine.Surfaces] = []
     for moments in sorted({s.n_moments for s in surfaces}):
         members = [(i, s) for i, s in enumerate(surfaces) if s.n_moments == moments]

@@ -69,7 +69,7 @@ FORMATS: dict[str, Format] = {
         Format(
             name="csv",
             extensions=(".csv",),
-            description="CSV, one row a detection; keeps everything, confidence included",
+            description="CSV, one row a detection; keeps labels, names and confidence bit by bit",
             sniff=csv_long.sniff,
             read=csv_long.read,
             write=csv_long.write,

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.camera import Observations
+from asterism.camera import Observations, Rig
 from asterism.errors import ParameterError, check_number
+from asterism.model import Tracks
 from asterism.simulate.seeing import Blobs, see
 from asterism.simulate.truth import Truth
 
@@ -17,8 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from asterism.camera import Projection, Rig, Surface
-    from asterism.model import Tracks
+    from asterism.camera import Projection, Surface
     from asterism.simulate.seeing import Seeing
 
 __all__ = ["Film", "film"]
@@ -53,7 +53,6 @@ def film(
     *,
     seeing: Seeing | None = None,
     seed: int = 0,
-    part: int = 0,
 ) -> Film:
     """Film markers.
 
@@ -70,9 +69,6 @@ def film(
         point is one image point where it belongs, in the order of the markers.
     seed : int
         Chooses everything that is random.
-    part : int
-        Which piece of a longer film this is: pieces differ in all that is random but in how late
-        each camera is.
 
     Returns
     -------
@@ -91,8 +87,12 @@ def film(
     >>> film(scene, rig).observations
     Observations(4 cameras, 10 frames, 320 points)
     >>> film(scene, rig, seeing=am.simulate.Seeing(missing=0.1), seed=1).observations
-    Observations(4 cameras, 10 frames, 292 points)
+    Observations(4 cameras, 10 frames, 293 points)
     """
+    if not isinstance(truth, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("truth", "Tracks", type(truth).__name__)
+    if not isinstance(rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("rig", "a Rig", type(rig).__name__)
     detections = truth.detections
     if detections.n_axes != 3:
         raise ParameterError("truth", "3-D detections", f"{detections.n_axes}-D ones")
@@ -104,7 +104,7 @@ def film(
     if seeing is None:
         blobs = _ideal(projection)
     else:
-        blobs = see(detections.times, positions, rig, surfaces, seeing, (seed, part))
+        blobs = see(detections.times, positions, rig, surfaces, seeing, int(seed))
     counts = np.bincount(blobs.cell, minlength=detections.n_frames * len(rig))
     observations = Observations(
         times=detections.times,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from asterism.camera.project import CLEARANCE
-from asterism.errors import check_number
+from asterism.camera import Reason
+from asterism.errors import ParameterError, check_number
 from asterism.simulate.sensed_points import touching
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ class Seeing:
     Parameters
     ----------
     marker_radius : float
-        Metres; 0 for points. A surface nearer before a marker than three times this does not hide
-        it: the marker sits on it.
+        Metres; 0 for points. Where the middle of a marker is before all surfaces, its rim may dip
+        into the one on which it sits, up to three radii deep, without being hidden by it.
     smallest_share : float
         A marker of which less than this share is to be seen is not seen; of the others the
         centroid is that of the part that is seen.
@@ -69,6 +69,9 @@ class Seeing:
             check_number(name, getattr(self, name), above=0, closed=True)
         for name in ("smallest_share", "missing"):
             check_number(name, getattr(self, name), above=0, below=1, closed=True)
+        check_number("false", self.false, below=1e6)
+        if not isinstance(self.merge, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise ParameterError("merge", "True or False", repr(self.merge))
 
 
 class Blobs(NamedTuple):
@@ -101,7 +104,7 @@ def see(
     rig: Rig,
     surfaces: Sequence[Surface],
     seeing: Seeing,
-    seed: tuple[int, int],
+    seed: int,
 ) -> Blobs:
     """Look at markers through every camera.
 
@@ -117,13 +120,12 @@ def see(
         What hides markers.
     seeing : Seeing
         What the cameras make of them.
-    seed : (int, int)
-        Seed and piece of a longer film: they choose everything that is random, the piece all but
-        how late the cameras are. Each switch has a stream of its own.
+    seed : int
+        Chooses everything that is random; each switch has a stream of its own, and none is that of
+        a scene with the same seed.
     """
-    rng_timing = np.random.default_rng(np.random.SeedSequence(seed[0]))
-    streams = np.random.SeedSequence(seed[0], spawn_key=(seed[1],)).spawn(4)
-    rng_missing, rng_noise, rng_false, rng_order = map(np.random.default_rng, streams)
+    streams = np.random.SeedSequence(seed).spawn(5)
+    rng_timing, rng_missing, rng_noise, rng_false, rng_order = map(np.random.default_rng, streams)
     T, K = positions.shape[:2]
     C = len(rig)
     late = seeing.timing * rng_timing.standard_normal(C)
@@ -191,16 +193,15 @@ def _discs(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Give centroid (T, K, 2) and share (T, K) of the part of each marker that is seen."""
     r = seeing.marker_radius
-    clearance = max(3 * r, CLEARANCE)
+    middle = camera.project(positions, surfaces)
+    in_view = np.isin(middle.reason, (Reason.VISIBLE, Reason.HIDDEN))
     if not surfaces or not r:
-        projection = camera.project(positions, surfaces, clearance=clearance)
-        seen = projection.visible
-        return np.where(seen[..., None], projection.pixels, np.nan), seen.astype(np.float64)
+        share = middle.visible.astype(np.float64)
+        return np.where(middle.visible[..., None], middle.pixels, np.nan), share
     towards = positions - camera.center
-    with np.errstate(invalid="ignore"):
-        towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
-    right = np.cross(towards, camera.T_camera_world[1, :3])
     with np.errstate(invalid="ignore", divide="ignore"):
+        towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
+        right = np.cross(towards, camera.T_camera_world[1, :3])
         right /= np.linalg.norm(right, axis=-1, keepdims=True)
     down = np.cross(towards, right)
     i = np.arange(_SAMPLES)
@@ -208,15 +209,19 @@ def _discs(
     offset = (
         np.cos(turn)[:, None] * right[..., None, :] + np.sin(turn)[:, None] * down[..., None, :]
     ) * reach[:, None]
-    projection = camera.project(positions[..., None, :] + offset, surfaces, clearance=clearance)
-    seen = projection.visible
-    share = seen.mean(axis=-1)
-    middle = camera.project(positions).pixels
-    with np.errstate(invalid="ignore"):
-        count = seen.sum(axis=-1)[..., None]
-        part = np.where(seen[..., None], projection.pixels, 0.0).sum(axis=-2) / count
+    disc = positions[..., None, :] + offset
+    forgiving = camera.project(disc, surfaces, clearance=3 * r)
+    exact = camera.project(disc, surfaces)
+    # A marker whose middle is hidden does not sit on what hides it.
+    is_hidden = (middle.reason == Reason.HIDDEN)[..., None]
+    seen = np.where(is_hidden, exact.visible, forgiving.visible)
+    counted = np.isin(exact.reason, (Reason.VISIBLE, Reason.HIDDEN))  # not beside the image
+    with np.errstate(invalid="ignore", divide="ignore"):
+        count = seen.sum(axis=-1)
+        share = np.where(in_view & (count > 0), count / counted.sum(axis=-1), 0.0)
+        part = np.where(seen[..., None], exact.pixels, 0.0).sum(axis=-2) / count[..., None]
     is_seen = (share > 0) & (share >= seeing.smallest_share)
-    centroid = np.where((share == 1)[..., None], middle, part)
+    centroid = np.where((share == 1)[..., None], middle.pixels, part)
     return np.where(is_seen[..., None], centroid, np.nan), share
 
 

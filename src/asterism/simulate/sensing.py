@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asterism.camera import Rig
 from asterism.errors import ParameterError, check_number
-from asterism.model import Capture, Detections
+from asterism.model import Capture, Detections, Tracks
+from asterism.simulate.episodes import Burst, Ghosts, Visits
 from asterism.simulate.false import anywhere, beside, haunting
 from asterism.simulate.losses import come_and_go, merge, seen_by_rig, shadowed
 from asterism.simulate.sampling import kept_frames, shaken
@@ -24,9 +26,6 @@ from asterism.simulate.truth import Truth
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.camera import Rig
-    from asterism.model import Tracks
-    from asterism.simulate.episodes import Burst, Ghosts, Visits
 
 __all__ = ["sense"]
 
@@ -141,12 +140,13 @@ def sense(
     (
         rng_missing, rng_burst, rng_noise, rng_clutter, rng_ghosts, rng_order,
         rng_spread, rng_visits, rng_nearby, rng_doubled, rng_dropped, rng_jitter, rng_views,
-    ) = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(13))  # fmt: skip
+    ) = map(np.random.default_rng, np.random.SeedSequence(int(seed)).spawn(13))  # fmt: skip
 
     chosen = kept_frames(rng_dropped, truth.detections.n_frames, stride, dropped)
     whole, origin = _markers(truth, chosen, keep_unnamed)
     n_frames, times = len(chosen), truth.detections.times[chosen]
-    surfaces = [s.during(chosen) for s in (truth.surfaces if isinstance(truth, Truth) else ())]
+    given = truth.surfaces if isinstance(truth, Truth) and n_frames else ()
+    surfaces = [s.during(chosen) for s in given]
     if visits is not None and len(origin):
         whole, again = come_and_go(rng_visits, visits, whole, n_frames, len(origin))
         origin = origin[again]
@@ -193,7 +193,7 @@ def sense(
     return Truth(
         detections=replace(
             _detections(truth.detections, chosen, times, mixed, names, stride, switches),
-            **_views(rng_views, mixed, clean, by_cameras),
+            **_views(rng_views, mixed, clean, by_cameras, noise * factor),
         ),
         labels=mixed.markers,
         names=names,
@@ -205,6 +205,13 @@ def sense(
 
 
 def _check(truth: Tracks, switches: dict[str, Any]) -> None:
+    if not isinstance(truth, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("truth", "Tracks", type(truth).__name__)
+    for name, kind in (("burst", Burst), ("visits", Visits), ("ghosts", Ghosts), ("rig", Rig)):
+        if not isinstance(switches[name], (kind, type(None))):
+            got = type(switches[name]).__name__
+            raise ParameterError(name, f"a {kind.__name__} or None", got)
+    check_number("clutter", switches["clutter"], below=1e6)
     for name in ("missing", "nearby", "doubled", "dropped"):
         check_number(name, switches[name], above=0, below=1, closed=True)
     for name in ("clutter", "noise", "noise_spread", "margin", "merged"):
@@ -219,8 +226,14 @@ def _check(truth: Tracks, switches: dict[str, Any]) -> None:
     check_number("seed", switches["seed"], above=0, closed=True, integer=True)
     if switches["rig"] is not None and truth.detections.n_axes != 3:
         raise ParameterError("rig", "a 3-D scene", f"{truth.detections.n_axes}-D")
-    if switches["rig"] is not None and len(switches["rig"]) > 62:
+    if switches["rig"] is None:
+        if switches["views"] != 2:
+            raise ParameterError("views", "a rig beside it", "none")
+    elif len(switches["rig"]) > 62:
         raise ParameterError("rig", "at most 62 cameras", len(switches["rig"]))
+    elif switches["views"] > len(switches["rig"]):
+        n = len(switches["rig"])
+        raise ParameterError("views", f"at most {n}, the cameras of the rig", switches["views"])
 
 
 def _record(switches: dict[str, Any]) -> dict[str, Any]:
@@ -241,11 +254,17 @@ def _record(switches: dict[str, Any]) -> dict[str, Any]:
 
 
 def _views(
-    rng: np.random.Generator, mixed: Points, clean: Points, by_cameras: NDArray[np.int64] | None
+    rng: np.random.Generator,
+    mixed: Points,
+    clean: Points,
+    by_cameras: NDArray[np.int64] | None,
+    sigma: NDArray[np.float64],
 ) -> dict[str, Any]:
     """Say which cameras saw each point, and how far their rays pass by it.
 
-    A false point has what a true one has, drawn at random: it gives nothing away.
+    The misfit of n rays, each off by `sigma` across, that were fitted by least squares has 2 n - 3
+    degrees of freedom and is independent of the error of the point: so it is drawn, and tells
+    nothing of the truth. A false point has what a true one has, drawn at random.
     """
     if by_cameras is None or not len(clean.frames):
         return {"cameras": None, "residuals": None}
@@ -253,13 +272,17 @@ def _views(
     index[clean.frames, clean.markers] = np.arange(len(clean.frames))
     index[:, -1] = -1  # where clutter of the original went
     at = index[np.minimum(mixed.frames, len(index) - 1), mixed.markers]
-    cameras, residuals = by_cameras[at], np.linalg.norm(mixed.places - clean.places[at], axis=1)
+    cameras = by_cameras[at]
     is_false = np.flatnonzero(at < 0)
     if len(is_false) == len(at):
         return {"cameras": None, "residuals": None}
     like = rng.choice(np.flatnonzero(at >= 0), len(is_false))
-    cameras[is_false], residuals[is_false] = cameras[like], residuals[like]
-    return {"cameras": cameras, "residuals": residuals}
+    cameras[is_false] = cameras[like]
+    markers = mixed.markers.copy()
+    markers[is_false] = markers[like]
+    n = sum((cameras >> i) & 1 for i in range(63))
+    misfit = rng.chisquare(np.maximum(2 * n - 3, 1)) / np.maximum(n, 1)
+    return {"cameras": cameras, "residuals": sigma[markers] * np.sqrt(misfit)}
 
 
 def _shuffled(rng: np.random.Generator, parts: list[Points]) -> Points:

@@ -79,7 +79,7 @@ def plot_coverage(
         top = float(np.quantile(known, _MOST)) if known.size else 1.0
         bottom = float(known.min(initial=top))
         drawn = axes.pcolormesh(
-            *edges, np.ma.masked_invalid(error), cmap=GRADIENT, rasterized=n.size > 5000,
+            *edges, np.ma.masked_invalid(error), cmap=f"{GRADIENT}_r", rasterized=n.size > 5000,
             norm=LogNorm(bottom, max(top, 1.001 * bottom)),
         )  # fmt: skip
         if known.size:
@@ -125,7 +125,7 @@ def draw_bar(
     bar.ax.tick_params(colors=INK, labelsize=8, length=3)
     bar.outline.set(edgecolor=GRID, linewidth=0.8)
     if ticks is not None:
-        bar.set_ticks(ticks.tolist(), labels=[f"{tick:.2g}" for tick in ticks])
+        bar.set_ticks(ticks.tolist(), labels=[f"{tick:.3g}" for tick in ticks])
         bar.minorticks_off()
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.camera import Polygon, Reason
+from asterism.camera import DepthImage, Polygon, Reason
 from asterism.errors import ParameterError, check_array
 from asterism.view.coverage import draw_bar
 from asterism.view.outlines import outlines
@@ -129,13 +129,13 @@ def plot_image(
     return axes
 
 
-def plot_depth(depth: ArrayLike, ax: Axes | None = None) -> Axes:
+def plot_depth(depth: DepthImage | ArrayLike, ax: Axes | None = None) -> Axes:
     """Draw a depth image, near dark and far light; white where nothing is seen.
 
     Parameters
     ----------
-    depth : array_like, shape (height, width)
-        Metres along the optical axis; infinite where nothing is seen. `DepthImage.depth` is one.
+    depth : DepthImage or array_like, shape (height, width)
+        Metres along the optical axis; infinite where nothing is seen.
     ax : Axes, optional
         Where to draw; a new figure unless given.
 
@@ -149,7 +149,8 @@ def plot_depth(depth: ArrayLike, ax: Axes | None = None) -> Axes:
     ParameterError
         If it is no image.
     """
-    image = check_array("depth", depth, ("height", "width"), finite=False)
+    given = depth.depth if isinstance(depth, DepthImage) else depth
+    image = check_array("depth", given, ("height", "width"), finite=False)
     if not image.size:
         raise ParameterError("depth", "at least one pixel", f"shape {image.shape}")
     height, width = image.shape
