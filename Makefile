@@ -32,6 +32,7 @@ bench: $(VENV)/.bench
 # The tables of scenes and of captures in the docs; the second needs the real captures beside the
 # project.
 tables: $(VENV)/.bench
+	$(BIN)/python benchmarks/report_smp.py --markdown docs/tables/report_smp.md
 	$(BIN)/python benchmarks/scenes.py --seeds 5 --markdown docs/tables/scenes.md
 	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md
 
