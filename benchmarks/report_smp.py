@@ -95,9 +95,8 @@ def main() -> None:
     lines = [*first_three(options.seeds), "", "| " + " | ".join(head) + " |"]
     lines += ["|---|---|---|" + "---:|" * 9]
     lines += ["| " + " | ".join(row) + " |" for row in walks(options.seeds)]
-    lines += [
-        "| ? | DWNA | the report's SMP | ~ 82 | ~ 11 | ~ 2.5 | ~ 2.5 | ~ 0.5 | ~ 0.5 | ~ 0.5 | ~ 0.5 |"
-    ]
+    reported = ("82", "–", "11", "2.5", "2.5", "0.5", "0.5", "0.5", "0.5")
+    lines += [f"| ? | DWNA | the report's SMP | {' | '.join(reported)} |"]
     text = "\n".join(lines)
     print(text)
     if options.markdown:
