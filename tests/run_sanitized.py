@@ -21,6 +21,7 @@ TESTS = (
     "test_camera.py",
     "test_camera_lens.py",
     "test_surfaces.py",
+    "test_joint_events.py",
 )
 LEFT_OUT = "hundred_thousand or memory"
 """Too slow, or measuring memory that the sanitizers inflate."""

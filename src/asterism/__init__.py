@@ -83,6 +83,8 @@ if TYPE_CHECKING:
     from asterism.model import Tracks as Tracks
     from asterism.model.posterior import log_posterior as log_posterior
     from asterism.model.posterior import track_scores as track_scores
+    from asterism.solve import JointMarginals as JointMarginals
+    from asterism.solve import joint_marginals as joint_marginals
     from asterism.view import plot_coverage as plot_coverage
     from asterism.view import plot_depth as plot_depth
     from asterism.view import plot_errors as plot_errors
@@ -149,6 +151,7 @@ _PUBLIC = {
         "method_by_name",
         "track",
     ),
+    "solve": ("JointMarginals", "joint_marginals"),
     "evaluate": ("Evaluation", "calibration", "evaluate", "floor"),
     "io": ("FORMATS", "CaptureInfo", "describe", "read", "read_tracks", "write"),
     "io.calibration": ("CALIBRATIONS", "read_rig", "write_rig"),
