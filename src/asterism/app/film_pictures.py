@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from asterism.camera import Rig, Surface
 
@@ -83,13 +84,30 @@ def contact_sheet(truth: Tracks, rig: Rig, t: int, title: str) -> Figure:
             surfaces=surfaces,
             ax=axes,
         )
-        axes.set_title(axes.get_title(loc="left"), fontsize=8, loc="left", parse_math=False)
+        is_near = _near(axes, projection[i].pixels, camera.size_px)
+        told = axes.get_title(loc="left") + (", a part of the image" if is_near else "")
+        axes.set_title(told, fontsize=8, loc="left", parse_math=False)
         axes.set(xlabel="", ylabel="")
         axes.tick_params(labelsize=6)
         for dots in axes.collections:
             if isinstance(dots, PathCollection):
                 dots.set(sizes=[_DOT])
     return figure
+
+
+def _near(axes: Any, pixels: NDArray[np.float64], size_px: tuple[int, int]) -> bool:
+    """Show the part of the image that holds the points, if it is a small one; say whether so."""
+    size = np.array(size_px)
+    inside = ((pixels > 0) & (pixels < size)).all(axis=1)
+    if not inside.any():
+        return False
+    low, high = pixels[inside].min(axis=0), pixels[inside].max(axis=0)
+    half = size * max(0.65 * float(((high - low) / size).max()), 0.02)
+    if half[0] > 0.35 * size[0]:
+        return False
+    (u, v), (du, dv) = (low + high) / 2, half
+    axes.set(xlim=(u - du, u + du), ylim=(v + dv, v - dv))
+    return True
 
 
 def rig_picture(truth: Tracks, rig: Rig) -> Figure:

@@ -99,8 +99,11 @@ def plot_image(
     for surface in surfaces:
         for line in outlines(surface, moment):
             edge = camera.project(_finely(line)).pixels
-            axes.plot(*edge.T, color=CLUTTER, linewidth=0.8, zorder=1)
-            if isinstance(surface, Polygon) and np.isfinite(edge).all():
+            # Limbs are many and lie over each other: pale, so that they do not bury the markers.
+            is_flat = isinstance(surface, Polygon)
+            pale = 1.0 if is_flat else 0.35
+            axes.plot(*edge.T, color=CLUTTER, linewidth=0.8, alpha=pale, zorder=1)
+            if is_flat and np.isfinite(edge).all():
                 axes.fill(*edge.T, color=GRID, alpha=0.5, linewidth=0, zorder=0)
     is_seen = projection.visible
     is_drawn = is_seen | (projection.reason == Reason.HIDDEN)
