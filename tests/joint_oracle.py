@@ -9,9 +9,9 @@ import numpy as np
 
 
 def every_event(log_weights, log_miss):
-    """All joint events of any weight: detection of each track, -1 for a miss; and their logs."""
+    """All joint events of some weight: detection of each track, -1 for a miss; logs of factors."""
     n, m = log_weights.shape
-    events, logs = [], []
+    events, factors = [], []
     for event in itertools.product(range(-1, m), repeat=n):
         taken = [j for j in event if j >= 0]
         if len(set(taken)) < len(taken):
@@ -19,16 +19,18 @@ def every_event(log_weights, log_miss):
         terms = [log_miss[i] if j < 0 else log_weights[i, j] for i, j in enumerate(event)]
         if -math.inf not in terms:
             events.append(event)
-            logs.append(math.fsum(terms))
-    return events, np.array(logs)
+            factors.append(terms)
+    return events, factors
 
 
 def enumerate_events(log_weights, log_miss):
     """Marginals with the miss last, log of the total weight, log of the greatest weight."""
     n, m = log_weights.shape
-    events, logs = every_event(log_weights, log_miss)
-    top = logs.max()
-    weights = np.exp(logs - top)
+    events, factors = every_event(log_weights, log_miss)
+    best = max(factors, key=math.fsum)
+    top = math.fsum(best)
+    # Every difference as one exact sum, so that great logs cost no precision.
+    weights = [math.exp(math.fsum([*terms, *(-x for x in best)])) for terms in factors]
     total = math.fsum(weights)
     marginals = np.zeros((n, m + 1))
     for event, weight in zip(events, weights, strict=True):

@@ -60,6 +60,16 @@ def test_equals_enumeration_where_plain_weights_would_underflow(seed):
         check_exact(weights, miss)
 
 
+@pytest.mark.parametrize("scale", [1e3, 1e6])
+def test_great_logs_cost_no_precision(scale):
+    # Densities may carry any factor of a track's own; its log must not eat the digits.
+    rng = np.random.default_rng(6)
+    for _ in range(40):
+        weights, miss = random_group(rng, 4, 4, spread=3)
+        offset = rng.uniform(-scale, scale, 4)
+        check_exact(weights + offset[:, None], miss + offset, tolerance=1e-13)
+
+
 def test_two_rivals_that_hate_to_miss():
     # A forward pass in plain scaled doubles loses the state that wins in the end: it has e^-1200 of
     # the other's weight, and the weight comes back only with the second track.
@@ -284,8 +294,8 @@ def left_or_by_one_of_four(n_links, log_last):
 
 def test_beyond_the_range_of_doubles_the_bound_says_so():
     # In the end 4^540 ways right outweigh the one way left by e^749, which loses it; but the
-    # last link makes them all worth nothing.
-    for n_links, log_last in ((540, -2000.0), (20, -5.0)):
+    # last link makes them all worth nothing. With 525 links a few digits are left.
+    for n_links, log_last in ((540, -2000.0), (525, -2000.0), (20, -5.0)):
         found = joint_marginals(*left_or_by_one_of_four(n_links, log_last))
         assert found.n_states <= 8
         assert abs(found.marginals.sum(axis=1) - 1).max() < 1e-12
