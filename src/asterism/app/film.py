@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import logging
 import shlex
 from pathlib import Path
@@ -188,7 +189,9 @@ def _truth(
         return made_scene(source, given, texts)[0], 1
     if not path.exists():
         expected = f"a capture, or a scene: {', '.join(am.simulate.SCENES)}"
-        raise ParameterError("CAPTURE", expected, f"{source!r}, which is neither")
+        near = difflib.get_close_matches(source, am.simulate.SCENES, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else ""
+        raise ParameterError("CAPTURE", expected, f"{source!r}, which is neither", hint)
     idle = [f"--{name}" for name in given if not (name == "seed" and is_seeing)]
     idle += ["--option"] * bool(texts)
     if idle:
