@@ -253,3 +253,11 @@ def test_what_is_no_truth_or_no_rig():
         film(cube(frames=2), RIG[0])
     with pytest.raises(ParameterError, match="truth"):
         film(cube(frames=2).detections, RIG)
+
+
+def test_small_blobs_touch_when_their_own_radii_say_so():
+    # Radii of 2.5 px at 4 m and 1.25 px at 8 m: they touch up to 3.75 px, not up to 5.
+    for apart_px, n in ((3.5, 1), (4.2, 2)):
+        truth = still([0, 0, 0], [apart_px * 8 / 1000, 4, 0])
+        shot = film(truth, one_camera(), seeing=Seeing(marker_radius=0.01, noise_px=0.0))
+        assert shot.observations.n_points == n

@@ -464,3 +464,31 @@ def test_switches_that_would_do_nothing_or_are_of_another_kind(wrong):
         sense(cube(frames=3), **wrong)
     with pytest.raises(ParameterError, match="truth"):
         sense(cube(frames=3).positions())  # type: ignore[arg-type]
+
+
+def test_visits_of_the_named_among_others():
+    scene = smooth(n_markers=4, frames=60)
+    names = ("A", None, "C", "D")
+    truth = Truth(
+        detections=scene.detections, labels=scene.labels, names=names, colours=[1, 2, 3, 4]
+    )
+    sensed = sense(truth, visits=Visits(shortest=5, longest=9), seed=1)
+    of = {"A": (0, 1), "C": (2, 3), "D": (3, 4)}
+    for k, name in enumerate(sensed.names):
+        original, colour = of[name.split("/")[0]]
+        assert sensed.colours[k] == colour
+        there = np.isfinite(sensed.positions()[:, k, 0])
+        np.testing.assert_array_equal(
+            sensed.positions()[there, k], scene.positions()[there, original]
+        )
+
+
+def test_false_points_nearby_fill_their_ball_evenly():
+    truth = Tracks.from_dense(np.arange(4000) / 100, np.zeros((4000, 1, 3)), ["a"])
+    sensed = sense(truth, nearby=1.0, nearby_within=0.05, seed=3)
+    far = np.linalg.norm(sensed.detections.points[sensed.labels < 0], axis=1)
+    assert len(far) == 4000
+    for share in (0.5, 0.8):
+        expected = share**3
+        inside = (far < share * 0.05).mean()
+        assert inside == pytest.approx(expected, abs=4 * np.sqrt(expected * (1 - expected) / 4000))
