@@ -296,9 +296,9 @@ def test_a_lens_apart_is_taken_into_the_camera():
     ("make", "word"),
     [
         (lambda: am.BrownConrady(k1=np.nan), "k1"),
-        (lambda: am.ReportRadial(a1="0.1"), "a1"),  # type: ignore[arg-type]
+        (lambda: am.ReportRadial(a1="0.1"), "a1"),
         (lambda: am.ViconRadial(k2=np.inf), "k2"),
-        (lambda: am.QuadraticCorrection(ex=(0, 0, 0, 0), ey=(0, 0, 0, 0, 0)), "ex"),  # type: ignore[arg-type]
+        (lambda: am.QuadraticCorrection(ex=(0, 0, 0, 0), ey=(0, 0, 0, 0, 0)), "ex"),
         (lambda: camera_of(am.QuadraticCorrection(ex=(-2, 0, 0, 0, 0), ey=(0,) * 5)), "lens"),
         (lambda: am.fit_lens(camera_of(None), am.Lens), "kind"),
         (lambda: am.fit_lens(camera_of(None), am.BrownConrady, without=("k9",)), "without"),

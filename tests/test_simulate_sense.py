@@ -463,7 +463,7 @@ def test_switches_that_would_do_nothing_or_are_of_another_kind(wrong):
     with pytest.raises(ParameterError, match=next(iter(wrong))):
         sense(cube(frames=3), **wrong)
     with pytest.raises(ParameterError, match="truth"):
-        sense(cube(frames=3).positions())  # type: ignore[arg-type]
+        sense(cube(frames=3).positions())
 
 
 def test_visits_of_the_named_among_others():

@@ -89,7 +89,7 @@ def test_strict_refuses_what_it_cannot_handle():
         with pytest.raises(am.ParameterError, match=r"2 in the frame at 0\.1 s"):
             method.step(state, 0.1, np.zeros((n, 3)))
     with pytest.raises(am.ParameterError, match="strict"):
-        am.SMP(strict=1)  # type: ignore[arg-type]
+        am.SMP(strict=1)
     assert am.track(d, am.SMP(), model=model).n_tracks >= 1  # which lifts both restrictions
 
 
