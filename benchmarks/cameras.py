@@ -6,8 +6,6 @@ python benchmarks/cameras.py [--markdown FILE]
 from __future__ import annotations
 
 import argparse
-import platform
-import time
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ import cv2  # pyright: ignore[reportMissingImports]  # an extra of the benchmark
 import numpy as np
 
 import asterism as am
+from report import best_of, conditions, publish
 
 BROWN = am.BrownConrady(k1=-0.3, k2=0.1, p1=0.001, p2=-0.002, k3=0.02)
 LENSES: tuple[tuple[str, am.Lens | None], ...] = (
@@ -25,16 +24,6 @@ LENSES: tuple[tuple[str, am.Lens | None], ...] = (
     ("report's radial, pincushion", am.ReportRadial(a1=-0.05, a2=-0.01)),
     ("Vicon's radial", am.ViconRadial(k1=3.5e-8, k2=-2e-14)),
 )
-
-
-def best_of(runs: int, work: Any) -> float:
-    """Least time of several runs, seconds."""
-    times: list[float] = []
-    for _ in range(runs):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 def points_a_second() -> list[str]:
@@ -115,14 +104,8 @@ def main() -> None:
     options = parser.parse_args()
     cv2.setNumThreads(1)
     lines = [*points_a_second(), "", *occlusion(), ""]
-    lines.append(
-        f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, "
-        f"NumPy {np.__version__}, asterism {am.__version__}; one core."
-    )
-    text = "\n".join(lines)
-    print(text)
-    if options.markdown:
-        options.markdown.write_text(text + "\n", encoding="utf-8")
+    lines.append(f"{conditions()}; one core.")
+    publish(lines, options.markdown)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import asterism as am
+from report import publish
 
 ENDINGS = (".c3d", ".tsv", "recording_000", "drone2", "marker3")
 METHODS = (am.GNN(), am.SMP())
@@ -146,10 +147,7 @@ def main() -> None:
          "links parted inside the recorder's pieces", "frames/s", "estimate s"],
         unlabelled,
     )  # fmt: skip
-    text = "\n".join(lines)
-    print(text)
-    if options.markdown:
-        options.markdown.write_text(text + "\n", encoding="utf-8")
+    publish(lines, options.markdown)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import asterism as am
+from report import publish
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -97,10 +98,7 @@ def main() -> None:
     lines += ["| " + " | ".join(row) + " |" for row in walks(options.seeds)]
     reported = ("82", "–", "11", "2.5", "2.5", "0.5", "0.5", "0.5", "0.5")
     lines += [f"| ? | DWNA | the report's SMP | {' | '.join(reported)} |"]
-    text = "\n".join(lines)
-    print(text)
-    if options.markdown:
-        options.markdown.write_text(text + "\n", encoding="utf-8")
+    publish(lines, options.markdown)
 
 
 if __name__ == "__main__":

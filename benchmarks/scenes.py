@@ -10,13 +10,13 @@ see past their limbs.
 from __future__ import annotations
 
 import argparse
-import platform
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import asterism as am
+from report import conditions, publish
 
 METHODS = (am.GNN(), am.SMP())
 
@@ -95,13 +95,9 @@ def main() -> None:
     lines += ["| " + " | ".join(row) + " |" for row in rows]
     lines += [
         "",
-        f"Means over {options.seeds} seeds, ± the standard deviation between them. "
-        f"{platform.machine()}, Python {platform.python_version()}, asterism {am.__version__}.",
+        f"Means over {options.seeds} seeds, ± the standard deviation between them. {conditions()}.",
     ]
-    text = "\n".join(lines)
-    print(text)
-    if options.markdown:
-        options.markdown.write_text(text + "\n", encoding="utf-8")
+    publish(lines, options.markdown)
 
 
 if __name__ == "__main__":

@@ -9,18 +9,17 @@ scene's own scale, and the same with three. Each figure is the best of several r
 from __future__ import annotations
 
 import argparse
-import platform
 import statistics
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import asterism as am
 from peer import track_in_numpy
+from report import best_of, conditions, publish
 
 SIZES = ((8, 20_000), (50, 4_000), (200, 1_000), (1000, 200))
 
@@ -45,16 +44,6 @@ def model_of(capture: am.Tracks, motions: int) -> am.TrackingModel:
             birth_density=1 / extent / n_frames, p_disappear=1e-5, max_speed=0.2, max_gap=8
         ),
     )
-
-
-def best_of(runs: int, work: Any) -> float:
-    """Least time of several runs, seconds."""
-    times: list[float] = []
-    for _ in range(runs):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 def step_times(detections: am.Detections, model: am.TrackingModel) -> list[float]:
@@ -144,13 +133,9 @@ def main() -> None:
         f"markers at 120 Hz, model estimated and tracked: peak memory {int(out[1]) / 1e6:.2f} GB, "
         f"of which {int(out[0]) / 1e6:.2f} GB were there with the capture alone; {out[2]} tracks.",
         "",
-        f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, "
-        f"NumPy {np.__version__}, asterism {am.__version__}; one core.",
+        f"{conditions()}; one core.",
     ]
-    text = "\n".join(lines)
-    print(text)
-    if options.markdown:
-        options.markdown.write_text(text + "\n", encoding="utf-8")
+    publish(lines, options.markdown)
 
 
 if __name__ == "__main__":

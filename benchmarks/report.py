@@ -1,0 +1,43 @@
+"""What the benchmarks share: a clock, a word on the machine, and where the pages go."""
+
+from __future__ import annotations
+
+import platform
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import asterism as am
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
+
+__all__ = ["best_of", "conditions", "publish"]
+
+
+def best_of(runs: int, work: Callable[[], object]) -> float:
+    """Least time of several runs, seconds."""
+    times: list[float] = []
+    for _ in range(runs):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def conditions() -> str:
+    """Machine and versions, for the foot of a page."""
+    return (
+        f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, "
+        f"NumPy {np.__version__}, asterism {am.__version__}"
+    )
+
+
+def publish(lines: Iterable[str], markdown: Path | None) -> None:
+    """Print a page, and write it where a file is given."""
+    text = "\n".join(lines)
+    print(text)
+    if markdown:
+        markdown.write_text(text + "\n", encoding="utf-8")
