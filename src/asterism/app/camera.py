@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -81,7 +82,8 @@ def info(
     rig = read_rig(calibration, format=from_format, units=units)
     cameras, whole = describe_rig(rig)
     if json:
-        print_json({"calibration": str(calibration), **whole, "cameras": [c.plain for c in cameras],
+        print_json({"calibration": str(calibration), **whole,
+                    "cameras": [dataclasses.asdict(c) for c in cameras],
                     "warnings": list(rig.warnings)})  # fmt: skip
         return
     print_table((_row(c) for c in cameras), _COLUMNS, title=f"{calibration}: {len(rig)} cameras")
@@ -224,7 +226,7 @@ def check(
     failed = any(c.status == "fails" for c in checks)
     if json:
         print_json({"calibration": str(calibration), "passed": not failed,
-                    "checks": [c.plain for c in checks], "reprojection": errors,
+                    "checks": [dataclasses.asdict(c) for c in checks], "reprojection": errors,
                     "warnings": list(rig.warnings)})  # fmt: skip
     else:
         _print_checks(checks, errors, rig.warnings)

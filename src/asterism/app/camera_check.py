@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -39,11 +38,6 @@ class Check:
     name: str
     status: str
     detail: str
-
-    @property
-    def plain(self) -> dict[str, Any]:
-        """The fields by their names."""
-        return dataclasses.asdict(self)
 
 
 def check_rig(rig: Rig) -> list[Check]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -49,11 +48,6 @@ class CameraInfo:
     lens: str
     largest_shift_px: float
     reach_percent: float
-
-    @property
-    def plain(self) -> dict[str, Any]:
-        """The figures by their names."""
-        return dataclasses.asdict(self)
 
 
 def describe_rig(rig: Rig) -> tuple[list[CameraInfo], dict[str, Any]]:
