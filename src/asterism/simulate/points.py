@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.errors import check_number
+from asterism.simulate.clock import clock
 from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:
@@ -57,14 +58,15 @@ def cube(
     """
     check_number("side", side, above=0)
     check_number("speed", speed, above=0, closed=True)
-    t = _clock(frames, rate, seed)
+    times = clock(frames, rate, seed)
+    t = np.arange(float(frames))
     rng = np.random.default_rng(seed)
     omega = rng.uniform(0.04, 0.08, 3)  # rad a frame: a hundred frames are about one round
     amplitude = 0.6 * speed / math.sqrt(3) / omega
     centre = amplitude * np.sin(t[:, None] * omega + rng.uniform(0, 2 * math.pi, 3))
     spin = 0.4 * speed / (side * math.sqrt(3) / 2)
     turn = _rotations(rng.standard_normal(3), spin * t)
-    return _named(rate, centre[:, None, :] + _turned(turn, side * _CORNERS), _cube(0, 1))
+    return _named(times, centre[:, None, :] + _turned(turn, side * _CORNERS), _cube(0, 1))
 
 
 def crossing(*, frames: int = 60, rate: float = 1.0, seed: int = 0, side: float = 0.25) -> Truth:
@@ -96,14 +98,15 @@ def crossing(*, frames: int = 60, rate: float = 1.0, seed: int = 0, side: float 
         If a number is out of range.
     """
     check_number("side", side, above=0)
-    t = _clock(frames, rate, seed)
+    times = clock(frames, rate, seed)
+    t = np.arange(float(frames))
     offset = np.random.default_rng(seed).normal(0.0, 0.025, 3)
     centre = offset + np.outer(t - (frames - 1) / 2, [0.02, 0.0, 0.0])
     turn = _rotations(np.array([0, 0, 1.0]), 0.08 * t) @ _rotations(np.array([0, 1.0, 0]), 0.04 * t)
     flying = centre[:, None, :] + _turned(turn, side * _CORNERS)
     standing = np.broadcast_to(side * _CORNERS, flying.shape)
     return _named(
-        rate,
+        times,
         np.concatenate([standing, flying], axis=1),
         _cube(0, 1) + _cube(8, 2),
         [1] * 8 + [2] * 8,
@@ -149,7 +152,8 @@ def smooth(
     """
     check_number("n_markers", n_markers, above=1, closed=True, integer=True)
     check_number("spacing", spacing, above=0)
-    t = _clock(frames, rate, seed)
+    times = clock(frames, rate, seed)
+    t = np.arange(float(frames))
     rng = np.random.default_rng(seed)
     shape = (n_markers, 3)
     centre = rng.uniform(0.0, spacing * n_markers ** (1 / 3), shape)
@@ -164,7 +168,7 @@ def smooth(
         np.sin(place, out=place)
         place *= amplitude
         place += centre + now * drift
-    return _named(rate, positions)
+    return _named(times, positions)
 
 
 def walk(
@@ -209,14 +213,14 @@ def walk(
     check_number("n_markers", n_markers, above=1, closed=True, integer=True)
     check_number("stride", stride, above=0, closed=True)
     check_number("pull", pull, above=0, below=1, closed=True)
-    t = _clock(frames, rate, seed)
+    times = clock(frames, rate, seed)
     i = np.arange(n_markers)
-    positions = np.empty((len(t), n_markers, 3))
+    positions = np.empty((frames, n_markers, 3))
     positions[:1] = _CORNERS[i % 8] * 0.3 * (i // 8 + 1)[:, None]
     steps = np.random.default_rng(seed).normal(0.0, stride, positions.shape)
     for k in range(1, frames):
         positions[k] = (1 - pull) * positions[k - 1] + steps[k]
-    return _named(rate, positions)
+    return _named(times, positions)
 
 
 def attracted(*, frames: int = 200, rate: float = 1.0, seed: int = 0) -> Truth:
@@ -280,10 +284,10 @@ def wander(
     check_number("n_markers", n_markers, above=1, closed=True, integer=True)
     check_number("speed", speed, above=0)
     check_number("agility", agility, above=0, below=1, closed=True)
-    t = _clock(frames, rate, seed)
+    times = clock(frames, rate, seed)
     rng = np.random.default_rng(seed)
     room = 0.3 * n_markers ** (1 / 3)
-    positions = np.empty((len(t), n_markers, 3))
+    positions = np.empty((frames, n_markers, 3))
     positions[0] = rng.uniform(-room, room, (n_markers, 3))
     kept, new = 1 - agility, math.sqrt(1 - (1 - agility) ** 2)
     velocity = 0.4 * speed * rng.standard_normal((n_markers, 3))
@@ -293,15 +297,7 @@ def wander(
         size = np.linalg.norm(velocity, axis=1, keepdims=True)
         velocity *= np.minimum(1.0, speed / np.maximum(size, 1e-300))
         positions[k] = positions[k - 1] + velocity
-    return _named(rate, positions)
-
-
-def _clock(frames: int, rate: float, seed: int) -> NDArray[np.float64]:
-    """Check what all scenes share and give the number of each frame, shape (T,)."""
-    check_number("frames", frames, above=1, closed=True, integer=True)
-    check_number("rate", rate, above=0)
-    check_number("seed", seed, above=0, closed=True, integer=True)
-    return np.arange(frames, dtype=np.float64)
+    return _named(times, positions)
 
 
 def _cube(first: int, colour: int) -> list[tuple[int, int, int]]:
@@ -310,15 +306,14 @@ def _cube(first: int, colour: int) -> list[tuple[int, int, int]]:
 
 
 def _named(
-    rate: float,
+    times: NDArray[np.float64],
     positions: NDArray[np.float64],
     lines: Sequence[tuple[int, int, int]] = (),
     colours: Sequence[int] = (),
 ) -> Truth:
-    n_frames, n_markers, _ = positions.shape
-    names = [f"M{i:02d}" for i in range(n_markers)]
+    names = [f"M{i:02d}" for i in range(positions.shape[1])]
     positions.flags.writeable = False  # nobody else has them: no need to copy
-    return Truth.of(np.arange(n_frames) / rate, positions, names, lines=lines, colours=colours)
+    return Truth.of(times, positions, names, lines=lines, colours=colours)
 
 
 def _rotations(axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.errors import check_number
+from asterism.simulate.clock import clock
 from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:
@@ -63,9 +64,8 @@ def swarm(
         If a number is out of range.
     """
     check_number("n_drones", n_drones, above=1, closed=True, integer=True)
-    check_number("frames", frames, above=1, closed=True, integer=True)
-    check_number("seed", seed, above=0, closed=True, integer=True)
-    for name, value in (("rate", rate), ("spacing", spacing), ("apart", apart), ("period", period)):
+    times = clock(frames, rate, seed)
+    for name, value in (("spacing", spacing), ("apart", apart), ("period", period)):
         check_number(name, value, above=0)
     rng = np.random.default_rng(seed)
     room = spacing * n_drones ** (1 / 3)
@@ -88,7 +88,7 @@ def swarm(
             velocity = velocity + dt * force
             place = place + dt * velocity
     names = [f"D{i:02d}" for i in range(n_drones)]
-    return Truth.of(np.arange(frames) / rate, positions, names)
+    return Truth.of(times, positions, names)
 
 
 def _lattice(n: int, pitch: float) -> NDArray[np.float64]:

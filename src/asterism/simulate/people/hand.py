@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Capsule
+from asterism.simulate.clock import clock
 from asterism.simulate.people.curves import about_x, about_y, about_z
 from asterism.simulate.people.marker_set import on_skin
-from asterism.simulate.people.person import clock
 from asterism.simulate.people.skeleton import Pose
 from asterism.simulate.truth import Truth
 

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.errors import ParameterError, check_number
+from asterism.simulate.clock import clock
 from asterism.simulate.people.activities import Walker
 from asterism.simulate.people.course import Course
 from asterism.simulate.people.curves import about_x, about_y, about_z, through, unit
 from asterism.simulate.people.gait import GRAVITY, Style, walking
 from asterism.simulate.people.marker_set import MarkerSet, lines_between
-from asterism.simulate.people.person import check_person, clock
+from asterism.simulate.people.person import check_person
 from asterism.simulate.people.skeleton import SIDES, Body, Limb, two_bones
 from asterism.simulate.truth import Truth
 

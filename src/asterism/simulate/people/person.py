@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.errors import ParameterError, check_number
+from asterism.simulate.clock import clock
 from asterism.simulate.people.activities import run, turn, walk
 from asterism.simulate.people.gait import Style
 from asterism.simulate.people.jump import jump
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from asterism.simulate.people.curves import Array
     from asterism.simulate.people.skeleton import Pose
 
-__all__ = ["ACTIVITIES", "check_person", "clock", "person"]
+__all__ = ["ACTIVITIES", "check_person", "person"]
 
 ACTIVITIES: dict[str, Callable[[Array, Body, Style, np.random.Generator], Pose]] = {
     "walk": walk,
@@ -93,14 +94,6 @@ def person(
         colours=markers.colours,
         surfaces=body.capsules(pose),
     )
-
-
-def clock(frames: int, rate: float, seed: int) -> Array:
-    """Check what all scenes share and give the time of each frame, shape (T,)."""
-    check_number("frames", frames, above=1, closed=True, integer=True)
-    check_number("rate", rate, above=0)
-    check_number("seed", seed, above=0, closed=True, integer=True)
-    return np.arange(frames) / rate
 
 
 def check_person(n_markers: int, **heights: float) -> None:

@@ -1,0 +1,22 @@
+"""The clock that all simulated scenes share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import check_number
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["clock"]
+
+
+def clock(frames: int, rate: float, seed: int) -> NDArray[np.float64]:
+    """Check what every scene takes and give the time of each frame, shape (T,), seconds."""
+    check_number("frames", frames, above=1, closed=True, integer=True)
+    check_number("rate", rate, above=0)
+    check_number("seed", seed, above=0, closed=True, integer=True)
+    return np.arange(frames) / rate
