@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from asterism import _engine
+from asterism.camera.compiled import compile_camera, middle_of_image
 from asterism.camera.depth_image import DepthImage
-from asterism.camera.lens import NO_LENS, QUADRATIC, Lens, QuadraticCorrection
+from asterism.camera.lens import Lens, QuadraticCorrection
 from asterism.camera.matrices import checked_intrinsics, checked_pose, decomposed, looking_at
 from asterism.camera.painter import Painting, in_painters_order
 from asterism.camera.project import CLEARANCE, as_coordinates, project_points
@@ -109,7 +110,9 @@ class Camera:
         object.__setattr__(self, "size_px", (int(size[0]), int(size[1])))
         if self.K_lens is not None:
             object.__setattr__(self, "K_lens", checked_intrinsics("K_lens", self.K_lens))
-        if isinstance(self.lens, QuadraticCorrection) and not self.lens.reaches(*self._start):
+        if isinstance(self.lens, QuadraticCorrection) and not self.lens.reaches(
+            *middle_of_image(self)
+        ):
             raise ParameterError("lens", "no fold at the centre of the image", self.lens)
 
     @classmethod
@@ -340,50 +343,10 @@ class Camera:
             return self.K
         return np.array([[1.0, 0.0, self.K[0, 2]], [0.0, 1.0, self.K[1, 2]], [0.0, 0.0, 1.0]])
 
-    @property
-    def _start(self) -> NDArray[np.float64]:
-        """The centre of the image in lens coordinates."""
-        w, h = self.size_px
-        middle = np.array([(w - 1) / 2, (h - 1) / 2, 1.0])
-        return np.asarray(np.linalg.solve(self.lens_matrix, middle)[:2], dtype=np.float64)
-
     @cached_property
     def engine(self) -> _engine.Camera:
         """The camera as the engine has it."""
-        B = self.lens_matrix if self.lens is not None else self.K
-        A = np.eye(3) if B is self.K else np.asarray(np.linalg.solve(B, self.K), np.float64)
-        lens = self.lens
-        return _engine.Camera(
-            R=np.ascontiguousarray(self.T_camera_world[:3, :3]),
-            t=np.ascontiguousarray(self.T_camera_world[:3, 3]),
-            A=np.ascontiguousarray(A[:2]),
-            B=np.ascontiguousarray(B[:2]),
-            lens_kind=NO_LENS if lens is None else lens.kind,
-            is_backward=lens is not None and lens.is_backward,
-            coefficients=np.empty(0) if lens is None else lens.coefficients,
-            r_end=float("inf") if lens is None else lens.radius,
-            q_table=self._table_extent(),
-            start=(float(self._start[0]), float(self._start[1]))
-            if lens is not None and lens.kind == QUADRATIC
-            else (0.0, 0.0),
-            near=self.near,
-            far=self.far,
-            width=self.size_px[0],
-            height=self.size_px[1],
-        )
-
-    def _table_extent(self) -> float:
-        """Squared radius of the image in the coordinates from which a radial lens is solved."""
-        if self.lens is None or self.lens.kind == QUADRATIC:
-            return 0.0
-        w, h = self.size_px
-        corners = np.array([[u, v, 1.0] for u in (-0.5, w - 0.5) for v in (-0.5, h - 0.5)])
-        r = float(np.linalg.norm(np.linalg.solve(self.lens_matrix, corners.T)[:2], axis=0).max())
-        if self.lens.is_backward:
-            r = min(r, self.lens.radius)
-            k = self.lens.coefficients
-            r *= 1 + r**2 * (k[0] + r**2 * (k[1] + r**2 * k[2]))
-        return r**2
+        return compile_camera(self)
 
     @cached_property
     def _ray_grid(self) -> _engine.RayGrid:
