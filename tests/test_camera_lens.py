@@ -308,3 +308,15 @@ def test_a_lens_apart_is_taken_into_the_camera():
 def test_bad_lenses(make, word):
     with pytest.raises(am.ParameterError, match=word):
         make()
+
+
+def test_a_fold_is_refused_at_the_centre_of_the_image_and_nowhere_else():
+    lens = am.QuadraticCorrection(ex=(0, 0, 0, 0, 0), ey=(0, 0, 0, 800 / 900, 0))  # 450 px up
+    upright = [[800, 0, 639.5], [0, 800, 511.5], [0, 0, 1]]
+    camera = am.Camera(K=upright, T_camera_world=np.eye(4), size_px=(1280, 1024), lens=lens)
+    top, middle = camera.rays([[639.5, 0.0], [639.5, 511.5]])
+    assert np.isnan(top).all()
+    np.testing.assert_allclose(middle, [0, 0, 1], atol=1e-12)
+    low = [[800, 0, 639.5], [0, 800, 1100.0], [0, 0, 1]]
+    with pytest.raises(am.ParameterError, match="no fold at the centre of the image"):
+        am.Camera(K=low, T_camera_world=np.eye(4), size_px=(1280, 1024), lens=lens)
