@@ -25,9 +25,23 @@ nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_m
   JointSummary summary;
   {
     nb::gil_scoped_release release;
-    summary = JointEvents({log_weights.data(), n * m}, {log_miss.data(), n}, max_states,
-                          {marginals.data.get(), n * (m + 1)}, {best.data.get(), n})
-                  .solve();
+    std::vector<Candidate> pairings;
+    std::vector<double> weights;
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t j = 0; j < m; ++j) {
+        const double w = log_weights.data()[i * m + j];
+        if (!(w > -std::numeric_limits<double>::infinity())) continue;
+        pairings.push_back({static_cast<std::int32_t>(i), static_cast<std::int32_t>(j),
+                            w - log_miss.data()[i], 0});
+        weights.push_back(w);
+      }
+    std::vector<double> paired(pairings.size()), missed(n);
+    summary = JointEvents(pairings, weights, {log_miss.data(), n}, static_cast<std::int32_t>(m),
+                          max_states)
+                  .solve(paired, missed, {best.data.get(), n});
+    for (std::size_t e = 0; e < pairings.size(); ++e)
+      marginals.data[pairings[e].row * (m + 1) + pairings[e].column] = paired[e];
+    for (std::size_t i = 0; i < n; ++i) marginals.data[i * (m + 1) + m] = missed[i];
   }
   return nb::make_tuple(marginals.give({n, m + 1}), summary.log_total, best.give({n}),
                         summary.bound, summary.n_states);

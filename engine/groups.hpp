@@ -15,10 +15,11 @@ struct Candidate {
   double distance2 = 0;  // squared distance of prediction and detection
 };
 
-// Candidates ordered by group, groups by their first row: group g is order[starts[g]:starts[g+1]].
+// Candidates ordered by group, groups by their first row: group g is order[starts[g]:starts[g+1]],
+// and sources are the places of its candidates in the list that was grouped.
 struct Groups {
   std::vector<Candidate> order;
-  std::vector<std::int32_t> starts;
+  std::vector<std::int32_t> sources, starts;
 
   std::size_t size() const { return starts.size() - 1; }
   std::span<const Candidate> operator[](std::size_t g) const {
@@ -57,7 +58,12 @@ inline Groups connected_groups(std::span<const Candidate> candidates, std::int32
   std::partial_sum(counts.begin(), counts.end(), groups.starts.begin() + 1);
   std::vector<std::int32_t> fill(groups.starts.begin(), groups.starts.end() - 1);
   groups.order.resize(candidates.size());
-  for (const Candidate& c : candidates) groups.order[fill[group_of[find(c.row)]]++] = c;
+  groups.sources.resize(candidates.size());
+  for (std::size_t e = 0; e < candidates.size(); ++e) {
+    const std::int32_t at = fill[group_of[find(candidates[e].row)]]++;
+    groups.order[at] = candidates[e];
+    groups.sources[at] = static_cast<std::int32_t>(e);
+  }
   return groups;
 }
 

@@ -30,53 +30,69 @@ struct FrontierLimit : std::runtime_error {
 
 struct JointSummary {
   double log_total = 0, bound = 0;
-  std::int64_t n_states = 1;
+  std::int64_t n_states = 1, n_beams = 0;  // most states of a layer; groups that were not exact
 };
 
 class JointEvents {
  public:
-  // Row-major weights (n, m). `marginals` has a row of m + 1 a track, the miss last; `best` is
-  // filled with the detection of each track, -1 for a miss.
-  JointEvents(std::span<const double> log_weights, std::span<const double> log_miss,
-              std::int64_t max_states, std::span<double> marginals, std::span<std::int32_t> best)
+  // Pairings ordered by row, each with its gain; `log_weights` are the w of the pairings, as a gain
+  // may have lost digits where logs are great.
+  JointEvents(std::span<const Candidate> pairings, std::span<const double> log_weights,
+              std::span<const double> log_miss, std::int32_t n_columns, std::int64_t max_states)
       : log_weights_(log_weights),
         log_miss_(log_miss),
         max_states_(max_states),
         n_(static_cast<std::int32_t>(log_miss.size())),
-        m_(n_ == 0 ? 0 : static_cast<std::int32_t>(log_weights.size() / log_miss.size())),
-        marginals_(marginals),
-        best_(best) {}
+        groups_(connected_groups(pairings, n_, n_columns)) {}
 
-  JointSummary solve() {
-    std::vector<Candidate> candidates;
-    for (std::int32_t i = 0; i < n_; ++i) {
-      best_[i] = -1;
-      const std::size_t before = candidates.size();
-      for (std::int32_t j = 0; j < m_; ++j)
-        if (log_weight(i, j) > -std::numeric_limits<double>::infinity())
-          candidates.push_back({i, j, log_weight(i, j) - log_miss_[i], 0});
-      if (candidates.size() > before) continue;
-      marginal(i, m_) = 1;
-      summary_.log_total += log_miss_[i];
-    }
-    const Groups groups = connected_groups(candidates, n_, m_);
-    Assignment assignment;
+  // Marginals of the pairings and of each row's miss; `best` gets the column of each row, -1 for a
+  // miss.
+  JointSummary solve(std::span<double> marginals, std::span<double> missed,
+                     std::span<std::int32_t> best) {
+    marginals_ = marginals;
+    missed_ = missed;
+    best_ = best;
+    std::fill(missed.begin(), missed.end(), 1.0);
+    std::fill(best.begin(), best.end(), -1);
+    std::vector<char> has_any(n_, 0);
+    for (const Candidate& c : groups_.order) has_any[c.row] = 1;
+    for (std::int32_t i = 0; i < n_; ++i)
+      if (!has_any[i]) summary_.log_total += log_miss_[i];
     double log_exact = 0;  // of the share of events that were summed
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      assignment.solve(groups[g], best_);
-      const double bound = solve_group(groups[g]);
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      assignment_.solve(groups_[g], best_);
+      const double bound = is_single(g) ? solve_single(g) : solve_group(g);
+      summary_.n_beams += bound > 0;
       log_exact += std::log1p(-bound);
     }
     if (log_exact < 0) summary_.bound = -std::expm1(log_exact);
     return summary_;
   }
 
+  const Groups& groups() const { return groups_; }
+
  private:
-  double log_weight(std::int32_t i, std::int32_t j) const {
-    return log_weights_[static_cast<std::size_t>(i) * m_ + j];
+  double log_weight(std::size_t g, std::size_t e) const {
+    return log_weights_[groups_.sources[groups_.starts[g] + e]];
   }
-  double& marginal(std::int32_t i, std::int32_t j) {
-    return marginals_[static_cast<std::size_t>(i) * (m_ + 1) + j];
+  double& marginal(std::size_t g, std::size_t e) {
+    return marginals_[groups_.sources[groups_.starts[g] + e]];
+  }
+
+  bool is_single(std::size_t g) const { return groups_[g].front().row == groups_[g].back().row; }
+
+  // A track that shares its detections with nobody has one of them or none.
+  double solve_single(std::size_t g) {
+    const std::int32_t i = groups_[g].front().row;
+    const std::size_t n = groups_[g].size();
+    double most = log_miss_[i], total = 0;
+    for (std::size_t e = 0; e < n; ++e) most = std::max(most, log_weight(g, e));
+    for (std::size_t e = 0; e < n; ++e) total += marginal(g, e) = std::exp(log_weight(g, e) - most);
+    total += missed_[i] = std::exp(log_miss_[i] - most);
+    for (std::size_t e = 0; e < n; ++e) marginal(g, e) /= total;
+    missed_[i] /= total;
+    summary_.log_total += most + std::log(total);
+    return 0;
   }
 
   // Prices on a grid: sums of two are exact, and so is their difference to a weight near them.
@@ -85,7 +101,8 @@ class JointEvents {
     return std::abs(x) < grid * grid ? std::nearbyint(x * grid) / grid : x;
   }
 
-  double solve_group(std::span<const Candidate> group) {
+  double solve_group(std::size_t g) {
+    const std::span<const Candidate> group = groups_[g];
     std::vector<std::int32_t> rows, columns, row_of(group.size()), column_of(group.size());
     number(group, rows, columns, row_of, column_of);
     const auto n = static_cast<std::int32_t>(rows.size());
@@ -117,16 +134,15 @@ class JointEvents {
     for (std::size_t e = 0; e < group.size(); ++e) {
       const std::int32_t i = row_of[e], j = column_of[e];
       const auto edge = static_cast<std::int32_t>(e);
-      graph.weight[e] = std::exp(log_weight(group[e].row, group[e].column) - (u[i] + p[j]));
+      graph.weight[e] = std::exp(log_weight(g, e) - (u[i] + p[j]));
       graph.links[i].push_back({n + j, edge});
       graph.links[n + j].push_back({i, edge});
     }
 
     MatchingMarginals result = sum(graph, n, partner);
     if (!is_finite(result)) result = only_best(graph, n, partner);
-    for (std::size_t e = 0; e < group.size(); ++e)
-      marginal(group[e].row, group[e].column) = result.edge[e];
-    for (std::int32_t i = 0; i < n; ++i) marginal(rows[i], m_) = result.alone[i];
+    for (std::size_t e = 0; e < group.size(); ++e) marginal(g, e) = result.edge[e];
+    for (std::int32_t i = 0; i < n; ++i) missed_[rows[i]] = result.alone[i];
     summary_.log_total += result.log_total + log_scale;
     summary_.n_states = std::max(summary_.n_states, result.n_states);
     return result.bound;
@@ -211,8 +227,10 @@ class JointEvents {
 
   std::span<const double> log_weights_, log_miss_;
   std::int64_t max_states_;
-  std::int32_t n_, m_;
-  std::span<double> marginals_;
+  std::int32_t n_;
+  Groups groups_;
+  Assignment assignment_;
+  std::span<double> marginals_, missed_;
   std::span<std::int32_t> best_;
   JointSummary summary_;
 };
