@@ -1,8 +1,12 @@
 // The solvers on plain arrays, as Python sees them.
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
 #include "arrays.hpp"
+#include "assignment.hpp"
 #include "bindings.hpp"
+#include "deferred_acceptance.hpp"
+#include "groups.hpp"
 #include "joint_events.hpp"
 
 using namespace nb::literals;
@@ -47,9 +51,57 @@ nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_m
                         summary.bound, summary.n_states);
 }
 
+// Rows and columns of a sparse gain list, ordered by row, paired for the greatest sum of gains.
+Out<std::int32_t> assign(std::int32_t n_rows, std::int32_t n_columns, const In<std::int32_t>& rows,
+                         const In<std::int32_t>& columns, const In<double>& gains) {
+  require(rows.size() == gains.size() && columns.size() == gains.size(), "one gain a pair");
+  require(n_rows >= 0 && n_columns >= 0, "sizes ≥ 0");
+  std::vector<Candidate> candidates;
+  for (std::size_t e = 0; e < gains.size(); ++e) {
+    const std::int32_t i = rows.data()[e], j = columns.data()[e];
+    require(i >= 0 && i < n_rows && j >= 0 && j < n_columns, "indices within the sizes");
+    require(e == 0 || i >= rows.data()[e - 1], "pairs ordered by row");
+    candidates.push_back({i, j, gains.data()[e], 0});
+  }
+  Owned<std::int32_t> match(n_rows);
+  std::fill_n(match.data.get(), n_rows, -1);
+  {
+    nb::gil_scoped_release release;
+    const Groups groups = connected_groups(candidates, n_rows, n_columns);
+    Assignment solver;
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      solver.solve(groups[g], {match.data.get(), static_cast<std::size_t>(n_rows)});
+  }
+  return match.give({static_cast<std::size_t>(n_rows)});
+}
+
+std::pair<Out<std::int32_t>, std::int64_t> marry(const In<std::int64_t>& first,
+                                                 const In<std::int32_t>& receivers,
+                                                 const In<double>& costs,
+                                                 std::int32_t n_receivers) {
+  require(first.ndim() == 1 && first.size() >= 1, "first: shape (P + 1,)");
+  require(receivers.size() == costs.size(), "a cost for every wish");
+  const std::size_t P = first.size() - 1;
+  require(first.data()[0] == 0 && first.data()[P] == static_cast<std::int64_t>(costs.size()),
+          "first: from 0 to the number of wishes");
+  for (std::size_t p = 0; p < P; ++p) require(first.data()[p] <= first.data()[p + 1], "first: rising");
+  std::vector<Proposal> lists;
+  for (std::size_t e = 0; e < costs.size(); ++e) {
+    const std::int32_t r = receivers.data()[e];
+    require(r >= 0 && r < n_receivers, "receivers within their number");
+    lists.push_back({r, costs.data()[e]});
+  }
+  Owned<std::int32_t> partner(P);
+  const std::int64_t n = deferred_acceptance(lists, {first.data(), first.size()}, n_receivers,
+                                             {partner.data.get(), P});
+  return {partner.give({P}), n};
+}
+
 }  // namespace
 
 void bind_solvers(nb::module_& module) {
+  module.def("assign", &assign, "n_rows"_a, "n_columns"_a, "rows"_a, "columns"_a, "gains"_a);
+  module.def("marry", &marry, "first"_a, "receivers"_a, "costs"_a, "n_receivers"_a);
   module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a);
 
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {

@@ -4,5 +4,6 @@
 #include <nanobind/nanobind.h>
 
 void bind_tracking(nanobind::module_& module);
+void bind_trackers(nanobind::module_& module);
 void bind_camera(nanobind::module_& module);
 void bind_solvers(nanobind::module_& module);

@@ -115,34 +115,43 @@ inline double log_density(int D, double S, double distance2) {
   return -0.5 * (D * std::log(2 * std::numbers::pi * S) + distance2 / S);
 }
 
-// Joseph form: the covariance stays symmetric and positive over runs of any length.
-inline void update(const AxisModel& m, const Point& y, AxisState& s) {
-  with_states(m.n, [&](auto n_states) {
-    constexpr int n = n_states;
-    const double S = innovation_variance(m, s);
-    assert(S > 0);
-    const Point predicted = observed(m, s);
-    AxisVector K{};
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j < n; ++j) K[i] += s.P[i * n + j] * m.H[j];
-      K[i] /= S;
-    }
-    for (int d = 0; d < m.D; ++d)
-      for (int i = 0; i < n; ++i) s.x[d][i] += K[i] * (y[d] - predicted[d]);
-    AxisMatrix A{}, AP{}, P{};
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) A[i * n + j] = (i == j ? 1.0 : 0.0) - K[i] * m.H[j];
-    for (int i = 0; i < n; ++i)
-      for (int k = 0; k < n; ++k)
-        for (int j = 0; j < n; ++j) AP[i * n + j] += A[i * n + k] * s.P[k * n + j];
-    for (int i = 0; i < n; ++i)
-      for (int j = i; j < n; ++j) {
-        double sum = K[i] * m.r * K[j];
-        for (int k = 0; k < n; ++k) sum += AP[i * n + k] * A[j * n + k];
-        P[i * n + j] = P[j * n + i] = sum;
+// What a detection does to a state: the mean moves by K times the innovation, the covariance becomes
+// P whatever the detection is. Joseph form: P stays symmetric and positive over runs of any length.
+struct KalmanGain {
+  AxisVector K{};
+  AxisMatrix P{};
+
+  KalmanGain(const AxisModel& m, const AxisState& s) {
+    with_states(m.n, [&](auto n_states) {
+      constexpr int n = n_states;
+      const double S = innovation_variance(m, s);
+      assert(S > 0);
+      for (int i = 0; i < n; ++i) {
+        for (int j = 0; j < n; ++j) K[i] += s.P[i * n + j] * m.H[j];
+        K[i] /= S;
       }
-    s.P = P;
-  });
+      AxisMatrix A{}, AP{};
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) A[i * n + j] = (i == j ? 1.0 : 0.0) - K[i] * m.H[j];
+      for (int i = 0; i < n; ++i)
+        for (int k = 0; k < n; ++k)
+          for (int j = 0; j < n; ++j) AP[i * n + j] += A[i * n + k] * s.P[k * n + j];
+      for (int i = 0; i < n; ++i)
+        for (int j = i; j < n; ++j) {
+          double sum = K[i] * m.r * K[j];
+          for (int k = 0; k < n; ++k) sum += AP[i * n + k] * A[j * n + k];
+          P[i * n + j] = P[j * n + i] = sum;
+        }
+    });
+  }
+};
+
+inline void update(const AxisModel& m, const Point& y, AxisState& s) {
+  const KalmanGain gain(m, s);
+  const Point predicted = observed(m, s);
+  for (int d = 0; d < m.D; ++d)
+    for (int i = 0; i < m.n; ++i) s.x[d][i] += gain.K[i] * (y[d] - predicted[d]);
+  s.P = gain.P;
 }
 
 // Rauch–Tung–Striebel: carry what the future knows (next, smoothed) back to a filtered state.

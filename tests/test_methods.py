@@ -16,6 +16,8 @@ METHODS = {
     "gnn": am.GNN(),
     "smp": am.SMP(),
     "smp by detections": am.SMP(proposers="detections"),
+    "jpda": am.JPDA(),
+    "jpda without guard": am.JPDA(guard=False),
 }
 each_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 

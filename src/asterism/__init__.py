@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from asterism import simulate as simulate
     from asterism.associate import GNN as GNN
     from asterism.associate import METHODS as METHODS
+    from asterism.associate import JPDA as JPDA
     from asterism.associate import SMP as SMP
     from asterism.associate import Method as Method
     from asterism.associate import ModelEstimate as ModelEstimate
@@ -143,6 +144,7 @@ _PUBLIC = {
     "associate": (
         "GNN",
         "METHODS",
+        "JPDA",
         "SMP",
         "Method",
         "ModelEstimate",

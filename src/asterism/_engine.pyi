@@ -1,6 +1,7 @@
 """The typed face of the compiled module; see engine/bindings.cpp."""
 
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,22 +43,22 @@ class FrameStats:
     def n_tentative(self) -> int: ...
     @property
     def n_pending(self) -> int: ...
+    @property
+    def n_beams(self) -> int: ...
+    @property
+    def n_states(self) -> int: ...
+    @property
+    def n_unguarded(self) -> int: ...
+    @property
+    def bound(self) -> float: ...
 
-class FrameTracker:
+class LifeOptions:
     def __init__(
-        self,
-        model: MotionModel,
-        score: ScoreModel,
-        *,
-        matcher: int,
-        gate: float,
-        confirm_score: float,
-        delete_drop: float,
-        max_candidates: int,
-        is_strict: bool,
-        capacity: int,
-        merged_within: float,
+        self, *, gate: float, confirm_score: float, delete_drop: float, max_candidates: int
     ) -> None: ...
+
+# What all trackers have; there is no such class in the module.
+class _Tracker:
     def step(
         self,
         time: float,
@@ -65,7 +66,13 @@ class FrameTracker:
         Q: NDArray[np.float64],
         points: NDArray[np.float64],
     ) -> tuple[
-        FrameTracker, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], FrameStats
+        Self,
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        FrameStats,
     ]: ...
     def run(
         self,
@@ -76,11 +83,19 @@ class FrameTracker:
         offsets: NDArray[np.int64],
         points: NDArray[np.float64],
         labels: NDArray[np.int64],
-    ) -> FrameStats: ...
-    def copy(self) -> FrameTracker: ...
+        confidence: NDArray[np.float64],
+    ) -> None: ...
+    def copy(self) -> Self: ...
     def tracks(
         self,
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]: ...
+    ) -> tuple[
+        NDArray[np.int64],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+    ]: ...
+    has_confidence: bool
     @property
     def n_frames(self) -> int: ...
     @property
@@ -89,6 +104,33 @@ class FrameTracker:
     def n_ids(self) -> int: ...
     @property
     def last_time(self) -> float: ...
+    @property
+    def total(self) -> FrameStats: ...
+
+class FrameTracker(_Tracker):
+    def __init__(
+        self,
+        model: MotionModel,
+        score: ScoreModel,
+        life: LifeOptions,
+        *,
+        matcher: int,
+        is_strict: bool,
+        capacity: int,
+        merged_within: float,
+    ) -> None: ...
+
+class JointTracker(_Tracker):
+    def __init__(
+        self,
+        model: MotionModel,
+        score: ScoreModel,
+        life: LifeOptions,
+        *,
+        max_states: int,
+        is_guarded: bool,
+        is_sure_until_gap: bool,
+    ) -> None: ...
 
 def score_tracks(
     model: MotionModel,

@@ -1,6 +1,7 @@
 """Who is whom: one file a method, plus what they share."""
 
 from asterism.associate.gnn import GNN
+from asterism.associate.jpda import JPDA
 from asterism.associate.method import Method, Update
 from asterism.associate.model_from_clip import ModelEstimate, estimate_model
 from asterism.associate.registry import METHODS, method_by_name
@@ -9,6 +10,7 @@ from asterism.associate.track import track
 
 __all__ = [
     "GNN",
+    "JPDA",
     "METHODS",
     "SMP",
     "Method",

@@ -10,8 +10,9 @@ and ends when the gap exceeds the model's d̄. The loop is in the engine.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, TypedDict
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,18 +27,12 @@ if TYPE_CHECKING:
     from asterism import _engine
     from asterism.model import Detections, TrackingModel
 
-__all__ = ["FrameByFrame", "FrameState", "Market"]
+    Tracker = _engine.FrameTracker | _engine.JointTracker
+
+__all__ = ["FrameByFrame", "FrameState"]
 
 MAX_CANDIDATES = 50_000_000
 """Pairs of track and detection within the gates of one frame (1.2 GB of them)."""
-
-
-class Market(TypedDict):
-    """How tracks and detections come together, as the engine takes it."""
-
-    is_strict: bool
-    capacity: int
-    merged_within: float
 
 
 FRAMES_A_CALL = 1000
@@ -54,18 +49,31 @@ class FrameState:
         The model.
     n_axes : int
         2 or 3.
-    tracker : FrameTracker
+    tracker : FrameTracker or JointTracker
         The live tracks, in the engine.
+    about : callable
+        What the method tells of a frame or of all so far.
     """
 
     model: TrackingModel
     n_axes: int
-    tracker: _engine.FrameTracker
+    tracker: Tracker
+    about: Callable[[_engine.FrameStats], dict[str, float]]
 
     @property
     def n_ids(self) -> int:
         """Number of identities given so far."""
         return self.tracker.n_ids
+
+    @property
+    def n_seen(self) -> int:
+        """Number of detections taken so far."""
+        return self.tracker.n_seen
+
+    @property
+    def info(self) -> dict[str, float]:
+        """Sums of what is counted and the worst of what is a size or a bound, over all frames."""
+        return self.about(self.tracker.total)
 
     def live(self) -> dict[str, NDArray[Any]]:
         """Give the believed tracks as they are now, for a display say.
@@ -73,11 +81,11 @@ class FrameState:
         Returns
         -------
         dict
-            ``ids (k,)``, ``gaps (k,)`` frames since the last detection, ``means (k, D, n)`` and
-            ``covariances (k, n, n)`` of the state, SI units.
+            ``ids (k,)``, ``gaps (k,)`` frames since the last detection, ``log_odds (k,)`` that the
+            marker exists, ``means (k, D, n)`` and ``covariances (k, n, n)`` of the state, SI units.
         """
-        ids, gaps, means, covariances = self.tracker.tracks()
-        return {"ids": ids, "gaps": gaps, "means": means, "covariances": covariances}
+        names = ("ids", "gaps", "log_odds", "means", "covariances")
+        return dict(zip(names, self.tracker.tracks(), strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,19 +106,27 @@ class FrameByFrame(Method[FrameState]):
     confirm_probability: float = 0.999
     delete_odds: float = 300.0
 
-    _matcher: ClassVar[int]
-
     def __post_init__(self) -> None:
         check_number("gate_probability", self.gate_probability, above=0, below=1)
         check_number("confirm_probability", self.confirm_probability, above=0.5, below=1)
         check_number("delete_odds", self.delete_odds, above=1)
 
-    def _engine_matcher(self) -> int:
-        return self._matcher
+    @abstractmethod
+    def _tracker(
+        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    ) -> Tracker:
+        """Make the engine's tracker."""
 
-    def _market(self) -> Market:
-        """Say how tracks and detections come together, beyond the matcher."""
-        return {"is_strict": False, "capacity": 1, "merged_within": 0.0}
+    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        """Tell what a frame, or a run of them, took."""
+        return {
+            "tracks": stats.n_confirmed,
+            "tentative": stats.n_tentative,
+            "pending": stats.n_pending,
+            "candidates": stats.n_candidates,
+            "groups": stats.n_groups,
+            "largest_group": stats.largest_group,
+        }
 
     def init(self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None) -> FrameState:
         """Make the state before the first frame; `seed` changes nothing, nothing is drawn."""
@@ -122,17 +138,14 @@ class FrameByFrame(Method[FrameState]):
         if n_axes not in (2, 3):
             raise ParameterError("n_axes", "2 or 3", repr(n_axes))
         p = self.confirm_probability
-        tracker = _engine.FrameTracker(
-            motion_model(model, n_axes),
-            score_model(model),
-            matcher=self._engine_matcher(),
+        life = _engine.LifeOptions(
             gate=float(chdtri(n_axes, self.gate_probability)),
             confirm_score=math.log(p / (1 - p)),
             delete_drop=math.log(self.delete_odds),
             max_candidates=MAX_CANDIDATES,
-            **self._market(),
         )
-        return FrameState(model=model, n_axes=n_axes, tracker=tracker)
+        tracker = self._tracker(motion_model(model, n_axes), score_model(model), life)
+        return FrameState(model=model, n_axes=n_axes, tracker=tracker, about=self._about)
 
     def step(self, state: FrameState, time: float, points: ArrayLike) -> tuple[FrameState, Update]:
         """Take the next frame; see `Method.step`."""
@@ -145,19 +158,20 @@ class FrameByFrame(Method[FrameState]):
         motion = state.model.motion
         F, Q = transition(motion, dt) if dt else no_transition(motion)
         try:
-            tracker, labels, revised, revised_labels, stats = before.step(time, F, Q, frame)
+            after, labels, sure, revised, revised_labels, revised_sure, stats = before.step(
+                time, F, Q, frame
+            )
         except OverflowError as error:
-            raise _too_many() from error
-        info = {
-            "tracks": stats.n_confirmed,
-            "tentative": stats.n_tentative,
-            "pending": stats.n_pending,
-            "candidates": stats.n_candidates,
-            "groups": stats.n_groups,
-            "largest_group": stats.largest_group,
-        }
-        update = Update(labels=labels, revised=revised, revised_labels=revised_labels, info=info)
-        return FrameState(model=state.model, n_axes=state.n_axes, tracker=tracker), update
+            raise _too_many(error) from error
+        update = Update(
+            labels=labels,
+            revised=revised,
+            revised_labels=revised_labels,
+            confidence=sure if before.has_confidence else None,
+            revised_confidence=revised_sure if before.has_confidence else None,
+            info=self._about(stats),
+        )
+        return replace(state, tracker=after), update
 
     def run(
         self,
@@ -165,7 +179,7 @@ class FrameByFrame(Method[FrameState]):
         detections: Detections,
         *,
         progress: Callable[[int], Any] | None = None,
-    ) -> tuple[FrameState, NDArray[np.int64], None]:
+    ) -> tuple[FrameState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; the same labels as the loop over `step`."""
         from asterism.model.compiled import steps_of
 
@@ -173,6 +187,7 @@ class FrameByFrame(Method[FrameState]):
         times, offsets = detections.times, detections.offsets
         start = tracker.n_seen
         labels = np.full(start + detections.n_points, -1, dtype=np.int64)
+        sure = np.zeros(len(labels) if tracker.has_confidence else 0)
         if detections.n_frames:
             checked_frame(float(times[0]), tracker.last_time, [], state.n_axes)
         # A state that has seen frames before is led on from the last of them.
@@ -185,16 +200,18 @@ class FrameByFrame(Method[FrameState]):
             starts = offsets[t : end + 1] - offsets[t]
             kinds = kind[n_before + t : n_before + end]
             try:
-                tracker.run(times[t:end], kinds, F, Q, starts, some, labels)
+                tracker.run(times[t:end], kinds, F, Q, starts, some, labels, sure)
             except OverflowError as error:
-                raise _too_many() from error
+                raise _too_many(error) from error
             if progress is not None:
                 progress(end)
-        final = FrameState(model=state.model, n_axes=state.n_axes, tracker=tracker)
-        return final, labels[start:], None
+        confidence = sure[start:] if tracker.has_confidence else None
+        return replace(state, tracker=tracker), labels[start:], confidence
 
 
-def _too_many() -> SolverLimit:
+def _too_many(error: OverflowError) -> SolverLimit:
+    if "compete" in str(error):
+        return SolverLimit("tracks that compete at once", 1025, 1024, "gate more narrowly")
     return SolverLimit(
         "pairs of track and detection within the gates of one frame",
         MAX_CANDIDATES + 1,

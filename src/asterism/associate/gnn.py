@@ -6,9 +6,12 @@ Blackman & Popoli 1999, ch. 6; §2.4 of the report (linear assignment).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from asterism.associate.frame_by_frame import FrameByFrame
+
+if TYPE_CHECKING:
+    from asterism import _engine
 
 __all__ = ["GNN"]
 
@@ -37,4 +40,12 @@ class GNN(FrameByFrame):
     """
 
     name: ClassVar[str] = "gnn"
-    _matcher: ClassVar[int] = 0
+
+    def _tracker(
+        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    ) -> _engine.FrameTracker:
+        from asterism import _engine
+
+        return _engine.FrameTracker(
+            motion, score, life, matcher=0, is_strict=False, capacity=1, merged_within=0.0
+        )

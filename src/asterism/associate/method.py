@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -21,9 +21,24 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections, TrackingModel
 
-__all__ = ["Method", "Update", "checked_frame"]
+__all__ = ["Method", "MethodState", "Update", "checked_frame"]
 
-State = TypeVar("State")
+
+class MethodState(Protocol):
+    """What every method's state tells."""
+
+    @property
+    def n_seen(self) -> int:
+        """Number of detections taken so far."""
+        ...
+
+    @property
+    def info(self) -> Mapping[str, float]:
+        """Numbers about the run so far; what was approximated, and by how much, among them."""
+        ...
+
+
+State = TypeVar("State", bound=MethodState)
 
 
 def _nothing() -> NDArray[np.int64]:
@@ -44,6 +59,8 @@ class Update:
         Their labels.
     confidence : ndarray, shape (n,), or None
         Probability that each label is right, from methods that know it.
+    revised_confidence : ndarray, shape (r,), or None
+        The same of the revised labels.
     info : mapping
         Numbers about the step: counts of tracks, groups, candidates.
     """
@@ -52,6 +69,7 @@ class Update:
     revised: NDArray[np.int64] = field(default_factory=_nothing)
     revised_labels: NDArray[np.int64] = field(default_factory=_nothing)
     confidence: NDArray[np.float64] | None = None
+    revised_confidence: NDArray[np.float64] | None = None
     info: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
@@ -123,20 +141,23 @@ class Method(ABC, Generic[State]):
             The last state, the label of every detection (N,), and the confidences if the method
             has any.
         """
-        labels = np.full(detections.n_points, -1, dtype=np.int64)
+        start = state.n_seen
+        labels = np.full(start + detections.n_points, -1, dtype=np.int64)
         confidence: NDArray[np.float64] | None = None
         for t, (time, points) in enumerate(detections):
             state, update = self.step(state, time, points)
-            frame = slice(detections.offsets[t], detections.offsets[t + 1])
+            frame = slice(start + detections.offsets[t], start + detections.offsets[t + 1])
             labels[frame] = update.labels
             labels[update.revised] = update.revised_labels
             if update.confidence is not None:
                 if confidence is None:
-                    confidence = np.zeros(detections.n_points)
+                    confidence = np.zeros(len(labels))
                 confidence[frame] = update.confidence
+                if update.revised_confidence is not None:
+                    confidence[update.revised] = update.revised_confidence
             if progress is not None:
                 progress(t + 1)
-        return state, labels, confidence
+        return state, labels[start:], None if confidence is None else confidence[start:]
 
 
 def checked_frame(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from asterism.associate.gnn import GNN
+from asterism.associate.jpda import JPDA
 from asterism.associate.smp import SMP
 from asterism.errors import check_fields
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["METHODS", "method_by_name"]
 
-METHODS: dict[str, type[Method[Any]]] = {method.name: method for method in (GNN, SMP)}
+METHODS: dict[str, type[Method[Any]]] = {method.name: method for method in (GNN, SMP, JPDA)}
 """Method by name, as the command line knows it."""
 
 

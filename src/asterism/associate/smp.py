@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from asterism.associate.frame_by_frame import FrameByFrame, FrameState, Market
+from asterism.associate.frame_by_frame import FrameByFrame, FrameState
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from asterism import _engine
     from asterism.associate.method import Update
     from asterism.model import Detections
 
@@ -66,15 +67,20 @@ class SMP(FrameByFrame):
         if self.strict and self.capacity > 1:
             raise ParameterError("capacity", "1, as strict=True is given", self.capacity)
 
-    def _engine_matcher(self) -> int:
-        return 1 if self.proposers == "tracks" else 2
+    def _tracker(
+        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    ) -> _engine.FrameTracker:
+        from asterism import _engine
 
-    def _market(self) -> Market:
-        return {
-            "is_strict": self.strict,
-            "capacity": self.capacity,
-            "merged_within": self.merged_within,
-        }
+        return _engine.FrameTracker(
+            motion,
+            score,
+            life,
+            matcher=1 if self.proposers == "tracks" else 2,
+            is_strict=self.strict,
+            capacity=self.capacity,
+            merged_within=self.merged_within,
+        )
 
     def step(self, state: FrameState, time: float, points: ArrayLike) -> tuple[FrameState, Update]:
         """Take the next frame; see `Method.step`.
@@ -94,7 +100,7 @@ class SMP(FrameByFrame):
         detections: Detections,
         *,
         progress: Callable[[int], Any] | None = None,
-    ) -> tuple[FrameState, NDArray[np.int64], None]:
+    ) -> tuple[FrameState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; the same labels as the loop over `step`."""
         if self.strict and detections.n_frames:
             wanted = state.n_ids if state.tracker.n_frames else int(detections.counts[0])

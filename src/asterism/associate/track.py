@@ -65,8 +65,8 @@ def track(
         model = estimate_model(detections).model
     _check_type("model", model, TrackingModel, "estimate_model(detections).model")
     state = method.init(model, n_axes=detections.n_axes, seed=seed)
-    _, labels, confidence = method.run(state, detections, progress=progress)
-    return Tracks(detections=detections, labels=labels, confidence=confidence)
+    state, labels, confidence = method.run(state, detections, progress=progress)
+    return Tracks(detections=detections, labels=labels, confidence=confidence, info=state.info)
 
 
 def _check_type(name: str, value: object, kind: type, hint: str) -> None:

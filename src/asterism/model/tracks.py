@@ -6,7 +6,7 @@ the points: the labels lie beside the detections that they speak of.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
@@ -16,7 +16,7 @@ from asterism.errors import ParameterError, keep_array
 from asterism.model.detections import Detections
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -42,6 +42,9 @@ class Tracks:
         K is the largest label + 1.
     confidence : array_like, shape (N,), optional
         Probability in [0, 1] that the label is right, from methods that know it.
+    info : mapping, optional
+        Numbers about how the labels were found, from methods: what was approximated and by how
+        much, what it took.
 
     Raises
     ------
@@ -61,6 +64,7 @@ class Tracks:
     labels: NDArray[np.int64]
     names: tuple[str | None, ...] = ()
     confidence: NDArray[np.float64] | None = None
+    info: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def __post_init__(self) -> None:
         n = self.detections.n_points

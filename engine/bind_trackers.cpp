@@ -1,0 +1,197 @@
+// The trackers that take a frame at a time, as Python sees them: one face for all.
+#include <nanobind/stl/tuple.h>
+
+#include "bindings.hpp"
+#include "frame_tracker.hpp"
+#include "joint_tracker.hpp"
+#include "motion_arrays.hpp"
+
+using namespace nb::literals;
+using namespace asterism;
+
+namespace {
+
+using Labels = nb::ndarray<std::int64_t, nb::numpy, nb::c_contig, nb::device::cpu>;
+using Confidence = nb::ndarray<double, nb::numpy, nb::c_contig, nb::device::cpu>;
+
+// One frame on a copy of the state: (new state, labels, their confidence, earlier detections whose
+// label changes, their labels, their confidence, stats). Without confidence its arrays are empty.
+template <typename Tracker>
+nb::tuple step(const Tracker& before, double time, const In<double>& F, const In<double>& Q,
+               const In<double>& points) {
+  const MotionModel& m = before.live().m;
+  const std::size_t size = static_cast<std::size_t>(m.M) * m.axis.n * m.axis.n;
+  require(F.size() == size && Q.size() == size, "F and Q: shape (modes, n, n)");
+  Tracker after(before);
+  const std::vector<Point> frame = to_points(points, m.axis.D);
+  const MotionStep motion = motion_step(m, F.data(), Q.data());
+  const std::size_t n = frame.size(), n_sure = Tracker::kHasConfidence ? n : 0;
+  Owned<std::int64_t> labels(n);
+  Owned<double> confidence(n_sure);
+  std::fill_n(labels.data.get(), n, -1);
+  struct Revision {
+    std::int64_t detection, id;
+    double confidence;
+  };
+  std::vector<Revision> revised;
+  const std::int64_t first = before.live().n_seen;
+  FrameStats stats;
+  {
+    nb::gil_scoped_release release;
+    stats = after.step(time, motion, frame, [&](std::int64_t detection, std::int64_t id, double p) {
+      if (detection < first) {
+        revised.push_back({detection, id, p});
+        return;
+      }
+      labels.data[detection - first] = id;
+      if (Tracker::kHasConfidence) confidence.data[detection - first] = p;
+    });
+  }
+  const std::size_t r = revised.size(), r_sure = Tracker::kHasConfidence ? r : 0;
+  Owned<std::int64_t> which(r), ids(r);
+  Owned<double> sure(r_sure);
+  for (std::size_t i = 0; i < r; ++i) {
+    which.data[i] = revised[i].detection;
+    ids.data[i] = revised[i].id;
+    if (Tracker::kHasConfidence) sure.data[i] = revised[i].confidence;
+  }
+  return nb::make_tuple(std::move(after), labels.give({n}), confidence.give({n_sure}),
+                        which.give({r}), ids.give({r}), sure.give({r_sure}), stats);
+}
+
+// Many frames in place. `labels` covers every detection since the state began; so does `confidence`
+// where the tracker has any.
+template <typename Tracker>
+void run(Tracker& tracker, const In<double>& times, const In<std::int32_t>& kind,
+         const In<double>& F, const In<double>& Q, const In<std::int64_t>& offsets,
+         const In<double>& points, Labels labels, Confidence confidence) {
+  const MotionModel& m = tracker.live().m;
+  const Timeline line = timeline(m, times, kind, F, Q);
+  const std::vector<Point> all = to_points(points, m.axis.D);
+  const std::size_t T = line.times.size();
+  require(offsets.ndim() == 1 && offsets.shape(0) == T + 1, "offsets: shape (T + 1,)");
+  require(T == 0 || line.kind[0] >= 0, "kind: an index into F");
+  for (std::size_t t = 0; t <= T; ++t)
+    require(offsets.data()[t] >= 0 && offsets.data()[t] <= static_cast<std::int64_t>(all.size()) &&
+                (t == 0 || offsets.data()[t] >= offsets.data()[t - 1]),
+            "offsets: rising, within the points");
+  const std::int64_t n_seen =
+      tracker.live().n_seen + (T == 0 ? 0 : offsets.data()[T] - offsets.data()[0]);
+  require(static_cast<std::int64_t>(labels.size()) >= n_seen,
+          "labels: one for every detection so far");
+  require(!Tracker::kHasConfidence || static_cast<std::int64_t>(confidence.size()) >= n_seen,
+          "confidence: one for every detection so far");
+  nb::gil_scoped_release release;
+  for (std::size_t t = 0; t < T; ++t) {
+    const auto frame = std::span(all).subspan(offsets.data()[t],
+                                              offsets.data()[t + 1] - offsets.data()[t]);
+    tracker.step(line.times[t], line.step(t), frame,
+                 [&](std::int64_t detection, std::int64_t id, double p) {
+                   labels.data()[detection] = id;
+                   if (Tracker::kHasConfidence) confidence.data()[detection] = p;
+                 });
+  }
+}
+
+// What a live display needs of the believed tracks: (ids, gaps, log odds that they exist, means and
+// covariances of the state).
+template <typename Tracker>
+nb::tuple tracks(const Tracker& tracker) {
+  const MotionModel& m = tracker.live().m;
+  std::size_t K = 0;
+  for (const LiveTrack& t : tracker.live().tracks) K += t.is_confirmed();
+  const std::size_t D = m.axis.D, n = m.axis.n;
+  Owned<std::int64_t> ids(K), gaps(K);
+  Owned<double> scores(K), means(K * D * n), covariances(K * n * n);
+  std::size_t k = 0;
+  for (const LiveTrack& t : tracker.live().tracks) {
+    if (!t.is_confirmed()) continue;
+    ids.data[k] = t.id;
+    gaps.data[k] = t.gap;
+    scores.data[k] = t.score;
+    const AxisState state = collapse(m, t.state);
+    for (std::size_t d = 0; d < D; ++d)
+      std::copy_n(state.x[d].begin(), n, means.data.get() + (k * D + d) * n);
+    std::copy_n(state.P.begin(), n * n, covariances.data.get() + k * n * n);
+    ++k;
+  }
+  return nb::make_tuple(ids.give({K}), gaps.give({K}), scores.give({K}), means.give({K, D, n}),
+                        covariances.give({K, n, n}));
+}
+
+template <typename Tracker>
+nb::class_<Tracker> bind(nb::module_& module, const char* name) {
+  return nb::class_<Tracker>(module, name)
+      .def("step", &step<Tracker>, "time"_a, "F"_a, "Q"_a, "points"_a)
+      .def("run", &run<Tracker>, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a, "points"_a,
+           "labels"_a.noconvert(), "confidence"_a.noconvert())
+      .def("copy", [](const Tracker& self) { return Tracker(self); })
+      .def("tracks", &tracks<Tracker>)
+      .def_prop_ro_static("has_confidence", [](nb::handle) { return Tracker::kHasConfidence; })
+      .def_prop_ro("n_frames", [](const Tracker& self) { return self.live().n_frames; })
+      .def_prop_ro("n_seen", [](const Tracker& self) { return self.live().n_seen; })
+      .def_prop_ro("n_ids", [](const Tracker& self) { return self.live().next_id; })
+      .def_prop_ro("last_time", [](const Tracker& self) { return self.live().last_time; })
+      .def_prop_ro("total", [](const Tracker& self) { return self.total(); });
+}
+
+}  // namespace
+
+void bind_trackers(nb::module_& module) {
+  nb::class_<FrameStats>(module, "FrameStats")
+      .def_ro("n_candidates", &FrameStats::n_candidates)
+      .def_ro("n_groups", &FrameStats::n_groups)
+      .def_ro("largest_group", &FrameStats::largest_group)
+      .def_ro("n_confirmed", &FrameStats::n_confirmed)
+      .def_ro("n_tentative", &FrameStats::n_tentative)
+      .def_ro("n_pending", &FrameStats::n_pending)
+      .def_ro("n_beams", &FrameStats::n_beams)
+      .def_ro("n_states", &FrameStats::n_states)
+      .def_ro("n_unguarded", &FrameStats::n_unguarded)
+      .def_ro("bound", &FrameStats::bound);
+
+  nb::class_<LifeOptions>(module, "LifeOptions")
+      .def(
+          "__init__",
+          [](LifeOptions* self, double gate, double confirm_score, double delete_drop,
+             std::int64_t max_candidates) {
+            new (self) LifeOptions{gate, confirm_score, delete_drop, max_candidates};
+          },
+          nb::kw_only(), "gate"_a, "confirm_score"_a, "delete_drop"_a, "max_candidates"_a);
+
+  bind<FrameTracker>(module, "FrameTracker")
+      .def(
+          "__init__",
+          [](FrameTracker* self, const MotionModel& model, const ScoreModel& score,
+             const LifeOptions& life, std::int32_t matcher, bool is_strict, std::int32_t capacity,
+             double merged_within) {
+            require(capacity >= 1 && capacity <= 64, "capacity: 1 to 64");
+            require(matcher >= 0 && matcher <= 2, "matcher: 0, 1 or 2");
+            new (self) FrameTracker(
+                model, score, life,
+                {static_cast<Matcher>(matcher), is_strict, capacity, merged_within});
+          },
+          "model"_a, "score"_a, "life"_a, nb::kw_only(), "matcher"_a, "is_strict"_a, "capacity"_a,
+          "merged_within"_a);
+
+  bind<JointTracker>(module, "JointTracker")
+      .def(
+          "__init__",
+          [](JointTracker* self, const MotionModel& model, const ScoreModel& score,
+             const LifeOptions& life, std::int64_t max_states, bool is_guarded,
+             bool is_sure_until_gap) {
+            require(max_states >= 1 && max_states <= std::int64_t{1} << 30,
+                    "max_states: 1 to 2^30");
+            new (self) JointTracker(model, score, life, {max_states, is_guarded, is_sure_until_gap});
+          },
+          "model"_a, "score"_a, "life"_a, nb::kw_only(), "max_states"_a, "is_guarded"_a,
+          "is_sure_until_gap"_a);
+
+  nb::register_exception_translator([](const std::exception_ptr& p, void*) {
+    try {
+      std::rethrow_exception(p);
+    } catch (const CandidateLimit&) {
+      PyErr_SetString(PyExc_OverflowError, "too many candidates in a frame");
+    }
+  });
+}

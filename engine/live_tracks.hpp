@@ -1,0 +1,212 @@
+// The life of a track, frame by frame: predicted, gated, updated or missed; born, believed, ended.
+//
+// How the points of a frame are shared out among the tracks is each method's own; all the rest is
+// here once. Everything is a plain value: copying it forks the run.
+//
+// The score of a track is the log odds of “these detections are one marker” against “they are
+// clutter”: log λ_b - log λ_f + log P_d at birth, then per frame log(1 - p_z) and either
+// log P_d N(y; ŷ, S) / λ_f or log(1 - P_d).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "filter_tracks.hpp"
+#include "gating.hpp"
+#include "groups.hpp"
+#include "modes.hpp"
+
+namespace asterism {
+
+struct LifeOptions {
+  double gate = 0;           // χ² bound on a pairing
+  double confirm_score = 0;  // log odds at which a tentative track is believed
+  double delete_drop = 0;    // a tentative track ends when its score falls so far below its best
+  std::int64_t max_candidates = 0;
+};
+
+// A detection of a tentative track, and how sure it is that it belongs to it, if it is a marker's.
+struct Pending {
+  std::int64_t detection = 0;
+  double confidence = 1;
+};
+
+struct LiveTrack {
+  std::int64_t id = -1;  // -1 while tentative
+  std::int32_t gap = 0;  // frames since the last detection
+  double score = 0, best_score = 0;
+  double last_time = 0;
+  Point last{};
+  MotionState state;
+  std::vector<Pending> pending;
+
+  bool is_confirmed() const { return id >= 0; }
+};
+
+// Of one frame, or of many: sums of what is counted, the worst of what is a size or a bound.
+struct FrameStats {
+  std::int64_t n_candidates = 0, n_groups = 0, largest_group = 0;
+  std::int64_t n_confirmed = 0, n_tentative = 0;  // at the end
+  std::int64_t n_pending = 0;  // detections that tentative tracks hold at the end
+  // Joint marginals: groups that were not summed exactly, how far off they may be, states held;
+  // groups too large for the guard against coalescence.
+  std::int64_t n_beams = 0, n_states = 0, n_unguarded = 0;
+  double bound = 0;
+
+  void add(const FrameStats& next) {
+    n_candidates += next.n_candidates;
+    n_groups += next.n_groups;
+    largest_group = std::max(largest_group, next.largest_group);
+    n_confirmed = next.n_confirmed;
+    n_tentative = next.n_tentative;
+    n_pending = next.n_pending;
+    n_beams += next.n_beams;
+    n_states = std::max(n_states, next.n_states);
+    n_unguarded += next.n_unguarded;
+    bound = std::max(bound, next.bound);
+  }
+};
+
+class CandidateLimit {};  // thrown when a frame has more candidates than allowed
+
+// log(1 + eˣ)
+inline double softplus(double x) { return x > 30 ? x : std::log1p(std::exp(x)); }
+
+// Working memory of one step, kept from step to step. A copied tracker starts with its own.
+struct GateScratch {
+  GateScratch() = default;
+  GateScratch(const GateScratch&) : GateScratch() {}
+  GateScratch& operator=(const GateScratch&) { return *this; }
+
+  std::vector<Prediction> predictions;
+  std::vector<double> radii;
+  PointGrid grid;
+};
+
+class LiveTracks {
+ public:
+  MotionModel m;
+  ScoreModel sm;
+  LifeOptions opt;
+  std::vector<LiveTrack> tracks;
+  std::int64_t n_frames = 0, n_seen = 0, next_id = 0;
+  double last_time = -std::numeric_limits<double>::infinity();
+
+  LiveTracks(const MotionModel& motion, const ScoreModel& score, const LifeOptions& options)
+      : m(motion), sm(score), opt(options) {}
+
+  LiveTrack& operator[](std::size_t i) { return tracks[i]; }
+  std::size_t size() const { return tracks.size(); }
+  const Prediction& prediction(std::size_t i) const { return s_.predictions[i]; }
+
+  double birth_gain() const { return sm.log_birth + sm.log_detect - sm.log_clutter; }
+  double hit_gain() const { return sm.log_survive + sm.log_detect - sm.log_clutter; }
+  double miss_gain() const { return sm.log_survive + sm.log_miss; }
+  // A point that no track takes is clutter or a new marker, not clutter alone.
+  double leftover_gain() const { return softplus(birth_gain()); }
+
+  // Predicts every track to the frame and lists the pairings within its gate, by track.
+  //
+  //   least(i)                     no point of less log likelihood is of any use to track i
+  //   gain(i, log likelihood)      of a pairing; it is listed where this is above `least_gain`
+  template <typename Least, typename Gain>
+  void candidates(double time, const MotionStep& step, std::span<const Point> points,
+                  double least_gain, Least&& least, Gain&& gain, std::vector<Candidate>& out) {
+    out.clear();
+    s_.radii.resize(tracks.size());
+    double sum_radii = 0;
+    predict_all(step);
+    for (std::size_t i = 0; i < tracks.size(); ++i) {
+      s_.radii[i] = s_.predictions[i].radius(opt.gate, least(i));
+      sum_radii += std::max(s_.radii[i], 0.0);
+    }
+    if (tracks.empty() || points.empty()) return;
+    const int D = m.axis.D;
+    s_.grid.build(points, D, 2 * sum_radii / static_cast<double>(tracks.size()));
+    std::array<double, kMaxModes> each{};
+    for (std::size_t i = 0; i < tracks.size(); ++i) {
+      if (s_.radii[i] < 0) continue;
+      const Prediction& prediction = s_.predictions[i];
+      const double reach = sm.max_speed * (time - tracks[i].last_time) + sm.speed_margin;
+      s_.grid.within(prediction.center, s_.radii[i], [&](std::int32_t j, double distance2) {
+        if (squared_distance(points[j], tracks[i].last, D) > reach * reach) return;
+        if (!prediction.is_gated(points[j], opt.gate)) return;
+        const double won = gain(i, prediction.log_likelihood(points[j], each));
+        if (won > least_gain && std::isfinite(won))
+          out.push_back({static_cast<std::int32_t>(i), j, won, distance2});
+      });
+      if (static_cast<std::int64_t>(out.size()) > opt.max_candidates) throw CandidateLimit{};
+    }
+  }
+
+  void predict_all(const MotionStep& step) {
+    s_.predictions.resize(tracks.size());
+    for (std::size_t i = 0; i < tracks.size(); ++i) {
+      predict(m, step, tracks[i].state);
+      s_.predictions[i] = Prediction(m, tracks[i].state);
+    }
+  }
+
+  // Track i has detection j of this frame, measured at y. Its state and score are the caller's.
+  // Calls label(detection, id, confidence) for every detection whose label is decided now: this one
+  // of a believed track, and all so far of a track that is believed from now on.
+  template <typename Label>
+  void take(std::size_t i, std::int32_t j, const Point& y, double time, double confidence,
+            Label&& label) {
+    LiveTrack& track = tracks[i];
+    track.last = y;
+    track.last_time = time;
+    track.gap = 0;
+    if (track.is_confirmed()) {
+      label(n_seen + j, track.id, confidence);
+      return;
+    }
+    track.pending.push_back({n_seen + j, confidence});
+    if (track.score < opt.confirm_score) return;
+    track.id = next_id++;
+    for (const Pending& p : track.pending) label(p.detection, track.id, p.confidence);
+    track.pending = {};
+  }
+
+  // After every track was updated or missed: a link spans at most max_gap frames, and a tentative
+  // track also ends by its score.
+  void end_tracks() {
+    std::erase_if(tracks, [&](LiveTrack& track) {
+      track.best_score = std::max(track.best_score, track.score);
+      const bool is_doubted =
+          !track.is_confirmed() && track.best_score - track.score > opt.delete_drop;
+      return track.gap >= sm.max_gap || is_doubted;
+    });
+  }
+
+  // A track begins at detection j of this frame.
+  LiveTrack& begin(std::size_t j, const Point& y, double time, double score) {
+    LiveTrack& track = tracks.emplace_back();
+    track.score = track.best_score = score;
+    track.last_time = time;
+    track.last = y;
+    track.state = begin_state(m, y);
+    track.pending.push_back({n_seen + static_cast<std::int64_t>(j), 1.0});
+    return track;
+  }
+
+  void end_frame(double time, std::size_t n_points, FrameStats& stats) {
+    for (const LiveTrack& track : tracks) {
+      ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
+      stats.n_pending += static_cast<std::int64_t>(track.pending.size());
+    }
+    n_seen += static_cast<std::int64_t>(n_points);
+    last_time = time;
+    ++n_frames;
+  }
+
+ private:
+  GateScratch s_;
+};
+
+}  // namespace asterism

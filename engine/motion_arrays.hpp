@@ -1,0 +1,59 @@
+// Models and frames, from Python's arrays.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "arrays.hpp"
+#include "filter_tracks.hpp"
+#include "modes.hpp"
+
+namespace asterism {
+
+// F and Q of every mode, one mode after the other.
+inline MotionStep motion_step(const MotionModel& m, const double* F, const double* Q) {
+  MotionStep step;
+  const int nn = m.axis.n * m.axis.n;
+  for (int b = 0; b < m.M; ++b) {
+    std::copy_n(F + b * nn, nn, step.mode[b].F.begin());
+    std::copy_n(Q + b * nn, nn, step.mode[b].Q.begin());
+  }
+  return step;
+}
+
+inline std::vector<MotionStep> motion_steps(const MotionModel& m, const In<double>& F,
+                                            const In<double>& Q) {
+  const auto n = static_cast<std::size_t>(m.axis.n), M = static_cast<std::size_t>(m.M);
+  require(F.ndim() == 4 && F.shape(1) == M && F.shape(2) == n && F.shape(3) == n,
+          "F: shape (kinds, modes, n, n)");
+  require(Q.ndim() == 4 && Q.shape(0) == F.shape(0) && Q.shape(1) == M && Q.shape(2) == n &&
+              Q.shape(3) == n,
+          "Q: shape (kinds, modes, n, n)");
+  std::vector<MotionStep> steps;
+  for (std::size_t i = 0; i < F.shape(0); ++i)
+    steps.push_back(motion_step(m, F.data() + i * M * n * n, Q.data() + i * M * n * n));
+  return steps;
+}
+
+inline Timeline timeline(const MotionModel& m, const In<double>& times,
+                         const In<std::int32_t>& kind, const In<double>& F, const In<double>& Q) {
+  require(times.ndim() == 1 && kind.ndim() == 1 && times.shape(0) == kind.shape(0),
+          "times and kind: shape (T,)");
+  Timeline line{{times.data(), times.shape(0)}, {kind.data(), kind.shape(0)}, motion_steps(m, F, Q)};
+  for (std::size_t t = 1; t < line.kind.size(); ++t)
+    require(line.kind[t] >= 0 && static_cast<std::size_t>(line.kind[t]) < line.steps.size(),
+            "kind: an index into F");
+  return line;
+}
+
+inline std::vector<Point> to_points(const In<double>& array, int D) {
+  require(array.ndim() == 2 && array.shape(1) == static_cast<std::size_t>(D),
+          "points: shape (N, D)");
+  std::vector<Point> points(array.shape(0), Point{});
+  for (std::size_t i = 0; i < points.size(); ++i)
+    std::copy_n(array.data() + i * D, D, points[i].begin());
+  return points;
+}
+
+}  // namespace asterism
