@@ -10,6 +10,7 @@ import pytest
 
 import asterism as am
 from frame_oracle import track_by_hand
+from jpda_oracle import jpda_by_hand
 from scenes import interacting, small_model, wanderers
 
 METHODS = {
@@ -25,11 +26,22 @@ each_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 def stream(method, model, detections, **options):
     state = method.init(model, n_axes=detections.n_axes, **options)
     labels = np.full(detections.n_points, -1)
+    confidence = np.full(detections.n_points, np.nan)
     for t, (time, points) in enumerate(detections):
         state, update = method.step(state, time, points)
-        labels[detections.offsets[t] : detections.offsets[t + 1]] = update.labels
+        frame = slice(detections.offsets[t], detections.offsets[t + 1])
+        labels[frame] = update.labels
         labels[update.revised] = update.revised_labels
-    return state, labels
+        if update.confidence is not None:
+            confidence[frame] = update.confidence
+            confidence[update.revised] = update.revised_confidence
+    return state, labels, confidence
+
+
+def by_hand(method, detections, model) -> np.ndarray:
+    if isinstance(method, am.JPDA):
+        return jpda_by_hand(detections, method, model)[0]
+    return track_by_hand(detections, method, model)
 
 
 def same_partition(a: np.ndarray, b: np.ndarray) -> bool:
@@ -52,8 +64,13 @@ def test_stream_and_batch_give_identical_labels(method, n_axes, irregular):
     truth = wanderers(rng, n_axes=n_axes, n_frames=80, clutter=1.5, irregular=irregular)
     model = small_model()
     tracks = am.track(truth.detections, method, model=model)
-    _, labels = stream(method, model, truth.detections)
+    state, labels, confidence = stream(method, model, truth.detections)
     assert (tracks.labels == labels).all()
+    if tracks.confidence is None:
+        assert np.isnan(confidence).all()
+    else:
+        assert (tracks.confidence == confidence).all()
+    assert tracks.info == state.info
     assert tracks.n_tracks >= 6
 
 
@@ -97,7 +114,7 @@ def test_the_engine_tracks_as_the_blackboard_does(method, motion, seed):
     if motion == "interacting":
         model = dataclasses.replace(model, motion=interacting())
     labels = am.track(truth.detections, method, model=model).labels
-    assert (labels == track_by_hand(truth.detections, method, model)).all()
+    assert (labels == by_hand(method, truth.detections, model)).all()
     assert labels.max() >= 3
 
 
@@ -117,7 +134,7 @@ def test_tight_bounds_are_those_of_the_blackboard(method, bound, seed):
     else:
         model = small_model(motion=interacting(), max_speed=0.6)
     labels = am.track(truth.detections, method, model=model).labels
-    assert (labels == track_by_hand(truth.detections, method, model)).all()
+    assert (labels == by_hand(method, truth.detections, model)).all()
     assert (labels != free).any()
 
 
@@ -126,9 +143,9 @@ def test_many_points_are_tracked_as_few_are(method):
     # Two hundred points a frame take the grid; on the blackboard there is none.
     rng = np.random.default_rng(4)
     truth = wanderers(rng, n_markers=150, n_frames=6, clutter=50)
-    model = small_model(clutter_density=2.0)
+    model = small_model(clutter_density=2.0, max_speed=0.5)  # faster, and all would hang together
     labels = am.track(truth.detections, method, model=model).labels
-    assert (labels == track_by_hand(truth.detections, method, model)).all()
+    assert (labels == by_hand(method, truth.detections, model)).all()
 
 
 @each_method

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from asterism import simulate as simulate
     from asterism.associate import GNN as GNN
-    from asterism.associate import METHODS as METHODS
     from asterism.associate import JPDA as JPDA
+    from asterism.associate import METHODS as METHODS
     from asterism.associate import SMP as SMP
     from asterism.associate import Method as Method
     from asterism.associate import ModelEstimate as ModelEstimate

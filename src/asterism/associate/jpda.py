@@ -65,9 +65,7 @@ class JPDA(FrameByFrame):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_number(
-            "max_states", self.max_states, above=1, below=2**30, closed=True, integer=True
-        )
+        check_number("max_states", self.max_states, above=1, below=2**30, closed=True, integer=True)
         for flag in ("guard", "sure_until_gap"):
             if not isinstance(getattr(self, flag), bool):
                 raise ParameterError(flag, "True or False", repr(getattr(self, flag)))
