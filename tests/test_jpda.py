@@ -136,12 +136,10 @@ def test_the_guard_acts_on_states_alone_and_only_where_tracks_share_points():
         (on, a), (off, b) = guarded.step(on, time, points), free.step(off, time, points)
         assert (a.labels == b.labels).all()
         assert (a.confidence == b.confidence).all()
-        is_equal = (on.live()["means"] == off.live()["means"]).all()
-        if a.info["tracks"] == 2 and a.info["largest_group"] > 1:
+        if (on.live()["means"] != off.live()["means"]).any():
             break
-        assert is_equal
-    assert on.tracker.n_frames > 2
-    assert not is_equal
+    assert a.info["largest_group"] > 1
+    assert on.tracker.n_frames < truth.detections.n_frames  # they did part, with equal marginals
 
 
 def heap(rng: np.random.Generator, n: int) -> tuple[am.Detections, am.TrackingModel]:
