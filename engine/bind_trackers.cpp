@@ -5,6 +5,7 @@
 #include "frame_tracker.hpp"
 #include "joint_tracker.hpp"
 #include "motion_arrays.hpp"
+#include "tree_tracker.hpp"
 
 using namespace nb::literals;
 using namespace asterism;
@@ -25,7 +26,7 @@ nb::tuple step(const Tracker& before, double time, const In<double>& F, const In
   Tracker after(before);
   const std::vector<Point> frame = to_points(points, m.axis.D);
   const MotionStep motion = motion_step(m, F.data(), Q.data());
-  const std::size_t n = frame.size(), n_sure = Tracker::kHasConfidence ? n : 0;
+  const std::size_t n = frame.size(), n_sure = before.has_confidence() ? n : 0;
   Owned<std::int64_t> labels(n);
   Owned<double> confidence(n_sure);
   std::fill_n(labels.data.get(), n, -1);
@@ -34,7 +35,7 @@ nb::tuple step(const Tracker& before, double time, const In<double>& F, const In
     double confidence;
   };
   std::vector<Revision> revised;
-  const std::int64_t first = before.live().n_seen;
+  const std::int64_t first = before.n_seen();
   FrameStats stats;
   {
     nb::gil_scoped_release release;
@@ -44,16 +45,16 @@ nb::tuple step(const Tracker& before, double time, const In<double>& F, const In
         return;
       }
       labels.data[detection - first] = id;
-      if (Tracker::kHasConfidence) confidence.data[detection - first] = p;
+      if (n_sure > 0) confidence.data[detection - first] = p;
     });
   }
-  const std::size_t r = revised.size(), r_sure = Tracker::kHasConfidence ? r : 0;
+  const std::size_t r = revised.size(), r_sure = before.has_confidence() ? r : 0;
   Owned<std::int64_t> which(r), ids(r);
   Owned<double> sure(r_sure);
   for (std::size_t i = 0; i < r; ++i) {
     which.data[i] = revised[i].detection;
     ids.data[i] = revised[i].id;
-    if (Tracker::kHasConfidence) sure.data[i] = revised[i].confidence;
+    if (r_sure > 0) sure.data[i] = revised[i].confidence;
   }
   return nb::make_tuple(std::move(after), labels.give({n}), confidence.give({n_sure}),
                         which.give({r}), ids.give({r}), sure.give({r_sure}), stats);
@@ -76,21 +77,25 @@ void run(Tracker& tracker, const In<double>& times, const In<std::int32_t>& kind
                 (t == 0 || offsets.data()[t] >= offsets.data()[t - 1]),
             "offsets: rising, within the points");
   const std::int64_t n_seen =
-      tracker.live().n_seen + (T == 0 ? 0 : offsets.data()[T] - offsets.data()[0]);
+      tracker.n_seen() + (T == 0 ? 0 : offsets.data()[T] - offsets.data()[0]);
   require(static_cast<std::int64_t>(labels.size()) >= n_seen,
           "labels: one for every detection so far");
-  require(!Tracker::kHasConfidence || static_cast<std::int64_t>(confidence.size()) >= n_seen,
+  require(!tracker.has_confidence() || static_cast<std::int64_t>(confidence.size()) >= n_seen,
           "confidence: one for every detection so far");
   nb::gil_scoped_release release;
+  const auto label = [&](std::int64_t detection, std::int64_t id, double p) {
+    labels.data()[detection] = id;
+    if (tracker.has_confidence()) confidence.data()[detection] = p;
+  };
   for (std::size_t t = 0; t < T; ++t) {
     const auto frame = std::span(all).subspan(offsets.data()[t],
                                               offsets.data()[t + 1] - offsets.data()[t]);
-    tracker.step(line.times[t], line.step(t), frame,
-                 [&](std::int64_t detection, std::int64_t id, double p) {
-                   labels.data()[detection] = id;
-                   if (Tracker::kHasConfidence) confidence.data()[detection] = p;
-                 });
+    if constexpr (requires { tracker.end_pass(label); })
+      tracker.pass(line.times[t], line.step(t), frame, label);
+    else
+      tracker.step(line.times[t], line.step(t), frame, label);
   }
+  if constexpr (requires { tracker.end_pass(label); }) tracker.end_pass(label);
 }
 
 // What a live display needs of the believed tracks: (ids, gaps, log odds that they exist, means and
@@ -99,12 +104,12 @@ template <typename Tracker>
 nb::tuple tracks(const Tracker& tracker) {
   const MotionModel& m = tracker.live().m;
   std::size_t K = 0;
-  for (const LiveTrack& t : tracker.live().tracks) K += t.is_confirmed();
+  for (const auto& t : tracker.live().tracks) K += t.is_confirmed();
   const std::size_t D = m.axis.D, n = m.axis.n;
   Owned<std::int64_t> ids(K), gaps(K);
   Owned<double> scores(K), means(K * D * n), covariances(K * n * n);
   std::size_t k = 0;
-  for (const LiveTrack& t : tracker.live().tracks) {
+  for (const auto& t : tracker.live().tracks) {
     if (!t.is_confirmed()) continue;
     ids.data[k] = t.id;
     gaps.data[k] = t.gap;
@@ -127,11 +132,11 @@ nb::class_<Tracker> bind(nb::module_& module, const char* name) {
            "labels"_a.noconvert(), "confidence"_a.noconvert())
       .def("copy", [](const Tracker& self) { return Tracker(self); })
       .def("tracks", &tracks<Tracker>)
-      .def_prop_ro_static("has_confidence", [](nb::handle) { return Tracker::kHasConfidence; })
-      .def_prop_ro("n_frames", [](const Tracker& self) { return self.live().n_frames; })
-      .def_prop_ro("n_seen", [](const Tracker& self) { return self.live().n_seen; })
+      .def_prop_ro("has_confidence", &Tracker::has_confidence)
+      .def_prop_ro("n_frames", &Tracker::n_frames)
+      .def_prop_ro("n_seen", &Tracker::n_seen)
       .def_prop_ro("n_ids", [](const Tracker& self) { return self.live().next_id; })
-      .def_prop_ro("last_time", [](const Tracker& self) { return self.live().last_time; })
+      .def_prop_ro("last_time", &Tracker::last_time)
       .def_prop_ro("total", [](const Tracker& self) { return self.total(); });
 }
 
@@ -148,7 +153,12 @@ void bind_trackers(nb::module_& module) {
       .def_ro("n_beams", &FrameStats::n_beams)
       .def_ro("n_states", &FrameStats::n_states)
       .def_ro("n_unguarded", &FrameStats::n_unguarded)
-      .def_ro("bound", &FrameStats::bound);
+      .def_ro("bound", &FrameStats::bound)
+      .def_ro("n_branches", &FrameStats::n_branches)
+      .def_ro("most_branches", &FrameStats::most_branches)
+      .def_ro("n_cut", &FrameStats::n_cut)
+      .def_ro("n_limited", &FrameStats::n_limited)
+      .def_ro("n_shared", &FrameStats::n_shared);
 
   nb::class_<LifeOptions>(module, "LifeOptions")
       .def(
@@ -186,6 +196,33 @@ void bind_trackers(nb::module_& module) {
           },
           "model"_a, "score"_a, "life"_a, nb::kw_only(), "max_states"_a, "is_guarded"_a,
           "is_sure_until_gap"_a);
+
+  nb::class_<BranchOptions>(module, "BranchOptions")
+      .def(
+          "__init__",
+          [](BranchOptions* self, std::int32_t window, std::int32_t max_branches,
+             std::int32_t merge_last, double prune_drop, double fading, const In<double>& delta,
+             double z) {
+            require(window >= 1 && window <= kMaxWindow, "window: 1 to 16");
+            require(max_branches >= 1 && merge_last >= 1, "max_branches, merge_last: at least 1");
+            new (self) BranchOptions{window, max_branches, merge_last, prune_drop, fading,
+                                     {delta.data(), delta.data() + delta.size()}, z};
+          },
+          nb::kw_only(), "window"_a, "max_branches"_a, "merge_last"_a, "prune_drop"_a, "fading"_a,
+          "delta"_a, "z"_a);
+
+  bind<TreeTracker>(module, "TreeTracker")
+      .def(
+          "__init__",
+          [](TreeTracker* self, const MotionModel& model, const ScoreModel& score,
+             const LifeOptions& life, const BranchOptions& branches, std::int32_t resolver,
+             bool is_independent) {
+            require(resolver >= 0 && resolver <= 2, "resolver: 0, 1 or 2");
+            new (self) TreeTracker(model, score, life, branches,
+                                   {static_cast<Resolver>(resolver), is_independent});
+          },
+          "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "resolver"_a,
+          "is_independent"_a);
 
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {
     try {

@@ -118,7 +118,8 @@ nb::tuple filter_tracks(const MotionModel& m, const In<double>& points,
 
 void bind_tracking(nb::module_& module) {
   nb::class_<MotionModel>(module, "MotionModel")
-      .def_static("make", &motion_model, "n_axes"_a, "H"_a, "P0"_a, "noise_sigma"_a, "T"_a);
+      .def_static("make", &motion_model, "n_axes"_a, "H"_a, "P0"_a, "noise_sigma"_a, "T"_a)
+      .def_prop_ro("n_axes", [](const MotionModel& m) { return m.axis.D; });
 
   nb::class_<ScoreModel>(module, "ScoreModel")
       .def(

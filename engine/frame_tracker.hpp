@@ -34,8 +34,6 @@ struct FrameOptions {
 
 class FrameTracker {
  public:
-  static constexpr bool kHasConfidence = false;
-
   FrameTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
                const FrameOptions& options)
       : live_(model, score, life), opt_(options) {}
@@ -65,8 +63,12 @@ class FrameTracker {
     return stats;
   }
 
-  const LiveTracks& live() const { return live_; }
+  bool has_confidence() const { return false; }
+  const LiveTracks<>& live() const { return live_; }
   const FrameStats& total() const { return total_; }
+  std::int64_t n_frames() const { return live_.n_frames; }
+  std::int64_t n_seen() const { return live_.n_seen; }
+  double last_time() const { return live_.last_time; }
 
  private:
   struct Scratch {
@@ -167,7 +169,7 @@ class FrameTracker {
   template <typename Label>
   void begin_strictly(double time, std::span<const Point> points, Label&& label) {
     for (std::size_t j = 0; j < points.size(); ++j) {
-      LiveTrack& track = live_.begin(j, points[j], time, 0.0);
+      LiveTrack<NoMore>& track = live_.begin(j, points[j], time, 0.0);
       track.pending = {};
       track.id = live_.next_id++;
       label(live_.n_seen + static_cast<std::int64_t>(j), track.id, 1.0);
@@ -177,7 +179,7 @@ class FrameTracker {
   template <typename Label>
   void update_tracks(double time, std::span<const Point> points, Label&& label) {
     for (std::size_t i = 0; i < live_.size(); ++i) {
-      LiveTrack& track = live_[i];
+      LiveTrack<NoMore>& track = live_[i];
       const std::int32_t j = s_.match[i];
       if (j < 0) {
         track.score += live_.miss_gain();
@@ -196,7 +198,7 @@ class FrameTracker {
       if (!s_.is_taken[j]) live_.begin(j, points[j], time, live_.birth_gain());
   }
 
-  LiveTracks live_;
+  LiveTracks<> live_;
   FrameOptions opt_;
   FrameStats total_;
   Scratch s_;

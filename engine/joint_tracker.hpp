@@ -34,8 +34,6 @@ struct JointOptions {
 
 class JointTracker {
  public:
-  static constexpr bool kHasConfidence = true;
-
   JointTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
                const JointOptions& options)
       : live_(model, score, life), opt_(options) {}
@@ -64,8 +62,12 @@ class JointTracker {
     return stats;
   }
 
-  const LiveTracks& live() const { return live_; }
+  bool has_confidence() const { return true; }
+  const LiveTracks<>& live() const { return live_; }
   const FrameStats& total() const { return total_; }
+  std::int64_t n_frames() const { return live_.n_frames; }
+  std::int64_t n_seen() const { return live_.n_seen; }
+  double last_time() const { return live_.last_time; }
 
  private:
   struct Scratch {
@@ -96,7 +98,7 @@ class JointTracker {
 
   // The log odds that a track exists, as far as sharing the detections goes.
   double existence(std::size_t i) const {
-    const LiveTrack& track = live_.tracks[i];
+    const LiveTrack<NoMore>& track = live_.tracks[i];
     const bool is_sure = opt_.is_sure_until_gap && track.is_confirmed();
     return is_sure ? std::max(track.score, live_.opt.confirm_score) : track.score;
   }
@@ -109,7 +111,7 @@ class JointTracker {
 
   void survive() {
     const double log_die = std::log(live_.sm.p_disappear);
-    for (LiveTrack& track : live_.tracks) {
+    for (LiveTrack<NoMore>& track : live_.tracks) {
       const double log_r = -softplus(-track.score), log_none = -softplus(track.score);
       const double log_died = log_die + log_r;
       const double most = std::max(log_none, log_died);
@@ -213,7 +215,7 @@ class JointTracker {
   template <typename Label>
   void update_tracks(double time, std::span<const Point> points, Label&& label) {
     for (std::size_t i = 0; i < live_.size(); ++i) {
-      LiveTrack& track = live_[i];
+      LiveTrack<NoMore>& track = live_[i];
       update_existence(i);
       const std::int32_t j = s_.match[i];
       if (j < 0) {
@@ -249,7 +251,7 @@ class JointTracker {
     }
   }
 
-  LiveTracks live_;
+  LiveTracks<> live_;
   JointOptions opt_;
   FrameStats total_;
   Scratch s_;

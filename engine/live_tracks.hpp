@@ -36,6 +36,10 @@ struct Pending {
   double confidence = 1;
 };
 
+// What a tracker keeps beside a track, where it keeps nothing.
+struct NoMore {};
+
+template <typename More>
 struct LiveTrack {
   std::int64_t id = -1;  // -1 while tentative
   std::int32_t gap = 0;  // frames since the last detection
@@ -44,6 +48,7 @@ struct LiveTrack {
   Point last{};
   MotionState state;
   std::vector<Pending> pending;
+  [[no_unique_address]] More more;
 
   bool is_confirmed() const { return id >= 0; }
 };
@@ -57,6 +62,9 @@ struct FrameStats {
   // groups too large for the guard against coalescence.
   std::int64_t n_beams = 0, n_states = 0, n_unguarded = 0;
   double bound = 0;
+  // Trees: branches at the end, most in a tree, cut by the χ² test, dropped by the limit on their
+  // number; detections that several trees like best.
+  std::int64_t n_branches = 0, most_branches = 0, n_cut = 0, n_limited = 0, n_shared = 0;
 
   void add(const FrameStats& next) {
     n_candidates += next.n_candidates;
@@ -69,6 +77,11 @@ struct FrameStats {
     n_states = std::max(n_states, next.n_states);
     n_unguarded += next.n_unguarded;
     bound = std::max(bound, next.bound);
+    n_branches = next.n_branches;
+    most_branches = std::max(most_branches, next.most_branches);
+    n_cut += next.n_cut;
+    n_limited += next.n_limited;
+    n_shared += next.n_shared;
   }
 };
 
@@ -88,19 +101,23 @@ struct GateScratch {
   PointGrid grid;
 };
 
+template <typename More = NoMore>
 class LiveTracks {
  public:
+  using Track = LiveTrack<More>;
+
   MotionModel m;
   ScoreModel sm;
   LifeOptions opt;
-  std::vector<LiveTrack> tracks;
+  std::vector<Track> tracks;
   std::int64_t n_frames = 0, n_seen = 0, next_id = 0;
   double last_time = -std::numeric_limits<double>::infinity();
 
   LiveTracks(const MotionModel& motion, const ScoreModel& score, const LifeOptions& options)
       : m(motion), sm(score), opt(options) {}
 
-  LiveTrack& operator[](std::size_t i) { return tracks[i]; }
+  Track& operator[](std::size_t i) { return tracks[i]; }
+  const Track& operator[](std::size_t i) const { return tracks[i]; }
   std::size_t size() const { return tracks.size(); }
   const Prediction& prediction(std::size_t i) const { return s_.predictions[i]; }
 
@@ -158,7 +175,7 @@ class LiveTracks {
   template <typename Label>
   void take(std::size_t i, std::int32_t j, const Point& y, double time, double confidence,
             Label&& label) {
-    LiveTrack& track = tracks[i];
+    Track& track = tracks[i];
     track.last = y;
     track.last_time = time;
     track.gap = 0;
@@ -176,7 +193,7 @@ class LiveTracks {
   // After every track was updated or missed: a link spans at most max_gap frames, and a tentative
   // track also ends by its score.
   void end_tracks() {
-    std::erase_if(tracks, [&](LiveTrack& track) {
+    std::erase_if(tracks, [&](Track& track) {
       track.best_score = std::max(track.best_score, track.score);
       const bool is_doubted =
           !track.is_confirmed() && track.best_score - track.score > opt.delete_drop;
@@ -185,8 +202,8 @@ class LiveTracks {
   }
 
   // A track begins at detection j of this frame.
-  LiveTrack& begin(std::size_t j, const Point& y, double time, double score) {
-    LiveTrack& track = tracks.emplace_back();
+  Track& begin(std::size_t j, const Point& y, double time, double score) {
+    Track& track = tracks.emplace_back();
     track.score = track.best_score = score;
     track.last_time = time;
     track.last = y;
@@ -196,7 +213,7 @@ class LiveTracks {
   }
 
   void end_frame(double time, std::size_t n_points, FrameStats& stats) {
-    for (const LiveTrack& track : tracks) {
+    for (const Track& track : tracks) {
       ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
       stats.n_pending += static_cast<std::int64_t>(track.pending.size());
     }

@@ -134,15 +134,16 @@ inline void predict(const MotionModel& m, const MotionStep& step, MotionState& s
 struct Prediction {
   Point center{};  // ŷ of the mixture
   std::array<Point, kMaxModes> y{};
-  std::array<double, kMaxModes> S{}, log_peak{};  // log_peak: log w_m N(ŷ_m; ŷ_m, S_m)
+  std::array<double, kMaxModes> w{1.0}, S{}, log_peak{};  // log_peak: log w_m N(ŷ_m; ŷ_m, S_m)
   int M = 1, D = 3;
 
   Prediction() = default;
   Prediction(const MotionModel& m, const MotionState& s) : M(m.M), D(m.axis.D) {
     for (int b = 0; b < M; ++b) {
+      if (M > 1) w[b] = s.w[b];
       y[b] = observed(m.axis, s.mode[b]);
       S[b] = innovation_variance(m.axis, s.mode[b]);
-      log_peak[b] = log_density(D, S[b], 0) + (M > 1 ? std::log(s.w[b]) : 0.0);
+      log_peak[b] = log_density(D, S[b], 0) + (M > 1 ? std::log(w[b]) : 0.0);
       if (std::isfinite(log_peak[b])) continue;
       // Numbers too large or small for the filter: this mode expects nothing, anywhere.
       log_peak[b] = -std::numeric_limits<double>::infinity();
@@ -150,7 +151,7 @@ struct Prediction {
       y[b] = {};
     }
     for (int b = 0; b < M; ++b)
-      for (int d = 0; d < D; ++d) center[d] += (M > 1 ? s.w[b] : 1.0) * y[b][d];
+      for (int d = 0; d < D; ++d) center[d] += w[b] * y[b][d];
   }
 
   // Fills the log of w_m N(y; ŷ_m, S_m) of every mode; returns the log of their sum.

@@ -15,6 +15,8 @@ class MotionModel:
         noise_sigma: float,
         T: NDArray[np.float64],
     ) -> MotionModel: ...
+    @property
+    def n_axes(self) -> int: ...
 
 class ScoreModel:
     def __init__(
@@ -51,6 +53,16 @@ class FrameStats:
     def n_unguarded(self) -> int: ...
     @property
     def bound(self) -> float: ...
+    @property
+    def n_branches(self) -> int: ...
+    @property
+    def most_branches(self) -> int: ...
+    @property
+    def n_cut(self) -> int: ...
+    @property
+    def n_limited(self) -> int: ...
+    @property
+    def n_shared(self) -> int: ...
 
 class LifeOptions:
     def __init__(
@@ -95,7 +107,8 @@ class _Tracker:
         NDArray[np.float64],
         NDArray[np.float64],
     ]: ...
-    has_confidence: bool
+    @property
+    def has_confidence(self) -> bool: ...
     @property
     def n_frames(self) -> int: ...
     @property
@@ -130,6 +143,31 @@ class JointTracker(_Tracker):
         max_states: int,
         is_guarded: bool,
         is_sure_until_gap: bool,
+    ) -> None: ...
+
+class BranchOptions:
+    def __init__(
+        self,
+        *,
+        window: int,
+        max_branches: int,
+        merge_last: int,
+        prune_drop: float,
+        fading: float,
+        delta: NDArray[np.float64],
+        z: float,
+    ) -> None: ...
+
+class TreeTracker(_Tracker):
+    def __init__(
+        self,
+        model: MotionModel,
+        score: ScoreModel,
+        life: LifeOptions,
+        branches: BranchOptions,
+        *,
+        resolver: int,
+        is_independent: bool,
     ) -> None: ...
 
 def score_tracks(

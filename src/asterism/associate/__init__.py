@@ -7,6 +7,7 @@ from asterism.associate.model_from_clip import ModelEstimate, estimate_model
 from asterism.associate.registry import METHODS, method_by_name
 from asterism.associate.smp import SMP
 from asterism.associate.track import track
+from asterism.associate.track_splitting import TrackSplitting
 
 __all__ = [
     "GNN",
@@ -15,6 +16,7 @@ __all__ = [
     "SMP",
     "Method",
     "ModelEstimate",
+    "TrackSplitting",
     "Update",
     "estimate_model",
     "method_by_name",

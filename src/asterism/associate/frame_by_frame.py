@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from asterism import _engine
     from asterism.model import Detections, TrackingModel
 
-    Tracker = _engine.FrameTracker | _engine.JointTracker
+    Tracker = _engine.FrameTracker | _engine.JointTracker | _engine.TreeTracker
 
 __all__ = ["FrameByFrame", "FrameState"]
 
@@ -49,7 +49,7 @@ class FrameState:
         The model.
     n_axes : int
         2 or 3.
-    tracker : FrameTracker or JointTracker
+    tracker : FrameTracker, JointTracker or TreeTracker
         The live tracks, in the engine.
     about : callable
         What the method tells of a frame or of all so far.

@@ -1,0 +1,269 @@
+// A track split into branches: one for each detection in the gate and one for a miss, frame after
+// frame, over a window of frames that are not decided yet.
+//
+//   λ(k) = ρ λ(k-1) + e²    e² = νᵀ S⁻¹ ν of the k-th detection, ρ what is left of the past (1: all)
+//   δ(k)                    a branch is kept while λ(k) ≤ δ(k); P[λ(k) > δ(k)] = α for a true track
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "live_tracks.hpp"
+
+namespace asterism {
+
+inline constexpr int kMaxWindow = 16;
+
+struct BranchOptions {
+  std::int32_t window = 1;        // frames until one is decided
+  std::int32_t max_branches = 1;  // of a track
+  std::int32_t merge_last = 1;    // branches that share their last so many frames become one
+  double prune_drop = 0;          // a branch ends so many nats below its tree's best
+  double fading = 1;              // ρ
+  std::vector<double> delta;      // δ(1), δ(2), …; empty: no test
+  double z = 0;                   // normal quantile of α, for δ beyond those where ρ is 1
+};
+
+// How much a believed track expects a detection: P_d N(y; ŷ, S) / λ_f.
+struct Claim {
+  std::int64_t track = 0;  // its key
+  std::int32_t column = 0;
+  double value = 0;
+};
+
+// A frame that is not decided yet; never changed, so that copies of a tracker share it.
+struct WindowFrame {
+  std::int64_t number = 0, first = 0;  // of the frame; of its first detection
+  double time = 0;
+  MotionStep step;
+  std::vector<Point> points;
+  PointGrid grid;
+  std::vector<Claim> claims;    // by track
+  std::vector<double> claimed;  // by all tracks, of each detection
+
+  // What a detection loses for a track by what the others expect: to it they are so much denser
+  // clutter, until the frame is decided and shared out (linear multitarget, Musicki & La Scala 2008).
+  double crowding(std::int64_t track, std::int32_t column) const {
+    double others = claimed[column];
+    auto at = std::lower_bound(claims.begin(), claims.end(), track,
+                               [](const Claim& c, std::int64_t key) { return c.track < key; });
+    for (; at != claims.end() && at->track == track; ++at)
+      if (at->column == column) others -= at->value;
+    return std::log1p(std::max(others, 0.0));
+  }
+};
+using Window = std::span<const std::shared_ptr<const WindowFrame>>;
+
+struct Branch {
+  MotionState state;
+  double score = 0;  // as a track's
+  double lambda = 0;
+  std::int64_t n_updates = 0;
+  double last_time = 0;
+  Point last{};
+  std::int32_t gap = 0, n_taken = 0;  // n_taken: detections within the window
+  bool has_ended = false;
+  // Detection in each frame of the window, -1 for a miss, and its squared distance from what was
+  // expected: by frame number, modulo the longest window.
+  std::array<std::int32_t, kMaxWindow> path{};
+  std::array<double, kMaxWindow> distance2{};
+
+  std::int32_t taken(std::int64_t frame) const { return path[frame % kMaxWindow]; }
+};
+
+// What a track keeps beside what is decided of it: λ up to there, and the branches from there on.
+struct Tree {
+  std::int64_t key = 0;  // its number in order of birth
+  double lambda = 0;
+  std::int64_t n_updates = 0;
+  std::vector<Branch> branches;
+};
+
+// ν ᵀ S⁻¹ ν; of a mixture, the χ² value that is as seldom exceeded as this point's distance.
+inline double surprise(const Prediction& p, const Point& y) {
+  if (p.M == 1) return squared_distance(y, p.y[0], p.D) / p.S[0];
+  double beyond = 0;
+  for (int b = 0; b < p.M; ++b) {
+    const double x = squared_distance(y, p.y[b], p.D) / p.S[b];
+    const double tail = p.D == 2 ? std::exp(-x / 2)
+                                 : std::erfc(std::sqrt(x / 2)) +
+                                       std::sqrt(2 * x / std::numbers::pi) * std::exp(-x / 2);
+    beyond += p.w[b] * tail;
+  }
+  beyond = std::clamp(beyond, 1e-300, 1.0);
+  if (p.D == 2) return -2 * std::log(beyond);
+  // Newton on log Q(x) for three degrees of freedom, from above, where it is concave.
+  double x = 3 - 2 * std::log(beyond) + 2 * std::log1p(-2 * std::log(beyond));
+  for (int k = 0; k < 60; ++k) {
+    const double tail = std::erfc(std::sqrt(x / 2)) +
+                        std::sqrt(2 * x / std::numbers::pi) * std::exp(-x / 2);
+    const double slope = -std::sqrt(x / (2 * std::numbers::pi)) * std::exp(-x / 2);
+    if (!(slope < 0) || !(tail > 0)) break;
+    const double next = x - tail * (std::log(tail) - std::log(beyond)) / slope;
+    const double moved = std::abs(next - x);
+    x = std::max(next, x / 16);
+    if (moved <= 1e-13 * x) break;
+  }
+  return x;
+}
+
+class BranchGrower {
+ public:
+  BranchGrower(const LiveTracks<Tree>& live, const BranchOptions& options)
+      : live_(live), opt_(options) {}
+
+  // What a branch is worth among those of its tree: its score, less what the detections it takes
+  // would be worth if left over.
+  double worth(const Branch& b) const { return b.score - b.n_taken * live_.leftover_gain(); }
+
+  // The decided part of a track, as the only branch.
+  Branch root(const LiveTrack<Tree>& track) const {
+    Branch b;
+    b.state = track.state;
+    b.score = track.score;
+    b.lambda = track.more.lambda;
+    b.n_updates = track.more.n_updates;
+    b.last_time = track.last_time;
+    b.last = track.last;
+    b.gap = track.gap;
+    b.has_ended = track.gap >= live_.sm.max_gap;
+    return b;
+  }
+
+  // Splits every branch over a further frame, the n_open-th that is not decided, and prunes them.
+  void grow(const WindowFrame& frame, LiveTrack<Tree>& track, std::int32_t n_open,
+            FrameStats& stats) {
+    grown_.clear();
+    for (Branch& parent : track.more.branches) split(frame, track, parent, stats);
+    prune(frame.number, n_open, stats);
+    track.more.branches.assign(grown_.begin(), grown_.end());
+  }
+
+  // What a track's best branch expects of a frame that comes next.
+  void claim(const LiveTrack<Tree>& track, WindowFrame& frame) const {
+    const Branch& best = track.more.branches.front();
+    if (best.has_ended) return;
+    MotionState state = best.state;
+    predict(live_.m, frame.step, state);
+    const Prediction prediction(live_.m, state);
+    const double log_seen = live_.sm.log_detect - live_.sm.log_clutter;
+    // Beyond this a claim is nothing beside the clutter.
+    const double radius = prediction.radius(live_.opt.gate, kNoClaim - log_seen);
+    if (radius < 0) return;
+    std::array<double, kMaxModes> each{};
+    frame.grid.within(prediction.center, radius, [&](std::int32_t j, double) {
+      const double value = std::exp(log_seen + prediction.log_likelihood(frame.points[j], each));
+      if (!std::isfinite(value)) return;
+      frame.claims.push_back({track.more.key, j, value});
+      frame.claimed[j] += value;
+    });
+  }
+
+  bool passes(double lambda, std::int64_t n_updates) const {
+    if (opt_.delta.empty()) return true;
+    const auto k = static_cast<std::size_t>(n_updates);
+    if (k <= opt_.delta.size()) return lambda <= opt_.delta[k - 1];
+    if (opt_.fading < 1) return lambda <= opt_.delta.back();
+    // Wilson & Hilferty 1931; with thousands of degrees of freedom right to seven digits.
+    const double v = 2.0 / (9.0 * static_cast<double>(k) * live_.m.axis.D);
+    const double root = 1 - v + opt_.z * std::sqrt(v);
+    return lambda <= 2.0 / (9.0 * v) * root * root * root;
+  }
+
+ private:
+  static constexpr double kNoClaim = -7;  // log of a claim
+
+  void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch& parent,
+             FrameStats& stats) {
+    const std::int64_t slot = frame.number % kMaxWindow;
+    parent.path[slot] = -1;
+    parent.distance2[slot] = 0;
+    if (parent.has_ended) {
+      grown_.push_back(parent);
+      return;
+    }
+    predict(live_.m, frame.step, parent.state);
+    const Prediction prediction(live_.m, parent.state);
+    const double hit = live_.hit_gain(), miss = live_.miss_gain();
+    const double least =
+        track.is_confirmed() ? miss + live_.leftover_gain() - hit - opt_.prune_drop
+                    : -std::numeric_limits<double>::infinity();
+    const double radius = prediction.radius(live_.opt.gate, least);
+    const double reach =
+        live_.sm.max_speed * (frame.time - parent.last_time) + live_.sm.speed_margin;
+    const int D = live_.m.axis.D;
+    if (radius >= 0) {
+      frame.grid.within(prediction.center, radius, [&](std::int32_t j, double d2) {
+        const Point& y = frame.points[j];
+        if (squared_distance(y, parent.last, D) > reach * reach) return;
+        if (!prediction.is_gated(y, live_.opt.gate)) return;
+        ++stats.n_candidates;
+        const double lambda = opt_.fading * parent.lambda + surprise(prediction, y);
+        if (!passes(lambda, parent.n_updates + 1)) {
+          ++stats.n_cut;
+          return;
+        }
+        Branch child = parent;
+        const double won = hit + update(live_.m, prediction, y, child.state);
+        if (!std::isfinite(won)) return;
+        child.score += won - frame.crowding(track.more.key, j);
+        child.lambda = lambda;
+        ++child.n_updates;
+        ++child.n_taken;
+        child.last = y;
+        child.last_time = frame.time;
+        child.gap = 0;
+        child.path[slot] = j;
+        child.distance2[slot] = d2;
+        grown_.push_back(std::move(child));
+      });
+      if (static_cast<std::int64_t>(grown_.size()) > live_.opt.max_candidates)
+        throw CandidateLimit{};
+    }
+    parent.score += miss;
+    parent.has_ended = ++parent.gap >= live_.sm.max_gap;
+    grown_.push_back(parent);
+  }
+
+  void prune(std::int64_t frame, std::int32_t n_open, FrameStats& stats) {
+    std::stable_sort(grown_.begin(), grown_.end(),
+                     [&](const Branch& a, const Branch& b) { return worth(a) > worth(b); });
+    const double least = worth(grown_.front()) - opt_.prune_drop;
+    std::size_t kept = 0;
+    for (std::size_t b = 0; b < grown_.size(); ++b) {
+      if (worth(grown_[b]) < least) break;
+      if (n_open > opt_.merge_last && is_merged(grown_[b], frame, kept)) continue;
+      if (kept == static_cast<std::size_t>(opt_.max_branches)) {
+        ++stats.n_limited;
+        continue;
+      }
+      if (kept != b) grown_[kept] = std::move(grown_[b]);
+      ++kept;
+    }
+    grown_.resize(kept);
+    stats.most_branches = std::max<std::int64_t>(stats.most_branches, static_cast<std::int64_t>(kept));
+  }
+
+  // Whether a likelier branch shares the last frames.
+  bool is_merged(const Branch& branch, std::int64_t frame, std::size_t kept) const {
+    for (std::size_t a = 0; a < kept; ++a) {
+      bool is_same = true;
+      for (std::int32_t k = 0; k < opt_.merge_last && is_same; ++k)
+        is_same = grown_[a].taken(frame - k) == branch.taken(frame - k);
+      if (is_same) return true;
+    }
+    return false;
+  }
+
+  const LiveTracks<Tree>& live_;
+  const BranchOptions& opt_;
+  std::vector<Branch> grown_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,263 @@
+// The trees of all tracks over a window of frames, of which the oldest is decided when the window is
+// full: who has which of its points, by what the branches of every track have met since.
+//
+// What is decided lives in live_tracks.hpp; its branches (branches.hpp) are what may follow.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "assignment.hpp"
+#include "branches.hpp"
+#include "live_tracks.hpp"
+#include "marriage_market.hpp"
+
+namespace asterism {
+
+enum class Resolver : std::int32_t {
+  assignment = 0,          // most likely joint pairing
+  marriage_by_tracks = 1,  // stable; tracks rank by the window's likelihood, points by its distances
+  marriage_by_points = 2,
+};
+
+struct ForestOptions {
+  Resolver resolver = Resolver::assignment;
+  // Trees keep what they like best though another has it: only the labels are shared out.
+  bool is_independent = false;
+};
+
+class Forest {
+ public:
+  Forest(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
+         const BranchOptions& branches, const ForestOptions& options)
+      : live(model, score, life), branches_(branches), opt_(options) {}
+
+  LiveTracks<Tree> live;
+
+  // Takes a frame; decides the oldest one if the window is full with it.
+  template <typename Label>
+  void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
+    BranchGrower grower(live, branches_);
+    frame->claimed.assign(frame->points.size(), 0);
+    if (!opt_.is_independent)
+      for (const LiveTrack<Tree>& track : live.tracks)
+        if (track.is_confirmed()) grower.claim(track, *frame);
+    window_.push_back(std::move(frame));
+    for (LiveTrack<Tree>& track : live.tracks)
+      grower.grow(*window_.back(), track, n_open(), stats);
+    if (n_open() == branches_.window) decide(stats, label);
+  }
+
+  // Decides all frames that are left, with what is known of them.
+  template <typename Label>
+  void decide_all(FrameStats& stats, Label&& label) {
+    while (!window_.empty()) decide(stats, label);
+  }
+
+  std::int32_t n_open() const { return static_cast<std::int32_t>(window_.size()); }
+
+  void count(FrameStats& stats) const {
+    for (const LiveTrack<Tree>& track : live.tracks) {
+      ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
+      stats.n_pending += static_cast<std::int64_t>(track.pending.size());
+      stats.n_branches += static_cast<std::int64_t>(track.more.branches.size());
+    }
+  }
+
+ private:
+  // The best branch of a tree through one detection of the frame that is decided, or through none.
+  struct Way {
+    std::int32_t column = -1;  // -1: missed
+    double worth = 0, crowding = 0;
+    double share = 0;  // of the weight of all branches
+    std::int32_t branch = -1;  // -1: no branch is left that misses
+  };
+
+  template <typename Label>
+  void decide(FrameStats& stats, Label&& label) {
+    const std::shared_ptr<const WindowFrame> frame = window_.front();
+    window_.erase(window_.begin());
+    match_.assign(live.size(), -1);
+    ways_.resize(live.size());
+    is_taken_.assign(frame->points.size(), 0);
+    count_shared(*frame, stats);
+    match_all(*frame, true, stats);
+    match_all(*frame, false, stats);
+    say_free(*frame, label);
+    for (std::size_t i = 0; i < live.size(); ++i) follow(*frame, i, stats, label);
+    live.end_tracks();
+    for (std::size_t j = 0; j < frame->points.size(); ++j) {
+      if (is_taken_[j]) continue;
+      LiveTrack<Tree>& track = live.begin(j, frame->points[j], frame->time, live.birth_gain());
+      track.more.key = n_trees_++;
+      regrow(track, stats);
+    }
+    FrameStats ignored;
+    live.end_frame(frame->time, frame->points.size(), ignored);
+  }
+
+  void list_ways(const WindowFrame& frame, std::size_t i) {
+    const BranchGrower grower(live, branches_);
+    const LiveTrack<Tree>& track = live[i];
+    std::vector<Way>& ways = ways_[i];
+    ways.assign(1, {});
+    double most = -std::numeric_limits<double>::infinity(), total = 0;
+    for (const Branch& b : track.more.branches) most = std::max(most, grower.worth(b));
+    // Where every branch that misses was pruned, it would have been worth no more than this.
+    ways[0].worth = most - branches_.prune_drop;
+    for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
+      const Branch& b = track.more.branches[k];
+      const std::int32_t column = b.taken(frame.number);
+      const double worth = grower.worth(b), weight = std::exp(worth - most);
+      auto way = std::find_if(ways.begin(), ways.end(), [&](const Way& w) { return w.column == column; });
+      if (way == ways.end()) way = ways.insert(ways.end(), Way{.column = column});
+      total += weight;
+      way->share += weight;
+      if (way->branch >= 0) continue;  // branches come with the best first
+      way->branch = static_cast<std::int32_t>(k);
+      // The frame is shared out now: what others expect of it counts by their own ways.
+      way->crowding = column < 0 ? 0 : frame.crowding(track.more.key, column);
+      way->worth = worth + way->crowding;
+    }
+    for (Way& way : ways) way.share /= total;
+    std::sort(ways.begin() + 1, ways.end(),
+              [](const Way& a, const Way& b) { return a.column < b.column; });
+  }
+
+  // For a tentative track, weighed with the odds that it is a marker at all.
+  double odds(const LiveTrack<Tree>& track, const Way& way) const {
+    if (track.is_confirmed()) return way.worth;
+    if (way.branch < 0) return softplus(way.worth);
+    const Branch& b = track.more.branches[way.branch];
+    return softplus(b.score + way.crowding) - b.n_taken * live.leftover_gain();
+  }
+
+  // Pairs the believed tracks, or the tentative ones, with points that are still free.
+  void match_all(const WindowFrame& frame, bool confirmed, FrameStats& stats) {
+    candidates_.clear();
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      const LiveTrack<Tree>& track = live[i];
+      if (track.is_confirmed() != confirmed) continue;
+      list_ways(frame, i);
+      const double missed = odds(track, ways_[i][0]);
+      for (std::size_t k = 1; k < ways_[i].size(); ++k) {
+        const Way& way = ways_[i][k];
+        const double gain = odds(track, way) - missed;
+        if (is_taken_[way.column] || !(gain > 0) || !std::isfinite(gain)) continue;
+        candidates_.push_back({static_cast<std::int32_t>(i), way.column, gain,
+                               mean_distance2(track.more.branches[way.branch])});
+      }
+    }
+    const Groups groups = connected_groups(candidates_, static_cast<std::int32_t>(live.size()),
+                                           static_cast<std::int32_t>(frame.points.size()));
+    const MarriageMarket market{opt_.resolver == Resolver::marriage_by_points, 1, 0};
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (opt_.resolver == Resolver::assignment || groups[g].size() == 1)
+        assignment_.solve(groups[g], match_);
+      else
+        market.marry(groups[g], frame.points, live.m.axis.D, match_, extras_);
+      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
+    }
+    stats.n_groups += static_cast<std::int64_t>(groups.size());
+    for (const Candidate& c : candidates_)
+      if (match_[c.row] == c.column) is_taken_[c.column] = 1;
+  }
+
+  // Mean squared distance of a branch's detections in the window from what was expected of each.
+  static double mean_distance2(const Branch& b) {
+    double sum = 0;
+    for (const double d2 : b.distance2) sum += d2;
+    return sum / b.n_taken;
+  }
+
+  void count_shared(const WindowFrame& frame, FrameStats& stats) {
+    claims_.assign(frame.points.size(), 0);
+    for (const LiveTrack<Tree>& track : live.tracks) {
+      const std::int32_t j = track.more.branches.front().taken(frame.number);
+      if (j >= 0 && track.is_confirmed() && ++claims_[j] == 2) ++stats.n_shared;
+    }
+  }
+
+  const Way* way_to(std::size_t i, std::int32_t column) const {
+    for (const Way& way : ways_[i])
+      if (way.column == column) return &way;
+    return nullptr;
+  }
+
+  // What no track takes gets no label, with the probability that none of the believed has it.
+  template <typename Label>
+  void say_free(const WindowFrame& frame, Label&& label) {
+    free_.assign(frame.points.size(), 1);
+    for (std::size_t i = 0; i < live.size(); ++i)
+      for (const Way& way : ways_[i])
+        if (way.column >= 0 && live[i].is_confirmed()) free_[way.column] *= 1 - way.share;
+    for (std::size_t j = 0; j < frame.points.size(); ++j)
+      label(frame.first + static_cast<std::int64_t>(j), -1, std::clamp(free_[j], 0.0, 1.0));
+  }
+
+  // Carries what is decided of a track over the frame, and keeps the branches that agree with it.
+  template <typename Label>
+  void follow(const WindowFrame& frame, std::size_t i, FrameStats& stats, Label&& label) {
+    LiveTrack<Tree>& track = live[i];
+    const std::int32_t j = match_[i];
+    const std::int32_t own = opt_.is_independent ? track.more.branches.front().taken(frame.number) : j;
+    predict(live.m, frame.step, track.state);
+    if (own >= 0) {
+      const Prediction prediction(live.m, track.state);
+      const Point& y = frame.points[own];
+      track.more.lambda = branches_.fading * track.more.lambda + surprise(prediction, y);
+      ++track.more.n_updates;
+      track.score += live.hit_gain() + update(live.m, prediction, y, track.state);
+      is_taken_[own] = 1;
+      track.last = y;
+      track.last_time = frame.time;
+    } else {
+      track.score += live.miss_gain();
+    }
+    if (j >= 0) {
+      const Point last = track.last;
+      live.take(i, j, last, frame.time, way_to(i, j)->share, label);
+    } else {
+      ++track.gap;
+    }
+    std::erase_if(track.more.branches,
+                  [&](const Branch& b) { return b.taken(frame.number) != own; });
+    if (track.more.branches.empty() || window_.empty())
+      regrow(track, stats);
+    else if (own >= 0)
+      for (Branch& b : track.more.branches) {
+        --b.n_taken;
+        b.score += frame.crowding(track.more.key, own);
+        b.distance2[frame.number % kMaxWindow] = 0;
+      }
+  }
+
+  void regrow(LiveTrack<Tree>& track, FrameStats& stats) {
+    BranchGrower grower(live, branches_);
+    track.more.branches.assign(1, grower.root(track));
+    std::int32_t n = 0;
+    for (const auto& frame : window_)
+      grower.grow(*frame, track, ++n, stats);
+  }
+
+  BranchOptions branches_;
+  ForestOptions opt_;
+  std::vector<std::shared_ptr<const WindowFrame>> window_;
+  std::int64_t n_trees_ = 0;
+
+  // Working memory of one decision.
+  std::vector<std::int32_t> match_, claims_;
+  std::vector<std::vector<Way>> ways_;
+  std::vector<char> is_taken_;
+  std::vector<double> free_;
+  std::vector<Candidate> candidates_;
+  std::vector<Pair> extras_;
+  Assignment assignment_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,152 @@
+"""The track-splitting filter (§2.2 of the report; Smith & Buechler 1975)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from asterism.associate.frame_by_frame import FrameByFrame
+from asterism.errors import ParameterError, check_number
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism import _engine
+
+__all__ = ["TrackSplitting", "chi2_limits"]
+
+_EXACT_LIMITS = 4096
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackSplitting(FrameByFrame):
+    """Track splitting: a branch for every detection in the gate and one for a miss.
+
+    Each track is a tree. Along a branch ``λ(k) = ρ λ(k-1) + νᵀ S⁻¹ ν`` sums how far the detections
+    lay from where they were expected; the branch is cut when ``λ(k) > δ(k)``, which for the right
+    branch has the probability α. With ``ρ = 1``, as in the report, ``δ(k)`` is the χ² quantile of
+    ``k D`` degrees of freedom. A χ² test over a whole life loses every track at last where the noise
+    is but slightly greater than the model's, so by default the past fades: ``δ(k)`` is then the
+    quantile of the χ² distribution with the mean and variance of the sum.
+
+    Branches also end when they are far less likely than the tree's best, when their last detections
+    are those of a likelier one, and beyond a number. A frame is decided when `window` frames have
+    come: trees that want the same detection are resolved by assignment over their best branches.
+    Until then labels are what would be decided now, and may change.
+
+    The confidence of a label is the share of its tree's branches, weighed by their likelihood, that
+    agree with it; other trees have no part in it.
+
+    Parameters
+    ----------
+    alpha : float
+        α, the share of right branches that the χ² test cuts in a frame.
+    fading : float
+        ρ, what is left of λ after a frame, above 0 to 1; 1 is the report's.
+    window : int
+        Frames until one is decided, 1 to 16.
+    max_branches : int
+        Most branches of a tree.
+    merge_last : int
+        Of branches that share their last so many frames the likeliest is kept.
+    prune_odds : float
+        A branch ends when it is so many times less likely than its tree's best.
+    independent : bool
+        Whether each tree goes on with what it likes best though another has it, as in the report:
+        then only the labels are resolved, and two trees may follow one marker.
+    gate_probability, confirm_probability, delete_odds : float
+        See `FrameByFrame`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(seed=1)
+    >>> am.track(truth.detections, am.TrackSplitting()).n_tracks
+    8
+    """
+
+    alpha: float = 0.01
+    fading: float = 0.9
+    window: int = 5
+    max_branches: int = 30
+    merge_last: int = 3
+    prune_odds: float = 1e6
+    independent: bool = False
+
+    name: ClassVar[str] = "splitting"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_number("alpha", self.alpha, above=0, below=1)
+        check_number("fading", self.fading, above=0)
+        if self.fading > 1:
+            raise ParameterError("fading", "a number in (0, 1]", repr(self.fading))
+        check_number("window", self.window, above=1, below=16, closed=True, integer=True)
+        check_number("max_branches", self.max_branches, above=1, closed=True, integer=True)
+        check_number("merge_last", self.merge_last, above=1, closed=True, integer=True)
+        check_number("prune_odds", self.prune_odds, above=1)
+        if not isinstance(self.independent, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise ParameterError("independent", "True or False", repr(self.independent))
+
+    def _tracker(
+        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    ) -> _engine.TreeTracker:
+        from scipy.special import ndtri
+
+        from asterism import _engine
+
+        branches = _engine.BranchOptions(
+            window=int(self.window),
+            max_branches=int(self.max_branches),
+            merge_last=int(self.merge_last),
+            prune_drop=math.log(self.prune_odds),
+            fading=self.fading,
+            delta=chi2_limits(self.alpha, motion.n_axes, self.fading),
+            z=float(-ndtri(self.alpha)),
+        )
+        return _engine.TreeTracker(
+            motion, score, life, branches, resolver=0, is_independent=self.independent
+        )
+
+    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        return super()._about(stats) | {
+            "branches": stats.n_branches,
+            "most_branches": stats.most_branches,
+            "cut_branches": stats.n_cut,
+            "dropped_branches": stats.n_limited,
+            "shared_detections": stats.n_shared,
+        }
+
+
+def chi2_limits(alpha: float, n_axes: int, fading: float) -> NDArray[np.float64]:
+    """Give δ(k) of the test of a branch with k detections.
+
+    Without fading ``P[χ²_{k D} > δ(k)] = α``. With fading, λ(k) is a weighted sum of χ² variables:
+    its quantile is taken from the scaled χ² with its mean and variance (Satterthwaite 1946).
+
+    Parameters
+    ----------
+    alpha : float
+        α.
+    n_axes : int
+        D, 2 or 3.
+    fading : float
+        ρ.
+
+    Returns
+    -------
+    ndarray, shape (K,)
+        For k = 1 to K; with fading the last one is that of all further k.
+    """
+    from scipy.special import chdtri
+
+    if fading == 1:
+        return np.asarray(chdtri(n_axes * np.arange(1, _EXACT_LIMITS + 1), alpha))
+    n = min(_EXACT_LIMITS, math.ceil(math.log(1e-12) / math.log(fading)) + 1)
+    k = np.arange(1, n + 1)
+    mean = n_axes * (1 - fading**k) / (1 - fading)
+    variance = 2 * n_axes * (1 - fading ** (2 * k)) / (1 - fading**2)
+    return np.asarray(chdtri(2 * mean**2 / variance, alpha)) * variance / (2 * mean)
