@@ -30,7 +30,9 @@ struct BranchOptions {
   double z = 0;                   // normal quantile of α, for δ beyond those where ρ is 1
 };
 
-// How much a believed track expects a detection: P_d N(y; ŷ, S) / λ_f.
+// How much a believed track expects a detection: w_j / (w_0 + Σ_{l≠j} w_l), where
+// w_j = P_d N(y_j; ŷ, S) / λ_f and w_0 = 1 - P_d. Who else takes it lowers the likelihood of the
+// frame by the factor 1 + this.
 struct Claim {
   std::int64_t track = 0;  // its key
   std::int32_t column = 0;
@@ -47,8 +49,9 @@ struct WindowFrame {
   std::vector<Claim> claims;    // by track
   std::vector<double> claimed;  // by all tracks, of each detection
 
-  // What a detection loses for a track by what the others expect: to it they are so much denser
-  // clutter, until the frame is decided and shared out (linear multitarget, Musicki & La Scala 2008).
+  // What a detection loses for a track by what the others expect, until the frame is decided and
+  // shared out: exact for two tracks, for more each is as if it were the only other one (linear
+  // multitarget, Musicki & La Scala 2008).
   double crowding(std::int64_t track, std::int32_t column) const {
     double others = claimed[column];
     auto at = std::lower_bound(claims.begin(), claims.end(), track,
@@ -146,23 +149,34 @@ class BranchGrower {
   }
 
   // What a track's best branch expects of a frame that comes next.
-  void claim(const LiveTrack<Tree>& track, WindowFrame& frame) const {
+  void claim(const LiveTrack<Tree>& track, WindowFrame& frame) {
     const Branch& best = track.more.branches.front();
     if (best.has_ended) return;
     MotionState state = best.state;
     predict(live_.m, frame.step, state);
     const Prediction prediction(live_.m, state);
     const double log_seen = live_.sm.log_detect - live_.sm.log_clutter;
-    // Beyond this a claim is nothing beside the clutter.
+    // Less is nothing beside the clutter.
     const double radius = prediction.radius(live_.opt.gate, kNoClaim - log_seen);
     if (radius < 0) return;
     std::array<double, kMaxModes> each{};
+    const std::size_t first = frame.claims.size();
     frame.grid.within(prediction.center, radius, [&](std::int32_t j, double) {
-      const double value = std::exp(log_seen + prediction.log_likelihood(frame.points[j], each));
-      if (!std::isfinite(value)) return;
-      frame.claims.push_back({track.more.key, j, value});
-      frame.claimed[j] += value;
+      const double log_w = log_seen + prediction.log_likelihood(frame.points[j], each);
+      if (log_w > kNoClaim && log_w < 700) frame.claims.push_back({track.more.key, j, std::exp(log_w)});
     });
+    for (std::size_t c = first; c < frame.claims.size(); ++c) {
+      Claim& claim = frame.claims[c];
+      double others = std::exp(live_.sm.log_miss);
+      for (std::size_t l = first; l < frame.claims.size(); ++l)
+        if (l != c) others += frame.claims[l].value;
+      values_.push_back(claim.value / others);
+    }
+    for (std::size_t c = first; c < frame.claims.size(); ++c) {
+      frame.claims[c].value = values_[c - first];
+      frame.claimed[frame.claims[c].column] += values_[c - first];
+    }
+    values_.clear();
   }
 
   bool passes(double lambda, std::int64_t n_updates) const {
@@ -177,7 +191,7 @@ class BranchGrower {
   }
 
  private:
-  static constexpr double kNoClaim = -7;  // log of a claim
+  static constexpr double kNoClaim = -7;  // log of w
 
   void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch& parent,
              FrameStats& stats) {
@@ -264,6 +278,7 @@ class BranchGrower {
   const LiveTracks<Tree>& live_;
   const BranchOptions& opt_;
   std::vector<Branch> grown_;
+  std::vector<double> values_;
 };
 
 }  // namespace asterism

@@ -12,6 +12,7 @@ import asterism as am
 from frame_oracle import track_by_hand
 from jpda_oracle import jpda_by_hand
 from scenes import interacting, small_model, wanderers
+from tree_oracle import trees_by_hand
 
 METHODS = {
     "gnn": am.GNN(),
@@ -19,6 +20,9 @@ METHODS = {
     "smp by detections": am.SMP(proposers="detections"),
     "jpda": am.JPDA(),
     "jpda without guard": am.JPDA(guard=False),
+    "smp of the past": am.SMP(window=3),
+    "splitting": am.TrackSplitting(),
+    "independent trees": am.TrackSplitting(independent=True, window=4),
 }
 each_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 
@@ -41,6 +45,8 @@ def stream(method, model, detections, **options):
 def by_hand(method, detections, model) -> np.ndarray:
     if isinstance(method, am.JPDA):
         return jpda_by_hand(detections, method, model)[0]
+    if getattr(method, "window", 1) > 1:
+        return trees_by_hand(detections, method, model)[0]
     return track_by_hand(detections, method, model)
 
 

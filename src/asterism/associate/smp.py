@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from asterism.model import Detections
 
 __all__ = ["SMP"]
+
+MAX_WAYS = 30
+PRUNE_ODDS = 1e6
+"""With a window: so many ways on are followed of each track, none so many times less likely."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +49,11 @@ class SMP(FrameByFrame):
     merged_within : float
         With a capacity above 1, greatest distance of a further detection from the one that the
         track likes best, metres.
+    window : int
+        Preferences from so many frames, 1 to 16 (past history, §5.6): a frame is decided when
+        `window` frames have come. A track then ranks the frame's detections by the likelihood of the
+        best way on from each through the window, a detection ranks tracks by their mean squared
+        distance along it. Until then labels are what would be decided now, and may change.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
     """
@@ -52,6 +62,7 @@ class SMP(FrameByFrame):
     strict: bool = False
     capacity: int = 1
     merged_within: float = 0.02
+    window: int = 1
 
     name: ClassVar[str] = "smp"
 
@@ -64,22 +75,40 @@ class SMP(FrameByFrame):
             raise ParameterError("strict", "True or False", repr(self.strict))
         check_number("capacity", self.capacity, above=1, below=64, closed=True, integer=True)
         check_number("merged_within", self.merged_within, above=0)
+        check_number("window", self.window, above=1, below=16, closed=True, integer=True)
         if self.strict and self.capacity > 1:
             raise ParameterError("capacity", "1, as strict=True is given", self.capacity)
+        if self.window > 1 and (self.strict or self.capacity > 1):
+            given = "strict=True" if self.strict else f"capacity={self.capacity}"
+            raise ParameterError("window", f"1, as {given} is given", self.window)
 
     def _tracker(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
-    ) -> _engine.FrameTracker:
+    ) -> _engine.FrameTracker | _engine.TreeTracker:
         from asterism import _engine
 
-        return _engine.FrameTracker(
-            motion,
-            score,
-            life,
-            matcher=1 if self.proposers == "tracks" else 2,
-            is_strict=self.strict,
-            capacity=self.capacity,
-            merged_within=self.merged_within,
+        matcher = 1 if self.proposers == "tracks" else 2
+        if self.window == 1:
+            return _engine.FrameTracker(
+                motion,
+                score,
+                life,
+                matcher=matcher,
+                is_strict=self.strict,
+                capacity=int(self.capacity),
+                merged_within=self.merged_within,
+            )
+        ways = _engine.BranchOptions(
+            window=int(self.window),
+            max_branches=MAX_WAYS,
+            merge_last=2,
+            prune_drop=math.log(PRUNE_ODDS),
+            fading=1.0,
+            delta=np.empty(0),  # no χ² test
+            z=0.0,
+        )
+        return _engine.TreeTracker(
+            motion, score, life, ways, resolver=matcher, is_independent=False
         )
 
     def step(self, state: FrameState, time: float, points: ArrayLike) -> tuple[FrameState, Update]:

@@ -30,12 +30,15 @@ class TrackSplitting(FrameByFrame):
     branch has the probability α. With ``ρ = 1``, as in the report, ``δ(k)`` is the χ² quantile of
     ``k D`` degrees of freedom. A χ² test over a whole life loses every track at last where the noise
     is but slightly greater than the model's, so by default the past fades: ``δ(k)`` is then the
-    quantile of the χ² distribution with the mean and variance of the sum.
+    quantile of the χ² distribution with the mean and variance of the sum. The report's α is 0.01:
+    of right branches one in a hundred is then lost in every frame.
 
     Branches also end when they are far less likely than the tree's best, when their last detections
     are those of a likelier one, and beyond a number. A frame is decided when `window` frames have
     come: trees that want the same detection are resolved by assignment over their best branches.
-    Until then labels are what would be decided now, and may change.
+    Until then labels are what would be decided now, and may change. What other trees expect of a
+    frame that is not decided yet counts against taking it (linear multitarget; Musicki & La Scala
+    2008).
 
     The confidence of a label is the share of its tree's branches, weighed by their likelihood, that
     agree with it; other trees have no part in it.
@@ -56,7 +59,8 @@ class TrackSplitting(FrameByFrame):
         A branch ends when it is so many times less likely than its tree's best.
     independent : bool
         Whether each tree goes on with what it likes best though another has it, as in the report:
-        then only the labels are resolved, and two trees may follow one marker.
+        then only the labels are resolved, trees know nothing of each other, and two may follow one
+        marker.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
 
@@ -68,11 +72,11 @@ class TrackSplitting(FrameByFrame):
     8
     """
 
-    alpha: float = 0.01
-    fading: float = 0.9
-    window: int = 5
+    alpha: float = 1e-9
+    fading: float = 0.5
+    window: int = 3
     max_branches: int = 30
-    merge_last: int = 3
+    merge_last: int = 2
     prune_odds: float = 1e6
     independent: bool = False
 
