@@ -124,6 +124,21 @@ nb::tuple tracks(const Tracker& tracker) {
                         covariances.give({K, n, n}));
 }
 
+// λ of the believed tracks and the number of detections in it, in the order of `tracks`.
+nb::tuple chi2(const TreeTracker& tracker) {
+  std::size_t K = 0;
+  for (const auto& t : tracker.live().tracks) K += t.is_confirmed();
+  Owned<double> lambda(K);
+  Owned<std::int64_t> n_updates(K);
+  std::size_t k = 0;
+  for (const auto& t : tracker.live().tracks) {
+    if (!t.is_confirmed()) continue;
+    lambda.data[k] = t.more.lambda;
+    n_updates.data[k++] = t.more.n_updates;
+  }
+  return nb::make_tuple(lambda.give({K}), n_updates.give({K}));
+}
+
 template <typename Tracker>
 nb::class_<Tracker> bind(nb::module_& module, const char* name) {
   return nb::class_<Tracker>(module, name)
@@ -212,6 +227,7 @@ void bind_trackers(nb::module_& module) {
           "delta"_a, "z"_a);
 
   bind<TreeTracker>(module, "TreeTracker")
+      .def("chi2", &chi2)
       .def(
           "__init__",
           [](TreeTracker* self, const MotionModel& model, const ScoreModel& score,

@@ -169,6 +169,7 @@ class TreeTracker(_Tracker):
         resolver: int,
         is_independent: bool,
     ) -> None: ...
+    def chi2(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]: ...
 
 def score_tracks(
     model: MotionModel,

@@ -82,10 +82,16 @@ class FrameState:
         -------
         dict
             ``ids (k,)``, ``gaps (k,)`` frames since the last detection, ``log_odds (k,)`` that the
-            marker exists, ``means (k, D, n)`` and ``covariances (k, n, n)`` of the state, SI units.
+            marker exists, ``means (k, D, n)`` and ``covariances (k, n, n)`` of the state, SI units;
+            of tracks with branches also ``chi2 (k,)`` λ and ``updates (k,)`` detections so far.
         """
+        from asterism import _engine
+
         names = ("ids", "gaps", "log_odds", "means", "covariances")
-        return dict(zip(names, self.tracker.tracks(), strict=True))
+        live: dict[str, NDArray[Any]] = dict(zip(names, self.tracker.tracks(), strict=True))
+        if isinstance(self.tracker, _engine.TreeTracker):
+            live |= zip(("chi2", "updates"), self.tracker.chi2(), strict=True)
+        return live
 
 
 @dataclass(frozen=True, kw_only=True)
