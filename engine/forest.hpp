@@ -14,6 +14,7 @@
 
 #include "assignment.hpp"
 #include "branches.hpp"
+#include "joint_events.hpp"
 #include "live_tracks.hpp"
 #include "marriage_market.hpp"
 
@@ -74,7 +75,8 @@ class Forest {
   struct Way {
     std::int32_t column = -1;  // -1: missed
     double worth = 0, crowding = 0;
-    double share = 0;  // of the weight of all branches
+    double log_weight = 0;   // of all its branches
+    double probability = 0;  // that this way is right, over all ways of sharing out the frame
     std::int32_t branch = -1;  // -1: no branch is left that misses
   };
 
@@ -86,8 +88,11 @@ class Forest {
     ways_.resize(live.size());
     is_taken_.assign(frame->points.size(), 0);
     count_shared(*frame, stats);
-    match_all(*frame, true, stats);
-    match_all(*frame, false, stats);
+    for (std::size_t i = 0; i < live.size(); ++i) list_ways(*frame, i);
+    for (const bool confirmed : {true, false}) {
+      if (opt_.resolver == Resolver::assignment) weigh_ways(*frame, confirmed, stats);
+      match_all(*frame, confirmed, stats);
+    }
     say_free(*frame, label);
     for (std::size_t i = 0; i < live.size(); ++i) follow(*frame, i, stats, label);
     live.end_tracks();
@@ -105,28 +110,57 @@ class Forest {
     const BranchGrower grower(live, branches_);
     const LiveTrack<Tree>& track = live[i];
     std::vector<Way>& ways = ways_[i];
-    ways.assign(1, {});
-    double most = -std::numeric_limits<double>::infinity(), total = 0;
-    for (const Branch& b : track.more.branches) most = std::max(most, grower.worth(b));
+    const double most = grower.worth(track.more.branches.front());  // the best comes first
     // Where every branch that misses was pruned, it would have been worth no more than this.
-    ways[0].worth = most - branches_.prune_drop;
+    const double pruned = most - branches_.prune_drop;
+    ways.assign(1, Way{.worth = pruned, .log_weight = std::exp(pruned - most)});
     for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
       const Branch& b = track.more.branches[k];
       const std::int32_t column = b.taken(frame.number);
-      const double worth = grower.worth(b), weight = std::exp(worth - most);
+      const double worth = grower.worth(b);
       auto way = std::find_if(ways.begin(), ways.end(), [&](const Way& w) { return w.column == column; });
       if (way == ways.end()) way = ways.insert(ways.end(), Way{.column = column});
-      total += weight;
-      way->share += weight;
-      if (way->branch >= 0) continue;  // branches come with the best first
-      way->branch = static_cast<std::int32_t>(k);
-      // The frame is shared out now: what others expect of it counts by their own ways.
-      way->crowding = column < 0 ? 0 : frame.crowding(track.more.key, column);
-      way->worth = worth + way->crowding;
+      if (way->branch < 0) {
+        // The frame is shared out now: what others expect of it counts by their own ways.
+        way->branch = static_cast<std::int32_t>(k);
+        way->crowding = column < 0 ? 0 : frame.crowding(track.more.key, column);
+        way->worth = worth + way->crowding;
+        way->log_weight = 0;
+      }
+      way->log_weight += std::exp(worth - most);
     }
-    for (Way& way : ways) way.share /= total;
+    for (Way& way : ways) way.log_weight = most + std::log(way.log_weight) + way.crowding;
     std::sort(ways.begin() + 1, ways.end(),
               [](const Way& a, const Way& b) { return a.column < b.column; });
+  }
+
+  // The probability of every way of the believed tracks, or of the tentative ones given that they
+  // are markers: marginals over all that the frame may be, each way with the weight of its branches.
+  void weigh_ways(const WindowFrame& frame, bool confirmed, FrameStats& stats) {
+    pairings_.clear();
+    gains_.clear();
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      if (live[i].is_confirmed() != confirmed) continue;
+      for (std::size_t k = 1; k < ways_[i].size(); ++k) {
+        const Way& way = ways_[i][k];
+        const double gain = way.log_weight - ways_[i][0].log_weight;
+        if (is_taken_[way.column] || !(gain > kNegligible) || !std::isfinite(gain)) continue;
+        pairings_.push_back({static_cast<std::int32_t>(i), way.column, gain, 0});
+        gains_.push_back(gain);
+      }
+    }
+    marginals_.resize(pairings_.size());
+    missed_.resize(live.size());
+    best_.resize(live.size());
+    log_miss_.assign(live.size(), 0);
+    JointEvents events(pairings_, gains_, log_miss_,
+                       static_cast<std::int32_t>(frame.points.size()), kMaxStates);
+    const JointSummary summary = events.solve(marginals_, missed_, best_);
+    stats.n_beams += summary.n_beams;
+    stats.bound = std::max(stats.bound, summary.bound);
+    for (std::size_t e = 0; e < pairings_.size(); ++e)
+      for (Way& way : ways_[pairings_[e].row])
+        if (way.column == pairings_[e].column) way.probability = marginals_[e];
   }
 
   // For a tentative track, weighed with the odds that it is a marker at all.
@@ -143,7 +177,6 @@ class Forest {
     for (std::size_t i = 0; i < live.size(); ++i) {
       const LiveTrack<Tree>& track = live[i];
       if (track.is_confirmed() != confirmed) continue;
-      list_ways(frame, i);
       const double missed = odds(track, ways_[i][0]);
       for (std::size_t k = 1; k < ways_[i].size(); ++k) {
         const Way& way = ways_[i][k];
@@ -195,7 +228,7 @@ class Forest {
     free_.assign(frame.points.size(), 1);
     for (std::size_t i = 0; i < live.size(); ++i)
       for (const Way& way : ways_[i])
-        if (way.column >= 0 && live[i].is_confirmed()) free_[way.column] *= 1 - way.share;
+        if (way.column >= 0 && live[i].is_confirmed()) free_[way.column] -= way.probability;
     for (std::size_t j = 0; j < frame.points.size(); ++j)
       label(frame.first + static_cast<std::int64_t>(j), -1, std::clamp(free_[j], 0.0, 1.0));
   }
@@ -221,7 +254,7 @@ class Forest {
     }
     if (j >= 0) {
       const Point last = track.last;
-      live.take(i, j, last, frame.time, way_to(i, j)->share, label);
+      live.take(i, j, last, frame.time, way_to(i, j)->probability, label);
     } else {
       ++track.gap;
     }
@@ -245,6 +278,9 @@ class Forest {
       grower.grow(*frame, track, ++n, stats);
   }
 
+  static constexpr double kNegligible = -27.6;  // log of a weight, of a miss of 1, not looked at
+  static constexpr std::int64_t kMaxStates = 4096;  // of the sum over what a frame may be
+
   BranchOptions branches_;
   ForestOptions opt_;
   std::vector<std::shared_ptr<const WindowFrame>> window_;
@@ -255,7 +291,9 @@ class Forest {
   std::vector<std::vector<Way>> ways_;
   std::vector<char> is_taken_;
   std::vector<double> free_;
-  std::vector<Candidate> candidates_;
+  std::vector<Candidate> candidates_, pairings_;
+  std::vector<double> gains_, marginals_, missed_, log_miss_;
+  std::vector<std::int32_t> best_;
   std::vector<Pair> extras_;
   Assignment assignment_;
 };

@@ -14,6 +14,7 @@ from scipy.stats import chi2
 import asterism as am
 from asterism.associate.track_splitting import chi2_limits
 from frame_oracle import OneTrack, pair, propose
+from jpda_oracle import components, marginals_of
 
 
 class Branch(OneTrack):
@@ -140,32 +141,49 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
 
     def ways(t: int, track: Branch):
         best: dict[int, Branch] = {}
-        share: dict[int, float] = {}
+        weight: dict[int, float] = {}
         top = max(map(worth, track.branches))
         for b in track.branches:
             j = b.path[t]
             best.setdefault(j, b)
-            share[j] = share.get(j, 0.0) + math.exp(worth(b) - top)
-        total = sum(share.values())
+            extra = crowding(t, track.key, j) if j >= 0 else 0.0
+            weight[j] = weight.get(j, 0.0) + math.exp(worth(b) - top + extra)
+        weight.setdefault(-1, math.exp(-o.drop))
         missed = top - o.drop
         if -1 in best:
             missed = odds(track, best[-1], 0.0)
         elif track.id < 0:
             missed = float(np.logaddexp(0, missed))
-        return best, {j: weight / total for j, weight in share.items()}, missed
+        return best, weight, missed
+
+    def probabilities(t: int, own: list[int], found, taken: set[int]):
+        """Marginals over all ways of sharing out the frame."""
+        weights = np.zeros((len(own), len(detections.frame(t))))
+        missed = np.array([found[i][1][-1] for i in own])
+        for row, i in enumerate(own):
+            for j, w in found[i][1].items():
+                if j >= 0 and j not in taken and w > math.exp(-27.6) * missed[row]:
+                    weights[row, j] = w
+        beta = np.zeros(weights.shape)
+        for rows in components(weights):
+            beta[rows] = marginals_of(weights[rows], missed[rows])[0][:, :-1]
+        return {i: beta[row] for row, i in enumerate(own)}
 
     def decide(t: int, later: list[int]) -> None:
         points, first = detections.frame(t), int(detections.offsets[t])
         taken: set[int] = set()
         match: dict[int, int] = {}
-        found = {}
+        found = {i: ways(t, track) for i, track in enumerate(tracks)}
+        sure: dict[int, np.ndarray] = {}
         for believed in (True, False):
+            own = [i for i, track in enumerate(tracks) if (track.id >= 0) == believed]
+            sure |= probabilities(t, own, found, taken)
             gains = np.full((len(tracks), len(points)), -np.inf)
             squares = np.full(gains.shape, np.inf)
             for i, track in enumerate(tracks):
                 if (track.id >= 0) != believed:
                     continue
-                best, share, missed = found[i] = ways(t, track)
+                best, _, missed = found[i]
                 for j, b in best.items():
                     if j < 0 or j in taken:
                         continue
@@ -177,10 +195,9 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
             taken |= set(match.values())
         free = np.ones(len(points))
         for i, track in enumerate(tracks):
-            for j, part in found[i][1].items():
-                if track.id >= 0 and j >= 0:
-                    free[j] *= 1 - part
-        confidence[first : first + len(points)] = free
+            if track.id >= 0:
+                free -= sure[i]
+        confidence[first : first + len(points)] = np.clip(free, 0, 1)
         for i, track in enumerate(tracks):
             j = match.get(i, -1)
             own = track.branches[0].path[t] if o.independent else j
@@ -197,13 +214,13 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
                 track.score += miss
             if j >= 0:
                 track.gap = 0
-                track.pending.append((first + j, found[i][1][j]))
+                track.pending.append((first + j, sure[i][j]))
                 if track.id < 0 and track.score >= confirm:
                     track.id = count["ids"]
                     count["ids"] += 1
                 if track.id >= 0:
-                    for detection, sure in track.pending:
-                        labels[detection], confidence[detection] = track.id, sure
+                    for detection, how_sure in track.pending:
+                        labels[detection], confidence[detection] = track.id, how_sure
                     track.pending = []
             else:
                 track.gap += 1

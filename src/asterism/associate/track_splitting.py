@@ -40,8 +40,10 @@ class TrackSplitting(FrameByFrame):
     frame that is not decided yet counts against taking it (linear multitarget; Musicki & La Scala
     2008).
 
-    The confidence of a label is the share of its tree's branches, weighed by their likelihood, that
-    agree with it; other trees have no part in it.
+    The confidence of a label is its probability when the frame is decided: the marginal over all
+    ways of sharing it out, each pairing weighed with the tree's branches through it
+    (`joint_marginals`). ``info["bound"]`` says how far off it may be where a group was too large to
+    be summed exactly.
 
     Parameters
     ----------
@@ -122,6 +124,8 @@ class TrackSplitting(FrameByFrame):
             "cut_branches": stats.n_cut,
             "dropped_branches": stats.n_limited,
             "shared_detections": stats.n_shared,
+            "approximate_groups": stats.n_beams,
+            "bound": stats.bound,
         }
 
 
