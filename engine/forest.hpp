@@ -75,6 +75,7 @@ class Forest {
   struct Way {
     std::int32_t column = -1;  // -1: missed
     double worth = 0, crowding = 0;
+    double newborn = -std::numeric_limits<double>::infinity();  // what it is worth to someone new
     double log_weight = 0;   // of all its branches
     double probability = 0;  // that this way is right, over all ways of sharing out the frame
     std::int32_t branch = -1;  // -1: no branch is left that misses
@@ -130,8 +131,31 @@ class Forest {
       way->log_weight += std::exp(worth - most);
     }
     for (Way& way : ways) way.log_weight = most + std::log(way.log_weight) + way.crowding;
+    if (track.is_confirmed() && ways.size() > 1) weigh_newborn(frame, track, ways);
     std::sort(ways.begin() + 1, ways.end(),
               [](const Way& a, const Way& b) { return a.column < b.column; });
+  }
+
+  // A believed track that takes a detection and all that follows may be mistaken: it may be gone,
+  // and these be the first of a new marker. That a single detection is one counts where it is left
+  // over; what the window adds is its future.
+  void weigh_newborn(const WindowFrame& frame, const LiveTrack<Tree>& track,
+                     std::vector<Way>& ways) const {
+    MotionState state = track.state;
+    predict(live.m, frame.step, state);
+    const Prediction prediction(live.m, state);
+    const std::int32_t n_missed = std::min(n_open() + 1, live.sm.max_gap - track.gap);
+    const double gone = track.score + n_missed * live.miss_gain();
+    const double over = live.leftover_gain();
+    std::array<double, kMaxModes> each{};
+    for (std::size_t k = 1; k < ways.size(); ++k) {
+      const Branch& b = track.more.branches[ways[k].branch];
+      const double hit =
+          live.hit_gain() + prediction.log_likelihood(frame.points[ways[k].column], each);
+      const double future = b.score + ways[k].crowding - track.score - hit - over * (b.n_taken - 1);
+      if (future > 0)
+        ways[k].newborn = gone + live.birth_gain() - over + future + std::log1p(-std::exp(-future));
+    }
   }
 
   // The probability of every way of the believed tracks, or of the tentative ones given that they
@@ -143,7 +167,7 @@ class Forest {
       if (live[i].is_confirmed() != confirmed) continue;
       for (std::size_t k = 1; k < ways_[i].size(); ++k) {
         const Way& way = ways_[i][k];
-        const double gain = way.log_weight - ways_[i][0].log_weight;
+        const double gain = way.log_weight - log_sum(ways_[i][0].log_weight, way.newborn);
         if (is_taken_[way.column] || !(gain > kNegligible) || !std::isfinite(gain)) continue;
         pairings_.push_back({static_cast<std::int32_t>(i), way.column, gain, 0});
         gains_.push_back(gain);
@@ -163,6 +187,10 @@ class Forest {
         if (way.column == pairings_[e].column) way.probability = marginals_[e];
   }
 
+  static double log_sum(double a, double b) {
+    return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
+  }
+
   // For a tentative track, weighed with the odds that it is a marker at all.
   double odds(const LiveTrack<Tree>& track, const Way& way) const {
     if (track.is_confirmed()) return way.worth;
@@ -180,7 +208,7 @@ class Forest {
       const double missed = odds(track, ways_[i][0]);
       for (std::size_t k = 1; k < ways_[i].size(); ++k) {
         const Way& way = ways_[i][k];
-        const double gain = odds(track, way) - missed;
+        const double gain = odds(track, way) - log_sum(missed, way.newborn);
         if (is_taken_[way.column] || !(gain > 0) || !std::isfinite(gain)) continue;
         candidates_.push_back({static_cast<std::int32_t>(i), way.column, gain,
                                mean_distance2(track.more.branches[way.branch])});

@@ -29,7 +29,7 @@ def crowd_model(motion: am.Motion | None = None) -> am.TrackingModel:
     [
         am.TrackSplitting(window=1),
         am.TrackSplitting(),
-        am.TrackSplitting(window=5, alpha=0.05, fading=1.0, max_branches=6),
+        am.TrackSplitting(window=5, alpha=0.05, fading=1.0, max_branches=6, merge_last=2),
         am.TrackSplitting(window=4, independent=True),
         am.TrackSplitting(window=6, prune_odds=20, merge_last=1),
         am.SMP(window=2),
@@ -311,6 +311,26 @@ def test_what_comes_later_decides_between_two_ways():
     assert wins["splitting"] > wins["gnn"] + 0.05 * n
     assert wins["smp of the past"] > wins["smp"] + 0.05 * n
     assert wins["splitting"] > 0.75 * n
+
+
+def test_confidence_is_calibrated_where_the_model_is_right():
+    right, sure = [], []
+    for seed in range(40):
+        truth = crowd(100 + seed, spread=0.1)
+        model = small_model(
+            motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
+            clutter_density=1.0 / (4 * np.pi / 3 * 0.3**3), birth_density=1e-2,
+            p_disappear=1e-4, max_gap=6, max_speed=1.5,
+        )  # fmt: skip
+        tracks = am.track(truth.detections, am.TrackSplitting(), model=model)
+        order, _ = tracks.by_track
+        is_link = np.diff(tracks.labels[order]) == 0
+        a, b = order[:-1][is_link], order[1:][is_link]
+        right.append(truth.labels[a] == truth.labels[b])
+        sure.append(tracks.confidence[b])
+    found = am.calibration(np.concatenate(sure), np.concatenate(right))
+    assert found.auc > 0.85
+    assert found.ece < 0.015
 
 
 def test_limits_on_branches_are_kept_and_told():

@@ -52,7 +52,7 @@ class Options:
             self.drop = math.log(method.prune_odds)
         else:
             self.limits, self.fading, self.independent = [math.inf] * 5000, 1.0, False
-            self.most, self.merge, self.drop = 30, 2, math.log(1e6)
+            self.most, self.merge, self.drop = 30, method.window, math.log(1e6)
 
 
 def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
@@ -139,7 +139,7 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
             return worth(b) + extra
         return float(np.logaddexp(0, b.score + extra)) - b.n_taken * over
 
-    def ways(t: int, track: Branch):
+    def ways(t: int, n_open: int, track: Branch):
         best: dict[int, Branch] = {}
         weight: dict[int, float] = {}
         top = max(map(worth, track.branches))
@@ -154,7 +154,22 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
             missed = odds(track, best[-1], 0.0)
         elif track.id < 0:
             missed = float(np.logaddexp(0, missed))
-        return best, weight, missed
+        new = {j: newborn(t, n_open, track, b) for j, b in best.items() if j >= 0}
+        scaled = {j: math.exp(v - top) for j, v in new.items()}
+        return best, weight, missed, new, scaled
+
+    def newborn(t: int, n_open: int, track: Branch, b: Branch) -> float:
+        """What a way is worth to a marker that begins there, the track being gone."""
+        if track.id < 0:
+            return -math.inf
+        j = b.path[t]
+        expected = track.fork()
+        expected.predict(step_to(t))
+        own = hit + math.log(expected.densities(detections.frame(t)[j]).sum())
+        gone = track.score + min(n_open, p.max_gap - track.gap) * miss
+        future = b.score + crowding(t, track.key, j) - track.score - own - over * (b.n_taken - 1)
+        birth = math.log(p.birth_density * s.p_detection / s.clutter_density)
+        return gone + birth - over + math.log(math.expm1(future)) if future > 0 else -math.inf
 
     def probabilities(t: int, own: list[int], found, taken: set[int]):
         """Marginals over all ways of sharing out the frame."""
@@ -162,7 +177,11 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
         missed = np.array([found[i][1][-1] for i in own])
         for row, i in enumerate(own):
             for j, w in found[i][1].items():
-                if j >= 0 and j not in taken and w > math.exp(-27.6) * missed[row]:
+                if j < 0 or j in taken:
+                    continue
+                # An event without the pair weighs as much as the miss and the newborn together.
+                w *= missed[row] / (missed[row] + found[i][4][j])
+                if w > math.exp(-27.6) * missed[row]:
                     weights[row, j] = w
         beta = np.zeros(weights.shape)
         for rows in components(weights):
@@ -173,7 +192,7 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
         points, first = detections.frame(t), int(detections.offsets[t])
         taken: set[int] = set()
         match: dict[int, int] = {}
-        found = {i: ways(t, track) for i, track in enumerate(tracks)}
+        found = {i: ways(t, 1 + len(later), track) for i, track in enumerate(tracks)}
         sure: dict[int, np.ndarray] = {}
         for believed in (True, False):
             own = [i for i, track in enumerate(tracks) if (track.id >= 0) == believed]
@@ -183,11 +202,12 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
             for i, track in enumerate(tracks):
                 if (track.id >= 0) != believed:
                     continue
-                best, _, missed = found[i]
+                best, _, missed, new, _ = found[i]
                 for j, b in best.items():
                     if j < 0 or j in taken:
                         continue
-                    gain = odds(track, b, crowding(t, track.key, j)) - missed
+                    gain = odds(track, b, crowding(t, track.key, j))
+                    gain -= float(np.logaddexp(missed, new[j]))
                     if gain > 0:
                         gains[i, j] = gain
                         squares[i, j] = sum(b.squares.values()) / b.n_taken

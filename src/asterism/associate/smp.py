@@ -101,7 +101,7 @@ class SMP(FrameByFrame):
         ways = _engine.BranchOptions(
             window=int(self.window),
             max_branches=MAX_WAYS,
-            merge_last=2,
+            merge_last=int(self.window),
             prune_drop=math.log(PRUNE_ODDS),
             fading=1.0,
             delta=np.empty(0),  # no χ² test

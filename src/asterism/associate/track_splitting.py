@@ -56,7 +56,9 @@ class TrackSplitting(FrameByFrame):
     max_branches : int
         Most branches of a tree.
     merge_last : int
-        Of branches that share their last so many frames the likeliest is kept.
+        Of branches that share their last so many frames the likeliest is kept. Fewer than `window`
+        saves time; but what is decided next may have lost its alternatives then, and the confidence
+        is too high.
     prune_odds : float
         A branch ends when it is so many times less likely than its tree's best.
     independent : bool
@@ -78,7 +80,7 @@ class TrackSplitting(FrameByFrame):
     fading: float = 0.5
     window: int = 3
     max_branches: int = 30
-    merge_last: int = 2
+    merge_last: int = 8
     prune_odds: float = 1e6
     independent: bool = False
 
