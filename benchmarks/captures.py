@@ -10,14 +10,18 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import asterism as am
+from methods import METHODS, links
 from report import publish
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 ENDINGS = (".c3d", ".tsv", "recording_000", "drone2", "marker3")
-METHODS = (am.GNN(), am.SMP())
 
 
 def captures(folder: Path) -> list[Path]:
@@ -37,38 +41,29 @@ def corrupted(truth: am.Tracks) -> am.Tracks:
     return am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1)
 
 
-def row_of(
-    name: str, condition: str, truth: am.Tracks, estimate: am.ModelEstimate, seconds: float
-) -> list[list[str]]:
-    d = truth.detections
-    rows: list[list[str]] = []
-    max_gap = estimate.model.population.max_gap
-    floors = [am.evaluate(am.floor(truth, gap), truth).idf1 for gap in (10, max_gap)]
-    for method in METHODS:
+def score(
+    truth: am.Tracks, model: am.TrackingModel
+) -> tuple[dict[str, am.Evaluation], dict[str, float], dict[str, am.Tracks]]:
+    """Track by every method: how well, and how many frames a second."""
+    found: dict[str, am.Evaluation] = {}
+    speed: dict[str, float] = {}
+    results: dict[str, am.Tracks] = {}
+    for name, method in METHODS.items():
         start = time.perf_counter()
-        tracks = am.track(d, method, model=estimate.model)
-        taken = time.perf_counter() - start
-        e = am.evaluate(tracks, truth)
-        rows.append(
-            [
-                name,
-                condition,
-                method.name,
-                f"{e.idf1:.3f}",
-                f"{floors[0]:.3f}",
-                f"{floors[1]:.3f} ({max_gap})",
-                f"{e.switches_per_1000:.2f}",
-                f"{e.wrong_links}, {e.broken_links}",
-                str(e.fragments),
-                f"{e.n_tracks}/{e.n_markers}",
-                "–"
-                if np.isnan(e.clutter_labelled_percent)
-                else f"{e.clutter_labelled_percent:.1f}",
-                f"{d.n_frames / taken:,.0f}",
-                f"{seconds:.1f}",
-            ]
-        )
-    return rows
+        results[name] = am.track(truth.detections, method, model=model)
+        speed[name] = truth.detections.n_frames / (time.perf_counter() - start)
+        found[name] = am.evaluate(results[name], truth)
+    return found, speed, results
+
+
+def details(e: am.Evaluation) -> list[str]:
+    clutter = e.clutter_labelled_percent
+    return [
+        f"{e.wrong_links}, {e.broken_links}",
+        str(e.fragments),
+        f"{e.n_tracks}/{e.n_markers}",
+        "–" if np.isnan(clutter) else f"{clutter:.1f}",
+    ]
 
 
 def unlabelled_row(path: Path, capture: am.Capture) -> list[str]:
@@ -110,8 +105,13 @@ def main() -> None:
     parser.add_argument("--only", default="")
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
-    rows: list[list[str]] = []
+    conditions = {"as captured": named_only, "corrupted": corrupted}
+    scores: list[list[str]] = []
+    more: list[list[str]] = []
     unlabelled: list[list[str]] = []
+    idf1: dict[tuple[str, str], list[float]] = {}
+    switches: dict[tuple[str, str], list[float]] = {}
+    confidence: dict[str, list[tuple[NDArray[np.float64], NDArray[np.bool_]]]] = {}
     for path in captures(options.data):
         if options.only not in path.name:
             continue
@@ -119,34 +119,66 @@ def main() -> None:
         if not any(capture.names):
             unlabelled.append(unlabelled_row(path, capture))
             continue
-        for condition, truth in (
-            ("as captured", named_only(capture.tracks)),
-            ("corrupted", corrupted(capture.tracks)),
-        ):
+        for condition, make in conditions.items():
+            truth = make(capture.tracks)
             start = time.perf_counter()
-            estimate = am.estimate_model(truth.detections)
-            new = row_of(path.name, condition, truth, estimate, time.perf_counter() - start)
-            rows += new
-            print(*(" ".join(r) for r in new), sep="\n", flush=True)
-    head = [
-        "capture", "condition", "method", "IDF1", "floor 10", "floor d̄ (d̄)", "switches / 1000",
-        "links wrong, broken", "fragments", "tracks/true", "clutter labelled %", "frames/s",
-        "estimate s",
-    ]  # fmt: skip
-    lines = [*table(head, rows), ""]
-    mean_head = ["condition", "method", "mean IDF1", "mean floor 10", "mean switches / 1000"]
-    means: list[list[str]] = []
-    for condition in ("as captured", "corrupted"):
-        for method in METHODS:
-            own = [row for row in rows if row[1] == condition and row[2] == method.name]
-            figures = (np.mean([float(row[i]) for row in own]) for i in (3, 4, 6))
-            means.append([condition, method.name, *(f"{figure:.3f}" for figure in figures)])
-    lines += [*table(mean_head, means), ""]
+            model = am.estimate_model(truth.detections).model
+            seconds = time.perf_counter() - start
+            gap = model.population.max_gap
+            floors = [am.evaluate(am.floor(truth, g), truth).idf1 for g in (10, gap)]
+            found, speed, results = score(truth, model)
+            row = [path.name, condition, f"{floors[0]:.3f}", f"{floors[1]:.3f} ({gap})"]
+            for name, e in found.items():
+                row.append(f"{e.idf1:.3f} ({e.switches_per_1000:.2f})")
+                idf1.setdefault((condition, name), []).append(e.idf1)
+                switches.setdefault((condition, name), []).append(e.switches_per_1000)
+                more.append(
+                    [
+                        path.name,
+                        condition,
+                        name,
+                        *details(e),
+                        f"{speed[name]:,.0f}",
+                        f"{seconds:.1f}",
+                    ]
+                )
+                sure = results[name].confidence
+                if sure is not None:
+                    later, is_right = links(results[name], truth)
+                    confidence.setdefault(name, []).append((sure[later], is_right))
+            scores.append(row)
+            print(*row, flush=True)
+    for condition in conditions:
+        row = ["**mean**", condition, "", ""]
+        for name in METHODS:
+            key = (condition, name)
+            row.append(f"**{np.mean(idf1[key]):.3f}** ({np.mean(switches[key]):.2f})")
+        scores.append(row)
+    lines = ["IDF1, and switches for 1000 detections:", ""]
+    head = ["capture", "condition", "floor 10", "floor d̄ (d̄)", *METHODS]
+    lines += [*table(head, scores), ""]
+    lines += ["Confidence of the links of all captures, where a method has any:", ""]
+    rows: list[list[str]] = []
+    for name, parts in confidence.items():
+        sure, right = (np.concatenate(side) for side in zip(*parts, strict=True))
+        c = am.calibration(sure, right)
+        rows.append(
+            [name, f"{len(right):,}", f"{int((~right).sum()):,}", f"{c.ece:.4f}", f"{c.auc:.3f}"]
+        )
+    head = ["method", "links", "wrong", "expected calibration error", "AUC for wrong links"]
+    lines += [*table(head, rows), ""]
+    lines += ["Captures without truth:", ""]
     lines += table(
-        ["unlabelled capture", "frames", "points", "tracks", "clutter %",
+        ["capture", "frames", "points", "tracks", "clutter %",
          "links parted inside the recorder's pieces", "frames/s", "estimate s"],
         unlabelled,
     )  # fmt: skip
+    lines += ["", "All that was counted:", ""]
+    head = [
+        "capture", "condition", "method", "links wrong, broken", "fragments", "tracks/true",
+        "clutter labelled %", "frames/s", "estimate s",
+    ]  # fmt: skip
+    lines += table(head, more)
     publish(lines, options.markdown)
 
 

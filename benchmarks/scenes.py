@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 import asterism as am
+from methods import METHODS, links
 from report import conditions, publish
-
-METHODS = (am.GNN(), am.SMP())
 
 # What is made, and the noise in metres; a rig where the scene is also seen through cameras.
 CASES: dict[str, tuple[str, dict[str, Any], float, bool]] = {
@@ -53,8 +52,14 @@ def sensed(case: str, seed: int, *, through_cameras: bool) -> am.Tracks:
     return am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=noise, rig=rig, seed=seed)
 
 
-def rows_of(case: str, seeds: int, *, through_cameras: bool) -> list[list[str]]:
-    found: dict[str, list[tuple[float, ...]]] = {method.name: [] for method in METHODS}
+Confidence = dict[str, list[tuple[Any, Any]]]
+
+
+def row_of(
+    case: str, seeds: int, confidence: Confidence, *, through_cameras: bool
+) -> tuple[list[str], list[str]]:
+    """Give the scores of every method, and the tracks that each found for one marker."""
+    found: dict[str, list[tuple[float, ...]]] = {name: [] for name in METHODS}
     floors: list[float] = []
     seen: list[float] = []
     for seed in range(seeds):
@@ -63,17 +68,40 @@ def rows_of(case: str, seeds: int, *, through_cameras: bool) -> list[list[str]]:
         floor = am.floor(truth, model.population.max_gap)
         floors.append(am.evaluate(floor, truth).idf1)
         seen.append(float((truth.labels >= 0).sum()) / truth.detections.n_frames / truth.n_tracks)
-        for method in METHODS:
-            e = am.evaluate(am.track(truth.detections, method, model=model), truth)
+        for name, method in METHODS.items():
+            tracks = am.track(truth.detections, method, model=model)
+            e = am.evaluate(tracks, truth)
             figures = (e.idf1, e.switches_per_1000, e.n_tracks / e.n_markers)
-            found[method.name].append(figures)
-    name = f"{case}, 4 cameras" if through_cameras else case
-    row = [name, f"{100 * np.mean(seen):.0f} %", f"{np.mean(floors):.3f}"]
-    for method in METHODS:
-        idf1, switches, tracks = np.array(found[method.name]).T
-        row += [f"{idf1.mean():.3f} ± {idf1.std():.3f}", f"{switches.mean():.1f}"]
-        row += [f"{tracks.mean():.2f}"]
-    return [row]
+            found[name].append(figures)
+            if tracks.confidence is not None:
+                later, is_right = links(tracks, truth)
+                confidence.setdefault(name, []).append((tracks.confidence[later], is_right))
+    scene = f"{case}, 4 cameras" if through_cameras else case
+    row = [scene, f"{100 * np.mean(seen):.0f} %", f"{np.mean(floors):.3f}"]
+    each = [scene]
+    for name in METHODS:
+        idf1, switches, tracks = np.array(found[name]).T
+        row.append(f"{idf1.mean():.3f} ± {idf1.std():.3f} ({switches.mean():.1f})")
+        each.append(f"{tracks.mean():.2f}")
+    return row, each
+
+
+def table(head: list[str], rows: list[list[str]]) -> list[str]:
+    return [
+        "| " + " | ".join(head) + " |",
+        "|---|" + "---:|" * (len(head) - 1),
+        *("| " + " | ".join(row) + " |" for row in rows),
+    ]
+
+
+def reliability(confidence: Confidence) -> list[list[str]]:
+    rows: list[list[str]] = []
+    for name, parts in confidence.items():
+        sure, right = (np.concatenate(side) for side in zip(*parts, strict=True))
+        c = am.calibration(sure, right)
+        wrong = int((~right).sum())
+        rows.append([name, f"{len(right):,}", f"{wrong:,}", f"{c.ece:.4f}", f"{c.auc:.3f}"])
+    return rows
 
 
 def main() -> None:
@@ -83,20 +111,22 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
     rows: list[list[str]] = []
+    ratios: list[list[str]] = []
+    confidence: Confidence = {}
     for case, (_, _, _, has_cameras) in CASES.items():
         if options.only in case:
             for through_cameras in (False, True)[: 1 + has_cameras]:
-                rows += rows_of(case, options.seeds, through_cameras=through_cameras)
-                print(*rows[-1], flush=True)
-    head = ["scene", "seen", "floor d̄"]
-    for method in METHODS:
-        head += [f"{method.name} IDF1", "switches / 1000", "tracks/true"]
-    lines = ["| " + " | ".join(head) + " |", "|---|" + "---:|" * (len(head) - 1)]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
-    lines += [
-        "",
-        f"Means over {options.seeds} seeds, ± the standard deviation between them. {conditions()}.",
-    ]
+                row, each = row_of(case, options.seeds, confidence, through_cameras=through_cameras)
+                rows.append(row)
+                ratios.append(each)
+                print(*row, flush=True)
+    lines = ["IDF1 ± its standard deviation between seeds, and switches for 1000 detections:", ""]
+    lines += [*table(["scene", "seen", "floor d̄", *METHODS], rows), ""]
+    lines += ["Tracks found for each true one:", "", *table(["scene", *METHODS], ratios), ""]
+    lines += ["Confidence of the links of all scenes, where a method has any:", ""]
+    head = ["method", "links", "wrong", "expected calibration error", "AUC for wrong links"]
+    lines += [*table(head, reliability(confidence)), ""]
+    lines += [f"Means over {options.seeds} seeds. {conditions()}."]
     publish(lines, options.markdown)
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import asterism as am
+from methods import METHODS
 from peer import track_in_numpy
 from report import best_of, conditions, publish
 
@@ -73,10 +74,10 @@ def beside_the_loop(d: am.Detections, model: am.TrackingModel) -> list[str]:
 def row_of(capture: am.Tracks, n_markers: int, motions: int) -> list[str]:
     d, model = capture.detections, model_of(capture, motions)
     row = [str(n_markers), str(motions)]
-    for method in (am.GNN(), am.SMP()):
+    for method in METHODS.values():
         seconds = best_of(3, lambda m=method: am.track(d, m, model=model))
         idf1 = am.evaluate(am.track(d, method, model=model), capture).idf1
-        row += [f"{d.n_frames / seconds:,.0f}", f"{idf1:.4f}"]
+        row.append(f"{d.n_frames / seconds:,.0f} ({idf1:.4f})")
     taken = step_times(d, model)
     row += [f"{statistics.median(taken) * 1e3:.3f}", f"{np.quantile(taken, 0.99) * 1e3:.3f}"]
     return row + (beside_the_loop(d, model) if motions == 1 else ["–"] * 3)
@@ -117,8 +118,8 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
     head = [
-        "markers", "motions", "GNN frames/s", "IDF1", "SMP frames/s", "IDF1",
-        "step ms (median)", "(99 %)", "NumPy loop frames/s", "GNN against it", "same labels",
+        "markers", "motions", *(f"{name}: frames/s (IDF1)" for name in METHODS),
+        "GNN step ms (median)", "(99 %)", "NumPy loop frames/s", "GNN against it", "same labels",
     ]  # fmt: skip
     lines = ["| " + " | ".join(head) + " |", "|" + "---:|" * len(head)]
     lines += ["| " + " | ".join(row) + " |" for row in frames_a_second()]

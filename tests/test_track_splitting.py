@@ -71,7 +71,9 @@ def test_labels_for_the_time_being_are_those_of_the_frames_so_far(method):
         a, b = d.offsets[t], d.offsets[t + 1]
         said[a:b], said[update.revised] = update.labels, update.revised_labels
         n_revised += len(update.revised)
-        first = am.Detections(times=d.times[: t + 1], offsets=d.offsets[: t + 2], points=d.points[:b])
+        first = am.Detections(
+            times=d.times[: t + 1], offsets=d.offsets[: t + 2], points=d.points[:b]
+        )
         batch = am.track(first, method, model=model)
         assert (said[:b] == batch.labels).all()
         if batch.confidence is not None:
@@ -264,8 +266,7 @@ def test_trees_that_want_one_detection_are_told_and_resolved():
     n = 40
     path = np.stack([0.01 * np.arange(n), np.zeros(n), np.zeros(n)], axis=1)
     frames = [
-        [path[t], path[t] + [0, 0.03, 0]] if t < 20 else [path[t] + [0, 0.004, 0]]
-        for t in range(n)
+        [path[t], path[t] + [0, 0.03, 0]] if t < 20 else [path[t] + [0, 0.004, 0]] for t in range(n)
     ]
     model = small_model(
         motion=am.DWNA(acceleration_sigma=0.6, velocity_sigma=0.2), noise_sigma=0.005,

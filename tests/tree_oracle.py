@@ -75,7 +75,9 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
         return round(detections.times[t] - detections.times[t - 1], 9)
 
     def crowding(t: int, key: int, j: int) -> float:
-        return math.log1p(sum(v for (k, column), v in claims[t].items() if column == j and k != key))
+        return math.log1p(
+            sum(v for (k, column), v in claims[t].items() if column == j and k != key)
+        )
 
     def worth(b: Branch) -> float:
         return b.score - b.n_taken * over

@@ -51,8 +51,8 @@ class SMP(FrameByFrame):
         track likes best, metres.
     window : int
         Preferences from so many frames, 1 to 16 (past history, §5.6): a frame is decided when
-        `window` frames have come. A track then ranks the frame's detections by the likelihood of the
-        best way on from each through the window, a detection ranks tracks by their mean squared
+        `window` frames have come. A track then ranks the frame's detections by the likelihood of
+        the best way on from each through the window, a detection ranks tracks by their mean squared
         distance along it. Until then labels are what would be decided now, and may change.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.

@@ -28,10 +28,10 @@ class TrackSplitting(FrameByFrame):
     Each track is a tree. Along a branch ``λ(k) = ρ λ(k-1) + νᵀ S⁻¹ ν`` sums how far the detections
     lay from where they were expected; the branch is cut when ``λ(k) > δ(k)``, which for the right
     branch has the probability α. With ``ρ = 1``, as in the report, ``δ(k)`` is the χ² quantile of
-    ``k D`` degrees of freedom. A χ² test over a whole life loses every track at last where the noise
+    ``k D`` degrees of freedom. Over a whole life the test loses every track at last where the noise
     is but slightly greater than the model's, so by default the past fades: ``δ(k)`` is then the
     quantile of the χ² distribution with the mean and variance of the sum. The report's α is 0.01:
-    of right branches one in a hundred is then lost in every frame.
+    of right branches one in a hundred is beyond the limit in any frame.
 
     Branches also end when they are far less likely than the tree's best, when their last detections
     are those of a likelier one, and beyond a number. A frame is decided when `window` frames have
