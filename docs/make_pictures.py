@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import asterism as am
+from asterism import _engine
 from asterism.view import plot_coverage, plot_image, plot_lens, plot_rig
 from asterism.view.style import CYCLE
 
@@ -35,6 +36,34 @@ def crossing(path: Path) -> None:
         low, high = marked.min(axis=0), marked.max(axis=0)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
         axes.set_box_aspect(high - low, zoom=1.12)
+    figure.savefig(path)
+
+
+def proposals(path: Path) -> None:
+    """Draw how many proposals a stable marriage takes, beside n log n and n²."""
+    rng = np.random.default_rng(1)
+    sizes = np.unique(np.geomspace(4, 1024, 13).astype(int))
+    counts: list[list[int]] = []
+    for n in sizes:
+        first = np.arange(n + 1, dtype=np.int64) * n
+        counts.append([])
+        for _ in range(40):
+            lists = np.concatenate([rng.permutation(n) for _ in range(n)]).astype(np.int32)
+            counts[-1].append(_engine.marry(first, lists, rng.random(n * n), int(n))[1])
+    figure = Figure(figsize=(7, 4.2), dpi=110, layout="constrained")
+    axes: Any = figure.subplots()
+    harmonic = np.array([(1 / np.arange(1, n + 1)).sum() for n in sizes])
+    axes.fill_between(
+        sizes, [min(c) for c in counts], [max(c) for c in counts], color=CYCLE[0], alpha=0.25, lw=0,
+        label="least to most of 40 runs",
+    )  # fmt: skip
+    axes.plot(sizes, [np.mean(c) for c in counts], "o-", color=CYCLE[0], label="mean")
+    axes.plot(sizes, sizes * harmonic, "--", color=CYCLE[1], label="$n (1 + 1/2 + … + 1/n)$")
+    axes.plot(sizes, sizes**2, ":", color="#666666", label="$n^2$, the worst case")
+    axes.set(xscale="log", yscale="log", xlabel="tracks and detections, n", ylabel="proposals")
+    axes.set_title("proposals until a stable marriage, random lists", fontsize=11, loc="left")
+    axes.legend(frameon=False)
+    axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(path)
 
 
@@ -184,5 +213,5 @@ def scenes(path: Path) -> None:
 if __name__ == "__main__":
     images = Path(__file__).parent / "images"
     images.mkdir(exist_ok=True)
-    for picture in (crossing, lenses, film, rig, scenes):
+    for picture in (crossing, proposals, lenses, film, rig, scenes):
         picture(images / f"{picture.__name__}.png")

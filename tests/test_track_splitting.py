@@ -166,9 +166,9 @@ def test_alpha_is_the_rate_at_which_right_branches_are_lost(n_axes):
     assert abs(shares - alpha).max() < 3.5 * error
 
 
-def test_with_fading_alpha_is_kept_nearly():
+def test_with_fading_alpha_is_kept():
     shares = share_above(0.5, 0.05, 3, [2, 5, 20], 1200)
-    assert abs(shares - 0.05).max() < 3.5 * np.sqrt(0.05 * 0.95 / 1200) + 0.005
+    assert abs(shares - 0.05).max() < 3.5 * np.sqrt(0.05 * 0.95 / 1200)
 
 
 @pytest.mark.parametrize("alpha", [0.2, 0.05])
@@ -188,7 +188,7 @@ def test_a_branch_beyond_the_limit_is_cut(alpha):
 
 
 @pytest.mark.parametrize("n_axes", [2, 3])
-def test_limits_are_chi2_quantiles_and_fading_ones_nearly(n_axes):
+def test_limits_are_quantiles_of_the_sum(n_axes):
     limits = chi2_limits(0.01, n_axes, 1.0)
     k = np.array([1, 7, 400])
     assert limits[k - 1] == pytest.approx(chi2.isf(0.01, n_axes * k), rel=1e-12)
@@ -199,7 +199,7 @@ def test_limits_are_chi2_quantiles_and_fading_ones_nearly(n_axes):
         for k in range(1, len(limits) + 1):
             total = fading * total + rng.chisquare(n_axes, total.size)
             if k in (1, 3, len(limits)):
-                assert (total > limits[k - 1]).mean() == pytest.approx(0.01, rel=0.4)
+                assert (total > limits[k - 1]).mean() == pytest.approx(0.01, rel=0.1)
             if k > 60:
                 break
 
@@ -347,7 +347,8 @@ def test_limits_on_branches_are_kept_and_told():
 
 def test_options_are_checked():
     for wrong in (
-        {"alpha": 0}, {"alpha": 1}, {"fading": 0}, {"fading": 1.1}, {"window": 0}, {"window": 17},
+        {"alpha": 0}, {"alpha": 1}, {"fading": 0}, {"fading": 1.1}, {"fading": 0.995},
+        {"window": 0}, {"window": 17},
         {"window": 2.5}, {"max_branches": 0}, {"merge_last": 0}, {"prune_odds": 1},
         {"independent": 1},
     ):  # fmt: skip

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Gap", "Summary", "summarize"]
 
+DOUBTFUL = 0.9
+
 
 @dataclass(frozen=True, kw_only=True)
 class Gap:
@@ -56,6 +58,10 @@ class Summary:
         The longest of them, up to three.
     seconds, frames_per_second : float
         Time that the method took, and its pace.
+    n_doubtful : int or None
+        Detections whose label is held with less than `DOUBTFUL`; None from methods that do not say.
+    info : dict
+        What the method tells of itself; what was approximated, among others.
     """
 
     input: str
@@ -70,6 +76,8 @@ class Summary:
     longest_gaps: tuple[Gap, ...]
     seconds: float
     frames_per_second: float
+    n_doubtful: int | None
+    info: dict[str, float]
 
     def rows(self) -> list[tuple[str, str]]:
         """Give the figures as people read them."""
@@ -84,9 +92,25 @@ class Summary:
             ("clutter", str(self.n_clutter)),
             ("gaps bridged", str(self.n_gaps)),
             *((("longest gaps"), gap) if i == 0 else ("", gap) for i, gap in enumerate(gaps)),
+            *self._doubts(),
             ("time", f"{self.seconds:.3g} s, {self.frames_per_second:,.0f} frames/s"),
             ("written", self.output),
         ]
+
+    def _doubts(self) -> list[tuple[str, str]]:
+        rows: list[tuple[str, str]] = []
+        if self.n_doubtful is not None:
+            rows.append((f"labels held below {DOUBTFUL:.0%}", str(self.n_doubtful)))
+        if self.info.get("bound", 0) > 0:
+            groups = f"{self.info['approximate_groups']:.0f} groups too large for the exact sum"
+            text = f"{groups}; probabilities there off by at most {self.info['bound']:.2g}"
+            rows.append(("approximated", text))
+        if self.info.get("unguarded_groups", 0) > 0:
+            text = (
+                f"{self.info['unguarded_groups']:.0f} groups too large: moved by their best event"
+            )
+            rows.append(("guard against coalescence", text))
+        return rows
 
     def to_dict(self) -> dict[str, Any]:
         """Give the figures as plain values."""
@@ -136,4 +160,8 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
         ),
         seconds=seconds,
         frames_per_second=d.n_frames / seconds if seconds else 0.0,
+        n_doubtful=None
+        if tracks.confidence is None
+        else int((tracks.confidence[order] < DOUBTFUL).sum()),
+        info=dict(tracks.info),
     )

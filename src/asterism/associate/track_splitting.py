@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TrackSplitting", "chi2_limits"]
 
+MOST_FADING = 0.99
 _EXACT_LIMITS = 4096
 
 
@@ -30,7 +32,7 @@ class TrackSplitting(FrameByFrame):
     branch has the probability α. With ``ρ = 1``, as in the report, ``δ(k)`` is the χ² quantile of
     ``k D`` degrees of freedom. Over a whole life the test loses every track at last where the noise
     is but slightly greater than the model's, so by default the past fades: ``δ(k)`` is then the
-    quantile of the χ² distribution with the mean and variance of the sum. The report's α is 0.01:
+    quantile of a weighted sum of χ² variables. The report's α is 0.01:
     of right branches one in a hundred is beyond the limit in any frame.
 
     Branches also end when they are far less likely than the tree's best, when their last detections
@@ -50,7 +52,7 @@ class TrackSplitting(FrameByFrame):
     alpha : float
         α, the share of right branches that the χ² test cuts in a frame.
     fading : float
-        ρ, what is left of λ after a frame, above 0 to 1; 1 is the report's.
+        ρ, what is left of λ after a frame: 1 as in the report, or above 0 to 0.99.
     window : int
         Frames until one is decided, 1 to 16.
     max_branches : int
@@ -90,8 +92,8 @@ class TrackSplitting(FrameByFrame):
         super().__post_init__()
         check_number("alpha", self.alpha, above=0, below=1)
         check_number("fading", self.fading, above=0)
-        if self.fading > 1:
-            raise ParameterError("fading", "a number in (0, 1]", repr(self.fading))
+        if not (self.fading <= MOST_FADING or self.fading == 1):
+            raise ParameterError("fading", f"1, or at most {MOST_FADING}", repr(self.fading))
         check_number("window", self.window, above=1, below=16, closed=True, integer=True)
         check_number("max_branches", self.max_branches, above=1, closed=True, integer=True)
         check_number("merge_last", self.merge_last, above=1, closed=True, integer=True)
@@ -131,11 +133,12 @@ class TrackSplitting(FrameByFrame):
         }
 
 
+@lru_cache(maxsize=16)
 def chi2_limits(alpha: float, n_axes: int, fading: float) -> NDArray[np.float64]:
     """Give δ(k) of the test of a branch with k detections.
 
-    Without fading ``P[χ²_{k D} > δ(k)] = α``. With fading, λ(k) is a weighted sum of χ² variables:
-    its quantile is taken from the scaled χ² with its mean and variance (Satterthwaite 1946).
+    Without fading ``P[χ²_{k D} > δ(k)] = α``. With fading λ(k) is a weighted sum of χ² variables,
+    whose tail is taken from its saddlepoint (Lugannani & Rice 1980; Kuonen 1999).
 
     Parameters
     ----------
@@ -154,9 +157,42 @@ def chi2_limits(alpha: float, n_axes: int, fading: float) -> NDArray[np.float64]
     from scipy.special import chdtri
 
     if fading == 1:
-        return np.asarray(chdtri(n_axes * np.arange(1, _EXACT_LIMITS + 1), alpha))
-    n = min(_EXACT_LIMITS, math.ceil(math.log(1e-12) / math.log(fading)) + 1)
-    k = np.arange(1, n + 1)
-    mean = n_axes * (1 - fading**k) / (1 - fading)
-    variance = 2 * n_axes * (1 - fading ** (2 * k)) / (1 - fading**2)
-    return np.asarray(chdtri(2 * mean**2 / variance, alpha)) * variance / (2 * mean)
+        limits = np.asarray(chdtri(n_axes * np.arange(1, _EXACT_LIMITS + 1), alpha))
+    else:
+        n = math.ceil(math.log(1e-6) / math.log(fading)) + 1
+        weights = fading ** np.arange(n)
+        further = [_upper_quantile(alpha, weights[:k], n_axes) for k in range(2, n + 1)]
+        limits = np.array([float(chdtri(n_axes, alpha)), *further])
+    limits.flags.writeable = False  # shared by all who ask
+    return limits
+
+
+def _upper_quantile(alpha: float, weights: NDArray[np.float64], n_axes: int) -> float:
+    """Value that ``Σ w_i χ²_D`` exceeds with probability α; the weights fall from 1."""
+    from scipy.optimize import brentq
+    from scipy.special import log_ndtr
+
+    # K(s) = -D/2 Σ log(1 - 2 s w), s < 1/2; the sum's value at which s is the saddlepoint is K'(s).
+    def parts(s: float) -> tuple[float, float, float]:
+        left = 1 - 2 * s * weights
+        first = n_axes * float((weights / left).sum())
+        second = 2 * n_axes * float(((weights / left) ** 2).sum())
+        return -n_axes / 2 * float(np.log(left).sum()), first, second
+
+    def log_tail(s: float) -> float:
+        K, first, second = parts(s)
+        w = math.copysign(math.sqrt(2 * (s * first - K)), s)
+        return float(log_ndtr(-(w + math.log(s * math.sqrt(second) / w) / w)))
+
+    # Around s = 0, which is the mean, the formula is 0/0; there, as far as the tail is concerned,
+    # a little to the side is as good.
+    low, high = -1e3, 0.5 * (1 - 1e-9)
+    target = math.log(alpha)
+    if log_tail(1e-4) < target:
+        high = -1e-4
+    else:
+        low = 1e-4
+    if log_tail(low) <= target or log_tail(high) >= target:
+        return parts(low if log_tail(low) <= target else high)[1]
+    root: Any = brentq(lambda s: log_tail(s) - target, low, high, xtol=1e-14, rtol=1e-12)
+    return parts(float(root))[1]
