@@ -194,5 +194,5 @@ def _upper_quantile(alpha: float, weights: NDArray[np.float64], n_axes: int) -> 
         low = 1e-4
     if log_tail(low) <= target or log_tail(high) >= target:
         return parts(low if log_tail(low) <= target else high)[1]
-    root: Any = brentq(lambda s: log_tail(s) - target, low, high, xtol=1e-14, rtol=1e-12)
+    root: Any = brentq(lambda s: log_tail(s) - target, low, high, xtol=1e-14)
     return parts(float(root))[1]
