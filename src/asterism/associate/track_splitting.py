@@ -160,7 +160,7 @@ def chi2_limits(alpha: float, n_axes: int, fading: float) -> NDArray[np.float64]
         limits = np.asarray(chdtri(n_axes * np.arange(1, _EXACT_LIMITS + 1), alpha))
     else:
         n = math.ceil(math.log(1e-6) / math.log(fading)) + 1
-        weights = fading ** np.arange(n)
+        weights = np.asarray(fading ** np.arange(n), dtype=np.float64)
         further = [_upper_quantile(alpha, weights[:k], n_axes) for k in range(2, n + 1)]
         limits = np.array([float(chdtri(n_axes, alpha)), *further])
     limits.flags.writeable = False  # shared by all who ask
@@ -194,5 +194,9 @@ def _upper_quantile(alpha: float, weights: NDArray[np.float64], n_axes: int) -> 
         low = 1e-4
     if log_tail(low) <= target or log_tail(high) >= target:
         return parts(low if log_tail(low) <= target else high)[1]
-    root: Any = brentq(lambda s: log_tail(s) - target, low, high, xtol=1e-14)
+
+    def excess(s: float) -> float:
+        return log_tail(s) - target
+
+    root: Any = brentq(excess, low, high, xtol=1e-14)
     return parts(float(root))[1]
