@@ -74,3 +74,40 @@ def wanderers(
         labels.append(names[order])
     detections = am.Detections.from_frames(times, frames)
     return am.Tracks(detections=detections, labels=np.concatenate(labels).astype(np.int64))
+
+
+def crowd(seed: int, n_axes: int = 3, spread: float = 0.08) -> am.Tracks:
+    """Five markers that hardly keep apart, in clutter that lies among them."""
+    rng = np.random.default_rng(seed)
+    n_frames = 25
+    x, v = rng.normal(0, spread, (5, n_axes)), rng.normal(0, 0.1, (5, n_axes))
+    frames, labels = [], []
+    for _ in range(n_frames):
+        x, v = x + 0.1 * v, v + rng.normal(0, 0.1, v.shape) - 0.3 * x
+        seen = np.flatnonzero(rng.random(5) < 0.9)
+        false = rng.normal(0, 2 * spread, (rng.poisson(1.0), n_axes))
+        points = np.concatenate([x[seen] + rng.normal(0, 0.01, (len(seen), n_axes)), false])
+        order = rng.permutation(len(points))
+        frames.append(points[order])
+        labels.append(np.concatenate([seen, np.full(len(false), -1)])[order])
+    d = am.Detections.from_frames(0.1 * np.arange(n_frames), frames)
+    return am.Tracks(detections=d, labels=np.concatenate(labels).astype(np.int64))
+
+
+def calibration_in_crowds(method):
+    """Hold the confidence of links against what they are, over forty crowds and their own model."""
+    right, sure = [], []
+    for seed in range(40):
+        truth = crowd(100 + seed, spread=0.1)
+        model = small_model(
+            motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
+            clutter_density=1.0 / (4 * np.pi / 3 * 0.3**3), birth_density=1e-2,
+            p_disappear=1e-4, max_gap=6, max_speed=1.5,
+        )  # fmt: skip
+        tracks = am.track(truth.detections, method, model=model)
+        order, _ = tracks.by_track
+        is_link = np.diff(tracks.labels[order]) == 0
+        a, b = order[:-1][is_link], order[1:][is_link]
+        right.append(truth.labels[a] == truth.labels[b])
+        sure.append(tracks.confidence[b])
+    return am.calibration(np.concatenate(sure), np.concatenate(right))

@@ -12,25 +12,7 @@ import pytest
 import asterism as am
 from asterism.solve import joint_marginals
 from jpda_oracle import jpda_by_hand
-from scenes import interacting, small_model
-
-
-def crowd(seed: int, n_axes: int = 3, spread: float = 0.08) -> am.Tracks:
-    """Five markers that hardly keep apart, in clutter that lies among them."""
-    rng = np.random.default_rng(seed)
-    n_frames = 25
-    x, v = rng.normal(0, spread, (5, n_axes)), rng.normal(0, 0.1, (5, n_axes))
-    frames, labels = [], []
-    for _ in range(n_frames):
-        x, v = x + 0.1 * v, v + rng.normal(0, 0.1, v.shape) - 0.3 * x
-        seen = np.flatnonzero(rng.random(5) < 0.9)
-        false = rng.normal(0, 2 * spread, (rng.poisson(1.0), n_axes))
-        points = np.concatenate([x[seen] + rng.normal(0, 0.01, (len(seen), n_axes)), false])
-        order = rng.permutation(len(points))
-        frames.append(points[order])
-        labels.append(np.concatenate([seen, np.full(len(false), -1)])[order])
-    d = am.Detections.from_frames(0.1 * np.arange(n_frames), frames)
-    return am.Tracks(detections=d, labels=np.concatenate(labels).astype(np.int64))
+from scenes import calibration_in_crowds, crowd, interacting, small_model
 
 
 @pytest.mark.parametrize("options", [{}, {"guard": False}, {"sure_until_gap": False}])
@@ -197,21 +179,7 @@ def test_a_track_that_is_not_seen_exists_less_and_less():
 
 
 def test_confidence_is_calibrated_where_the_model_is_right():
-    right, sure = [], []
-    for seed in range(40):
-        truth = crowd(100 + seed, spread=0.1)
-        model = small_model(
-            motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
-            clutter_density=1.0 / (4 * math.pi / 3 * 0.3**3), birth_density=1e-2,
-            p_disappear=1e-4, max_gap=6, max_speed=1.5,
-        )  # fmt: skip
-        tracks = am.track(truth.detections, am.JPDA(), model=model)
-        order, offsets = tracks.by_track
-        for a, b in itertools.pairwise(offsets):
-            link = order[a:b]
-            right += list(truth.labels[link[1:]] == truth.labels[link[:-1]])
-            sure += list(tracks.confidence[link[1:]])
-    found = am.calibration(sure, right)
+    found = calibration_in_crowds(am.JPDA())
     assert found.auc > 0.85
     assert found.ece < 0.015
 

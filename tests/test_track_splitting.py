@@ -10,8 +10,7 @@ from scipy.stats import chi2
 
 import asterism as am
 from asterism.associate.track_splitting import chi2_limits
-from scenes import interacting, small_model, wanderers
-from test_jpda import crowd
+from scenes import calibration_in_crowds, crowd, interacting, small_model, wanderers
 from tree_oracle import trees_by_hand
 
 NO_TEST = 1e-300
@@ -315,21 +314,7 @@ def test_what_comes_later_decides_between_two_ways():
 
 
 def test_confidence_is_calibrated_where_the_model_is_right():
-    right, sure = [], []
-    for seed in range(40):
-        truth = crowd(100 + seed, spread=0.1)
-        model = small_model(
-            motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
-            clutter_density=1.0 / (4 * np.pi / 3 * 0.3**3), birth_density=1e-2,
-            p_disappear=1e-4, max_gap=6, max_speed=1.5,
-        )  # fmt: skip
-        tracks = am.track(truth.detections, am.TrackSplitting(), model=model)
-        order, _ = tracks.by_track
-        is_link = np.diff(tracks.labels[order]) == 0
-        a, b = order[:-1][is_link], order[1:][is_link]
-        right.append(truth.labels[a] == truth.labels[b])
-        sure.append(tracks.confidence[b])
-    found = am.calibration(np.concatenate(sure), np.concatenate(right))
+    found = calibration_in_crowds(am.TrackSplitting())
     assert found.auc > 0.85
     assert found.ece < 0.015
 
