@@ -8,6 +8,7 @@
 #include "deferred_acceptance.hpp"
 #include "groups.hpp"
 #include "joint_events.hpp"
+#include "k_best.hpp"
 
 using namespace nb::literals;
 using namespace asterism;
@@ -97,11 +98,32 @@ std::pair<Out<std::int32_t>, std::int64_t> marry(const In<std::int64_t>& first,
   return {partner.give({P}), n};
 }
 
+// The first k assignments of n rows to N columns by cost, N ≥ n; further rows fill up at no cost.
+Out<std::int32_t> k_best(const In<double>& cost, std::int64_t k) {
+  require(cost.ndim() == 2 && cost.shape(1) >= cost.shape(0), "cost: shape (n, N), N ≥ n");
+  require(cost.shape(1) < std::size_t{1} << 15, "N below 2^15");
+  const std::size_t n = cost.shape(0), N = cost.shape(1);
+  std::vector<std::int32_t> all;
+  std::size_t n_found = 0;
+  {
+    nb::gil_scoped_release release;
+    KBest({cost.data(), n * N}, static_cast<std::int32_t>(n), static_cast<std::int32_t>(N))
+        .solve(k, [&](std::span<const std::int32_t> columns) {
+          all.insert(all.end(), columns.begin(), columns.end());
+          ++n_found;
+        });
+  }
+  Owned<std::int32_t> out(all.size());
+  std::copy(all.begin(), all.end(), out.data.get());
+  return out.give({n_found, n});
+}
+
 }  // namespace
 
 void bind_solvers(nb::module_& module) {
   module.def("assign", &assign, "n_rows"_a, "n_columns"_a, "rows"_a, "columns"_a, "gains"_a);
   module.def("marry", &marry, "first"_a, "receivers"_a, "costs"_a, "n_receivers"_a);
+  module.def("k_best", &k_best, "cost"_a, "k"_a);
   module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a);
 
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {

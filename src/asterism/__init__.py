@@ -86,7 +86,9 @@ if TYPE_CHECKING:
     from asterism.model.posterior import log_posterior as log_posterior
     from asterism.model.posterior import track_scores as track_scores
     from asterism.solve import JointMarginals as JointMarginals
+    from asterism.solve import KBestAssignments as KBestAssignments
     from asterism.solve import joint_marginals as joint_marginals
+    from asterism.solve import k_best_assignments as k_best_assignments
     from asterism.view import plot_coverage as plot_coverage
     from asterism.view import plot_depth as plot_depth
     from asterism.view import plot_errors as plot_errors
@@ -155,7 +157,7 @@ _PUBLIC = {
         "method_by_name",
         "track",
     ),
-    "solve": ("JointMarginals", "joint_marginals"),
+    "solve": ("JointMarginals", "KBestAssignments", "joint_marginals", "k_best_assignments"),
     "evaluate": ("Evaluation", "calibration", "evaluate", "floor"),
     "io": ("FORMATS", "CaptureInfo", "describe", "read", "read_tracks", "write"),
     "io.calibration": ("CALIBRATIONS", "read_rig", "write_rig"),
