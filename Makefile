@@ -29,6 +29,7 @@ bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/speed.py --markdown docs/tables/speed.md
 	$(BIN)/python benchmarks/cameras.py --markdown docs/tables/cameras.md
 	$(BIN)/python benchmarks/joint.py --markdown docs/tables/joint.md
+	$(BIN)/python benchmarks/k_best.py --markdown docs/tables/k_best.md
 
 # The tables of scenes and of captures in the docs; the second needs the real captures beside the
 # project.

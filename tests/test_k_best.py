@@ -32,7 +32,7 @@ def check(gains: np.ndarray, k: int, *, complete: bool) -> None:
     assert np.allclose(found.totals, [t for t, _ in wanted[:k]], rtol=0, atol=1e-9)
     matches = [tuple(row) for row in found.matches.tolist()]
     assert len(set(matches)) == len(matches)
-    sums = dict((choice, total) for total, choice in wanted)
+    sums = {choice: total for total, choice in wanted}
     assert np.allclose([sums[match] for match in matches], found.totals, rtol=0, atol=1e-9)
 
 

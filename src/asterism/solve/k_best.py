@@ -40,8 +40,8 @@ def k_best_assignments(gains: ArrayLike, k: int, *, complete: bool = False) -> K
     """Rank the pairings of n rows with m columns by their sum of gains.
 
     A pairing gives every row one column or none, and no column to two rows. Murty's partition [1]_
-    with the improvements of [2]_: a subproblem starts from the duals of the one it is part of, takes
-    one shortest augmenting path, and is solved when its lower bound comes to the front.
+    with the improvements of [2]_: a subproblem starts from the duals of the one it is part of,
+    takes one shortest augmenting path, and is solved when its lower bound comes to the front.
 
     Parameters
     ----------
@@ -93,8 +93,10 @@ def k_best_assignments(gains: ArrayLike, k: int, *, complete: bool = False) -> K
         raise SolverLimit(
             "rows and columns", n + m, _LARGEST, "solve groups that share nothing apart"
         )
-    if complete:
-        found = _engine.k_best(np.ascontiguousarray(-g), int(k)) if n <= m else _none(n)
+    if complete and n > m:
+        found = np.empty((0, n), dtype=np.int32)
+    elif complete:
+        found = _engine.k_best(np.ascontiguousarray(-g), int(k))
     else:
         # A column for each row to be alone in.
         cost = np.full((n, m + n), np.inf)
@@ -102,13 +104,5 @@ def k_best_assignments(gains: ArrayLike, k: int, *, complete: bool = False) -> K
         cost[np.arange(n), m + np.arange(n)] = 0.0
         found = _engine.k_best(cost, int(k))
     matches = np.where(found < m, found, -1).astype(np.int64)
-    paired = (
-        np.take_along_axis(np.concatenate([g, np.zeros((n, 1))], axis=1), matches.T, axis=1).T
-        if n
-        else np.zeros((len(matches), 0))
-    )
-    return KBestAssignments(matches=matches, totals=paired.sum(axis=1))
-
-
-def _none(n: int) -> NDArray[np.int32]:
-    return np.empty((0, n), dtype=np.int32)
+    won = np.concatenate([g, np.zeros((n, 1))], axis=1)  # alone is -1, the last
+    return KBestAssignments(matches=matches, totals=won[np.arange(n), matches].sum(axis=1))
