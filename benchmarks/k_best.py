@@ -1,7 +1,7 @@
 """The k best assignments: time by size, beside nrl-tracker's Murty on the same matrices.
 
-Full matrices of normal gains, every row to have a column; both in the same process, and their totals
-must agree.
+Full matrices of normal gains, every row to have a column; both in the same process, and their
+totals must agree.
 
     python benchmarks/k_best.py [--markdown FILE]
 """
