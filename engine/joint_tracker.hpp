@@ -7,8 +7,8 @@
 //   β_ij     marginals of the joint events (joint_events.hpp)
 //   r⁺       1 - β_i0 + β_i0 r (1 - P_d) / (1 - r P_d)
 //
-// Believed tracks share the detections first; a tentative one takes what they leave over, and of
-// that the likeliest alone: it knows so little that a mean over what fits would be nowhere.
+// Believed tracks share the detections first; tentative ones take what they leave over, by the
+// likeliest event: they know so little that a mean over what fits would be nowhere.
 #pragma once
 
 #include <algorithm>
@@ -51,8 +51,8 @@ class JointTracker {
     s_.missed.assign(live_.size(), 1);
     s_.free.assign(points.size(), 1);
     s_.is_taken.assign(points.size(), 0);
-    share(true, points, stats);
-    share(false, points, stats);
+    share_among_believed(points, stats);
+    share_among_tentative(points, stats);
     for (std::size_t j = 0; j < points.size(); ++j)
       label(live_.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * (1 - newborn(1)));
     update_tracks(time, points, label);
@@ -81,6 +81,7 @@ class JointTracker {
     std::vector<double> match_probability, missed;
     std::vector<double> free;                    // probability that a detection is of no track
     std::vector<char> is_taken;
+    Assignment assignment;  // of tentative tracks
     BestPermutations guard;
     std::vector<double> weights;
     std::vector<WeightedPoint> mixture;
@@ -133,8 +134,8 @@ class JointTracker {
         s_.candidates);
   }
 
-  // Joint events of the believed tracks, or of the tentative ones over what is left.
-  void share(bool confirmed, std::span<const Point> points, FrameStats& stats) {
+  // Pairings of the believed tracks, or of the tentative ones with what is left.
+  void find_eligible(bool confirmed) {
     s_.eligible.clear();
     s_.gains.clear();
     for (Candidate c : s_.candidates) {
@@ -144,6 +145,10 @@ class JointTracker {
       s_.eligible.push_back(c);
       s_.gains.push_back(c.gain);
     }
+  }
+
+  void share_among_believed(std::span<const Point> points, FrameStats& stats) {
+    find_eligible(true);
     s_.log_miss.assign(live_.size(), 0);
     s_.all_missed.resize(live_.size());
     s_.best.resize(live_.size());
@@ -164,6 +169,45 @@ class JointTracker {
       const Candidate& c = s_.eligible[e];
       s_.free[c.column] = std::max(s_.free[c.column] - s_.marginals[e], 0.0);
       if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
+    }
+  }
+
+  // Tentative tracks take what the likeliest event gives them, and each is as sure of it as it can be
+  // if the others have what that event gives to them. Together they fit almost anything: a sum over
+  // all their events would take long and tell little.
+  void share_among_tentative(std::span<const Point> points, FrameStats& stats) {
+    find_eligible(false);
+    const Groups groups =
+        connected_groups(s_.eligible, static_cast<std::int32_t>(live_.size()),
+                         static_cast<std::int32_t>(points.size()));
+    stats.n_groups += static_cast<std::int64_t>(groups.size());
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      s_.assignment.solve(groups[g], s_.match);
+      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
+    }
+    for (const Candidate& c : s_.eligible)
+      if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
+    for (std::size_t first = 0, last; first < s_.eligible.size(); first = last) {
+      const std::int32_t i = s_.eligible[first].row;
+      const auto is_open = [&](const Candidate& c) {
+        return !s_.is_taken[c.column] || s_.match[i] == c.column;
+      };
+      double most = 0, total = 0;
+      for (last = first; last < s_.eligible.size() && s_.eligible[last].row == i; ++last)
+        if (is_open(s_.eligible[last])) most = std::max(most, s_.eligible[last].gain);
+      total = std::exp(-most);
+      for (std::size_t e = first; e < last; ++e)
+        if (is_open(s_.eligible[e])) total += std::exp(s_.eligible[e].gain - most);
+      s_.missed[i] = std::exp(-most) / total;
+      for (std::size_t e = first; e < last; ++e) {
+        const Candidate& c = s_.eligible[e];
+        if (!is_open(c)) continue;
+        const double p = std::exp(c.gain - most) / total;
+        s_.free[c.column] = std::max(s_.free[c.column] - p, 0.0);
+        if (s_.match[i] == c.column) s_.match_probability[i] = p;
+      }
+      if (s_.match[i] >= 0)
+        update(live_.m, live_.prediction(i), points[s_.match[i]], live_[i].state);
     }
   }
 
@@ -197,19 +241,15 @@ class JointTracker {
   }
 
   // How far each pairing of a group moves its track: as much as is probable; where events differ by
-  // who is who, only the best; of tentative tracks and beyond the guard's reach, the best event.
+  // who is who, only the best of them; beyond the guard's reach, the best event.
   void weigh(std::span<const Candidate> group, std::span<const std::int32_t> sources,
              FrameStats& stats) {
-    const bool is_believed = live_[group.front().row].is_confirmed();
-    const bool is_shared = group.front().row != group.back().row;
-    if (is_believed && is_shared && opt_.is_guarded) {
-      if (s_.guard.solve(group, s_.best, s_.weights)) return;
-      ++stats.n_unguarded;
-    }
-    const bool is_soft = is_believed && !(is_shared && opt_.is_guarded);
+    const bool needs_guard = opt_.is_guarded && group.front().row != group.back().row;
+    if (needs_guard && s_.guard.solve(group, s_.best, s_.weights)) return;
+    stats.n_unguarded += needs_guard;
     s_.weights.resize(group.size());
     for (std::size_t e = 0; e < group.size(); ++e)
-      s_.weights[e] = is_soft ? s_.marginals[sources[e]] : s_.best[group[e].row] == group[e].column;
+      s_.weights[e] = !needs_guard ? s_.marginals[sources[e]] : s_.best[group[e].row] == group[e].column;
   }
 
   template <typename Label>

@@ -174,12 +174,17 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
                     continue
                 some, none = open_to[rows], missed[rows]
                 found, best = marginals_of(some, none)
-                beta[rows], match[rows] = found, best
-                moved = np.zeros_like(found)
-                moved[np.arange(len(rows)), best] = 1
-                if believed[rows[0]]:
-                    is_guarded = method.guard and len(rows) > 1
-                    moved = best_permutations(some, none) if is_guarded else found
+                match[rows] = best
+                is_guarded = method.guard and len(rows) > 1
+                moved = best_permutations(some, none) if is_guarded else found
+                if not believed[rows[0]]:
+                    # The best event; each as sure as it is if the others have their part of it.
+                    for k in range(len(rows)):
+                        rest = some[k] * ~np.isin(np.arange(m), np.delete(best, k))
+                        found[k] = np.append(rest, none[k]) / (rest.sum() + none[k])
+                    moved = np.zeros_like(found)
+                    moved[np.arange(len(rows)), best] = 1
+                beta[rows] = found
                 for i, share in zip(rows, moved, strict=True):
                     r = sigmoid(tracks[i].sure(method, confirm))
                     share[m] *= r * (1 - P_d) / (1 - r * P_d)

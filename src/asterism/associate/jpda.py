@@ -25,8 +25,9 @@ class JPDA(FrameByFrame):
     the detections differ by is shared out evenly among them.
 
     Each track has a probability ``r`` to exist (JIPDA; Musicki & Evans 2004): it is missed with
-    probability ``1 - r P_d``, and what it is seen or missed with changes it. Tentative tracks share
-    what the believed ones leave over, and each takes the likeliest of it.
+    probability ``1 - r P_d``, and what it is seen or missed with changes it. Tentative tracks take
+    what the believed ones leave over by the likeliest event; how sure each is of its part is told
+    as if the others had theirs.
 
     Labels are those of the most probable joint event; their confidence is the marginal of the
     pairing. Where there is no label, it is the probability that the point is of no track.
