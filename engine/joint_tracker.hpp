@@ -283,10 +283,9 @@ class JointTracker {
   }
 
   void begin_tracks(double time, std::span<const Point> points) {
-    const double least = std::exp(-live_.opt.delete_drop);
     for (std::size_t j = 0; j < points.size(); ++j) {
-      if (s_.is_taken[j] || s_.free[j] < least) continue;
       const double r = newborn(s_.free[j]);
+      if (s_.is_taken[j] || !(r > 0)) continue;
       live_.begin(j, points[j], time, std::log(r) - std::log1p(-r));
     }
   }

@@ -226,7 +226,7 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
             and (track.id >= 0 or track.best - track.score <= math.log(method.delete_odds))
         ]
         for j, y in enumerate(points):
-            if taken[j] or free[j] < 1 / method.delete_odds:
+            if taken[j] or free[j] <= 0:
                 continue
             track = SoftTrack(model, now, y, first + j)
             r = free[j] * born
