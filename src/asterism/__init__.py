@@ -87,6 +87,8 @@ if TYPE_CHECKING:
     from asterism.model.posterior import track_scores as track_scores
     from asterism.solve import JointMarginals as JointMarginals
     from asterism.solve import KBestAssignments as KBestAssignments
+    from asterism.solve import MultidimensionalAssignment as MultidimensionalAssignment
+    from asterism.solve import assign_multidimensional as assign_multidimensional
     from asterism.solve import joint_marginals as joint_marginals
     from asterism.solve import k_best_assignments as k_best_assignments
     from asterism.view import plot_coverage as plot_coverage
@@ -157,7 +159,14 @@ _PUBLIC = {
         "method_by_name",
         "track",
     ),
-    "solve": ("JointMarginals", "KBestAssignments", "joint_marginals", "k_best_assignments"),
+    "solve": (
+        "JointMarginals",
+        "KBestAssignments",
+        "MultidimensionalAssignment",
+        "assign_multidimensional",
+        "joint_marginals",
+        "k_best_assignments",
+    ),
     "evaluate": ("Evaluation", "calibration", "evaluate", "floor"),
     "io": ("FORMATS", "CaptureInfo", "describe", "read", "read_tracks", "write"),
     "io.calibration": ("CALIBRATIONS", "read_rig", "write_rig"),
