@@ -9,6 +9,7 @@
 #include "groups.hpp"
 #include "joint_events.hpp"
 #include "k_best.hpp"
+#include "set_packing.hpp"
 
 using namespace nb::literals;
 using namespace asterism;
@@ -118,12 +119,57 @@ Out<std::int32_t> k_best(const In<double>& cost, std::int64_t k) {
   return out.give({n_found, n});
 }
 
+// The k best ways for every tree to take one option, no resource twice. Options are listed by tree;
+// option o uses uses[first_use[o]:first_use[o + 1]]. Each tree needs one that uses nothing.
+nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& worths,
+               const In<std::int64_t>& first_use, const In<std::int32_t>& uses, std::int64_t k,
+               double drop, std::int64_t max_nodes) {
+  require(first_option.size() >= 1 && first_use.size() == worths.size() + 1, "one list of uses an option");
+  const std::size_t n = first_option.size() - 1;
+  require(first_option.data()[n] == static_cast<std::int64_t>(worths.size()) &&
+              first_use.data()[worths.size()] == static_cast<std::int64_t>(uses.size()),
+          "lists to the end");
+  std::vector<std::vector<PackingOption>> trees(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    bool has_free = false;
+    require(first_option.data()[i] >= 0 && first_option.data()[i] <= first_option.data()[i + 1],
+            "first_option: rising");
+    for (std::int64_t o = first_option.data()[i]; o < first_option.data()[i + 1]; ++o) {
+      const std::int64_t a = first_use.data()[o], b = first_use.data()[o + 1];
+      require(a >= 0 && a <= b, "first_use: rising");
+      for (std::int64_t u = a; u < b; ++u) require(uses.data()[u] >= 0, "resources from 0");
+      trees[i].push_back({worths.data()[o], {uses.data() + a, uses.data() + b}});
+      has_free = has_free || a == b;
+    }
+    require(has_free, "an option that uses nothing in every tree");
+  }
+  std::vector<std::int32_t> all;
+  std::vector<double> totals;
+  PackingSummary summary;
+  {
+    nb::gil_scoped_release release;
+    summary = SetPacking(trees).solve(
+        k, drop, max_nodes, [&](std::span<const std::int32_t> options, double worth) {
+          all.insert(all.end(), options.begin(), options.end());
+          totals.push_back(worth);
+        });
+  }
+  Owned<std::int32_t> out(all.size());
+  std::copy(all.begin(), all.end(), out.data.get());
+  Owned<double> worth(totals.size());
+  std::copy(totals.begin(), totals.end(), worth.data.get());
+  return nb::make_tuple(out.give({totals.size(), n}), worth.give({totals.size()}), summary.is_exact,
+                        summary.bound, summary.n_nodes);
+}
+
 }  // namespace
 
 void bind_solvers(nb::module_& module) {
   module.def("assign", &assign, "n_rows"_a, "n_columns"_a, "rows"_a, "columns"_a, "gains"_a);
   module.def("marry", &marry, "first"_a, "receivers"_a, "costs"_a, "n_receivers"_a);
   module.def("k_best", &k_best, "cost"_a, "k"_a);
+  module.def("pack", &pack, "first_option"_a, "worths"_a, "first_use"_a, "uses"_a, "k"_a, "drop"_a,
+             "max_nodes"_a);
   module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a);
 
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {

@@ -201,6 +201,15 @@ def assign(
     gains: NDArray[np.float64],
 ) -> NDArray[np.int32]: ...
 def k_best(cost: NDArray[np.float64], k: int) -> NDArray[np.int32]: ...
+def pack(
+    first_option: NDArray[np.int64],
+    worths: NDArray[np.float64],
+    first_use: NDArray[np.int64],
+    uses: NDArray[np.int32],
+    k: int,
+    drop: float,
+    max_nodes: int,
+) -> tuple[NDArray[np.int32], NDArray[np.float64], bool, float, int]: ...
 def joint_marginals(
     log_weights: NDArray[np.float64], log_miss: NDArray[np.float64], max_states: int
 ) -> tuple[NDArray[np.float64], float, NDArray[np.int32], float, int]: ...
