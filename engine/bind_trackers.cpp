@@ -2,6 +2,7 @@
 #include <nanobind/stl/tuple.h>
 
 #include "bindings.hpp"
+#include "forest.hpp"
 #include "frame_tracker.hpp"
 #include "joint_tracker.hpp"
 #include "motion_arrays.hpp"
@@ -125,7 +126,7 @@ nb::tuple tracks(const Tracker& tracker) {
 }
 
 // λ of the believed tracks and the number of detections in it, in the order of `tracks`.
-nb::tuple chi2(const TreeTracker& tracker) {
+nb::tuple chi2(const TreeTracker<Forest>& tracker) {
   std::size_t K = 0;
   for (const auto& t : tracker.live().tracks) K += t.is_confirmed();
   Owned<double> lambda(K);
@@ -221,21 +222,21 @@ void bind_trackers(nb::module_& module) {
             require(window >= 1 && window <= kMaxWindow, "window: 1 to 16");
             require(max_branches >= 1 && merge_last >= 1, "max_branches, merge_last: at least 1");
             new (self) BranchOptions{window, max_branches, merge_last, prune_drop, fading,
-                                     {delta.data(), delta.data() + delta.size()}, z};
+                                     {delta.data(), delta.data() + delta.size()}, z, false, {}};
           },
           nb::kw_only(), "window"_a, "max_branches"_a, "merge_last"_a, "prune_drop"_a, "fading"_a,
           "delta"_a, "z"_a);
 
-  bind<TreeTracker>(module, "TreeTracker")
+  bind<TreeTracker<Forest>>(module, "TreeTracker")
       .def("chi2", &chi2)
       .def(
           "__init__",
-          [](TreeTracker* self, const MotionModel& model, const ScoreModel& score,
+          [](TreeTracker<Forest>* self, const MotionModel& model, const ScoreModel& score,
              const LifeOptions& life, const BranchOptions& branches, std::int32_t resolver,
              bool is_independent) {
             require(resolver >= 0 && resolver <= 2, "resolver: 0, 1 or 2");
-            new (self) TreeTracker(model, score, life, branches,
-                                   {static_cast<Resolver>(resolver), is_independent});
+            new (self) TreeTracker<Forest>(Forest(
+                model, score, life, branches, {static_cast<Resolver>(resolver), is_independent}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "resolver"_a,
           "is_independent"_a);

@@ -28,6 +28,10 @@ struct BranchOptions {
   double fading = 1;              // ρ
   std::vector<double> delta;      // δ(1), δ(2), …; empty: no test
   double z = 0;                   // normal quantile of α, for δ beyond those where ρ is 1
+  // Tracks are weighed jointly: a branch is worth its part of the log posterior, and what others
+  // expect is for the joint choice to settle.
+  bool is_joint = false;
+  std::vector<double> log_end;  // then: log of the probability of nothing more in so many frames
 };
 
 // How much a believed track expects a detection: w_j / (w_0 + Σ_{l≠j} w_l), where
@@ -122,8 +126,12 @@ class BranchGrower {
       : live_(live), opt_(options) {}
 
   // What a branch is worth among those of its tree: its score, less what the detections it takes
-  // would be worth if left over.
-  double worth(const Branch& b) const { return b.score - b.n_taken * live_.leftover_gain(); }
+  // would be worth if left over. Jointly, what it is worth in the posterior: no less for misses
+  // after which it may have ended.
+  double worth(const Branch& b) const {
+    if (opt_.is_joint) return b.score - b.gap * live_.miss_gain() + opt_.log_end[b.gap];
+    return b.score - b.n_taken * live_.leftover_gain();
+  }
 
   // The decided part of a track, as the only branch.
   Branch root(const LiveTrack<Tree>& track) const {
@@ -226,7 +234,7 @@ class BranchGrower {
         Branch child = parent;
         const double won = hit + update(live_.m, prediction, y, child.state);
         if (!std::isfinite(won)) return;
-        child.score += won - frame.crowding(track.more.key, j);
+        child.score += opt_.is_joint ? won : won - frame.crowding(track.more.key, j);
         child.lambda = lambda;
         ++child.n_updates;
         ++child.n_taken;

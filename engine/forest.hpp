@@ -1,7 +1,5 @@
 // The trees of all tracks over a window of frames, of which the oldest is decided when the window is
 // full: who has which of its points, by what the branches of every track have met since.
-//
-// What is decided lives in live_tracks.hpp; its branches (branches.hpp) are what may follow.
 #pragma once
 
 #include <algorithm>
@@ -13,10 +11,9 @@
 #include <vector>
 
 #include "assignment.hpp"
-#include "branches.hpp"
 #include "joint_events.hpp"
-#include "live_tracks.hpp"
 #include "marriage_market.hpp"
+#include "open_window.hpp"
 
 namespace asterism {
 
@@ -36,39 +33,26 @@ class Forest {
  public:
   Forest(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
          const BranchOptions& branches, const ForestOptions& options)
-      : live(model, score, life), branches_(branches), opt_(options) {}
-
-  LiveTracks<Tree> live;
+      : open_{{model, score, life}, branches, {}}, opt_(options) {}
 
   // Takes a frame; decides the oldest one if the window is full with it.
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
-    BranchGrower grower(live, branches_);
     frame->claimed.assign(frame->points.size(), 0);
-    if (!opt_.is_independent)
-      for (const LiveTrack<Tree>& track : live.tracks)
-        if (track.is_confirmed()) grower.claim(track, *frame);
-    window_.push_back(std::move(frame));
-    for (LiveTrack<Tree>& track : live.tracks)
-      grower.grow(*window_.back(), track, n_open(), stats);
-    if (n_open() == branches_.window) decide(stats, label);
+    if (!opt_.is_independent) open_.claim(*frame);
+    open_.push(std::move(frame), stats);
+    if (open_.is_full()) decide(stats, label);
   }
 
   // Decides all frames that are left, with what is known of them.
   template <typename Label>
   void decide_all(FrameStats& stats, Label&& label) {
-    while (!window_.empty()) decide(stats, label);
+    while (open_.n_open() > 0) decide(stats, label);
   }
 
-  std::int32_t n_open() const { return static_cast<std::int32_t>(window_.size()); }
-
-  void count(FrameStats& stats) const {
-    for (const LiveTrack<Tree>& track : live.tracks) {
-      ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
-      stats.n_pending += static_cast<std::int64_t>(track.pending.size());
-      stats.n_branches += static_cast<std::int64_t>(track.more.branches.size());
-    }
-  }
+  bool has_confidence() const { return opt_.resolver == Resolver::assignment; }
+  const LiveTracks<Tree>& live() const { return open_.live; }
+  void count(FrameStats& stats) const { open_.count(stats); }
 
  private:
   // The best branch of a tree through one detection of the frame that is decided, or through none.
@@ -83,37 +67,36 @@ class Forest {
 
   template <typename Label>
   void decide(FrameStats& stats, Label&& label) {
-    const std::shared_ptr<const WindowFrame> frame = window_.front();
-    window_.erase(window_.begin());
-    match_.assign(live.size(), -1);
-    ways_.resize(live.size());
+    const std::shared_ptr<const WindowFrame> frame = open_.pop();
+    match_.assign(open_.live.size(), -1);
+    ways_.resize(open_.live.size());
     is_taken_.assign(frame->points.size(), 0);
     count_shared(*frame, stats);
-    for (std::size_t i = 0; i < live.size(); ++i) list_ways(*frame, i);
+    for (std::size_t i = 0; i < open_.live.size(); ++i) list_ways(*frame, i);
     for (const bool confirmed : {true, false}) {
       if (opt_.resolver == Resolver::assignment) weigh_ways(*frame, confirmed, stats);
       match_all(*frame, confirmed, stats);
     }
     say_free(*frame, label);
-    for (std::size_t i = 0; i < live.size(); ++i) follow(*frame, i, stats, label);
-    live.end_tracks();
+    for (std::size_t i = 0; i < open_.live.size(); ++i) follow(*frame, i, stats, label);
+    open_.live.end_tracks();
     for (std::size_t j = 0; j < frame->points.size(); ++j) {
       if (is_taken_[j]) continue;
-      LiveTrack<Tree>& track = live.begin(j, frame->points[j], frame->time, live.birth_gain());
-      track.more.key = n_trees_++;
-      regrow(track, stats);
+      LiveTrack<Tree>& track = open_.live.begin(j, frame->points[j], frame->time, open_.live.birth_gain());
+      track.more.key = open_.n_trees++;
+      open_.regrow(track, stats);
     }
     FrameStats ignored;
-    live.end_frame(frame->time, frame->points.size(), ignored);
+    open_.live.end_frame(frame->time, frame->points.size(), ignored);
   }
 
   void list_ways(const WindowFrame& frame, std::size_t i) {
-    const BranchGrower grower(live, branches_);
-    const LiveTrack<Tree>& track = live[i];
+    const BranchGrower grower(open_.live, open_.branches);
+    const LiveTrack<Tree>& track = open_.live[i];
     std::vector<Way>& ways = ways_[i];
     const double most = grower.worth(track.more.branches.front());  // the best comes first
     // Where every branch that misses was pruned, it would have been worth no more than this.
-    const double pruned = most - branches_.prune_drop;
+    const double pruned = most - open_.branches.prune_drop;
     ways.assign(1, Way{.worth = pruned, .log_weight = std::exp(pruned - most)});
     for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
       const Branch& b = track.more.branches[k];
@@ -142,19 +125,19 @@ class Forest {
   void weigh_newborn(const WindowFrame& frame, const LiveTrack<Tree>& track,
                      std::vector<Way>& ways) const {
     MotionState state = track.state;
-    predict(live.m, frame.step, state);
-    const Prediction prediction(live.m, state);
-    const std::int32_t n_missed = std::min(n_open() + 1, live.sm.max_gap - track.gap);
-    const double gone = track.score + n_missed * live.miss_gain();
-    const double over = live.leftover_gain();
+    predict(open_.live.m, frame.step, state);
+    const Prediction prediction(open_.live.m, state);
+    const std::int32_t n_missed = std::min(open_.n_open() + 1, open_.live.sm.max_gap - track.gap);
+    const double gone = track.score + n_missed * open_.live.miss_gain();
+    const double over = open_.live.leftover_gain();
     std::array<double, kMaxModes> each{};
     for (std::size_t k = 1; k < ways.size(); ++k) {
       const Branch& b = track.more.branches[ways[k].branch];
       const double hit =
-          live.hit_gain() + prediction.log_likelihood(frame.points[ways[k].column], each);
+          open_.live.hit_gain() + prediction.log_likelihood(frame.points[ways[k].column], each);
       const double future = b.score + ways[k].crowding - track.score - hit - over * (b.n_taken - 1);
       if (future > 0)
-        ways[k].newborn = gone + live.birth_gain() - over + future + std::log1p(-std::exp(-future));
+        ways[k].newborn = gone + open_.live.birth_gain() - over + future + std::log1p(-std::exp(-future));
     }
   }
 
@@ -163,8 +146,8 @@ class Forest {
   void weigh_ways(const WindowFrame& frame, bool confirmed, FrameStats& stats) {
     pairings_.clear();
     gains_.clear();
-    for (std::size_t i = 0; i < live.size(); ++i) {
-      if (live[i].is_confirmed() != confirmed) continue;
+    for (std::size_t i = 0; i < open_.live.size(); ++i) {
+      if (open_.live[i].is_confirmed() != confirmed) continue;
       for (std::size_t k = 1; k < ways_[i].size(); ++k) {
         const Way& way = ways_[i][k];
         const double gain = way.log_weight - log_sum(ways_[i][0].log_weight, way.newborn);
@@ -174,9 +157,9 @@ class Forest {
       }
     }
     marginals_.resize(pairings_.size());
-    missed_.resize(live.size());
-    best_.resize(live.size());
-    log_miss_.assign(live.size(), 0);
+    missed_.resize(open_.live.size());
+    best_.resize(open_.live.size());
+    log_miss_.assign(open_.live.size(), 0);
     JointEvents events(pairings_, gains_, log_miss_,
                        static_cast<std::int32_t>(frame.points.size()), kMaxStates);
     const JointSummary summary = events.solve(marginals_, missed_, best_);
@@ -196,14 +179,14 @@ class Forest {
     if (track.is_confirmed()) return way.worth;
     if (way.branch < 0) return softplus(way.worth);
     const Branch& b = track.more.branches[way.branch];
-    return softplus(b.score + way.crowding) - b.n_taken * live.leftover_gain();
+    return softplus(b.score + way.crowding) - b.n_taken * open_.live.leftover_gain();
   }
 
   // Pairs the believed tracks, or the tentative ones, with points that are still free.
   void match_all(const WindowFrame& frame, bool confirmed, FrameStats& stats) {
     candidates_.clear();
-    for (std::size_t i = 0; i < live.size(); ++i) {
-      const LiveTrack<Tree>& track = live[i];
+    for (std::size_t i = 0; i < open_.live.size(); ++i) {
+      const LiveTrack<Tree>& track = open_.live[i];
       if (track.is_confirmed() != confirmed) continue;
       const double missed = odds(track, ways_[i][0]);
       for (std::size_t k = 1; k < ways_[i].size(); ++k) {
@@ -214,14 +197,14 @@ class Forest {
                                mean_distance2(track.more.branches[way.branch])});
       }
     }
-    const Groups groups = connected_groups(candidates_, static_cast<std::int32_t>(live.size()),
+    const Groups groups = connected_groups(candidates_, static_cast<std::int32_t>(open_.live.size()),
                                            static_cast<std::int32_t>(frame.points.size()));
     const MarriageMarket market{opt_.resolver == Resolver::marriage_by_points, 1, 0};
     for (std::size_t g = 0; g < groups.size(); ++g) {
       if (opt_.resolver == Resolver::assignment || groups[g].size() == 1)
         assignment_.solve(groups[g], match_);
       else
-        market.marry(groups[g], frame.points, live.m.axis.D, match_, extras_);
+        market.marry(groups[g], frame.points, open_.live.m.axis.D, match_, extras_);
       stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
     }
     stats.n_groups += static_cast<std::int64_t>(groups.size());
@@ -238,7 +221,7 @@ class Forest {
 
   void count_shared(const WindowFrame& frame, FrameStats& stats) {
     claims_.assign(frame.points.size(), 0);
-    for (const LiveTrack<Tree>& track : live.tracks) {
+    for (const LiveTrack<Tree>& track : open_.live.tracks) {
       const std::int32_t j = track.more.branches.front().taken(frame.number);
       if (j >= 0 && track.is_confirmed() && ++claims_[j] == 2) ++stats.n_shared;
     }
@@ -254,9 +237,9 @@ class Forest {
   template <typename Label>
   void say_free(const WindowFrame& frame, Label&& label) {
     free_.assign(frame.points.size(), 1);
-    for (std::size_t i = 0; i < live.size(); ++i)
+    for (std::size_t i = 0; i < open_.live.size(); ++i)
       for (const Way& way : ways_[i])
-        if (way.column >= 0 && live[i].is_confirmed()) free_[way.column] -= way.probability;
+        if (way.column >= 0 && open_.live[i].is_confirmed()) free_[way.column] -= way.probability;
     for (std::size_t j = 0; j < frame.points.size(); ++j)
       label(frame.first + static_cast<std::int64_t>(j), -1, std::clamp(free_[j], 0.0, 1.0));
   }
@@ -264,55 +247,25 @@ class Forest {
   // Carries what is decided of a track over the frame, and keeps the branches that agree with it.
   template <typename Label>
   void follow(const WindowFrame& frame, std::size_t i, FrameStats& stats, Label&& label) {
-    LiveTrack<Tree>& track = live[i];
+    LiveTrack<Tree>& track = open_.live[i];
     const std::int32_t j = match_[i];
     const std::int32_t own = opt_.is_independent ? track.more.branches.front().taken(frame.number) : j;
-    predict(live.m, frame.step, track.state);
-    if (own >= 0) {
-      const Prediction prediction(live.m, track.state);
-      const Point& y = frame.points[own];
-      track.more.lambda = branches_.fading * track.more.lambda + surprise(prediction, y);
-      ++track.more.n_updates;
-      track.score += live.hit_gain() + update(live.m, prediction, y, track.state);
-      is_taken_[own] = 1;
-      track.last = y;
-      track.last_time = frame.time;
-    } else {
-      track.score += live.miss_gain();
-    }
+    open_.carry(frame, i, own);
+    if (own >= 0) is_taken_[own] = 1;
     if (j >= 0) {
       const Point last = track.last;
-      live.take(i, j, last, frame.time, way_to(i, j)->probability, label);
+      open_.live.take(i, j, last, frame.time, way_to(i, j)->probability, label);
     } else {
       ++track.gap;
     }
-    std::erase_if(track.more.branches,
-                  [&](const Branch& b) { return b.taken(frame.number) != own; });
-    if (track.more.branches.empty() || window_.empty())
-      regrow(track, stats);
-    else if (own >= 0)
-      for (Branch& b : track.more.branches) {
-        --b.n_taken;
-        b.score += frame.crowding(track.more.key, own);
-        b.distance2[frame.number % kMaxWindow] = 0;
-      }
-  }
-
-  void regrow(LiveTrack<Tree>& track, FrameStats& stats) {
-    BranchGrower grower(live, branches_);
-    track.more.branches.assign(1, grower.root(track));
-    std::int32_t n = 0;
-    for (const auto& frame : window_)
-      grower.grow(*frame, track, ++n, stats);
+    open_.keep(frame, i, own, stats);
   }
 
   static constexpr double kNegligible = -27.6;  // log of a weight, of a miss of 1, not looked at
   static constexpr std::int64_t kMaxStates = 4096;  // of the sum over what a frame may be
 
-  BranchOptions branches_;
+  OpenWindow open_;
   ForestOptions opt_;
-  std::vector<std::shared_ptr<const WindowFrame>> window_;
-  std::int64_t n_trees_ = 0;
 
   // Working memory of one decision.
   std::vector<std::int32_t> match_, claims_;

@@ -13,17 +13,16 @@
 #include <utility>
 #include <vector>
 
-#include "forest.hpp"
+#include "branches.hpp"
+#include "live_tracks.hpp"
 
 namespace asterism {
 
+template <typename Forest>
 class TreeTracker {
  public:
-  TreeTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
-              const BranchOptions& branches, const ForestOptions& options)
-      : forest_(model, score, life, branches, options),
-        present_(forest_.live),
-        has_confidence_(options.resolver == Resolver::assignment) {}
+  explicit TreeTracker(const Forest& forest)
+      : forest_(forest), present_(forest.live()), has_confidence_(forest.has_confidence()) {}
 
   // As FrameTracker::step; also calls label for earlier detections whose label changes.
   template <typename Label>
@@ -80,7 +79,7 @@ class TreeTracker {
     frame->step = step;
     frame->points.assign(points.begin(), points.end());
     // Cells as wide as a track may move in the frame, were it as fast as can be.
-    const LiveTracks<Tree>& live = forest_.live;
+    const LiveTracks<Tree>& live = forest_.live();
     const double dt = n_frames_ == 0 ? 0 : time - last_time_;
     frame->grid.build(frame->points, live.m.axis.D, live.sm.max_speed * dt + live.sm.speed_margin);
     forest_.add(std::move(frame), stats, [&](std::int64_t detection, std::int64_t id, double p) {
@@ -98,7 +97,7 @@ class TreeTracker {
     for (const auto& [detection, said] : decided)
       if (said.id < 0) unlabelled_[detection] = said.confidence;
     std::int64_t oldest = said_.empty() ? n_seen_ : said_.begin()->first;
-    for (const LiveTrack<Tree>& track : forest_.live.tracks)
+    for (const LiveTrack<Tree>& track : forest_.live().tracks)
       if (!track.pending.empty()) oldest = std::min(oldest, track.pending.front().detection);
     unlabelled_.erase(unlabelled_.begin(), unlabelled_.lower_bound(oldest));
   }
@@ -124,7 +123,7 @@ class TreeTracker {
           label(detection, said.id, said.confidence);
       }
     said_ = std::move(now);
-    present_ = std::move(ahead.live);
+    present_ = ahead.live();
   }
 
   Forest forest_;

@@ -1,0 +1,98 @@
+// The frames that are not decided yet, and the branches of every track over them.
+//
+// What is decided of a track lives in live_tracks.hpp; its branches (branches.hpp) are what may
+// follow. Who has which point of the oldest frame is for others to decide; here it is carried out.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "branches.hpp"
+#include "live_tracks.hpp"
+
+namespace asterism {
+
+struct OpenWindow {
+  LiveTracks<Tree> live;
+  BranchOptions branches;
+  std::vector<std::shared_ptr<const WindowFrame>> frames;
+  std::int64_t n_trees = 0;
+
+  std::int32_t n_open() const { return static_cast<std::int32_t>(frames.size()); }
+  bool is_full() const { return n_open() == branches.window; }
+
+  void count(FrameStats& stats) const {
+    for (const LiveTrack<Tree>& track : live.tracks) {
+      ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
+      stats.n_pending += static_cast<std::int64_t>(track.pending.size());
+      stats.n_branches += static_cast<std::int64_t>(track.more.branches.size());
+    }
+  }
+
+  // What the believed tracks expect of a frame that comes.
+  void claim(WindowFrame& frame) const {
+    BranchGrower grower(live, branches);
+    for (const LiveTrack<Tree>& track : live.tracks)
+      if (track.is_confirmed()) grower.claim(track, frame);
+  }
+
+  void push(std::shared_ptr<const WindowFrame> frame, FrameStats& stats) {
+    frames.push_back(std::move(frame));
+    BranchGrower grower(live, branches);
+    for (LiveTrack<Tree>& track : live.tracks) grower.grow(*frames.back(), track, n_open(), stats);
+  }
+
+  std::shared_ptr<const WindowFrame> pop() {
+    std::shared_ptr<const WindowFrame> oldest = frames.front();
+    frames.erase(frames.begin());
+    return oldest;
+  }
+
+  // Carries what is decided of track i over the frame just popped, with detection `own` or, at -1,
+  // none.
+  void carry(const WindowFrame& frame, std::size_t i, std::int32_t own) {
+    LiveTrack<Tree>& track = live[i];
+    predict(live.m, frame.step, track.state);
+    if (own >= 0) {
+      const Prediction prediction(live.m, track.state);
+      const Point& y = frame.points[own];
+      track.more.lambda = branches.fading * track.more.lambda + surprise(prediction, y);
+      ++track.more.n_updates;
+      track.score += live.hit_gain() + update(live.m, prediction, y, track.state);
+      track.last = y;
+      track.last_time = frame.time;
+    } else {
+      track.score += live.miss_gain();
+    }
+  }
+
+  // Keeps the branches that agree with what was carried; grows new ones where none do.
+  void keep(const WindowFrame& frame, std::size_t i, std::int32_t own, FrameStats& stats) {
+    LiveTrack<Tree>& track = live[i];
+    std::erase_if(track.more.branches,
+                  [&](const Branch& b) { return b.taken(frame.number) != own; });
+    if (track.more.branches.empty() || frames.empty())
+      regrow(track, stats);
+    else if (own >= 0)
+      settle(frame, own, track);
+  }
+
+  // The branches of a track have `own` behind them.
+  void settle(const WindowFrame& frame, std::int32_t own, LiveTrack<Tree>& track) const {
+    for (Branch& b : track.more.branches) {
+      --b.n_taken;
+      b.distance2[frame.number % kMaxWindow] = 0;
+      if (!branches.is_joint) b.score += frame.crowding(track.more.key, own);
+    }
+  }
+
+  void regrow(LiveTrack<Tree>& track, FrameStats& stats) {
+    BranchGrower grower(live, branches);
+    track.more.branches.assign(1, grower.root(track));
+    std::int32_t n = 0;
+    for (const auto& frame : frames) grower.grow(*frame, track, ++n, stats);
+  }
+};
+
+}  // namespace asterism
