@@ -4,6 +4,7 @@
 #include "bindings.hpp"
 #include "forest.hpp"
 #include "frame_tracker.hpp"
+#include "hypothesis_forest.hpp"
 #include "joint_tracker.hpp"
 #include "motion_arrays.hpp"
 #include "tree_tracker.hpp"
@@ -174,7 +175,10 @@ void bind_trackers(nb::module_& module) {
       .def_ro("most_branches", &FrameStats::most_branches)
       .def_ro("n_cut", &FrameStats::n_cut)
       .def_ro("n_limited", &FrameStats::n_limited)
-      .def_ro("n_shared", &FrameStats::n_shared);
+      .def_ro("n_shared", &FrameStats::n_shared)
+      .def_ro("n_hypotheses", &FrameStats::n_hypotheses)
+      .def_ro("n_nodes", &FrameStats::n_nodes)
+      .def_ro("gap", &FrameStats::gap);
 
   nb::class_<LifeOptions>(module, "LifeOptions")
       .def(
@@ -240,6 +244,21 @@ void bind_trackers(nb::module_& module) {
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "resolver"_a,
           "is_independent"_a);
+
+  bind<TreeTracker<HypothesisForest>>(module, "HypothesisTracker")
+      .def(
+          "__init__",
+          [](TreeTracker<HypothesisForest>* self, const MotionModel& model, const ScoreModel& score,
+             const LifeOptions& life, BranchOptions branches, std::int64_t max_hypotheses,
+             std::int64_t max_nodes, double new_track_claim) {
+            require(max_hypotheses >= 1 && max_nodes >= 1, "limits: at least 1");
+            branches.is_joint = true;
+            branches.log_end = log_end_table(score, score.max_gap);
+            new (self) TreeTracker<HypothesisForest>(HypothesisForest(
+                model, score, life, branches, {max_hypotheses, max_nodes, new_track_claim}));
+          },
+          "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
+          "max_nodes"_a, "new_track_claim"_a);
 
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {
     try {

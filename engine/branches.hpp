@@ -143,7 +143,6 @@ class BranchGrower {
     b.last_time = track.last_time;
     b.last = track.last;
     b.gap = track.gap;
-    b.has_ended = track.gap >= live_.sm.max_gap;
     return b;
   }
 

@@ -65,6 +65,10 @@ struct FrameStats {
   // Trees: branches at the end, most in a tree, cut by the χ² test, dropped by the limit on their
   // number; detections that several trees like best.
   std::int64_t n_branches = 0, most_branches = 0, n_cut = 0, n_limited = 0, n_shared = 0;
+  // Joint hypotheses: most of a cluster, nodes of the search, how far the chosen one may be below the
+  // best where the search was cut short.
+  std::int64_t n_hypotheses = 0, n_nodes = 0;
+  double gap = 0;
 
   void add(const FrameStats& next) {
     n_candidates += next.n_candidates;
@@ -82,6 +86,9 @@ struct FrameStats {
     n_cut += next.n_cut;
     n_limited += next.n_limited;
     n_shared += next.n_shared;
+    n_hypotheses = std::max(n_hypotheses, next.n_hypotheses);
+    n_nodes += next.n_nodes;
+    gap = std::max(gap, next.gap);
   }
 };
 

@@ -3,8 +3,12 @@
 //
 // Best first. A node allows each tree some of its options and is worth at most the sum of their best
 // ones. Where two of these want one resource, the node is split by who has it; where none do, they are
-// the best of the node, and the rest of it is split as Murty does. The parts never overlap, so that
-// every packing comes once.
+// a packing, and the rest of the node is split as Murty does. The parts never overlap, so that every
+// packing comes once.
+//
+// Where that takes more than a few nodes, the resources get prices, by subgradient (a Lagrangian
+// relaxation): an option is worth so much less, whoever has a resource pays for it, and a node is worth
+// at most the sum of all prices and of the best options at these prices.
 #pragma once
 
 #include <algorithm>
@@ -33,65 +37,49 @@ class SetPacking {
   explicit SetPacking(std::span<const std::vector<PackingOption>> trees) {
     for (const auto& options : trees) {
       first_.push_back(static_cast<std::int32_t>(options_.size()));
-      order_of_.emplace_back();
-      for (std::size_t k = 0; k < options.size(); ++k)
-        order_of_.back().push_back(static_cast<std::int32_t>(k));
-      std::stable_sort(order_of_.back().begin(), order_of_.back().end(),
-                       [&](std::int32_t a, std::int32_t b) { return options[a].worth > options[b].worth; });
-      for (const std::int32_t k : order_of_.back()) options_.push_back(&options[k]);
+      for (const PackingOption& option : options) {
+        options_.push_back(&option);
+        priced_.push_back(option.worth);
+      }
     }
     first_.push_back(static_cast<std::int32_t>(options_.size()));
     std::int32_t n_resources = 0;
     for (const PackingOption* o : options_)
       for (const std::int32_t r : o->uses) n_resources = std::max(n_resources, r + 1);
-    users_.resize(n_resources);
-    for (std::size_t o = 0; o < options_.size(); ++o)
-      for (const std::int32_t r : options_[o]->uses) users_[r].push_back(static_cast<std::int32_t>(o));
-    tree_of_.resize(options_.size());
-    for (std::size_t i = 0; i + 1 < first_.size(); ++i)
-      for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) tree_of_[o] = static_cast<std::int32_t>(i);
+    price_.assign(n_resources, 0);
+    sort();
   }
 
   // Calls found(option of each tree, worth) for up to k packings, the best first, none of them more
   // than `drop` below it. With more than `max_nodes` nodes the best that can be repaired is given.
   template <typename Found>
   PackingSummary solve(std::int64_t k, double drop, std::int64_t max_nodes, Found&& found) {
-    PackingSummary summary;
-    Node root;
-    root.is_banned.assign(options_.size(), 0);
-    root.chosen.resize(n_trees());
-    for (std::int32_t i = 0; i < n_trees(); ++i) root.chosen[i] = first_[i];
-    push(std::move(root));
-    double best = -std::numeric_limits<double>::infinity();
-    std::int64_t n_found = 0;
-    summary.bound = heap_.front().bound;
-    while (!heap_.empty() && n_found < k) {
-      std::pop_heap(heap_.begin(), heap_.end());
-      const Node node = std::move(heap_.back());
-      heap_.pop_back();
-      if (n_found > 0 && node.bound < best - drop) break;
-      if (++summary.n_nodes > max_nodes) {
-        summary.is_exact = false;
-        if (n_found == 0) summary.bound = node.bound;
-        if (n_found == 0) give(repaired(node), found);
-        return summary;
-      }
-      const std::int32_t contested = conflict(node);
-      if (contested >= 0) {
-        split_by_owner(node, contested);
-        continue;
-      }
-      if (n_found++ == 0) summary.bound = best = node.bound;
-      give(node.chosen, found);
-      if (n_found < k) split_rest(node);
+    PackingSummary summary = search(k, drop, std::min(max_nodes, kUnpriced));
+    if (!summary.is_exact && max_nodes > kUnpriced) {
+      set_prices();
+      sort();
+      const std::int64_t n_before = summary.n_nodes;
+      summary = search(k, drop, max_nodes - n_before);
+      summary.n_nodes += n_before;
     }
+    for (const Packing& packing : packings_)
+      found(std::span<const std::int32_t>(packing.own), packing.worth);
     return summary;
   }
 
  private:
+  static constexpr std::int64_t kUnpriced = 32;  // nodes before prices are worth their while
+  static constexpr int kPriceRounds = 100;
+
+  struct Packing {
+    std::vector<std::int32_t> own;  // option of each tree, as the caller numbers them
+    double worth = 0;
+  };
+
   struct Node {
     double bound = 0;
     std::int64_t number = 0;
+    bool is_packing = false;            // `chosen` is one, and all there is in the node
     std::vector<char> is_banned;        // by option
     std::vector<std::int32_t> chosen;  // best allowed option of each tree
 
@@ -102,20 +90,134 @@ class SetPacking {
 
   std::int32_t n_trees() const { return static_cast<std::int32_t>(first_.size()) - 1; }
 
-  template <typename Found>
-  void give(const std::vector<std::int32_t>& chosen, Found&& found) const {
-    std::vector<std::int32_t> own(chosen.size());
-    double worth = 0;
-    for (std::int32_t i = 0; i < n_trees(); ++i) {
-      own[i] = order_of_[i][chosen[i] - first_[i]];
-      worth += options_[chosen[i]]->worth;
+  // Options of every tree by what they are worth at the prices, the best first; who uses what.
+  void sort() {
+    std::vector<std::int32_t> order(options_.size());
+    for (std::size_t o = 0; o < order.size(); ++o) order[o] = static_cast<std::int32_t>(o);
+    for (std::size_t i = 0; i + 1 < first_.size(); ++i)
+      std::stable_sort(order.begin() + first_[i], order.begin() + first_[i + 1],
+                       [&](std::int32_t a, std::int32_t b) { return priced_[a] > priced_[b]; });
+    std::vector<const PackingOption*> options;
+    std::vector<double> priced;
+    std::vector<std::int32_t> number;
+    for (const std::int32_t o : order) {
+      options.push_back(options_[o]);
+      priced.push_back(priced_[o]);
+      number.push_back(number_.empty() ? o - first_[tree_of(o)] : number_[o]);
     }
-    found(std::span<const std::int32_t>(own), worth);
+    options_ = std::move(options);
+    priced_ = std::move(priced);
+    number_ = std::move(number);
+    users_.assign(price_.size(), {});
+    tree_of_.resize(options_.size());
+    for (std::size_t i = 0; i + 1 < first_.size(); ++i)
+      for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
+        tree_of_[o] = static_cast<std::int32_t>(i);
+        for (const std::int32_t r : options_[o]->uses) users_[r].push_back(o);
+      }
+  }
+  std::int32_t tree_of(std::int32_t option) const {
+    return static_cast<std::int32_t>(
+        std::upper_bound(first_.begin(), first_.end() - 1, option) - first_.begin() - 1);
+  }
+
+  PackingSummary search(std::int64_t k, double drop, std::int64_t max_nodes) {
+    PackingSummary summary;
+    packings_.clear();
+    heap_.clear();
+    n_pushed_ = 0;
+    Node root;
+    root.is_banned.assign(options_.size(), 0);
+    root.chosen.assign(first_.begin(), first_.end() - 1);
+    push(std::move(root));
+    summary.bound = heap_.front().bound;
+    while (!heap_.empty() && static_cast<std::int64_t>(packings_.size()) < k) {
+      std::pop_heap(heap_.begin(), heap_.end());
+      Node node = std::move(heap_.back());
+      heap_.pop_back();
+      if (!packings_.empty() && node.bound < packings_.front().worth - drop) break;
+      if (packings_.empty()) summary.bound = node.bound;
+      if (node.is_packing) {
+        packings_.push_back(packing(node.chosen));
+        continue;
+      }
+      if (++summary.n_nodes > max_nodes) {
+        summary.is_exact = false;
+        if (packings_.empty()) packings_.push_back(packing(repaired(node)));
+        break;
+      }
+      const std::int32_t contested = conflict(node);
+      if (contested >= 0) {
+        split_by_owner(node, contested);
+        continue;
+      }
+      split_rest(node);
+      node.is_packing = true;
+      push(std::move(node));
+    }
+    if (!packings_.empty() && summary.is_exact) summary.bound = packings_.front().worth;
+    return summary;
+  }
+
+  // Prices that bring the bound down: who is wanted by several becomes dear, who by none cheap.
+  void set_prices() {
+    double best = packings_.empty() ? 0 : packings_.front().worth, least = 0, step = 1;
+    std::vector<double> price(price_.size(), 0), used(price_.size());
+    std::vector<std::int32_t> chosen(n_trees());
+    int n_idle = 0;
+    for (int round = 0; round < kPriceRounds && step > 1e-3; ++round) {
+      double dual = 0, length = 0;
+      for (const double x : price) dual += x;
+      std::fill(used.begin(), used.end(), 0);
+      for (std::int32_t i = 0; i < n_trees(); ++i) {
+        double most = -std::numeric_limits<double>::infinity();
+        for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
+          double worth = options_[o]->worth;
+          for (const std::int32_t r : options_[o]->uses) worth -= price[r];
+          if (worth <= most) continue;
+          most = worth;
+          chosen[i] = o;
+        }
+        dual += most;
+        for (const std::int32_t r : options_[chosen[i]]->uses) used[r] += 1;
+      }
+      if (round == 0 || dual < least) {
+        least = dual;
+        price_ = price;
+        n_idle = 0;
+      } else if (++n_idle >= 5) {
+        step /= 2;
+        n_idle = 0;
+      }
+      for (std::size_t r = 0; r < price.size(); ++r)
+        if (used[r] > 1 || (used[r] < 1 && price[r] > 0)) length += (1 - used[r]) * (1 - used[r]);
+      if (length == 0 || !(dual > best)) break;
+      for (std::size_t r = 0; r < price.size(); ++r)
+        price[r] = std::max(price[r] - step * (dual - best) / length * (1 - used[r]), 0.0);
+    }
+    for (std::size_t o = 0; o < options_.size(); ++o) {
+      priced_[o] = options_[o]->worth;
+      for (const std::int32_t r : options_[o]->uses) priced_[o] -= price_[r];
+    }
+  }
+
+  Packing packing(const std::vector<std::int32_t>& chosen) const {
+    Packing out;
+    for (const std::int32_t o : chosen) {
+      out.own.push_back(number_[o]);
+      out.worth += options_[o]->worth;
+    }
+    return out;
   }
 
   void push(Node node) {
     node.bound = 0;
-    for (std::int32_t i = 0; i < n_trees(); ++i) node.bound += options_[node.chosen[i]]->worth;
+    if (node.is_packing) {
+      for (const std::int32_t o : node.chosen) node.bound += options_[o]->worth;
+    } else {
+      for (const double x : price_) node.bound += x;
+      for (const std::int32_t o : node.chosen) node.bound += priced_[o];
+    }
     node.number = n_pushed_++;
     heap_.push_back(std::move(node));
     std::push_heap(heap_.begin(), heap_.end());
@@ -187,7 +289,7 @@ class SetPacking {
     std::vector<std::int32_t> order(n_trees()), out(n_trees());
     for (std::int32_t i = 0; i < n_trees(); ++i) order[i] = i;
     std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-      return options_[node.chosen[a]]->worth > options_[node.chosen[b]]->worth;
+      return priced_[node.chosen[a]] > priced_[node.chosen[b]];
     });
     is_used_.assign(users_.size(), 0);
     for (const std::int32_t i : order) {
@@ -201,8 +303,11 @@ class SetPacking {
   }
 
   std::vector<const PackingOption*> options_;  // by tree, the best first
-  std::vector<std::vector<std::int32_t>> order_of_, users_;
+  std::vector<double> priced_, price_;         // of options: worth less prices; of resources
+  std::vector<std::int32_t> number_;           // of an option within its tree, as the caller has it
+  std::vector<std::vector<std::int32_t>> users_;
   std::vector<std::int32_t> first_, tree_of_;
+  std::vector<Packing> packings_;
   std::vector<Node> heap_;
   std::vector<char> is_used_;
   std::int64_t n_pushed_ = 0;

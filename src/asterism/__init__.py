@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from asterism.associate import SMP as SMP
     from asterism.associate import Method as Method
     from asterism.associate import ModelEstimate as ModelEstimate
+    from asterism.associate import TOMHT as TOMHT
     from asterism.associate import TrackSplitting as TrackSplitting
     from asterism.associate import Update as Update
     from asterism.associate import estimate_model as estimate_model
@@ -151,6 +152,7 @@ _PUBLIC = {
         "METHODS",
         "JPDA",
         "SMP",
+        "TOMHT",
         "TrackSplitting",
         "Method",
         "ModelEstimate",

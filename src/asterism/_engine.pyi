@@ -63,6 +63,12 @@ class FrameStats:
     def n_limited(self) -> int: ...
     @property
     def n_shared(self) -> int: ...
+    @property
+    def n_hypotheses(self) -> int: ...
+    @property
+    def n_nodes(self) -> int: ...
+    @property
+    def gap(self) -> float: ...
 
 class LifeOptions:
     def __init__(
@@ -170,6 +176,19 @@ class TreeTracker(_Tracker):
         is_independent: bool,
     ) -> None: ...
     def chi2(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]: ...
+
+class HypothesisTracker(_Tracker):
+    def __init__(
+        self,
+        model: MotionModel,
+        score: ScoreModel,
+        life: LifeOptions,
+        branches: BranchOptions,
+        *,
+        max_hypotheses: int,
+        max_nodes: int,
+        new_track_claim: float,
+    ) -> None: ...
 
 def score_tracks(
     model: MotionModel,

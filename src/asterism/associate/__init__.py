@@ -6,6 +6,7 @@ from asterism.associate.method import Method, Update
 from asterism.associate.model_from_clip import ModelEstimate, estimate_model
 from asterism.associate.registry import METHODS, method_by_name
 from asterism.associate.smp import SMP
+from asterism.associate.tomht import TOMHT
 from asterism.associate.track import track
 from asterism.associate.track_splitting import TrackSplitting
 
@@ -14,6 +15,7 @@ __all__ = [
     "JPDA",
     "METHODS",
     "SMP",
+    "TOMHT",
     "Method",
     "ModelEstimate",
     "TrackSplitting",

@@ -27,7 +27,12 @@ if TYPE_CHECKING:
     from asterism import _engine
     from asterism.model import Detections, TrackingModel
 
-    Tracker = _engine.FrameTracker | _engine.JointTracker | _engine.TreeTracker
+    Tracker = (
+        _engine.FrameTracker
+        | _engine.JointTracker
+        | _engine.TreeTracker
+        | _engine.HypothesisTracker
+    )
 
 __all__ = ["FrameByFrame", "FrameState"]
 
@@ -49,7 +54,7 @@ class FrameState:
         The model.
     n_axes : int
         2 or 3.
-    tracker : FrameTracker, JointTracker or TreeTracker
+    tracker : one of the engine's trackers
         The live tracks, in the engine.
     about : callable
         What the method tells of a frame or of all so far.

@@ -1,0 +1,110 @@
+"""Track-oriented multiple hypothesis tracking (Kurien 1990; Blackman 2004)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from asterism.associate.frame_by_frame import FrameByFrame
+from asterism.errors import check_number
+
+if TYPE_CHECKING:
+    from asterism import _engine
+
+__all__ = ["TOMHT"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TOMHT(FrameByFrame):
+    """Track-oriented multiple hypotheses: the best compatible set of track hypotheses.
+
+    Each track is a tree: a branch for every detection in its gate and one for a miss, over a window
+    of frames; every detection may begin a new one. A hypothesis takes one branch of each tree, no
+    detection twice, and is worth its log posterior (`log_posterior`). In each cluster of trees that
+    share detections the best one is found by exact set packing, and the oldest frame is decided by
+    it (N-scan pruning). Until then labels are what would be decided now, and may change.
+
+    The confidence of a label is its probability over the best hypotheses of its cluster.
+
+    Parameters
+    ----------
+    window : int
+        Frames until one is decided, 2 to 16.
+    max_branches : int
+        Most branches of a tree.
+    prune_odds : float
+        A branch ends when it is so many times less likely than its tree's best.
+    max_hypotheses : int
+        Most hypotheses of a cluster, for the confidence; of the best only those count that are not
+        e^25 times less likely.
+    max_nodes : int
+        Most nodes of the search in a cluster; where it is cut short, a compatible set is made of
+        what was found, and ``info`` says by how many nats it may be below the best.
+    new_track_odds : float
+        A detection that a believed track expects by more than these odds begins no track.
+    gate_probability, confirm_probability, delete_odds : float
+        See `FrameByFrame`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(seed=1)
+    >>> tracks = am.track(truth.detections, am.TOMHT())
+    >>> tracks.n_tracks, tracks.info["gap"]
+    (8, 0.0)
+    """
+
+    window: int = 4
+    max_branches: int = 30
+    prune_odds: float = 1e6
+    max_hypotheses: int = 20
+    max_nodes: int = 2000
+    new_track_odds: float = 1000.0
+
+    name: ClassVar[str] = "tomht"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_number("window", self.window, above=2, below=16, closed=True, integer=True)
+        for name in ("max_branches", "max_hypotheses", "max_nodes"):
+            check_number(name, getattr(self, name), above=1, closed=True, integer=True)
+        check_number("prune_odds", self.prune_odds, above=1)
+        check_number("new_track_odds", self.new_track_odds, above=0)
+
+    def _tracker(
+        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    ) -> _engine.HypothesisTracker:
+        from asterism import _engine
+
+        branches = _engine.BranchOptions(
+            window=int(self.window),
+            max_branches=int(self.max_branches),
+            merge_last=int(self.window),
+            prune_drop=math.log(self.prune_odds),
+            fading=1.0,
+            delta=np.empty(0),  # no χ² test
+            z=0.0,
+        )
+        return _engine.HypothesisTracker(
+            motion,
+            score,
+            life,
+            branches,
+            max_hypotheses=int(self.max_hypotheses),
+            max_nodes=int(self.max_nodes),
+            new_track_claim=self.new_track_odds,
+        )
+
+    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        return super()._about(stats) | {
+            "branches": stats.n_branches,
+            "most_branches": stats.most_branches,
+            "dropped_branches": stats.n_limited,
+            "most_hypotheses": stats.n_hypotheses,
+            "nodes": stats.n_nodes,
+            "clusters_cut_short": stats.n_beams,
+            "gap": stats.gap,
+        }
