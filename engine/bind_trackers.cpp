@@ -253,9 +253,15 @@ void bind_trackers(nb::module_& module) {
              std::int64_t max_nodes, double new_track_claim) {
             require(max_hypotheses >= 1 && max_nodes >= 1, "limits: at least 1");
             branches.is_joint = true;
-            branches.log_end = log_end_table(score, score.max_gap);
+            branches.log_end = log_end_table(score, score.max_gap + kMaxWindow);
+            const double least_new_worth = -branches.prune_drop;
+            const double drop = std::max(branches.prune_drop, 25.0);
+            // A way on may be so much worse than another and still better than to lose the marker
+            // and to begin a new one.
+            branches.prune_drop += std::max(score.log_clutter - score.log_birth - score.log_detect, 0.0) -
+                                   std::log(score.p_disappear);
             new (self) TreeTracker<HypothesisForest>(HypothesisForest(
-                model, score, life, branches, {max_hypotheses, max_nodes, new_track_claim}));
+                model, score, life, branches, {max_hypotheses, max_nodes, new_track_claim, least_new_worth, drop}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
           "max_nodes"_a, "new_track_claim"_a);

@@ -125,12 +125,15 @@ class BranchGrower {
   BranchGrower(const LiveTracks<Tree>& live, const BranchOptions& options)
       : live_(live), opt_(options) {}
 
-  // What a branch is worth among those of its tree: its score, less what the detections it takes
-  // would be worth if left over. Jointly, what it is worth in the posterior: no less for misses
-  // after which it may have ended.
+  // What a branch is worth among those of its tree, as long as the track lives: its score, less what
+  // the detections it takes would be worth if left over.
+  double rank(const Branch& b) const { return b.score - b.n_taken * live_.leftover_gain(); }
+
+  // What a branch is worth. Jointly, its part of the posterior: no less for misses after which the
+  // track may have ended.
   double worth(const Branch& b) const {
     if (opt_.is_joint) return b.score - b.gap * live_.miss_gain() + opt_.log_end[b.gap];
-    return b.score - b.n_taken * live_.leftover_gain();
+    return rank(b);
   }
 
   // The decided part of a track, as the only branch.
@@ -206,6 +209,10 @@ class BranchGrower {
     parent.path[slot] = -1;
     parent.distance2[slot] = 0;
     if (parent.has_ended) {
+      if (opt_.is_joint) {  // one more frame in which it was not seen
+        ++parent.gap;
+        parent.score += live_.miss_gain();
+      }
       grown_.push_back(parent);
       return;
     }
@@ -254,11 +261,11 @@ class BranchGrower {
 
   void prune(std::int64_t frame, std::int32_t n_open, FrameStats& stats) {
     std::stable_sort(grown_.begin(), grown_.end(),
-                     [&](const Branch& a, const Branch& b) { return worth(a) > worth(b); });
-    const double least = worth(grown_.front()) - opt_.prune_drop;
+                     [&](const Branch& a, const Branch& b) { return rank(a) > rank(b); });
+    const double least = rank(grown_.front()) - opt_.prune_drop;
     std::size_t kept = 0;
     for (std::size_t b = 0; b < grown_.size(); ++b) {
-      if (worth(grown_[b]) < least) break;
+      if (rank(grown_[b]) < least) break;
       if (n_open > opt_.merge_last && is_merged(grown_[b], frame, kept)) continue;
       if (kept == static_cast<std::size_t>(opt_.max_branches)) {
         ++stats.n_limited;

@@ -24,6 +24,8 @@ struct HypothesisOptions {
   std::int64_t max_hypotheses = 1;  // of a cluster, for the probabilities
   std::int64_t max_nodes = 1;       // of the search for them
   double new_track_claim = 0;       // a detection that is expected by more begins no tree
+  double least_new_worth = 0;       // a branch of a new tree that is worth less is no option
+  double drop = 0;                  // a hypothesis so many nats below the best does not count
 };
 
 class HypothesisForest {
@@ -51,7 +53,12 @@ class HypothesisForest {
 
   bool has_confidence() const { return true; }
   const LiveTracks<Tree>& live() const { return open_.live; }
-  void count(FrameStats& stats) const { open_.count(stats); }
+  // What may begin in an open frame is tentative as well.
+  void count(FrameStats& stats) const {
+    open_.count(stats);
+    stats.n_tentative += static_cast<std::int64_t>(seeds_.size());
+    stats.n_pending += static_cast<std::int64_t>(seeds_.size());
+  }
 
  private:
   // What a tree does in a hypothesis.
@@ -150,7 +157,7 @@ class HypothesisForest {
       bool has_free = false;
       for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
         const Branch& b = track.more.branches[k];
-        if (is_seed && (b.n_taken < 2 || !(grower.worth(b) > 0))) continue;
+        if (is_seed && (b.n_taken < 2 || grower.worth(b) < opt_.least_new_worth)) continue;
         PackingOption option{grower.worth(b), {}};
         for (std::size_t f = 0; f < open_.frames.size(); ++f) {
           const std::int64_t number = open_.frames[f]->number;
@@ -168,8 +175,8 @@ class HypothesisForest {
         tree.options.push_back({0, {}});
         tree.choices.push_back({kNothing, -1});
       } else if (!has_free) {
-        const std::int32_t gap = std::min(track.gap + open_.n_open(), open_.live.sm.max_gap);
-        const double lost = track.score - track.gap * open_.live.miss_gain() + open_.branches.log_end[gap];
+        const double lost = track.score - track.gap * open_.live.miss_gain() +
+                            open_.branches.log_end[track.gap + open_.n_open()];
         tree.options.push_back({lost, {}});
         tree.choices.push_back({kLost, -1});
       }
@@ -206,7 +213,7 @@ class HypothesisForest {
     std::vector<std::int32_t> chosen;
     std::vector<double> totals;
     const PackingSummary summary = SetPacking(options).solve(
-        opt_.max_hypotheses, kNegligible, opt_.max_nodes,
+        opt_.max_hypotheses, opt_.drop, opt_.max_nodes,
         [&](std::span<const std::int32_t> own, double worth) {
           chosen.insert(chosen.end(), own.begin(), own.end());
           totals.push_back(worth);
@@ -233,8 +240,6 @@ class HypothesisForest {
       }
     }
   }
-
-  static constexpr double kNegligible = 25;  // nats below the best hypothesis
 
   OpenWindow open_;
   HypothesisOptions opt_;

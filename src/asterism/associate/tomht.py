@@ -36,7 +36,8 @@ class TOMHT(FrameByFrame):
     max_branches : int
         Most branches of a tree.
     prune_odds : float
-        A branch ends when it is so many times less likely than its tree's best.
+        A branch ends when it is so many times less likely than its tree's best would be if it lost
+        the marker and began another.
     max_hypotheses : int
         Most hypotheses of a cluster, for the confidence; of the best only those count that are not
         e^25 times less likely.
@@ -57,9 +58,9 @@ class TOMHT(FrameByFrame):
     (8, 0.0)
     """
 
-    window: int = 4
+    window: int = 5
     max_branches: int = 30
-    prune_odds: float = 1e6
+    prune_odds: float = 100.0
     max_hypotheses: int = 20
     max_nodes: int = 2000
     new_track_odds: float = 1000.0

@@ -1,0 +1,127 @@
+"""Track-oriented multiple hypotheses: the best partition of all, its probabilities, its limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import asterism as am
+from partition_oracle import every_partition, every_track, tiny_problem
+from scenes import calibration_in_crowds, crowd, small_model, wanderers
+
+# Nothing is pruned, nothing is left out, and what is more likely than not is believed.
+WHOLE = am.TOMHT(
+    window=16, max_branches=10**6, prune_odds=1e30, max_hypotheses=10**6, max_nodes=10**6,
+    new_track_odds=1e300, gate_probability=1e-300, confirm_probability=0.5 + 1e-12,
+    delete_odds=1e300,
+)  # fmt: skip
+
+
+def tiny_model(rng: np.random.Generator) -> am.TrackingModel:
+    return small_model(
+        motion=am.DWNA(acceleration_sigma=2.0, velocity_sigma=0.4),
+        noise_sigma=0.01,
+        p_detection=float(rng.uniform(0.6, 0.95)),
+        clutter_density=float(rng.uniform(1, 30)),
+        birth_density=float(rng.uniform(0.5, 10)),
+        p_disappear=float(rng.uniform(0.01, 0.3)),
+        max_speed=float(rng.choice([1.0, 4.0])),
+        max_gap=int(rng.integers(1, 5)),
+        termination=str(rng.choice(["marginal", "last"])),
+    )
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_whole_tree_finds_the_best_of_all_partitions_and_their_probabilities(seed):
+    rng = np.random.default_rng(seed)
+    n_tracks = 0
+    for _ in range(60):
+        n_frames, most = ((5, 2), (4, 3), (3, 4))[rng.integers(3)]
+        d, model = tiny_problem(rng, n_frames, most, int(rng.integers(2, 4))), tiny_model(rng)
+        partitions, totals = every_partition(d, model)
+        tracks = am.track(d, WHOLE, model=model)
+        assert tracks.info["gap"] == 0
+        assert am.log_posterior(tracks, model) == pytest.approx(totals.max(), abs=1e-9)
+        n_tracks += tracks.n_tracks
+        # The first frame is decided with all that is known; how sure is it of each of its points?
+        weights = np.exp(totals - totals.max())
+        for i in range(int(d.offsets[1])):
+            in_a_track = [any(i in path for path in p) for p in partitions]
+            p = weights[in_a_track].sum() / weights.sum()
+            wanted = p if tracks.labels[i] >= 0 else 1 - p
+            assert tracks.confidence[i] == pytest.approx(wanted, abs=1e-9)
+    assert n_tracks > 20
+
+
+def best_by_solver(d: am.Detections, model: am.TrackingModel) -> float:
+    paths, scores = every_track(d, model)
+    if not paths:
+        return 0.0
+    tuples = np.full((len(paths), d.n_frames), -1)
+    for k, path in enumerate(paths):
+        tuples[k, d.frame_of[list(path)]] = path
+    return am.assign_multidimensional(tuples, scores).value
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_larger_problems_are_solved_as_well_as_by_the_exact_solver(seed):
+    rng = np.random.default_rng(100 + seed)
+    for _ in range(8):
+        d, model = tiny_problem(rng, 5, 4), tiny_model(rng)
+        found = am.log_posterior(am.track(d, WHOLE, model=model), model)
+        assert found == pytest.approx(best_by_solver(d, model), abs=1e-5)
+
+
+def test_a_longer_window_explains_a_crowd_better_than_single_frames():
+    gains = []
+    for seed in range(12):
+        truth = crowd(seed, spread=0.08)
+        model = small_model(
+            motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
+            max_speed=1.5, clutter_density=5.0, birth_density=0.5, p_disappear=1e-3, max_gap=6,
+        )  # fmt: skip
+        best = {
+            name: am.log_posterior(am.track(truth.detections, method, model=model), model)
+            for name, method in (("gnn", am.GNN()), ("tomht", am.TOMHT()))
+        }
+        gains.append(best["tomht"] - best["gnn"])
+    assert np.mean(gains) > 5
+    assert min(gains) > -5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_where_nothing_is_in_doubt_the_truth_is_found(seed):
+    truth = wanderers(np.random.default_rng(seed), n_frames=80)
+    tracks = am.track(truth.detections, am.TOMHT(), model=small_model())
+    e = am.evaluate(tracks, truth)
+    assert e.idf1 > 0.98
+    assert tracks.info["gap"] == 0
+
+
+def test_confidence_is_calibrated_where_the_model_is_right():
+    found = calibration_in_crowds(am.TOMHT())
+    assert found.auc > 0.8
+    assert found.ece < 0.01
+
+
+def test_a_search_cut_short_says_by_how_much_it_may_be_off():
+    d = crowd(3, spread=0.04).detections
+    model = small_model(
+        motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
+        max_speed=1.5, clutter_density=1.0, birth_density=1.0,
+    )  # fmt: skip
+    whole = am.track(d, am.TOMHT(max_nodes=10**6), model=model)
+    short = am.track(d, am.TOMHT(max_nodes=2), model=model)
+    assert (whole.info["gap"], whole.info["clusters_cut_short"]) == (0, 0)
+    assert short.info["clusters_cut_short"] > 0
+    assert short.info["gap"] > 0
+    assert am.log_posterior(short, model) < am.log_posterior(whole, model)
+
+
+def test_options_are_checked():
+    for wrong in (
+        {"window": 1}, {"window": 17}, {"max_branches": 0}, {"max_hypotheses": 0},
+        {"max_nodes": 0}, {"prune_odds": 1}, {"new_track_odds": 0},
+    ):  # fmt: skip
+        with pytest.raises(am.ParameterError, match=next(iter(wrong))):
+            am.TOMHT(**wrong)
