@@ -19,6 +19,7 @@ METHODS: dict[str, am.Method[Any]] = {
     "smp, window=3": am.SMP(window=3),
     "jpda": am.JPDA(),
     "splitting": am.TrackSplitting(),
+    "tomht": am.TOMHT(),
 }
 
 
