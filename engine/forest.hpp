@@ -261,7 +261,7 @@ class Forest {
     open_.keep(frame, i, own, stats);
   }
 
-  static constexpr double kNegligible = -27.6;  // log of a weight, of a miss of 1, not looked at
+  static constexpr double kNegligible = -20.7;  // log of a weight, of a miss of 1, not looked at
   static constexpr std::int64_t kMaxStates = 4096;  // of the sum over what a frame may be
 
   OpenWindow open_;

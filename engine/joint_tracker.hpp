@@ -87,7 +87,7 @@ class JointTracker {
     std::vector<WeightedPoint> mixture;
   };
 
-  static constexpr double kNegligible = -27.6;  // log of a weight, of a miss of 1, not looked at
+  static constexpr double kNegligible = -20.7;  // log of a weight, of a miss of 1, not looked at
   static constexpr double kMostOdds = 700;
 
   static double probability(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }

@@ -167,7 +167,7 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
         beta[:, m] = 1
         for own in (believed, ~believed):
             open_to = np.where(own[:, None] & ~taken, weights * free, 0)
-            open_to[open_to <= math.exp(-27.6) * missed[:, None]] = 0
+            open_to[open_to <= math.exp(-20.7) * missed[:, None]] = 0
             for rows in components(open_to):
                 rows = [i for i in rows if own[i]]
                 if not rows:

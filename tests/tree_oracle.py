@@ -183,7 +183,7 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
                     continue
                 # An event without the pair weighs as much as the miss and the newborn together.
                 w *= missed[row] / (missed[row] + found[i][4][j])
-                if w > math.exp(-27.6) * missed[row]:
+                if w > math.exp(-20.7) * missed[row]:
                     weights[row, j] = w
         beta = np.zeros(weights.shape)
         for rows in components(weights):
