@@ -20,9 +20,10 @@ class JPDA(FrameByFrame):
 
     Every way of sharing the detections out among the believed tracks has a probability, and so has
     every pairing: ``β_ij``, summed over all of them, exactly where a group takes no more than
-    `max_states` (`joint_marginals`). A pairing a billion times less likely than a miss is none. A track is moved by all its detections, each with its
-    probability, and brought back to one Gaussian; the axes share one covariance, so what
-    the detections differ by is shared out evenly among them.
+    `max_states` (`joint_marginals`). A pairing a billion times less likely than a miss is none. A
+    track is moved by all its detections, each with its probability, and brought back to one
+    Gaussian; the axes share one covariance, so what the detections differ by is shared out evenly
+    among them.
 
     Each track has a probability ``r`` to exist (JIPDA; Musicki & Evans 2004): it is missed with
     probability ``1 - r P_d``, and what it is seen or missed with changes it. Tentative tracks take
