@@ -159,6 +159,7 @@ def beside_stone_soup() -> list[list[str]]:
                 worst = max(worst, float(abs(beta - found.marginals).max()))
                 theirs += best_of(1, partial(frame.marginals, associator))
                 ours += best_of(3, partial(am.joint_marginals, frame.weights, frame.miss))
+            assert worst < 1e-9, "two ways of summing the same events"
             rows.append(
                 [
                     f"{n} × {n}",
