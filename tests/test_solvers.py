@@ -62,7 +62,7 @@ def random_market(rng: np.random.Generator, n: int, m: int, share: float, *, tie
 def test_marriage_is_stable_and_best_for_every_proposer(seed):
     rng = np.random.default_rng(seed)
     for _ in range(50):
-        n, m = rng.integers(1, 6, 2)
+        n, m = rng.integers(1, 7, 2)
         lists, costs = random_market(rng, n, m, rng.uniform(0.4, 1.0), ties=bool(seed % 3 == 0))
         partners, _ = marry(lists, costs, m)
         stable = list(stable_matchings(lists, costs, m))
