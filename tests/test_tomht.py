@@ -82,7 +82,7 @@ def test_a_longer_window_explains_a_crowd_better_than_single_frames():
         )  # fmt: skip
         best = {
             name: am.log_posterior(am.track(truth.detections, method, model=model), model)
-            for name, method in (("gnn", am.GNN()), ("tomht", am.TOMHT()))
+            for name, method in (("gnn", am.GNN()), ("tomht", am.TOMHT(window=5)))
         }
         gains.append(best["tomht"] - best["gnn"])
     assert np.mean(gains) > 5

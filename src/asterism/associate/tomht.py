@@ -58,7 +58,7 @@ class TOMHT(FrameByFrame):
     (8, 0.0)
     """
 
-    window: int = 5
+    window: int = 3
     max_branches: int = 30
     prune_odds: float = 100.0
     max_hypotheses: int = 20
