@@ -102,7 +102,9 @@ def test_summary_as_json(scene, capsys):
     assert summary["n_tracks"] == tracks.n_tracks
     assert summary["n_clutter"] == (tracks.labels == -1).sum()
     assert summary["n_labelled"] + summary["n_clutter"] == summary["n_detections"]
-    assert am.TrackingModel.from_dict(summary["model"]).population.max_gap > 0
+    model = am.TrackingModel.from_dict(summary["model"])
+    assert model.population.max_gap > 0
+    assert summary["log_posterior"] == pytest.approx(am.log_posterior(tracks, model), rel=1e-12)
     gap = summary["longest_gaps"][0]
     frames = tracks.detections.frame_of[tracks.labels == gap["track"]] + 1
     assert not np.isin(np.arange(gap["first"], gap["last"] + 1), frames).any()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +59,9 @@ class Summary:
         The longest of them, up to three.
     seconds, frames_per_second : float
         Time that the method took, and its pace.
+    log_posterior : float or None
+        Of the partition under the model, nats above “everything is clutter”: what methods may be
+        compared by. None where the model forbids one of the tracks.
     n_doubtful : int or None
         Detections whose label is held with less than `DOUBTFUL`; None from methods that do not say.
     info : dict
@@ -76,6 +80,7 @@ class Summary:
     longest_gaps: tuple[Gap, ...]
     seconds: float
     frames_per_second: float
+    log_posterior: float | None
     n_doubtful: int | None
     info: dict[str, float]
 
@@ -93,9 +98,15 @@ class Summary:
             ("gaps bridged", str(self.n_gaps)),
             *((("longest gaps"), gap) if i == 0 else ("", gap) for i, gap in enumerate(gaps)),
             *self._doubts(),
+            *self._posterior(),
             ("time", f"{self.seconds:.3g} s, {self.frames_per_second:,.0f} frames/s"),
             ("written", self.output),
         ]
+
+    def _posterior(self) -> list[tuple[str, str]]:
+        if self.log_posterior is None:
+            return []
+        return [("log posterior", f"{self.log_posterior:,.1f} nats above all clutter")]
 
     def _doubts(self) -> list[tuple[str, str]]:
         rows: list[tuple[str, str]] = []
@@ -121,13 +132,17 @@ class Summary:
         return dataclasses.asdict(self)
 
 
-def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> Summary:
+def summarize(
+    tracks: am.Tracks, *, model: am.TrackingModel, out: Path, method: str, seconds: float
+) -> Summary:
     """Count what a tracking did.
 
     Parameters
     ----------
     tracks : Tracks
         The result, over a `Capture`.
+    model : TrackingModel
+        The model that was searched.
     out : Path
         The file it went to.
     method : str
@@ -143,6 +158,7 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
     before = np.flatnonzero(is_gap)
     length = frame[before + 1] - frame[before]
     n_labelled = len(order)
+    log_posterior = am.log_posterior(tracks, model)
     return Summary(
         input=str(d.path),
         output=str(out),
@@ -164,6 +180,7 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
         ),
         seconds=seconds,
         frames_per_second=d.n_frames / seconds if seconds else 0.0,
+        log_posterior=log_posterior if math.isfinite(log_posterior) else None,
         n_doubtful=None
         if tracks.confidence is None
         else int((tracks.confidence[order] < DOUBTFUL).sum()),
