@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <numeric>
@@ -20,12 +21,18 @@
 
 namespace asterism {
 
+// Chooses an option of each tree, no resource twice: given the options of all trees and the first
+// resource of every open frame. Adds to the stats by how much its choice may be below the best.
+using Packer = std::function<std::vector<std::int32_t>(
+    std::span<const std::vector<PackingOption>>, std::span<const std::int32_t>, FrameStats&)>;
+
 struct HypothesisOptions {
   std::int64_t max_hypotheses = 1;  // of a cluster, for the probabilities
   std::int64_t max_nodes = 1;       // of the search for them
   double new_track_claim = 0;       // a detection that is expected by more begins no tree
   double least_new_worth = 0;       // a branch of a new tree that is worth less is no option
   double drop = 0;                  // a hypothesis so many nats below the best does not count
+  Packer packer;                    // who chooses in place of the search below, where there is one
 };
 
 class HypothesisForest {
@@ -51,7 +58,7 @@ class HypothesisForest {
     while (open_.n_open() > 0) decide(stats, label);
   }
 
-  bool has_confidence() const { return true; }
+  bool has_confidence() const { return !opt_.packer; }
   const LiveTracks<Tree>& live() const { return open_.live; }
   // What may begin in an open frame is tentative as well.
   void count(FrameStats& stats) const {
@@ -203,8 +210,27 @@ class HypothesisForest {
     std::vector<std::vector<std::int32_t>> clusters(trees_.size());
     for (std::size_t i = 0; i < trees_.size(); ++i)
       clusters[find(static_cast<std::int32_t>(i))].push_back(static_cast<std::int32_t>(i));
-    for (const std::vector<std::int32_t>& cluster : clusters)
-      if (!cluster.empty()) choose_in(cluster, stats);
+    std::vector<std::int32_t> entangled;
+    for (const std::vector<std::int32_t>& cluster : clusters) {
+      if (cluster.empty()) continue;
+      if (opt_.packer && cluster.size() > 1)
+        entangled.insert(entangled.end(), cluster.begin(), cluster.end());
+      else
+        choose_in(cluster, stats);
+    }
+    if (!entangled.empty()) choose_by_packer(entangled, stats);
+  }
+
+  void choose_by_packer(const std::vector<std::int32_t>& entangled, FrameStats& stats) {
+    std::vector<std::vector<PackingOption>> options;
+    for (const std::int32_t i : entangled) options.push_back(std::move(trees_[i].options));
+    const std::vector<std::int32_t> own = opt_.packer(options, first_resource_, stats);
+    ++stats.n_groups;
+    stats.largest_group = std::max<std::int64_t>(stats.largest_group, entangled.size());
+    for (std::size_t c = 0; c < entangled.size(); ++c) {
+      TreeOptions& tree = trees_[entangled[c]];
+      tree.best = tree.choices[own[c]];
+    }
   }
 
   void choose_in(const std::vector<std::int32_t>& cluster, FrameStats& stats) {

@@ -24,10 +24,11 @@ METHODS = {
     "splitting": am.TrackSplitting(),
     "independent trees": am.TrackSplitting(independent=True, window=4),
     "tomht": am.TOMHT(),
+    "mda": am.MDA(),
 }
 each_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 # The others are held to every partition of small problems instead.
-ON_A_BLACKBOARD = {name: m for name, m in METHODS.items() if not isinstance(m, am.TOMHT)}
+ON_A_BLACKBOARD = {name: m for name, m in METHODS.items() if not isinstance(m, am.TOMHT | am.MDA)}
 each_on_a_blackboard = pytest.mark.parametrize(
     "method", ON_A_BLACKBOARD.values(), ids=ON_A_BLACKBOARD
 )

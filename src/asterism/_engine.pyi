@@ -1,6 +1,6 @@
 """The typed face of the compiled module; see engine/bindings.cpp."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
@@ -177,6 +177,17 @@ class TreeTracker(_Tracker):
     ) -> None: ...
     def chi2(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]: ...
 
+_Choose = Callable[
+    [
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+        NDArray[np.int32],
+        NDArray[np.int32],
+    ],
+    tuple[NDArray[np.int32], float],
+]
+
 class HypothesisTracker(_Tracker):
     def __init__(
         self,
@@ -188,6 +199,7 @@ class HypothesisTracker(_Tracker):
         max_hypotheses: int,
         max_nodes: int,
         new_track_claim: float,
+        choose: _Choose | None = None,
     ) -> None: ...
 
 def score_tracks(

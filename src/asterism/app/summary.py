@@ -116,8 +116,9 @@ class Summary:
             groups = f"{self.info['approximate_groups']:.0f} groups too large for the exact sum"
             text = f"{groups}; probabilities there off by at most {self.info['bound']:.2g}"
             rows.append(("approximated", text))
-        if self.info.get("clusters_cut_short", 0) > 0:
-            groups = f"{self.info['clusters_cut_short']:.0f} searches cut short"
+        if self.info.get("gap", 0) > 0:
+            n = self.info.get("clusters_cut_short") or self.info.get("windows_with_a_gap", 0)
+            groups = f"{n:.0f} choices not proven best"
             text = f"{groups}; at most {self.info['gap']:.3g} nats below the best"
             rows.append(("approximated", text))
         if self.info.get("unguarded_groups", 0) > 0:

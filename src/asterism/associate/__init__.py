@@ -2,6 +2,7 @@
 
 from asterism.associate.gnn import GNN
 from asterism.associate.jpda import JPDA
+from asterism.associate.mda import MDA
 from asterism.associate.method import Method, Update
 from asterism.associate.model_from_clip import ModelEstimate, estimate_model
 from asterism.associate.registry import METHODS, method_by_name
@@ -13,6 +14,7 @@ from asterism.associate.track_splitting import TrackSplitting
 __all__ = [
     "GNN",
     "JPDA",
+    "MDA",
     "METHODS",
     "SMP",
     "TOMHT",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from asterism.associate.gnn import GNN
 from asterism.associate.jpda import JPDA
+from asterism.associate.mda import MDA
 from asterism.associate.smp import SMP
 from asterism.associate.tomht import TOMHT
 from asterism.associate.track_splitting import TrackSplitting
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["METHODS", "method_by_name"]
 
 METHODS: dict[str, type[Method[Any]]] = {
-    method.name: method for method in (GNN, SMP, JPDA, TrackSplitting, TOMHT)
+    method.name: method for method in (GNN, SMP, JPDA, TrackSplitting, TOMHT, MDA)
 }
 """Method by name, as the command line knows it."""
 
