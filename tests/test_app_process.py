@@ -99,6 +99,31 @@ def test_stopped_early(folder):
     assert sorted(p.name for p in folder.iterdir()) == ["in.csv", "model.toml"]
 
 
+@pytest.mark.parametrize(
+    "where",
+    [
+        "class Last:\n    def __del__(self): ask()\nLast()\n",
+        "import weakref\nclass Last: pass\nlast = Last()\n"
+        "kept = weakref.ref(last, lambda _: ask())\ndel last\n",
+    ],
+    ids=["finaliser", "weak reference"],
+)
+def test_a_signal_where_exceptions_are_lost(where):
+    # Imports hold such callbacks, so that any command may be stopped within one.
+    body = "".join(f"    {line}\n" for line in where.splitlines())
+    script = (
+        "import signal, sys, os, time\n"
+        "from asterism.app.endings import exit_code\n"
+        "def ask(): os.kill(os.getpid(), signal.SIGTERM)\n"
+        f"def run():\n{body}    time.sleep(20)\n"
+        "sys.exit(exit_code(run))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], timeout=30, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (143, "asterism: stopped by SIGTERM\n")
+
+
 def test_an_ignored_signal_stays_ignored(tmp_path):
     script = (
         "import signal, sys, os\n"

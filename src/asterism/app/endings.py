@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import logging
 import os
 import signal
@@ -106,11 +107,23 @@ def _stopping() -> Generator[None, None, None]:
             signal.signal(number, signal.SIG_IGN)
         raise Stopped(signum)
 
+    def again(lost: sys.UnraisableHookArgs) -> None:
+        # The signal came while Python ran a finaliser or a weak reference's callback, which
+        # cannot be left by an exception: it comes once more, when that is over.
+        if not isinstance(lost.exc_value, Stopped):
+            hook(lost)
+            return
+        for number in before:
+            signal.signal(number, stop)
+        threading.Timer(0.01, _thread.interrupt_main, [lost.exc_value.signum]).start()
+
     # Who started us with a signal ignored (nohup, a shell's background job) wants it ignored.
     asked = [s for s in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(s) != signal.SIG_IGN]
     before = {number: signal.signal(number, stop) for number in asked}
+    hook, sys.unraisablehook = sys.unraisablehook, again
     try:
         yield
     finally:
+        sys.unraisablehook = hook
         for number, handler in before.items():
             signal.signal(number, handler)
