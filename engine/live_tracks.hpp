@@ -71,17 +71,22 @@ struct FrameStats {
   double gap = 0;
 
   void add(const FrameStats& next) {
-    n_candidates += next.n_candidates;
-    n_groups += next.n_groups;
-    largest_group = std::max(largest_group, next.largest_group);
+    add_work(next);
     n_confirmed = next.n_confirmed;
     n_tentative = next.n_tentative;
     n_pending = next.n_pending;
+    n_branches = next.n_branches;
+  }
+
+  // What it took, without what there is at the end.
+  void add_work(const FrameStats& next) {
+    n_candidates += next.n_candidates;
+    n_groups += next.n_groups;
+    largest_group = std::max(largest_group, next.largest_group);
     n_beams += next.n_beams;
     n_states = std::max(n_states, next.n_states);
     n_unguarded += next.n_unguarded;
     bound = std::max(bound, next.bound);
-    n_branches = next.n_branches;
     most_branches = std::max(most_branches, next.most_branches);
     n_cut += next.n_cut;
     n_limited += next.n_limited;

@@ -33,6 +33,7 @@ class TreeTracker {
     forest_.count(stats);
     total_.add(stats);
     look_ahead(decided, label);
+    stats.add_work(ahead_);  // what is told of the open frames now is told of this step too
     return stats;
   }
 
@@ -58,7 +59,12 @@ class TreeTracker {
   bool has_confidence() const { return has_confidence_; }
   // The tracks as they would be decided on now.
   const LiveTracks<Tree>& live() const { return present_; }
-  const FrameStats& total() const { return total_; }
+  // Of what is decided, and of what would be decided now.
+  FrameStats total() const {
+    FrameStats all = total_;
+    all.add_work(ahead_);
+    return all;
+  }
   std::int64_t n_frames() const { return n_frames_; }
   std::int64_t n_seen() const { return n_seen_; }
   double last_time() const { return last_time_; }
@@ -106,9 +112,9 @@ class TreeTracker {
   template <typename Label>
   void look_ahead(const std::map<std::int64_t, Said>& decided, Label&& label) {
     Forest ahead(forest_);
-    FrameStats ignored;
+    ahead_ = {};
     std::map<std::int64_t, Said> now;
-    ahead.decide_all(ignored, [&](std::int64_t detection, std::int64_t id, double p) {
+    ahead.decide_all(ahead_, [&](std::int64_t detection, std::int64_t id, double p) {
       now[detection] = {id, has_confidence_ ? p : 0};
     });
     // Said before of what is neither decided nor open to a label any more: taken back.
@@ -131,7 +137,7 @@ class TreeTracker {
   bool has_confidence_;
   std::map<std::int64_t, Said> said_;  // of what is not decided
   std::map<std::int64_t, double> unlabelled_;
-  FrameStats total_;
+  FrameStats total_, ahead_;
   std::int64_t n_frames_ = 0, n_seen_ = 0;
   double last_time_ = -std::numeric_limits<double>::infinity();
 };

@@ -118,6 +118,27 @@ def test_a_search_cut_short_says_by_how_much_it_may_be_off():
     assert am.log_posterior(short, model) < am.log_posterior(whole, model)
 
 
+def test_what_is_only_looked_ahead_at_is_told_as_well():
+    # The window is longer than the take: nothing is decided, and still it says what was cut short.
+    d = crowd(3, spread=0.04).detections
+    first = am.Detections(
+        times=d.times[:8], offsets=d.offsets[:9], points=d.points[: d.offsets[8]]
+    )
+    model = small_model(
+        motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
+        max_speed=1.5, clutter_density=1.0, birth_density=1.0,
+    )  # fmt: skip
+    method = am.TOMHT(window=16, max_nodes=2)
+    short = am.track(first, method, model=model)
+    assert short.info["gap"] > 0
+    assert short.info["clusters_cut_short"] > 0
+    state = method.init(model)
+    for time, points in first:
+        state, update = method.step(state, time, points)
+    assert update.info["gap"] == state.info["gap"] == short.info["gap"]
+    assert am.track(first, am.TOMHT(window=16, max_nodes=10**6), model=model).info["gap"] == 0
+
+
 def test_options_are_checked():
     for wrong in (
         {"window": 1}, {"window": 17}, {"max_branches": 0}, {"max_hypotheses": 0},
