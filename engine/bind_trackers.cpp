@@ -325,8 +325,8 @@ void bind_trackers(nb::module_& module) {
                            std::span<const std::int32_t> first_resource,
                            FrameStats& stats) { return (*shared)(trees, first_resource, stats); };
             new (self) TreeTracker<HypothesisForest>(
-                HypothesisForest(model, score, life, branches,
-                                 {max_hypotheses, max_nodes, new_track_claim, least_new_worth, drop,
+                HypothesisForest(model, score, life, branches, new_track_claim,
+                                 {max_hypotheses, max_nodes, least_new_worth, drop,
                                   std::move(packer)}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "live_tracks.hpp"
+#include "surprise.hpp"
 
 namespace asterism {
 
@@ -65,7 +66,6 @@ struct WindowFrame {
     return std::log1p(std::max(others, 0.0));
   }
 };
-using Window = std::span<const std::shared_ptr<const WindowFrame>>;
 
 struct Branch {
   MotionState state;
@@ -91,34 +91,6 @@ struct Tree {
   std::int64_t n_updates = 0;
   std::vector<Branch> branches;
 };
-
-// ν ᵀ S⁻¹ ν; of a mixture, the χ² value that is as seldom exceeded as this point's distance.
-inline double surprise(const Prediction& p, const Point& y) {
-  if (p.M == 1) return squared_distance(y, p.y[0], p.D) / p.S[0];
-  double beyond = 0;
-  for (int b = 0; b < p.M; ++b) {
-    const double x = squared_distance(y, p.y[b], p.D) / p.S[b];
-    const double tail = p.D == 2 ? std::exp(-x / 2)
-                                 : std::erfc(std::sqrt(x / 2)) +
-                                       std::sqrt(2 * x / std::numbers::pi) * std::exp(-x / 2);
-    beyond += p.w[b] * tail;
-  }
-  beyond = std::clamp(beyond, 1e-300, 1.0);
-  if (p.D == 2) return -2 * std::log(beyond);
-  // Newton on log Q(x) for three degrees of freedom, from above, where it is concave.
-  double x = 3 - 2 * std::log(beyond) + 2 * std::log1p(-2 * std::log(beyond));
-  for (int k = 0; k < 60; ++k) {
-    const double tail = std::erfc(std::sqrt(x / 2)) +
-                        std::sqrt(2 * x / std::numbers::pi) * std::exp(-x / 2);
-    const double slope = -std::sqrt(x / (2 * std::numbers::pi)) * std::exp(-x / 2);
-    if (!(slope < 0) || !(tail > 0)) break;
-    const double next = x - tail * (std::log(tail) - std::log(beyond)) / slope;
-    const double moved = std::abs(next - x);
-    x = std::max(next, x / 16);
-    if (moved <= 1e-13 * x) break;
-  }
-  return x;
-}
 
 class BranchGrower {
  public:
@@ -175,18 +147,17 @@ class BranchGrower {
       const double log_w = log_seen + prediction.log_likelihood(frame.points[j], each);
       if (log_w > kNoClaim && log_w < 700) frame.claims.push_back({track.more.key, j, std::exp(log_w)});
     });
-    for (std::size_t c = first; c < frame.claims.size(); ++c) {
-      Claim& claim = frame.claims[c];
+    weights_.clear();
+    for (std::size_t c = first; c < frame.claims.size(); ++c)
+      weights_.push_back(frame.claims[c].value);
+    for (std::size_t c = 0; c < weights_.size(); ++c) {
       double others = std::exp(live_.sm.log_miss);
-      for (std::size_t l = first; l < frame.claims.size(); ++l)
-        if (l != c) others += frame.claims[l].value;
-      values_.push_back(claim.value / others);
+      for (std::size_t l = 0; l < weights_.size(); ++l)
+        if (l != c) others += weights_[l];
+      Claim& claim = frame.claims[first + c];
+      claim.value = weights_[c] / others;
+      frame.claimed[claim.column] += claim.value;
     }
-    for (std::size_t c = first; c < frame.claims.size(); ++c) {
-      frame.claims[c].value = values_[c - first];
-      frame.claimed[frame.claims[c].column] += values_[c - first];
-    }
-    values_.clear();
   }
 
   bool passes(double lambda, std::int64_t n_updates) const {
@@ -222,38 +193,32 @@ class BranchGrower {
     const double least =
         track.is_confirmed() ? miss + live_.leftover_gain() - hit - opt_.prune_drop
                     : -std::numeric_limits<double>::infinity();
-    const double radius = prediction.radius(live_.opt.gate, least);
-    const double reach =
-        live_.sm.max_speed * (frame.time - parent.last_time) + live_.sm.speed_margin;
-    const int D = live_.m.axis.D;
-    if (radius >= 0) {
-      frame.grid.within(prediction.center, radius, [&](std::int32_t j, double d2) {
-        const Point& y = frame.points[j];
-        if (squared_distance(y, parent.last, D) > reach * reach) return;
-        if (!prediction.is_gated(y, live_.opt.gate)) return;
-        ++stats.n_candidates;
-        const double lambda = opt_.fading * parent.lambda + surprise(prediction, y);
-        if (!passes(lambda, parent.n_updates + 1)) {
-          ++stats.n_cut;
-          return;
-        }
-        Branch child = parent;
-        const double won = hit + update(live_.m, prediction, y, child.state);
-        if (!std::isfinite(won)) return;
-        child.score += opt_.is_joint ? won : won - frame.crowding(track.more.key, j);
-        child.lambda = lambda;
-        ++child.n_updates;
-        ++child.n_taken;
-        child.last = y;
-        child.last_time = frame.time;
-        child.gap = 0;
-        child.path[slot] = j;
-        child.distance2[slot] = d2;
-        grown_.push_back(std::move(child));
-      });
-      if (static_cast<std::int64_t>(grown_.size()) > live_.opt.max_candidates)
-        throw CandidateLimit{};
-    }
+    const auto child_with = [&](std::int32_t j, double d2) {
+      const Point& y = frame.points[j];
+      ++stats.n_candidates;
+      const double lambda = opt_.fading * parent.lambda + surprise(prediction, y);
+      if (!passes(lambda, parent.n_updates + 1)) {
+        ++stats.n_cut;
+        return;
+      }
+      Branch child = parent;
+      const double won = hit + update(live_.m, prediction, y, child.state);
+      if (!std::isfinite(won)) return;
+      child.score += opt_.is_joint ? won : won - frame.crowding(track.more.key, j);
+      child.lambda = lambda;
+      ++child.n_updates;
+      ++child.n_taken;
+      child.last = y;
+      child.last_time = frame.time;
+      child.gap = 0;
+      child.path[slot] = j;
+      child.distance2[slot] = d2;
+      grown_.push_back(std::move(child));
+    };
+    live_.within_gate(frame.grid, frame.points, prediction,
+                      prediction.radius(live_.opt.gate, least), parent.last,
+                      frame.time - parent.last_time, child_with);
+    if (static_cast<std::int64_t>(grown_.size()) > live_.opt.max_candidates) throw CandidateLimit{};
     parent.score += miss;
     parent.has_ended = ++parent.gap >= live_.sm.max_gap;
     grown_.push_back(parent);
@@ -292,7 +257,7 @@ class BranchGrower {
   const LiveTracks<Tree>& live_;
   const BranchOptions& opt_;
   std::vector<Branch> grown_;
-  std::vector<double> values_;
+  std::vector<double> weights_;
 };
 
 }  // namespace asterism

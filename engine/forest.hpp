@@ -65,12 +65,25 @@ class Forest {
     std::int32_t branch = -1;  // -1: no branch is left that misses
   };
 
+  // Of one decision.
+  struct Memory {
+    std::vector<std::int32_t> match, claims;
+    std::vector<std::vector<Way>> ways;
+    std::vector<char> is_taken;
+    std::vector<double> free;
+    std::vector<Candidate> candidates, pairings;
+    std::vector<double> gains, marginals, missed, log_miss;
+    std::vector<std::int32_t> best;
+    std::vector<Pair> extras;
+    Assignment assignment;
+  };
+
   template <typename Label>
   void decide(FrameStats& stats, Label&& label) {
     const std::shared_ptr<const WindowFrame> frame = open_.pop();
-    match_.assign(open_.live.size(), -1);
-    ways_.resize(open_.live.size());
-    is_taken_.assign(frame->points.size(), 0);
+    s_.match.assign(open_.live.size(), -1);
+    s_.ways.resize(open_.live.size());
+    s_.is_taken.assign(frame->points.size(), 0);
     count_shared(*frame, stats);
     for (std::size_t i = 0; i < open_.live.size(); ++i) list_ways(*frame, i);
     for (const bool confirmed : {true, false}) {
@@ -81,7 +94,7 @@ class Forest {
     for (std::size_t i = 0; i < open_.live.size(); ++i) follow(*frame, i, stats, label);
     open_.live.end_tracks();
     for (std::size_t j = 0; j < frame->points.size(); ++j) {
-      if (is_taken_[j]) continue;
+      if (s_.is_taken[j]) continue;
       LiveTrack<Tree>& track = open_.live.begin(j, frame->points[j], frame->time, open_.live.birth_gain());
       track.more.key = open_.n_trees++;
       open_.regrow(track, stats);
@@ -93,7 +106,7 @@ class Forest {
   void list_ways(const WindowFrame& frame, std::size_t i) {
     const BranchGrower grower(open_.live, open_.branches);
     const LiveTrack<Tree>& track = open_.live[i];
-    std::vector<Way>& ways = ways_[i];
+    std::vector<Way>& ways = s_.ways[i];
     const double most = grower.worth(track.more.branches.front());  // the best comes first
     // Where every branch that misses was pruned, it would have been worth no more than this.
     const double pruned = most - open_.branches.prune_drop;
@@ -144,30 +157,30 @@ class Forest {
   // The probability of every way of the believed tracks, or of the tentative ones given that they
   // are markers: marginals over all that the frame may be, each way with the weight of its branches.
   void weigh_ways(const WindowFrame& frame, bool confirmed, FrameStats& stats) {
-    pairings_.clear();
-    gains_.clear();
+    s_.pairings.clear();
+    s_.gains.clear();
     for (std::size_t i = 0; i < open_.live.size(); ++i) {
       if (open_.live[i].is_confirmed() != confirmed) continue;
-      for (std::size_t k = 1; k < ways_[i].size(); ++k) {
-        const Way& way = ways_[i][k];
-        const double gain = way.log_weight - log_sum(ways_[i][0].log_weight, way.newborn);
-        if (is_taken_[way.column] || !(gain > kNegligible) || !std::isfinite(gain)) continue;
-        pairings_.push_back({static_cast<std::int32_t>(i), way.column, gain, 0});
-        gains_.push_back(gain);
+      for (std::size_t k = 1; k < s_.ways[i].size(); ++k) {
+        const Way& way = s_.ways[i][k];
+        const double gain = way.log_weight - log_sum(s_.ways[i][0].log_weight, way.newborn);
+        if (s_.is_taken[way.column] || !(gain > kNegligible) || !std::isfinite(gain)) continue;
+        s_.pairings.push_back({static_cast<std::int32_t>(i), way.column, gain, 0});
+        s_.gains.push_back(gain);
       }
     }
-    marginals_.resize(pairings_.size());
-    missed_.resize(open_.live.size());
-    best_.resize(open_.live.size());
-    log_miss_.assign(open_.live.size(), 0);
-    JointEvents events(pairings_, gains_, log_miss_,
+    s_.marginals.resize(s_.pairings.size());
+    s_.missed.resize(open_.live.size());
+    s_.best.resize(open_.live.size());
+    s_.log_miss.assign(open_.live.size(), 0);
+    JointEvents events(s_.pairings, s_.gains, s_.log_miss,
                        static_cast<std::int32_t>(frame.points.size()), kMaxStates);
-    const JointSummary summary = events.solve(marginals_, missed_, best_);
+    const JointSummary summary = events.solve(s_.marginals, s_.missed, s_.best);
     stats.n_beams += summary.n_beams;
     stats.bound = std::max(stats.bound, summary.bound);
-    for (std::size_t e = 0; e < pairings_.size(); ++e)
-      for (Way& way : ways_[pairings_[e].row])
-        if (way.column == pairings_[e].column) way.probability = marginals_[e];
+    for (std::size_t e = 0; e < s_.pairings.size(); ++e)
+      for (Way& way : s_.ways[s_.pairings[e].row])
+        if (way.column == s_.pairings[e].column) way.probability = s_.marginals[e];
   }
 
   static double log_sum(double a, double b) {
@@ -184,32 +197,32 @@ class Forest {
 
   // Pairs the believed tracks, or the tentative ones, with points that are still free.
   void match_all(const WindowFrame& frame, bool confirmed, FrameStats& stats) {
-    candidates_.clear();
+    s_.candidates.clear();
     for (std::size_t i = 0; i < open_.live.size(); ++i) {
       const LiveTrack<Tree>& track = open_.live[i];
       if (track.is_confirmed() != confirmed) continue;
-      const double missed = odds(track, ways_[i][0]);
-      for (std::size_t k = 1; k < ways_[i].size(); ++k) {
-        const Way& way = ways_[i][k];
+      const double missed = odds(track, s_.ways[i][0]);
+      for (std::size_t k = 1; k < s_.ways[i].size(); ++k) {
+        const Way& way = s_.ways[i][k];
         const double gain = odds(track, way) - log_sum(missed, way.newborn);
-        if (is_taken_[way.column] || !(gain > 0) || !std::isfinite(gain)) continue;
-        candidates_.push_back({static_cast<std::int32_t>(i), way.column, gain,
+        if (s_.is_taken[way.column] || !(gain > 0) || !std::isfinite(gain)) continue;
+        s_.candidates.push_back({static_cast<std::int32_t>(i), way.column, gain,
                                mean_distance2(track.more.branches[way.branch])});
       }
     }
-    const Groups groups = connected_groups(candidates_, static_cast<std::int32_t>(open_.live.size()),
+    const Groups groups = connected_groups(s_.candidates, static_cast<std::int32_t>(open_.live.size()),
                                            static_cast<std::int32_t>(frame.points.size()));
     const MarriageMarket market{opt_.resolver == Resolver::marriage_by_points, 1, 0};
     for (std::size_t g = 0; g < groups.size(); ++g) {
       if (opt_.resolver == Resolver::assignment || groups[g].size() == 1)
-        assignment_.solve(groups[g], match_);
+        s_.assignment.solve(groups[g], s_.match);
       else
-        market.marry(groups[g], frame.points, open_.live.m.axis.D, match_, extras_);
+        market.marry(groups[g], frame.points, open_.live.m.axis.D, s_.match, s_.extras);
       stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
     }
     stats.n_groups += static_cast<std::int64_t>(groups.size());
-    for (const Candidate& c : candidates_)
-      if (match_[c.row] == c.column) is_taken_[c.column] = 1;
+    for (const Candidate& c : s_.candidates)
+      if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
   }
 
   // Mean squared distance of a branch's detections in the window from what was expected of each.
@@ -220,15 +233,15 @@ class Forest {
   }
 
   void count_shared(const WindowFrame& frame, FrameStats& stats) {
-    claims_.assign(frame.points.size(), 0);
+    s_.claims.assign(frame.points.size(), 0);
     for (const LiveTrack<Tree>& track : open_.live.tracks) {
       const std::int32_t j = track.more.branches.front().taken(frame.number);
-      if (j >= 0 && track.is_confirmed() && ++claims_[j] == 2) ++stats.n_shared;
+      if (j >= 0 && track.is_confirmed() && ++s_.claims[j] == 2) ++stats.n_shared;
     }
   }
 
   const Way* way_to(std::size_t i, std::int32_t column) const {
-    for (const Way& way : ways_[i])
+    for (const Way& way : s_.ways[i])
       if (way.column == column) return &way;
     return nullptr;
   }
@@ -236,22 +249,22 @@ class Forest {
   // What no track takes gets no label, with the probability that none of the believed has it.
   template <typename Label>
   void say_free(const WindowFrame& frame, Label&& label) {
-    free_.assign(frame.points.size(), 1);
+    s_.free.assign(frame.points.size(), 1);
     for (std::size_t i = 0; i < open_.live.size(); ++i)
-      for (const Way& way : ways_[i])
-        if (way.column >= 0 && open_.live[i].is_confirmed()) free_[way.column] -= way.probability;
+      for (const Way& way : s_.ways[i])
+        if (way.column >= 0 && open_.live[i].is_confirmed()) s_.free[way.column] -= way.probability;
     for (std::size_t j = 0; j < frame.points.size(); ++j)
-      label(frame.first + static_cast<std::int64_t>(j), -1, std::clamp(free_[j], 0.0, 1.0));
+      label(frame.first + static_cast<std::int64_t>(j), -1, std::clamp(s_.free[j], 0.0, 1.0));
   }
 
   // Carries what is decided of a track over the frame, and keeps the branches that agree with it.
   template <typename Label>
   void follow(const WindowFrame& frame, std::size_t i, FrameStats& stats, Label&& label) {
     LiveTrack<Tree>& track = open_.live[i];
-    const std::int32_t j = match_[i];
+    const std::int32_t j = s_.match[i];
     const std::int32_t own = opt_.is_independent ? track.more.branches.front().taken(frame.number) : j;
     open_.carry(frame, i, own);
-    if (own >= 0) is_taken_[own] = 1;
+    if (own >= 0) s_.is_taken[own] = 1;
     if (j >= 0) {
       const Point last = track.last;
       open_.live.take(i, j, last, frame.time, way_to(i, j)->probability, label);
@@ -267,16 +280,7 @@ class Forest {
   OpenWindow open_;
   ForestOptions opt_;
 
-  // Working memory of one decision.
-  std::vector<std::int32_t> match_, claims_;
-  std::vector<std::vector<Way>> ways_;
-  std::vector<char> is_taken_;
-  std::vector<double> free_;
-  std::vector<Candidate> candidates_, pairings_;
-  std::vector<double> gains_, marginals_, missed_, log_miss_;
-  std::vector<std::int32_t> best_;
-  std::vector<Pair> extras_;
-  Assignment assignment_;
+  Fresh<Memory> s_;
 };
 
 }  // namespace asterism

@@ -71,11 +71,7 @@ class FrameTracker {
   double last_time() const { return live_.last_time; }
 
  private:
-  struct Scratch {
-    Scratch() = default;
-    Scratch(const Scratch&) : Scratch() {}
-    Scratch& operator=(const Scratch&) { return *this; }
-
+  struct Memory {
     std::vector<Candidate> candidates, eligible;
     std::vector<std::int32_t> match;
     std::vector<Pair> extras;  // further detections of a track
@@ -201,7 +197,7 @@ class FrameTracker {
   LiveTracks<> live_;
   FrameOptions opt_;
   FrameStats total_;
-  Scratch s_;
+  Fresh<Memory> s_;
 };
 
 }  // namespace asterism

@@ -1,9 +1,5 @@
 // Track-oriented multiple hypotheses: trees of track hypotheses over a window of frames, of which the
 // best compatible set explains all detections at once; the oldest frame is decided by it (N-scan).
-//
-// A hypothesis is one branch of every tree, no detection in two. It is worth the sum of their parts of
-// the log posterior, s(τ) up to now; a detection in none is clutter and worth nothing. Any detection
-// may begin a tree, which is worth something from its second detection on.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +12,7 @@
 #include <span>
 #include <vector>
 
-#include "open_window.hpp"
+#include "hypothesis_window.hpp"
 #include "set_packing.hpp"
 
 namespace asterism {
@@ -29,7 +25,6 @@ using Packer = std::function<std::vector<std::int32_t>(
 struct HypothesisOptions {
   std::int64_t max_hypotheses = 1;  // of a cluster, for the probabilities
   std::int64_t max_nodes = 1;       // of the search for them
-  double new_track_claim = 0;       // a detection that is expected by more begins no tree
   double least_new_worth = 0;       // a branch of a new tree that is worth less is no option
   double drop = 0;                  // a hypothesis so many nats below the best does not count
   Packer packer;                    // who chooses in place of the search below, where there is one
@@ -38,8 +33,9 @@ struct HypothesisOptions {
 class HypothesisForest {
  public:
   HypothesisForest(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
-                   const BranchOptions& branches, const HypothesisOptions& options)
-      : open_{{model, score, life}, branches, {}}, opt_(options) {}
+                   const BranchOptions& branches, double new_track_claim,
+                   const HypothesisOptions& options)
+      : open_{{{model, score, life}, branches, {}}, new_track_claim, {}}, opt_(options) {}
 
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
@@ -47,9 +43,8 @@ class HypothesisForest {
     open_.claim(*frame);
     open_.push(frame, stats);
     BranchGrower grower(open_.live, open_.branches);
-    for (LiveTrack<Tree>& seed : seeds_) grower.grow(*frame, seed, open_.n_open(), stats);
-    for (std::size_t j = 0; j < frame->points.size(); ++j)
-      if (frame->claimed[j] <= opt_.new_track_claim) sow(*frame, static_cast<std::int32_t>(j));
+    for (LiveTrack<Tree>& seed : open_.seeds) grower.grow(*frame, seed, open_.n_open(), stats);
+    open_.sow();
     if (open_.is_full()) decide(stats, label);
   }
 
@@ -60,12 +55,7 @@ class HypothesisForest {
 
   bool has_confidence() const { return !opt_.packer; }
   const LiveTracks<Tree>& live() const { return open_.live; }
-  // What may begin in an open frame is tentative as well.
-  void count(FrameStats& stats) const {
-    open_.count(stats);
-    stats.n_tentative += static_cast<std::int64_t>(seeds_.size());
-    stats.n_pending += static_cast<std::int64_t>(seeds_.size());
-  }
+  void count(FrameStats& stats) const { open_.count(stats); }
 
  private:
   // What a tree does in a hypothesis.
@@ -79,88 +69,31 @@ class HypothesisForest {
   struct TreeOptions {
     std::vector<PackingOption> options;
     std::vector<Choice> choices;
-    double probability_of_own = 0;  // of the best hypothesis' choice in the frame that is decided
-    Choice best;
   };
-
-  // A tree that begins at a detection of a frame not decided yet.
-  void sow(const WindowFrame& frame, std::int32_t j) {
-    LiveTrack<Tree> seed;
-    seed.score = seed.best_score = open_.live.birth_gain();
-    seed.last = frame.points[j];
-    seed.last_time = frame.time;
-    seed.state = begin_state(open_.live.m, seed.last);
-    seed.more.key = frame.number;
-    Branch b = BranchGrower(open_.live, open_.branches).root(seed);
-    b.path[frame.number % kMaxWindow] = j;
-    b.n_taken = 1;
-    seed.more.branches.push_back(std::move(b));
-    seeds_.push_back(std::move(seed));
-  }
 
   template <typename Label>
   void decide(FrameStats& stats, Label&& label) {
     list_options();
     choose(stats);
-    const std::shared_ptr<const WindowFrame> frame = open_.pop();
-    LiveTracks<Tree>& live = open_.live;
-    for (std::size_t j = 0; j < frame->points.size(); ++j)
-      label(frame->first + static_cast<std::int64_t>(j), -1, std::clamp(free_[j], 0.0, 1.0));
-    for (std::size_t i = 0; i < live.size(); ++i) {
-      const Choice& choice = trees_[i].best;
-      const bool is_nothing = choice.branch == kNothing;
-      open_.carry(*frame, i, is_nothing ? -1 : choice.column);
-      if (!is_nothing && choice.column >= 0) {
-        const Point last = live[i].last;
-        live.take(i, choice.column, last, frame->time, trees_[i].probability_of_own, label);
-      } else {
-        ++live[i].gap;
-      }
-      if (is_nothing) live[i].gap = live.sm.max_gap;
-      open_.keep(*frame, i, choice.column, stats);
-    }
-    const std::size_t n_live = live.size();
-    for (std::size_t k = 0; k < seeds_.size(); ++k)
-      if (seeds_[k].more.key == frame->number && trees_[n_live + k].best.branch >= 0)
-        begin(*frame, seeds_[k], trees_[n_live + k], stats);
-    std::erase_if(seeds_, [&](const LiveTrack<Tree>& s) { return s.more.key == frame->number; });
-    live.end_tracks();
-    FrameStats ignored;
-    live.end_frame(frame->time, frame->points.size(), ignored);
-  }
-
-  // A seed becomes a track, with those of its branches that have a second detection.
-  void begin(const WindowFrame& frame, LiveTrack<Tree>& seed, const TreeOptions& tree,
-             FrameStats& stats) {
-    const std::int32_t j = seed.more.branches.front().taken(frame.number);
-    LiveTrack<Tree>& track =
-        open_.live.begin(j, frame.points[j], frame.time, open_.live.birth_gain());
-    track.pending.back().confidence = tree.probability_of_own;
-    track.more.key = open_.n_trees++;
-    track.more.branches = std::move(seed.more.branches);
-    if (open_.n_open() == 0)
-      open_.regrow(track, stats);
-    else
-      open_.settle(frame, j, track);
+    open_.carry_out(s_.fates, s_.free, stats, label);
   }
 
   // Every tree's branches as options, over the detections of all open frames as resources.
   void list_options() {
     const BranchGrower grower(open_.live, open_.branches);
-    std::int32_t n_resources = 0;
-    first_resource_.clear();
+    s_.n_resources = 0;
+    s_.first_resource.clear();
     for (const auto& frame : open_.frames) {
-      first_resource_.push_back(n_resources);
-      n_resources += static_cast<std::int32_t>(frame->points.size());
+      s_.first_resource.push_back(s_.n_resources);
+      s_.n_resources += static_cast<std::int32_t>(frame->points.size());
     }
-    n_resources_ = n_resources;
-    const std::size_t n_live = open_.live.size();
-    trees_.assign(n_live + seeds_.size(), {});
-    for (std::size_t i = 0; i < trees_.size(); ++i) {
-      const bool is_seed = i >= n_live;
-      const LiveTrack<Tree>& track = is_seed ? seeds_[i - n_live] : open_.live[i];
-      TreeOptions& tree = trees_[i];
-      const std::int64_t first = is_seed ? track.more.key : open_.frames.front()->number;
+    s_.trees.assign(open_.n_all(), {});
+    s_.fates.assign(open_.n_all(), {});
+    for (std::size_t i = 0; i < s_.trees.size(); ++i) {
+      const bool is_seed = open_.is_seed(i);
+      const LiveTrack<Tree>& track = open_.tree(i);
+      TreeOptions& tree = s_.trees[i];
+      const std::int64_t first = open_.first_frame(i);
       bool has_free = false;
       for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
         const Branch& b = track.more.branches[k];
@@ -169,7 +102,7 @@ class HypothesisForest {
         for (std::size_t f = 0; f < open_.frames.size(); ++f) {
           const std::int64_t number = open_.frames[f]->number;
           if (number >= first && b.taken(number) >= 0)
-            option.uses.push_back(first_resource_[f] + b.taken(number));
+            option.uses.push_back(s_.first_resource[f] + b.taken(number));
         }
         has_free = has_free || option.uses.empty();
         const std::int32_t column = is_seed && first != open_.frames.front()->number
@@ -192,23 +125,23 @@ class HypothesisForest {
 
   // The best hypothesis of every cluster of trees, and the probabilities over its best ones.
   void choose(FrameStats& stats) {
-    free_.assign(open_.frames.front()->points.size(), 1);
-    std::vector<std::int32_t> owner(n_resources_, -1), parent(trees_.size());
+    s_.free.assign(open_.frames.front()->points.size(), 1);
+    std::vector<std::int32_t> owner(s_.n_resources, -1), parent(s_.trees.size());
     std::iota(parent.begin(), parent.end(), 0);
     const auto find = [&](std::int32_t i) {
       while (parent[i] != i) i = parent[i] = parent[parent[i]];
       return i;
     };
-    for (std::size_t i = 0; i < trees_.size(); ++i)
-      for (const PackingOption& option : trees_[i].options)
+    for (std::size_t i = 0; i < s_.trees.size(); ++i)
+      for (const PackingOption& option : s_.trees[i].options)
         for (const std::int32_t r : option.uses) {
           const auto own = static_cast<std::int32_t>(i);
           if (owner[r] < 0) owner[r] = own;
           const std::int32_t a = find(owner[r]), b = find(own);
           parent[std::max(a, b)] = std::min(a, b);
         }
-    std::vector<std::vector<std::int32_t>> clusters(trees_.size());
-    for (std::size_t i = 0; i < trees_.size(); ++i)
+    std::vector<std::vector<std::int32_t>> clusters(s_.trees.size());
+    for (std::size_t i = 0; i < s_.trees.size(); ++i)
       clusters[find(static_cast<std::int32_t>(i))].push_back(static_cast<std::int32_t>(i));
     std::vector<std::int32_t> entangled;
     for (const std::vector<std::int32_t>& cluster : clusters) {
@@ -223,19 +156,19 @@ class HypothesisForest {
 
   void choose_by_packer(const std::vector<std::int32_t>& entangled, FrameStats& stats) {
     std::vector<std::vector<PackingOption>> options;
-    for (const std::int32_t i : entangled) options.push_back(std::move(trees_[i].options));
-    const std::vector<std::int32_t> own = opt_.packer(options, first_resource_, stats);
+    for (const std::int32_t i : entangled) options.push_back(std::move(s_.trees[i].options));
+    const std::vector<std::int32_t> own = opt_.packer(options, s_.first_resource, stats);
     ++stats.n_groups;
     stats.largest_group = std::max<std::int64_t>(stats.largest_group, entangled.size());
     for (std::size_t c = 0; c < entangled.size(); ++c) {
-      TreeOptions& tree = trees_[entangled[c]];
-      tree.best = tree.choices[own[c]];
+      const Choice& best = s_.trees[entangled[c]].choices[own[c]];
+      s_.fates[entangled[c]] = {best.branch != kNothing, best.column, 0};
     }
   }
 
   void choose_in(const std::vector<std::int32_t>& cluster, FrameStats& stats) {
     std::vector<std::vector<PackingOption>> options;
-    for (const std::int32_t i : cluster) options.push_back(std::move(trees_[i].options));
+    for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
     std::vector<std::int32_t> chosen;
     std::vector<double> totals;
     const PackingSummary summary = SetPacking(options).solve(
@@ -255,27 +188,32 @@ class HypothesisForest {
     double sum = 0;
     for (const double total : totals) sum += std::exp(total - totals.front());
     for (std::size_t c = 0; c < cluster.size(); ++c) {
-      TreeOptions& tree = trees_[cluster[c]];
-      tree.best = tree.choices[chosen[c]];
+      const TreeOptions& tree = s_.trees[cluster[c]];
+      const Choice& best = tree.choices[chosen[c]];
+      double own = 0;
       for (std::size_t h = 0; h < totals.size(); ++h) {
         const double p = std::exp(totals[h] - totals.front()) / sum;
         const Choice& choice = tree.choices[chosen[h * cluster.size() + c]];
-        const bool is_own = choice.branch != kNothing && choice.column == tree.best.column;
-        if (is_own) tree.probability_of_own = std::min(tree.probability_of_own + p, 1.0);
-        if (choice.branch != kNothing && choice.column >= 0) free_[choice.column] -= p;
+        if (choice.branch == kNothing) continue;
+        if (choice.column == best.column) own += p;
+        if (choice.column >= 0) s_.free[choice.column] -= p;
       }
+      s_.fates[cluster[c]] = {best.branch != kNothing, best.column, std::min(own, 1.0)};
     }
   }
 
-  OpenWindow open_;
-  HypothesisOptions opt_;
-  std::vector<LiveTrack<Tree>> seeds_;  // their key is the number of the frame that they begin in
+  // Of one decision: live tracks first, then seeds.
+  struct Memory {
+    std::vector<TreeOptions> trees;
+    std::vector<Fate> fates;
+    std::vector<std::int32_t> first_resource;
+    std::int32_t n_resources = 0;
+    std::vector<double> free;
+  };
 
-  // Working memory of one decision: live tracks first, then seeds.
-  std::vector<TreeOptions> trees_;
-  std::vector<std::int32_t> first_resource_;
-  std::int32_t n_resources_ = 0;
-  std::vector<double> free_;
+  HypothesisWindow open_;
+  HypothesisOptions opt_;
+  Fresh<Memory> s_;
 };
 
 }  // namespace asterism

@@ -70,11 +70,7 @@ class JointTracker {
   double last_time() const { return live_.last_time; }
 
  private:
-  struct Scratch {
-    Scratch() = default;
-    Scratch(const Scratch&) : Scratch() {}
-    Scratch& operator=(const Scratch&) { return *this; }
-
+  struct Memory {
     std::vector<Candidate> candidates, eligible;
     std::vector<double> gains, marginals, log_miss, all_missed;
     std::vector<std::int32_t> best, match;       // by track
@@ -293,7 +289,7 @@ class JointTracker {
   LiveTracks<> live_;
   JointOptions opt_;
   FrameStats total_;
-  Scratch s_;
+  Fresh<Memory> s_;
 };
 
 }  // namespace asterism

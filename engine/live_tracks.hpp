@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "filter_tracks.hpp"
+#include "fresh.hpp"
 #include "gating.hpp"
 #include "groups.hpp"
 #include "modes.hpp"
@@ -102,12 +103,8 @@ class CandidateLimit {};  // thrown when a frame has more candidates than allowe
 // log(1 + eˣ)
 inline double softplus(double x) { return x > 30 ? x : std::log1p(std::exp(x)); }
 
-// Working memory of one step, kept from step to step. A copied tracker starts with its own.
-struct GateScratch {
-  GateScratch() = default;
-  GateScratch(const GateScratch&) : GateScratch() {}
-  GateScratch& operator=(const GateScratch&) { return *this; }
-
+// Working memory of one step.
+struct GateMemory {
   std::vector<Prediction> predictions;
   std::vector<double> radii;
   PointGrid grid;
@@ -155,22 +152,33 @@ class LiveTracks {
       sum_radii += std::max(s_.radii[i], 0.0);
     }
     if (tracks.empty() || points.empty()) return;
-    const int D = m.axis.D;
-    s_.grid.build(points, D, 2 * sum_radii / static_cast<double>(tracks.size()));
+    s_.grid.build(points, m.axis.D, 2 * sum_radii / static_cast<double>(tracks.size()));
     std::array<double, kMaxModes> each{};
     for (std::size_t i = 0; i < tracks.size(); ++i) {
-      if (s_.radii[i] < 0) continue;
       const Prediction& prediction = s_.predictions[i];
-      const double reach = sm.max_speed * (time - tracks[i].last_time) + sm.speed_margin;
-      s_.grid.within(prediction.center, s_.radii[i], [&](std::int32_t j, double distance2) {
-        if (squared_distance(points[j], tracks[i].last, D) > reach * reach) return;
-        if (!prediction.is_gated(points[j], opt.gate)) return;
+      const auto list = [&](std::int32_t j, double distance2) {
         const double won = gain(i, prediction.log_likelihood(points[j], each));
         if (won > least_gain && std::isfinite(won))
           out.push_back({static_cast<std::int32_t>(i), j, won, distance2});
-      });
+      };
+      within_gate(s_.grid, points, prediction, s_.radii[i], tracks[i].last,
+                  time - tracks[i].last_time, list);
       if (static_cast<std::int64_t>(out.size()) > opt.max_candidates) throw CandidateLimit{};
     }
+  }
+
+  // Calls visit(point, squared distance from the prediction) for every point within `radius` that is
+  // in the gate and that the marker, `dt` ago at `last`, can have come to.
+  template <typename Visit>
+  void within_gate(const PointGrid& grid, std::span<const Point> points,
+                   const Prediction& prediction, double radius, const Point& last, double dt,
+                   Visit&& visit) const {
+    if (radius < 0) return;
+    const double reach = sm.max_speed * dt + sm.speed_margin;
+    grid.within(prediction.center, radius, [&](std::int32_t j, double distance2) {
+      if (squared_distance(points[j], last, m.axis.D) > reach * reach) return;
+      if (prediction.is_gated(points[j], opt.gate)) visit(j, distance2);
+    });
   }
 
   void predict_all(const MotionStep& step) {
@@ -235,7 +243,7 @@ class LiveTracks {
   }
 
  private:
-  GateScratch s_;
+  Fresh<GateMemory> s_;
 };
 
 }  // namespace asterism
