@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from asterism.associate.frame_by_frame import FrameByFrame
+from asterism.associate.over_window import Hypotheses, branch_options
 from asterism.errors import ParameterError, check_number
 from asterism.solve import assign_multidimensional
 
@@ -21,7 +20,7 @@ __all__ = ["MDA"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class MDA(FrameByFrame):
+class MDA(Hypotheses):
     """Multidimensional assignment: the best way to share out all detections of a window at once.
 
     A tuple takes a track, or none for a new one, and a detection or none of each frame of the
@@ -55,36 +54,24 @@ class MDA(FrameByFrame):
     (8, 0.0)
     """
 
-    window: int = 3
     solver: Literal["exact", "relaxed"] = "exact"
     max_branches: int = 200
-    prune_odds: float = 100.0
-    new_track_odds: float = 1000.0
 
     name: ClassVar[str] = "mda"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_number("window", self.window, above=2, below=16, closed=True, integer=True)
         if self.solver not in ("exact", "relaxed"):
             raise ParameterError("solver", "'exact' or 'relaxed'", repr(self.solver))
         check_number("max_branches", self.max_branches, above=1, closed=True, integer=True)
-        check_number("prune_odds", self.prune_odds, above=1)
-        check_number("new_track_odds", self.new_track_odds, above=0)
 
     def _tracker(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
     ) -> _engine.HypothesisTracker:
         from asterism import _engine
 
-        branches = _engine.BranchOptions(
-            window=int(self.window),
-            max_branches=int(self.max_branches),
-            merge_last=int(self.window),
-            prune_drop=math.log(self.prune_odds),
-            fading=1.0,
-            delta=np.empty(0),  # no χ² test
-            z=0.0,
+        branches = branch_options(
+            window=self.window, max_branches=self.max_branches, prune_odds=self.prune_odds
         )
         return _engine.HypothesisTracker(
             motion,
@@ -128,8 +115,6 @@ class MDA(FrameByFrame):
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
         return super()._about(stats) | {
-            "branches": stats.n_branches,
-            "most_branches": stats.most_branches,
             "dropped_branches": stats.n_limited,
             "windows_with_a_gap": stats.n_beams,
             "gap": stats.gap,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from asterism.associate.frame_by_frame import FrameByFrame, FrameState
+from asterism.associate.over_window import branch_options, check_window
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class SMP(FrameByFrame):
             raise ParameterError("strict", "True or False", repr(self.strict))
         check_number("capacity", self.capacity, above=1, below=64, closed=True, integer=True)
         check_number("merged_within", self.merged_within, above=0)
-        check_number("window", self.window, above=1, below=16, closed=True, integer=True)
+        check_window(self.window, 1)
         if self.strict and self.capacity > 1:
             raise ParameterError("capacity", "1, as strict=True is given", self.capacity)
         if self.window > 1 and (self.strict or self.capacity > 1):
@@ -98,15 +98,7 @@ class SMP(FrameByFrame):
                 capacity=int(self.capacity),
                 merged_within=self.merged_within,
             )
-        ways = _engine.BranchOptions(
-            window=int(self.window),
-            max_branches=MAX_WAYS,
-            merge_last=int(self.window),
-            prune_drop=math.log(PRUNE_ODDS),
-            fading=1.0,
-            delta=np.empty(0),  # no χ² test
-            z=0.0,
-        )
+        ways = branch_options(window=self.window, max_branches=MAX_WAYS, prune_odds=PRUNE_ODDS)
         return _engine.TreeTracker(
             motion, score, life, ways, resolver=matcher, is_independent=False
         )

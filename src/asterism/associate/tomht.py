@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
-from asterism.associate.frame_by_frame import FrameByFrame
+from asterism.associate.over_window import Hypotheses, branch_options
 from asterism.errors import check_number
 
 if TYPE_CHECKING:
@@ -18,7 +15,7 @@ __all__ = ["TOMHT"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class TOMHT(FrameByFrame):
+class TOMHT(Hypotheses):
     """Track-oriented multiple hypotheses: the best compatible set of track hypotheses.
 
     Each track is a tree: a branch for every detection in its gate and one for a miss, over a window
@@ -58,36 +55,24 @@ class TOMHT(FrameByFrame):
     (8, 0.0)
     """
 
-    window: int = 3
     max_branches: int = 30
-    prune_odds: float = 100.0
     max_hypotheses: int = 20
     max_nodes: int = 2000
-    new_track_odds: float = 1000.0
 
     name: ClassVar[str] = "tomht"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_number("window", self.window, above=2, below=16, closed=True, integer=True)
         for name in ("max_branches", "max_hypotheses", "max_nodes"):
             check_number(name, getattr(self, name), above=1, closed=True, integer=True)
-        check_number("prune_odds", self.prune_odds, above=1)
-        check_number("new_track_odds", self.new_track_odds, above=0)
 
     def _tracker(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
     ) -> _engine.HypothesisTracker:
         from asterism import _engine
 
-        branches = _engine.BranchOptions(
-            window=int(self.window),
-            max_branches=int(self.max_branches),
-            merge_last=int(self.window),
-            prune_drop=math.log(self.prune_odds),
-            fading=1.0,
-            delta=np.empty(0),  # no χ² test
-            z=0.0,
+        branches = branch_options(
+            window=self.window, max_branches=self.max_branches, prune_odds=self.prune_odds
         )
         return _engine.HypothesisTracker(
             motion,
@@ -101,8 +86,6 @@ class TOMHT(FrameByFrame):
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
         return super()._about(stats) | {
-            "branches": stats.n_branches,
-            "most_branches": stats.most_branches,
             "dropped_branches": stats.n_limited,
             "most_hypotheses": stats.n_hypotheses,
             "nodes": stats.n_nodes,

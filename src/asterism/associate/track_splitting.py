@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from asterism.associate.frame_by_frame import FrameByFrame
+from asterism.associate.over_window import branch_options, check_window
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ class TrackSplitting(FrameByFrame):
         check_number("fading", self.fading, above=0)
         if not (self.fading <= MOST_FADING or self.fading == 1):
             raise ParameterError("fading", f"1, or at most {MOST_FADING}", repr(self.fading))
-        check_number("window", self.window, above=1, below=16, closed=True, integer=True)
+        check_window(self.window, 1)
         check_number("max_branches", self.max_branches, above=1, closed=True, integer=True)
         check_number("merge_last", self.merge_last, above=1, closed=True, integer=True)
         check_number("prune_odds", self.prune_odds, above=1)
@@ -108,13 +109,13 @@ class TrackSplitting(FrameByFrame):
 
         from asterism import _engine
 
-        branches = _engine.BranchOptions(
-            window=int(self.window),
-            max_branches=int(self.max_branches),
-            merge_last=int(self.merge_last),
-            prune_drop=math.log(self.prune_odds),
+        branches = branch_options(
+            window=self.window,
+            max_branches=self.max_branches,
+            prune_odds=self.prune_odds,
+            merge_last=self.merge_last,
             fading=self.fading,
-            delta=chi2_limits(self.alpha, motion.n_axes, self.fading),
+            limits=chi2_limits(self.alpha, motion.n_axes, self.fading),
             z=float(-ndtri(self.alpha)),
         )
         return _engine.TreeTracker(
