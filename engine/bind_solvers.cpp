@@ -108,11 +108,9 @@ Out<std::int32_t> k_best(const In<double>& cost, std::int64_t k) {
   std::size_t n_found = 0;
   {
     nb::gil_scoped_release release;
-    KBest({cost.data(), n * N}, static_cast<std::int32_t>(n), static_cast<std::int32_t>(N))
-        .solve(k, [&](std::span<const std::int32_t> columns) {
-          all.insert(all.end(), columns.begin(), columns.end());
-          ++n_found;
-        });
+    KBest best({cost.data(), n * N}, static_cast<std::int32_t>(n), static_cast<std::int32_t>(N));
+    for (; static_cast<std::int64_t>(n_found) < k && best.next(); ++n_found)
+      all.insert(all.end(), best.columns().begin(), best.columns().end());
   }
   Owned<std::int32_t> out(all.size());
   std::copy(all.begin(), all.end(), out.data.get());

@@ -86,7 +86,8 @@ struct Branch {
 
 // What a track keeps beside what is decided of it: λ up to there, and the branches from there on.
 struct Tree {
-  std::int64_t key = 0;  // its number in order of birth
+  std::int64_t key = 0;    // its number in order of birth
+  std::int64_t first = 0;  // frame that it begins in, as far as that is not decided
   double lambda = 0;
   std::int64_t n_updates = 0;
   std::vector<Branch> branches;
@@ -125,9 +126,61 @@ class BranchGrower {
   void grow(const WindowFrame& frame, LiveTrack<Tree>& track, std::int32_t n_open,
             FrameStats& stats) {
     grown_.clear();
-    for (Branch& parent : track.more.branches) split(frame, track, parent, stats);
+    for (Branch& parent : track.more.branches)
+      split(frame, track, std::move(parent), grown_, stats);
     prune(frame.number, n_open, stats);
     track.more.branches.assign(grown_.begin(), grown_.end());
+  }
+
+  // Adds a branch's ways over a further frame: one for each detection in its gate, then the miss.
+  void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch parent,
+             std::vector<Branch>& out, FrameStats& stats) const {
+    const std::int64_t slot = frame.number % kMaxWindow;
+    parent.path[slot] = -1;
+    parent.distance2[slot] = 0;
+    if (parent.has_ended) {
+      if (opt_.is_joint) {  // one more frame in which it was not seen
+        ++parent.gap;
+        parent.score += live_.miss_gain();
+      }
+      out.push_back(std::move(parent));
+      return;
+    }
+    predict(live_.m, frame.step, parent.state);
+    const Prediction prediction(live_.m, parent.state);
+    const double hit = live_.hit_gain(), miss = live_.miss_gain();
+    const double least =
+        track.is_confirmed() ? miss + live_.leftover_gain() - hit - opt_.prune_drop
+                    : -std::numeric_limits<double>::infinity();
+    const auto child_with = [&](std::int32_t j, double d2) {
+      const Point& y = frame.points[j];
+      ++stats.n_candidates;
+      const double lambda = opt_.fading * parent.lambda + surprise(prediction, y);
+      if (!passes(lambda, parent.n_updates + 1)) {
+        ++stats.n_cut;
+        return;
+      }
+      Branch child = parent;
+      const double won = hit + update(live_.m, prediction, y, child.state);
+      if (!std::isfinite(won)) return;
+      child.score += opt_.is_joint ? won : won - frame.crowding(track.more.key, j);
+      child.lambda = lambda;
+      ++child.n_updates;
+      ++child.n_taken;
+      child.last = y;
+      child.last_time = frame.time;
+      child.gap = 0;
+      child.path[slot] = j;
+      child.distance2[slot] = d2;
+      out.push_back(std::move(child));
+    };
+    live_.within_gate(frame.grid, frame.points, prediction,
+                      prediction.radius(live_.opt.gate, least), parent.last,
+                      frame.time - parent.last_time, child_with);
+    if (static_cast<std::int64_t>(out.size()) > live_.opt.max_candidates) throw CandidateLimit{};
+    parent.score += miss;
+    parent.has_ended = ++parent.gap >= live_.sm.max_gap;
+    out.push_back(std::move(parent));
   }
 
   // What a track's best branch expects of a frame that comes next.
@@ -173,56 +226,6 @@ class BranchGrower {
 
  private:
   static constexpr double kNoClaim = -7;  // log of w
-
-  void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch& parent,
-             FrameStats& stats) {
-    const std::int64_t slot = frame.number % kMaxWindow;
-    parent.path[slot] = -1;
-    parent.distance2[slot] = 0;
-    if (parent.has_ended) {
-      if (opt_.is_joint) {  // one more frame in which it was not seen
-        ++parent.gap;
-        parent.score += live_.miss_gain();
-      }
-      grown_.push_back(parent);
-      return;
-    }
-    predict(live_.m, frame.step, parent.state);
-    const Prediction prediction(live_.m, parent.state);
-    const double hit = live_.hit_gain(), miss = live_.miss_gain();
-    const double least =
-        track.is_confirmed() ? miss + live_.leftover_gain() - hit - opt_.prune_drop
-                    : -std::numeric_limits<double>::infinity();
-    const auto child_with = [&](std::int32_t j, double d2) {
-      const Point& y = frame.points[j];
-      ++stats.n_candidates;
-      const double lambda = opt_.fading * parent.lambda + surprise(prediction, y);
-      if (!passes(lambda, parent.n_updates + 1)) {
-        ++stats.n_cut;
-        return;
-      }
-      Branch child = parent;
-      const double won = hit + update(live_.m, prediction, y, child.state);
-      if (!std::isfinite(won)) return;
-      child.score += opt_.is_joint ? won : won - frame.crowding(track.more.key, j);
-      child.lambda = lambda;
-      ++child.n_updates;
-      ++child.n_taken;
-      child.last = y;
-      child.last_time = frame.time;
-      child.gap = 0;
-      child.path[slot] = j;
-      child.distance2[slot] = d2;
-      grown_.push_back(std::move(child));
-    };
-    live_.within_gate(frame.grid, frame.points, prediction,
-                      prediction.radius(live_.opt.gate, least), parent.last,
-                      frame.time - parent.last_time, child_with);
-    if (static_cast<std::int64_t>(grown_.size()) > live_.opt.max_candidates) throw CandidateLimit{};
-    parent.score += miss;
-    parent.has_ended = ++parent.gap >= live_.sm.max_gap;
-    grown_.push_back(parent);
-  }
 
   void prune(std::int64_t frame, std::int32_t n_open, FrameStats& stats) {
     std::stable_sort(grown_.begin(), grown_.end(),

@@ -26,7 +26,7 @@ struct Fate {
 
 struct HypothesisWindow : OpenWindow {
   double new_track_claim = 0;  // a detection that is expected by more begins no tree
-  std::vector<LiveTrack<Tree>> seeds;  // not decided on; their key is the frame that they begin in
+  std::vector<LiveTrack<Tree>> seeds;  // begin in a frame that is not decided
 
   std::size_t n_all() const { return live.size() + seeds.size(); }
   bool is_seed(std::size_t i) const { return i >= live.size(); }
@@ -36,7 +36,7 @@ struct HypothesisWindow : OpenWindow {
   }
   // The first frame in which a tree may have a branch of its own.
   std::int64_t first_frame(std::size_t i) const {
-    return is_seed(i) ? tree(i).more.key : frames.front()->number;
+    return is_seed(i) ? tree(i).more.first : frames.front()->number;
   }
 
   // What may begin in an open frame is tentative as well.
@@ -56,7 +56,8 @@ struct HypothesisWindow : OpenWindow {
       seed.last = frame.points[j];
       seed.last_time = frame.time;
       seed.state = begin_state(live.m, seed.last);
-      seed.more.key = frame.number;
+      seed.more.key = n_trees++;
+      seed.more.first = frame.number;
       Branch b = BranchGrower(live, branches).root(seed);
       b.path[frame.number % kMaxWindow] = static_cast<std::int32_t>(j);
       b.n_taken = 1;
@@ -87,9 +88,9 @@ struct HypothesisWindow : OpenWindow {
       keep(*frame, i, fate.column, stats);
     }
     for (std::size_t k = 0; k < seeds.size(); ++k)
-      if (seeds[k].more.key == frame->number && fates[n_live + k].exists)
+      if (seeds[k].more.first == frame->number && fates[n_live + k].exists)
         begin(*frame, seeds[k], fates[n_live + k].probability, stats);
-    std::erase_if(seeds, [&](const LiveTrack<Tree>& s) { return s.more.key == frame->number; });
+    std::erase_if(seeds, [&](const LiveTrack<Tree>& s) { return s.more.first == frame->number; });
     live.end_tracks();
     FrameStats ignored;
     live.end_frame(frame->time, frame->points.size(), ignored);
@@ -102,7 +103,7 @@ struct HypothesisWindow : OpenWindow {
     const std::int32_t j = seed.more.branches.front().taken(frame.number);
     LiveTrack<Tree>& track = live.begin(j, frame.points[j], frame.time, live.birth_gain());
     track.pending.back().confidence = probability;
-    track.more.key = n_trees++;
+    track.more.key = seed.more.key;
     track.more.branches = std::move(seed.more.branches);
     if (n_open() == 0)
       regrow(track, stats);

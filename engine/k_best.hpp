@@ -23,31 +23,30 @@ class KBest {
   // `cost` is row-major, n × N; all further rows are zero.
   KBest(std::span<const double> cost, std::int32_t n, std::int32_t N) : c_(cost), n_(n), N_(N) {}
 
-  // Calls found(column of each of the n rows) for up to k assignments, the least cost first.
-  template <typename Found>
-  void solve(std::int64_t k, Found&& found) {
-    auto first = std::make_shared<Solution>(N_);
-    for (std::int32_t i = 0; i < n_; ++i) {
-      const double least = *std::min_element(&c_[static_cast<std::size_t>(i) * N_],
-                                             &c_[static_cast<std::size_t>(i) * N_] + N_);
-      first->u[i] = least < kForbidden ? least : 0;
-    }
-    std::vector<char> is_open(N_, 1);
-    for (std::int32_t i = 0; i < N_; ++i)
-      if (!augment(*first, i, {}, is_open)) return;
-    push({cost_of(*first), 0, first, 0, {}, true});
-    while (k > 0 && !queue_.empty()) {
+  // Goes on to the next best assignment; false where there is none.
+  bool next() {
+    if (current_.solution)
+      split(current_);
+    else
+      begin();
+    current_ = {};
+    while (!queue_.empty()) {
       std::pop_heap(queue_.begin(), queue_.end());
       Node node = std::move(queue_.back());
       queue_.pop_back();
-      if (!node.is_solved) {
-        settle(node);
-        continue;
+      if (node.is_solved) {
+        current_ = std::move(node);
+        return true;
       }
-      found(std::span<const std::int32_t>(node.solution->column).first(n_));
-      --k;
-      split(node);
+      settle(node);
     }
+    return false;
+  }
+
+  // Of the assignment that `next` went to: its cost, and the column of each of the n rows.
+  double least_cost() const { return current_.cost; }
+  std::span<const std::int32_t> columns() const {
+    return std::span<const std::int32_t>(current_.solution->column).first(n_);
   }
 
  private:
@@ -59,17 +58,30 @@ class KBest {
 
   // Rows before `n_fixed` keep their columns in the solution; row n_fixed may not have `forbidden`.
   struct Node {
-    double cost;  // of its best solution, or a lower bound of it
-    std::int64_t number;
+    double cost = 0;  // of its best solution, or a lower bound of it
+    std::int64_t number = 0;
     std::shared_ptr<const Solution> solution;  // its own, or that of the problem it is part of
-    std::int32_t n_fixed;
+    std::int32_t n_fixed = 0;
     std::vector<std::int32_t> forbidden;
-    bool is_solved;
+    bool is_solved = false;
 
     bool operator<(const Node& other) const {
       return cost != other.cost ? cost > other.cost : number > other.number;
     }
   };
+
+  void begin() {
+    auto first = std::make_shared<Solution>(N_);
+    for (std::int32_t i = 0; i < n_; ++i) {
+      const double least = *std::min_element(&c_[static_cast<std::size_t>(i) * N_],
+                                             &c_[static_cast<std::size_t>(i) * N_] + N_);
+      first->u[i] = least < kForbidden ? least : 0;
+    }
+    std::vector<char> is_open(N_, 1);
+    for (std::int32_t i = 0; i < N_; ++i)
+      if (!augment(*first, i, {}, is_open)) return;
+    push({cost_of(*first), 0, first, 0, {}, true});
+  }
 
   double cost(std::int32_t i, std::int32_t j) const {
     return i < n_ ? c_[static_cast<std::size_t>(i) * N_ + j] : 0;
@@ -185,6 +197,7 @@ class KBest {
   std::span<const double> c_;
   std::int32_t n_, N_;
   std::int64_t n_nodes_ = 0;
+  Node current_;
   std::vector<Node> queue_;  // a heap, the least cost on top
   std::vector<double> distance_;
   std::vector<std::int32_t> from_;
