@@ -1,10 +1,13 @@
 // The trackers that take a frame at a time, as Python sees them: one face for all.
 #include <nanobind/stl/tuple.h>
 
+#include <map>
+
 #include "bindings.hpp"
 #include "forest.hpp"
 #include "frame_tracker.hpp"
 #include "hypothesis_forest.hpp"
+#include "hypothesis_matrix.hpp"
 #include "joint_tracker.hpp"
 #include "motion_arrays.hpp"
 #include "tree_tracker.hpp"
@@ -199,6 +202,59 @@ class PythonPacker {
   nb::object choose_;
 };
 
+// Branches that are worth their part of the log posterior.
+void make_joint(BranchOptions& branches, const ScoreModel& score) {
+  branches.is_joint = true;
+  branches.log_end = log_end_table(score, score.max_gap + kMaxWindow);
+  // A way on may be so much worse than another and still better than to lose the marker and to begin
+  // a new one.
+  branches.prune_drop += std::max(score.log_clutter - score.log_birth - score.log_detect, 0.0) -
+                         std::log(score.p_disappear);
+}
+
+// Of each cluster (numbers of its trees, detections of the open frames that they may have, by
+// hypothesis and detection the tree that has it or -1, log weights).
+nb::list clusters(const TreeTracker<HypothesisMatrix>& tracker) {
+  const HypothesisWindow& window = tracker.forest().window();
+  std::map<std::int64_t, std::size_t> index_of;
+  for (std::size_t i = 0; i < window.n_all(); ++i) index_of[window.tree(i).more.key] = i;
+  nb::list out;
+  for (const Cluster& cluster : tracker.forest().clusters()) {
+    const std::size_t n = cluster.keys.size(), H = cluster.hypotheses.size();
+    std::map<std::int64_t, std::size_t> place;  // of a detection
+    std::vector<std::map<std::int64_t, std::int64_t>> owners(H);
+    for (std::size_t h = 0; h < H; ++h)
+      for (std::size_t k = 0; k < n; ++k) {
+        const std::int32_t b = cluster.hypotheses[h].branches[k];
+        const std::size_t i = index_of.at(cluster.keys[k]);
+        if (b < 0) continue;
+        const Branch& branch = window.tree(i).more.branches[b];
+        for (const auto& frame : window.frames) {
+          const std::int32_t j = branch.taken(frame->number);
+          if (frame->number < window.first_frame(i) || j < 0) continue;
+          place[frame->first + j] = 0;
+          const bool is_lone = window.is_seed(i) && branch.n_taken < 2;
+          owners[h][frame->first + j] = is_lone ? -1 : cluster.keys[k];
+        }
+      }
+    std::size_t p = 0;
+    for (auto& [detection, at] : place) at = p++;
+    Owned<std::int64_t> keys(n), detections(p), origins(H * p);
+    Owned<double> log_weights(H);
+    std::copy(cluster.keys.begin(), cluster.keys.end(), keys.data.get());
+    for (const auto& [detection, at] : place) detections.data[at] = detection;
+    std::fill_n(origins.data.get(), H * p, -1);
+    for (std::size_t h = 0; h < H; ++h) {
+      log_weights.data[h] = cluster.hypotheses[h].log_weight();
+      for (const auto& [detection, key] : owners[h])
+        origins.data[h * p + place.at(detection)] = key;
+    }
+    out.append(nb::make_tuple(keys.give({n}), detections.give({p}), origins.give({H, p}),
+                              log_weights.give({H})));
+  }
+  return out;
+}
+
 template <typename Tracker>
 nb::class_<Tracker> bind(nb::module_& module, const char* name) {
   return nb::class_<Tracker>(module, name)
@@ -236,7 +292,8 @@ void bind_trackers(nb::module_& module) {
       .def_ro("n_shared", &FrameStats::n_shared)
       .def_ro("n_hypotheses", &FrameStats::n_hypotheses)
       .def_ro("n_nodes", &FrameStats::n_nodes)
-      .def_ro("gap", &FrameStats::gap);
+      .def_ro("gap", &FrameStats::gap)
+      .def_ro("n_merged", &FrameStats::n_merged);
 
   nb::class_<LifeOptions>(module, "LifeOptions")
       .def(
@@ -310,14 +367,9 @@ void bind_trackers(nb::module_& module) {
              const LifeOptions& life, BranchOptions branches, std::int64_t max_hypotheses,
              std::int64_t max_nodes, double new_track_claim, nb::object choose) {
             require(max_hypotheses >= 1 && max_nodes >= 1, "limits: at least 1");
-            branches.is_joint = true;
-            branches.log_end = log_end_table(score, score.max_gap + kMaxWindow);
             const double least_new_worth = -branches.prune_drop;
             const double drop = std::max(branches.prune_drop, 25.0);
-            // A way on may be so much worse than another and still better than to lose the marker
-            // and to begin a new one.
-            branches.prune_drop += std::max(score.log_clutter - score.log_birth - score.log_detect, 0.0) -
-                                   std::log(score.p_disappear);
+            make_joint(branches, score);
             Packer packer;
             if (!choose.is_none())
               packer = [shared = std::make_shared<const PythonPacker>(std::move(choose))](
@@ -331,6 +383,22 @@ void bind_trackers(nb::module_& module) {
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
           "max_nodes"_a, "new_track_claim"_a, "choose"_a = nb::none());
+
+  bind<TreeTracker<HypothesisMatrix>>(module, "MatrixTracker")
+      .def("clusters", &clusters)
+      .def(
+          "__init__",
+          [](TreeTracker<HypothesisMatrix>* self, const MotionModel& model, const ScoreModel& score,
+             const LifeOptions& life, BranchOptions branches, std::int64_t max_hypotheses,
+             double merged_within, double new_track_claim) {
+            require(max_hypotheses >= 1, "max_hypotheses: at least 1");
+            make_joint(branches, score);
+            new (self) TreeTracker<HypothesisMatrix>(
+                HypothesisMatrix(model, score, life, branches, new_track_claim,
+                                 {max_hypotheses, branches.prune_drop, merged_within}));
+          },
+          "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
+          "merged_within"_a, "new_track_claim"_a);
 
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {
     try {

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "union_find.hpp"
+
 namespace asterism {
 
 // One possible pairing of a track (row) with a detection (column).
@@ -30,23 +32,12 @@ struct Groups {
 // `candidates` must be ordered by row.
 inline Groups connected_groups(std::span<const Candidate> candidates, std::int32_t n_rows,
                                std::int32_t n_columns) {
-  std::vector<std::int32_t> parent(n_rows + n_columns);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find = [&](std::int32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
-  for (const Candidate& c : candidates) {
-    const std::int32_t a = find(c.row), b = find(n_rows + c.column);
-    if (a < b)
-      parent[b] = a;
-    else
-      parent[a] = b;
-  }
+  UnionFind sets(n_rows + n_columns);
+  for (const Candidate& c : candidates) sets.join(c.row, n_rows + c.column);
   // The root of a component is its smallest row, so counting by root also orders the groups.
   std::vector<std::int32_t> group_of(n_rows, -1), counts;
   for (const Candidate& c : candidates) {
-    std::int32_t& g = group_of[find(c.row)];
+    std::int32_t& g = group_of[sets.find(c.row)];
     if (g < 0) {
       g = static_cast<std::int32_t>(counts.size());
       counts.push_back(0);
@@ -60,7 +51,7 @@ inline Groups connected_groups(std::span<const Candidate> candidates, std::int32
   groups.order.resize(candidates.size());
   groups.sources.resize(candidates.size());
   for (std::size_t e = 0; e < candidates.size(); ++e) {
-    const std::int32_t at = fill[group_of[find(candidates[e].row)]]++;
+    const std::int32_t at = fill[group_of[sets.find(candidates[e].row)]]++;
     groups.order[at] = candidates[e];
     groups.sources[at] = static_cast<std::int32_t>(e);
   }

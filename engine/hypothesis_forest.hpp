@@ -8,12 +8,12 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <numeric>
 #include <span>
 #include <vector>
 
 #include "hypothesis_window.hpp"
 #include "set_packing.hpp"
+#include "union_find.hpp"
 
 namespace asterism {
 
@@ -126,23 +126,18 @@ class HypothesisForest {
   // The best hypothesis of every cluster of trees, and the probabilities over its best ones.
   void choose(FrameStats& stats) {
     s_.free.assign(open_.frames.front()->points.size(), 1);
-    std::vector<std::int32_t> owner(s_.n_resources, -1), parent(s_.trees.size());
-    std::iota(parent.begin(), parent.end(), 0);
-    const auto find = [&](std::int32_t i) {
-      while (parent[i] != i) i = parent[i] = parent[parent[i]];
-      return i;
-    };
+    std::vector<std::int32_t> owner(s_.n_resources, -1);
+    UnionFind sets(s_.trees.size());
     for (std::size_t i = 0; i < s_.trees.size(); ++i)
       for (const PackingOption& option : s_.trees[i].options)
         for (const std::int32_t r : option.uses) {
           const auto own = static_cast<std::int32_t>(i);
           if (owner[r] < 0) owner[r] = own;
-          const std::int32_t a = find(owner[r]), b = find(own);
-          parent[std::max(a, b)] = std::min(a, b);
+          sets.join(owner[r], own);
         }
     std::vector<std::vector<std::int32_t>> clusters(s_.trees.size());
     for (std::size_t i = 0; i < s_.trees.size(); ++i)
-      clusters[find(static_cast<std::int32_t>(i))].push_back(static_cast<std::int32_t>(i));
+      clusters[sets.find(static_cast<std::int32_t>(i))].push_back(static_cast<std::int32_t>(i));
     std::vector<std::int32_t> entangled;
     for (const std::vector<std::int32_t>& cluster : clusters) {
       if (cluster.empty()) continue;

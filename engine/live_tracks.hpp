@@ -70,6 +70,7 @@ struct FrameStats {
   // best where the search was cut short.
   std::int64_t n_hypotheses = 0, n_nodes = 0;
   double gap = 0;
+  std::int64_t n_merged = 0;  // hypotheses that became part of a similar one
 
   void add(const FrameStats& next) {
     add_work(next);
@@ -95,6 +96,7 @@ struct FrameStats {
     n_hypotheses = std::max(n_hypotheses, next.n_hypotheses);
     n_nodes += next.n_nodes;
     gap = std::max(gap, next.gap);
+    n_merged += next.n_merged;
   }
 };
 

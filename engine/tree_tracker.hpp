@@ -57,6 +57,7 @@ class TreeTracker {
   }
 
   bool has_confidence() const { return has_confidence_; }
+  const Forest& forest() const { return forest_; }
   // The tracks as they would be decided on now.
   const LiveTracks<Tree>& live() const { return present_; }
   // Of what is decided, and of what would be decided now.

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 import asterism as am
+from scenes import small_model
 
 
 def every_track(detections: am.Detections, model: am.TrackingModel):
@@ -56,3 +57,18 @@ def tiny_problem(rng: np.random.Generator, n_frames: int, most: int, n_axes: int
         x = x + rng.normal(0, 0.03, x.shape)
         frames.append(x[rng.permutation(most)[: rng.integers(0, most + 1)]])
     return am.Detections.from_frames(times, [f.reshape(-1, n_axes) for f in frames])
+
+
+def tiny_model(rng: np.random.Generator) -> am.TrackingModel:
+    """A model under which such points have several explanations that are worth something."""
+    return small_model(
+        motion=am.DWNA(acceleration_sigma=2.0, velocity_sigma=0.4),
+        noise_sigma=0.01,
+        p_detection=float(rng.uniform(0.6, 0.95)),
+        clutter_density=float(rng.uniform(1, 30)),
+        birth_density=float(rng.uniform(0.5, 10)),
+        p_disappear=float(rng.uniform(0.01, 0.3)),
+        max_speed=float(rng.choice([1.0, 4.0])),
+        max_gap=int(rng.integers(1, 5)),
+        termination=str(rng.choice(["marginal", "last"])),
+    )

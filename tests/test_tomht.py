@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from partition_oracle import every_partition, every_track, tiny_problem
+from partition_oracle import every_partition, every_track, tiny_model, tiny_problem
 from scenes import calibration_in_crowds, crowd, small_model, wanderers
 
 # Nothing is pruned, nothing is left out, and what is more likely than not is believed.
@@ -15,20 +15,6 @@ WHOLE = am.TOMHT(
     new_track_odds=1e300, gate_probability=1e-300, confirm_probability=0.5 + 1e-12,
     delete_odds=1e300,
 )  # fmt: skip
-
-
-def tiny_model(rng: np.random.Generator) -> am.TrackingModel:
-    return small_model(
-        motion=am.DWNA(acceleration_sigma=2.0, velocity_sigma=0.4),
-        noise_sigma=0.01,
-        p_detection=float(rng.uniform(0.6, 0.95)),
-        clutter_density=float(rng.uniform(1, 30)),
-        birth_density=float(rng.uniform(0.5, 10)),
-        p_disappear=float(rng.uniform(0.01, 0.3)),
-        max_speed=float(rng.choice([1.0, 4.0])),
-        max_gap=int(rng.integers(1, 5)),
-        termination=str(rng.choice(["marginal", "last"])),
-    )
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -121,9 +107,7 @@ def test_a_search_cut_short_says_by_how_much_it_may_be_off():
 def test_what_is_only_looked_ahead_at_is_told_as_well():
     # The window is longer than the take: nothing is decided, and still it says what was cut short.
     d = crowd(3, spread=0.04).detections
-    first = am.Detections(
-        times=d.times[:8], offsets=d.offsets[:9], points=d.points[: d.offsets[8]]
-    )
+    first = am.Detections(times=d.times[:8], offsets=d.offsets[:9], points=d.points[: d.offsets[8]])
     model = small_model(
         motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
         max_speed=1.5, clutter_density=1.0, birth_density=1.0,

@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from asterism.associate import JPDA as JPDA
     from asterism.associate import MDA as MDA
     from asterism.associate import METHODS as METHODS
+    from asterism.associate import MHT as MHT
     from asterism.associate import SMP as SMP
     from asterism.associate import TOMHT as TOMHT
+    from asterism.associate import HypothesisCluster as HypothesisCluster
     from asterism.associate import Method as Method
     from asterism.associate import ModelEstimate as ModelEstimate
     from asterism.associate import TrackSplitting as TrackSplitting
@@ -153,9 +155,11 @@ _PUBLIC = {
         "METHODS",
         "JPDA",
         "MDA",
+        "MHT",
         "SMP",
         "TOMHT",
         "TrackSplitting",
+        "HypothesisCluster",
         "Method",
         "ModelEstimate",
         "Update",

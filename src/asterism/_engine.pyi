@@ -69,6 +69,8 @@ class FrameStats:
     def n_nodes(self) -> int: ...
     @property
     def gap(self) -> float: ...
+    @property
+    def n_merged(self) -> int: ...
 
 class LifeOptions:
     def __init__(
@@ -201,6 +203,24 @@ class HypothesisTracker(_Tracker):
         new_track_claim: float,
         choose: _Choose | None = None,
     ) -> None: ...
+
+class MatrixTracker(_Tracker):
+    def __init__(
+        self,
+        model: MotionModel,
+        score: ScoreModel,
+        life: LifeOptions,
+        branches: BranchOptions,
+        *,
+        max_hypotheses: int,
+        merged_within: float,
+        new_track_claim: float,
+    ) -> None: ...
+    def clusters(
+        self,
+    ) -> list[
+        tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
+    ]: ...
 
 def score_tracks(
     model: MotionModel,

@@ -4,6 +4,7 @@ from asterism.associate.gnn import GNN
 from asterism.associate.jpda import JPDA
 from asterism.associate.mda import MDA
 from asterism.associate.method import Method, Update
+from asterism.associate.mht import MHT, HypothesisCluster
 from asterism.associate.model_from_clip import ModelEstimate, estimate_model
 from asterism.associate.registry import METHODS, method_by_name
 from asterism.associate.smp import SMP
@@ -16,8 +17,10 @@ __all__ = [
     "JPDA",
     "MDA",
     "METHODS",
+    "MHT",
     "SMP",
     "TOMHT",
+    "HypothesisCluster",
     "Method",
     "ModelEstimate",
     "TrackSplitting",

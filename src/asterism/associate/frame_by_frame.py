@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         | _engine.JointTracker
         | _engine.TreeTracker
         | _engine.HypothesisTracker
+        | _engine.MatrixTracker
     )
 
 __all__ = ["FrameByFrame", "FrameState"]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from asterism.associate.gnn import GNN
 from asterism.associate.jpda import JPDA
 from asterism.associate.mda import MDA
+from asterism.associate.mht import MHT
 from asterism.associate.smp import SMP
 from asterism.associate.tomht import TOMHT
 from asterism.associate.track_splitting import TrackSplitting
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["METHODS", "method_by_name"]
 
 METHODS: dict[str, type[Method[Any]]] = {
-    method.name: method for method in (GNN, SMP, JPDA, TrackSplitting, TOMHT, MDA)
+    method.name: method for method in (GNN, SMP, JPDA, TrackSplitting, TOMHT, MDA, MHT)
 }
 """Method by name, as the command line knows it."""
 
