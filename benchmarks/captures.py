@@ -10,16 +10,12 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 import asterism as am
-from methods import METHODS, links
-from report import publish
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from methods import METHODS, LinkConfidence
+from report import publish, table
 
 ENDINGS = (".c3d", ".tsv", "recording_000", "drone2", "marker3")
 
@@ -90,14 +86,6 @@ def unlabelled_row(path: Path, capture: am.Capture) -> list[str]:
     ]
 
 
-def table(head: list[str], rows: list[list[str]]) -> list[str]:
-    return [
-        "| " + " | ".join(head) + " |",
-        "|" + "---|" * len(head),
-        *("| " + " | ".join(row) + " |" for row in rows),
-    ]
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -111,7 +99,7 @@ def main() -> None:
     unlabelled: list[list[str]] = []
     idf1: dict[tuple[str, str], list[float]] = {}
     switches: dict[tuple[str, str], list[float]] = {}
-    confidence: dict[str, list[tuple[NDArray[np.float64], NDArray[np.bool_]]]] = {}
+    confidence = LinkConfidence()
     for path in captures(options.data):
         if options.only not in path.name:
             continue
@@ -142,10 +130,7 @@ def main() -> None:
                         f"{seconds:.1f}",
                     ]
                 )
-                sure = results[name].confidence
-                if sure is not None:
-                    later, is_right = links(results[name], truth)
-                    confidence.setdefault(name, []).append((sure[later], is_right))
+                confidence.add(name, results[name], truth)
             scores.append(row)
             print(*row, flush=True)
     for condition in conditions:
@@ -158,15 +143,7 @@ def main() -> None:
     head = ["capture", "condition", "floor 10", "floor d̄ (d̄)", *METHODS]
     lines += [*table(head, scores), ""]
     lines += ["Confidence of the links of all captures, where a method has any:", ""]
-    rows: list[list[str]] = []
-    for name, parts in confidence.items():
-        sure, right = (np.concatenate(side) for side in zip(*parts, strict=True))
-        c = am.calibration(sure, right)
-        rows.append(
-            [name, f"{len(right):,}", f"{int((~right).sum()):,}", f"{c.ece:.4f}", f"{c.auc:.3f}"]
-        )
-    head = ["method", "links", "wrong", "expected calibration error", "AUC for wrong links"]
-    lines += [*table(head, rows), ""]
+    lines += [*confidence.table(), ""]
     lines += ["Captures without truth:", ""]
     lines += table(
         ["capture", "frames", "points", "tracks", "clutter %",

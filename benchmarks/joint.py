@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import asterism as am
-from report import best_of, conditions, publish
+from report import best_of, conditions, publish, table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -171,14 +171,6 @@ def beside_stone_soup() -> list[list[str]]:
                 ]
             )
     return rows
-
-
-def table(head: list[str], rows: list[list[str]]) -> list[str]:
-    return [
-        "| " + " | ".join(head) + " |",
-        "|---|" + "---:|" * (len(head) - 1),
-        *("| " + " | ".join(row) + " |" for row in rows),
-    ]
 
 
 def main() -> None:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import asterism as am
+from report import table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["METHODS", "links"]
+__all__ = ["METHODS", "LinkConfidence", "links"]
 
 METHODS: dict[str, am.Method[Any]] = {
     "gnn": am.GNN(),
@@ -20,6 +21,7 @@ METHODS: dict[str, am.Method[Any]] = {
     "jpda": am.JPDA(),
     "splitting": am.TrackSplitting(),
     "tomht": am.TOMHT(),
+    "mht": am.MHT(),
 }
 
 
@@ -29,3 +31,27 @@ def links(tracks: am.Tracks, truth: am.Tracks) -> tuple[NDArray[np.int64], NDArr
     is_link = np.diff(tracks.labels[order]) == 0
     a, b = order[:-1][is_link], order[1:][is_link]
     return b, (truth.labels[a] == truth.labels[b]) & (truth.labels[b] >= 0)
+
+
+class LinkConfidence:
+    """How sure each method was of its links, and whether they are right."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, list[tuple[NDArray[np.float64], NDArray[np.bool_]]]] = {}
+
+    def add(self, name: str, tracks: am.Tracks, truth: am.Tracks) -> None:
+        """Take the links of one result, if its method has a confidence."""
+        if tracks.confidence is not None:
+            later, is_right = links(tracks, truth)
+            self._parts.setdefault(name, []).append((tracks.confidence[later], is_right))
+
+    def table(self) -> list[str]:
+        """Lines of a table with a row for each method."""
+        rows: list[list[str]] = []
+        for name, parts in self._parts.items():
+            sure, right = (np.concatenate(side) for side in zip(*parts, strict=True))
+            c = am.calibration(sure, right)
+            wrong = int((~right).sum())
+            rows.append([name, f"{len(right):,}", f"{wrong:,}", f"{c.ece:.4f}", f"{c.auc:.3f}"])
+        head = ["method", "links", "wrong", "expected calibration error", "AUC for wrong links"]
+        return table(head, rows)

@@ -11,10 +11,10 @@ import numpy as np
 import asterism as am
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
-__all__ = ["best_of", "conditions", "publish"]
+__all__ = ["best_of", "conditions", "publish", "table"]
 
 
 def best_of(runs: int, work: Callable[[], object]) -> float:
@@ -41,3 +41,12 @@ def publish(lines: Iterable[str], markdown: Path | None) -> None:
     print(text)
     if markdown:
         markdown.write_text(text + "\n", encoding="utf-8")
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Lines of a table in Markdown, all but the first column to the right."""
+    return [
+        "| " + " | ".join(head) + " |",
+        "|---|" + "---:|" * (len(head) - 1),
+        *("| " + " | ".join(row) + " |" for row in rows),
+    ]

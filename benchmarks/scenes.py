@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 import asterism as am
-from methods import METHODS, links
-from report import conditions, publish
+from methods import METHODS, LinkConfidence
+from report import conditions, publish, table
 
 # What is made, and the noise in metres; a rig where the scene is also seen through cameras.
 CASES: dict[str, tuple[str, dict[str, Any], float, bool]] = {
@@ -52,11 +52,8 @@ def sensed(case: str, seed: int, *, through_cameras: bool) -> am.Tracks:
     return am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=noise, rig=rig, seed=seed)
 
 
-Confidence = dict[str, list[tuple[Any, Any]]]
-
-
 def row_of(
-    case: str, seeds: int, confidence: Confidence, *, through_cameras: bool
+    case: str, seeds: int, confidence: LinkConfidence, *, through_cameras: bool
 ) -> tuple[list[str], list[str]]:
     """Give the scores of every method, and the tracks that each found for one marker."""
     found: dict[str, list[tuple[float, ...]]] = {name: [] for name in METHODS}
@@ -73,9 +70,7 @@ def row_of(
             e = am.evaluate(tracks, truth)
             figures = (e.idf1, e.switches_per_1000, e.n_tracks / e.n_markers)
             found[name].append(figures)
-            if tracks.confidence is not None:
-                later, is_right = links(tracks, truth)
-                confidence.setdefault(name, []).append((tracks.confidence[later], is_right))
+            confidence.add(name, tracks, truth)
     scene = f"{case}, 4 cameras" if through_cameras else case
     row = [scene, f"{100 * np.mean(seen):.0f} %", f"{np.mean(floors):.3f}"]
     each = [scene]
@@ -86,24 +81,6 @@ def row_of(
     return row, each
 
 
-def table(head: list[str], rows: list[list[str]]) -> list[str]:
-    return [
-        "| " + " | ".join(head) + " |",
-        "|---|" + "---:|" * (len(head) - 1),
-        *("| " + " | ".join(row) + " |" for row in rows),
-    ]
-
-
-def reliability(confidence: Confidence) -> list[list[str]]:
-    rows: list[list[str]] = []
-    for name, parts in confidence.items():
-        sure, right = (np.concatenate(side) for side in zip(*parts, strict=True))
-        c = am.calibration(sure, right)
-        wrong = int((~right).sum())
-        rows.append([name, f"{len(right):,}", f"{wrong:,}", f"{c.ece:.4f}", f"{c.auc:.3f}"])
-    return rows
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=3)
@@ -112,7 +89,7 @@ def main() -> None:
     options = parser.parse_args()
     rows: list[list[str]] = []
     ratios: list[list[str]] = []
-    confidence: Confidence = {}
+    confidence = LinkConfidence()
     for case, (_, _, _, has_cameras) in CASES.items():
         if options.only in case:
             for through_cameras in (False, True)[: 1 + has_cameras]:
@@ -124,8 +101,7 @@ def main() -> None:
     lines += [*table(["scene", "seen", "floor d̄", *METHODS], rows), ""]
     lines += ["Tracks found for each true one:", "", *table(["scene", *METHODS], ratios), ""]
     lines += ["Confidence of the links of all scenes, where a method has any:", ""]
-    head = ["method", "links", "wrong", "expected calibration error", "AUC for wrong links"]
-    lines += [*table(head, reliability(confidence)), ""]
+    lines += [*confidence.table(), ""]
     lines += [f"Means over {options.seeds} seeds. {conditions()}."]
     publish(lines, options.markdown)
 

@@ -43,6 +43,18 @@ class Assignment {
       if (column_of_[i] != kAlone) match[rows_[i]] = columns_[column_of_[i]];
   }
 
+  // Also writes what each column of the group is worth to whoever has it: no pairing has a greater
+  // sum of gains than Σ price_j + Σ_i max(0, max_j gain_ij - price_j), and the best has just that.
+  void solve(std::span<const Candidate> group, std::span<std::int32_t> match,
+             std::span<double> price) {
+    solve(group, match);
+    if (group.size() == 1) {
+      price[group[0].column] = 0;
+      return;
+    }
+    for (std::size_t j = 0; j < columns_.size(); ++j) price[columns_[j]] = -v_[j];
+  }
+
  private:
   static constexpr std::int32_t kAlone = -1;
 

@@ -392,10 +392,11 @@ void bind_trackers(nb::module_& module) {
              const LifeOptions& life, BranchOptions branches, std::int64_t max_hypotheses,
              double merged_within, double new_track_claim) {
             require(max_hypotheses >= 1, "max_hypotheses: at least 1");
+            const double drop = branches.prune_drop;
             make_joint(branches, score);
             new (self) TreeTracker<HypothesisMatrix>(
                 HypothesisMatrix(model, score, life, branches, new_track_claim,
-                                 {max_hypotheses, branches.prune_drop, merged_within}));
+                                 {max_hypotheses, drop, merged_within}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
           "merged_within"_a, "new_track_claim"_a);

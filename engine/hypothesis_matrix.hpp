@@ -1,6 +1,6 @@
 // Reid's multiple hypotheses (1979): whole hypotheses carried from frame to frame, by cluster.
 //
-//   CLUSTER  which clusters want one detection; these become one (a super-cluster)
+//   CLUSTER  which clusters may have one and the same detection; these become one (a super-cluster)
 //   HYPGEN   the best hypotheses about the new frame, of all that follow from those so far
 //   REDUCE   few, likely and different ones are kept; what is older than the window is decided by the
 //            best (N-scan); what shares no detection any more goes into clusters of its own
@@ -23,6 +23,7 @@
 #include <utility>
 #include <vector>
 
+#include "assignment.hpp"
 #include "fresh.hpp"
 #include "hypothesis_window.hpp"
 #include "k_best.hpp"
@@ -117,6 +118,9 @@ class HypothesisMatrix {
   struct Memory {
     std::vector<std::int64_t> keys;  // of all trees
     std::vector<Ways> ways;
+    std::vector<std::int32_t> likeliest;  // branch of each tree in the likeliest hypothesis
+    std::vector<double> price;            // of each detection of the new frame
+    Assignment assignment;
     // By open frame and tree: what the best hypothesis says, and the probability of each detection
     // to be nobody's.
     std::vector<std::map<std::int64_t, Fate>> fates;
@@ -154,29 +158,120 @@ class HypothesisMatrix {
     list_keys();
   }
 
-  // Calls visit(way, gain over the miss) for what a branch may take and would not be dropped for.
+  // Calls visit(way, gain over the miss) for what a branch may take.
   template <typename Visit>
   void each_hit(std::size_t tree, std::int32_t branch, Visit&& visit) const {
     const Ways& ways = s_.ways[tree];
     const std::int32_t miss = ways.first[branch + 1] - 1;
-    for (std::int32_t w = ways.first[branch]; w < miss; ++w) {
-      const double gain = ways.worth[w] - ways.worth[miss];
-      if (gain > -opt_.drop) visit(w, gain);
+    for (std::int32_t w = ways.first[branch]; w < miss; ++w)
+      visit(w, ways.worth[w] - ways.worth[miss]);
+  }
+
+  // Prices of the new frame's detections, were the likeliest hypothesis of every cluster right.
+  void set_prices(const WindowFrame& frame) {
+    std::vector<Candidate> wanted;
+    for (std::size_t i = 0; i < s_.likeliest.size(); ++i) {
+      if (s_.likeliest[i] < 0) continue;
+      each_hit(i, s_.likeliest[i], [&](std::int32_t w, double gain) {
+        if (gain > 0)
+          wanted.push_back({static_cast<std::int32_t>(i), s_.ways[i].branches[w].taken(frame.number),
+                            gain, 0});
+      });
     }
+    s_.price.assign(frame.points.size(), 0);
+    std::vector<std::int32_t> match(s_.likeliest.size(), -1);
+    const Groups groups = connected_groups(wanted, static_cast<std::int32_t>(match.size()),
+                                           static_cast<std::int32_t>(frame.points.size()));
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      s_.assignment.solve(groups[g], match, s_.price);
+  }
+
+  // What a cluster's hypotheses are worth at most at these prices, by what they may take of the frame:
+  // all of it, not detection j, or surely detection j.
+  static constexpr double kNever = -std::numeric_limits<double>::infinity();
+  struct Bounds {
+    struct Either {
+      double without = kNever, with = kNever;
+    };
+    double all = kNever;
+    std::map<std::int32_t, Either> by_detection;
+  };
+  Bounds bounds_of(const Cluster& cluster, const WindowFrame& frame) const {
+    // Of a tree in a hypothesis, the best and the next best that it may take.
+    struct Surplus {
+      double best = 0, next = 0;
+      std::int32_t column = -1;
+    };
+    Bounds bounds;
+    for (const std::int64_t key : cluster.keys)
+      for (const Branch& b : s_.ways[index_of(key)].branches)
+        if (b.taken(frame.number) >= 0) bounds.by_detection[b.taken(frame.number)];
+    std::vector<Surplus> surplus(cluster.keys.size());
+    for (const Hypothesis& h : cluster.hypotheses) {
+      double total = h.merged;
+      for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
+        surplus[k] = {};
+        if (h.branches[k] < 0) continue;
+        const std::size_t i = index_of(cluster.keys[k]);
+        total += s_.ways[i].worth[s_.ways[i].first[h.branches[k] + 1] - 1];
+        each_hit(i, h.branches[k], [&](std::int32_t w, double gain) {
+          const std::int32_t j = s_.ways[i].branches[w].taken(frame.number);
+          const double left = gain - s_.price[j];
+          if (left > surplus[k].best)
+            surplus[k] = {left, surplus[k].best, j};
+          else
+            surplus[k].next = std::max(surplus[k].next, left);
+        });
+        total += surplus[k].best;
+      }
+      bounds.all = std::max(bounds.all, total);
+      // What the others lose where one takes detection j.
+      std::map<std::int32_t, double> lost;
+      for (const Surplus& s : surplus)
+        if (s.column >= 0) lost[s.column] += s.best - s.next;
+      for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
+        if (h.branches[k] < 0) continue;
+        const std::size_t i = index_of(cluster.keys[k]);
+        each_hit(i, h.branches[k], [&](std::int32_t w, double gain) {
+          const std::int32_t j = s_.ways[i].branches[w].taken(frame.number);
+          const auto at = lost.find(j);
+          const double others = at == lost.end() ? 0 : at->second;
+          const double own = surplus[k].column == j ? surplus[k].best - surplus[k].next : 0;
+          double& with = bounds.by_detection.at(j).with;
+          with = std::max(with, total - surplus[k].best - (others - own) + gain - s_.price[j]);
+        });
+      }
+      for (auto& [j, bound] : bounds.by_detection) {
+        const auto at = lost.find(j);
+        bound.without = std::max(bound.without, total - (at == lost.end() ? 0 : at->second));
+      }
+    }
+    return bounds;
   }
 
   // CLUSTER
   std::vector<SuperCluster> cluster(const WindowFrame& frame, FrameStats& stats) {
     const auto n_clusters = static_cast<std::int32_t>(clusters_.size());
     const auto n_points = static_cast<std::int32_t>(frame.points.size());
+    s_.likeliest.assign(open_.n_all(), -1);
+    for (const Cluster& one : clusters_)
+      for (std::size_t k = 0; k < one.keys.size(); ++k)
+        s_.likeliest[index_of(one.keys[k])] = one.hypotheses.front().branches[k];
+    set_prices(frame);
+    // What it costs at least that a cluster has a detection: its own hypotheses with it are worth so
+    // much less, and so are those of the others without.
+    std::vector<Bounds> bounds;
+    std::vector<double> kept_from_others(n_points, 0);
+    for (const Cluster& one : clusters_) {
+      bounds.push_back(bounds_of(one, frame));
+      for (const auto& [j, bound] : bounds.back().by_detection)
+        kept_from_others[j] += bounds.back().all - bound.without;
+    }
     UnionFind sets(static_cast<std::size_t>(n_clusters) + n_points);
     for (std::int32_t c = 0; c < n_clusters; ++c)
-      for (const std::int64_t key : clusters_[c].keys) {
-        const std::size_t i = index_of(key);
-        for (std::size_t b = 0; b + 1 < s_.ways[i].first.size(); ++b)
-          each_hit(i, static_cast<std::int32_t>(b), [&](std::int32_t w, double) {
-            sets.join(c, n_clusters + s_.ways[i].branches[w].taken(frame.number));
-          });
+      for (const auto& [j, bound] : bounds[c].by_detection) {
+        const double others = kept_from_others[j] - (bounds[c].all - bound.without);
+        if (bounds[c].all - bound.with + others <= opt_.drop) sets.join(c, n_clusters + j);
       }
     std::map<std::int32_t, SuperCluster> super;
     for (std::int32_t c = 0; c < n_clusters; ++c) {
@@ -318,9 +413,9 @@ class HypothesisMatrix {
       parent.missed += s_.ways[i].worth[s_.ways[i].first[branch + 1] - 1];
       each_hit(i, branch, [&](std::int32_t w, double gain) {
         const std::int32_t column = s_.ways[i].branches[w].taken(frame.number);
-        const std::size_t j =
-            std::lower_bound(super.columns.begin(), super.columns.end(), column) -
-            super.columns.begin();
+        const auto at = std::lower_bound(super.columns.begin(), super.columns.end(), column);
+        if (at == super.columns.end() || *at != column) return;  // surely another cluster's
+        const auto j = static_cast<std::size_t>(at - super.columns.begin());
         parent.cost[j * N + k] = -gain;
         parent.ways[k * n_points + j] = w;
         most[j] = std::max(most[j], gain);

@@ -68,8 +68,7 @@ class MHT(Hypotheses):
         and ``info["most_dropped_odds"]`` is the greatest odds, against the cluster's likeliest, of
         any that was left out.
     prune_odds : float
-        A hypothesis is dropped when it is so many times less likely than the likeliest would be, had
-        that lost a marker and begun another.
+        A hypothesis is dropped when it is so many times less likely than its cluster's likeliest.
     merged_within : float
         Of hypotheses with the same targets, whose estimates differ by less than so many standard
         deviations, the likeliest stands for all; 0 merges none.
@@ -86,6 +85,7 @@ class MHT(Hypotheses):
     8
     """
 
+    prune_odds: float = 1e4
     max_hypotheses: int = 100
     merged_within: float = 0.0
 

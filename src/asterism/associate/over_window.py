@@ -57,8 +57,7 @@ class Hypotheses(FrameByFrame):
     window : int
         Frames until one is decided, 2 to 16.
     prune_odds : float
-        What is so many times less likely than the best would be, had it lost the marker and begun
-        another, is not followed further.
+        What is so many times less likely than the best is not followed further.
     new_track_odds : float
         A detection that a believed track expects by more than these odds begins no track.
     gate_probability, confirm_probability, delete_odds : float
