@@ -37,7 +37,7 @@ def model_of(capture: am.Tracks, motions: int) -> am.TrackingModel:
             models=single,
             transitions=np.array([[0.95, 0.045, 0.005], [0.045, 0.95, 0.005], [0.25, 0.25, 0.5]]),
         )
-    clutter = float((capture.labels < 0).sum()) / n_frames / extent
+    clutter = max(float((capture.labels < 0).sum()), 1.0) / n_frames / extent
     return am.TrackingModel(
         motion=motion,
         sensor=am.Sensor(noise_sigma=0.005, p_detection=0.9, clutter_density=clutter),

@@ -39,7 +39,7 @@ struct MatrixOptions {
 
 struct Hypothesis {
   double worth = 0;   // of its branches
-  double merged = 0;  // log of how much likelier it is with those that were merged into it
+  double merged = 0;  // log of how much likelier it is by those that were merged into it
   std::vector<std::int32_t> branches;  // of each tree of the cluster; -1: its detections are others'
 
   double log_weight() const { return worth + merged; }
@@ -640,20 +640,25 @@ class HypothesisMatrix {
     struct Sums {
       std::size_t place = 0;
       double with = 0, without = 0;  // weights with and without what was merged
-    };
+    } all;
     std::map<std::vector<std::int32_t>, Sums> seen;
     const double most = cluster.hypotheses.front().log_weight();
     for (const Hypothesis& h : cluster.hypotheses) {
       std::vector<std::int32_t> branches;
       for (const std::size_t k : places) branches.push_back(h.branches[k]);
       const auto [at, is_new] = seen.try_emplace(branches, Sums{part.hypotheses.size(), 0, 0});
-      at->second.with += std::exp(h.log_weight() - most);
-      at->second.without += std::exp(h.worth - most);
+      for (Sums* sums : {&at->second, &all}) {
+        sums->with += std::exp(h.log_weight() - most);
+        sums->without += std::exp(h.worth - most);
+      }
       if (is_new) part.hypotheses.push_back({worth_of(part, branches, grower), 0, branches});
     }
+    // How much more probable the part is by what was merged; in each part just its own share.
     for (const auto& [branches, sums] : seen)
       part.hypotheses[sums.place].merged =
-          sums.with == sums.without ? 0 : std::log(sums.with / sums.without);
+          sums.with == sums.without && all.with == all.without
+              ? 0
+              : std::log(sums.with / all.with) - std::log(sums.without / all.without);
     sort(part.hypotheses);
     return part;
   }

@@ -76,10 +76,9 @@ def wanderers(
     return am.Tracks(detections=detections, labels=np.concatenate(labels).astype(np.int64))
 
 
-def crowd(seed: int, n_axes: int = 3, spread: float = 0.08) -> am.Tracks:
+def crowd(seed: int, n_axes: int = 3, spread: float = 0.08, n_frames: int = 25) -> am.Tracks:
     """Five markers that hardly keep apart, in clutter that lies among them."""
     rng = np.random.default_rng(seed)
-    n_frames = 25
     x, v = rng.normal(0, spread, (5, n_axes)), rng.normal(0, 0.1, (5, n_axes))
     frames, labels = [], []
     for _ in range(n_frames):

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import asterism as am
-from partition_oracle import every_partition, tiny_problem
+from partition_oracle import every_partition, tiny_model, tiny_problem
 from scenes import crowd, small_model, wanderers
-from test_tomht import tiny_model
 
 WHOLE = am.MDA(
     window=16, max_branches=10**6, prune_odds=1e30, new_track_odds=1e300, gate_probability=1e-300,

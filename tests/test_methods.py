@@ -24,11 +24,14 @@ METHODS = {
     "splitting": am.TrackSplitting(),
     "independent trees": am.TrackSplitting(independent=True, window=4),
     "tomht": am.TOMHT(),
+    "mht": am.MHT(),
     "mda": am.MDA(),
 }
 each_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 # The others are held to every partition of small problems instead.
-ON_A_BLACKBOARD = {name: m for name, m in METHODS.items() if not isinstance(m, am.TOMHT | am.MDA)}
+ON_A_BLACKBOARD = {
+    name: m for name, m in METHODS.items() if not isinstance(m, am.TOMHT | am.MDA | am.MHT)
+}
 each_on_a_blackboard = pytest.mark.parametrize(
     "method", ON_A_BLACKBOARD.values(), ids=ON_A_BLACKBOARD
 )
@@ -83,7 +86,7 @@ def test_stream_and_batch_give_identical_labels(method, n_axes, irregular):
         assert np.isnan(confidence).all()
     else:
         assert (tracks.confidence == confidence).all()
-    assert tracks.info == state.info
+    assert tracks.info == state.info | {"log_posterior": am.log_posterior(tracks, model)}
     assert tracks.n_tracks >= 6
 
 

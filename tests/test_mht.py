@@ -165,6 +165,21 @@ def test_similar_hypotheses_are_merged():
     assert sure[0.1] == pytest.approx(sure[0.0], abs=1e-3)
 
 
+def test_merging_again_and_again_stays_probable():
+    # Clusters that join, merge and part for long: what was merged counts once, in its own part.
+    d = crowd(1, spread=0.03, n_frames=300).detections
+    method, model = am.MHT(merged_within=2.0, window=5), crowd_model()
+    state = method.init(model)
+    for time, points in d:
+        state, _ = method.step(state, time, points)
+        for *_, log_weights in state.tracker.clusters():
+            assert np.ptp(log_weights) < math.log(method.prune_odds) + 1
+    tracks = am.track(d, method, model=model)
+    assert tracks.info["merged"] > 300
+    plain = am.track(d, am.MHT(window=5), model=model)
+    assert (tracks.labels >= 0).sum() == pytest.approx((plain.labels >= 0).sum(), rel=0.02)
+
+
 def test_confidence_is_calibrated_where_the_model_is_right():
     found = calibration_in_crowds(am.MHT())
     assert found.auc > 0.8

@@ -133,17 +133,13 @@ class Summary:
         return dataclasses.asdict(self)
 
 
-def summarize(
-    tracks: am.Tracks, *, model: am.TrackingModel, out: Path, method: str, seconds: float
-) -> Summary:
+def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> Summary:
     """Count what a tracking did.
 
     Parameters
     ----------
     tracks : Tracks
-        The result, over a `Capture`.
-    model : TrackingModel
-        The model that was searched.
+        The result of `track`, over a `Capture`.
     out : Path
         The file it went to.
     method : str
@@ -159,7 +155,8 @@ def summarize(
     before = np.flatnonzero(is_gap)
     length = frame[before + 1] - frame[before]
     n_labelled = len(order)
-    log_posterior = am.log_posterior(tracks, model)
+    info = dict(tracks.info)
+    log_posterior = info.pop("log_posterior")
     return Summary(
         input=str(d.path),
         output=str(out),
@@ -185,5 +182,5 @@ def summarize(
         n_doubtful=None
         if tracks.confidence is None
         else int((tracks.confidence[order] < DOUBTFUL).sum()),
-        info=dict(tracks.info),
+        info=info,
     )

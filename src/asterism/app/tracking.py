@@ -121,7 +121,7 @@ def _carry_out(job: Job, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
             capture.path,
         )
     am.write(tracks, out, format=job.format)
-    summary = summarize(tracks, model=job.model, out=out, method=job.method, seconds=seconds)
+    summary = summarize(tracks, out=out, method=job.method, seconds=seconds)
     for name, text in summary.rows():
         log.info("%s %s", name, text)
     return tracks, summary

@@ -46,15 +46,15 @@ class HypothesisCluster:
 
 @dataclass(frozen=True, kw_only=True)
 class MHT(Hypotheses):
-    """Reid's multiple hypotheses: whole explanations of all detections, carried from frame to frame.
+    """Reid's multiple hypotheses: whole explanations of all detections, from frame to frame.
 
-    Targets that compete for detections form a cluster, which keeps its own hypotheses. CLUSTER joins
-    clusters that a new frame makes compete; HYPGEN makes the best hypotheses about the frame out of
-    those so far, by Murty's k best assignments; REDUCE keeps few of them, the likely and different
-    ones, decides what is older than the window by the likeliest (N-scan pruning), and parts what
-    competes no longer; MASH takes out the detections of which all hypotheses say the same and
-    confirms the targets that they come from. A hypothesis has the log posterior of its partition
-    (`log_posterior`).
+    Targets that compete for detections form a cluster, which keeps its own hypotheses. CLUSTER
+    joins clusters that a new frame makes compete; HYPGEN makes the best hypotheses about the frame
+    out of those so far, by Murty's k best assignments; REDUCE keeps few of them, the likely and
+    different ones, decides what is older than the window by the likeliest (N-scan pruning), and
+    parts what competes no longer; MASH takes out the detections of which all hypotheses say the
+    same and confirms the targets that they come from. A hypothesis has the log posterior of its
+    partition (`log_posterior`).
 
     Until a frame is decided its labels are those of the likeliest hypotheses, and may change. The
     confidence of a label is its probability over the hypotheses of its cluster.
@@ -85,7 +85,7 @@ class MHT(Hypotheses):
     8
     """
 
-    prune_odds: float = 1e4
+    prune_odds: float = 1e6
     max_hypotheses: int = 100
     merged_within: float = 0.0
 

@@ -9,6 +9,7 @@ from asterism.associate.method import Method
 from asterism.associate.model_from_clip import estimate_model
 from asterism.errors import ParameterError
 from asterism.model import Detections, TrackingModel, Tracks
+from asterism.model.posterior import log_posterior
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,7 +44,8 @@ def track(
     -------
     Tracks
         Labels for the same detections; tracks are numbered in the order in which they were
-        believed.
+        believed. ``info["log_posterior"]`` is what every method is measured by (`log_posterior`),
+        the rest of ``info`` is the method's own.
 
     Raises
     ------
@@ -66,7 +68,10 @@ def track(
     _check_type("model", model, TrackingModel, "estimate_model(detections).model")
     state = method.init(model, n_axes=detections.n_axes, seed=seed)
     state, labels, confidence = method.run(state, detections, progress=progress)
-    return Tracks(detections=detections, labels=labels, confidence=confidence, info=state.info)
+    info = dict(state.info)
+    tracks = Tracks(detections=detections, labels=labels, confidence=confidence, info=info)
+    info["log_posterior"] = log_posterior(tracks, model)
+    return tracks
 
 
 def _check_type(name: str, value: object, kind: type, hint: str) -> None:
