@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 
@@ -81,6 +82,24 @@ def test_all_hypotheses_are_all_partitions_with_their_probabilities(seed):
             ]
             assert tracks.confidence[i] == pytest.approx(wanted[says].sum(), abs=1e-9)
     assert n_tracks > 20
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_clusters_apart_and_what_is_dropped_hardly_change_the_probabilities(seed):
+    rng = np.random.default_rng(50 + seed)
+    method = dataclasses.replace(WHOLE, prune_odds=1e8)
+    n_apart = 0
+    for _ in range(40):
+        d, model = tiny_problem(rng, *((5, 2), (4, 3), (3, 4))[rng.integers(3)]), tiny_model(rng)
+        partitions, totals = every_partition(d, model)
+        wanted = np.exp(totals - totals.max())
+        wanted /= wanted.sum()
+        clusters = method.hypotheses(after_all(method, d, model))
+        n_apart += len(clusters) > 1
+        found = as_partitions(clusters)
+        p = np.array([found.get(frozenset(tracks), 0.0) for tracks in partitions])
+        np.testing.assert_allclose(p, wanted, rtol=0, atol=1e-4)
+    assert n_apart > 5
 
 
 @pytest.mark.parametrize("seed", range(3))
