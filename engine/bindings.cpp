@@ -11,4 +11,5 @@ NB_MODULE(_engine, module) {
   bind_trackers(module);
   bind_camera(module);
   bind_solvers(module);
+  bind_chain(module);
 }

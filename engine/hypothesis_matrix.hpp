@@ -576,7 +576,7 @@ class HypothesisMatrix {
           const std::size_t i = index_of(cluster.keys[k]);
           const Fate best = s_.fates[0].at(cluster.keys[k]);
           const Fate own = fate_of(i, h.branches[k], frame);
-          if (own.exists != best.exists || own.column != best.column) return true;
+          if (own.column != best.column) return true;
         }
         return false;
       });

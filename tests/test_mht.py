@@ -102,10 +102,11 @@ def test_clusters_apart_and_what_is_dropped_hardly_change_the_probabilities(seed
     assert n_apart > 5
 
 
+@pytest.mark.parametrize("prune_odds", [2.0, 1e6])
 @pytest.mark.parametrize("seed", range(3))
-def test_where_nothing_is_in_doubt_the_truth_is_found(seed):
+def test_where_nothing_is_in_doubt_the_truth_is_found(seed, prune_odds):
     truth = wanderers(np.random.default_rng(seed), n_frames=80)
-    tracks = am.track(truth.detections, am.MHT(), model=small_model())
+    tracks = am.track(truth.detections, am.MHT(prune_odds=prune_odds), model=small_model())
     assert am.evaluate(tracks, truth).idf1 > 0.98
     assert tracks.info["limited"] == 0
 
@@ -170,17 +171,22 @@ def test_similar_hypotheses_are_merged():
     frames[6] = np.concatenate([frames[6], frames[6] + 1e-6])
     d = am.Detections.from_frames(t, frames)
     model = crowd_model(max_speed=10.0)
-    counts, sure = {}, {}
+    counts, sure, missed = {}, {}, {}
     for within in (0.0, 0.1):
         method = am.MHT(merged_within=within, window=8)
         state = after_all(method, am.Detections.from_frames(t[:7], frames[:7]), model)
         counts[within] = sum(len(c.probabilities) for c in method.hypotheses(state))
+        # Hypotheses in which the track has neither: as probable as without merging.
+        (own,) = [c for c in method.hypotheses(state) if 5 in c.detections]
+        neither = (own.origins[:, np.isin(own.detections, [6, 7])] < 0).all(axis=1)
+        missed[within] = own.probabilities[neither].sum()
         tracks = am.track(d, method, model=model)
         assert tracks.n_tracks == 1
         assert (tracks.info["merged"] > 0) == (within > 0)
         sure[within] = tracks.confidence[8:].min()
     assert counts[0.1] < counts[0.0]
     # What was merged still counts: of the rest it is as sure as without.
+    assert missed[0.1] == pytest.approx(missed[0.0], rel=1e-3)
     assert sure[0.1] == pytest.approx(sure[0.0], abs=1e-3)
 
 

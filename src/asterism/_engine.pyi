@@ -321,3 +321,37 @@ def project(
     surfaces: Sequence[Surfaces],
     clearance: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8], NDArray[np.int32]]: ...
+
+class Chain:
+    def __init__(
+        self,
+        model: MotionModel,
+        score: ScoreModel,
+        *,
+        weights: NDArray[np.float64],
+        is_informed: bool,
+        stop: float,
+        floor: float,
+        has_first_rules: bool,
+        is_ascent: bool,
+        seed: int,
+    ) -> None: ...
+    def add_frame(
+        self,
+        time: float,
+        F: NDArray[np.float64],
+        Q: NDArray[np.float64],
+        points: NDArray[np.float64],
+    ) -> None: ...
+    def freeze(self, frame: int) -> None: ...
+    def assign(self, labels: NDArray[np.int64]) -> None: ...
+    def labels(self) -> NDArray[np.int64]: ...
+    def log_posterior(self) -> float: ...
+    def run(self, n_moves: int) -> None: ...
+    def counts(self) -> NDArray[np.int64]: ...
+    def visits(self, n_moves: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]: ...
+    def trace(
+        self, n_moves: int
+    ) -> list[
+        tuple[int, int, NDArray[np.int64], NDArray[np.int64], float, float, float, bool, float]
+    ]: ...

@@ -1,0 +1,219 @@
+// The chain of MCMC data association, as Python sees it.
+#include <nanobind/stl/tuple.h>
+
+#include <memory>
+#include <variant>
+
+#include "bindings.hpp"
+#include "motion_arrays.hpp"
+#include "sampler.hpp"
+#include "tally.hpp"
+
+using namespace nb::literals;
+using namespace asterism;
+
+namespace {
+
+class Chain {
+  template <typename F>
+  decltype(auto) visit(F&& f) {
+    return std::visit([&](auto& s) -> decltype(auto) { return f(*s); }, sampler_);
+  }
+  template <typename F>
+  decltype(auto) visit(F&& f) const {
+    return std::visit([&](const auto& s) -> decltype(auto) { return f(std::as_const(*s)); },
+                      sampler_);
+  }
+
+
+ public:
+  Chain(const MotionModel& m, const ScoreModel& sm, const ChainOptions& options, std::uint64_t seed)
+      : m_(m) {
+    if (m.M == 1)
+      sampler_ = std::make_unique<Sampler<OneMotion>>(m, sm, options, seed);
+    else
+      sampler_ = std::make_unique<Sampler<SeveralMotions>>(m, sm, options, seed);
+  }
+
+  void add_frame(double time, const In<double>& F, const In<double>& Q, const In<double>& points) {
+    const std::size_t size = static_cast<std::size_t>(m_.M) * m_.axis.n * m_.axis.n;
+    require(F.size() == size && Q.size() == size, "F and Q: shape (modes, n, n)");
+    const std::vector<Point> frame = to_points(points, m_.axis.D);
+    visit([&](auto& s) {
+      s.partition().add_frame(time, motion_step(m_, F.data(), Q.data()), frame, n_seen_);
+    });
+    n_seen_ += static_cast<std::int64_t>(frame.size());
+  }
+
+  void freeze(std::int64_t frame) {
+    visit([&](auto& s) {
+      require(frame <= s.partition().window().now(), "frame: one that was added");
+      s.partition().freeze(frame);
+    });
+  }
+
+  // Tracks as in `labels`, in place of what is there; nothing may be settled yet.
+  void assign(const In<std::int64_t>& labels) {
+    require(static_cast<std::int64_t>(labels.size()) == n_seen_, "labels: one for each detection");
+    visit([&](auto& s) { assign_to(s, labels.data()); });
+  }
+
+  Out<std::int64_t> labels() const {
+    return visit([&](const auto& s) {
+      const std::vector<std::int64_t> all = labels_of(s.partition());
+      Owned<std::int64_t> out(all.size());
+      std::copy(all.begin(), all.end(), out.data.get());
+      return out.give({all.size()});
+    });
+  }
+  double log_posterior() const {
+    return visit([](const auto& s) { return s.partition().log_posterior(); });
+  }
+
+  void run(std::int64_t n_moves) {
+    nb::gil_scoped_release release;
+    visit([&](auto& s) {
+      for (std::int64_t n = 0; n < n_moves; ++n) s.step();
+    });
+  }
+
+  // (drawn, possible, taken) of each kind of move.
+  Out<std::int64_t> counts() const {
+    Owned<std::int64_t> out(kMoves * 3);
+    visit([&](const auto& s) {
+      for (int k = 0; k < kMoves; ++k) {
+        const MoveCounts& c = s.counts()[k];
+        out.data[3 * k] = c.n_drawn;
+        out.data[3 * k + 1] = c.n_possible;
+        out.data[3 * k + 2] = c.n_taken;
+      }
+    });
+    return out.give({kMoves, 3});
+  }
+
+  // (labels of each partition, moves after which the chain was in it).
+  nb::tuple visits(std::int64_t n_moves) {
+    std::unordered_map<std::uint64_t, Visited> visited;
+    {
+      nb::gil_scoped_release release;
+      visited = visit([&](auto& s) { return tally(s, n_moves); });
+    }
+    const auto n = static_cast<std::size_t>(n_seen_), V = visited.size();
+    Owned<std::int64_t> labels(V * n), counts(V);
+    std::size_t v = 0;
+    for (const auto& [key, one] : visited) {
+      std::copy(one.labels.begin(), one.labels.end(), labels.data.get() + v * n);
+      counts.data[v++] = one.count;
+    }
+    return nb::make_tuple(labels.give({V, n}), counts.give({V}));
+  }
+
+  // Moves that are weighed to the end, one by one: (kind, what was drawn on the way, labels before
+  // and after, log q forward and back, gain, whether it was taken).
+  nb::list trace(std::int64_t n_moves) {
+    nb::list out;
+    visit([&](auto& s) {
+      s.trace(true);
+      for (std::int64_t n = 0; n < n_moves; ++n) trace_one(s, out);
+      s.trace(false);
+    });
+    return out;
+  }
+
+ private:
+  template <typename Filter>
+  static void assign_to(Sampler<Filter>& s, const std::int64_t* labels) {
+    Partition<Filter>& p = s.partition();
+    std::vector<Edit<Filter>> edits;
+    for (const std::int32_t k : p.tracks().items()) {
+      require(p.track(k).n_frozen == 0, "labels: before anything is settled");
+      edits.emplace_back().track = k;
+    }
+    p.apply(edits);
+    edits.clear();
+    std::unordered_map<std::int64_t, std::size_t> place;
+    const DetectionWindow& window = p.window();
+    for (std::int64_t t = window.first(); t <= window.now(); ++t)
+      for (const std::int32_t i : window.frame(t).ids) {
+        const std::int64_t label = labels[window[i].number];
+        if (label < 0) continue;
+        const auto [at, is_new] = place.try_emplace(label, edits.size());
+        if (is_new) edits.emplace_back();
+        Edit<Filter>& edit = edits[at->second];
+        require(is_new || window.is_linkable(edit.tail.nodes.back(), i), "labels: tracks of the model");
+        p.append(edit, i);
+      }
+    for (const Edit<Filter>& edit : edits)
+      require(edit.tail.nodes.size() > 1, "labels: at least two detections of each track");
+    p.apply(edits);
+  }
+
+  template <typename Filter>
+  void trace_one(Sampler<Filter>& s, nb::list& out) {
+    const std::vector<std::int64_t> before = labels_of(s.partition());
+    const double value = s.partition().log_posterior();
+    struct Seen {
+      std::int64_t move = 0, with = -1;
+      double log_forward = 0, log_reverse = 0, gain = 0;
+      bool is_taken = false, is_any = false;
+      std::vector<std::int64_t> after;
+    } seen;
+    s.step([&](const Proposal<Filter>& q, double log_reverse, bool is_taken) {
+      seen.move = static_cast<std::int64_t>(q.move);
+      seen.with = q.with;
+      if (q.with >= 0 && q.move != Move::update) seen.with = s.partition().window()[q.with].number;
+      seen.log_forward = q.log_forward;
+      seen.log_reverse = log_reverse;
+      seen.gain = q.gain;
+      seen.is_taken = is_taken;
+      seen.is_any = true;
+      Partition<Filter> copy(s.partition());
+      std::vector<Edit<Filter>> edits(q.edits.begin(), q.edits.begin() + q.n_edits);
+      copy.apply(edits);
+      seen.after = labels_of(copy);
+    });
+    if (!seen.is_any) return;
+    const auto give = [](const std::vector<std::int64_t>& all) {
+      Owned<std::int64_t> array(all.size());
+      std::copy(all.begin(), all.end(), array.data.get());
+      return array.give({all.size()});
+    };
+    out.append(nb::make_tuple(seen.move, seen.with, give(before), give(seen.after),
+                              seen.log_forward, seen.log_reverse, seen.gain, seen.is_taken, value));
+  }
+
+  MotionModel m_;
+  std::variant<std::unique_ptr<Sampler<OneMotion>>, std::unique_ptr<Sampler<SeveralMotions>>>
+      sampler_;
+  std::int64_t n_seen_ = 0;
+};
+
+}  // namespace
+
+void bind_chain(nb::module_& module) {
+  nb::class_<Chain>(module, "Chain")
+      .def(
+          "__init__",
+          [](Chain* self, const MotionModel& model, const ScoreModel& score,
+             const In<double>& weights, bool is_informed, double stop, double floor,
+             bool has_first_rules, bool is_ascent, std::uint64_t seed) {
+            require(weights.ndim() == 1 && weights.size() == kMoves, "weights: one for each move");
+            ChainOptions options;
+            options.growth = {is_informed, stop, floor};
+            std::copy_n(weights.data(), kMoves, options.weights.begin());
+            options.has_first_rules = has_first_rules;
+            options.is_ascent = is_ascent;
+            new (self) Chain(model, score, options, seed);
+          },
+          "model"_a, "score"_a, nb::kw_only(), "weights"_a, "is_informed"_a, "stop"_a, "floor"_a,
+          "has_first_rules"_a, "is_ascent"_a, "seed"_a)
+      .def("add_frame", &Chain::add_frame, "time"_a, "F"_a, "Q"_a, "points"_a)
+      .def("freeze", &Chain::freeze, "frame"_a)
+      .def("assign", &Chain::assign, "labels"_a)
+      .def("labels", &Chain::labels)
+      .def("log_posterior", &Chain::log_posterior)
+      .def("run", &Chain::run, "n_moves"_a)
+      .def("counts", &Chain::counts)
+      .def("visits", &Chain::visits, "n_moves"_a)
+      .def("trace", &Chain::trace, "n_moves"_a);
+}

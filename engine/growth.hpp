@@ -1,0 +1,167 @@
+// How moves lengthen a track: detection after detection, each drawn among those that are free to
+// follow, until the track stops; and how probable it is to grow just so.
+//
+//   uniform   stop with probability γ, else a gap d uniform in 1 … d̄ and a free detection with that
+//             gap, all alike; where there is none the track stops too
+//   informed  a detection j weighs exp(what it adds to the score) + ε, the stop exp(its end term)
+//
+// Forced growth takes at least one step, which is no stop.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "partition.hpp"
+#include "random.hpp"
+
+namespace asterism {
+
+struct GrowthOptions {
+  bool is_informed = true;
+  double stop = 0.01;    // γ
+  double floor = 1e-4;   // ε
+};
+
+template <typename Filter>
+class Growth {
+ public:
+  using State = typename Filter::State;
+  static constexpr double kNever = -std::numeric_limits<double>::infinity();
+
+  Growth(const Partition<Filter>& partition, const GrowthOptions& options)
+      : p_(partition), opt_(options) {}
+
+  // Lengthens the tail of an edit. Free is what is in no track, and what the edited track has beyond
+  // what it keeps. Returns the log probability, -inf where a forced step is impossible.
+  double grow(Edit<Filter>& edit, bool is_forced, Random& random) {
+    own_ = edit.track;
+    keep_ = edit.keep;
+    double log_p = 0;
+    for (;; is_forced = false) {
+      const bool is_first = edit.tail.nodes.empty();
+      const std::int32_t i =
+          is_first ? p_.track(own_).nodes[keep_ - 1] : edit.tail.nodes.back();
+      const State& state = is_first ? p_.state(i) : edit.tail.states.back();
+      const std::int32_t j = opt_.is_informed ? draw_informed(i, state, is_forced, random, log_p)
+                                              : draw_uniform(i, is_forced, random, log_p);
+      if (j < 0) return log_p;
+      p_.append(edit, j);
+    }
+  }
+
+  // Log probability that a track which keeps its first detections grows into what it is now.
+  double log_probability(std::int32_t track, std::int32_t keep, bool is_forced) {
+    own_ = track;
+    keep_ = keep;
+    const auto& nodes = p_.track(track).nodes;
+    double log_p = 0;
+    for (std::size_t n = keep; n <= nodes.size(); ++n, is_forced = false) {
+      const std::int32_t i = nodes[n - 1], j = n < nodes.size() ? nodes[n] : -1;
+      log_p += opt_.is_informed ? log_informed(i, p_.state(i), j, is_forced)
+                                : log_uniform(i, j, is_forced);
+    }
+    return log_p;
+  }
+
+ private:
+  bool is_free(std::int32_t j) const {
+    const std::int32_t t = p_.track_of(j);
+    return t == kFree || (t >= 0 && t == own_ && p_.place_of(j) >= keep_);
+  }
+  std::int32_t n_free(std::int32_t i, int d) const {
+    std::int32_t n = 0;
+    for (const std::int32_t j : p_.window().next(i, d)) n += is_free(j);
+    return n;
+  }
+  double log_stop(std::int32_t i) const {
+    const int max_gap = p_.window().max_gap();
+    int n_empty = 0;
+    for (int d = 1; d <= max_gap; ++d) n_empty += n_free(i, d) == 0;
+    return std::log(opt_.stop + (1 - opt_.stop) * n_empty / max_gap);
+  }
+
+  std::int32_t draw_uniform(std::int32_t i, bool is_forced, Random& random, double& log_p) {
+    const int max_gap = p_.window().max_gap();
+    if (!is_forced && random.uniform() < opt_.stop) {
+      log_p += log_stop(i);
+      return -1;
+    }
+    const int d = 1 + random.below(max_gap);
+    const std::int32_t n = n_free(i, d);
+    if (n == 0) {
+      log_p += is_forced ? kNever : log_stop(i);
+      return -1;
+    }
+    log_p += (is_forced ? 0 : std::log1p(-opt_.stop)) - std::log(static_cast<double>(max_gap) * n);
+    std::int32_t left = random.below(n);
+    for (const std::int32_t j : p_.window().next(i, d))
+      if (is_free(j) && left-- == 0) return j;
+    return -1;
+  }
+
+  double log_uniform(std::int32_t i, std::int32_t j, bool is_forced) const {
+    if (j < 0) return log_stop(i);
+    const int max_gap = p_.window().max_gap();
+    const int d = static_cast<int>(p_.window()[j].frame - p_.window()[i].frame);
+    return (is_forced ? 0 : std::log1p(-opt_.stop)) -
+           std::log(static_cast<double>(max_gap) * n_free(i, d));
+  }
+
+  // Fills in what may follow i and their weights; returns the sum, with that of the stop.
+  double weigh(std::int32_t i, const State& state, bool is_forced) {
+    const DetectionWindow& window = p_.window();
+    const std::int64_t frame = window[i].frame;
+    choices_.clear();
+    weights_.clear();
+    double sum = 0;
+    for (int d = 1; d <= window.max_gap() && frame + d <= window.now(); ++d) {
+      bool is_known = false;
+      for (const std::int32_t j : window.next(i, d)) {
+        if (!is_free(j)) continue;
+        if (!is_known) Filter::expect(p_.motion(), window, state, frame, d, expected_);
+        is_known = true;
+        const double gain =
+            p_.gap_score(d) + Filter::log_likelihood(expected_.prediction, window[j].y);
+        choices_.push_back(j);
+        weights_.push_back(std::exp(std::min(gain, 500.0)) + opt_.floor);
+        sum += weights_.back();
+      }
+    }
+    if (is_forced) return sum;
+    choices_.push_back(-1);
+    weights_.push_back(std::exp(p_.end_score(i)));
+    return sum + weights_.back();
+  }
+
+  std::int32_t draw_informed(std::int32_t i, const State& state, bool is_forced, Random& random,
+                             double& log_p) {
+    const double total = weigh(i, state, is_forced);
+    if (choices_.empty()) {
+      log_p = kNever;
+      return -1;
+    }
+    double left = random.uniform() * total;
+    std::size_t c = 0;
+    while (c + 1 < choices_.size() && left >= weights_[c]) left -= weights_[c++];
+    log_p += std::log(weights_[c] / total);
+    return choices_[c];
+  }
+
+  double log_informed(std::int32_t i, const State& state, std::int32_t j, bool is_forced) {
+    const double total = weigh(i, state, is_forced);
+    for (std::size_t c = 0; c < choices_.size(); ++c)
+      if (choices_[c] == j) return std::log(weights_[c] / total);
+    return kNever;
+  }
+
+  const Partition<Filter>& p_;
+  GrowthOptions opt_;
+  std::int32_t own_ = -1, keep_ = 0;
+  Expected<State> expected_;
+  std::vector<std::int32_t> choices_;
+  std::vector<double> weights_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,375 @@
+// The moves of MCMC data association (Oh, Russell & Sastry 2009; §4.2 of the report) and four more.
+//
+// A move draws a new partition ω' from ω; `log_forward` is the log probability of having drawn just
+// that, log q(ω → ω'), and `log_reverse` that of the inverse move in ω', both without the share ξ of
+// the kind of move. Where the same ω' may be drawn by several values of a number drawn on the way
+// (what is kept in an update, the link in a switch), both are given for that value: detailed balance
+// holds for each.
+//
+//   K  tracks      F  free detections      N  detections in tracks      L  links
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "growth.hpp"
+#include "partition.hpp"
+#include "random.hpp"
+
+namespace asterism {
+
+enum class Move : std::int32_t {
+  birth = 0,      // a free detection and what grows from it become a track
+  death,          // a track's detections become free
+  split,          // a track becomes two
+  merge,          // two tracks become one, the second after the first
+  extension,      // a track grows
+  reduction,      // a track ends earlier
+  update,         // a track ends earlier and grows anew
+  switch_tails,   // two tracks change tails
+  insertion,      // a free detection goes into, before or after a track
+  deletion,       // a detection of a track becomes free
+  transfer,       // the tail of a track goes to the end of another
+  replacement,    // a free detection stands in for one of a track in the same frame
+};
+inline constexpr int kMoves = 12;
+
+inline constexpr Move inverse(Move move) {
+  switch (move) {
+    case Move::birth: return Move::death;
+    case Move::death: return Move::birth;
+    case Move::split: return Move::merge;
+    case Move::merge: return Move::split;
+    case Move::extension: return Move::reduction;
+    case Move::reduction: return Move::extension;
+    case Move::insertion: return Move::deletion;
+    case Move::deletion: return Move::insertion;
+    default: return move;
+  }
+}
+
+template <typename Filter>
+struct Proposal {
+  Move move = Move::birth;
+  std::array<Edit<Filter>, 2> edits;
+  std::int32_t n_edits = 0;
+  double gain = 0;  // of the log posterior
+  double log_forward = 0;
+  std::int32_t with = -1;  // what was drawn on the way: detections kept, or the detection at hand
+
+  std::span<Edit<Filter>> all() { return {edits.data(), static_cast<std::size_t>(n_edits)}; }
+  Edit<Filter>& edit(std::int32_t track, std::int32_t keep) {
+    Edit<Filter>& e = edits[n_edits++];
+    e.track = track;
+    e.keep = keep;
+    e.tail.clear();
+    return e;
+  }
+};
+
+template <typename Filter>
+class Moves {
+ public:
+  Moves(const Partition<Filter>& partition, const GrowthOptions& growth)
+      : p_(partition), growth_(partition, growth) {}
+
+  // Draws ω'; false where the draw leads nowhere, so that the state stays.
+  bool propose(Move move, Random& random, Proposal<Filter>& out) {
+    out.move = move;
+    out.n_edits = 0;
+    out.log_forward = 0;
+    out.with = -1;
+    if (!draw(random, out)) return false;
+    out.gain = 0;
+    for (const Edit<Filter>& e : out.all())
+      out.gain += p_.score_of(e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
+    return out.log_forward > Growth<Filter>::kNever;
+  }
+
+  double log_reverse(const Proposal<Filter>& q) {
+    const Edit<Filter>& first = q.edits[0];
+    const auto n_tail = static_cast<std::int32_t>(first.tail.nodes.size());
+    const std::int32_t n_new = first.keep + n_tail;
+    switch (q.move) {
+      case Move::birth:
+        return -log(p_.young().size() + 1);
+      case Move::death:
+        return -log(p_.free().size() + p_.track(first.track).size()) +
+               growth_.log_probability(first.track, 1, true);
+      case Move::split:
+        return -log(p_.tracks().size() + 1) - log(n_starts_after(node(first.track, first.keep - 1)) + 1);
+      case Move::merge:
+        return -log(p_.tracks().size() - 1) - log(n_new - 1 - least_kept(first.track));
+      case Move::extension:
+        return -log(p_.tracks().size()) - log(n_new - least_kept(first.track));
+      case Move::reduction:
+        return -log(p_.tracks().size()) + growth_.log_probability(first.track, first.keep, true);
+      case Move::update:
+        return -log(p_.tracks().size()) - log(n_new + 1 - least_updated(first.track)) +
+               growth_.log_probability(first.track, first.keep, first.keep == 1);
+      case Move::switch_tails:
+        return -log(p_.linked().size()) - log(n_partners_after(q));
+      case Move::insertion:
+        return -log(p_.taken().size() + 1);
+      case Move::deletion:
+        list_slots(q.with);
+        return -log(p_.free().size() + 1) - log(slots_.size());
+      case Move::transfer:
+      case Move::replacement:
+        return q.log_forward;
+    }
+    return Growth<Filter>::kNever;
+  }
+
+ private:
+  template <typename Count>
+  static double log(Count n) {
+    return std::log(static_cast<double>(n));
+  }
+  std::int32_t node(std::int32_t track, std::int32_t place) const {
+    return p_.track(track).nodes[place];
+  }
+  // A track keeps at least so many detections when it is cut, or grown anew.
+  std::int32_t least_kept(std::int32_t track) const {
+    return std::max(2, p_.track(track).n_frozen);
+  }
+  std::int32_t least_updated(std::int32_t track) const {
+    return std::max(1, p_.track(track).n_frozen);
+  }
+
+  bool draw(Random& random, Proposal<Filter>& q) {
+    switch (q.move) {
+      case Move::birth: return draw_birth(random, q);
+      case Move::death: return draw_death(random, q);
+      case Move::split: return draw_split(random, q);
+      case Move::merge: return draw_merge(random, q);
+      case Move::extension: return draw_extension(random, q);
+      case Move::reduction: return draw_reduction(random, q);
+      case Move::update: return draw_update(random, q);
+      case Move::switch_tails: return draw_switch(random, q);
+      case Move::insertion: return draw_insertion(random, q);
+      case Move::deletion: return draw_deletion(random, q);
+      case Move::transfer: return draw_transfer(random, q);
+      case Move::replacement: return draw_replacement(random, q);
+    }
+    return false;
+  }
+
+  // One of a set, each alike; -1 of an empty one.
+  std::int32_t draw_one(const IndexSet& set, Random& random, Proposal<Filter>& q) const {
+    if (set.size() == 0) return -1;
+    q.log_forward -= log(set.size());
+    return set[random.below(set.size())];
+  }
+  template <typename T>
+  T draw_one(const std::vector<T>& list, Random& random, Proposal<Filter>& q) const {
+    q.log_forward -= log(list.size());
+    return list[random.below(static_cast<std::int32_t>(list.size()))];
+  }
+  void append(Edit<Filter>& edit, std::int32_t track, std::int32_t from) const {
+    const auto& nodes = p_.track(track).nodes;
+    for (std::size_t n = from; n < nodes.size(); ++n) p_.append(edit, nodes[n]);
+  }
+
+  bool draw_birth(Random& random, Proposal<Filter>& q) {
+    const std::int32_t i = draw_one(p_.free(), random, q);
+    if (i < 0) return false;
+    Edit<Filter>& e = q.edit(-1, 0);
+    p_.append(e, i);
+    q.log_forward += growth_.grow(e, true, random);
+    return e.tail.nodes.size() > 1;
+  }
+
+  bool draw_death(Random& random, Proposal<Filter>& q) {
+    const std::int32_t k = draw_one(p_.young(), random, q);
+    if (k < 0) return false;
+    q.edit(k, 0);
+    return true;
+  }
+
+  bool draw_split(Random& random, Proposal<Filter>& q) {
+    const std::int32_t k = draw_one(p_.tracks(), random, q);
+    if (k < 0) return false;
+    const std::int32_t n_cuts = p_.track(k).size() - 1 - least_kept(k);
+    if (n_cuts < 1) return false;
+    const std::int32_t keep = least_kept(k) + random.below(n_cuts);
+    q.log_forward -= log(n_cuts);
+    q.edit(k, keep);
+    append(q.edit(-1, 0), k, keep);
+    return true;
+  }
+
+  bool draw_merge(Random& random, Proposal<Filter>& q) {
+    const std::int32_t k = draw_one(p_.tracks(), random, q);
+    if (k < 0) return false;
+    starts_.clear();
+    for (const std::int32_t j : p_.window().next(p_.last(k)))
+      if (is_start(j)) starts_.push_back(p_.track_of(j));
+    if (starts_.empty()) return false;
+    const std::int32_t other = draw_one(starts_, random, q);
+    append(q.edit(k, p_.track(k).size()), other, 0);
+    q.edit(other, 0);
+    return true;
+  }
+  // A track that begins here, and is not settled there.
+  bool is_start(std::int32_t j) const {
+    return p_.track_of(j) >= 0 && p_.place_of(j) == 0 && !p_.is_frozen(j);
+  }
+  std::int32_t n_starts_after(std::int32_t i) const {
+    std::int32_t n = 0;
+    for (const std::int32_t j : p_.window().next(i)) n += is_start(j);
+    return n;
+  }
+
+  bool draw_extension(Random& random, Proposal<Filter>& q) {
+    const std::int32_t k = draw_one(p_.tracks(), random, q);
+    if (k < 0) return false;
+    Edit<Filter>& e = q.edit(k, p_.track(k).size());
+    q.log_forward += growth_.grow(e, true, random);
+    return !e.tail.nodes.empty();
+  }
+
+  bool draw_reduction(Random& random, Proposal<Filter>& q) {
+    const std::int32_t k = draw_one(p_.tracks(), random, q);
+    if (k < 0) return false;
+    const std::int32_t n_cuts = p_.track(k).size() - least_kept(k);
+    if (n_cuts < 1) return false;
+    q.log_forward -= log(n_cuts);
+    q.edit(k, least_kept(k) + random.below(n_cuts));
+    return true;
+  }
+
+  bool draw_update(Random& random, Proposal<Filter>& q) {
+    const std::int32_t k = draw_one(p_.tracks(), random, q);
+    if (k < 0) return false;
+    const std::int32_t n_cuts = p_.track(k).size() + 1 - least_updated(k);
+    q.log_forward -= log(n_cuts);
+    q.with = least_updated(k) + random.below(n_cuts);
+    Edit<Filter>& e = q.edit(k, q.with);
+    q.log_forward += growth_.grow(e, q.with == 1, random);
+    return true;
+  }
+
+  // The link is a → b; others with d after a, whose c before it may be followed by b.
+  bool draw_switch(Random& random, Proposal<Filter>& q) {
+    const std::int32_t b = draw_one(p_.linked(), random, q);
+    if (b < 0) return false;
+    const std::int32_t a = p_.before(b), own = p_.track_of(b);
+    partners_.clear();
+    for (const std::int32_t d : p_.window().next(a))
+      if (p_.linked().has(d) && p_.track_of(d) != own && p_.window().is_linkable(p_.before(d), b))
+        partners_.push_back(d);
+    if (partners_.empty()) return false;
+    const std::int32_t d = draw_one(partners_, random, q), other = p_.track_of(d);
+    q.with = b;
+    append(q.edit(own, p_.place_of(b)), other, p_.place_of(d));
+    append(q.edit(other, p_.place_of(d)), own, p_.place_of(b));
+    return true;
+  }
+  // The partners of the link a → d in ω', where the tails have changed tracks.
+  std::int32_t n_partners_after(const Proposal<Filter>& q) const {
+    const std::int32_t a = p_.before(q.with), own = q.edits[0].track, other = q.edits[1].track;
+    const std::int32_t d = q.edits[0].tail.nodes.front(), c = p_.before(d);
+    std::int32_t n = 0;
+    for (const std::int32_t e : p_.window().next(a)) {
+      if (!p_.linked().has(e)) continue;
+      std::int32_t track = p_.track_of(e);
+      if (track == own && p_.place_of(e) >= q.edits[0].keep)
+        track = other;
+      else if (track == other && p_.place_of(e) >= q.edits[1].keep)
+        track = own;
+      const std::int32_t before = e == q.with ? c : p_.before(e);
+      n += track != own && p_.window().is_linkable(before, d);
+    }
+    return n;
+  }
+
+  // Where a detection may stand in a track: the track, and how many are before it.
+  struct Slot {
+    std::int32_t track = 0, keep = 0;
+  };
+  // Slots of x, as if it were free.
+  void list_slots(std::int32_t x) {
+    const DetectionWindow& window = p_.window();
+    slots_.clear();
+    for (const std::int32_t i : window.prev(x)) {
+      if (p_.track_of(i) < 0) continue;
+      std::int32_t j = p_.after(i);
+      if (j == x) j = p_.after(x);
+      if (j < 0 || (!p_.is_frozen(j) && window.is_linkable(x, j)))
+        slots_.push_back({p_.track_of(i), p_.place_of(i) + 1});
+    }
+    for (const std::int32_t j : window.next(x)) {
+      if (p_.track_of(j) < 0 || p_.is_frozen(j)) continue;
+      const std::int32_t i = p_.before(j);
+      if (i < 0 || (i == x && p_.place_of(x) == 0)) slots_.push_back({p_.track_of(j), 0});
+    }
+  }
+  bool draw_insertion(Random& random, Proposal<Filter>& q) {
+    const std::int32_t x = draw_one(p_.free(), random, q);
+    if (x < 0) return false;
+    list_slots(x);
+    if (slots_.empty()) return false;
+    const Slot slot = draw_one(slots_, random, q);
+    q.with = x;
+    Edit<Filter>& e = q.edit(slot.track, slot.keep);
+    p_.append(e, x);
+    append(e, slot.track, slot.keep);
+    return true;
+  }
+
+  bool draw_deletion(Random& random, Proposal<Filter>& q) {
+    const std::int32_t x = draw_one(p_.taken(), random, q);
+    if (x < 0) return false;
+    const std::int32_t k = p_.track_of(x), i = p_.before(x), j = p_.after(x);
+    if (p_.track(k).size() < 3 || (i >= 0 && j >= 0 && !p_.window().is_linkable(i, j))) return false;
+    q.with = x;
+    append(q.edit(k, p_.place_of(x)), k, p_.place_of(x) + 1);
+    return true;
+  }
+
+  bool draw_transfer(Random& random, Proposal<Filter>& q) {
+    const std::int32_t b = draw_one(p_.linked(), random, q);
+    if (b < 0 || p_.place_of(b) < 2) return false;
+    const std::int32_t own = p_.track_of(b);
+    starts_.clear();
+    for (const std::int32_t i : p_.window().prev(b))
+      if (p_.track_of(i) >= 0 && p_.track_of(i) != own && p_.after(i) < 0)
+        starts_.push_back(p_.track_of(i));
+    if (starts_.empty()) return false;
+    const std::int32_t other = draw_one(starts_, random, q);
+    q.with = b;
+    q.edit(own, p_.place_of(b));
+    append(q.edit(other, p_.track(other).size()), own, p_.place_of(b));
+    return true;
+  }
+
+  bool draw_replacement(Random& random, Proposal<Filter>& q) {
+    const std::int32_t x = draw_one(p_.taken(), random, q);
+    if (x < 0) return false;
+    const DetectionWindow& window = p_.window();
+    starts_.clear();
+    for (const std::int32_t y : window.frame(window[x].frame).ids)
+      if (p_.is_free(y)) starts_.push_back(y);
+    if (starts_.empty()) return false;
+    const std::int32_t y = draw_one(starts_, random, q), k = p_.track_of(x);
+    const std::int32_t i = p_.before(x), j = p_.after(x);
+    if ((i >= 0 && !window.is_linkable(i, y)) || (j >= 0 && !window.is_linkable(y, j))) return false;
+    q.with = x;
+    Edit<Filter>& e = q.edit(k, p_.place_of(x));
+    p_.append(e, y);
+    append(e, k, p_.place_of(x) + 1);
+    return true;
+  }
+
+  const Partition<Filter>& p_;
+  Growth<Filter> growth_;
+  std::vector<std::int32_t> starts_, partners_;
+  std::vector<Slot> slots_;
+};
+
+}  // namespace asterism
