@@ -158,7 +158,7 @@ class Chain {
       bool is_taken = false, is_any = false;
       std::vector<std::int64_t> after;
     } seen;
-    s.step([&](const Proposal<Filter>& q, double log_reverse, bool is_taken) {
+    s.step([&](const Change<Filter>& q, double log_reverse, bool is_taken) {
       seen.move = static_cast<std::int64_t>(q.move);
       seen.with = q.with;
       if (q.with >= 0 && q.move != Move::update) seen.with = s.partition().window()[q.with].number;
@@ -195,18 +195,10 @@ void bind_chain(nb::module_& module) {
       .def(
           "__init__",
           [](Chain* self, const MotionModel& model, const ScoreModel& score,
-             const In<double>& weights, bool is_informed, double stop, double floor,
-             bool has_first_rules, bool is_ascent, std::uint64_t seed) {
-            require(weights.ndim() == 1 && weights.size() == kMoves, "weights: one for each move");
-            ChainOptions options;
-            options.growth = {is_informed, stop, floor};
-            std::copy_n(weights.data(), kMoves, options.weights.begin());
-            options.has_first_rules = has_first_rules;
-            options.is_ascent = is_ascent;
+             const ChainOptions& options, std::uint64_t seed) {
             new (self) Chain(model, score, options, seed);
           },
-          "model"_a, "score"_a, nb::kw_only(), "weights"_a, "is_informed"_a, "stop"_a, "floor"_a,
-          "has_first_rules"_a, "is_ascent"_a, "seed"_a)
+          "model"_a, "score"_a, "options"_a, "seed"_a)
       .def("add_frame", &Chain::add_frame, "time"_a, "F"_a, "Q"_a, "points"_a)
       .def("freeze", &Chain::freeze, "frame"_a)
       .def("assign", &Chain::assign, "labels"_a)

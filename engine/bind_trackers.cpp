@@ -9,6 +9,7 @@
 #include "hypothesis_forest.hpp"
 #include "hypothesis_matrix.hpp"
 #include "joint_tracker.hpp"
+#include "mcmc_tracker.hpp"
 #include "motion_arrays.hpp"
 #include "tree_tracker.hpp"
 
@@ -25,7 +26,7 @@ using Confidence = nb::ndarray<double, nb::numpy, nb::c_contig, nb::device::cpu>
 template <typename Tracker>
 nb::tuple step(const Tracker& before, double time, const In<double>& F, const In<double>& Q,
                const In<double>& points) {
-  const MotionModel& m = before.live().m;
+  const MotionModel& m = before.motion();
   const std::size_t size = static_cast<std::size_t>(m.M) * m.axis.n * m.axis.n;
   require(F.size() == size && Q.size() == size, "F and Q: shape (modes, n, n)");
   Tracker after(before);
@@ -71,7 +72,7 @@ template <typename Tracker>
 void run(Tracker& tracker, const In<double>& times, const In<std::int32_t>& kind,
          const In<double>& F, const In<double>& Q, const In<std::int64_t>& offsets,
          const In<double>& points, Labels labels, Confidence confidence) {
-  const MotionModel& m = tracker.live().m;
+  const MotionModel& m = tracker.motion();
   const Timeline line = timeline(m, times, kind, F, Q);
   const std::vector<Point> all = to_points(points, m.axis.D);
   const std::size_t T = line.times.size();
@@ -107,14 +108,15 @@ void run(Tracker& tracker, const In<double>& times, const In<std::int32_t>& kind
 // covariances of the state).
 template <typename Tracker>
 nb::tuple tracks(const Tracker& tracker) {
-  const MotionModel& m = tracker.live().m;
+  const MotionModel& m = tracker.motion();
+  const auto& live = tracker.live();
   std::size_t K = 0;
-  for (const auto& t : tracker.live().tracks) K += t.is_confirmed();
+  for (const auto& t : live.tracks) K += t.is_confirmed();
   const std::size_t D = m.axis.D, n = m.axis.n;
   Owned<std::int64_t> ids(K), gaps(K);
   Owned<double> scores(K), means(K * D * n), covariances(K * n * n);
   std::size_t k = 0;
-  for (const auto& t : tracker.live().tracks) {
+  for (const auto& t : live.tracks) {
     if (!t.is_confirmed()) continue;
     ids.data[k] = t.id;
     gaps.data[k] = t.gap;
@@ -266,9 +268,37 @@ nb::class_<Tracker> bind(nb::module_& module, const char* name) {
       .def_prop_ro("has_confidence", &Tracker::has_confidence)
       .def_prop_ro("n_frames", &Tracker::n_frames)
       .def_prop_ro("n_seen", &Tracker::n_seen)
-      .def_prop_ro("n_ids", [](const Tracker& self) { return self.live().next_id; })
+      .def_prop_ro("n_ids", [](const Tracker& self) { return self.n_ids(); })
       .def_prop_ro("last_time", &Tracker::last_time)
       .def_prop_ro("total", [](const Tracker& self) { return self.total(); });
+}
+
+template <typename Filter>
+void bind_mcmc(nb::module_& module, const char* name) {
+  using Tracker = McmcTracker<Filter>;
+  bind<Tracker>(module, name)
+      .def("counts",
+           [](const Tracker& self) {
+             Owned<std::int64_t> out(kMoves * 3);
+             for (int k = 0; k < kMoves; ++k) {
+               const MoveCounts& c = self.counts()[k];
+               out.data[3 * k] = c.n_drawn;
+               out.data[3 * k + 1] = c.n_possible;
+               out.data[3 * k + 2] = c.n_taken;
+             }
+             return out.give({kMoves, 3});
+           })
+      .def(
+          "__init__",
+          [](Tracker* self, const MotionModel& model, const ScoreModel& score,
+             const ChainOptions& chain, std::int32_t window, double moves, double deadline,
+             bool has_assignment, std::uint64_t seed) {
+            require(window >= 1, "window: at least 1");
+            require((model.M == 1) == std::is_same_v<Filter, OneMotion>, "model: as many motions");
+            new (self) Tracker(model, score, chain,
+                               {window, moves, deadline, has_assignment}, seed);
+          },
+          "model"_a, "score"_a, "chain"_a, nb::kw_only(), "window"_a, "moves"_a, "deadline"_a, "has_assignment"_a, "seed"_a);
 }
 
 }  // namespace
@@ -293,7 +323,9 @@ void bind_trackers(nb::module_& module) {
       .def_ro("n_hypotheses", &FrameStats::n_hypotheses)
       .def_ro("n_nodes", &FrameStats::n_nodes)
       .def_ro("gap", &FrameStats::gap)
-      .def_ro("n_merged", &FrameStats::n_merged);
+      .def_ro("n_merged", &FrameStats::n_merged)
+      .def_ro("n_moves", &FrameStats::n_moves)
+      .def_ro("n_taken", &FrameStats::n_taken);
 
   nb::class_<LifeOptions>(module, "LifeOptions")
       .def(
@@ -303,6 +335,18 @@ void bind_trackers(nb::module_& module) {
             new (self) LifeOptions{gate, confirm_score, delete_drop, max_candidates};
           },
           nb::kw_only(), "gate"_a, "confirm_score"_a, "delete_drop"_a, "max_candidates"_a);
+
+  nb::class_<ChainOptions>(module, "ChainOptions")
+      .def(
+          "__init__",
+          [](ChainOptions* self, const In<double>& weights, bool is_informed, double stop,
+             double floor, bool has_first_rules, bool is_ascent) {
+            require(weights.ndim() == 1 && weights.size() == kMoves, "weights: one for each move");
+            new (self) ChainOptions{{is_informed, stop, floor}, {}, has_first_rules, is_ascent};
+            std::copy_n(weights.data(), kMoves, self->weights.begin());
+          },
+          nb::kw_only(), "weights"_a, "is_informed"_a, "stop"_a, "floor"_a, "has_first_rules"_a,
+          "is_ascent"_a);
 
   bind<FrameTracker>(module, "FrameTracker")
       .def(
@@ -400,6 +444,9 @@ void bind_trackers(nb::module_& module) {
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
           "merged_within"_a, "new_track_claim"_a);
+
+  bind_mcmc<OneMotion>(module, "OneMotionTracker");
+  bind_mcmc<SeveralMotions>(module, "SeveralMotionsTracker");
 
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {
     try {

@@ -20,6 +20,7 @@ class DetectionWindow {
  public:
   struct Detection {
     Point y{};
+    double time = 0;
     std::int64_t frame = 0, number = 0;  // number: in order of arrival
     // What may come next and what before, by gap: those of gap d from from[d - 1] to from[d].
     std::vector<std::int32_t> next, next_from, prev, prev_from;
@@ -53,7 +54,7 @@ class DetectionWindow {
     const Detection &a = detections_[i], &b = detections_[j];
     const std::int64_t gap = b.frame - a.frame;
     if (gap < 1 || gap > sm_.max_gap) return false;
-    return is_reachable(sm_, a.y, b.y, frame(b.frame).time - frame(a.frame).time, m_.axis.D);
+    return is_reachable(sm_, a.y, b.y, b.time - a.time, m_.axis.D);
   }
 
   // The next frame, and the numbers of its detections in order of arrival.
@@ -73,6 +74,7 @@ class DetectionWindow {
       }
       Detection& d = detections_[id];
       d.y = points[k];
+      d.time = time;
       d.frame = t;
       d.number = first_number + static_cast<std::int64_t>(k);
       d.next.clear();

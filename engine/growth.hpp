@@ -8,9 +8,12 @@
 // Forced growth takes at least one step, which is no stop.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <compare>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "partition.hpp"
@@ -66,47 +69,78 @@ class Growth {
   }
 
  private:
-  bool is_free(std::int32_t j) const {
-    const std::int32_t t = p_.track_of(j);
-    return t == kFree || (t >= 0 && t == own_ && p_.place_of(j) >= keep_);
+  struct Follower {
+    std::int32_t gap = 0, detection = 0;
+    auto operator<=>(const Follower&) const = default;
+  };
+
+  // What is free to follow i, in order of gaps. Looked for among what may follow or among what is free, whichever is less.
+  void list_free(std::int32_t i) {
+    const DetectionWindow& window = p_.window();
+    const auto linked = window.next(i);
+    free_.clear();
+    if (linked.size() <= static_cast<std::size_t>(p_.free().size())) {
+      for (const std::int32_t j : linked) {
+        const std::int32_t t = p_.track_of(j);
+        if (t == kFree || (t >= 0 && t == own_ && p_.place_of(j) >= keep_)) add_free(i, j);
+      }
+      return;
+    }
+    for (const std::int32_t j : p_.free().items())
+      if (window.is_linkable(i, j)) add_free(i, j);
+    if (own_ >= 0) {
+      const auto& nodes = p_.track(own_).nodes;
+      for (std::size_t n = keep_; n < nodes.size(); ++n)
+        if (window.is_linkable(i, nodes[n])) add_free(i, nodes[n]);
+    }
+    std::sort(free_.begin(), free_.end());
   }
-  std::int32_t n_free(std::int32_t i, int d) const {
-    std::int32_t n = 0;
-    for (const std::int32_t j : p_.window().next(i, d)) n += is_free(j);
-    return n;
+  void add_free(std::int32_t i, std::int32_t j) {
+    free_.push_back({static_cast<std::int32_t>(p_.window()[j].frame - p_.window()[i].frame), j});
   }
-  double log_stop(std::int32_t i) const {
+  double log_stop() const {
     const int max_gap = p_.window().max_gap();
-    int n_empty = 0;
-    for (int d = 1; d <= max_gap; ++d) n_empty += n_free(i, d) == 0;
-    return std::log(opt_.stop + (1 - opt_.stop) * n_empty / max_gap);
+    int n_gaps = 0;
+    for (std::size_t k = 0; k < free_.size(); ++k)
+      n_gaps += k == 0 || free_[k].gap != free_[k - 1].gap;
+    return std::log(opt_.stop + (1 - opt_.stop) * (max_gap - n_gaps) / max_gap);
   }
 
   std::int32_t draw_uniform(std::int32_t i, bool is_forced, Random& random, double& log_p) {
     const int max_gap = p_.window().max_gap();
     if (!is_forced && random.uniform() < opt_.stop) {
-      log_p += log_stop(i);
+      list_free(i);
+      log_p += log_stop();
       return -1;
     }
+    list_free(i);
     const int d = 1 + random.below(max_gap);
-    const std::int32_t n = n_free(i, d);
-    if (n == 0) {
-      log_p += is_forced ? kNever : log_stop(i);
+    const auto [first, last] = with_gap(d);
+    if (first == last) {
+      log_p += is_forced ? kNever : log_stop();
       return -1;
     }
+    const auto n = static_cast<std::int32_t>(last - first);
     log_p += (is_forced ? 0 : std::log1p(-opt_.stop)) - std::log(static_cast<double>(max_gap) * n);
-    std::int32_t left = random.below(n);
-    for (const std::int32_t j : p_.window().next(i, d))
-      if (is_free(j) && left-- == 0) return j;
-    return -1;
+    return first[random.below(n)].detection;
   }
 
-  double log_uniform(std::int32_t i, std::int32_t j, bool is_forced) const {
-    if (j < 0) return log_stop(i);
+  double log_uniform(std::int32_t i, std::int32_t j, bool is_forced) {
+    list_free(i);
+    if (j < 0) return log_stop();
     const int max_gap = p_.window().max_gap();
-    const int d = static_cast<int>(p_.window()[j].frame - p_.window()[i].frame);
+    const auto [first, last] =
+        with_gap(static_cast<int>(p_.window()[j].frame - p_.window()[i].frame));
     return (is_forced ? 0 : std::log1p(-opt_.stop)) -
-           std::log(static_cast<double>(max_gap) * n_free(i, d));
+           std::log(static_cast<double>(max_gap) * static_cast<double>(last - first));
+  }
+  std::pair<const Follower*, const Follower*> with_gap(int d) const {
+    const Follower* first = free_.data();
+    const Follower* const end = first + free_.size();
+    while (first != end && first->gap < d) ++first;
+    const Follower* last = first;
+    while (last != end && last->gap == d) ++last;
+    return {first, last};
   }
 
   // Fills in what may follow i and their weights; returns the sum, with that of the stop.
@@ -115,19 +149,18 @@ class Growth {
     const std::int64_t frame = window[i].frame;
     choices_.clear();
     weights_.clear();
+    list_free(i);
     double sum = 0;
-    for (int d = 1; d <= window.max_gap() && frame + d <= window.now(); ++d) {
-      bool is_known = false;
-      for (const std::int32_t j : window.next(i, d)) {
-        if (!is_free(j)) continue;
-        if (!is_known) Filter::expect(p_.motion(), window, state, frame, d, expected_);
-        is_known = true;
-        const double gain =
-            p_.gap_score(d) + Filter::log_likelihood(expected_.prediction, window[j].y);
-        choices_.push_back(j);
-        weights_.push_back(std::exp(std::min(gain, 500.0)) + opt_.floor);
-        sum += weights_.back();
-      }
+    int expected_gap = 0;
+    for (const auto& [gap, j] : free_) {
+      if (gap != expected_gap)
+        Filter::expect(p_.motion(), window, state, frame, gap, expected_, expected_gap);
+      expected_gap = gap;
+      const double gain =
+          p_.gap_score(gap) + Filter::log_likelihood(expected_.prediction, window[j].y);
+      choices_.push_back(j);
+      weights_.push_back(std::exp(std::min(gain, 500.0)) + opt_.floor);
+      sum += weights_.back();
     }
     if (is_forced) return sum;
     choices_.push_back(-1);
@@ -160,6 +193,7 @@ class Growth {
   GrowthOptions opt_;
   std::int32_t own_ = -1, keep_ = 0;
   Expected<State> expected_;
+  std::vector<Follower> free_;
   std::vector<std::int32_t> choices_;
   std::vector<double> weights_;
 };

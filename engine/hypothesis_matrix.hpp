@@ -90,8 +90,6 @@ class HypothesisMatrix {
   void decide_all(FrameStats& stats, Label&& label) {
     list_keys();
     weigh(open_.frames.size());
-    for (Cluster& cluster : clusters_) cluster.hypotheses.resize(1);
-    keep_used_branches();
     while (open_.n_open() > 0) mash(stats, label);
   }
 

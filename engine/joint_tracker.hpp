@@ -63,6 +63,8 @@ class JointTracker {
   }
 
   bool has_confidence() const { return true; }
+  const MotionModel& motion() const { return live_.m; }
+  std::int64_t n_ids() const { return live_.next_id; }
   const LiveTracks<>& live() const { return live_; }
   const FrameStats& total() const { return total_; }
   std::int64_t n_frames() const { return live_.n_frames; }

@@ -53,7 +53,7 @@ inline constexpr Move inverse(Move move) {
 }
 
 template <typename Filter>
-struct Proposal {
+struct Change {
   Move move = Move::birth;
   std::array<Edit<Filter>, 2> edits;
   std::int32_t n_edits = 0;
@@ -78,7 +78,7 @@ class Moves {
       : p_(partition), growth_(partition, growth) {}
 
   // Draws ω'; false where the draw leads nowhere, so that the state stays.
-  bool propose(Move move, Random& random, Proposal<Filter>& out) {
+  bool propose(Move move, Random& random, Change<Filter>& out) {
     out.move = move;
     out.n_edits = 0;
     out.log_forward = 0;
@@ -90,7 +90,7 @@ class Moves {
     return out.log_forward > Growth<Filter>::kNever;
   }
 
-  double log_reverse(const Proposal<Filter>& q) {
+  double log_reverse(const Change<Filter>& q) {
     const Edit<Filter>& first = q.edits[0];
     const auto n_tail = static_cast<std::int32_t>(first.tail.nodes.size());
     const std::int32_t n_new = first.keep + n_tail;
@@ -110,7 +110,7 @@ class Moves {
         return -log(p_.tracks().size()) + growth_.log_probability(first.track, first.keep, true);
       case Move::update:
         return -log(p_.tracks().size()) - log(n_new + 1 - least_updated(first.track)) +
-               growth_.log_probability(first.track, first.keep, first.keep == 1);
+               growth_.log_probability(first.track, first.keep, must_grow(first.track, first.keep));
       case Move::switch_tails:
         return -log(p_.linked().size()) - log(n_partners_after(q));
       case Move::insertion:
@@ -126,22 +126,33 @@ class Moves {
   }
 
  private:
+  // Of counts, which are small for the most part.
   template <typename Count>
   static double log(Count n) {
-    return std::log(static_cast<double>(n));
+    static const auto table = [] {
+      std::array<double, 512> logs{};
+      for (std::size_t k = 0; k < logs.size(); ++k) logs[k] = std::log(static_cast<double>(k));
+      return logs;
+    }();
+    const auto at = static_cast<std::size_t>(n);
+    return at < table.size() ? table[at] : std::log(static_cast<double>(n));
   }
   std::int32_t node(std::int32_t track, std::int32_t place) const {
     return p_.track(track).nodes[place];
   }
   // A track keeps at least so many detections when it is cut, or grown anew.
   std::int32_t least_kept(std::int32_t track) const {
-    return std::max(2, p_.track(track).n_frozen);
+    return std::max(2 - p_.track(track).n_gone, p_.track(track).n_frozen);
   }
   std::int32_t least_updated(std::int32_t track) const {
     return std::max(1, p_.track(track).n_frozen);
   }
+  // Whether a track that keeps so much of its own must grow, as one detection is no track.
+  bool must_grow(std::int32_t track, std::int32_t keep) const {
+    return p_.track(track).n_gone + keep == 1;
+  }
 
-  bool draw(Random& random, Proposal<Filter>& q) {
+  bool draw(Random& random, Change<Filter>& q) {
     switch (q.move) {
       case Move::birth: return draw_birth(random, q);
       case Move::death: return draw_death(random, q);
@@ -160,13 +171,13 @@ class Moves {
   }
 
   // One of a set, each alike; -1 of an empty one.
-  std::int32_t draw_one(const IndexSet& set, Random& random, Proposal<Filter>& q) const {
+  std::int32_t draw_one(const IndexSet& set, Random& random, Change<Filter>& q) const {
     if (set.size() == 0) return -1;
     q.log_forward -= log(set.size());
     return set[random.below(set.size())];
   }
   template <typename T>
-  T draw_one(const std::vector<T>& list, Random& random, Proposal<Filter>& q) const {
+  T draw_one(const std::vector<T>& list, Random& random, Change<Filter>& q) const {
     q.log_forward -= log(list.size());
     return list[random.below(static_cast<std::int32_t>(list.size()))];
   }
@@ -175,7 +186,7 @@ class Moves {
     for (std::size_t n = from; n < nodes.size(); ++n) p_.append(edit, nodes[n]);
   }
 
-  bool draw_birth(Random& random, Proposal<Filter>& q) {
+  bool draw_birth(Random& random, Change<Filter>& q) {
     const std::int32_t i = draw_one(p_.free(), random, q);
     if (i < 0) return false;
     Edit<Filter>& e = q.edit(-1, 0);
@@ -184,14 +195,14 @@ class Moves {
     return e.tail.nodes.size() > 1;
   }
 
-  bool draw_death(Random& random, Proposal<Filter>& q) {
+  bool draw_death(Random& random, Change<Filter>& q) {
     const std::int32_t k = draw_one(p_.young(), random, q);
     if (k < 0) return false;
     q.edit(k, 0);
     return true;
   }
 
-  bool draw_split(Random& random, Proposal<Filter>& q) {
+  bool draw_split(Random& random, Change<Filter>& q) {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
     const std::int32_t n_cuts = p_.track(k).size() - 1 - least_kept(k);
@@ -203,7 +214,7 @@ class Moves {
     return true;
   }
 
-  bool draw_merge(Random& random, Proposal<Filter>& q) {
+  bool draw_merge(Random& random, Change<Filter>& q) {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
     starts_.clear();
@@ -225,7 +236,7 @@ class Moves {
     return n;
   }
 
-  bool draw_extension(Random& random, Proposal<Filter>& q) {
+  bool draw_extension(Random& random, Change<Filter>& q) {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
     Edit<Filter>& e = q.edit(k, p_.track(k).size());
@@ -233,7 +244,7 @@ class Moves {
     return !e.tail.nodes.empty();
   }
 
-  bool draw_reduction(Random& random, Proposal<Filter>& q) {
+  bool draw_reduction(Random& random, Change<Filter>& q) {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
     const std::int32_t n_cuts = p_.track(k).size() - least_kept(k);
@@ -243,19 +254,19 @@ class Moves {
     return true;
   }
 
-  bool draw_update(Random& random, Proposal<Filter>& q) {
+  bool draw_update(Random& random, Change<Filter>& q) {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
     const std::int32_t n_cuts = p_.track(k).size() + 1 - least_updated(k);
     q.log_forward -= log(n_cuts);
     q.with = least_updated(k) + random.below(n_cuts);
     Edit<Filter>& e = q.edit(k, q.with);
-    q.log_forward += growth_.grow(e, q.with == 1, random);
+    q.log_forward += growth_.grow(e, must_grow(k, q.with), random);
     return true;
   }
 
   // The link is a → b; others with d after a, whose c before it may be followed by b.
-  bool draw_switch(Random& random, Proposal<Filter>& q) {
+  bool draw_switch(Random& random, Change<Filter>& q) {
     const std::int32_t b = draw_one(p_.linked(), random, q);
     if (b < 0) return false;
     const std::int32_t a = p_.before(b), own = p_.track_of(b);
@@ -271,7 +282,7 @@ class Moves {
     return true;
   }
   // The partners of the link a → d in ω', where the tails have changed tracks.
-  std::int32_t n_partners_after(const Proposal<Filter>& q) const {
+  std::int32_t n_partners_after(const Change<Filter>& q) const {
     const std::int32_t a = p_.before(q.with), own = q.edits[0].track, other = q.edits[1].track;
     const std::int32_t d = q.edits[0].tail.nodes.front(), c = p_.before(d);
     std::int32_t n = 0;
@@ -309,7 +320,7 @@ class Moves {
       if (i < 0 || (i == x && p_.place_of(x) == 0)) slots_.push_back({p_.track_of(j), 0});
     }
   }
-  bool draw_insertion(Random& random, Proposal<Filter>& q) {
+  bool draw_insertion(Random& random, Change<Filter>& q) {
     const std::int32_t x = draw_one(p_.free(), random, q);
     if (x < 0) return false;
     list_slots(x);
@@ -322,20 +333,21 @@ class Moves {
     return true;
   }
 
-  bool draw_deletion(Random& random, Proposal<Filter>& q) {
+  bool draw_deletion(Random& random, Change<Filter>& q) {
     const std::int32_t x = draw_one(p_.taken(), random, q);
     if (x < 0) return false;
     const std::int32_t k = p_.track_of(x), i = p_.before(x), j = p_.after(x);
-    if (p_.track(k).size() < 3 || (i >= 0 && j >= 0 && !p_.window().is_linkable(i, j))) return false;
+    if (p_.track(k).whole_size() < 3 || (i >= 0 && j >= 0 && !p_.window().is_linkable(i, j))) return false;
     q.with = x;
     append(q.edit(k, p_.place_of(x)), k, p_.place_of(x) + 1);
     return true;
   }
 
-  bool draw_transfer(Random& random, Proposal<Filter>& q) {
+  bool draw_transfer(Random& random, Change<Filter>& q) {
     const std::int32_t b = draw_one(p_.linked(), random, q);
-    if (b < 0 || p_.place_of(b) < 2) return false;
+    if (b < 0) return false;
     const std::int32_t own = p_.track_of(b);
+    if (p_.track(own).n_gone + p_.place_of(b) < 2) return false;
     starts_.clear();
     for (const std::int32_t i : p_.window().prev(b))
       if (p_.track_of(i) >= 0 && p_.track_of(i) != own && p_.after(i) < 0)
@@ -348,7 +360,7 @@ class Moves {
     return true;
   }
 
-  bool draw_replacement(Random& random, Proposal<Filter>& q) {
+  bool draw_replacement(Random& random, Change<Filter>& q) {
     const std::int32_t x = draw_one(p_.taken(), random, q);
     if (x < 0) return false;
     const DetectionWindow& window = p_.window();

@@ -50,9 +50,11 @@ class Partition {
   struct Track {
     std::vector<std::int32_t> nodes;
     std::int32_t n_frozen = 0;
-    std::int64_t id = -1;  // of whom the outside knows it as
+    std::int32_t n_gone = 0;  // detections before the first, which have left the window
+    std::int64_t id = -1;     // by which the outside knows it, once something of it is settled
 
     std::int32_t size() const { return static_cast<std::int32_t>(nodes.size()); }
+    std::int32_t whole_size() const { return n_gone + size(); }
   };
 
   Partition(const MotionModel& m, const ScoreModel& sm)
@@ -179,6 +181,22 @@ class Partition {
       }
     frozen_ = std::max(frozen_, frame);
   }
+  std::int64_t frozen() const { return frozen_; }
+
+  // Forgets the oldest frame, which is settled.
+  void drop_frame() {
+    for (const std::int32_t i : window_.frame(window_.first()).ids) {
+      const std::int32_t k = track_of_[i];
+      if (k < 0) continue;
+      Track& t = tracks_[k];
+      t.nodes.erase(t.nodes.begin());
+      --t.n_frozen;
+      ++t.n_gone;
+      for (const std::int32_t j : t.nodes) --place_[j];
+      if (t.nodes.empty()) remove_track(k);
+    }
+    window_.drop();
+  }
 
   std::span<const std::int32_t> add_frame(double time, const MotionStep& step,
                                           std::span<const Point> points, std::int64_t number) {
@@ -219,7 +237,7 @@ class Partition {
       k = unused_.back();
       unused_.pop_back();
     }
-    tracks_[k].n_frozen = 0;
+    tracks_[k].n_frozen = tracks_[k].n_gone = 0;
     tracks_[k].id = -1;
     all_.add(k);
     young_.add(k);

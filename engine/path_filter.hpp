@@ -16,13 +16,15 @@ struct Expected {
   Prediction prediction;
 };
 
+// `expect` may go on from what was expected after a shorter gap, `before`, of the same track.
+
 // One motion: the steps of a gap are taken at once.
 struct OneMotion {
   using State = AxisState;
   static State begin(const MotionModel& m, const Point& y) { return begin_state(m.axis, y); }
 
   static void expect(const MotionModel& m, const DetectionWindow& window, const State& from,
-                     std::int64_t frame, int gap, Expected<State>& out) {
+                     std::int64_t frame, int gap, Expected<State>& out, int = 0) {
     out.state = from;
     predict(m.axis, window.frame(frame + gap).single[gap - 1], out.state);
     out.prediction.M = 1;
@@ -47,9 +49,9 @@ struct SeveralMotions {
   static State begin(const MotionModel& m, const Point& y) { return begin_state(m, y); }
 
   static void expect(const MotionModel& m, const DetectionWindow& window, const State& from,
-                     std::int64_t frame, int gap, Expected<State>& out) {
-    out.state = from;
-    for (int d = 1; d <= gap; ++d) predict(m, window.frame(frame + d).step, out.state);
+                     std::int64_t frame, int gap, Expected<State>& out, int before = 0) {
+    if (before == 0) out.state = from;
+    for (int d = before + 1; d <= gap; ++d) predict(m, window.frame(frame + d).step, out.state);
     out.prediction = Prediction(m, out.state);
   }
   static double log_likelihood(const Prediction& p, const Point& y) {

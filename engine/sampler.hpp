@@ -6,6 +6,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "moves.hpp"
@@ -37,22 +40,30 @@ class Sampler {
       : partition_(m, sm), opt_(options), random_(seed) {
     for (int K = 0; K < 3; ++K) shares_[K] = shares(K);
   }
-  // The moves look at the partition beside them.
-  Sampler(const Sampler& other)
-      : partition_(other.partition_),
-        opt_(other.opt_),
-        random_(other.random_),
-        shares_(other.shares_),
-        counts_(other.counts_),
-        best_gain_(other.best_gain_),
-        last_gain_(other.last_gain_) {}
+  // The moves look at the partition beside them, so that they are made anew.
+  Sampler(const Sampler& o)
+      : partition_(o.partition_),
+        opt_(o.opt_),
+        random_(o.random_),
+        shares_(o.shares_),
+        counts_(o.counts_),
+        best_gain_(o.best_gain_),
+        last_gain_(o.last_gain_) {}
+  Sampler(Sampler&& o) noexcept
+      : partition_(std::move(o.partition_)),
+        opt_(o.opt_),
+        random_(o.random_),
+        shares_(o.shares_),
+        counts_(o.counts_),
+        best_gain_(o.best_gain_),
+        last_gain_(o.last_gain_) {}
   Sampler& operator=(const Sampler&) = delete;
 
   Partition<Filter>& partition() { return partition_; }
   const Partition<Filter>& partition() const { return partition_; }
   const std::array<MoveCounts, kMoves>& counts() const { return counts_; }
 
-  // One move; true where the partition changes. `seen(proposal, log of the reverse, is taken)` is
+  // One move; true where the partition changes. `seen(change, log of the reverse, is taken)` is
   // called for what was weighed to the end.
   template <typename Seen>
   bool step(Seen&& seen) {
@@ -62,31 +73,70 @@ class Sampler {
     while (kind + 1 < kMoves && at >= now.upto[kind]) ++kind;
     MoveCounts& count = counts_[kind];
     ++count.n_drawn;
-    if (!moves_.propose(static_cast<Move>(kind), random_, proposal_)) return false;
+    if (!moves_.propose(static_cast<Move>(kind), random_, change_)) return false;
     ++count.n_possible;
     const Shares& then = shares_[std::min(n_tracks_after(), 2)];
-    const int back = static_cast<int>(inverse(proposal_.move));
+    const int back = static_cast<int>(inverse(change_.move));
     const double log_u = std::log(random_.uniform());
     // A probability is at most 1: what is too little before the way back is weighed stays so.
-    double log_ratio = proposal_.gain + (best_gain_ - last_gain_) + then.log[back] -
-                       now.log[kind] - proposal_.log_forward;
+    double log_ratio = change_.gain + (best_gain_ - last_gain_) + then.log[back] -
+                       now.log[kind] - change_.log_forward;
     if (!(log_ratio > log_u) && !is_traced_) return false;
-    const double log_reverse = moves_.log_reverse(proposal_);
+    const double log_reverse = moves_.log_reverse(change_);
     log_ratio += log_reverse;
     const bool is_taken = log_ratio > log_u;
-    seen(proposal_, log_reverse, is_taken);
+    seen(change_, log_reverse, is_taken);
     if (!is_taken) return false;
     ++count.n_taken;
     if (opt_.is_ascent) {
-      last_gain_ = best_gain_ + proposal_.gain;
-      if (!(proposal_.gain > 0)) return false;
+      last_gain_ = best_gain_ + change_.gain;
+      if (!(change_.gain > 0)) return false;
       best_gain_ = last_gain_;
     }
-    partition_.apply(proposal_.all());
+    if (is_best_ && change_.gain < 0) {
+      save();
+      is_best_ = false;
+    }
+    partition_.apply(change_.all());
+    gain_ += change_.gain;
+    is_best_ = is_best_ || gain_ > most_ + kBetter;
+    most_ = std::max(most_, gain_);
     return true;
   }
   bool step() {
-    return step([](const Proposal<Filter>&, double, bool) {});
+    return step([](const Change<Filter>&, double, bool) {});
+  }
+
+  // From here on the best partition is kept in mind; then the chain is put there.
+  void begin_best() {
+    gain_ = most_ = 0;
+    is_best_ = true;
+  }
+  void restore_best() {
+    if (is_best_ || gain_ >= most_ - kBetter) return;
+    edits_.clear();
+    std::map<std::int32_t, std::size_t> now;  // tracks by first detection
+    for (const std::int32_t k : partition_.tracks().items())
+      now[partition_.track(k).nodes.front()] = static_cast<std::size_t>(k);
+    for (std::size_t s = 0; s + 1 < first_saved_.size(); ++s) {
+      const std::span<const std::int32_t> nodes(saved_.data() + first_saved_[s],
+                                                saved_.data() + first_saved_[s + 1]);
+      Edit<Filter>& edit = edits_.emplace_back();
+      const auto at = now.find(nodes.front());
+      if (at != now.end()) {
+        edit.track = static_cast<std::int32_t>(at->second);
+        const auto& own = partition_.track(edit.track).nodes;
+        while (edit.keep < static_cast<std::int32_t>(std::min(own.size(), nodes.size())) &&
+               own[edit.keep] == nodes[edit.keep])
+          ++edit.keep;
+        now.erase(at);
+      }
+      for (std::size_t n = edit.keep; n < nodes.size(); ++n) partition_.append(edit, nodes[n]);
+    }
+    for (const auto& [first, k] : now) edits_.emplace_back().track = static_cast<std::int32_t>(k);
+    partition_.apply(edits_);
+    is_best_ = true;
+    gain_ = most_;
   }
 
   // Weigh everything to the end, for whoever looks on.
@@ -116,9 +166,19 @@ class Sampler {
     return out;
   }
 
+  void save() {
+    saved_.clear();
+    first_saved_.assign(1, 0);
+    for (const std::int32_t k : partition_.tracks().items()) {
+      const auto& nodes = partition_.track(k).nodes;
+      saved_.insert(saved_.end(), nodes.begin(), nodes.end());
+      first_saved_.push_back(static_cast<std::int32_t>(saved_.size()));
+    }
+  }
+
   std::int32_t n_tracks_after() const {
     std::int32_t n = partition_.tracks().size();
-    switch (proposal_.move) {
+    switch (change_.move) {
       case Move::birth:
       case Move::split: return n + 1;
       case Move::death:
@@ -131,12 +191,20 @@ class Sampler {
   ChainOptions opt_;
   Random random_;
   Moves<Filter> moves_{partition_, opt_.growth};
-  Proposal<Filter> proposal_;
+  Change<Filter> change_;
   std::array<Shares, 3> shares_{};
   std::array<MoveCounts, kMoves> counts_{};
   // Ascent: log posterior of the best partition and of the last one taken, less that at the start.
   double best_gain_ = 0, last_gain_ = 0;
   bool is_traced_ = false;
+
+  // Since `begin_best`: what was won, the most of it, whether it is as good here as it ever was; and
+  // the tracks where it was best, if that is elsewhere.
+  static constexpr double kBetter = 1e-9;
+  double gain_ = 0, most_ = 0;
+  bool is_best_ = false;
+  std::vector<std::int32_t> saved_, first_saved_;
+  std::vector<Edit<Filter>> edits_;
 };
 
 }  // namespace asterism

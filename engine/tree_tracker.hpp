@@ -60,6 +60,8 @@ class TreeTracker {
   const Forest& forest() const { return forest_; }
   // The tracks as they would be decided on now.
   const LiveTracks<Tree>& live() const { return present_; }
+  const MotionModel& motion() const { return present_.m; }
+  std::int64_t n_ids() const { return present_.next_id; }
   // Of what is decided, and of what would be decided now.
   FrameStats total() const {
     FrameStats all = total_;

@@ -43,12 +43,12 @@ def make_chain(
     floor: float = 1e-3, weights=None, seed: int = 0, first_rules: bool = False,
     ascent: bool = False, frames: int | None = None,
 ):  # fmt: skip
-    chain = _engine.Chain(
-        motion_model(model, d.n_axes), score_model(model),
+    options = _engine.ChainOptions(
         weights=np.ones(len(MOVES)) if weights is None else np.asarray(weights, float),
         is_informed=informed, stop=stop, floor=floor, has_first_rules=first_rules,
-        is_ascent=ascent, seed=seed,
+        is_ascent=ascent,
     )  # fmt: skip
+    chain = _engine.Chain(motion_model(model, d.n_axes), score_model(model), options, seed)
     kind, F, Q = steps_of(model.motion, d.times)
     for t, (time, points) in enumerate(d):
         if frames is None or t < frames:

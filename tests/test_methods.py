@@ -25,12 +25,15 @@ METHODS = {
     "independent trees": am.TrackSplitting(independent=True, window=4),
     "tomht": am.TOMHT(),
     "mht": am.MHT(),
+    "mcmcda": am.MCMCDA(),
     "mda": am.MDA(),
 }
 each_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 # The others are held to every partition of small problems instead.
 ON_A_BLACKBOARD = {
-    name: m for name, m in METHODS.items() if not isinstance(m, am.TOMHT | am.MDA | am.MHT)
+    name: m
+    for name, m in METHODS.items()
+    if not isinstance(m, am.TOMHT | am.MDA | am.MHT | am.MCMCDA)
 }
 each_on_a_blackboard = pytest.mark.parametrize(
     "method", ON_A_BLACKBOARD.values(), ids=ON_A_BLACKBOARD
@@ -234,6 +237,16 @@ def test_clutter_alone_gives_no_track(method):
     assert (tracks.labels == -1).all()
 
 
+@pytest.mark.parametrize("method", [am.TOMHT, am.MHT, am.MDA], ids=["tomht", "mht", "mda"])
+def test_a_detection_that_a_track_expects_begins_no_other(method):
+    # A second marker comes up within the gate of the first, and stays there.
+    frames = [[[0.1 * t, 0, 0], [0.1 * t, 0.03, 0]][: 1 + (t >= 6)] for t in range(20)]
+    d = am.Detections.from_frames(0.1 * np.arange(20), frames)
+    model = small_model(noise_sigma=0.01, clutter_density=0.1, birth_density=0.1)
+    assert am.track(d, method(), model=model).n_tracks == 2
+    assert am.track(d, method(new_track_odds=1e-6), model=model).n_tracks == 1
+
+
 @each_method
 def test_memory_of_an_endless_stream_is_bounded(method):
     rng = np.random.default_rng(9)
@@ -243,9 +256,10 @@ def test_memory_of_an_endless_stream_is_bounded(method):
     for t in range(3000):
         points = np.vstack([[[0.0, 0, 0], [1, 0, 0]], rng.uniform(-2, 2, (4, 3))])
         state, update = method.step(state, t * 0.1, points)
-        most = max(most, update.info["tentative"])
-        held = max(held, update.info["pending"])
-    assert 2 < most < 60
+        info = update.info
+        most = max(most, info["tentative"] if "tentative" in info else info["tracks"])
+        held = max(held, info["pending"] if "pending" in info else info["detections"])
+    assert 2 <= most < 60
     assert 2 < held < 120
     assert update.info["tracks"] >= 2
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from asterism import simulate as simulate
     from asterism.associate import GNN as GNN
     from asterism.associate import JPDA as JPDA
+    from asterism.associate import MCMCDA as MCMCDA
     from asterism.associate import MDA as MDA
     from asterism.associate import METHODS as METHODS
     from asterism.associate import MHT as MHT
@@ -154,6 +155,7 @@ _PUBLIC = {
         "GNN",
         "METHODS",
         "JPDA",
+        "MCMCDA",
         "MDA",
         "MHT",
         "SMP",

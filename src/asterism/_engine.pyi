@@ -71,6 +71,10 @@ class FrameStats:
     def gap(self) -> float: ...
     @property
     def n_merged(self) -> int: ...
+    @property
+    def n_moves(self) -> int: ...
+    @property
+    def n_taken(self) -> int: ...
 
 class LifeOptions:
     def __init__(
@@ -322,11 +326,9 @@ def project(
     clearance: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8], NDArray[np.int32]]: ...
 
-class Chain:
+class ChainOptions:
     def __init__(
         self,
-        model: MotionModel,
-        score: ScoreModel,
         *,
         weights: NDArray[np.float64],
         is_informed: bool,
@@ -334,7 +336,30 @@ class Chain:
         floor: float,
         has_first_rules: bool,
         is_ascent: bool,
+    ) -> None: ...
+
+# One for models with one motion, one for those with several.
+class _ChainTracker(_Tracker):
+    def __init__(
+        self,
+        model: MotionModel,
+        score: ScoreModel,
+        chain: ChainOptions,
+        *,
+        window: int,
+        moves: float,
+        deadline: float,
+        has_assignment: bool,
         seed: int,
+    ) -> None: ...
+    def counts(self) -> NDArray[np.int64]: ...
+
+class OneMotionTracker(_ChainTracker): ...
+class SeveralMotionsTracker(_ChainTracker): ...
+
+class Chain:
+    def __init__(
+        self, model: MotionModel, score: ScoreModel, options: ChainOptions, seed: int
     ) -> None: ...
     def add_frame(
         self,

@@ -2,6 +2,7 @@
 
 from asterism.associate.gnn import GNN
 from asterism.associate.jpda import JPDA
+from asterism.associate.mcmcda import MCMCDA
 from asterism.associate.mda import MDA
 from asterism.associate.method import Method, Update
 from asterism.associate.mht import MHT, HypothesisCluster
@@ -15,6 +16,7 @@ from asterism.associate.track_splitting import TrackSplitting
 __all__ = [
     "GNN",
     "JPDA",
+    "MCMCDA",
     "MDA",
     "METHODS",
     "MHT",

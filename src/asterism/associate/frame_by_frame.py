@@ -11,97 +11,22 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from asterism.associate.method import Method, Update, checked_frame
-from asterism.errors import ParameterError, SolverLimit, check_number
+from asterism.associate.engine_method import MAX_CANDIDATES, EngineMethod
+from asterism.errors import check_number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike, NDArray
-
     from asterism import _engine
-    from asterism.model import Detections, TrackingModel
+    from asterism.associate.engine_method import Tracker
+    from asterism.model import TrackingModel
 
-    Tracker = (
-        _engine.FrameTracker
-        | _engine.JointTracker
-        | _engine.TreeTracker
-        | _engine.HypothesisTracker
-        | _engine.MatrixTracker
-    )
-
-__all__ = ["FrameByFrame", "FrameState"]
-
-MAX_CANDIDATES = 50_000_000
-"""Pairs of track and detection within the gates of one frame (1.2 GB of them)."""
-
-
-FRAMES_A_CALL = 1000
-"""The engine takes so many frames at a time: few enough to show progress and to be stopped."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class FrameState:
-    """The state of a frame-by-frame method.
-
-    Parameters
-    ----------
-    model : TrackingModel
-        The model.
-    n_axes : int
-        2 or 3.
-    tracker : one of the engine's trackers
-        The live tracks, in the engine.
-    about : callable
-        What the method tells of a frame or of all so far.
-    """
-
-    model: TrackingModel
-    n_axes: int
-    tracker: Tracker
-    about: Callable[[_engine.FrameStats], dict[str, float]]
-
-    @property
-    def n_ids(self) -> int:
-        """Number of identities given so far."""
-        return self.tracker.n_ids
-
-    @property
-    def n_seen(self) -> int:
-        """Number of detections taken so far."""
-        return self.tracker.n_seen
-
-    @property
-    def info(self) -> dict[str, float]:
-        """Sums of what is counted and the worst of what is a size or a bound, over all frames."""
-        return self.about(self.tracker.total)
-
-    def live(self) -> dict[str, NDArray[Any]]:
-        """Give the believed tracks as they are now, for a display say.
-
-        Returns
-        -------
-        dict
-            ``ids (k,)``, ``gaps (k,)`` frames since the last detection, ``log_odds (k,)`` that the
-            marker exists, ``means (k, D, n)`` and ``covariances (k, n, n)`` of the state, SI units;
-            of tracks with branches also ``chi2 (k,)`` λ and ``updates (k,)`` detections so far.
-        """
-        from asterism import _engine
-
-        names = ("ids", "gaps", "log_odds", "means", "covariances")
-        live: dict[str, NDArray[Any]] = dict(zip(names, self.tracker.tracks(), strict=True))
-        if isinstance(self.tracker, _engine.TreeTracker):
-            live |= zip(("chi2", "updates"), self.tracker.chi2(), strict=True)
-        return live
+__all__ = ["FrameByFrame"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrameByFrame(Method[FrameState]):
+class FrameByFrame(EngineMethod):
     """Options of every frame-by-frame method.
 
     Parameters
@@ -123,11 +48,26 @@ class FrameByFrame(Method[FrameState]):
         check_number("confirm_probability", self.confirm_probability, above=0.5, below=1)
         check_number("delete_odds", self.delete_odds, above=1)
 
+    def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> Tracker:
+        from scipy.special import chdtri
+
+        from asterism import _engine
+        from asterism.model.compiled import motion_model, score_model
+
+        p = self.confirm_probability
+        life = _engine.LifeOptions(
+            gate=float(chdtri(n_axes, self.gate_probability)),
+            confirm_score=math.log(p / (1 - p)),
+            delete_drop=math.log(self.delete_odds),
+            max_candidates=MAX_CANDIDATES,
+        )
+        return self._make(motion_model(model, n_axes), score_model(model), life)
+
     @abstractmethod
-    def _tracker(
+    def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
     ) -> Tracker:
-        """Make the engine's tracker."""
+        """Make the engine's tracker; nothing is drawn, so that there is no seed."""
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
         """Tell what a frame, or a run of them, took."""
@@ -139,94 +79,3 @@ class FrameByFrame(Method[FrameState]):
             "groups": stats.n_groups,
             "largest_group": stats.largest_group,
         }
-
-    def init(self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None) -> FrameState:
-        """Make the state before the first frame; `seed` changes nothing, nothing is drawn."""
-        from scipy.special import chdtri
-
-        from asterism import _engine
-        from asterism.model.compiled import motion_model, score_model
-
-        if n_axes not in (2, 3):
-            raise ParameterError("n_axes", "2 or 3", repr(n_axes))
-        p = self.confirm_probability
-        life = _engine.LifeOptions(
-            gate=float(chdtri(n_axes, self.gate_probability)),
-            confirm_score=math.log(p / (1 - p)),
-            delete_drop=math.log(self.delete_odds),
-            max_candidates=MAX_CANDIDATES,
-        )
-        tracker = self._tracker(motion_model(model, n_axes), score_model(model), life)
-        return FrameState(model=model, n_axes=n_axes, tracker=tracker, about=self._about)
-
-    def step(self, state: FrameState, time: float, points: ArrayLike) -> tuple[FrameState, Update]:
-        """Take the next frame; see `Method.step`."""
-        from asterism.model.compiled import no_transition, transition
-
-        before = state.tracker
-        frame = checked_frame(time, before.last_time, points, state.n_axes)
-        # The first frame has no step before it, and no track that would take it.
-        dt = time - before.last_time if before.n_frames else None
-        motion = state.model.motion
-        F, Q = transition(motion, dt) if dt else no_transition(motion)
-        try:
-            after, labels, sure, revised, revised_labels, revised_sure, stats = before.step(
-                time, F, Q, frame
-            )
-        except OverflowError as error:
-            raise _too_many(error) from error
-        update = Update(
-            labels=labels,
-            revised=revised,
-            revised_labels=revised_labels,
-            confidence=sure if before.has_confidence else None,
-            revised_confidence=revised_sure if before.has_confidence else None,
-            info=self._about(stats),
-        )
-        return replace(state, tracker=after), update
-
-    def run(
-        self,
-        state: FrameState,
-        detections: Detections,
-        *,
-        progress: Callable[[int], Any] | None = None,
-    ) -> tuple[FrameState, NDArray[np.int64], NDArray[np.float64] | None]:
-        """Take all frames in the engine; the same labels as the loop over `step`."""
-        from asterism.model.compiled import steps_of
-
-        tracker = state.tracker.copy()
-        times, offsets = detections.times, detections.offsets
-        start = tracker.n_seen
-        labels = np.full(start + detections.n_points, -1, dtype=np.int64)
-        sure = np.zeros(len(labels) if tracker.has_confidence else 0)
-        if detections.n_frames:
-            checked_frame(float(times[0]), tracker.last_time, [], state.n_axes)
-        # A state that has seen frames before is led on from the last of them.
-        n_before = min(tracker.n_frames, 1)
-        known = np.concatenate([np.full(n_before, tracker.last_time), times])
-        kind, F, Q = steps_of(state.model.motion, known)
-        for t in range(0, detections.n_frames, FRAMES_A_CALL):
-            end = min(t + FRAMES_A_CALL, detections.n_frames)
-            some = detections.points[offsets[t] : offsets[end]]
-            starts = offsets[t : end + 1] - offsets[t]
-            kinds = kind[n_before + t : n_before + end]
-            try:
-                tracker.run(times[t:end], kinds, F, Q, starts, some, labels, sure)
-            except OverflowError as error:
-                raise _too_many(error) from error
-            if progress is not None:
-                progress(end)
-        confidence = sure[start:] if tracker.has_confidence else None
-        return replace(state, tracker=tracker), labels[start:], confidence
-
-
-def _too_many(error: OverflowError) -> SolverLimit:
-    if "compete" in str(error):
-        return SolverLimit("tracks that compete at once", 1025, 1024, "gate more narrowly")
-    return SolverLimit(
-        "pairs of track and detection within the gates of one frame",
-        MAX_CANDIDATES + 1,
-        MAX_CANDIDATES,
-        "the model's maximal speed or noise is too large for points so dense",
-    )

@@ -41,7 +41,7 @@ class GNN(FrameByFrame):
 
     name: ClassVar[str] = "gnn"
 
-    def _tracker(
+    def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
     ) -> _engine.FrameTracker:
         from asterism import _engine

@@ -72,7 +72,7 @@ class JPDA(FrameByFrame):
             if not isinstance(getattr(self, flag), bool):
                 raise ParameterError(flag, "True or False", repr(getattr(self, flag)))
 
-    def _tracker(
+    def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
     ) -> _engine.JointTracker:
         from asterism import _engine

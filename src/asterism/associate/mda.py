@@ -65,7 +65,7 @@ class MDA(Hypotheses):
             raise ParameterError("solver", "'exact' or 'relaxed'", repr(self.solver))
         check_number("max_branches", self.max_branches, above=1, closed=True, integer=True)
 
-    def _tracker(
+    def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
     ) -> _engine.HypothesisTracker:
         from asterism import _engine

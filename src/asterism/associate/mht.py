@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism import _engine
-    from asterism.associate.frame_by_frame import FrameState
+    from asterism.associate.engine_method import EngineState
 
 __all__ = ["MHT", "HypothesisCluster"]
 
@@ -96,7 +96,7 @@ class MHT(Hypotheses):
         check_number("max_hypotheses", self.max_hypotheses, above=1, closed=True, integer=True)
         check_number("merged_within", self.merged_within, above=0, closed=True)
 
-    def hypotheses(self, state: FrameState) -> list[HypothesisCluster]:
+    def hypotheses(self, state: EngineState) -> list[HypothesisCluster]:
         """Give what the method holds possible after the last frame, cluster by cluster.
 
         Clusters are independent: the probability of a choice of one hypothesis of each is the
@@ -104,7 +104,7 @@ class MHT(Hypotheses):
 
         Parameters
         ----------
-        state : FrameState
+        state : EngineState
             From `init` or `step` of this method.
 
         Returns
@@ -133,7 +133,7 @@ class MHT(Hypotheses):
             )
         return found
 
-    def _tracker(
+    def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
     ) -> _engine.MatrixTracker:
         from asterism import _engine

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from asterism.associate.gnn import GNN
 from asterism.associate.jpda import JPDA
+from asterism.associate.mcmcda import MCMCDA
 from asterism.associate.mda import MDA
 from asterism.associate.mht import MHT
 from asterism.associate.smp import SMP
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["METHODS", "method_by_name"]
 
 METHODS: dict[str, type[Method[Any]]] = {
-    method.name: method for method in (GNN, SMP, JPDA, TrackSplitting, TOMHT, MDA, MHT)
+    method.name: method for method in (GNN, SMP, JPDA, TrackSplitting, TOMHT, MDA, MHT, MCMCDA)
 }
 """Method by name, as the command line knows it."""
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from asterism.associate.frame_by_frame import FrameByFrame, FrameState
+from asterism.associate.frame_by_frame import FrameByFrame
 from asterism.associate.over_window import branch_options, check_window
 from asterism.errors import ParameterError, check_number
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from asterism import _engine
+    from asterism.associate.engine_method import EngineState
     from asterism.associate.method import Update
     from asterism.model import Detections
 
@@ -82,7 +83,7 @@ class SMP(FrameByFrame):
             given = "strict=True" if self.strict else f"capacity={self.capacity}"
             raise ParameterError("window", f"1, as {given} is given", self.window)
 
-    def _tracker(
+    def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
     ) -> _engine.FrameTracker | _engine.TreeTracker:
         from asterism import _engine
@@ -103,7 +104,9 @@ class SMP(FrameByFrame):
             motion, score, life, ways, resolver=matcher, is_independent=False
         )
 
-    def step(self, state: FrameState, time: float, points: ArrayLike) -> tuple[FrameState, Update]:
+    def step(
+        self, state: EngineState, time: float, points: ArrayLike
+    ) -> tuple[EngineState, Update]:
         """Take the next frame; see `Method.step`.
 
         Raises
@@ -117,11 +120,11 @@ class SMP(FrameByFrame):
 
     def run(
         self,
-        state: FrameState,
+        state: EngineState,
         detections: Detections,
         *,
         progress: Callable[[int], Any] | None = None,
-    ) -> tuple[FrameState, NDArray[np.int64], NDArray[np.float64] | None]:
+    ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; the same labels as the loop over `step`."""
         if self.strict and detections.n_frames:
             wanted = state.n_ids if state.tracker.n_frames else int(detections.counts[0])

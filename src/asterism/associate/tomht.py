@@ -66,7 +66,7 @@ class TOMHT(Hypotheses):
         for name in ("max_branches", "max_hypotheses", "max_nodes"):
             check_number(name, getattr(self, name), above=1, closed=True, integer=True)
 
-    def _tracker(
+    def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
     ) -> _engine.HypothesisTracker:
         from asterism import _engine

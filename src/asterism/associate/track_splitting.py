@@ -102,7 +102,7 @@ class TrackSplitting(FrameByFrame):
         if not isinstance(self.independent, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise ParameterError("independent", "True or False", repr(self.independent))
 
-    def _tracker(
+    def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
     ) -> _engine.TreeTracker:
         from scipy.special import ndtri

@@ -1,0 +1,202 @@
+"""Markov chain Monte Carlo data association (§2.5, §4 of the report; Oh, Russell & Sastry 2009)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from asterism.associate.engine_method import EngineMethod
+from asterism.errors import ParameterError, check_fields, check_number
+
+if TYPE_CHECKING:
+    from asterism import _engine
+    from asterism.associate.engine_method import Tracker
+    from asterism.model import TrackingModel
+
+__all__ = ["MCMCDA", "MOVES"]
+
+MOVES = (
+    "birth",
+    "death",
+    "split",
+    "merge",
+    "extension",
+    "reduction",
+    "update",
+    "switch",
+    "insertion",
+    "deletion",
+    "transfer",
+    "replacement",
+)
+"""Kinds of moves; the last four are not the report's."""
+
+WEIGHTS: dict[str, dict[str, float]] = {
+    "uniform": dict.fromkeys(MOVES, 1.0),
+    # Equation 4.7 of the report, its bounds taken apart.
+    "report": {
+        "birth": 1.0,
+        "death": 1.0,
+        "split": 2.0,
+        "merge": 2.0,
+        "extension": 9.0,
+        "reduction": 5.0,
+        "switch": 5.0,
+        "update": 5.0,
+    },
+}
+PAIRS = (
+    ("birth", "death"),
+    ("split", "merge"),
+    ("extension", "reduction"),
+    ("insertion", "deletion"),
+)
+FLOOR = 1e-4
+"""Least weight of a step of informed growth; to end in the last frame weighs 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MCMCDA(EngineMethod):
+    """Markov chain Monte Carlo data association: a walk over the partitions of a window.
+
+    A move draws a new partition from the present one and is taken with the probability of
+    Metropolis and Hastings, so that partitions are visited as often as the posterior has them
+    (`log_posterior`). In each frame the walk begins at the exact assignment of the new detections
+    and the best partition met is kept. A frame that leaves the window is settled by it; behind the
+    window only the filter states of the tracks are kept: the past informs, and costs nothing.
+
+    Until a frame is settled its labels are those of the best partition so far, and may change.
+
+    Parameters
+    ----------
+    window : int
+        Frames until one is settled.
+    moves : float or None
+        Moves in a frame, for each of its detections (or each track, if these are more); None with a
+        `deadline` alone.
+    deadline : float or None
+        Seconds after the arrival of a frame at which the walk stops; then results depend on the
+        machine, and ``info["moves"]`` says how far it came.
+    proposal : {"informed", "uniform"}
+        How moves lengthen a track: detections drawn by what they add to the score, or all alike
+        with a fixed probability to stop, as in the report.
+    move_weights : {"uniform", "report"} or mapping
+        How often each kind of move is drawn: all alike, by equation 4.7 of the report (whose eight
+        these are), or weights by kind.
+    chain : {"metropolis", "ascent"}
+        The report draws from the best partition so far and weighs against the last one taken
+        ("ascent"): that climbs and does not sample.
+    first_rules : bool
+        The report's: nothing but births while there is no track, and neither merge nor switch while
+        there is one.
+    assignment : bool
+        Whether the walk begins at the exact assignment of a new frame; otherwise its detections are
+        nobody's at first, as in the report.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(seed=1)
+    >>> am.track(truth.detections, am.MCMCDA(), seed=1).n_tracks
+    8
+    """
+
+    window: int = 10
+    moves: float | None = 25.0
+    deadline: float | None = None
+    proposal: Literal["informed", "uniform"] = "informed"
+    move_weights: Literal["uniform", "report"] | Mapping[str, float] = "uniform"
+    chain: Literal["metropolis", "ascent"] = "metropolis"
+    first_rules: bool = False
+    assignment: bool = True
+
+    name: ClassVar[str] = "mcmcda"
+
+    def __post_init__(self) -> None:
+        check_number("window", self.window, above=1, closed=True, integer=True)
+        if self.moves is not None:
+            check_number("moves", self.moves, above=0, closed=True)
+        elif self.deadline is None:
+            raise ParameterError("moves", "a number, or a deadline beside it", "None")
+        if self.deadline is not None:
+            check_number("deadline", self.deadline, above=0)
+        for name, choices in (
+            ("proposal", ("informed", "uniform")),
+            ("chain", ("metropolis", "ascent")),
+        ):
+            if getattr(self, name) not in choices:
+                wanted = " or ".join(map(repr, choices))
+                raise ParameterError(name, wanted, repr(getattr(self, name)))
+        for name in ("first_rules", "assignment"):
+            if not isinstance(getattr(self, name), bool):
+                raise ParameterError(name, "True or False", repr(getattr(self, name)))
+        _checked_weights(self.move_weights)
+
+    def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> Tracker:
+        from asterism import _engine
+        from asterism.model.compiled import motion_model, score_model
+
+        weights = _checked_weights(self.move_weights)
+        chain = _engine.ChainOptions(
+            weights=np.array([weights.get(move, 0.0) for move in MOVES]),
+            is_informed=self.proposal == "informed",
+            stop=model.population.p_disappear,
+            floor=FLOOR,
+            has_first_rules=self.first_rules,
+            is_ascent=self.chain == "ascent",
+        )
+        one = len(model.motion.modes) == 1
+        make = _engine.OneMotionTracker if one else _engine.SeveralMotionsTracker
+        return make(
+            motion_model(model, n_axes),
+            score_model(model),
+            chain,
+            window=int(self.window),
+            moves=math.inf if self.moves is None else self.moves,
+            deadline=self.deadline or 0.0,
+            has_assignment=self.assignment,
+            seed=_checked_seed(seed),
+        )
+
+    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        return {
+            "tracks": stats.n_confirmed,
+            "detections": stats.n_pending,
+            "candidates": stats.n_candidates,
+            "groups": stats.n_groups,
+            "largest_group": stats.largest_group,
+            "moves": stats.n_moves,
+            "taken": stats.n_taken,
+        }
+
+
+def _checked_seed(seed: int | None) -> int:
+    if seed is None:
+        return 0
+    check_number("seed", seed, above=0, below=2**64 - 1, closed=True, integer=True)
+    return int(seed)
+
+
+def _checked_weights(weights: str | Mapping[str, float]) -> Mapping[str, float]:
+    if isinstance(weights, str):
+        if weights not in WEIGHTS:
+            raise ParameterError("move_weights", "'uniform', 'report' or a mapping", repr(weights))
+        return WEIGHTS[weights]
+    if not isinstance(weights, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("move_weights", "'uniform', 'report' or a mapping", repr(weights))
+    check_fields("move_weights", weights, MOVES)
+    for move, weight in weights.items():
+        check_number(f"move_weights[{move}]", weight, above=0, closed=True)
+    if not weights.get("birth"):
+        raise ParameterError("move_weights", "births among the moves", dict(weights))
+    for one, other in PAIRS:
+        if bool(weights.get(one)) != bool(weights.get(other)):
+            raise ParameterError(
+                "move_weights", f"{one} and {other} both or neither", dict(weights),
+                "a move that cannot be taken back is never taken",
+            )  # fmt: skip
+    return weights
