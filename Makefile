@@ -36,6 +36,7 @@ bench: $(VENV)/.bench
 tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/report_smp.py --markdown docs/tables/report_smp.md
 	$(BIN)/python benchmarks/chi2_test.py --markdown docs/tables/chi2_test.md
+	$(BIN)/python benchmarks/report_mcmcda.py --markdown docs/tables/report_mcmcda.md
 	$(BIN)/python benchmarks/several_frames.py --markdown docs/tables/several_frames.md
 	$(BIN)/python benchmarks/scenes.py --seeds 5 --markdown docs/tables/scenes.md
 	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md

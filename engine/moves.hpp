@@ -265,15 +265,19 @@ class Moves {
     return true;
   }
 
-  // The link is a → b; others with d after a, whose c before it may be followed by b.
+  // The link is a → b. Another track goes on with d after a; and b goes on where d did: after the c
+  // before it, which it must be able to follow, or as the first, where it must not be all there is.
   bool draw_switch(Random& random, Change<Filter>& q) {
     const std::int32_t b = draw_one(p_.linked(), random, q);
     if (b < 0) return false;
     const std::int32_t a = p_.before(b), own = p_.track_of(b);
     partners_.clear();
-    for (const std::int32_t d : p_.window().next(a))
-      if (p_.linked().has(d) && p_.track_of(d) != own && p_.window().is_linkable(p_.before(d), b))
-        partners_.push_back(d);
+    const bool has_tail = p_.after(b) >= 0;
+    for (const std::int32_t d : p_.window().next(a)) {
+      if (!p_.taken().has(d) || p_.track_of(d) == own) continue;
+      const std::int32_t c = p_.before(d);
+      if (c < 0 ? has_tail : p_.window().is_linkable(c, b)) partners_.push_back(d);
+    }
     if (partners_.empty()) return false;
     const std::int32_t d = draw_one(partners_, random, q), other = p_.track_of(d);
     q.with = b;
@@ -285,16 +289,17 @@ class Moves {
   std::int32_t n_partners_after(const Change<Filter>& q) const {
     const std::int32_t a = p_.before(q.with), own = q.edits[0].track, other = q.edits[1].track;
     const std::int32_t d = q.edits[0].tail.nodes.front(), c = p_.before(d);
+    const bool has_tail = q.edits[0].tail.nodes.size() > 1;
     std::int32_t n = 0;
     for (const std::int32_t e : p_.window().next(a)) {
-      if (!p_.linked().has(e)) continue;
+      if (!p_.taken().has(e)) continue;
       std::int32_t track = p_.track_of(e);
       if (track == own && p_.place_of(e) >= q.edits[0].keep)
         track = other;
       else if (track == other && p_.place_of(e) >= q.edits[1].keep)
         track = own;
       const std::int32_t before = e == q.with ? c : p_.before(e);
-      n += track != own && p_.window().is_linkable(before, d);
+      if (track != own) n += before < 0 ? has_tail : p_.window().is_linkable(before, d);
     }
     return n;
   }

@@ -195,11 +195,19 @@ class Oracle:
         links = {y: x for x, y in self.links(w)}
         (own,) = [t for t in w if b in t]
         a = links[b]
-        partners = [
-            d for d in self.after[a]
-            if d in links and d not in own and self.is_linkable(links[d], b)
-        ]  # fmt: skip
+        partners = self.partners(w, own, a, b)
         return -math.log(len(links)) - math.log(len(partners))
+
+    def partners(self, w, own, a, b):
+        """With which of other tracks the link a → b may change tails: d after a, b in d's place."""
+        found = []
+        for t in w:
+            for before, d in itertools.pairwise((None, *t)):
+                if t == own or d not in self.after[a] or self.is_frozen(d):
+                    continue
+                fits = own[-1] != b if before is None else self.is_linkable(before, b)
+                found += [d] if fits else []
+        return found
 
     def of_insertion(self, w, v, x):
         slots = 0

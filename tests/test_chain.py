@@ -104,10 +104,7 @@ class SwitchPartnersInTheOldTracks(Oracle):
         a = links[b]
         (own,) = [t for t in w if a in t]
         (mine,) = [t for t in v if a in t]
-        partners = [
-            d for d in self.after[a]
-            if d in links and d not in own and d not in mine and self.is_linkable(links[d], b)
-        ]  # fmt: skip
+        partners = [d for d in self.partners(w, own, a, b) if d not in mine]
         return -math.log(len(links)) - math.log(max(len(partners), 1))
 
 
