@@ -25,12 +25,14 @@ METHODS: dict[str, am.Method[Any]] = {
 }
 
 
-def links(tracks: am.Tracks, truth: am.Tracks) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Give the later detection of every link of the tracks, and whether the link is right."""
+def links(
+    tracks: am.Tracks, truth: am.Tracks
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Give the two detections of every link of the tracks, and whether the link is right."""
     order, _ = tracks.by_track
     is_link = np.diff(tracks.labels[order]) == 0
     a, b = order[:-1][is_link], order[1:][is_link]
-    return b, (truth.labels[a] == truth.labels[b]) & (truth.labels[b] >= 0)
+    return a, b, (truth.labels[a] == truth.labels[b]) & (truth.labels[b] >= 0)
 
 
 class LinkConfidence:
@@ -42,8 +44,10 @@ class LinkConfidence:
     def add(self, name: str, tracks: am.Tracks, truth: am.Tracks) -> None:
         """Take the links of one result, if its method has a confidence."""
         if tracks.confidence is not None:
-            later, is_right = links(tracks, truth)
-            self._parts.setdefault(name, []).append((tracks.confidence[later], is_right))
+            a, b, is_right = links(tracks, truth)
+            # As sure as of the detection that is less sure to be the marker's.
+            sure = np.minimum(tracks.confidence[a], tracks.confidence[b])
+            self._parts.setdefault(name, []).append((sure, is_right))
 
     def table(self) -> list[str]:
         """Lines of a table with a row for each method."""

@@ -277,17 +277,6 @@ template <typename Filter>
 void bind_mcmc(nb::module_& module, const char* name) {
   using Tracker = McmcTracker<Filter>;
   bind<Tracker>(module, name)
-      .def("counts",
-           [](const Tracker& self) {
-             Owned<std::int64_t> out(kMoves * 3);
-             for (int k = 0; k < kMoves; ++k) {
-               const MoveCounts& c = self.counts()[k];
-               out.data[3 * k] = c.n_drawn;
-               out.data[3 * k + 1] = c.n_possible;
-               out.data[3 * k + 2] = c.n_taken;
-             }
-             return out.give({kMoves, 3});
-           })
       .def(
           "__init__",
           [](Tracker* self, const MotionModel& model, const ScoreModel& score,

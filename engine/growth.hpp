@@ -74,29 +74,19 @@ class Growth {
     auto operator<=>(const Follower&) const = default;
   };
 
-  // What is free to follow i, in order of gaps. Looked for among what may follow or among what is free, whichever is less.
+  // What is free to follow i, in order of gaps.
   void list_free(std::int32_t i) {
-    const DetectionWindow& window = p_.window();
-    const auto linked = window.next(i);
     free_.clear();
-    if (linked.size() <= static_cast<std::size_t>(p_.free().size())) {
-      for (const std::int32_t j : linked) {
-        const std::int32_t t = p_.track_of(j);
-        if (t == kFree || (t >= 0 && t == own_ && p_.place_of(j) >= keep_)) add_free(i, j);
-      }
-      return;
-    }
-    for (const std::int32_t j : p_.free().items())
-      if (window.is_linkable(i, j)) add_free(i, j);
+    for (const std::int32_t j : p_.free().items()) add_free(i, j);
     if (own_ >= 0) {
       const auto& nodes = p_.track(own_).nodes;
-      for (std::size_t n = keep_; n < nodes.size(); ++n)
-        if (window.is_linkable(i, nodes[n])) add_free(i, nodes[n]);
+      for (std::size_t n = keep_; n < nodes.size(); ++n) add_free(i, nodes[n]);
     }
     std::sort(free_.begin(), free_.end());
   }
   void add_free(std::int32_t i, std::int32_t j) {
-    free_.push_back({static_cast<std::int32_t>(p_.window()[j].frame - p_.window()[i].frame), j});
+    if (p_.window().is_linkable(i, j))
+      free_.push_back({static_cast<std::int32_t>(p_.window()[j].frame - p_.window()[i].frame), j});
   }
   double log_stop() const {
     const int max_gap = p_.window().max_gap();

@@ -65,7 +65,6 @@ class McmcTracker {
   double last_time() const { return last_time_; }
   FrameStats total() const { return total_; }
   const Partition<Filter>& partition() const { return sampler_.partition(); }
-  const std::array<MoveCounts, kMoves>& counts() const { return sampler_.counts(); }
 
   const MotionModel& motion() const { return partition().motion(); }
   std::int64_t n_ids() const { return next_id_ + n_named_; }
@@ -117,23 +116,23 @@ class McmcTracker {
     const DetectionWindow& window = p.window();
     const auto& ids = window.frame(window.now()).ids;
     s_.candidates.clear();
+    const DetectionWindow::Places& places = *window.frame(window.now()).places;
     std::vector<std::int32_t> rows;
     Expected<typename Filter::State> expected;
     for (const std::int32_t k : p.tracks().items()) {
       const std::int32_t i = p.last(k);
       const std::int64_t gap = window.now() - window[i].frame;
       if (gap < 1 || gap > window.max_gap()) continue;
-      const auto found = window.next(i, static_cast<int>(gap));
-      if (found.empty()) continue;
       Filter::expect(p.motion(), window, p.state(i), window[i].frame, static_cast<int>(gap), expected);
       const double base = p.gap_score(static_cast<int>(gap)) - p.end_score(i);
-      for (const std::int32_t j : found) {
-        const double gain = base + Filter::log_likelihood(expected.prediction, window[j].y);
-        if (gain > 0)
-          s_.candidates.push_back({static_cast<std::int32_t>(rows.size()),
-                                   static_cast<std::int32_t>(window[j].number - window[ids[0]].number),
-                                   gain, 0});
-      }
+      const double radius =
+          expected.prediction.radius(std::numeric_limits<double>::infinity(), -base);
+      if (radius < 0) continue;
+      places.grid.within(expected.prediction.center, radius, [&](std::int32_t j, double) {
+        const double gain = base + Filter::log_likelihood(expected.prediction, places.points[j]);
+        if (gain > 0 && window.is_linkable(i, ids[j]))
+          s_.candidates.push_back({static_cast<std::int32_t>(rows.size()), j, gain, 0});
+      });
       rows.push_back(k);
     }
     stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());

@@ -218,21 +218,18 @@ class Moves {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
     starts_.clear();
-    for (const std::int32_t j : p_.window().next(p_.last(k)))
-      if (is_start(j)) starts_.push_back(p_.track_of(j));
+    for (const std::int32_t other : p_.young().items())
+      if (p_.window().is_linkable(p_.last(k), node(other, 0))) starts_.push_back(other);
     if (starts_.empty()) return false;
     const std::int32_t other = draw_one(starts_, random, q);
     append(q.edit(k, p_.track(k).size()), other, 0);
     q.edit(other, 0);
     return true;
   }
-  // A track that begins here, and is not settled there.
-  bool is_start(std::int32_t j) const {
-    return p_.track_of(j) >= 0 && p_.place_of(j) == 0 && !p_.is_frozen(j);
-  }
+  // Tracks that begin within reach, in what is not settled.
   std::int32_t n_starts_after(std::int32_t i) const {
     std::int32_t n = 0;
-    for (const std::int32_t j : p_.window().next(i)) n += is_start(j);
+    for (const std::int32_t k : p_.young().items()) n += p_.window().is_linkable(i, node(k, 0));
     return n;
   }
 
@@ -273,11 +270,11 @@ class Moves {
     const std::int32_t a = p_.before(b), own = p_.track_of(b);
     partners_.clear();
     const bool has_tail = p_.after(b) >= 0;
-    for (const std::int32_t d : p_.window().next(a)) {
-      if (!p_.taken().has(d) || p_.track_of(d) == own) continue;
+    each_rival(a, b, [&](std::int32_t d) {
       const std::int32_t c = p_.before(d);
-      if (c < 0 ? has_tail : p_.window().is_linkable(c, b)) partners_.push_back(d);
-    }
+      if (p_.track_of(d) != own && (c < 0 ? has_tail : p_.window().is_linkable(c, b)))
+        partners_.push_back(d);
+    });
     if (partners_.empty()) return false;
     const std::int32_t d = draw_one(partners_, random, q), other = p_.track_of(d);
     q.with = b;
@@ -285,22 +282,39 @@ class Moves {
     append(q.edit(other, p_.place_of(d)), own, p_.place_of(b));
     return true;
   }
+  // Every detection in a track, and not settled, that may follow a and where b may have been before:
+  // one no later than b, one whose track leaps over the frame of b, or one that begins its track.
+  template <typename Visit>
+  void each_rival(std::int32_t a, std::int32_t b, Visit&& visit) const {
+    const DetectionWindow& window = p_.window();
+    const std::int64_t last = window[b].frame;
+    for (std::int64_t t = std::max(window[a].frame, p_.frozen()) + 1; t <= last; ++t)
+      window.each_after(a, t, [&](std::int32_t d) {
+        if (p_.taken().has(d)) visit(d);
+      });
+    for (const std::int32_t d : p_.leapt().items())
+      if (window[d].frame > last && window[p_.before(d)].frame < last && window.is_linkable(a, d))
+        visit(d);
+    for (const std::int32_t k : p_.young().items())
+      if (window[node(k, 0)].frame > last && window.is_linkable(a, node(k, 0))) visit(node(k, 0));
+  }
   // The partners of the link a → d in ω', where the tails have changed tracks.
   std::int32_t n_partners_after(const Change<Filter>& q) const {
-    const std::int32_t a = p_.before(q.with), own = q.edits[0].track, other = q.edits[1].track;
+    const DetectionWindow& window = p_.window();
+    const std::int32_t b = q.with, a = p_.before(b), own = q.edits[0].track, other = q.edits[1].track;
     const std::int32_t d = q.edits[0].tail.nodes.front(), c = p_.before(d);
     const bool has_tail = q.edits[0].tail.nodes.size() > 1;
     std::int32_t n = 0;
-    for (const std::int32_t e : p_.window().next(a)) {
-      if (!p_.taken().has(e)) continue;
+    const auto count = [&](std::int32_t e) {
       std::int32_t track = p_.track_of(e);
       if (track == own && p_.place_of(e) >= q.edits[0].keep)
         track = other;
       else if (track == other && p_.place_of(e) >= q.edits[1].keep)
         track = own;
-      const std::int32_t before = e == q.with ? c : p_.before(e);
-      if (track != own) n += before < 0 ? has_tail : p_.window().is_linkable(before, d);
-    }
+      const std::int32_t before = e == b ? c : p_.before(e);
+      if (track != own) n += before < 0 ? has_tail : window.is_linkable(before, d);
+    };
+    each_rival(a, d, count);
     return n;
   }
 
@@ -308,22 +322,28 @@ class Moves {
   struct Slot {
     std::int32_t track = 0, keep = 0;
   };
-  // Slots of x, as if it were free.
+  // Slots of x, as if it were free: in a leap over its frame, after a track's end, before its
+  // beginning.
   void list_slots(std::int32_t x) {
     const DetectionWindow& window = p_.window();
+    const std::int64_t frame = window[x].frame;
+    const std::int32_t own = p_.track_of(x) >= 0 ? p_.track_of(x) : -1;
     slots_.clear();
-    for (const std::int32_t i : window.prev(x)) {
-      if (p_.track_of(i) < 0) continue;
-      std::int32_t j = p_.after(i);
-      if (j == x) j = p_.after(x);
-      if (j < 0 || (!p_.is_frozen(j) && window.is_linkable(x, j)))
-        slots_.push_back({p_.track_of(i), p_.place_of(i) + 1});
-    }
-    for (const std::int32_t j : window.next(x)) {
-      if (p_.track_of(j) < 0 || p_.is_frozen(j)) continue;
+    const auto offer = [&](std::int32_t k, std::int32_t keep, std::int32_t i, std::int32_t j) {
+      if ((i < 0 || window.is_linkable(i, x)) && (j < 0 || window.is_linkable(x, j)))
+        slots_.push_back({k, keep});
+    };
+    for (const std::int32_t j : p_.leapt().items()) {
       const std::int32_t i = p_.before(j);
-      if (i < 0 || (i == x && p_.place_of(x) == 0)) slots_.push_back({p_.track_of(j), 0});
+      if (window[j].frame > frame && window[i].frame < frame)
+        offer(p_.track_of(j), p_.place_of(j), i, j);
     }
+    for (const std::int32_t k : p_.tracks().items())
+      if (k != own && window[p_.last(k)].frame < frame)
+        offer(k, p_.track(k).size(), p_.last(k), -1);
+    for (const std::int32_t k : p_.young().items())
+      if (k != own && window[node(k, 0)].frame > frame) offer(k, 0, -1, node(k, 0));
+    if (own >= 0) offer(own, p_.place_of(x), p_.before(x), p_.after(x));
   }
   bool draw_insertion(Random& random, Change<Filter>& q) {
     const std::int32_t x = draw_one(p_.free(), random, q);
@@ -354,9 +374,8 @@ class Moves {
     const std::int32_t own = p_.track_of(b);
     if (p_.track(own).n_gone + p_.place_of(b) < 2) return false;
     starts_.clear();
-    for (const std::int32_t i : p_.window().prev(b))
-      if (p_.track_of(i) >= 0 && p_.track_of(i) != own && p_.after(i) < 0)
-        starts_.push_back(p_.track_of(i));
+    for (const std::int32_t k : p_.tracks().items())
+      if (k != own && p_.window().is_linkable(p_.last(k), b)) starts_.push_back(k);
     if (starts_.empty()) return false;
     const std::int32_t other = draw_one(starts_, random, q);
     q.with = b;

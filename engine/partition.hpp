@@ -77,6 +77,8 @@ class Partition {
   const IndexSet& free() const { return free_; }
   const IndexSet& taken() const { return taken_; }
   const IndexSet& linked() const { return linked_; }
+  // Of these, the ones before which their track was missed in some frame.
+  const IndexSet& leapt() const { return leapt_; }
   // Tracks, and those of which nothing is frozen.
   const IndexSet& tracks() const { return all_; }
   const IndexSet& young() const { return young_; }
@@ -158,7 +160,10 @@ class Partition {
         free_.remove(i);
         if (!is_frozen(i)) {
           taken_.add(i);
-          if (t.size() > 0) linked_.add(i);
+          if (t.size() > 0) {
+            linked_.add(i);
+            if (window_[i].frame - window_[t.nodes.back()].frame > 1) leapt_.add(i);
+          }
         }
         t.nodes.push_back(i);
       }
@@ -173,6 +178,7 @@ class Partition {
         free_.remove(i);
         taken_.remove(i);
         linked_.remove(i);
+        leapt_.remove(i);
         const std::int32_t k = track_of_[i];
         if (k == kFree) track_of_[i] = kClutter;
         if (k < 0) continue;
@@ -210,6 +216,7 @@ class Partition {
       free_.reserve_up_to(n);
       taken_.reserve_up_to(n);
       linked_.reserve_up_to(n);
+      leapt_.reserve_up_to(n);
     }
     for (const std::int32_t i : ids) {
       track_of_[i] = kFree;
@@ -225,6 +232,7 @@ class Partition {
     track_of_[i] = kFree;
     taken_.remove(i);
     linked_.remove(i);
+    leapt_.remove(i);
     free_.add(i);
   }
   std::int32_t new_track() {
@@ -256,7 +264,7 @@ class Partition {
   std::int64_t frozen_ = -1;
   std::vector<Track> tracks_;
   std::vector<std::int32_t> unused_;
-  IndexSet free_, taken_, linked_, all_, young_;
+  IndexSet free_, taken_, linked_, leapt_, all_, young_;
   std::vector<std::int32_t> track_of_, place_;
   std::vector<State> state_;
   std::vector<double> score_;

@@ -305,7 +305,7 @@ def test_what_is_no_capture_is_refused():
 
 
 def test_points_too_dense_for_the_model_are_a_clear_limit(monkeypatch):
-    monkeypatch.setattr("asterism.associate.frame_by_frame.MAX_CANDIDATES", 1000)
+    monkeypatch.setattr("asterism.associate.engine_method.MAX_CANDIDATES", 1000)
     rng = np.random.default_rng(1)
     d = am.Detections.from_frames([0.0, 0.1], [rng.normal(0, 0.01, (200, 3)) for _ in range(2)])
     with pytest.raises(am.SolverLimit, match="limit of 1000"):

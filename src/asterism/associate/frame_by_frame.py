@@ -14,7 +14,8 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from asterism.associate.engine_method import MAX_CANDIDATES, EngineMethod
+from asterism.associate import engine_method
+from asterism.associate.engine_method import EngineMethod
 from asterism.errors import check_number
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ class FrameByFrame(EngineMethod):
             gate=float(chdtri(n_axes, self.gate_probability)),
             confirm_score=math.log(p / (1 - p)),
             delete_drop=math.log(self.delete_odds),
-            max_candidates=MAX_CANDIDATES,
+            max_candidates=engine_method.MAX_CANDIDATES,
         )
         return self._make(motion_model(model, n_axes), score_model(model), life)
 
