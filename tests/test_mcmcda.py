@@ -32,7 +32,7 @@ def test_the_window_s_best_partition_is_found():
         for k, path in enumerate(paths):
             tuples[k, d.frame_of[list(path)]] = path
         best = am.assign_multidimensional(tuples, scores).value
-        tracks = am.track(d, am.MCMCDA(window=5, moves=1000), model=model, seed=seed)
+        tracks = am.track(d, am.MCMCDA(window=5, moves=5000), model=model, seed=seed)
         assert tracks.info["log_posterior"] <= best + 1e-5
         n += 1
         n_best += tracks.info["log_posterior"] > best - 0.01
