@@ -158,12 +158,12 @@ class Chain {
       bool is_taken = false, is_any = false;
       std::vector<std::int64_t> after;
     } seen;
-    s.step([&](const Change<Filter>& q, double log_reverse, bool is_taken) {
+    s.step([&](const Change<Filter>& q, bool is_taken) {
       seen.move = static_cast<std::int64_t>(q.move);
       seen.with = q.with;
       if (q.with >= 0 && q.move != Move::update) seen.with = s.partition().window()[q.with].number;
       seen.log_forward = q.log_forward;
-      seen.log_reverse = log_reverse;
+      seen.log_reverse = q.log_reverse;
       seen.gain = q.gain;
       seen.is_taken = is_taken;
       seen.is_any = true;

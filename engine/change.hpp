@@ -22,8 +22,9 @@ enum class Move : std::int32_t {
   deletion,       // a detection of a track becomes free
   transfer,       // the tail of a track goes to the end of another
   replacement,    // a free detection stands in for one of a track in the same frame
+  exchange,       // two tracks change one detection of the same frame
 };
-inline constexpr int kMoves = 12;
+inline constexpr int kMoves = 13;
 
 inline constexpr Move inverse(Move move) {
   switch (move) {
@@ -45,7 +46,8 @@ struct Change {
   std::array<Edit<Filter>, 2> edits;
   std::int32_t n_edits = 0;
   double gain = 0;  // of the log posterior
-  double log_forward = 0;
+  double log_forward = 0, log_reverse = 0;
+  double log_ratio = 0;  // of Metropolis and Hastings: it is taken with so much probability, at most 1
   std::int32_t with = -1;  // what was drawn on the way: detections kept, or the detection at hand
 
   std::span<Edit<Filter>> all() { return {edits.data(), static_cast<std::size_t>(n_edits)}; }

@@ -1,4 +1,4 @@
-// The moves of MCMC data association (Oh, Russell & Sastry 2009; §4.2 of the report) and four more.
+// The moves of MCMC data association (Oh, Russell & Sastry 2009; §4.2 of the report) and five more.
 //
 // A move draws a new partition ω' from ω; `log_forward` is the log probability of having drawn just
 // that, log q(ω → ω'), and `log_reverse` that of the inverse move in ω', both without the share ξ of
@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "change.hpp"
@@ -72,6 +73,7 @@ class Moves {
         return -log(p_.free().size() + 1) - log(slots_.size());
       case Move::transfer:
       case Move::replacement:
+      case Move::exchange:
         return q.log_forward;
     }
     return Growth<Filter>::kNever;
@@ -118,6 +120,7 @@ class Moves {
       case Move::deletion: return draw_deletion(random, q);
       case Move::transfer: return draw_transfer(random, q);
       case Move::replacement: return draw_replacement(random, q);
+      case Move::exchange: return draw_exchange(random, q);
     }
     return false;
   }
@@ -344,14 +347,45 @@ class Moves {
     for (const std::int32_t y : window.frame(window[x].frame).ids)
       if (p_.is_free(y)) starts_.push_back(y);
     if (starts_.empty()) return false;
-    const std::int32_t y = draw_one(starts_, random, q), k = p_.track_of(x);
-    const std::int32_t i = p_.before(x), j = p_.after(x);
-    if ((i >= 0 && !window.is_linkable(i, y)) || (j >= 0 && !window.is_linkable(y, j))) return false;
+    const std::int32_t y = draw_one(starts_, random, q);
     q.with = x;
+    return replace(x, y, q);
+  }
+  // A free detection in the place of another; false where its neighbours forbid it.
+  bool replace(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
+    if (!fits_in_place_of(y, x)) return false;
+    const std::int32_t k = p_.track_of(x);
     Edit<Filter>& e = q.edit(k, p_.place_of(x));
     p_.append(e, y);
     append(e, k, p_.place_of(x) + 1);
     return true;
+  }
+
+  bool draw_exchange(Random& random, Change<Filter>& q) {
+    const std::int32_t x = draw_one(p_.taken(), random, q);
+    if (x < 0) return false;
+    starts_.clear();
+    for (const std::int32_t y : p_.window().frame(p_.window()[x].frame).ids)
+      if (y != x && p_.taken().has(y)) starts_.push_back(y);
+    if (starts_.empty()) return false;
+    q.with = x;
+    return exchange(x, draw_one(starts_, random, q), q);
+  }
+  // Each of two detections of one frame in the place of the other; false where neighbours forbid it.
+  bool exchange(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
+    if (!fits_in_place_of(y, x) || !fits_in_place_of(x, y)) return false;
+    for (const auto& [old, now] : {std::pair{x, y}, std::pair{y, x}}) {
+      const std::int32_t k = p_.track_of(old);
+      Edit<Filter>& e = q.edit(k, p_.place_of(old));
+      p_.append(e, now);
+      append(e, k, p_.place_of(old) + 1);
+    }
+    return true;
+  }
+  bool fits_in_place_of(std::int32_t y, std::int32_t x) const {
+    const DetectionWindow& window = p_.window();
+    const std::int32_t i = p_.before(x), j = p_.after(x);
+    return (i < 0 || window.is_linkable(i, y)) && (j < 0 || window.is_linkable(y, j));
   }
 
   const Partition<Filter>& p_;

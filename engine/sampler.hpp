@@ -63,8 +63,8 @@ class Sampler {
   const Partition<Filter>& partition() const { return partition_; }
   const std::array<MoveCounts, kMoves>& counts() const { return counts_; }
 
-  // One move; true where the partition changes. `seen(change, log of the reverse, is taken)` is
-  // called for what was weighed to the end.
+  // One move; true where the partition changes. `seen(change, is taken)` is called for what was
+  // weighed to the end.
   template <typename Seen>
   bool step(Seen&& seen) {
     const Shares& now = shares_[std::min(partition_.tracks().size(), 2)];
@@ -79,13 +79,13 @@ class Sampler {
     const int back = static_cast<int>(inverse(change_.move));
     const double log_u = std::log(random_.uniform());
     // A probability is at most 1: what is too little before the way back is weighed stays so.
-    double log_ratio = change_.gain + (best_gain_ - last_gain_) + then.log[back] -
-                       now.log[kind] - change_.log_forward;
-    if (!(log_ratio > log_u) && !is_traced_) return false;
-    const double log_reverse = moves_.log_reverse(change_);
-    log_ratio += log_reverse;
-    const bool is_taken = log_ratio > log_u;
-    seen(change_, log_reverse, is_taken);
+    change_.log_ratio = change_.gain + (best_gain_ - last_gain_) + then.log[back] -
+                        now.log[kind] - change_.log_forward;
+    if (!(change_.log_ratio > log_u) && !is_traced_) return false;
+    change_.log_reverse = moves_.log_reverse(change_);
+    change_.log_ratio += change_.log_reverse;
+    const bool is_taken = change_.log_ratio > log_u;
+    seen(std::as_const(change_), is_taken);
     if (!is_taken) return false;
     ++count.n_taken;
     if (opt_.is_ascent) {
@@ -104,7 +104,7 @@ class Sampler {
     return true;
   }
   bool step() {
-    return step([](const Change<Filter>&, double, bool) {});
+    return step([](const Change<Filter>&, bool) {});
   }
 
   // From here on the best partition is kept in mind; then the chain is put there.

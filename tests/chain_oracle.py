@@ -21,7 +21,7 @@ from asterism.model.compiled import (
 
 MOVES = (
     "birth", "death", "split", "merge", "extension", "reduction", "update", "switch", "insertion",
-    "deletion", "transfer", "replacement",
+    "deletion", "transfer", "replacement", "exchange",
 )  # fmt: skip
 INVERSE = {
     "birth": "death", "death": "birth", "split": "merge", "merge": "split",
@@ -234,6 +234,10 @@ class Oracle:
     def of_replacement(self, w, v, x):
         others = [y for y in self.free(w) if self.frame[y] == self.frame[x]]
         return -math.log(len(self.active_taken(w))) - math.log(len(others))
+
+    def of_exchange(self, w, v, x):
+        others = [y for y in self.active_taken(w) if self.frame[y] == self.frame[x]]
+        return -math.log(len(self.active_taken(w))) - math.log(len(others) - 1)
 
     def with_back(self, move: str, with_: int, w: Partition, v: Partition) -> int:
         """What the inverse move draws on the way."""

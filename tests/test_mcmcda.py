@@ -45,7 +45,7 @@ def test_a_crowd_is_explained_no_worse_than_by_any_other_method():
     more = []
     for seed in range(6):
         d, model = crowd(seed, spread=0.08).detections, crowd_model()
-        own = am.track(d, am.MCMCDA(moves=3000), model=model, seed=1).info["log_posterior"]
+        own = am.track(d, am.MCMCDA(moves=10_000), model=model, seed=1).info["log_posterior"]
         more.append(own - max(am.track(d, m, model=model).info["log_posterior"] for m in others))
     assert min(more) > -0.01
 

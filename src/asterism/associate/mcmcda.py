@@ -32,8 +32,9 @@ MOVES = (
     "deletion",
     "transfer",
     "replacement",
+    "exchange",
 )
-"""Kinds of moves; the last four are not the report's."""
+"""Kinds of moves; the last five are not the report's."""
 
 WEIGHTS: dict[str, dict[str, float]] = {
     "uniform": dict.fromkeys(MOVES, 1.0),
