@@ -113,9 +113,9 @@ class Chain {
   nb::list trace(std::int64_t n_moves) {
     nb::list out;
     visit([&](auto& s) {
-      s.trace(true);
+      s.weigh_above(-std::numeric_limits<double>::infinity());
       for (std::int64_t n = 0; n < n_moves; ++n) trace_one(s, out);
-      s.trace(false);
+      s.weigh_above(Sampler<OneMotion>::kOnlyWhatMayBeTaken);
     });
     return out;
   }

@@ -152,14 +152,11 @@ void bind_mcmc(nb::module_& module, const char* name) {
       .def(
           "__init__",
           [](Tracker* self, const MotionModel& model, const ScoreModel& score,
-             const ChainOptions& chain, std::int32_t window, double moves, double deadline,
-             bool has_assignment, std::uint64_t seed) {
-            require(window >= 1, "window: at least 1");
+             const ChainOptions& chain, const McmcOptions& options, std::uint64_t seed) {
             require((model.M == 1) == std::is_same_v<Filter, OneMotion>, "model: as many motions");
-            new (self) Tracker(model, score, chain,
-                               {window, moves, deadline, has_assignment}, seed);
+            new (self) Tracker(model, score, chain, options, seed);
           },
-          "model"_a, "score"_a, "chain"_a, nb::kw_only(), "window"_a, "moves"_a, "deadline"_a, "has_assignment"_a, "seed"_a);
+          "model"_a, "score"_a, "chain"_a, "options"_a, "seed"_a);
 }
 
 }  // namespace
@@ -185,8 +182,45 @@ void bind_trackers(nb::module_& module) {
       .def_ro("n_nodes", &FrameStats::n_nodes)
       .def_ro("gap", &FrameStats::gap)
       .def_ro("n_merged", &FrameStats::n_merged)
-      .def_ro("n_moves", &FrameStats::n_moves)
-      .def_ro("n_taken", &FrameStats::n_taken);
+      .def_ro("chain", &FrameStats::chain);
+
+  nb::class_<ChainStats>(module, "ChainStats")
+      .def_ro("n_search", &ChainStats::n_search)
+      .def_ro("n_sampled", &ChainStats::n_sampled)
+      .def_ro("n_walked", &ChainStats::n_walked)
+      .def_ro("n_sure", &ChainStats::n_sure)
+      .def_ro("n_cut", &ChainStats::n_cut)
+      .def_ro("n_doubtful", &ChainStats::n_doubtful)
+      .def_ro("rhat", &ChainStats::rhat)
+      .def_ro("ess", &ChainStats::ess)
+      // (drawn, possible, taken) of each kind of move.
+      .def_prop_ro("moves", [](const ChainStats& self) {
+        Owned<std::int64_t> out(kMoves * 3);
+        for (int k = 0; k < kMoves; ++k) {
+          out.data[3 * k] = self.moves[k].n_drawn;
+          out.data[3 * k + 1] = self.moves[k].n_possible;
+          out.data[3 * k + 2] = self.moves[k].n_taken;
+        }
+        return out.give({kMoves, 3});
+      }, nb::rv_policy::move);
+
+  nb::class_<McmcOptions>(module, "McmcOptions")
+      .def(
+          "__init__",
+          [](McmcOptions* self, std::int32_t window, double moves, double deadline,
+             bool has_assignment, double confidence, std::int32_t chains, std::int32_t threads,
+             std::int32_t split_by, double doubt, double distance, std::int32_t bonds,
+             double tolerance) {
+            require(window >= 1, "window: at least 1");
+            require(chains >= 1 && threads >= 1, "chains and threads: at least 1");
+            require(split_by >= 0 && split_by <= 3, "split_by: 0 to 3");
+            require(bonds == 0 || (bonds >= 2 && bonds <= 4), "bonds: 0, 2, 3 or 4");
+            new (self) McmcOptions{window, moves, deadline, has_assignment, confidence, chains,
+                                   threads, {static_cast<SplitBy>(split_by), doubt, distance},
+                                   {bonds, window, tolerance}};
+          },
+          nb::kw_only(), "window"_a, "moves"_a, "deadline"_a, "has_assignment"_a, "confidence"_a,
+          "chains"_a, "threads"_a, "split_by"_a, "doubt"_a, "distance"_a, "bonds"_a, "tolerance"_a);
 
   nb::class_<LifeOptions>(module, "LifeOptions")
       .def(

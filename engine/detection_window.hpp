@@ -30,11 +30,15 @@ class DetectionWindow {
     std::vector<Point> points;
     PointGrid grid;
   };
-  struct Frame {
-    double time = 0;
-    std::shared_ptr<const Places> places;
+  // How a track moves to a frame; shared as well.
+  struct Steps {
     MotionStep step;               // from the frame before
     std::vector<AxisStep> single;  // with one motion: from d frames before, at d - 1
+  };
+  struct Frame {
+    double time = 0;
+    std::shared_ptr<const Places> places;  // none in a part of a window
+    std::shared_ptr<const Steps> steps;
     std::vector<std::int32_t> ids;
   };
 
@@ -61,7 +65,12 @@ class DetectionWindow {
     const Frame& later = frame(frame_number);
     const Detection& a = detections_[i];
     const double reach = sm_.max_speed * (later.time - a.time) + sm_.speed_margin;
-    later.places->grid.within(a.y, reach, [&](std::int32_t k, double) { visit(later.ids[k]); });
+    if (later.places) {
+      later.places->grid.within(a.y, reach, [&](std::int32_t k, double) { visit(later.ids[k]); });
+      return;
+    }
+    for (const std::int32_t j : later.ids)
+      if (squared_distance(a.y, detections_[j].y, m_.axis.D) <= reach * reach) visit(j);
   }
 
   // The next frame, and the numbers of its detections in order of arrival.
@@ -69,7 +78,6 @@ class DetectionWindow {
                                     std::span<const Point> points, std::int64_t first_number) {
     Frame& frame = frames_.emplace_back();
     frame.time = time;
-    frame.step = step;
     const std::int64_t t = now();
     auto places = std::make_shared<Places>();
     places->points.assign(points.begin(), points.end());
@@ -91,8 +99,28 @@ class DetectionWindow {
       d.number = first_number + static_cast<std::int64_t>(k);
       frame.ids.push_back(id);
     }
-    if (m_.M == 1) compose(frame, t);
+    auto steps = std::make_shared<Steps>();
+    steps->step = step;
+    if (m_.M == 1) compose(*steps, t);
+    frame.steps = std::move(steps);
     return frame.ids;
+  }
+
+  // Becomes the part of a window that holds some of its detections, numbered here as they are given.
+  void take_part(const DetectionWindow& whole, std::span<const std::int32_t> ids) {
+    first_ = whole.first_;
+    frames_.resize(whole.frames_.size());
+    for (std::size_t t = 0; t < frames_.size(); ++t) {
+      frames_[t].time = whole.frames_[t].time;
+      frames_[t].steps = whole.frames_[t].steps;
+      frames_[t].ids.clear();
+    }
+    detections_.clear();
+    unused_.clear();
+    for (const std::int32_t i : ids) {
+      frames_[whole.detections_[i].frame - first_].ids.push_back(n_ids());
+      detections_.push_back(whole.detections_[i]);
+    }
   }
 
   // Forgets the oldest frame. Nothing may refer to its detections any more.
@@ -105,12 +133,12 @@ class DetectionWindow {
  private:
   // F and Q over d frames: x ↦ F₂ F₁ x, Q = F₂ Q₁ F₂ᵀ + Q₂. Noise of separate steps adds up; that of
   // one step over the whole time would not be the same.
-  void compose(Frame& frame, std::int64_t t) {
+  void compose(Steps& steps, std::int64_t t) const {
     const int n = m_.axis.n;
-    const AxisStep& last = frame.step.mode[0];
-    frame.single.push_back(last);
+    const AxisStep& last = steps.step.mode[0];
+    steps.single.push_back(last);
     for (int d = 2; d <= sm_.max_gap && t - d >= first_; ++d) {
-      const AxisStep& before = frames_[t - 1 - first_].single[d - 2];
+      const AxisStep& before = frames_[t - 1 - first_].steps->single[d - 2];
       AxisStep all;
       AxisMatrix FQ{};
       all.Q = last.Q;
@@ -123,7 +151,7 @@ class DetectionWindow {
       for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j)
           for (int k = 0; k < n; ++k) all.Q[i * n + j] += FQ[i * n + k] * last.F[j * n + k];
-      frame.single.push_back(all);
+      steps.single.push_back(all);
     }
   }
 

@@ -144,10 +144,10 @@ class Growth {
     int expected_gap = 0;
     for (const auto& [gap, j] : free_) {
       if (gap != expected_gap)
-        Filter::expect(p_.motion(), window, state, frame, gap, expected_, expected_gap);
+        p_.filter().expect(p_.motion(), window, state, frame, gap, expected_, expected_gap);
       expected_gap = gap;
       const double gain =
-          p_.gap_score(gap) + Filter::log_likelihood(expected_.prediction, window[j].y);
+          p_.gap_score(gap) + Filter::log_likelihood(p_.motion(), expected_, window[j].y);
       choices_.push_back(j);
       weights_.push_back(std::exp(std::min(gain, 500.0)) + opt_.floor);
       sum += weights_.back();
@@ -182,7 +182,7 @@ class Growth {
   const Partition<Filter>& p_;
   GrowthOptions opt_;
   std::int32_t own_ = -1, keep_ = 0;
-  Expected<State> expected_;
+  typename Filter::Expected expected_;
   std::vector<Follower> free_;
   std::vector<std::int32_t> choices_;
   std::vector<double> weights_;

@@ -11,6 +11,10 @@ class IndexSet {
   void reserve_up_to(std::int32_t n) {
     if (static_cast<std::int32_t>(where_.size()) < n) where_.resize(n, -1);
   }
+  void clear() {
+    items_.clear();
+    where_.assign(where_.size(), -1);
+  }
   std::int32_t size() const { return static_cast<std::int32_t>(items_.size()); }
   std::int32_t operator[](std::int32_t k) const { return items_[k]; }
   bool has(std::int32_t i) const { return where_[i] >= 0; }

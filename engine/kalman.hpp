@@ -68,15 +68,24 @@ inline AxisState begin_state(const AxisModel& m, const Point& y) {
   return s;
 }
 
-inline void predict(const AxisModel& m, const AxisStep& step, AxisState& s) {
+// The mean alone; `out` may be `s`.
+inline void predict_mean(const AxisModel& m, const AxisStep& step, const AxisState& s,
+                         AxisState& out) {
   with_states(m.n, [&](auto n_states) {
     constexpr int n = n_states;
     for (int d = 0; d < m.D; ++d) {
       AxisVector x{};
       for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) x[i] += step.F[i * n + j] * s.x[d][j];
-      s.x[d] = x;
+      out.x[d] = x;
     }
+  });
+}
+
+inline void predict(const AxisModel& m, const AxisStep& step, AxisState& s) {
+  predict_mean(m, step, s, s);
+  with_states(m.n, [&](auto n_states) {
+    constexpr int n = n_states;
     AxisMatrix FP{}, P = step.Q;
     for (int i = 0; i < n; ++i)
       for (int k = 0; k < n; ++k) {

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "chain_stats.hpp"
 #include "filter_tracks.hpp"
 #include "fresh.hpp"
 #include "gating.hpp"
@@ -71,7 +72,7 @@ struct FrameStats {
   std::int64_t n_hypotheses = 0, n_nodes = 0;
   double gap = 0;
   std::int64_t n_merged = 0;  // hypotheses that became part of a similar one
-  std::int64_t n_moves = 0, n_taken = 0;  // of a chain
+  ChainStats chain;
 
   void add(const FrameStats& next) {
     add_work(next);
@@ -98,8 +99,7 @@ struct FrameStats {
     n_nodes += next.n_nodes;
     gap = std::max(gap, next.gap);
     n_merged += next.n_merged;
-    n_moves += next.n_moves;
-    n_taken += next.n_taken;
+    chain.add(next.chain);
   }
 };
 

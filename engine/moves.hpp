@@ -37,10 +37,18 @@ class Moves {
     out.log_forward = 0;
     out.with = -1;
     if (!draw(random, out)) return false;
-    out.gain = 0;
-    for (const Edit<Filter>& e : out.all())
-      out.gain += p_.score_of(e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
+    weigh(out);
     return out.log_forward > Growth<Filter>::kNever;
+  }
+
+  // The moves at two given detections x and y of a list, which are their own inverses there: drawn as
+  // often in ω as in ω' while the list stays. False where they lead nowhere.
+  bool propose_at(std::int32_t x, std::int32_t y, bool is_one, Change<Filter>& out) const {
+    out.n_edits = 0;
+    out.log_forward = out.log_reverse = 0;
+    if (!(is_one ? trade(x, y, out) : swap_tails(x, y, out))) return false;
+    weigh(out);
+    return true;
   }
 
   double log_reverse(const Change<Filter>& q) {
@@ -80,6 +88,11 @@ class Moves {
   }
 
  private:
+  void weigh(Change<Filter>& q) const {
+    q.gain = 0;
+    for (const Edit<Filter>& e : q.all())
+      q.gain += p_.score_of(e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
+  }
   // Of counts, which are small for the most part.
   template <typename Count>
   static double log(Count n) {
@@ -370,6 +383,28 @@ class Moves {
     if (starts_.empty()) return false;
     q.with = x;
     return exchange(x, draw_one(starts_, random, q), q);
+  }
+  // Two detections of one frame, of which one at least is in a track, in each other's place.
+  bool trade(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
+    const bool has_x = p_.taken().has(x), has_y = p_.taken().has(y);
+    if (has_x && has_y) return exchange(x, y, q);
+    if (!has_x && !has_y) return false;
+    return has_x ? replace(x, y, q) : replace(y, x, q);
+  }
+  // Two tracks change what they have from x and from y on.
+  bool swap_tails(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
+    if (!p_.taken().has(x) || !p_.taken().has(y)) return false;
+    const std::int32_t k = p_.track_of(x), other = p_.track_of(y);
+    if (k == other) return false;
+    if (!fits_from(y, x) || !fits_from(x, y)) return false;
+    append(q.edit(k, p_.place_of(x)), other, p_.place_of(y));
+    append(q.edit(other, p_.place_of(y)), k, p_.place_of(x));
+    return true;
+  }
+  // Whether a track may go on with y in place of x; as its first y must not be its last.
+  bool fits_from(std::int32_t y, std::int32_t x) const {
+    const std::int32_t i = p_.before(x);
+    return i < 0 ? p_.after(y) >= 0 : p_.window().is_linkable(i, y);
   }
   // Each of two detections of one frame in the place of the other; false where neighbours forbid it.
   bool exchange(std::int32_t x, std::int32_t y, Change<Filter>& q) const {

@@ -9,7 +9,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "detection_window.hpp"
@@ -55,12 +57,18 @@ class Partition {
 
     std::int32_t size() const { return static_cast<std::int32_t>(nodes.size()); }
     std::int32_t whole_size() const { return n_gone + size(); }
+    // Place of the last that is settled, from which the rest goes on; 0 where nothing is.
+    std::int32_t first_open() const { return std::max(n_frozen - 1, 0); }
   };
 
   Partition(const MotionModel& m, const ScoreModel& sm)
-      : m_(m), sm_(sm), window_(m, sm), log_end_(log_end_table(sm, kEndTable)) {}
+      : Partition(m, sm, std::make_shared<const std::vector<double>>(log_end_table(sm, kEndTable))) {}
+
+  // One of the same model, with nothing in it.
+  Partition empty() const { return Partition(m_, sm_, log_end_); }
 
   const DetectionWindow& window() const { return window_; }
+  Filter& filter() const { return filter_; }  // it only remembers what it would give anyway
   const MotionModel& motion() const { return m_; }
   const ScoreModel& model() const { return sm_; }
 
@@ -99,7 +107,7 @@ class Partition {
   }
   double end_score(std::int32_t i) const {
     const std::int64_t left = window_.now() - window_[i].frame;
-    return log_end_[std::min(left, kEndTable)];
+    return (*log_end_)[std::min(left, kEndTable)];
   }
   double score_of(std::int32_t k) const {
     const std::int32_t i = last(k);
@@ -122,7 +130,7 @@ class Partition {
     Tail<Filter>& tail = edit.tail;
     State& state = tail.states.emplace_back();
     if (edit.keep == 0 && tail.nodes.empty()) {
-      state = Filter::begin(m_, window_[j].y);
+      state = filter_.begin(m_, window_[j].y, window_[j].frame);
       tail.scores.push_back(begin_score());
     } else {
       const bool is_first = tail.nodes.empty();
@@ -130,9 +138,8 @@ class Partition {
           is_first ? tracks_[edit.track].nodes[edit.keep - 1] : tail.nodes.back();
       const State& from = is_first ? state_[i] : tail.states[tail.states.size() - 2];
       const int gap = static_cast<int>(window_[j].frame - window_[i].frame);
-      Expected<State> expected;
-      Filter::expect(m_, window_, from, window_[i].frame, gap, expected);
-      const double gain = gap_score(gap) + Filter::take(m_, expected, window_[j].y, state);
+      filter_.expect(m_, window_, from, window_[i].frame, gap, expected_);
+      const double gain = gap_score(gap) + filter_.take(m_, expected_, window_[j].y, state);
       tail.scores.push_back((is_first ? score_[i] : tail.scores.back()) + gain);
     }
     tail.nodes.push_back(j);
@@ -153,19 +160,8 @@ class Partition {
       Track& t = tracks_[edit.track];
       for (std::size_t n = 0; n < edit.tail.nodes.size(); ++n) {
         const std::int32_t i = edit.tail.nodes[n];
-        track_of_[i] = edit.track;
-        place_[i] = t.size();
-        state_[i] = edit.tail.states[n];
-        score_[i] = edit.tail.scores[n];
         free_.remove(i);
-        if (!is_frozen(i)) {
-          taken_.add(i);
-          if (t.size() > 0) {
-            linked_.add(i);
-            if (window_[i].frame - window_[t.nodes.back()].frame > 1) leapt_.add(i);
-          }
-        }
-        t.nodes.push_back(i);
+        put(edit.track, i, edit.tail.states[n], edit.tail.scores[n]);
       }
       if (t.nodes.empty()) remove_track(edit.track);
     }
@@ -189,6 +185,85 @@ class Partition {
   }
   std::int64_t frozen() const { return frozen_; }
 
+  // Becomes the part of a partition that has some of its tracks and free detections: everything that
+  // is open of them, and of what is settled the last of each track.
+  void take_part(const Partition& whole, std::span<const std::int32_t> tracks,
+                 std::span<const std::int32_t> free) {
+    frozen_ = whole.frozen_;
+    origin_.clear();
+    for (const std::int32_t k : tracks) {
+      const Track& t = whole.tracks_[k];
+      origin_.insert(origin_.end(), t.nodes.begin() + t.first_open(), t.nodes.end());
+    }
+    origin_.insert(origin_.end(), free.begin(), free.end());
+    window_.take_part(whole.window_, origin_);
+    filter_.remember(window_);
+    clear(static_cast<std::int32_t>(origin_.size()));
+    std::int32_t i = 0;
+    for (const std::int32_t k : tracks) {
+      const Track& t = whole.tracks_[k];
+      const std::int32_t own = new_track();
+      tracks_[own].n_frozen = std::min(t.n_frozen, 1);
+      tracks_[own].n_gone = t.n_gone + t.first_open();
+      if (t.n_frozen > 0) young_.remove(own);
+      for (std::int32_t p = t.first_open(); p < t.size(); ++p, ++i)
+        adopt(own, i, whole.state_[t.nodes[p]], whole.score_[t.nodes[p]]);
+    }
+    for (; i < static_cast<std::int32_t>(origin_.size()); ++i) free_.add(i);
+  }
+  std::int32_t origin(std::int32_t i) const { return origin_[i]; }
+
+  // Takes over what a part, which was taken of these tracks, has come to.
+  void take_over(const Partition& part, std::span<const std::int32_t> tracks) {
+    std::unordered_map<std::int32_t, std::int32_t> by_first;
+    for (const std::int32_t k : tracks)
+      by_first[tracks_[k].nodes[tracks_[k].first_open()]] = k;
+    std::vector<Edit<Filter>> edits;
+    for (const std::int32_t p : part.all_.items()) {
+      const auto& nodes = part.tracks_[p].nodes;
+      Edit<Filter> edit;
+      std::size_t same = 0;
+      if (const auto at = by_first.find(part.origin_[nodes.front()]); at != by_first.end()) {
+        edit.track = at->second;
+        const Track& own = tracks_[edit.track];
+        edit.keep = own.first_open();
+        while (same < nodes.size() && edit.keep < own.size() &&
+               own.nodes[edit.keep] == part.origin_[nodes[same]]) {
+          ++same;
+          ++edit.keep;
+        }
+        by_first.erase(at);
+        if (same == nodes.size() && edit.keep == own.size()) continue;
+      }
+      for (; same < nodes.size(); ++same) {
+        edit.tail.nodes.push_back(part.origin_[nodes[same]]);
+        filter_.adopt(edit.tail.states.emplace_back(part.state_[nodes[same]]));
+        edit.tail.scores.push_back(part.score_[nodes[same]]);
+      }
+      edits.push_back(std::move(edit));
+    }
+    for (const std::int32_t k : tracks)
+      if (by_first.contains(tracks_[k].nodes[tracks_[k].first_open()])) edits.emplace_back().track = k;
+    apply(edits);
+  }
+
+  // Opens again all that is settled.
+  void thaw() {
+    frozen_ = window_.first() - 1;
+    for (const std::int32_t k : all_.items()) {
+      Track& t = tracks_[k];
+      t.n_frozen = 0;
+      if (t.n_gone == 0) young_.add(k);
+      for (const std::int32_t i : t.nodes) list(i);
+    }
+    for (std::int64_t t = window_.first(); t <= window_.now(); ++t)
+      for (const std::int32_t i : window_.frame(t).ids)
+        if (track_of_[i] < 0) {
+          track_of_[i] = kFree;
+          free_.add(i);
+        }
+  }
+
   // Forgets the oldest frame, which is settled.
   void drop_frame() {
     for (const std::int32_t i : window_.frame(window_.first()).ids) {
@@ -207,17 +282,7 @@ class Partition {
   std::span<const std::int32_t> add_frame(double time, const MotionStep& step,
                                           std::span<const Point> points, std::int64_t number) {
     const auto ids = window_.add(time, step, points, number);
-    const std::int32_t n = window_.n_ids();
-    if (static_cast<std::int32_t>(track_of_.size()) < n) {
-      track_of_.resize(n, kFree);
-      place_.resize(n);
-      state_.resize(n);
-      score_.resize(n);
-      free_.reserve_up_to(n);
-      taken_.reserve_up_to(n);
-      linked_.reserve_up_to(n);
-      leapt_.reserve_up_to(n);
-    }
+    reserve_up_to(window_.n_ids());
     for (const std::int32_t i : ids) {
       track_of_[i] = kFree;
       free_.add(i);
@@ -228,6 +293,50 @@ class Partition {
  private:
   static constexpr std::int64_t kEndTable = 4096;
 
+  Partition(const MotionModel& m, const ScoreModel& sm,
+            std::shared_ptr<const std::vector<double>> log_end)
+      : m_(m), sm_(sm), window_(m, sm), log_end_(std::move(log_end)) {}
+
+  void reserve_up_to(std::int32_t n) {
+    if (static_cast<std::int32_t>(track_of_.size()) >= n) return;
+    track_of_.resize(n, kFree);
+    place_.resize(n);
+    state_.resize(n);
+    score_.resize(n);
+    for (IndexSet* set : {&free_, &taken_, &linked_, &leapt_}) set->reserve_up_to(n);
+  }
+  // No tracks, and n detections of which nothing is known.
+  void clear(std::int32_t n) {
+    for (IndexSet* set : {&free_, &taken_, &linked_, &leapt_, &all_, &young_}) set->clear();
+    reserve_up_to(n);
+    std::fill_n(track_of_.begin(), n, kFree);
+    unused_.clear();
+    for (std::int32_t k = static_cast<std::int32_t>(tracks_.size()) - 1; k >= 0; --k) {
+      tracks_[k].nodes.clear();
+      unused_.push_back(k);
+    }
+  }
+
+  // A detection at the end of a track.
+  void put(std::int32_t k, std::int32_t i, const State& state, double score) {
+    track_of_[i] = k;
+    place_[i] = tracks_[k].size();
+    state_[i] = state;
+    score_[i] = score;
+    tracks_[k].nodes.push_back(i);
+    if (!is_frozen(i)) list(i);
+  }
+  void adopt(std::int32_t k, std::int32_t i, const State& state, double score) {
+    put(k, i, state, score);
+    filter_.adopt(state_[i]);
+  }
+  // Into the sets of what may change.
+  void list(std::int32_t i) {
+    taken_.add(i);
+    if (place_[i] == 0) return;
+    linked_.add(i);
+    if (window_[i].frame - window_[before(i)].frame > 1) leapt_.add(i);
+  }
   void release(std::int32_t i) {
     track_of_[i] = kFree;
     taken_.remove(i);
@@ -260,7 +369,7 @@ class Partition {
   MotionModel m_;
   ScoreModel sm_;
   DetectionWindow window_;
-  std::vector<double> log_end_;
+  std::shared_ptr<const std::vector<double>> log_end_;
   std::int64_t frozen_ = -1;
   std::vector<Track> tracks_;
   std::vector<std::int32_t> unused_;
@@ -268,6 +377,9 @@ class Partition {
   std::vector<std::int32_t> track_of_, place_;
   std::vector<State> state_;
   std::vector<double> score_;
+  mutable Filter filter_;
+  mutable typename Filter::Expected expected_{};  // while one is asked for
+  std::vector<std::int32_t> origin_;  // of a part: numbers of its detections in the whole
 };
 
 }  // namespace asterism

@@ -1,64 +1,170 @@
 // The state of a track after each of its detections, and what the next one adds to its score.
+//
+// A filter has a State, what it has Expected of a later frame, and
+//
+//   begin       the state after a track's first detection
+//   expect      what a state leads to after a gap
+//   center, radius, log_likelihood   of what is expected: where, how far around it the log
+//               likelihood is above some value, and the log likelihood of a point
+//   take        the state after a point that was expected
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <vector>
 
 #include "detection_window.hpp"
 #include "modes.hpp"
 
 namespace asterism {
 
-// What a track expects after a gap: where, how sharply, and the state it would have there.
-template <typename State>
-struct Expected {
-  State state;
-  Prediction prediction;
-};
-
-// `expect` may go on from what was expected after a shorter gap, `before`, of the same track.
-
 // One motion: the steps of a gap are taken at once.
-struct OneMotion {
-  using State = AxisState;
-  static State begin(const MotionModel& m, const Point& y) { return begin_state(m.axis, y); }
+//
+// Covariances depend on the pattern of detections alone, and a chain tries the same patterns again and
+// again. In a part they are remembered: a node is a pattern, and knows those that it leads to.
+class OneMotion {
+ public:
+  struct State : AxisState {
+    std::int32_t node = -1;  // of what is remembered
+  };
+  // What does not depend on where a track is: how sharply it is expected, and what a detection does.
+  struct Pattern {
+    double S = 0, log_peak = 0;
+    AxisVector K{};
+    AxisMatrix P{};
+  };
+  struct Expected {
+    AxisState state;
+    Point center{};
+    double S = 0, log_peak = 0;
+    std::int32_t node = -1;
+    Pattern own;  // where none is remembered
+  };
 
-  static void expect(const MotionModel& m, const DetectionWindow& window, const State& from,
-                     std::int64_t frame, int gap, Expected<State>& out, int = 0) {
-    out.state = from;
-    predict(m.axis, window.frame(frame + gap).single[gap - 1], out.state);
-    out.prediction.M = 1;
-    out.prediction.D = m.axis.D;
-    out.prediction.center = out.prediction.y[0] = observed(m.axis, out.state);
-    out.prediction.S[0] = innovation_variance(m.axis, out.state);
-    out.prediction.log_peak[0] = log_density(m.axis.D, out.prediction.S[0], 0);
+  // Forgets what was remembered, and remembers from now on, for frames from this one on.
+  void remember(const DetectionWindow& window) {
+    is_remembered_ = true;
+    first_ = window.first();
+    max_gap_ = window.max_gap();
+    roots_.assign(window.now() - first_ + 1, -1);
+    nodes_.clear();
+    next_.clear();
   }
-  static double log_likelihood(const Prediction& p, const Point& y) {
-    return p.log_peak[0] - 0.5 * squared_distance(y, p.y[0], p.D) / p.S[0];
+  // A state that comes from elsewhere.
+  void adopt(State& state) { state.node = is_remembered_ ? add({}) : -1; }
+
+  State begin(const MotionModel& m, const Point& y, std::int64_t frame) {
+    State state;
+    static_cast<AxisState&>(state) = begin_state(m.axis, y);
+    if (!is_remembered_) return state;
+    std::int32_t& root = roots_[frame - first_];
+    if (root < 0) root = add({});
+    state.node = root;
+    return state;
   }
-  static double take(const MotionModel& m, const Expected<State>& e, const Point& y, State& out) {
-    out = e.state;
-    update(m.axis, y, out);
-    return log_likelihood(e.prediction, y);
+
+  void expect(const MotionModel& m, const DetectionWindow& window, const State& from,
+              std::int64_t frame, int gap, Expected& out, int = 0) {
+    const AxisStep& step = window.frame(frame + gap).steps->single[gap - 1];
+    out.node = -1;
+    if (from.node >= 0) {
+      const std::size_t at = static_cast<std::size_t>(from.node) * max_gap_ + (gap - 1);
+      if (next_[at] < 0 && nodes_.size() < kMost) {
+        const std::int32_t node = add(pattern(m, step, from));
+        next_[at] = node;
+      }
+      out.node = next_[at];
+    }
+    if (out.node < 0) out.own = pattern(m, step, from);
+    const Pattern& known = pattern_of(out);
+    out.S = known.S;
+    out.log_peak = known.log_peak;
+    predict_mean(m.axis, step, from, out.state);
+    out.center = observed(m.axis, out.state);
   }
+
+  static const Point& center(const Expected& e) { return e.center; }
+  static double radius(const Expected& e, double log_likelihood) {
+    const double half = e.log_peak - log_likelihood;
+    return half < 0 ? -1 : std::sqrt(2 * e.S * half);
+  }
+  static double log_likelihood(const MotionModel& m, const Expected& e, const Point& y) {
+    return e.log_peak - 0.5 * squared_distance(y, e.center, m.axis.D) / e.S;
+  }
+  double take(const MotionModel& m, const Expected& e, const Point& y, State& out) const {
+    const Pattern& known = pattern_of(e);
+    static_cast<AxisState&>(out) = e.state;
+    for (int d = 0; d < m.axis.D; ++d)
+      for (int i = 0; i < m.axis.n; ++i) out.x[d][i] += known.K[i] * (y[d] - e.center[d]);
+    out.P = known.P;
+    out.node = e.node;
+    return log_likelihood(m, e, y);
+  }
+
+ private:
+  static constexpr std::size_t kMost = 1 << 16;
+
+  std::int32_t add(const Pattern& pattern) {
+    if (nodes_.size() >= kMost) return -1;
+    nodes_.push_back(pattern);
+    next_.resize(next_.size() + max_gap_, -1);
+    return static_cast<std::int32_t>(nodes_.size()) - 1;
+  }
+  const Pattern& pattern_of(const Expected& e) const {
+    return e.node >= 0 ? nodes_[e.node] : e.own;
+  }
+  static Pattern pattern(const MotionModel& m, const AxisStep& step, const AxisState& from) {
+    AxisState s = from;
+    predict(m.axis, step, s);
+    Pattern out;
+    out.S = innovation_variance(m.axis, s);
+    out.log_peak = log_density(m.axis.D, out.S, 0);
+    const KalmanGain gain(m.axis, s);
+    out.K = gain.K;
+    out.P = gain.P;
+    return out;
+  }
+
+  bool is_remembered_ = false;
+  std::int64_t first_ = 0;
+  int max_gap_ = 0;
+  std::vector<std::int32_t> roots_, next_;
+  std::vector<Pattern> nodes_;
 };
 
-// Several interacting motions, frame by frame.
-struct SeveralMotions {
+// Several interacting motions, frame by frame. What is expected after a gap may go on from what was
+// expected `before`, after a shorter one.
+class SeveralMotions {
+ public:
   using State = MotionState;
-  static State begin(const MotionModel& m, const Point& y) { return begin_state(m, y); }
+  struct Expected {
+    State state;
+    Prediction prediction;
+  };
 
+  void remember(const DetectionWindow&) {}
+  void adopt(State&) {}
+
+  static State begin(const MotionModel& m, const Point& y, std::int64_t) {
+    return begin_state(m, y);
+  }
   static void expect(const MotionModel& m, const DetectionWindow& window, const State& from,
-                     std::int64_t frame, int gap, Expected<State>& out, int before = 0) {
+                     std::int64_t frame, int gap, Expected& out, int before = 0) {
     if (before == 0) out.state = from;
-    for (int d = before + 1; d <= gap; ++d) predict(m, window.frame(frame + d).step, out.state);
+    for (int d = before + 1; d <= gap; ++d) predict(m, window.frame(frame + d).steps->step, out.state);
     out.prediction = Prediction(m, out.state);
   }
-  static double log_likelihood(const Prediction& p, const Point& y) {
-    std::array<double, kMaxModes> each{};
-    return p.log_likelihood(y, each);
+  static const Point& center(const Expected& e) { return e.prediction.center; }
+  static double radius(const Expected& e, double log_likelihood) {
+    return e.prediction.radius(std::numeric_limits<double>::infinity(), log_likelihood);
   }
-  static double take(const MotionModel& m, const Expected<State>& e, const Point& y, State& out) {
+  static double log_likelihood(const MotionModel&, const Expected& e, const Point& y) {
+    std::array<double, kMaxModes> each{};
+    return e.prediction.log_likelihood(y, each);
+  }
+  static double take(const MotionModel& m, const Expected& e, const Point& y, State& out) {
     out = e.state;
     return update(m, e.prediction, y, out);
   }

@@ -28,43 +28,32 @@ struct ChainOptions {
   bool is_ascent = false;
 };
 
-struct MoveCounts {
-  std::int64_t n_drawn = 0, n_possible = 0, n_taken = 0;
-};
-
 template <typename Filter>
 class Sampler {
  public:
   Sampler(const MotionModel& m, const ScoreModel& sm, const ChainOptions& options,
           std::uint64_t seed)
-      : partition_(m, sm), opt_(options), random_(seed) {
+      : Sampler(Partition<Filter>(m, sm), options, seed) {}
+  Sampler(Partition<Filter> partition, const ChainOptions& options, std::uint64_t seed)
+      : partition_(std::move(partition)), opt_(options), random_(seed) {
     for (int K = 0; K < 3; ++K) shares_[K] = shares(K);
   }
-  // The moves look at the partition beside them, so that they are made anew.
-  Sampler(const Sampler& o)
-      : partition_(o.partition_),
-        opt_(o.opt_),
-        random_(o.random_),
-        shares_(o.shares_),
-        counts_(o.counts_),
-        best_gain_(o.best_gain_),
-        last_gain_(o.last_gain_) {}
-  Sampler(Sampler&& o) noexcept
-      : partition_(std::move(o.partition_)),
-        opt_(o.opt_),
-        random_(o.random_),
-        shares_(o.shares_),
-        counts_(o.counts_),
-        best_gain_(o.best_gain_),
-        last_gain_(o.last_gain_) {}
+  Sampler(const Sampler&) = delete;  // the moves look at the partition beside them
   Sampler& operator=(const Sampler&) = delete;
 
   Partition<Filter>& partition() { return partition_; }
   const Partition<Filter>& partition() const { return partition_; }
   const std::array<MoveCounts, kMoves>& counts() const { return counts_; }
 
+  // Begins anew, with other random numbers.
+  void begin(std::uint64_t seed) {
+    random_ = Random(seed);
+    counts_ = {};
+    best_gain_ = last_gain_ = 0;
+  }
+
   // One move; true where the partition changes. `seen(change, is taken)` is called for what was
-  // weighed to the end.
+  // weighed to the end, before it is carried out.
   template <typename Seen>
   bool step(Seen&& seen) {
     const Shares& now = shares_[std::min(partition_.tracks().size(), 2)];
@@ -81,31 +70,35 @@ class Sampler {
     // A probability is at most 1: what is too little before the way back is weighed stays so.
     change_.log_ratio = change_.gain + (best_gain_ - last_gain_) + then.log[back] -
                         now.log[kind] - change_.log_forward;
-    if (!(change_.log_ratio > log_u) && !is_traced_) return false;
+    const bool is_weighed = change_.log_ratio > weighed_above_;
+    if (!(change_.log_ratio > log_u) && !is_weighed) return false;
     change_.log_reverse = moves_.log_reverse(change_);
     change_.log_ratio += change_.log_reverse;
-    const bool is_taken = change_.log_ratio > log_u;
-    seen(std::as_const(change_), is_taken);
-    if (!is_taken) return false;
-    ++count.n_taken;
-    if (opt_.is_ascent) {
-      last_gain_ = best_gain_ + change_.gain;
-      if (!(change_.gain > 0)) return false;
-      best_gain_ = last_gain_;
-    }
-    if (is_best_ && change_.gain < 0) {
-      save();
-      is_best_ = false;
-    }
-    partition_.apply(change_.all());
-    gain_ += change_.gain;
-    is_best_ = is_best_ || gain_ > most_ + kBetter;
-    most_ = std::max(most_, gain_);
-    return true;
+    const bool is_taken = take(log_u, is_weighed, seen);
+    count.n_taken += is_taken;
+    return is_taken;
   }
   bool step() {
     return step([](const Change<Filter>&, bool) {});
   }
+
+  // One move at two detections; see `Moves::propose_at`.
+  template <typename Seen>
+  bool step_at(std::int32_t x, std::int32_t y, bool is_one, Seen&& seen) {
+    if (!moves_.propose_at(x, y, is_one, change_)) return false;
+    change_.log_ratio = change_.gain;
+    return take(std::log(random_.uniform()), true, seen);
+  }
+  // What such a move would gain; -inf where it is impossible.
+  double gain_at(std::int32_t x, std::int32_t y, bool is_one) {
+    return moves_.propose_at(x, y, is_one, change_) ? change_.gain
+                                                    : -std::numeric_limits<double>::infinity();
+  }
+  Random& random() { return random_; }
+
+  // Since `begin_best`, what the partition has won, and the most of it.
+  double gain() const { return gain_; }
+  double most() const { return most_; }
 
   // From here on the best partition is kept in mind; then the chain is put there.
   void begin_best() {
@@ -139,10 +132,36 @@ class Sampler {
     gain_ = most_;
   }
 
-  // Weigh everything to the end, for whoever looks on.
-  void trace(bool is_traced) { is_traced_ = is_traced; }
+  // What has more than this log probability before the way back is weighed, is weighed to the end
+  // whether it will be taken or not, for whoever looks on.
+  void weigh_above(double log_p) { weighed_above_ = log_p; }
+  static constexpr double kOnlyWhatMayBeTaken = std::numeric_limits<double>::infinity();
 
  private:
+  template <typename Seen>
+  bool take(double log_u, bool is_weighed, Seen&& seen) {
+    const bool is_taken = change_.log_ratio > log_u;
+    change_.p_taken = !is_weighed             ? is_taken
+                      : change_.log_ratio >= 0 ? 1
+                                               : std::exp(change_.log_ratio);
+    seen(std::as_const(change_), is_taken);
+    if (!is_taken) return false;
+    if (opt_.is_ascent) {
+      last_gain_ = best_gain_ + change_.gain;
+      if (!(change_.gain > 0)) return false;
+      best_gain_ = last_gain_;
+    }
+    if (is_best_ && change_.gain < 0) {
+      save();
+      is_best_ = false;
+    }
+    partition_.apply(change_.all());
+    gain_ += change_.gain;
+    is_best_ = is_best_ || gain_ > most_ + kBetter;
+    most_ = std::max(most_, gain_);
+    return true;
+  }
+
   struct Shares {
     std::array<double, kMoves> upto{}, log{};
   };
@@ -196,7 +215,7 @@ class Sampler {
   std::array<MoveCounts, kMoves> counts_{};
   // Ascent: log posterior of the best partition and of the last one taken, less that at the start.
   double best_gain_ = 0, last_gain_ = 0;
-  bool is_traced_ = false;
+  double weighed_above_ = kOnlyWhatMayBeTaken;
 
   // Since `begin_best`: what was won, the most of it, whether it is as good here as it ever was; and
   // the tracks where it was best, if that is elsewhere.

@@ -72,9 +72,45 @@ class FrameStats:
     @property
     def n_merged(self) -> int: ...
     @property
-    def n_moves(self) -> int: ...
+    def chain(self) -> ChainStats: ...
+
+class ChainStats:
     @property
-    def n_taken(self) -> int: ...
+    def moves(self) -> NDArray[np.int64]: ...
+    @property
+    def n_search(self) -> int: ...
+    @property
+    def n_sampled(self) -> int: ...
+    @property
+    def n_walked(self) -> int: ...
+    @property
+    def n_sure(self) -> int: ...
+    @property
+    def n_cut(self) -> int: ...
+    @property
+    def n_doubtful(self) -> int: ...
+    @property
+    def rhat(self) -> float: ...
+    @property
+    def ess(self) -> float: ...
+
+class McmcOptions:
+    def __init__(
+        self,
+        *,
+        window: int,
+        moves: float,
+        deadline: float,
+        has_assignment: bool,
+        confidence: float,
+        chains: int,
+        threads: int,
+        split_by: int,
+        doubt: float,
+        distance: float,
+        bonds: int,
+        tolerance: float,
+    ) -> None: ...
 
 class LifeOptions:
     def __init__(
@@ -345,11 +381,7 @@ class _ChainTracker(_Tracker):
         model: MotionModel,
         score: ScoreModel,
         chain: ChainOptions,
-        *,
-        window: int,
-        moves: float,
-        deadline: float,
-        has_assignment: bool,
+        options: McmcOptions,
         seed: int,
     ) -> None: ...
 

@@ -56,6 +56,7 @@ PAIRS = (
     ("extension", "reduction"),
     ("insertion", "deletion"),
 )
+SPLITS = ("whole", "likelihood", "cells", "clusters")
 FLOOR = 1e-4
 """Least weight of a step of informed growth; to end in the last frame weighs 1."""
 
@@ -75,13 +76,35 @@ class MCMCDA(EngineMethod):
     Parameters
     ----------
     window : int
-        Frames until one is settled.
+        Frames until one is settled; 1 is the single-scan form.
     moves : float or None
-        Moves in a frame, for each of its detections (or each track, if these are more); None with a
-        `deadline` alone.
+        Moves in a frame, for each of its detections (or each track, if these are more) that is in
+        doubt; None with a `deadline` alone.
     deadline : float or None
         Seconds after the arrival of a frame at which the walk stops; then results depend on the
         machine, and ``info["moves"]`` says how far it came.
+    confidence : float
+        Moves for the confidence of labels, counted as above; 0 for none. A confidence is the share
+        of a walk in which a detection follows the one that it follows (the first of a track: in
+        which the next follows it; clutter: in which it is in no track).
+    chains : int
+        Walks beside each other in each frame: the best partition of all counts, and their
+        agreement tells whether they found the same confidence.
+    threads : int
+        Walks at the same time. The result does not depend on it.
+    groups : {"likelihood", "clusters", "cells", "whole"}
+        What is walked over apart: tracks and detections that no plausible link joins; that are
+        further than `distance` from each other; that are in different cells of space with that
+        edge, which are shifted by half a cell in every other frame; or nothing.
+    doubt : float
+        Nats. A link that is less plausible by more is not in doubt.
+    distance : float or None
+        Metres; for "clusters" and "cells" alone.
+    bonds : {0, 2, 3, 4}
+        Tracks that were seen in every frame of the window, so many of which kept their distances
+        two by two, are sure: the walk leaves them as they are. 0 for none.
+    bond_tolerance : float or None
+        Metres by which a distance that is kept may vary; by default 6√2 times the noise.
     proposal : {"informed", "uniform"}
         How moves lengthen a track: detections drawn by what they add to the score, or all alike
         with a fixed probability to stop, as in the report.
@@ -109,6 +132,14 @@ class MCMCDA(EngineMethod):
     window: int = 10
     moves: float | None = 25.0
     deadline: float | None = None
+    confidence: float = 25.0
+    chains: int = 1
+    threads: int = 1
+    groups: Literal["likelihood", "clusters", "cells", "whole"] = "likelihood"
+    doubt: float = 12.0
+    distance: float | None = None
+    bonds: Literal[0, 2, 3, 4] = 0
+    bond_tolerance: float | None = None
     proposal: Literal["informed", "uniform"] = "informed"
     move_weights: Literal["uniform", "report"] | Mapping[str, float] = "uniform"
     chain: Literal["metropolis", "ascent"] = "metropolis"
@@ -125,9 +156,18 @@ class MCMCDA(EngineMethod):
             raise ParameterError("moves", "a number, or a deadline beside it", "None")
         if self.deadline is not None:
             check_number("deadline", self.deadline, above=0)
+        check_number("confidence", self.confidence, above=0, closed=True)
+        check_number("chains", self.chains, above=1, below=1024, closed=True, integer=True)
+        check_number("threads", self.threads, above=1, below=1024, closed=True, integer=True)
+        check_number("doubt", self.doubt, above=0, closed=True)
+        if self.bond_tolerance is not None:
+            check_number("bond_tolerance", self.bond_tolerance, above=0)
+        if isinstance(self.bonds, bool) or self.bonds not in (0, 2, 3, 4):
+            raise ParameterError("bonds", "0, 2, 3 or 4", repr(self.bonds))
         for name, choices in (
             ("proposal", ("informed", "uniform")),
             ("chain", ("metropolis", "ascent")),
+            ("groups", SPLITS),
         ):
             if getattr(self, name) not in choices:
                 wanted = " or ".join(map(repr, choices))
@@ -135,6 +175,17 @@ class MCMCDA(EngineMethod):
         for name in ("first_rules", "assignment"):
             if not isinstance(getattr(self, name), bool):
                 raise ParameterError(name, "True or False", repr(getattr(self, name)))
+        is_by_distance = self.groups in ("clusters", "cells")
+        if self.distance is not None:
+            check_number("distance", self.distance, above=0)
+        if is_by_distance != (self.distance is not None):
+            wanted = "a length in metres" if is_by_distance else "none, or groups by distance"
+            raise ParameterError("distance", wanted, repr(self.distance))
+        if self.chain == "ascent" and self.confidence > 0:
+            raise ParameterError(
+                "confidence", "0 with the ascent", repr(self.confidence),
+                "only the metropolis chain samples",
+            )  # fmt: skip
         _checked_weights(self.move_weights)
 
     def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> Tracker:
@@ -150,29 +201,52 @@ class MCMCDA(EngineMethod):
             has_first_rules=self.first_rules,
             is_ascent=self.chain == "ascent",
         )
-        one = len(model.motion.modes) == 1
-        make = _engine.OneMotionTracker if one else _engine.SeveralMotionsTracker
-        return make(
-            motion_model(model, n_axes),
-            score_model(model),
-            chain,
+        options = _engine.McmcOptions(
             window=int(self.window),
             moves=math.inf if self.moves is None else self.moves,
             deadline=self.deadline or 0.0,
             has_assignment=self.assignment,
-            seed=_checked_seed(seed),
+            confidence=self.confidence,
+            chains=int(self.chains),
+            threads=int(self.threads),
+            split_by=SPLITS.index(self.groups),
+            doubt=self.doubt,
+            distance=self.distance or 0.0,
+            bonds=self.bonds,
+            tolerance=self.bond_tolerance or 6 * math.sqrt(2) * model.sensor.noise_sigma,
         )
+        is_one = len(model.motion.modes) == 1
+        make = _engine.OneMotionTracker if is_one else _engine.SeveralMotionsTracker
+        motion, score = motion_model(model, n_axes), score_model(model)
+        return make(motion, score, chain, options, _checked_seed(seed))
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
-        return {
+        chain = stats.chain
+        drawn, _, taken = chain.moves.T
+        about: dict[str, float] = {
             "tracks": stats.n_confirmed,
             "detections": stats.n_pending,
             "candidates": stats.n_candidates,
             "groups": stats.n_groups,
             "largest_group": stats.largest_group,
-            "moves": stats.n_moves,
-            "taken": stats.n_taken,
+            "groups_in_doubt": chain.n_walked,
+            "cut_links": chain.n_cut,
+            "moves": chain.n_search,
         }
+        about |= {
+            f"accepted_{move}": float(n / max(all_, 1))
+            for move, n, all_ in zip(MOVES, taken, drawn, strict=True)
+        }
+        if self.bonds:
+            about["sure_tracks"] = chain.n_sure
+        if self.confidence > 0:
+            about |= {
+                "confidence_moves": chain.n_sampled,
+                "rhat": chain.rhat,
+                "effective_samples": chain.ess,
+                "disagreements": chain.n_doubtful,
+            }
+        return about
 
 
 def _checked_seed(seed: int | None) -> int:

@@ -1,0 +1,40 @@
+// What a walk over partitions did, and whether it agrees with itself.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <limits>
+
+#include "move_kinds.hpp"
+
+namespace asterism {
+
+struct ChainStats {
+  std::array<MoveCounts, kMoves> moves{};
+  std::int64_t n_search = 0, n_sampled = 0;  // moves for the best partition, and for confidence
+  std::int64_t n_walked = 0;    // groups that were walked over, of all that were looked at
+  std::int64_t n_sure = 0;      // tracks that distance bonds kept out
+  std::int64_t n_cut = 0;       // plausible links between different groups, which none could take
+  std::int64_t n_doubtful = 0;  // detections of whose label halves or chains differ by over 0.1
+  double rhat = 1;              // of the log posterior, the worst
+  double ess = std::numeric_limits<double>::infinity();  // effective samples of it, the least
+
+  void add(const ChainStats& next) {
+    for (int k = 0; k < kMoves; ++k) {
+      moves[k].n_drawn += next.moves[k].n_drawn;
+      moves[k].n_possible += next.moves[k].n_possible;
+      moves[k].n_taken += next.moves[k].n_taken;
+    }
+    n_search += next.n_search;
+    n_sampled += next.n_sampled;
+    n_walked += next.n_walked;
+    n_sure += next.n_sure;
+    n_cut += next.n_cut;
+    n_doubtful += next.n_doubtful;
+    rhat = std::max(rhat, next.rhat);
+    ess = std::min(ess, next.ess);
+  }
+};
+
+}  // namespace asterism

@@ -1,0 +1,34 @@
+// The links of a window that are in doubt: which detection may follow which instead of what does now.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <vector>
+
+namespace asterism {
+
+class Doubts {
+ public:
+  struct Link {
+    std::int32_t from = 0, to = 0;
+  };
+
+  // The newest frame, of whose detections the links added from here on lead to one.
+  void add_frame() { frames_.emplace_back(); }
+  void add(std::int32_t from, std::int32_t to) { frames_.back().push_back({from, to}); }
+  // Forgets all but the newest frames.
+  void keep(std::size_t n_frames) {
+    while (frames_.size() > n_frames) frames_.pop_front();
+  }
+
+  template <typename Visit>
+  void each(Visit&& visit) const {
+    for (const std::vector<Link>& links : frames_)
+      for (const Link& link : links) visit(link.from, link.to);
+  }
+
+ private:
+  std::deque<std::vector<Link>> frames_;
+};
+
+}  // namespace asterism

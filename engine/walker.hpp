@@ -1,0 +1,216 @@
+// Chains that walk over a part of a partition: for the best of it, and for how probable it is.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "chain_stats.hpp"
+#include "marginals.hpp"
+#include "sampler.hpp"
+#include "split.hpp"
+
+namespace asterism {
+
+using Clock = std::chrono::steady_clock;
+
+// How long a walk may be: so many moves, and so much time.
+struct Budget {
+  std::int64_t moves = 0;
+  Clock::time_point until = Clock::time_point::max();
+
+  bool is_over(std::int64_t n) const {
+    return n >= moves || (until != Clock::time_point::max() && n % 16 == 0 && Clock::now() > until);
+  }
+};
+
+// What a chain found in its two halves.
+struct Halves {
+  static constexpr int kN = 2;
+  std::vector<std::int32_t> detections;      // in the whole
+  std::array<std::vector<double>, kN> shares;  // in which they follow what they follow
+  std::array<double, kN> mean{}, variance{};   // of the log posterior
+  double ess = 0;
+  std::int64_t n_moves = 0;
+};
+
+template <typename Filter>
+class Walker {
+ public:
+  Walker(Partition<Filter> empty, const ChainOptions& options)
+      : sampler_(std::move(empty), options, 0), marginals_(sampler_.partition()) {}
+
+  // Looks for the best; returns what it is better by than the start, and stays there.
+  double search(const Partition<Filter>& whole, const Group& group, std::uint64_t seed,
+                const Budget& budget, ChainStats& stats) {
+    sampler_.partition().take_part(whole, group.tracks, group.free);
+    sampler_.begin(seed);
+    sampler_.weigh_above(sampler_.kOnlyWhatMayBeTaken);
+    sampler_.begin_best();
+    std::int64_t n = 0;
+    for (; !budget.is_over(n); ++n) sampler_.step();
+    sampler_.restore_best();
+    stats.n_search += n;
+    add_counts(stats);
+    return sampler_.most();
+  }
+  const Partition<Filter>& partition() const { return sampler_.partition(); }
+
+  // How probable the partition is that it begins at.
+  void sample(const Partition<Filter>& whole, const Group& group, std::uint64_t seed, const Budget& budget, Halves& out, ChainStats& stats) {
+    Partition<Filter>& p = sampler_.partition();
+    p.take_part(whole, group.tracks, group.free);
+    sampler_.begin(seed);
+    sampler_.begin_best();
+    list_hot(group);
+    sampler_.weigh_above(kLookedAtAbove);
+    marginals_.begin();
+    out.detections.clear();
+    for (std::int32_t i = 0; i < p.window().n_ids(); ++i)
+      if (!p.is_frozen(i)) out.detections.push_back(p.origin(i));
+    // Halves of equal length, unless time runs out.
+    Trace trace;
+    const std::int64_t half = std::max<std::int64_t>(budget.moves / Halves::kN, 1);
+    out.n_moves = 0;
+    for (int h = 0; h < Halves::kN; ++h) {
+      marginals_.forget();
+      trace.begin(half);
+      const Budget own{half, budget.until};
+      std::int64_t n = 0;
+      for (; n == 0 || !own.is_over(n); ++n) {
+        step();
+        marginals_.count();
+        trace.add(sampler_.gain());
+      }
+      out.n_moves += n;
+      out.mean[h] = trace.mean();
+      out.variance[h] = trace.variance();
+      out.shares[h].clear();
+      for (std::int32_t i = 0; i < p.window().n_ids(); ++i)
+        if (!p.is_frozen(i)) out.shares[h].push_back(marginals_.share(i));
+    }
+    out.ess = trace.ess_of_halves(out.n_moves);
+    stats.n_sampled += out.n_moves;
+    add_counts(stats);
+  }
+
+ private:
+  // Moves less probable than this before the way back is weighed need not be known when refused.
+  static constexpr double kLookedAtAbove = -9;
+  // So often a hot pair is drawn, where there is any.
+  static constexpr double kHotShare = 0.5;
+
+  // The log posterior along a walk: mean, variance, and from the means of batches how many
+  // independent draws it is worth.
+  class Trace {
+   public:
+    void begin(std::int64_t n) {
+      batch_ = std::max<std::int64_t>(n / kBatches, 1);
+      n_ = in_batch_ = 0;
+      sum_ = sum2_ = batch_sum_ = 0;
+    }
+    void add(double x) {
+      ++n_;
+      sum_ += x;
+      sum2_ += x * x;
+      batch_sum_ += x;
+      if (++in_batch_ < batch_) return;
+      means_.push_back(batch_sum_ / static_cast<double>(batch_));
+      batch_sum_ = 0;
+      in_batch_ = 0;
+    }
+    double mean() const { return sum_ / static_cast<double>(n_); }
+    double variance() const {
+      return std::max(sum2_ / static_cast<double>(n_) - mean() * mean(), 0.0);
+    }
+    double ess_of_halves(std::int64_t n) const {
+      double mean = 0, between = 0;
+      for (const double x : means_) mean += x / static_cast<double>(means_.size());
+      for (const double x : means_) between += (x - mean) * (x - mean);
+      between /= std::max<double>(static_cast<double>(means_.size()) - 1, 1);
+      const double all = variance();
+      if (!(between > 0) || !(all > 0)) return static_cast<double>(n);
+      return std::min(static_cast<double>(n), static_cast<double>(n) * all /
+                                                  (static_cast<double>(batch_) * between));
+    }
+
+   private:
+    static constexpr std::int64_t kBatches = 10;
+    std::vector<double> means_;
+    std::int64_t batch_ = 1, n_ = 0, in_batch_ = 0;
+    double sum_ = 0, sum2_ = 0, batch_sum_ = 0;
+  };
+
+  // Two detections at which tracks may change what they have: all that follows, or them alone.
+  struct HotPair {
+    std::int32_t x = 0, y = 0;
+    bool is_one = false;
+    double upto = 0;
+  };
+
+  void step() {
+    const auto seen = [&](const Change<Filter>& change, bool is_taken) {
+      marginals_.weigh(change, is_taken);
+    };
+    if (hot_.empty() || sampler_.random().uniform() >= kHotShare) {
+      sampler_.step(seen);
+      return;
+    }
+    const double at = sampler_.random().uniform() * hot_.back().upto;
+    const auto pair = std::upper_bound(hot_.begin(), hot_.end(), at,
+                                       [](double a, const HotPair& p) { return a < p.upto; });
+    sampler_.step_at(pair->x, pair->y, pair->is_one, seen);
+  }
+
+  // The links in doubt of this part. That a pair is drawn as often any time before and after makes
+  // its move exact; how often is free.
+  void list_hot(const Group& group) {
+    const Partition<Filter>& p = sampler_.partition();
+    const std::int32_t n = p.window().n_ids();
+    for (std::int32_t i = 0; i < n; ++i) {
+      if (static_cast<std::int32_t>(local_.size()) <= p.origin(i)) local_.resize(p.origin(i) + 1, -1);
+      local_[p.origin(i)] = i;
+    }
+    const auto local = [&](std::int32_t i) {
+      return i < static_cast<std::int32_t>(local_.size()) ? local_[i] : -1;
+    };
+    hot_.clear();
+    for (const auto& [from, to] : group.doubts) {
+      const std::int32_t a = local(from), y = local(to);
+      if (a < 0 || y < 0 || p.track_of(a) < 0) continue;
+      const std::int32_t x = p.after(a);
+      if (x < 0 || x == y || p.is_frozen(x)) continue;
+      add_hot(x, y, false);
+      if (p.window()[x].frame == p.window()[y].frame) add_hot(x, y, true);
+    }
+    for (std::int32_t i = 0; i < n; ++i) local_[p.origin(i)] = -1;
+  }
+  void add_hot(std::int32_t x, std::int32_t y, bool is_one) {
+    const double gain = sampler_.gain_at(x, y, is_one);
+    if (gain < -kHotWithin) return;
+    const double before = hot_.empty() ? 0 : hot_.back().upto;
+    hot_.push_back({x, y, is_one, before + std::exp(std::min(gain, 0.0) / 4)});
+  }
+  static constexpr double kHotWithin = 12;
+
+  void add_counts(ChainStats& stats) const {
+    for (int k = 0; k < kMoves; ++k) {
+      stats.moves[k].n_drawn += sampler_.counts()[k].n_drawn;
+      stats.moves[k].n_possible += sampler_.counts()[k].n_possible;
+      stats.moves[k].n_taken += sampler_.counts()[k].n_taken;
+    }
+  }
+
+  Sampler<Filter> sampler_;
+  Marginals<Filter> marginals_;
+  std::vector<HotPair> hot_;
+  std::vector<std::int32_t> local_;
+};
+
+}  // namespace asterism
