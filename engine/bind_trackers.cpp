@@ -1,4 +1,5 @@
 // The trackers as Python sees them: how each is made, and what it alone can tell.
+#include <nanobind/stl/function.h>
 #include <nanobind/stl/tuple.h>
 
 #include <map>
@@ -145,6 +146,38 @@ nb::list clusters(const TreeTracker<HypothesisMatrix>& tracker) {
   return out;
 }
 
+// Walks over all that a tracker has seen, and writes its labels. Between two calls of `goes_on`, with
+// the share that is done, no Python runs; what it raises ends the walk.
+template <typename Tracker>
+void finish(Tracker& tracker, Labels labels, Confidence confidence,
+            const std::function<bool(double)>& goes_on) {
+  require(static_cast<std::int64_t>(labels.size()) >= tracker.n_seen(),
+          "labels: one for every detection so far");
+  require(!tracker.has_confidence() ||
+              static_cast<std::int64_t>(confidence.size()) >= tracker.n_seen(),
+          "confidence: one for every detection so far");
+  std::optional<nb::python_error> raised;
+  {
+    nb::gil_scoped_release release;
+    tracker.finish(
+        [&](std::int64_t detection, std::int64_t id, double p) {
+          labels.data()[detection] = id;
+          if (tracker.has_confidence()) confidence.data()[detection] = p;
+        },
+        [&](double share) {
+          nb::gil_scoped_acquire acquire;
+          try {
+            if (PyErr_CheckSignals() != 0) throw nb::python_error();
+            return goes_on(share);
+          } catch (nb::python_error& error) {
+            raised.emplace(std::move(error));
+            return false;
+          }
+        });
+  }
+  if (raised) throw std::move(*raised);
+}
+
 template <typename Filter>
 void bind_mcmc(nb::module_& module, const char* name) {
   using Tracker = McmcTracker<Filter>;
@@ -156,7 +189,14 @@ void bind_mcmc(nb::module_& module, const char* name) {
             require((model.M == 1) == std::is_same_v<Filter, OneMotion>, "model: as many motions");
             new (self) Tracker(model, score, chain, options, seed);
           },
-          "model"_a, "score"_a, "chain"_a, "options"_a, "seed"_a);
+          "model"_a, "score"_a, "chain"_a, "options"_a, "seed"_a)
+      .def("start_from",
+           [](Tracker& self, const In<std::int64_t>& labels) {
+             self.start_from({labels.data(), labels.data() + labels.size()});
+           },
+           "labels"_a)
+      .def("finish", &finish<Tracker>, "labels"_a.noconvert(), "confidence"_a.noconvert(),
+           "goes_on"_a);
 }
 
 }  // namespace
@@ -190,6 +230,8 @@ void bind_trackers(nb::module_& module) {
       .def_ro("n_walked", &ChainStats::n_walked)
       .def_ro("n_sure", &ChainStats::n_sure)
       .def_ro("n_cut", &ChainStats::n_cut)
+      .def_ro("n_given", &ChainStats::n_given)
+      .def_ro("n_refused", &ChainStats::n_refused)
       .def_ro("n_doubtful", &ChainStats::n_doubtful)
       .def_ro("rhat", &ChainStats::rhat)
       .def_ro("ess", &ChainStats::ess)
@@ -207,7 +249,7 @@ void bind_trackers(nb::module_& module) {
   nb::class_<McmcOptions>(module, "McmcOptions")
       .def(
           "__init__",
-          [](McmcOptions* self, std::int32_t window, double moves, double deadline,
+          [](McmcOptions* self, std::int32_t window, bool is_whole, double moves, double deadline,
              bool has_assignment, double confidence, std::int32_t chains, std::int32_t threads,
              std::int32_t split_by, double doubt, double distance, std::int32_t bonds,
              double tolerance) {
@@ -215,11 +257,11 @@ void bind_trackers(nb::module_& module) {
             require(chains >= 1 && threads >= 1, "chains and threads: at least 1");
             require(split_by >= 0 && split_by <= 3, "split_by: 0 to 3");
             require(bonds == 0 || (bonds >= 2 && bonds <= 4), "bonds: 0, 2, 3 or 4");
-            new (self) McmcOptions{window, moves, deadline, has_assignment, confidence, chains,
+            new (self) McmcOptions{window, is_whole, moves, deadline, has_assignment, confidence, chains,
                                    threads, {static_cast<SplitBy>(split_by), doubt, distance},
                                    {bonds, window, tolerance}};
           },
-          nb::kw_only(), "window"_a, "moves"_a, "deadline"_a, "has_assignment"_a, "confidence"_a,
+          nb::kw_only(), "window"_a, "is_whole"_a, "moves"_a, "deadline"_a, "has_assignment"_a, "confidence"_a,
           "chains"_a, "threads"_a, "split_by"_a, "doubt"_a, "distance"_a, "bonds"_a, "tolerance"_a);
 
   nb::class_<LifeOptions>(module, "LifeOptions")

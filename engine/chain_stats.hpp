@@ -16,6 +16,7 @@ struct ChainStats {
   std::int64_t n_walked = 0;    // groups that were walked over, of all that were looked at
   std::int64_t n_sure = 0;      // tracks that distance bonds kept out
   std::int64_t n_cut = 0;       // plausible links between different groups, which none could take
+  std::int64_t n_given = 0, n_refused = 0;  // links to start from; that the model or others forbade
   std::int64_t n_doubtful = 0;  // detections of whose label halves or chains differ by over 0.1
   double rhat = 1;              // of the log posterior, the worst
   double ess = std::numeric_limits<double>::infinity();  // effective samples of it, the least
@@ -31,6 +32,8 @@ struct ChainStats {
     n_walked += next.n_walked;
     n_sure += next.n_sure;
     n_cut += next.n_cut;
+    n_given += next.n_given;
+    n_refused += next.n_refused;
     n_doubtful += next.n_doubtful;
     rhat = std::max(rhat, next.rhat);
     ess = std::min(ess, next.ess);

@@ -28,14 +28,15 @@ enum class SplitBy : std::int32_t { whole, likelihood, cells, clusters };
 
 struct SplitOptions {
   SplitBy by = SplitBy::likelihood;
-  double doubt = 12;     // nats: links that are less probable than others by more are no doubt
+  double doubt = 10;     // nats: links that are less probable than others by more are no doubt
   double distance = 0;   // edge of a cell, or of what is in one cluster
 };
 
 struct Group {
   std::vector<std::int32_t> tracks, free;
   std::vector<Doubts::Link> doubts;
-  std::int32_t n_new = 0;  // detections of the newest frame
+  std::int64_t n_new = 0;   // tracks and free detections that are seen in the newest frame
+  std::int64_t n_open = 0;  // detections that are not settled
 };
 
 struct Split {
@@ -135,7 +136,13 @@ class Splitter {
       }
       Group& group = out.groups[group_of[root]];
       const Item& item = items_[n];
-      (item.track >= 0 ? group.tracks : group.free).push_back(item.track >= 0 ? item.track : item.detection);
+      if (item.track >= 0) {
+        group.tracks.push_back(item.track);
+        group.n_open += p_.track(item.track).size() - p_.track(item.track).n_frozen;
+      } else {
+        group.free.push_back(item.detection);
+        ++group.n_open;
+      }
       group.n_new += p_.window()[item.detection].frame == p_.window().now();
     }
     doubts.each([&](std::int32_t i, std::int32_t j) {

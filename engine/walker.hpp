@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -11,24 +10,13 @@
 #include <utility>
 #include <vector>
 
+#include "budgets.hpp"
 #include "chain_stats.hpp"
 #include "marginals.hpp"
 #include "sampler.hpp"
 #include "split.hpp"
 
 namespace asterism {
-
-using Clock = std::chrono::steady_clock;
-
-// How long a walk may be: so many moves, and so much time.
-struct Budget {
-  std::int64_t moves = 0;
-  Clock::time_point until = Clock::time_point::max();
-
-  bool is_over(std::int64_t n) const {
-    return n >= moves || (until != Clock::time_point::max() && n % 16 == 0 && Clock::now() > until);
-  }
-};
 
 // What a chain found in its two halves.
 struct Halves {
@@ -81,7 +69,7 @@ class Walker {
     for (int h = 0; h < Halves::kN; ++h) {
       marginals_.forget();
       trace.begin(half);
-      const Budget own{half, budget.until};
+      const Budget own{half, budget.until, budget.watch};
       std::int64_t n = 0;
       for (; n == 0 || !own.is_over(n); ++n) {
         step();

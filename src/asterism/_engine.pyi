@@ -88,6 +88,10 @@ class ChainStats:
     @property
     def n_cut(self) -> int: ...
     @property
+    def n_given(self) -> int: ...
+    @property
+    def n_refused(self) -> int: ...
+    @property
     def n_doubtful(self) -> int: ...
     @property
     def rhat(self) -> float: ...
@@ -99,6 +103,7 @@ class McmcOptions:
         self,
         *,
         window: int,
+        is_whole: bool,
         moves: float,
         deadline: float,
         has_assignment: bool,
@@ -383,6 +388,13 @@ class _ChainTracker(_Tracker):
         chain: ChainOptions,
         options: McmcOptions,
         seed: int,
+    ) -> None: ...
+    def start_from(self, labels: NDArray[np.int64]) -> None: ...
+    def finish(
+        self,
+        labels: NDArray[np.int64],
+        confidence: NDArray[np.float64],
+        goes_on: Callable[[float], bool],
     ) -> None: ...
 
 class OneMotionTracker(_ChainTracker): ...

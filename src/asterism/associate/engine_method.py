@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.associate.method import Method, Update, checked_frame
+from asterism.associate.method import Method, Update, checked_frame, refuse_start
 from asterism.errors import ParameterError, SolverLimit
 
 if TYPE_CHECKING:
@@ -148,14 +148,16 @@ class EngineMethod(Method[EngineState]):
         detections: Detections,
         *,
         progress: Callable[[int], Any] | None = None,
+        start: NDArray[np.int64] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; the same labels as the loop over `step`."""
         from asterism.model.compiled import steps_of
 
+        refuse_start(start)
         tracker = state.tracker.copy()
         times, offsets = detections.times, detections.offsets
-        start = tracker.n_seen
-        labels = np.full(start + detections.n_points, -1, dtype=np.int64)
+        first = tracker.n_seen
+        labels = np.full(first + detections.n_points, -1, dtype=np.int64)
         sure = np.zeros(len(labels) if tracker.has_confidence else 0)
         if detections.n_frames:
             checked_frame(float(times[0]), tracker.last_time, [], state.n_axes)
@@ -174,8 +176,8 @@ class EngineMethod(Method[EngineState]):
                 raise _too_many(error) from error
             if progress is not None:
                 progress(end)
-        confidence = sure[start:] if tracker.has_confidence else None
-        return replace(state, tracker=tracker), labels[start:], confidence
+        confidence = sure[first:] if tracker.has_confidence else None
+        return replace(state, tracker=tracker), labels[first:], confidence
 
 
 def _too_many(error: OverflowError) -> SolverLimit:

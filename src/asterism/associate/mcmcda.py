@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -13,9 +13,14 @@ from asterism.associate.engine_method import EngineMethod
 from asterism.errors import ParameterError, check_fields, check_number
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
     from asterism import _engine
-    from asterism.associate.engine_method import Tracker
-    from asterism.model import TrackingModel
+    from asterism.associate.engine_method import EngineState, Tracker
+    from asterism.associate.method import Update
+    from asterism.model import Detections, TrackingModel
 
 __all__ = ["MCMCDA", "MOVES"]
 
@@ -57,6 +62,8 @@ PAIRS = (
     ("insertion", "deletion"),
 )
 SPLITS = ("whole", "likelihood", "cells", "clusters")
+FIRST_PASS = 10
+"""Window of the pass over a whole take from which the walk over all of it begins."""
 FLOOR = 1e-4
 """Least weight of a step of informed growth; to end in the last frame weighs 1."""
 
@@ -75,8 +82,10 @@ class MCMCDA(EngineMethod):
 
     Parameters
     ----------
-    window : int
-        Frames until one is settled; 1 is the single-scan form.
+    window : int or None
+        Frames until one is settled; 1 is the single-scan form. None is for whole takes: when all
+        frames have come, everything is opened again and walked over, with `moves` for each
+        detection.
     moves : float or None
         Moves in a frame, for each of its detections (or each track, if these are more) that is in
         doubt; None with a `deadline` alone.
@@ -129,14 +138,14 @@ class MCMCDA(EngineMethod):
     8
     """
 
-    window: int = 10
+    window: int | None = 10
     moves: float | None = 25.0
     deadline: float | None = None
     confidence: float = 25.0
     chains: int = 1
     threads: int = 1
     groups: Literal["likelihood", "clusters", "cells", "whole"] = "likelihood"
-    doubt: float = 12.0
+    doubt: float = 10.0
     distance: float | None = None
     bonds: Literal[0, 2, 3, 4] = 0
     bond_tolerance: float | None = None
@@ -149,7 +158,10 @@ class MCMCDA(EngineMethod):
     name: ClassVar[str] = "mcmcda"
 
     def __post_init__(self) -> None:
-        check_number("window", self.window, above=1, closed=True, integer=True)
+        if self.window is not None:
+            check_number("window", self.window, above=1, closed=True, integer=True)
+        elif self.deadline is not None:
+            raise ParameterError("deadline", "none for a whole take", repr(self.deadline))
         if self.moves is not None:
             check_number("moves", self.moves, above=0, closed=True)
         elif self.deadline is None:
@@ -202,7 +214,8 @@ class MCMCDA(EngineMethod):
             is_ascent=self.chain == "ascent",
         )
         options = _engine.McmcOptions(
-            window=int(self.window),
+            window=FIRST_PASS if self.window is None else int(self.window),
+            is_whole=self.window is None,
             moves=math.inf if self.moves is None else self.moves,
             deadline=self.deadline or 0.0,
             has_assignment=self.assignment,
@@ -219,6 +232,54 @@ class MCMCDA(EngineMethod):
         make = _engine.OneMotionTracker if is_one else _engine.SeveralMotionsTracker
         motion, score = motion_model(model, n_axes), score_model(model)
         return make(motion, score, chain, options, _checked_seed(seed))
+
+    def step(
+        self, state: EngineState, time: float, points: ArrayLike
+    ) -> tuple[EngineState, Update]:
+        """Take the next frame; see `Method.step`."""
+        if self.window is None:
+            raise ParameterError("window", "a number of frames", "None", "a stream has no end")
+        return super().step(state, time, points)
+
+    def run(
+        self,
+        state: EngineState,
+        detections: Detections,
+        *,
+        progress: Callable[[int], Any] | None = None,
+        start: NDArray[np.int64] | None = None,
+    ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
+        """Take all frames in the engine; see `Method.run`."""
+        from asterism import _engine
+
+        tracker = state.tracker.copy()
+        assert isinstance(tracker, (_engine.OneMotionTracker, _engine.SeveralMotionsTracker))
+        if start is not None:
+            tracker.start_from(np.ascontiguousarray(start, dtype=np.int64))
+        state = replace(state, tracker=tracker)
+        if self.window is not None:
+            return super().run(state, detections, progress=progress)
+        T = detections.n_frames
+        n_before = state.n_seen
+
+        def tell(share: float) -> bool:
+            if progress is not None:
+                progress(int(T * share))
+            return True
+
+        # Most of the work comes after the last frame.
+        part = 1 / (1 + FIRST_PASS)
+        state, labels, sure = super().run(
+            state, detections, progress=lambda t: tell(part * t / max(T, 1))
+        )
+        labels = np.concatenate([np.full(n_before, -1, dtype=np.int64), labels])
+        confidence = np.zeros(len(labels) if sure is not None else 0)
+        tracker = state.tracker.copy()
+        assert isinstance(tracker, (_engine.OneMotionTracker, _engine.SeveralMotionsTracker))
+        tracker.finish(labels, confidence, lambda share: tell(part + (1 - part) * share))
+        tell(1.0)
+        state = replace(state, tracker=tracker)
+        return state, labels[n_before:], None if sure is None else confidence[n_before:]
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
         chain = stats.chain
@@ -237,6 +298,8 @@ class MCMCDA(EngineMethod):
             f"accepted_{move}": float(n / max(all_, 1))
             for move, n, all_ in zip(MOVES, taken, drawn, strict=True)
         }
+        if chain.n_given:
+            about |= {"given_links": chain.n_given, "refused_links": chain.n_refused}
         if self.bonds:
             about["sure_tracks"] = chain.n_sure
         if self.confidence > 0:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections, TrackingModel
 
-__all__ = ["Method", "MethodState", "Update", "checked_frame"]
+__all__ = ["Method", "MethodState", "Update", "checked_frame", "refuse_start"]
 
 
 class MethodState(Protocol):
@@ -123,6 +123,7 @@ class Method(ABC, Generic[State]):
         detections: Detections,
         *,
         progress: Callable[[int], Any] | None = None,
+        start: NDArray[np.int64] | None = None,
     ) -> tuple[State, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames of `detections`: the loop over `step`, with its revisions applied.
 
@@ -134,6 +135,8 @@ class Method(ABC, Generic[State]):
             The frames.
         progress : callable, optional
             Called now and then with the number of frames done.
+        start : ndarray of int, shape (N,), optional
+            Labels to start from, -1 for none; for methods that improve on what they are given.
 
         Returns
         -------
@@ -141,12 +144,13 @@ class Method(ABC, Generic[State]):
             The last state, the label of every detection (N,), and the confidences if the method
             has any.
         """
-        start = state.n_seen
-        labels = np.full(start + detections.n_points, -1, dtype=np.int64)
+        refuse_start(start)
+        first = state.n_seen
+        labels = np.full(first + detections.n_points, -1, dtype=np.int64)
         confidence: NDArray[np.float64] | None = None
         for t, (time, points) in enumerate(detections):
             state, update = self.step(state, time, points)
-            frame = slice(start + detections.offsets[t], start + detections.offsets[t + 1])
+            frame = slice(first + detections.offsets[t], first + detections.offsets[t + 1])
             labels[frame] = update.labels
             labels[update.revised] = update.revised_labels
             if update.confidence is not None:
@@ -157,7 +161,13 @@ class Method(ABC, Generic[State]):
                     confidence[update.revised] = update.revised_confidence
             if progress is not None:
                 progress(t + 1)
-        return state, labels[start:], None if confidence is None else confidence[start:]
+        return state, labels[first:], None if confidence is None else confidence[first:]
+
+
+def refuse_start(start: object) -> None:
+    """Raise `ParameterError` where there is something to start from."""
+    if start is not None:
+        raise ParameterError("start", "none", "labels", "only mcmcda begins with what it is given")
 
 
 def checked_frame(

@@ -14,6 +14,9 @@ from asterism.model.posterior import log_posterior
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy as np
+    from numpy.typing import NDArray
+
 __all__ = ["track"]
 
 
@@ -23,6 +26,7 @@ def track(
     *,
     model: TrackingModel | None = None,
     seed: int | None = None,
+    start: Tracks | None = None,
     progress: Callable[[int], Any] | None = None,
 ) -> Tracks:
     """Tell which detection is which marker.
@@ -37,6 +41,9 @@ def track(
         The model that is searched; estimated from the clip where none is given.
     seed : int, optional
         For the methods that draw.
+    start : Tracks, optional
+        Tracks of the same detections to begin with, the fragments of a file say; `MCMCDA` repairs
+        them by merging, splitting and switching.
     progress : callable, optional
         Called now and then with the number of frames done.
 
@@ -67,11 +74,21 @@ def track(
         model = estimate_model(detections).model
     _check_type("model", model, TrackingModel, "estimate_model(detections).model")
     state = method.init(model, n_axes=detections.n_axes, seed=seed)
-    state, labels, confidence = method.run(state, detections, progress=progress)
+    labels = None if start is None else _labels_of(start, detections)
+    state, labels, confidence = method.run(state, detections, progress=progress, start=labels)
     info = dict(state.info)
     tracks = Tracks(detections=detections, labels=labels, confidence=confidence, info=info)
     info["log_posterior"] = log_posterior(tracks, model)
     return tracks
+
+
+def _labels_of(start: Tracks, detections: Detections) -> NDArray[np.int64]:
+    _check_type("start", start, Tracks, "a Capture's tracks")
+    if len(start.labels) != detections.n_points:
+        raise ParameterError(
+            "start", f"labels of the same {detections.n_points} detections", len(start.labels)
+        )
+    return start.labels
 
 
 def _check_type(name: str, value: object, kind: type, hint: str) -> None:
