@@ -9,8 +9,8 @@ import pytest
 
 import asterism as am
 from chain_oracle import MOVES as MOVE_NAMES
-from partition_oracle import every_track, tiny_model, tiny_problem
-from scenes import crowd, small_model, wanderers
+from partition_oracle import every_partition, every_track, tiny_model, tiny_problem
+from scenes import calibration_in_crowds, crowd, small_model, wanderers
 
 
 def crowd_model():
@@ -100,15 +100,223 @@ def test_a_deadline_stops_the_walk_and_is_told():
     d, model = crowd(6, spread=0.05, n_frames=20).detections, crowd_model()
     method = am.MCMCDA(moves=None, deadline=0.005)
     state = method.init(model)
-    taken = []
+    taken, n_walked = [], 0
     for now, points in d:
         start = time.perf_counter()
         state, update = method.step(state, now, points)
         taken.append(time.perf_counter() - start)
-        assert update.info["moves"] > 0
+        assert (update.info["moves"] > 0) == (update.info["groups_in_doubt"] > 0)
+        n_walked += update.info["groups_in_doubt"] > 0
+    assert n_walked > 10
     assert np.median(taken) < 0.05
     both = am.track(d, am.MCMCDA(moves=10, deadline=10.0), model=model)
     assert both.info["moves"] == am.track(d, am.MCMCDA(moves=10), model=model).info["moves"]
+
+
+def test_confidence_is_the_share_of_the_posterior_in_which_a_detection_follows_the_same():
+    off, sure = [], []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        d, model = tiny_problem(rng, 5, 3, 2 + seed % 2), tiny_model(rng)
+        if not 6 <= d.n_points <= 11:
+            continue
+        partitions, totals = every_partition(d, model)
+        p = np.exp(totals - totals.max())
+        p /= p.sum()
+        for groups in ("whole", "likelihood"):
+            method = am.MCMCDA(window=5, moves=1000, confidence=60_000, groups=groups, doubt=20)
+            tracks = am.track(d, method, model=model, seed=seed)
+            before = predecessors(tracks.labels)
+            # Links to the last frame were asked for once: what is told is not yet a mean over frames.
+            for i in np.flatnonzero(d.frame_of == d.n_frames - 1):
+                if tracks.labels[i] >= 0 and before[i] < 0:
+                    continue
+                exact = sum(
+                    q for tracks_, q in zip(partitions, p, strict=True)
+                    if follows(tracks_, i) == before[i]
+                )  # fmt: skip
+                off.append(tracks.confidence[i] - exact)
+                sure.append(exact)
+    assert len(off) > 60
+    assert np.std(sure) > 0.1  # not a row of ones
+    assert np.max(np.abs(off)) < 0.04
+    assert np.sqrt(np.mean(np.square(off))) < 0.012
+
+
+def predecessors(labels):
+    """Of each detection, the one before in its track; -1 for the first, -2 in no track."""
+    last, before = {}, np.full(len(labels), -2)
+    for i, label in enumerate(labels.tolist()):
+        if label >= 0:
+            before[i] = last.get(label, -1)
+            last[label] = i
+    return before
+
+
+def follows(tracks, i):
+    for t in tracks:
+        if i in t:
+            return t[t.index(i) - 1] if t.index(i) else -1
+    return -2
+
+
+def test_confidence_tells_wrong_links():
+    c = calibration_in_crowds(am.MCMCDA())
+    assert c.ece < 0.02
+    assert c.auc > 0.85
+
+
+def test_neither_threads_nor_the_way_of_running_change_a_byte():
+    d, model = crowd(8, spread=0.1, n_frames=40).detections, crowd_model()
+    found = []
+    for threads in (1, 2, 3):
+        method = am.MCMCDA(moves=5, chains=2, threads=threads)
+        tracks = am.track(d, method, model=model, seed=5)
+        found.append((tracks.labels.tolist(), tracks.confidence.tolist(), dict(tracks.info)))
+    assert found[0] == found[1] == found[2]
+
+
+def test_chains_disagree_where_they_are_short_and_say_so():
+    d, model = crowd(9, spread=0.06, n_frames=40).detections, crowd_model()
+
+    def info(confidence):
+        method = am.MCMCDA(chains=4, confidence=confidence)
+        return am.track(d, method, model=model, seed=1).info
+
+    short, long = info(30), info(5000)
+    assert long["disagreements"] < short["disagreements"] / 2
+    assert 1 <= long["rhat"] < short["rhat"]
+    assert long["effective_samples"] > short["effective_samples"] >= 1
+    assert 0 < long["accepted_extension"] < 1
+
+
+def test_more_chains_find_no_worse():
+    d, model = crowd(2, spread=0.1, n_frames=60).detections, crowd_model()
+
+    def value(chains):
+        method = am.MCMCDA(moves=3, chains=chains, confidence=0)
+        return np.mean(
+            [am.track(d, method, model=model, seed=s).info["log_posterior"] for s in range(6)]
+        )
+
+    assert value(8) > value(1)
+
+
+def test_groups_that_nothing_joins_are_walked_apart():
+    near = crowd(3, spread=0.1, n_frames=40)
+    model = crowd_model()
+    frames = [np.concatenate([p, p + [5.0, 0, 0]]) for _, p in near.detections]
+    d = am.Detections.from_frames(near.detections.times, frames)
+    info = {}
+    for groups, distance in (
+        ("whole", None),
+        ("likelihood", None),
+        ("clusters", 1.5),
+        ("cells", 2.5),
+    ):
+        method = am.MCMCDA(moves=200, groups=groups, distance=distance)
+        info[groups] = am.track(d, method, model=model, seed=1).info
+    best = max(one["log_posterior"] for one in info.values())
+    assert all(one["log_posterior"] > best - 12 for one in info.values())
+    assert info["whole"]["groups"] == d.n_frames
+    assert info["likelihood"]["groups"] > info["clusters"]["groups"] > d.n_frames
+    assert info["whole"]["largest_group"] > info["clusters"]["largest_group"]
+    # The clusters are further apart than any link; cells cut some in two.
+    assert info["likelihood"]["cut_links"] == info["clusters"]["cut_links"] == 0
+    cut = am.track(d, am.MCMCDA(groups="cells", distance=0.2), model=model, seed=1).info
+    assert cut["cut_links"] > 0
+
+
+def test_tracks_that_keep_their_distances_are_sure():
+    truth = am.simulate.cube(frames=60, seed=3)
+    loose = wanderers(np.random.default_rng(1), n_frames=60, missing=0, clutter=0)
+    rigid = am.estimate_model(truth.detections).model
+    moves = {}
+    for bonds in (0, 2, 3, 4):
+        tracks = am.track(truth.detections, am.MCMCDA(bonds=bonds), model=rigid)
+        assert am.evaluate(tracks, truth).idf1 == 1
+        moves[bonds] = tracks.info.get("sure_tracks", 0)
+    # All eight from the frame on with which the window is full.
+    assert moves == {0: 0, 2: 8 * 51, 3: 8 * 51, 4: 8 * 51}
+    alone = am.track(loose.detections, am.MCMCDA(bonds=3), model=small_model())
+    assert alone.info["sure_tracks"] == 0
+
+
+def test_a_single_scan_at_a_time():
+    truth = wanderers(np.random.default_rng(4), n_frames=60)
+    method = am.MCMCDA(window=1, moves=100)
+    tracks = am.track(truth.detections, method, model=small_model(), seed=1)
+    assert am.evaluate(tracks, truth).idf1 > 0.95
+
+
+def broken(truth, rng, n_cuts=12, n_swaps=4):
+    """The truth cut into fragments, some of whose ends are another's."""
+    labels, frame = truth.labels.copy(), truth.detections.frame_of
+    for _ in range(n_swaps):
+        a, b = rng.choice(np.unique(truth.labels[truth.labels >= 0]), 2, replace=False)
+        late = frame >= rng.integers(10, frame[-1] - 10)
+        is_a, is_b = (labels == a) & late, (labels == b) & late
+        labels[is_a], labels[is_b] = b, a
+    for _ in range(n_cuts):
+        one = rng.choice(np.unique(labels[labels >= 0]))
+        late = frame >= rng.integers(5, frame[-1] - 5)
+        labels[(labels == one) & late] = labels.max() + 1
+    return am.Tracks(detections=truth.detections, labels=labels)
+
+
+@pytest.mark.parametrize("window", [10, None])
+def test_fragments_are_repaired(window):
+    truth = wanderers(np.random.default_rng(6), n_frames=80)
+    model = small_model()
+    start = broken(truth, np.random.default_rng(1))
+    assert am.evaluate(start, truth).idf1 < 0.8
+    method = am.MCMCDA(window=window, moves=100)
+    tracks = am.track(truth.detections, method, model=model, start=start, seed=1)
+    assert am.evaluate(tracks, truth).idf1 > 0.98
+    assert tracks.info["given_links"] > 300
+    assert tracks.info["refused_links"] < 30
+    # What it is given it does not throw away: with no move to spare it is what comes out.
+    few = am.MCMCDA(window=window, moves=0, confidence=0)
+    kept = am.track(truth.detections, few, model=model, start=truth)
+    assert am.evaluate(kept, am.floor(truth, model.population.max_gap)).idf1 > 0.99
+
+
+def test_a_start_is_for_those_who_can():
+    truth = wanderers(np.random.default_rng(6), n_frames=10)
+    with pytest.raises(am.ParameterError, match="mcmcda"):
+        am.track(truth.detections, am.GNN(), model=small_model(), start=truth)
+    other = wanderers(np.random.default_rng(7), n_frames=10)
+    with pytest.raises(am.ParameterError, match="same"):
+        am.track(truth.detections, am.MCMCDA(), model=small_model(), start=other)
+
+
+def test_a_whole_take_is_walked_over_in_the_end():
+    truth = crowd(4, spread=0.1, n_frames=60)
+    d, model = truth.detections, crowd_model()
+    method = am.MCMCDA(window=None, moves=200)
+    done = []
+    whole = am.track(d, method, model=model, seed=1, progress=done.append)
+    assert done == sorted(done)
+    assert done[-1] == d.n_frames
+    narrow = am.track(d, am.MCMCDA(window=3, moves=200), model=model, seed=1)
+    assert whole.info["log_posterior"] > narrow.info["log_posterior"]
+    assert whole.info["moves"] > 100 * d.n_points
+    assert ((whole.confidence > 0) & (whole.confidence <= 1)).all()
+    with pytest.raises(am.ParameterError, match="window"):
+        method.step(method.init(model), 0.0, d.points[:2])
+
+
+def test_a_walk_over_a_whole_take_can_be_interrupted():
+    d, model = crowd(4, spread=0.1, n_frames=60).detections, crowd_model()
+
+    def stop(t):
+        if t > d.n_frames // 2:
+            raise KeyboardInterrupt
+
+    start = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        am.track(d, am.MCMCDA(window=None, moves=5000), model=model, progress=stop)
+    assert time.perf_counter() - start < 60
 
 
 def test_weights_of_moves_by_name():
@@ -125,6 +333,12 @@ def test_weights_of_moves_by_name():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
+        ({"confidence": -1}, "confidence"), ({"chains": 0}, "chains"), ({"threads": 0}, "threads"),
+        ({"groups": "mine"}, "likelihood"), ({"groups": "cells"}, "distance"),
+        ({"distance": 1.0}, "distance"), ({"groups": "clusters", "distance": -1}, "distance"),
+        ({"doubt": -1}, "doubt"), ({"bonds": 1}, "bonds"), ({"bonds": True}, "bonds"),
+        ({"bonds": 2, "bond_tolerance": 0}, "bond_tolerance"),
+        ({"chain": "ascent"}, "confidence"), ({"window": None, "deadline": 1.0}, "deadline"),
         ({"window": 0}, "window"), ({"moves": -1}, "moves"), ({"moves": None}, "deadline"),
         ({"deadline": 0}, "deadline"), ({"proposal": "clever"}, "'informed' or 'uniform'"),
         ({"chain": "descent"}, "'metropolis' or 'ascent'"), ({"first_rules": 1}, "first_rules"),

@@ -124,13 +124,14 @@ class SMP(FrameByFrame):
         detections: Detections,
         *,
         progress: Callable[[int], Any] | None = None,
+        start: NDArray[np.int64] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; the same labels as the loop over `step`."""
         if self.strict and detections.n_frames:
             wanted = state.n_ids if state.tracker.n_frames else int(detections.counts[0])
             for t in np.flatnonzero(detections.counts != wanted):
                 _check_number(int(detections.counts[t]), wanted, f"in frame {t}")
-        return super().run(state, detections, progress=progress)
+        return super().run(state, detections, progress=progress, start=start)
 
 
 def _check_number(n: int, wanted: int, where: str) -> None:
