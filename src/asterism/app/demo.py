@@ -59,7 +59,8 @@ def demo(
         folder.mkdir(exist_ok=True)
         job = Job(
             source=out / "capture.c3d", sha256=sha256_of(out / "capture.c3d"), method=name,
-            options=resolved_method(name, [])[1], model=estimate.model, seed=seed, format="c3d",
+            options=resolved_method(name, [])[1], model=estimate.model, seed=seed, start=False,
+            format="c3d",
         )  # fmt: skip
         tracks, summary = carry_out(job, capture, folder / "tracked.c3d", folder)
         am.write(tracks, folder / "tracked.csv")

@@ -44,9 +44,7 @@ class Option:
     @property
     def type_text(self) -> str:
         """The type as people write it."""
-        if typing.get_origin(self.kind) is Literal:
-            return "|".join(map(str, typing.get_args(self.kind)))
-        return getattr(self.kind, "__name__", str(self.kind))
+        return _type_text(self.kind)
 
     def parse(self, text: str) -> Any:
         """Read a value of this option.
@@ -125,6 +123,17 @@ def parsed(owner: str, texts: Sequence[str], known: dict[str, Option]) -> dict[s
         check_fields(f"option of {owner}", [name], known)
         values[name] = known[name].parse(value.strip())
     return values
+
+
+def _type_text(kind: Any) -> str:
+    if typing.get_origin(kind) is Literal:
+        return "|".join(map(str, typing.get_args(kind)))
+    if typing.get_origin(kind) in (Union, types.UnionType):
+        # What can be typed: the first of them, and none.
+        inner = [k for k in typing.get_args(kind) if k is not type(None)]
+        is_optional = len(inner) < len(typing.get_args(kind))
+        return _type_text(inner[0]) + (" | None" if is_optional else "")
+    return getattr(kind, "__name__", str(kind))
 
 
 def _parse(name: str, kind: Any, text: str) -> Any:

@@ -39,6 +39,10 @@ log = logging.getLogger(__name__)
 FILES = CONFIG, LOG, SUMMARY = "run.toml", "log.txt", "summary.json"
 
 
+NONE = "none"
+"""How an option that is None is written, here as on the command line."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Job:
     """A tracking with everything decided.
@@ -57,6 +61,8 @@ class Job:
         The model.
     seed : int
         For the methods that draw.
+    start : bool
+        Whether to begin with the tracks that the capture carries.
     format : str
         Format of the result, a key of `asterism.io.FORMATS`.
     """
@@ -67,6 +73,7 @@ class Job:
     options: dict[str, Any]
     model: am.TrackingModel
     seed: int
+    start: bool
     format: str
 
     def to_toml(self) -> str:
@@ -80,8 +87,9 @@ class Job:
                 "method": {
                     "name": self.method,
                     "seed": self.seed,
-                    # TOML has no null: an option that is left out is None.
-                    "options": {k: v for k, v in self.options.items() if v is not None},
+                    "start": self.start,
+                    # TOML has no null.
+                    "options": {k: NONE if v is None else v for k, v in self.options.items()},
                 },
                 "model": self.model.to_dict(),
                 "versions": versions(),
@@ -109,7 +117,11 @@ class Job:
                 source=Path(_text(values, "input", "path")),
                 sha256=_text(values, "input", "sha256"),
                 method=_text(values, "method", "name"),
-                options=dict(_table(_table(values, "method"), "options")),
+                options={
+                    k: None if v == NONE else v
+                    for k, v in _table(_table(values, "method"), "options").items()
+                },
+                start=_table(values, "method").get("start", False) is True,
                 model=am.TrackingModel.from_dict(_table(values, "model")),
                 seed=_table(values, "method").get("seed", 0),
                 format=_text(values, "output", "format"),

@@ -41,6 +41,12 @@ _Model = Annotated[
     typer.Option(help="Model to use, TOML; by default it is estimated from the capture."),
 ]
 _Seed = Annotated[int | None, typer.Option(help="For methods that draw.", show_default="0")]
+_Start = Annotated[
+    bool,
+    typer.Option(
+        "--start", help="Begin with the tracks that IN carries, and repair them (mcmcda)."
+    ),
+]
 _Run = Annotated[
     Path | None,
     typer.Option(
@@ -65,6 +71,7 @@ def track(
     option: _Options = None,
     model: _Model = None,
     seed: _Seed = None,
+    start: _Start = False,
     run: _Run = None,
     overwrite: _Overwrite = False,
     repeat: _From = None,
@@ -84,6 +91,8 @@ def track(
 
         asterism track trial.c3d -o tracks.csv --model model.toml
 
+        asterism track pieces.c3d --method mcmcda --start
+
         asterism track trial.c3d --run runs/first
 
         asterism track --from runs/first/run.toml -o again.c3d
@@ -98,7 +107,8 @@ def track(
         check_folder(run, overwrite=overwrite)
     estimate: am.ModelEstimate | None = None
     if repeat is not None:
-        settings = {"--method": method, "--option": option, "--model": model, "--seed": seed}
+        settings = {"--method": method, "--option": option, "--model": model, "--seed": seed,
+                    "--start": start or None}  # fmt: skip
         given_too = [name for name, value in settings.items() if value not in (None, [])]
         job, capture = _repeated(repeat, source, given_too)
         job = dataclasses.replace(job, format=output_format(capture, out, format or job.format))
@@ -110,13 +120,15 @@ def track(
         given = None if model is None else _read_model(model)
         capture = am.read(source)
         chosen_format = output_format(capture, out, format)
+        if start and not (capture.labels >= 0).any():
+            raise ParameterError("--start", "a capture with tracks", f"none in {source}")
         if given is None:
             with progress("estimating the model"):
                 estimate = am.estimate_model(capture)
             given = estimate.model
         job = Job(
             source=source, sha256=sha256_of(source), method=name, options=options,
-            model=given, seed=seed or 0, format=chosen_format,
+            model=given, seed=seed or 0, start=start, format=chosen_format,
         )  # fmt: skip
     if out is None:
         out = default_output(job.source, job.format)

@@ -113,7 +113,10 @@ def _carry_out(job: Job, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
     method.init(job.model, n_axes=capture.n_axes)  # loads the engine, which is no time of tracking
     start = time.perf_counter()
     with progress(f"tracking with {job.method}", capture.n_frames) as advance:
-        tracks = am.track(capture, method, model=job.model, seed=job.seed, progress=advance)
+        tracks = am.track(
+            capture, method, model=job.model, seed=job.seed, progress=advance,
+            start=capture.tracks if job.start else None,
+        )  # fmt: skip
     seconds = time.perf_counter() - start
     if capture.n_points and not tracks.n_tracks:
         log.warning(
