@@ -109,8 +109,8 @@ def test_stopped_early(folder):
     ids=["finaliser", "weak reference"],
 )
 def test_a_signal_where_exceptions_are_lost(where):
-    # Imports hold such callbacks, so that any command may be stopped within one. Where the signal is
-    # lost, the command runs to its end.
+    # Imports hold such callbacks, so that any command may be stopped within one. Where the signal
+    # is lost, the command runs to its end.
     body = "".join(f"    {line}\n" for line in where.splitlines())
     script = (
         "import signal, sys, os, time\n"
