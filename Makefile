@@ -3,13 +3,13 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint types contracts docs bench tables sanitize wheel clean
+.PHONY: demo install test lint types contracts docs bench tables sanitize wheel clean
 
 demo: $(VENV)/.demo
 	$(BIN)/asterism demo --out demo --overwrite
 
 test: $(VENV)/.test
-	$(BIN)/python -m pytest --doctest-modules --doctest-continue-on-failure
+	$(BIN)/python -m pytest -n auto --doctest-modules --doctest-continue-on-failure
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff check .
@@ -44,7 +44,6 @@ tables: $(VENV)/.bench
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
 # beside the package, never installed.
 sanitize: $(VENV)/.test
-	$(BIN)/python -m pip install --quiet cmake ninja nanobind
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake -S . -B build/sanitize -G Ninja \
 	  -DASTERISM_SANITIZE=ON -DASTERISM_WERROR=ON -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
 	  -Dnanobind_DIR="$$($(BIN)/python -m nanobind --cmake_dir)"
@@ -58,19 +57,29 @@ wheel: $(VENV)/.python
 clean:
 	rm -rf $(VENV) build dist site demo
 
-# One stamp for each set of extras; a newer pyproject.toml or engine installs again.
+# One stamp for each set of extras; a newer pyproject.toml or engine installs again. What builds the
+# engine is in the environment: an isolated build would find it in another place each time and
+# compile everything again.
 SOURCES := pyproject.toml CMakeLists.txt $(wildcard engine/*)
+INSTALL := $(BIN)/python -m pip install --quiet --no-build-isolation --check-build-dependencies -e
 
 $(VENV)/.python:
 	$(PYTHON) -c 'import sys; sys.exit("asterism needs Python 3.11 or newer: set PYTHON=python3.x") if sys.version_info < (3, 11) else None'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet cmake nanobind ninja scikit-build-core
 	touch $@
 
 $(VENV)/.demo: $(VENV)/.python $(SOURCES)
-	$(BIN)/python -m pip install --quiet -e .
+	$(INSTALL) .
 	touch $@
 
 $(VENV)/.%: $(VENV)/.python $(SOURCES)
-	$(BIN)/python -m pip install --quiet -e '.[$*]'
+	$(INSTALL) '.[$*]'
 	touch $@
+
+# What the checks need, at once: quicker than each by itself.
+CHECKS := demo test lint docs
+install: $(VENV)/.python
+	$(INSTALL) '.[test,lint,docs]'
+	touch $(CHECKS:%=$(VENV)/.%)

@@ -37,18 +37,16 @@ def report_radial(lens: am.ReportRadial, x: float, y: float) -> tuple[float, flo
 def first_triangle(center: Any, point: Any, triangles: Any, clearance: float = 1e-6) -> int:
     """The nearest triangle between a camera and a point (Möller and Trumbore), or -1."""
     d = point - center
-    best, nearest = -1, 1 - clearance / np.linalg.norm(d)
-    for i, (a, b, c) in enumerate(triangles):
-        p = np.cross(d, c - a)
-        det = (b - a) @ p
-        if abs(det) < 1e-300:
-            continue
-        u = (center - a) @ p / det
-        q = np.cross(center - a, b - a)
-        v, s = d @ q / det, (c - a) @ q / det
-        if u >= 0 and v >= 0 and u + v <= 1 and 0 < s < nearest:
-            best, nearest = i, s
-    return best
+    a, b, c = np.moveaxis(np.asarray(triangles), 1, 0)
+    p, q = np.cross(d, c - a), np.cross(center - a, b - a)
+    det = ((b - a) * p).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a ray along a triangle does not meet it
+        u = ((center - a) * p).sum(axis=1) / det
+        v, s = q @ d / det, ((c - a) * q).sum(axis=1) / det
+    before = 1 - clearance / np.linalg.norm(d)
+    is_within = (np.abs(det) >= 1e-300) & (u >= 0) & (v >= 0) & (u + v <= 1)
+    is_hit = is_within & (s > 0) & (s < before)
+    return int(np.argmin(np.where(is_hit, s, np.inf))) if is_hit.any() else -1
 
 
 def capsule_entry(center: Any, direction: Any, ends: Any, radius: float, until: float) -> float:

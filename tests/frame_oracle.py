@@ -6,12 +6,19 @@ It shares nothing with the engine but the definitions: what a gain is, when a tr
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import chi2
 
 import asterism as am
+
+
+@cache
+def step_of(mode: am.Motion, dt: float):
+    """F and Q of one motion over a time; asked for again and again."""
+    return mode.transition(dt)[0], mode.process_noise(dt)[0]
 
 
 class OneTrack:
@@ -42,7 +49,7 @@ class OneTrack:
                 share[a] * (self.P[a] + (self.x[a] - mean).T @ (self.x[a] - mean) / D)
                 for a in range(len(self.modes))
             )
-            F, Q = mode.transition(dt)[0], mode.process_noise(dt)[0]
+            F, Q = step_of(mode, dt)
             mixed_x.append(mean @ F.T)
             mixed_P.append(F @ P @ F.T + Q)
         self.x, self.P, self.w = mixed_x, mixed_P, prior
@@ -61,8 +68,11 @@ class OneTrack:
         return bool((e2 <= gate * self.S).any())
 
     def distance(self, y) -> float:
+        return float(self.distances(y[None])[0])
+
+    def distances(self, points) -> np.ndarray:
         expected = sum(w * x @ self.h for w, x in zip(self.w, self.x, strict=True))
-        return float(((y - expected) ** 2).sum())
+        return ((points - expected) ** 2).sum(axis=1)
 
     def update(self, y) -> None:
         each = self.densities(y)
@@ -93,8 +103,9 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
             reach = p.max_speed * (now - track.last_time) + 6 * s.noise_sigma
             odds = track.odds
             missed = odds(miss) + leftover
-            for j, y in enumerate(points):
-                if np.linalg.norm(y - track.last) > reach or not track.within(y, gate):
+            for j in np.flatnonzero(np.linalg.norm(points - track.last, axis=1) <= reach):
+                y = points[j]
+                if not track.within(y, gate):
                     continue
                 total = track.densities(y).sum()
                 if total <= 0:
@@ -150,7 +161,7 @@ def pair(tracks, points, gains, method) -> dict[int, list[int]]:
         return {int(i): [int(j)] for i, j in zip(rows, columns, strict=True) if i < n and j < m}
     n, m = gains.shape
     q = method.capacity
-    near = {(i, j): tracks[i].distance(points[j]) for i in range(n) for j in range(m)}
+    near = np.array([track.distances(points) for track in tracks]).reshape(n, m)
     # Every track stands in the market q times; its further copies look near its favourite only.
     wanted: dict[tuple[int, int], list[int]] = {}
     for i in range(n):

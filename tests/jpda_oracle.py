@@ -6,7 +6,6 @@ definitions.
 
 from __future__ import annotations
 
-import itertools
 import math
 from functools import cache
 from typing import TYPE_CHECKING
@@ -22,41 +21,45 @@ if TYPE_CHECKING:
 
 def events_of(weights: np.ndarray, missed: np.ndarray):
     """Every joint event and its weight: a detection or -1 for each track, none for two."""
-    for event in itertools.product(*([-1, *np.flatnonzero(row > 0)] for row in weights)):
-        used = [j for j in event if j >= 0]
-        if len(used) == len(set(used)):
-            yield (
-                event,
-                math.prod(missed[i] if j < 0 else weights[i, j] for i, j in enumerate(event)),
-            )
+    events: list[tuple[tuple[int, ...], float]] = [((), 1.0)]
+    for row, none in zip(weights, missed, strict=True):
+        events = [
+            ((*event, j), weight * (none if j < 0 else row[j]))
+            for event, weight in events
+            for j in (-1, *np.flatnonzero(row > 0).tolist())
+            if j < 0 or j not in event
+        ]
+    return events
 
 
 def marginals_of(weights: np.ndarray, missed: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
     """β (n, m + 1) with the miss last, and the best event: by recursion over the tracks."""
     n, m = weights.shape
 
-    def total(rows: tuple[int, ...], used: int) -> float:
+    def total(rows: tuple[int, ...]):
+        """The weight of all that these tracks may do without the detections in a set."""
+
         @cache
-        def rest(k: int, used: int) -> float:
+        def rest(used: int, k: int = 0) -> float:
             if k == len(rows):
                 return 1.0
             i = rows[k]
-            return missed[i] * rest(k + 1, used) + sum(
-                weights[i, j] * rest(k + 1, used | 1 << j)
+            return missed[i] * rest(used, k + 1) + sum(
+                weights[i, j] * rest(used | 1 << j, k + 1)
                 for j in range(m)
                 if weights[i, j] > 0 and not used >> j & 1
             )
 
-        return rest(0, used)
+        return rest
 
-    everything = total(tuple(range(n)), 0)
+    everything = total(tuple(range(n)))(0)
     beta = np.zeros((n, m + 1))
     for i in range(n):
-        others = tuple(k for k in range(n) if k != i)
+        others = total(tuple(k for k in range(n) if k != i))
         for j in range(m):
             if weights[i, j] > 0:
-                beta[i, j] = weights[i, j] * total(others, 1 << j) / everything
-        beta[i, m] = missed[i] * total(others, 0) / everything
+                beta[i, j] = weights[i, j] * others(1 << j) / everything
+        beta[i, m] = missed[i] * others(0) / everything
 
     @cache
     def best(i: int, used: int) -> tuple[float, tuple[int, ...]]:
@@ -158,8 +161,9 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
             missed[i] = 1 - r * P_d
             track.predict(round(now - detections.times[t - 1], 9))
             reach = p.max_speed * (now - track.last_time) + 6 * s.noise_sigma
-            for j, y in enumerate(points):
-                if np.linalg.norm(y - track.last) <= reach and track.within(y, gate):
+            for j in np.flatnonzero(np.linalg.norm(points - track.last, axis=1) <= reach):
+                y = points[j]
+                if track.within(y, gate):
                     weights[i, j] = r * P_d * track.densities(y).sum() / density
         believed = np.array([track.id >= 0 for track in tracks], dtype=bool)
         free, taken = np.ones(m), np.zeros(m, dtype=bool)

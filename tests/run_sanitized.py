@@ -34,6 +34,18 @@ LEFT_OUT = (
 """Too slow (a blackboard is Python, a posterior is sampled for millions of moves), or measuring
 memory that the sanitizers inflate."""
 
+PLUGIN = """
+import sys
+from pathlib import Path
+
+sys.meta_path[:] = [f for f in sys.meta_path
+                    if "editable" not in type(f).__module__ + type(f).__name__.lower()]
+import asterism._engine as engine
+
+assert Path(engine.__file__).is_relative_to(Path(__file__).parent), engine.__file__
+"""
+"""What every process of pytest does first: forget the engine that is installed."""
+
 
 def main() -> int:
     build = Path(sys.argv[1]).resolve()
@@ -51,24 +63,19 @@ def main() -> int:
         for built in package.glob("_engine*.so"):
             built.unlink()
         shutil.copy(engine, package)
+        (Path(folder) / "sanitized.py").write_text(PLUGIN)
         environment = {
             **os.environ,
+            "PYTHONPATH": folder,
             "LD_PRELOAD": ":".join(runtimes),
             "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1",
             "UBSAN_OPTIONS": "print_stacktrace=1:halt_on_error=1",
             "PYTHONMALLOC": "malloc",
         }
-        code = (
-            "import sys; sys.meta_path[:] = [f for f in sys.meta_path "
-            "if 'editable' not in type(f).__module__ + type(f).__name__.lower()];"
-            f"sys.path.insert(0, {folder!r});"
-            "import asterism._engine as e;"
-            f"assert e.__file__.startswith({folder!r}), e.__file__;"
-            "import pytest; sys.exit(pytest.main(sys.argv[1:]))"
-        )
         arguments = [str(root / "tests" / name) for name in TESTS]
         return subprocess.run(
-            [sys.executable, "-c", code, "-q", "-p", "no:cacheprovider", "-k", f"not ({LEFT_OUT})",
+            [sys.executable, "-m", "pytest", "-q", "-p", "sanitized", "-p", "no:cacheprovider",
+             "-n", "auto", "-k", f"not ({LEFT_OUT})",
              "--capture=sys", *arguments],  # a report of the sanitizers gets past pytest
             cwd=root / "tests", env=environment, check=False,
         ).returncode  # fmt: skip

@@ -93,7 +93,7 @@ def test_a_laboratory_is_above_its_floor_and_no_mirror_of_itself(path, n, height
 @pytest.mark.parametrize("source", [FLYDRA, MYPTV, VICON, QUALISYS], ids=lambda p: p.name)
 @pytest.mark.parametrize("format", CALIBRATIONS)
 def test_real_rigs_go_through_every_format(tmp_path, source, format):
-    rig = read_rig(source)[:3]
+    rig = read_rig(source)[:2]
     form = CALIBRATIONS[format]
     fits = [fit_to_format(camera, form) for camera in rig]
     cameras = tuple(c if f is None else f.camera for c, f in zip(rig, fits, strict=True))

@@ -332,7 +332,7 @@ def test_absurd_numbers_do_no_harm(method, motion, scale, step, changes):
     model = small_model(**changes)
     if motion == "interacting":
         model = dataclasses.replace(model, motion=interacting())
-    frames = [rng.uniform(-1, 1, (n, 3)) * scale for n in (80, 3, 0, 70, 90)]
+    frames = [rng.uniform(-1, 1, (n, 3)) * scale for n in (66, 3, 0, 65, 64)]  # 64 take the grid
     d = am.Detections.from_frames(np.arange(5) * step, frames)
     tracks = am.track(d, method, model=model)
     assert (tracks.labels >= -1).all()

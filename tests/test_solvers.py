@@ -58,7 +58,7 @@ def random_market(rng: np.random.Generator, n: int, m: int, share: float, *, tie
     return lists, costs
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(20))
 def test_marriage_is_stable_and_best_for_every_proposer(seed):
     rng = np.random.default_rng(seed)
     for _ in range(50):

@@ -9,6 +9,7 @@ import copy
 import math
 
 import numpy as np
+from scipy.special import chdtrc, chdtri
 from scipy.stats import chi2
 
 import asterism as am
@@ -38,7 +39,7 @@ class Branch(OneTrack):
         squares = np.array([((y - x @ self.h) ** 2).sum() for x in self.x]) / self.S
         if len(squares) == 1:
             return float(squares[0])
-        return float(chi2.isf(self.w @ chi2.sf(squares, len(y)), len(y)))
+        return float(chdtri(len(y), self.w @ chdtrc(len(y), squares)))
 
 
 class Options:
@@ -98,8 +99,10 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
                 continue
             b.predict(step_to(t))
             reach = p.max_speed * (detections.times[t] - b.last_time) + 6 * s.noise_sigma
-            for j, y in enumerate(detections.frame(t)):
-                if np.linalg.norm(y - b.last) > reach or not b.within(y, gate):
+            points = detections.frame(t)
+            for j in np.flatnonzero(np.linalg.norm(points - b.last, axis=1) <= reach).tolist():
+                y = points[j]
+                if not b.within(y, gate):
                     continue
                 likelihood = b.densities(y).sum()
                 if likelihood <= 0:
