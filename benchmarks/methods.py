@@ -22,6 +22,7 @@ METHODS: dict[str, am.Method[Any]] = {
     "splitting": am.TrackSplitting(),
     "tomht": am.TOMHT(),
     "mht": am.MHT(),
+    "mcmcda": am.MCMCDA(),
 }
 
 
@@ -36,7 +37,10 @@ def links(
 
 
 class LinkConfidence:
-    """How sure each method was of its links, and whether they are right."""
+    """How sure each method was of its links, and whether they are right.
+
+    The confidence of a detection is that of the link that leads to it.
+    """
 
     def __init__(self) -> None:
         self._parts: dict[str, list[tuple[NDArray[np.float64], NDArray[np.bool_]]]] = {}
@@ -44,16 +48,22 @@ class LinkConfidence:
     def add(self, name: str, tracks: am.Tracks, truth: am.Tracks) -> None:
         """Take the links of one result, if its method has a confidence."""
         if tracks.confidence is not None:
-            a, b, is_right = links(tracks, truth)
-            # As sure as of the detection that is less sure to be the marker's.
-            sure = np.minimum(tracks.confidence[a], tracks.confidence[b])
-            self._parts.setdefault(name, []).append((sure, is_right))
+            _, b, is_right = links(tracks, truth)
+            self._parts.setdefault(name, []).append((tracks.confidence[b], is_right))
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._parts
+
+    def links(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Give the confidence of every link of a method, and whether it is right."""
+        sure, right = zip(*self._parts[name], strict=True)
+        return np.concatenate(sure), np.concatenate(right)
 
     def table(self) -> list[str]:
         """Lines of a table with a row for each method."""
         rows: list[list[str]] = []
-        for name, parts in self._parts.items():
-            sure, right = (np.concatenate(side) for side in zip(*parts, strict=True))
+        for name in self._parts:
+            sure, right = self.links(name)
             c = am.calibration(sure, right)
             wrong = int((~right).sum())
             rows.append([name, f"{len(right):,}", f"{wrong:,}", f"{c.ece:.4f}", f"{c.auc:.3f}"])

@@ -19,8 +19,9 @@ enum class Move : std::int32_t {
   transfer,       // the tail of a track goes to the end of another
   replacement,    // a free detection stands in for one of a track in the same frame
   exchange,       // two tracks change one detection of the same frame
+  relocation,     // a detection of a track goes into, before or after another
 };
-inline constexpr int kMoves = 13;
+inline constexpr int kMoves = 14;
 
 inline constexpr Move inverse(Move move) {
   switch (move) {

@@ -1,4 +1,4 @@
-// The moves of MCMC data association (Oh, Russell & Sastry 2009; §4.2 of the report) and five more.
+// The moves of MCMC data association (Oh, Russell & Sastry 2009; §4.2 of the report) and six more.
 //
 // A move draws a new partition ω' from ω; `log_forward` is the log probability of having drawn just
 // that, log q(ω → ω'), and `log_reverse` that of the inverse move in ω', both without the share ξ of
@@ -82,6 +82,7 @@ class Moves {
       case Move::transfer:
       case Move::replacement:
       case Move::exchange:
+      case Move::relocation:
         return q.log_forward;
     }
     return Growth<Filter>::kNever;
@@ -134,6 +135,7 @@ class Moves {
       case Move::transfer: return draw_transfer(random, q);
       case Move::replacement: return draw_replacement(random, q);
       case Move::exchange: return draw_exchange(random, q);
+      case Move::relocation: return draw_relocation(random, q);
     }
     return false;
   }
@@ -329,11 +331,20 @@ class Moves {
   bool draw_deletion(Random& random, Change<Filter>& q) {
     const std::int32_t x = draw_one(p_.taken(), random, q);
     if (x < 0) return false;
-    const std::int32_t k = p_.track_of(x), i = p_.before(x), j = p_.after(x);
-    if (p_.track(k).whole_size() < 3 || (i >= 0 && j >= 0 && !p_.window().is_linkable(i, j))) return false;
+    if (!may_go(x)) return false;
     q.with = x;
-    append(q.edit(k, p_.place_of(x)), k, p_.place_of(x) + 1);
+    take_out(x, q);
     return true;
+  }
+  // Whether what is left without x is a track.
+  bool may_go(std::int32_t x) const {
+    const std::int32_t i = p_.before(x), j = p_.after(x);
+    return p_.track(p_.track_of(x)).whole_size() >= 3 &&
+           (i < 0 || j < 0 || p_.window().is_linkable(i, j));
+  }
+  void take_out(std::int32_t x, Change<Filter>& q) const {
+    const std::int32_t k = p_.track_of(x);
+    append(q.edit(k, p_.place_of(x)), k, p_.place_of(x) + 1);
   }
 
   bool draw_transfer(Random& random, Change<Filter>& q) {
@@ -371,6 +382,22 @@ class Moves {
     Edit<Filter>& e = q.edit(k, p_.place_of(x));
     p_.append(e, y);
     append(e, k, p_.place_of(x) + 1);
+    return true;
+  }
+
+  // Without x both partitions are the same, and so are the places where it may go.
+  bool draw_relocation(Random& random, Change<Filter>& q) {
+    const std::int32_t x = draw_one(p_.taken(), random, q);
+    if (x < 0 || !may_go(x)) return false;
+    list_slots(x);
+    slots_.pop_back();  // where it is
+    if (slots_.empty()) return false;
+    const Slot slot = draw_one(slots_, random, q);
+    q.with = x;
+    take_out(x, q);
+    Edit<Filter>& e = q.edit(slot.track, slot.keep);
+    p_.append(e, x);
+    append(e, slot.track, slot.keep);
     return true;
   }
 

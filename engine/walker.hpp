@@ -41,8 +41,10 @@ class Walker {
     sampler_.begin(seed);
     sampler_.weigh_above(sampler_.kOnlyWhatMayBeTaken);
     sampler_.begin_best();
+    list_hot(group);
+    const auto look_at_none = [](const Change<Filter>&, bool) {};
     std::int64_t n = 0;
-    for (; !budget.is_over(n); ++n) sampler_.step();
+    for (; !budget.is_over(n); ++n) step(look_at_none);
     sampler_.restore_best();
     stats.n_search += n;
     add_counts(stats);
@@ -63,6 +65,9 @@ class Walker {
     for (std::int32_t i = 0; i < p.window().n_ids(); ++i)
       if (!p.is_frozen(i)) out.detections.push_back(p.origin(i));
     // Halves of equal length, unless time runs out.
+    const auto weigh = [&](const Change<Filter>& change, bool is_taken) {
+      marginals_.weigh(change, is_taken);
+    };
     Trace trace;
     const std::int64_t half = std::max<std::int64_t>(budget.moves / Halves::kN, 1);
     out.n_moves = 0;
@@ -72,7 +77,7 @@ class Walker {
       const Budget own{half, budget.until, budget.watch};
       std::int64_t n = 0;
       for (; n == 0 || !own.is_over(n); ++n) {
-        step();
+        step(weigh);
         marginals_.count();
         trace.add(sampler_.gain());
       }
@@ -142,10 +147,8 @@ class Walker {
     double upto = 0;
   };
 
-  void step() {
-    const auto seen = [&](const Change<Filter>& change, bool is_taken) {
-      marginals_.weigh(change, is_taken);
-    };
+  template <typename Seen>
+  void step(Seen&& seen) {
     if (hot_.empty() || sampler_.random().uniform() >= kHotShare) {
       sampler_.step(seen);
       return;

@@ -22,6 +22,7 @@ from asterism.model.compiled import (
 MOVES = (
     "birth", "death", "split", "merge", "extension", "reduction", "update", "switch", "insertion",
     "deletion", "transfer", "replacement", "exchange",
+    "relocation",
 )  # fmt: skip
 INVERSE = {
     "birth": "death", "death": "birth", "split": "merge", "merge": "split",
@@ -210,6 +211,10 @@ class Oracle:
         return found
 
     def of_insertion(self, w, v, x):
+        return -math.log(len(self.free(w))) - math.log(self.slots(w, x))
+
+    def slots(self, w, x):
+        """Places of x in tracks of which it is none."""
         slots = 0
         for t in w:
             for r in range(len(t) + 1):
@@ -218,7 +223,7 @@ class Oracle:
                     after is None or (self.is_linkable(x, after) and not self.is_frozen(after))
                 )
                 slots += fits
-        return -math.log(len(self.free(w))) - math.log(slots)
+        return slots
 
     def active_taken(self, w):
         return [i for t in w for i in t if not self.is_frozen(i)]
@@ -238,6 +243,11 @@ class Oracle:
     def of_exchange(self, w, v, x):
         others = [y for y in self.active_taken(w) if self.frame[y] == self.frame[x]]
         return -math.log(len(self.active_taken(w))) - math.log(len(others) - 1)
+
+    def of_relocation(self, w, v, x):
+        (own,) = [t for t in w if x in t]
+        rest = w - {own} | {tuple(i for i in own if i != x)}
+        return -math.log(len(self.active_taken(w))) - math.log(self.slots(rest, x) - 1)
 
     def with_back(self, move: str, with_: int, w: Partition, v: Partition) -> int:
         """What the inverse move draws on the way."""

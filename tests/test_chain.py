@@ -215,7 +215,7 @@ def test_the_chain_visits_partitions_as_often_as_they_are_probable(informed, see
 @pytest.mark.parametrize("informed", [False, True], ids=["uniform", "informed"])
 @pytest.mark.parametrize(
     "move", ["split", "extension", "update", "switch", "insertion", "transfer", "replacement",
-             "exchange"],
+             "exchange", "relocation"],
 )  # fmt: skip
 def test_each_move_is_right_beside_birth_and_death_alone(move, informed):
     d, model = problem_of_size(150, 1500, 7, 2)

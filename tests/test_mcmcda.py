@@ -127,7 +127,7 @@ def test_confidence_is_the_share_of_the_posterior_in_which_a_detection_follows_t
             method = am.MCMCDA(window=5, moves=1000, confidence=60_000, groups=groups, doubt=20)
             tracks = am.track(d, method, model=model, seed=seed)
             before = predecessors(tracks.labels)
-            # Links to the last frame were asked for once: what is told is not yet a mean over frames.
+            # Links to the last frame were asked for once: that is not yet a mean over frames.
             for i in np.flatnonzero(d.frame_of == d.n_frames - 1):
                 if tracks.labels[i] >= 0 and before[i] < 0:
                     continue
@@ -205,7 +205,7 @@ def test_more_chains_find_no_worse():
 def test_groups_that_nothing_joins_are_walked_apart():
     near = crowd(3, spread=0.1, n_frames=40)
     model = crowd_model()
-    frames = [np.concatenate([p, p + [5.0, 0, 0]]) for _, p in near.detections]
+    frames = [np.concatenate([p, p + np.array([5.0, 0, 0])]) for _, p in near.detections]
     d = am.Detections.from_frames(near.detections.times, frames)
     info = {}
     for groups, distance in (

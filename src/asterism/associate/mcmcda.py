@@ -38,8 +38,9 @@ MOVES = (
     "transfer",
     "replacement",
     "exchange",
+    "relocation",
 )
-"""Kinds of moves; the last five are not the report's."""
+"""Kinds of moves; the last six are not the report's."""
 
 WEIGHTS: dict[str, dict[str, float]] = {
     "uniform": dict.fromkeys(MOVES, 1.0),
@@ -174,7 +175,7 @@ class MCMCDA(EngineMethod):
         check_number("doubt", self.doubt, above=0, closed=True)
         if self.bond_tolerance is not None:
             check_number("bond_tolerance", self.bond_tolerance, above=0)
-        if isinstance(self.bonds, bool) or self.bonds not in (0, 2, 3, 4):
+        if repr(self.bonds) not in ("0", "2", "3", "4"):
             raise ParameterError("bonds", "0, 2, 3 or 4", repr(self.bonds))
         for name, choices in (
             ("proposal", ("informed", "uniform")),
