@@ -41,16 +41,6 @@ class Moves {
     return out.log_forward > Growth<Filter>::kNever;
   }
 
-  // The moves at two given detections x and y of a list, which are their own inverses there: drawn as
-  // often in ω as in ω' while the list stays. False where they lead nowhere.
-  bool propose_at(std::int32_t x, std::int32_t y, bool is_one, Change<Filter>& out) const {
-    out.n_edits = 0;
-    out.log_forward = out.log_reverse = 0;
-    if (!(is_one ? trade(x, y, out) : swap_tails(x, y, out))) return false;
-    weigh(out);
-    return true;
-  }
-
   double log_reverse(const Change<Filter>& q) {
     const Edit<Filter>& first = q.edits[0];
     const auto n_tail = static_cast<std::int32_t>(first.tail.nodes.size());
@@ -88,12 +78,50 @@ class Moves {
     return Growth<Filter>::kNever;
   }
 
- private:
+  // What a drawn change gains.
   void weigh(Change<Filter>& q) const {
     q.gain = 0;
     for (const Edit<Filter>& e : q.all())
       q.gain += p_.score_of(e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
   }
+  // What a track has from a place on.
+  void append(Edit<Filter>& edit, std::int32_t track, std::int32_t from) const {
+    const auto& nodes = p_.track(track).nodes;
+    for (std::size_t n = from; n < nodes.size(); ++n) p_.append(edit, nodes[n]);
+  }
+  // Whether what is left without x is a track.
+  bool may_go(std::int32_t x) const {
+    const std::int32_t i = p_.before(x), j = p_.after(x);
+    return p_.track(p_.track_of(x)).whole_size() >= 3 &&
+           (i < 0 || j < 0 || p_.window().is_linkable(i, j));
+  }
+  // A track without x.
+  void take_out(std::int32_t x, Change<Filter>& q) const {
+    const std::int32_t k = p_.track_of(x);
+    append(q.edit(k, p_.place_of(x)), k, p_.place_of(x) + 1);
+  }
+  // A free detection in the place of another; false where its neighbours forbid it.
+  bool replace(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
+    if (!fits_in_place_of(y, x)) return false;
+    const std::int32_t k = p_.track_of(x);
+    Edit<Filter>& e = q.edit(k, p_.place_of(x));
+    p_.append(e, y);
+    append(e, k, p_.place_of(x) + 1);
+    return true;
+  }
+  // Each of two detections of one frame in the place of the other; false where neighbours forbid it.
+  bool exchange(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
+    if (!fits_in_place_of(y, x) || !fits_in_place_of(x, y)) return false;
+    for (const auto& [old, now] : {std::pair{x, y}, std::pair{y, x}}) {
+      const std::int32_t k = p_.track_of(old);
+      Edit<Filter>& e = q.edit(k, p_.place_of(old));
+      p_.append(e, now);
+      append(e, k, p_.place_of(old) + 1);
+    }
+    return true;
+  }
+
+ private:
   // Of counts, which are small for the most part.
   template <typename Count>
   static double log(Count n) {
@@ -150,10 +178,6 @@ class Moves {
   T draw_one(const std::vector<T>& list, Random& random, Change<Filter>& q) const {
     q.log_forward -= log(list.size());
     return list[random.below(static_cast<std::int32_t>(list.size()))];
-  }
-  void append(Edit<Filter>& edit, std::int32_t track, std::int32_t from) const {
-    const auto& nodes = p_.track(track).nodes;
-    for (std::size_t n = from; n < nodes.size(); ++n) p_.append(edit, nodes[n]);
   }
 
   bool draw_birth(Random& random, Change<Filter>& q) {
@@ -336,16 +360,6 @@ class Moves {
     take_out(x, q);
     return true;
   }
-  // Whether what is left without x is a track.
-  bool may_go(std::int32_t x) const {
-    const std::int32_t i = p_.before(x), j = p_.after(x);
-    return p_.track(p_.track_of(x)).whole_size() >= 3 &&
-           (i < 0 || j < 0 || p_.window().is_linkable(i, j));
-  }
-  void take_out(std::int32_t x, Change<Filter>& q) const {
-    const std::int32_t k = p_.track_of(x);
-    append(q.edit(k, p_.place_of(x)), k, p_.place_of(x) + 1);
-  }
 
   bool draw_transfer(Random& random, Change<Filter>& q) {
     const std::int32_t b = draw_one(p_.linked(), random, q);
@@ -375,15 +389,6 @@ class Moves {
     q.with = x;
     return replace(x, y, q);
   }
-  // A free detection in the place of another; false where its neighbours forbid it.
-  bool replace(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
-    if (!fits_in_place_of(y, x)) return false;
-    const std::int32_t k = p_.track_of(x);
-    Edit<Filter>& e = q.edit(k, p_.place_of(x));
-    p_.append(e, y);
-    append(e, k, p_.place_of(x) + 1);
-    return true;
-  }
 
   // Without x both partitions are the same, and so are the places where it may go.
   bool draw_relocation(Random& random, Change<Filter>& q) {
@@ -410,39 +415,6 @@ class Moves {
     if (starts_.empty()) return false;
     q.with = x;
     return exchange(x, draw_one(starts_, random, q), q);
-  }
-  // Two detections of one frame, of which one at least is in a track, in each other's place.
-  bool trade(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
-    const bool has_x = p_.taken().has(x), has_y = p_.taken().has(y);
-    if (has_x && has_y) return exchange(x, y, q);
-    if (!has_x && !has_y) return false;
-    return has_x ? replace(x, y, q) : replace(y, x, q);
-  }
-  // Two tracks change what they have from x and from y on.
-  bool swap_tails(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
-    if (!p_.taken().has(x) || !p_.taken().has(y)) return false;
-    const std::int32_t k = p_.track_of(x), other = p_.track_of(y);
-    if (k == other) return false;
-    if (!fits_from(y, x) || !fits_from(x, y)) return false;
-    append(q.edit(k, p_.place_of(x)), other, p_.place_of(y));
-    append(q.edit(other, p_.place_of(y)), k, p_.place_of(x));
-    return true;
-  }
-  // Whether a track may go on with y in place of x; as its first y must not be its last.
-  bool fits_from(std::int32_t y, std::int32_t x) const {
-    const std::int32_t i = p_.before(x);
-    return i < 0 ? p_.after(y) >= 0 : p_.window().is_linkable(i, y);
-  }
-  // Each of two detections of one frame in the place of the other; false where neighbours forbid it.
-  bool exchange(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
-    if (!fits_in_place_of(y, x) || !fits_in_place_of(x, y)) return false;
-    for (const auto& [old, now] : {std::pair{x, y}, std::pair{y, x}}) {
-      const std::int32_t k = p_.track_of(old);
-      Edit<Filter>& e = q.edit(k, p_.place_of(old));
-      p_.append(e, now);
-      append(e, k, p_.place_of(old) + 1);
-    }
-    return true;
   }
   bool fits_in_place_of(std::int32_t y, std::int32_t x) const {
     const DetectionWindow& window = p_.window();

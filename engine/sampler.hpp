@@ -14,6 +14,7 @@
 #include "moves.hpp"
 #include "partition.hpp"
 #include "random.hpp"
+#include "toggles.hpp"
 
 namespace asterism {
 
@@ -82,17 +83,17 @@ class Sampler {
     return step([](const Change<Filter>&, bool) {});
   }
 
-  // One move at two detections; see `Moves::propose_at`.
+  // One move of a list; see toggles.hpp.
   template <typename Seen>
-  bool step_at(std::int32_t x, std::int32_t y, bool is_one, Seen&& seen) {
-    if (!moves_.propose_at(x, y, is_one, change_)) return false;
+  bool step(const Toggle& toggle, Seen&& seen) {
+    if (!toggles_.propose(toggle, change_)) return false;
     change_.log_ratio = change_.gain;
     return take(std::log(random_.uniform()), true, seen);
   }
-  // What such a move would gain; -inf where it is impossible.
-  double gain_at(std::int32_t x, std::int32_t y, bool is_one) {
-    return moves_.propose_at(x, y, is_one, change_) ? change_.gain
-                                                    : -std::numeric_limits<double>::infinity();
+  // What it would gain; -inf where it is impossible.
+  double gain_of(const Toggle& toggle) {
+    return toggles_.propose(toggle, change_) ? change_.gain
+                                             : -std::numeric_limits<double>::infinity();
   }
   Random& random() { return random_; }
 
@@ -210,6 +211,7 @@ class Sampler {
   ChainOptions opt_;
   Random random_;
   Moves<Filter> moves_{partition_, opt_.growth};
+  Toggles<Filter> toggles_{partition_, moves_};
   Change<Filter> change_;
   std::array<Shares, 3> shares_{};
   std::array<MoveCounts, kMoves> counts_{};

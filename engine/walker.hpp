@@ -96,7 +96,7 @@ class Walker {
  private:
   // Moves less probable than this before the way back is weighed need not be known when refused.
   static constexpr double kLookedAtAbove = -9;
-  // So often a hot pair is drawn, where there is any.
+  // So often a move is one of the hot ones, where there is any.
   static constexpr double kHotShare = 0.5;
 
   // The log posterior along a walk: mean, variance, and from the means of batches how many
@@ -140,10 +140,8 @@ class Walker {
     double sum_ = 0, sum2_ = 0, batch_sum_ = 0;
   };
 
-  // Two detections at which tracks may change what they have: all that follows, or them alone.
-  struct HotPair {
-    std::int32_t x = 0, y = 0;
-    bool is_one = false;
+  struct Hot {
+    Toggle toggle;
     double upto = 0;
   };
 
@@ -154,13 +152,13 @@ class Walker {
       return;
     }
     const double at = sampler_.random().uniform() * hot_.back().upto;
-    const auto pair = std::upper_bound(hot_.begin(), hot_.end(), at,
-                                       [](double a, const HotPair& p) { return a < p.upto; });
-    sampler_.step_at(pair->x, pair->y, pair->is_one, seen);
+    const auto hot = std::upper_bound(hot_.begin(), hot_.end(), at,
+                                      [](double x, const Hot& h) { return x < h.upto; });
+    sampler_.step(hot->toggle, seen);
   }
 
-  // The links in doubt of this part. That a pair is drawn as often any time before and after makes
-  // its move exact; how often is free.
+  // What may be done about the links in doubt of this part. That a toggle is drawn as often before as
+  // after makes it exact; how often is free.
   void list_hot(const Group& group) {
     const Partition<Filter>& p = sampler_.partition();
     const std::int32_t n = p.window().n_ids();
@@ -175,18 +173,23 @@ class Walker {
     for (const auto& [from, to] : group.doubts) {
       const std::int32_t a = local(from), y = local(to);
       if (a < 0 || y < 0 || p.track_of(a) < 0) continue;
-      const std::int32_t x = p.after(a);
-      if (x < 0 || x == y || p.is_frozen(x)) continue;
-      add_hot(x, y, false);
-      if (p.window()[x].frame == p.window()[y].frame) add_hot(x, y, true);
+      const std::int32_t x = p.after(a), c = p.track_of(y) < 0 ? -1 : p.before(y);
+      if (x == y) continue;
+      if (c >= 0) {
+        add_hot({Toggle::Kind::relocate, y, a, c});
+        if (x < 0) add_hot({Toggle::Kind::transfer, y, a, c});
+      }
+      if (x < 0 || p.is_frozen(x)) continue;
+      add_hot({Toggle::Kind::swap, y, x});
+      if (p.window()[x].frame == p.window()[y].frame) add_hot({Toggle::Kind::trade, y, x});
     }
     for (std::int32_t i = 0; i < n; ++i) local_[p.origin(i)] = -1;
   }
-  void add_hot(std::int32_t x, std::int32_t y, bool is_one) {
-    const double gain = sampler_.gain_at(x, y, is_one);
+  void add_hot(const Toggle& toggle) {
+    const double gain = sampler_.gain_of(toggle);
     if (gain < -kHotWithin) return;
     const double before = hot_.empty() ? 0 : hot_.back().upto;
-    hot_.push_back({x, y, is_one, before + std::exp(std::min(gain, 0.0) / 4)});
+    hot_.push_back({toggle, before + std::exp(std::min(gain, 0.0) / 4)});
   }
   static constexpr double kHotWithin = 12;
 
@@ -200,7 +203,7 @@ class Walker {
 
   Sampler<Filter> sampler_;
   Marginals<Filter> marginals_;
-  std::vector<HotPair> hot_;
+  std::vector<Hot> hot_;
   std::vector<std::int32_t> local_;
 };
 

@@ -1,10 +1,11 @@
 """How far the visits of a chain are from the enumerated posterior: ``measure_chain.py [MOVES]``.
 
-Five problems of hundreds to thousands of partitions, each with uniform and informed growth, in two
-and three dimensions, with gaps and uneven sampling; the last with a settled zone. With as many moves
-as the docs speak of (30 million, the default) it takes some minutes.
+Five problems of hundreds to thousands of partitions, each with uniform and informed growth, in
+two and three dimensions, with gaps and uneven sampling; the last with a settled zone. With as many
+moves as the docs speak of (30 million, the default) it takes some minutes.
 """
 
+# ruff: noqa: T201
 from __future__ import annotations
 
 import sys
