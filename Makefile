@@ -28,6 +28,7 @@ docs: $(VENV)/.docs
 bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/speed.py --markdown docs/tables/speed.md
 	$(BIN)/python benchmarks/cameras.py --markdown docs/tables/cameras.md
+	$(BIN)/python benchmarks/smooth.py --markdown docs/tables/smooth.md
 	$(BIN)/python benchmarks/joint.py --markdown docs/tables/joint.md
 	$(BIN)/python benchmarks/k_best.py --markdown docs/tables/k_best.md
 
@@ -37,6 +38,8 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/report_smp.py --markdown docs/tables/report_smp.md
 	$(BIN)/python benchmarks/chi2_test.py --markdown docs/tables/chi2_test.md
 	$(BIN)/python benchmarks/report_mcmcda.py --markdown docs/tables/report_mcmcda.md
+	$(BIN)/python benchmarks/crossing.py --markdown docs/tables/crossing.md \
+	  --figure docs/images/reliability.png
 	$(BIN)/python benchmarks/several_frames.py --markdown docs/tables/several_frames.md
 	$(BIN)/python benchmarks/scenes.py --seeds 5 --markdown docs/tables/scenes.md
 	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md

@@ -105,7 +105,6 @@ def main() -> None:
     scenes = [crossing(seed) for seed in range(options.scenes)]
     rows: list[list[str]] = []
     confidence = LinkConfidence()
-    parts: dict[str, tuple[Any, Any]] = {}
     for name, method in METHODS.items():
         wrong: list[float] = []
         wrong_links: list[float] = []
@@ -119,12 +118,13 @@ def main() -> None:
             wrong_links.append(100 * float((~links(tracks, truth)[2]).mean()))
             value.append(tracks.info["log_posterior"])
             confidence.add(name, tracks, truth)
-        parts = {n: confidence.links(n) for n in ("jpda", name) if n in confidence}
         error = np.std(wrong) / np.sqrt(len(wrong))
         rows.append([name, f"{np.mean(wrong):.2f} ± {error:.2f}", f"{np.mean(wrong_links):.2f}",
                      f"{np.mean(value):.1f}", f"{np.mean(ms):.2f}"])  # fmt: skip
         print(*rows[-1], flush=True)
     if options.figure:
+        shown = {"jpda": "jpda", "mht": "mht", "mcmcda": "mcmcda, 3000 moves a frame"}
+        parts = {label: confidence.links(name) for label, name in shown.items()}
         reliability(parts, options.figure)
     head = ["method", "% wrong", "% wrong links", "log posterior", "ms a frame"]
     lines = [*table(head, rows), "", *confidence.table(), ""]

@@ -51,9 +51,6 @@ class LinkConfidence:
             _, b, is_right = links(tracks, truth)
             self._parts.setdefault(name, []).append((tracks.confidence[b], is_right))
 
-    def __contains__(self, name: str) -> bool:
-        return name in self._parts
-
     def links(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Give the confidence of every link of a method, and whether it is right."""
         sure, right = zip(*self._parts[name], strict=True)

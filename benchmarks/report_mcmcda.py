@@ -21,16 +21,25 @@ import numpy as np
 import asterism as am
 from report import conditions, publish, table
 
+WHOLE: dict[str, Any] = {"groups": "whole", "confidence": 0}
 REPORT: dict[str, Any] = {
-    "proposal": "uniform", "move_weights": "report", "first_rules": True, "assignment": False,
+    "proposal": "uniform", "move_weights": "report", "first_rules": True, "assignment": False, **WHOLE,
 }  # fmt: skip
-WAYS: dict[str, dict[str, Any]] = {
-    "the report's: uniform growth, its shares, ascent": {**REPORT, "chain": "ascent"},
-    "… but true Metropolis": REPORT,
-    "informed growth, all twelve moves": {"assignment": False},
-    "… from the exact assignment": {},
-}
 COUNTS = (30, 80, 1000)
+WAYS: dict[str, tuple[dict[str, Any], tuple[int, ...]]] = {
+    "the report's: uniform growth, its shares, ascent": ({**REPORT, "chain": "ascent"}, COUNTS),
+    "… but true Metropolis": (REPORT, COUNTS),
+    "… with two bonds": ({**REPORT, "bonds": 2}, (80,)),
+    "… with three bonds": ({**REPORT, "bonds": 3}, (80,)),
+    "… with four bonds": ({**REPORT, "bonds": 4}, (80,)),
+    "… in cells of 0.5 m": ({**REPORT, "groups": "cells", "distance": 0.5}, (80,)),
+    "… in clusters within 0.25 m": ({**REPORT, "groups": "clusters", "distance": 0.25}, (80,)),
+    "informed growth, all moves": ({**WHOLE, "assignment": False}, COUNTS),
+    "… from the exact assignment": (WHOLE, COUNTS),
+    "… with four bonds, too": ({**WHOLE, "bonds": 4}, (30,)),
+    "… in groups that plausible links join": ({"confidence": 0}, (30, 80)),
+    "… and with confidence": ({}, (80,)),
+}
 
 
 def clips(seeds: int, max_gap: int) -> list[tuple[am.Tracks, am.TrackingModel]]:
@@ -63,8 +72,8 @@ def rows_of(max_gap: int, seeds: int) -> list[list[str]]:
     best = [am.log_posterior(floor, model) for floor, (_, model) in zip(floors, some, strict=True)]
     found = [am.evaluate(floor, truth) for floor, (truth, _) in zip(floors, some, strict=True)]
     rows = [["floor", *row(found, [0.0], 0, 0)]]
-    for name, options in WAYS.items():
-        for count in COUNTS:
+    for name, (options, counts) in WAYS.items():
+        for count in counts:
             method = am.MCMCDA(moves=count / 8.8, **options)  # detections in a frame, on average
             found, more, moves, seconds = [], [], [], []
             for seed, (truth, model) in enumerate(some):
