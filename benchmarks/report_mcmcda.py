@@ -23,7 +23,8 @@ from report import conditions, publish, table
 
 WHOLE: dict[str, Any] = {"groups": "whole", "confidence": 0}
 REPORT: dict[str, Any] = {
-    "proposal": "uniform", "move_weights": "report", "first_rules": True, "assignment": False, **WHOLE,
+    "proposal": "uniform", "move_weights": "report", "first_rules": True, "assignment": False,
+    **WHOLE,
 }  # fmt: skip
 COUNTS = (30, 80, 1000)
 WAYS: dict[str, tuple[dict[str, Any], tuple[int, ...]]] = {
