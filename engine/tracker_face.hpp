@@ -4,6 +4,7 @@
 #include <nanobind/stl/tuple.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -64,6 +65,9 @@ nb::tuple step(const Tracker& before, double time, const In<double>& F, const In
                         which.give({r}), ids.give({r}), sure.give({r_sure}), stats);
 }
 
+// So often a run asks whether it is to end.
+inline constexpr std::chrono::milliseconds kLookEvery{50};
+
 // Many frames in place. `labels` covers every detection since the state began; so does `confidence`
 // where the tracker has any.
 template <typename Tracker>
@@ -91,7 +95,13 @@ void run(Tracker& tracker, const In<double>& times, const In<std::int32_t>& kind
     labels.data()[detection] = id;
     if (tracker.has_confidence()) confidence.data()[detection] = p;
   };
+  auto next_look = std::chrono::steady_clock::now() + kLookEvery;
   for (std::size_t t = 0; t < T; ++t) {
+    if (std::chrono::steady_clock::now() > next_look) {
+      nb::gil_scoped_acquire acquire;
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
+      next_look = std::chrono::steady_clock::now() + kLookEvery;
+    }
     const auto frame = std::span(all).subspan(offsets.data()[t],
                                               offsets.data()[t + 1] - offsets.data()[t]);
     if constexpr (requires { tracker.end_pass(label); })

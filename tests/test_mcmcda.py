@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 
 import numpy as np
@@ -306,6 +307,25 @@ def test_a_whole_take_is_walked_over_in_the_end():
         method.step(method.init(model), 0.0, d.points[:2])
 
 
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no interval timers here")
+def test_a_signal_ends_a_run_between_two_frames():
+    d, model = crowd(4, spread=0.1, n_frames=60).detections, crowd_model()
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, stop)
+    start = time.perf_counter()
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        with pytest.raises(KeyboardInterrupt):
+            am.track(d, am.MCMCDA(moves=100_000), model=model)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert time.perf_counter() - start < 5  # to the end it would be a minute
+
+
 def test_a_walk_over_a_whole_take_can_be_interrupted():
     d, model = crowd(4, spread=0.1, n_frames=60).detections, crowd_model()
 
@@ -339,7 +359,8 @@ def test_weights_of_moves_by_name():
         ({"doubt": -1}, "doubt"), ({"bonds": 1}, "bonds"), ({"bonds": True}, "bonds"),
         ({"bonds": 2, "bond_tolerance": 0}, "bond_tolerance"),
         ({"chain": "ascent"}, "confidence"), ({"window": None, "deadline": 1.0}, "deadline"),
-        ({"window": 0}, "window"), ({"moves": -1}, "moves"), ({"moves": None}, "deadline"),
+        ({"window": 0}, "window"), ({"window": 10**9}, "window"), ({"moves": 1e300}, "moves"),
+        ({"moves": -1}, "moves"), ({"moves": None}, "deadline"),
         ({"deadline": 0}, "deadline"), ({"proposal": "clever"}, "'informed' or 'uniform'"),
         ({"chain": "descent"}, "'metropolis' or 'ascent'"), ({"first_rules": 1}, "first_rules"),
         ({"assignment": "yes"}, "assignment"), ({"move_weights": "mine"}, "move_weights"),

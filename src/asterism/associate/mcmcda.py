@@ -63,6 +63,8 @@ PAIRS = (
     ("insertion", "deletion"),
 )
 SPLITS = ("whole", "likelihood", "cells", "clusters")
+MOST = 1_000_000
+"""Of moves for a marker in a frame, which are then some seconds, and of frames in a window."""
 FIRST_PASS = 10
 """Window of the pass over a whole take from which the walk over all of it begins."""
 FLOOR = 1e-4
@@ -160,16 +162,16 @@ class MCMCDA(EngineMethod):
 
     def __post_init__(self) -> None:
         if self.window is not None:
-            check_number("window", self.window, above=1, closed=True, integer=True)
+            check_number("window", self.window, above=1, below=MOST, closed=True, integer=True)
         elif self.deadline is not None:
             raise ParameterError("deadline", "none for a whole take", repr(self.deadline))
         if self.moves is not None:
-            check_number("moves", self.moves, above=0, closed=True)
+            check_number("moves", self.moves, above=0, below=MOST, closed=True)
         elif self.deadline is None:
             raise ParameterError("moves", "a number, or a deadline beside it", "None")
         if self.deadline is not None:
             check_number("deadline", self.deadline, above=0)
-        check_number("confidence", self.confidence, above=0, closed=True)
+        check_number("confidence", self.confidence, above=0, below=MOST, closed=True)
         check_number("chains", self.chains, above=1, below=1024, closed=True, integer=True)
         check_number("threads", self.threads, above=1, below=1024, closed=True, integer=True)
         check_number("doubt", self.doubt, above=0, closed=True)
