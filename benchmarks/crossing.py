@@ -27,9 +27,9 @@ METHODS: dict[str, am.Method[Any]] = {
     "jpda": am.JPDA(),
     "tomht": am.TOMHT(window=5),
     "mht": am.MHT(window=5),
-    "mcmcda, 300 moves a frame": am.MCMCDA(moves=300 / 16),
-    "mcmcda, 3000 moves a frame": am.MCMCDA(moves=3000 / 16),
-    "mcmcda, … 10 times the confidence": am.MCMCDA(moves=3000 / 16, confidence=250),
+    "mcmcda, 300 moves a frame": am.MCMCDA(end_odds=1, moves=300 / 16),
+    "mcmcda, 3000 moves a frame": am.MCMCDA(end_odds=1, moves=3000 / 16),
+    "mcmcda, … 10 times the confidence": am.MCMCDA(end_odds=1, moves=3000 / 16, confidence=250),
 }
 
 

@@ -21,7 +21,8 @@ import numpy as np
 import asterism as am
 from report import conditions, publish, table
 
-WHOLE: dict[str, Any] = {"groups": "whole", "confidence": 0}
+MODEL: dict[str, Any] = {"end_odds": 1}
+WHOLE: dict[str, Any] = {**MODEL, "groups": "whole", "confidence": 0}
 REPORT: dict[str, Any] = {
     "proposal": "uniform", "move_weights": "report", "first_rules": True, "assignment": False,
     **WHOLE,
@@ -38,8 +39,8 @@ WAYS: dict[str, tuple[dict[str, Any], tuple[int, ...]]] = {
     "informed growth, all moves": ({**WHOLE, "assignment": False}, COUNTS),
     "… from the exact assignment": (WHOLE, COUNTS),
     "… with four bonds, too": ({**WHOLE, "bonds": 4}, (30,)),
-    "… in groups that plausible links join": ({"confidence": 0}, (30, 80)),
-    "… and with confidence": ({}, (80,)),
+    "… in groups that plausible links join": ({**MODEL, "confidence": 0}, (30, 80)),
+    "… and with confidence": (MODEL, (80,)),
 }
 
 

@@ -21,10 +21,10 @@ from report import conditions, publish, table
 
 SIZES = {53: 1000, 200: 300, 1000: 100}
 METHODS: dict[str, am.Method[Any]] = {
-    "mcmcda, without confidence": am.MCMCDA(confidence=0),
-    "mcmcda": am.MCMCDA(),
-    "mcmcda, 2 threads": am.MCMCDA(threads=2),
-    "mcmcda, groups=whole": am.MCMCDA(groups="whole", confidence=0),
+    "mcmcda, without confidence": am.MCMCDA(end_odds=1, confidence=0),
+    "mcmcda": am.MCMCDA(end_odds=1),
+    "mcmcda, 2 threads": am.MCMCDA(end_odds=1, threads=2),
+    "mcmcda, groups=whole": am.MCMCDA(end_odds=1, groups="whole", confidence=0),
     "gnn": am.GNN(),
     "jpda": am.JPDA(),
     "mht": am.MHT(),
@@ -95,9 +95,12 @@ def latency(rate: float) -> list[list[str]]:
     frames = list(truth.detections)
     rows: list[list[str]] = []
     for name, method in (
-        ("53 markers, without confidence", am.MCMCDA(confidence=0)),
-        ("53 markers", am.MCMCDA()),
-        (f"53 markers, deadline={0.5 / rate:.4f}", am.MCMCDA(deadline=0.5 / rate)),
+        ("53 markers, without confidence", am.MCMCDA(end_odds=1, confidence=0)),
+        ("53 markers", am.MCMCDA(end_odds=1)),
+        (
+            f"53 markers, deadline={0.5 / rate:.4f}",
+            am.MCMCDA(end_odds=1, deadline=0.5 / rate),
+        ),
     ):
         state = method.init(model, seed=1)
         taken: list[float] = []

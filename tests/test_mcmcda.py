@@ -33,7 +33,7 @@ def test_the_window_s_best_partition_is_found():
         for k, path in enumerate(paths):
             tuples[k, d.frame_of[list(path)]] = path
         best = am.assign_multidimensional(tuples, scores).value
-        tracks = am.track(d, am.MCMCDA(window=5, moves=5000), model=model, seed=seed)
+        tracks = am.track(d, am.MCMCDA(window=5, moves=5000, end_odds=1), model=model, seed=seed)
         assert tracks.info["log_posterior"] <= best + 1e-5
         n += 1
         n_best += tracks.info["log_posterior"] > best - 0.01
@@ -46,7 +46,9 @@ def test_a_crowd_is_explained_no_worse_than_by_any_other_method():
     more = []
     for seed in range(6):
         d, model = crowd(seed, spread=0.08).detections, crowd_model()
-        own = am.track(d, am.MCMCDA(moves=1000), model=model, seed=1).info["log_posterior"]
+        own = am.track(d, am.MCMCDA(moves=1000, end_odds=1), model=model, seed=1).info[
+            "log_posterior"
+        ]
         more.append(own - max(am.track(d, m, model=model).info["log_posterior"] for m in others))
     assert min(more) > -0.01
 
@@ -125,7 +127,9 @@ def test_confidence_is_the_share_of_the_posterior_in_which_a_detection_follows_t
         p = np.exp(totals - totals.max())
         p /= p.sum()
         groups = ("whole", "likelihood")[seed // 2 % 2]
-        method = am.MCMCDA(window=5, moves=1000, confidence=250_000, groups=groups, doubt=20)
+        method = am.MCMCDA(
+            window=5, moves=1000, confidence=250_000, groups=groups, doubt=20, end_odds=1
+        )
         tracks = am.track(d, method, model=model, seed=seed)
         before = predecessors(tracks.labels)
         # Links to the last frame were asked for once: that is not yet a mean over frames.
@@ -243,6 +247,19 @@ def test_tracks_that_keep_their_distances_are_sure():
     assert alone.info["sure_tracks"] == 0
 
 
+def test_tracks_are_not_broken_where_a_marker_jerks():
+    # A marker that jumps by more than the model foresees: a new one would be likelier.
+    times = 0.1 * np.arange(60)
+    x = np.column_stack([0.5 * times, np.zeros(60), np.zeros(60)])
+    x[30:] += [0.0, 0.1, 0.0]
+    d = am.Detections.from_frames(times, [row[None] for row in x])
+    model = small_model(
+        motion=am.DWNA(acceleration_sigma=1.0, velocity_sigma=0.8), birth_density=2.0
+    )
+    n = {o: am.track(d, am.MCMCDA(end_odds=o), model=model).n_tracks for o in (1, 1000)}
+    assert n == {1: 2, 1000: 1}
+
+
 def test_a_single_scan_at_a_time():
     truth = wanderers(np.random.default_rng(4), n_frames=60)
     method = am.MCMCDA(window=1, moves=100)
@@ -356,7 +373,8 @@ def test_weights_of_moves_by_name():
         ({"confidence": -1}, "confidence"), ({"chains": 0}, "chains"), ({"threads": 0}, "threads"),
         ({"groups": "mine"}, "likelihood"), ({"groups": "cells"}, "distance"),
         ({"distance": 1.0}, "distance"), ({"groups": "clusters", "distance": -1}, "distance"),
-        ({"doubt": -1}, "doubt"), ({"bonds": 1}, "bonds"), ({"bonds": True}, "bonds"),
+        ({"doubt": -1}, "doubt"), ({"end_odds": 0.5}, "end_odds"), ({"end_odds": 1e300}, "end_odds"),
+        ({"bonds": 1}, "bonds"), ({"bonds": True}, "bonds"),
         ({"bonds": 2, "bond_tolerance": 0}, "bond_tolerance"),
         ({"chain": "ascent"}, "confidence"), ({"window": None, "deadline": 1.0}, "deadline"),
         ({"window": 0}, "window"), ({"window": 10**9}, "window"), ({"moves": 1e300}, "moves"),

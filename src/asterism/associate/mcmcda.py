@@ -99,6 +99,10 @@ class MCMCDA(EngineMethod):
         Moves for the confidence of labels, counted as above; 0 for none. A confidence is the share
         of a walk in which a detection follows the one that it follows (the first of a track: in
         which the next follows it; clutter: in which it is in no track).
+    end_odds : float
+        A track counts as so many times less likely to end than the model has it, so that it is not
+        broken where a marker moves as the model does not foresee; 1 samples the model's own
+        posterior.
     chains : int
         Walks beside each other in each frame: the best partition of all counts, and their
         agreement tells whether they found the same confidence.
@@ -145,6 +149,7 @@ class MCMCDA(EngineMethod):
     moves: float | None = 25.0
     deadline: float | None = None
     confidence: float = 25.0
+    end_odds: float = 1000.0
     chains: int = 1
     threads: int = 1
     groups: Literal["likelihood", "clusters", "cells", "whole"] = "likelihood"
@@ -172,6 +177,7 @@ class MCMCDA(EngineMethod):
         if self.deadline is not None:
             check_number("deadline", self.deadline, above=0)
         check_number("confidence", self.confidence, above=0, below=MOST, closed=True)
+        check_number("end_odds", self.end_odds, above=1, below=1e12, closed=True)
         check_number("chains", self.chains, above=1, below=1024, closed=True, integer=True)
         check_number("threads", self.threads, above=1, below=1024, closed=True, integer=True)
         check_number("doubt", self.doubt, above=0, closed=True)
@@ -233,8 +239,10 @@ class MCMCDA(EngineMethod):
         )
         is_one = len(model.motion.modes) == 1
         make = _engine.OneMotionTracker if is_one else _engine.SeveralMotionsTracker
-        motion, score = motion_model(model, n_axes), score_model(model)
-        return make(motion, score, chain, options, _checked_seed(seed))
+        population = model.population
+        rare = replace(population, p_disappear=population.p_disappear / self.end_odds)
+        score = score_model(replace(model, population=rare))
+        return make(motion_model(model, n_axes), score, chain, options, _checked_seed(seed))
 
     def step(
         self, state: EngineState, time: float, points: ArrayLike
