@@ -77,7 +77,7 @@ def perfect_data(path: Path) -> None:
     model = dataclasses.replace(model, population=population)
     report: dict[str, Any] = {
         "proposal": "uniform", "move_weights": "report", "first_rules": True, "assignment": False,
-        "groups": "whole", "confidence": 0, "moves": 30 / 8,
+        "groups": "whole", "confidence": 0, "end_odds": 1, "moves": 30 / 8,
     }  # fmt: skip
     ways = {
         "the report's original: true Metropolis": am.MCMCDA(**report),
@@ -88,7 +88,7 @@ def perfect_data(path: Path) -> None:
     for i, (title, method) in enumerate(ways.items()):
         tracks = am.track(truth.detections, method, model=model, seed=1)
         e = am.evaluate(tracks, truth)
-        axes: Any = figure.add_axes((i / 3 - 0.06, -0.36, 0.46, 1.5), projection="3d")
+        axes: Any = figure.add_axes((i / 3 - 0.05, -0.29, 0.44, 1.4), projection="3d")
         am.plot_trajectories(tracks, ax=axes)
         axes.set_title("", loc="left")
         axes.set_title("")
