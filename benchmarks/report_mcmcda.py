@@ -25,7 +25,7 @@ MODEL: dict[str, Any] = {"end_odds": 1}
 WHOLE: dict[str, Any] = {**MODEL, "groups": "whole", "confidence": 0}
 REPORT: dict[str, Any] = {
     "proposal": "uniform", "move_weights": "report", "first_rules": True, "assignment": False,
-    **WHOLE,
+    "at_doubts": 0, **WHOLE,
 }  # fmt: skip
 COUNTS = (30, 80, 1000)
 WAYS: dict[str, tuple[dict[str, Any], tuple[int, ...]]] = {

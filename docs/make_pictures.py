@@ -77,7 +77,7 @@ def perfect_data(path: Path) -> None:
     model = dataclasses.replace(model, population=population)
     report: dict[str, Any] = {
         "proposal": "uniform", "move_weights": "report", "first_rules": True, "assignment": False,
-        "groups": "whole", "confidence": 0, "end_odds": 1, "moves": 30 / 8,
+        "groups": "whole", "confidence": 0, "end_odds": 1, "at_doubts": 0, "moves": 30 / 8,
     }  # fmt: skip
     ways = {
         "the report's original: true Metropolis": am.MCMCDA(**report),

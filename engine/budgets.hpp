@@ -25,7 +25,8 @@ class Watch {
   Watch(double all, std::function<bool(double)> goes_on)
       : all_(all), goes_on_(std::move(goes_on)), owner_(std::this_thread::get_id()) {}
 
-  bool is_stopped_after(std::int64_t n_more) {
+  // Counts moves that are about to be made.
+  bool is_stopped_before(std::int64_t n_more) {
     n_done_ += n_more;
     if (std::this_thread::get_id() == owner_ && Clock::now() > next_) {
       next_ = Clock::now() + std::chrono::milliseconds(100);
@@ -48,12 +49,14 @@ struct Budget {
   std::int64_t moves = 0;
   Clock::time_point until = Clock::time_point::max();
   Watch* watch = nullptr;
+  static constexpr std::int64_t kLookEvery = 256;
 
   bool is_over(std::int64_t n) const {
     if (n >= moves) return true;
     if (n % 16 != 0) return false;
     if (until != Clock::time_point::max() && Clock::now() > until) return true;
-    return watch != nullptr && n > 0 && n % 256 == 0 && watch->is_stopped_after(256);
+    return watch != nullptr && n % kLookEvery == 0 &&
+           watch->is_stopped_before(std::min(kLookEvery, moves - n));
   }
 };
 

@@ -27,6 +27,8 @@ struct ChainOptions {
   // The report's chain: ω' is drawn from the best partition so far and weighed against the last one
   // that was taken. That climbs; it does not sample the posterior.
   bool is_ascent = false;
+  // So often a move is drawn at a link in doubt, where there is any (walker.hpp).
+  double share_at_doubts = 0;
 };
 
 template <typename Filter>

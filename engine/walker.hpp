@@ -32,7 +32,9 @@ template <typename Filter>
 class Walker {
  public:
   Walker(Partition<Filter> empty, const ChainOptions& options)
-      : sampler_(std::move(empty), options, 0), marginals_(sampler_.partition()) {}
+      : sampler_(std::move(empty), options, 0),
+        marginals_(sampler_.partition()),
+        hot_share_(options.share_at_doubts) {}
 
   // Looks for the best; returns what it is better by than the start, and stays there.
   double search(const Partition<Filter>& whole, const Group& group, std::uint64_t seed,
@@ -96,8 +98,6 @@ class Walker {
  private:
   // Moves less probable than this before the way back is weighed need not be known when refused.
   static constexpr double kLookedAtAbove = -9;
-  // So often a move is one of the hot ones, where there is any.
-  static constexpr double kHotShare = 0.5;
 
   // The log posterior along a walk: mean, variance, and from the means of batches how many
   // independent draws it is worth.
@@ -147,7 +147,7 @@ class Walker {
 
   template <typename Seen>
   void step(Seen&& seen) {
-    if (hot_.empty() || sampler_.random().uniform() >= kHotShare) {
+    if (hot_.empty() || sampler_.random().uniform() >= hot_share_) {
       sampler_.step(seen);
       return;
     }
@@ -160,6 +160,8 @@ class Walker {
   // What may be done about the links in doubt of this part. That a toggle is drawn as often before as
   // after makes it exact; how often is free.
   void list_hot(const Group& group) {
+    hot_.clear();
+    if (hot_share_ == 0) return;
     const Partition<Filter>& p = sampler_.partition();
     const std::int32_t n = p.window().n_ids();
     for (std::int32_t i = 0; i < n; ++i) {
@@ -169,7 +171,6 @@ class Walker {
     const auto local = [&](std::int32_t i) {
       return i < static_cast<std::int32_t>(local_.size()) ? local_[i] : -1;
     };
-    hot_.clear();
     for (const auto& [from, to] : group.doubts) {
       const std::int32_t a = local(from), y = local(to);
       if (a < 0 || y < 0 || p.track_of(a) < 0) continue;
@@ -203,6 +204,7 @@ class Walker {
 
   Sampler<Filter> sampler_;
   Marginals<Filter> marginals_;
+  double hot_share_;
   std::vector<Hot> hot_;
   std::vector<std::int32_t> local_;
 };

@@ -356,6 +356,20 @@ def test_a_walk_over_a_whole_take_can_be_interrupted():
     assert time.perf_counter() - start < 60
 
 
+def test_the_report_s_own_makes_no_moves_but_its_own():
+    # Births and deaths alone can never undo half a track; moves at doubts would.
+    d, model = crowd(7, n_frames=30).detections, crowd_model()
+    few = {"birth": 1, "death": 1}
+    own = am.MCMCDA(move_weights=few, at_doubts=0, assignment=False, groups="whole")
+    info = am.track(d, own, model=model, seed=1).info
+    taken = [name for name, share in info.items() if name.startswith("accepted_") and share > 0]
+    assert set(taken) <= {"accepted_birth", "accepted_death"}
+    more = am.track(
+        d, am.MCMCDA(move_weights=few, groups="whole", assignment=False), model=model, seed=1
+    )
+    assert more.info["log_posterior"] > info["log_posterior"]
+
+
 def test_weights_of_moves_by_name():
     d, model = crowd(7, n_frames=30).detections, crowd_model()
     shares = dict.fromkeys(MOVE_NAMES, 1.0)
@@ -377,7 +391,9 @@ def test_weights_of_moves_by_name():
         ({"end_odds": 1e300}, "end_odds"),
         ({"bonds": 1}, "bonds"), ({"bonds": True}, "bonds"),
         ({"bonds": 2, "bond_tolerance": 0}, "bond_tolerance"),
-        ({"chain": "ascent"}, "confidence"), ({"window": None, "deadline": 1.0}, "deadline"),
+        ({"at_doubts": 1}, "at_doubts"), ({"chain": "ascent"}, "confidence"),
+        ({"chain": "ascent", "confidence": 0}, "at_doubts"),
+        ({"window": None, "deadline": 1.0}, "deadline"),
         ({"window": 0}, "window"), ({"window": 10**9}, "window"), ({"moves": 1e300}, "moves"),
         ({"moves": -1}, "moves"), ({"moves": None}, "deadline"),
         ({"deadline": 0}, "deadline"), ({"proposal": "clever"}, "'informed' or 'uniform'"),

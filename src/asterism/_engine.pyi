@@ -377,6 +377,7 @@ class ChainOptions:
         floor: float,
         has_first_rules: bool,
         is_ascent: bool,
+        share_at_doubts: float = 0.0,
     ) -> None: ...
 
 # One for models with one motion, one for those with several.

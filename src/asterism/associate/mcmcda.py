@@ -127,6 +127,9 @@ class MCMCDA(EngineMethod):
     move_weights : {"uniform", "report"} or mapping
         How often each kind of move is drawn: all alike, by equation 4.7 of the report (whose eight
         these are), or weights by kind.
+    at_doubts : float
+        Share of the moves that are drawn at the links in doubt, where two tracks change what they
+        have; 0 for none, as in the report.
     chain : {"metropolis", "ascent"}
         The report draws from the best partition so far and weighs against the last one taken
         ("ascent"): that climbs and does not sample.
@@ -159,6 +162,7 @@ class MCMCDA(EngineMethod):
     bond_tolerance: float | None = None
     proposal: Literal["informed", "uniform"] = "informed"
     move_weights: Literal["uniform", "report"] | Mapping[str, float] = "uniform"
+    at_doubts: float = 0.5
     chain: Literal["metropolis", "ascent"] = "metropolis"
     first_rules: bool = False
     assignment: bool = True
@@ -180,6 +184,7 @@ class MCMCDA(EngineMethod):
         check_number("end_odds", self.end_odds, above=1, below=1e12, closed=True)
         check_number("chains", self.chains, above=1, below=1024, closed=True, integer=True)
         check_number("threads", self.threads, above=1, below=1024, closed=True, integer=True)
+        check_number("at_doubts", self.at_doubts, above=0, below=0.99, closed=True)
         check_number("doubt", self.doubt, above=0, closed=True)
         if self.bond_tolerance is not None:
             check_number("bond_tolerance", self.bond_tolerance, above=0)
@@ -202,11 +207,12 @@ class MCMCDA(EngineMethod):
         if is_by_distance != (self.distance is not None):
             wanted = "a length in metres" if is_by_distance else "none, or groups by distance"
             raise ParameterError("distance", wanted, repr(self.distance))
-        if self.chain == "ascent" and self.confidence > 0:
-            raise ParameterError(
-                "confidence", "0 with the ascent", repr(self.confidence),
-                "only the metropolis chain samples",
-            )  # fmt: skip
+        for name in ("confidence", "at_doubts"):
+            if self.chain == "ascent" and getattr(self, name) > 0:
+                raise ParameterError(
+                    name, "0 with the ascent", repr(getattr(self, name)),
+                    "only the metropolis chain samples",
+                )  # fmt: skip
         _checked_weights(self.move_weights)
 
     def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> Tracker:
@@ -221,6 +227,7 @@ class MCMCDA(EngineMethod):
             floor=FLOOR,
             has_first_rules=self.first_rules,
             is_ascent=self.chain == "ascent",
+            share_at_doubts=self.at_doubts,
         )
         options = _engine.McmcOptions(
             window=FIRST_PASS if self.window is None else int(self.window),
