@@ -13,9 +13,11 @@ class Doubts {
     std::int32_t from = 0, to = 0;
   };
 
-  // The newest frame, of whose detections the links added from here on lead to one.
   void add_frame() { frames_.emplace_back(); }
-  void add(std::int32_t from, std::int32_t to) { frames_.back().push_back({from, to}); }
+  // A link that leads into a frame so many before the newest.
+  void add(std::int32_t from, std::int32_t to, std::int64_t age = 0) {
+    frames_[frames_.size() - 1 - static_cast<std::size_t>(age)].push_back({from, to});
+  }
   // Forgets all but the newest frames.
   void keep(std::size_t n_frames) {
     while (frames_.size() > n_frames) frames_.pop_front();
