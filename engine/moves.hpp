@@ -21,6 +21,7 @@
 #include "growth.hpp"
 #include "partition.hpp"
 #include "random.hpp"
+#include "splices.hpp"
 
 namespace asterism {
 
@@ -28,7 +29,7 @@ template <typename Filter>
 class Moves {
  public:
   Moves(const Partition<Filter>& partition, const GrowthOptions& growth)
-      : p_(partition), growth_(partition, growth) {}
+      : p_(partition), splices_(partition), growth_(partition, growth) {}
 
   // Draws ω'; false where the draw leads nowhere, so that the state stays.
   bool propose(Move move, Random& random, Change<Filter>& out) {
@@ -37,7 +38,7 @@ class Moves {
     out.log_forward = 0;
     out.with = -1;
     if (!draw(random, out)) return false;
-    weigh(out);
+    splices_.weigh(out);
     return out.log_forward > Growth<Filter>::kNever;
   }
 
@@ -76,49 +77,6 @@ class Moves {
         return q.log_forward;
     }
     return Growth<Filter>::kNever;
-  }
-
-  // What a drawn change gains.
-  void weigh(Change<Filter>& q) const {
-    q.gain = 0;
-    for (const Edit<Filter>& e : q.all())
-      q.gain += p_.score_of(e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
-  }
-  // What a track has from a place on.
-  void append(Edit<Filter>& edit, std::int32_t track, std::int32_t from) const {
-    const auto& nodes = p_.track(track).nodes;
-    for (std::size_t n = from; n < nodes.size(); ++n) p_.append(edit, nodes[n]);
-  }
-  // Whether what is left without x is a track.
-  bool may_go(std::int32_t x) const {
-    const std::int32_t i = p_.before(x), j = p_.after(x);
-    return p_.track(p_.track_of(x)).whole_size() >= 3 &&
-           (i < 0 || j < 0 || p_.window().is_linkable(i, j));
-  }
-  // A track without x.
-  void take_out(std::int32_t x, Change<Filter>& q) const {
-    const std::int32_t k = p_.track_of(x);
-    append(q.edit(k, p_.place_of(x)), k, p_.place_of(x) + 1);
-  }
-  // A free detection in the place of another; false where its neighbours forbid it.
-  bool replace(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
-    if (!fits_in_place_of(y, x)) return false;
-    const std::int32_t k = p_.track_of(x);
-    Edit<Filter>& e = q.edit(k, p_.place_of(x));
-    p_.append(e, y);
-    append(e, k, p_.place_of(x) + 1);
-    return true;
-  }
-  // Each of two detections of one frame in the place of the other; false where neighbours forbid it.
-  bool exchange(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
-    if (!fits_in_place_of(y, x) || !fits_in_place_of(x, y)) return false;
-    for (const auto& [old, now] : {std::pair{x, y}, std::pair{y, x}}) {
-      const std::int32_t k = p_.track_of(old);
-      Edit<Filter>& e = q.edit(k, p_.place_of(old));
-      p_.append(e, now);
-      append(e, k, p_.place_of(old) + 1);
-    }
-    return true;
   }
 
  private:
@@ -204,7 +162,7 @@ class Moves {
     const std::int32_t keep = least_kept(k) + random.below(n_cuts);
     q.log_forward -= log(n_cuts);
     q.edit(k, keep);
-    append(q.edit(-1, 0), k, keep);
+    splices_.append(q.edit(-1, 0), k, keep);
     return true;
   }
 
@@ -216,7 +174,7 @@ class Moves {
       if (p_.window().is_linkable(p_.last(k), node(other, 0))) starts_.push_back(other);
     if (starts_.empty()) return false;
     const std::int32_t other = draw_one(starts_, random, q);
-    append(q.edit(k, p_.track(k).size()), other, 0);
+    splices_.append(q.edit(k, p_.track(k).size()), other, 0);
     q.edit(other, 0);
     return true;
   }
@@ -272,8 +230,8 @@ class Moves {
     if (partners_.empty()) return false;
     const std::int32_t d = draw_one(partners_, random, q), other = p_.track_of(d);
     q.with = b;
-    append(q.edit(own, p_.place_of(b)), other, p_.place_of(d));
-    append(q.edit(other, p_.place_of(d)), own, p_.place_of(b));
+    splices_.append(q.edit(own, p_.place_of(b)), other, p_.place_of(d));
+    splices_.append(q.edit(other, p_.place_of(d)), own, p_.place_of(b));
     return true;
   }
   // Every detection in a track, and not settled, that may follow a and where b may have been before:
@@ -348,16 +306,16 @@ class Moves {
     q.with = x;
     Edit<Filter>& e = q.edit(slot.track, slot.keep);
     p_.append(e, x);
-    append(e, slot.track, slot.keep);
+    splices_.append(e, slot.track, slot.keep);
     return true;
   }
 
   bool draw_deletion(Random& random, Change<Filter>& q) {
     const std::int32_t x = draw_one(p_.taken(), random, q);
     if (x < 0) return false;
-    if (!may_go(x)) return false;
+    if (!splices_.may_go(x)) return false;
     q.with = x;
-    take_out(x, q);
+    splices_.take_out(x, q);
     return true;
   }
 
@@ -373,7 +331,7 @@ class Moves {
     const std::int32_t other = draw_one(starts_, random, q);
     q.with = b;
     q.edit(own, p_.place_of(b));
-    append(q.edit(other, p_.track(other).size()), own, p_.place_of(b));
+    splices_.append(q.edit(other, p_.track(other).size()), own, p_.place_of(b));
     return true;
   }
 
@@ -387,22 +345,22 @@ class Moves {
     if (starts_.empty()) return false;
     const std::int32_t y = draw_one(starts_, random, q);
     q.with = x;
-    return replace(x, y, q);
+    return splices_.replace(x, y, q);
   }
 
   // Without x both partitions are the same, and so are the places where it may go.
   bool draw_relocation(Random& random, Change<Filter>& q) {
     const std::int32_t x = draw_one(p_.taken(), random, q);
-    if (x < 0 || !may_go(x)) return false;
+    if (x < 0 || !splices_.may_go(x)) return false;
     list_slots(x);
     slots_.pop_back();  // where it is
     if (slots_.empty()) return false;
     const Slot slot = draw_one(slots_, random, q);
     q.with = x;
-    take_out(x, q);
+    splices_.take_out(x, q);
     Edit<Filter>& e = q.edit(slot.track, slot.keep);
     p_.append(e, x);
-    append(e, slot.track, slot.keep);
+    splices_.append(e, slot.track, slot.keep);
     return true;
   }
 
@@ -414,15 +372,11 @@ class Moves {
       if (y != x && p_.taken().has(y)) starts_.push_back(y);
     if (starts_.empty()) return false;
     q.with = x;
-    return exchange(x, draw_one(starts_, random, q), q);
-  }
-  bool fits_in_place_of(std::int32_t y, std::int32_t x) const {
-    const DetectionWindow& window = p_.window();
-    const std::int32_t i = p_.before(x), j = p_.after(x);
-    return (i < 0 || window.is_linkable(i, y)) && (j < 0 || window.is_linkable(y, j));
+    return splices_.exchange(x, draw_one(starts_, random, q), q);
   }
 
   const Partition<Filter>& p_;
+  Splices<Filter> splices_;
   Growth<Filter> growth_;
   std::vector<std::int32_t> starts_, partners_;
   std::vector<Slot> slots_;

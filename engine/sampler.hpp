@@ -213,7 +213,7 @@ class Sampler {
   ChainOptions opt_;
   Random random_;
   Moves<Filter> moves_{partition_, opt_.growth};
-  Toggles<Filter> toggles_{partition_, moves_};
+  Toggles<Filter> toggles_{partition_};
   Change<Filter> change_;
   std::array<Shares, 3> shares_{};
   std::array<MoveCounts, kMoves> counts_{};

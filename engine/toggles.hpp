@@ -1,22 +1,24 @@
 // Moves at given detections that are their own inverses: as long as a list of them stays, each is drawn
 // as often in ω as in ω', and the gain alone decides.
 //
-//   trade     x and y, of one frame, of which one at least is in a track, in each other's place
+//   trade     x and y, of which one at least is in a track, in each other's place
 //   swap      two tracks change what they have from x and from y on
 //   relocate  y stands after a instead of after c, or back
 //   transfer  all from y on stands after a instead of after c, one of which is a track's last; or back
+//   begin     a is the first of the track that had y as its first, or of a new one of both; or back
 #pragma once
 
 #include <cstdint>
 #include <limits>
 
-#include "moves.hpp"
+#include "change.hpp"
 #include "partition.hpp"
+#include "splices.hpp"
 
 namespace asterism {
 
 struct Toggle {
-  enum class Kind { trade, swap, relocate, transfer };
+  enum class Kind { trade, swap, relocate, transfer, begin };
   Kind kind = Kind::trade;
   std::int32_t y = 0, a = 0, c = 0;  // for the first two a stands for x
 };
@@ -24,15 +26,14 @@ struct Toggle {
 template <typename Filter>
 class Toggles {
  public:
-  Toggles(const Partition<Filter>& partition, const Moves<Filter>& moves)
-      : p_(partition), moves_(moves) {}
+  explicit Toggles(const Partition<Filter>& partition) : p_(partition), splices_(partition) {}
 
   // False where it leads nowhere.
   bool propose(const Toggle& t, Change<Filter>& out) const {
     out.n_edits = 0;
     out.log_forward = out.log_reverse = 0;
     if (!draw(t, out)) return false;
-    moves_.weigh(out);
+    splices_.weigh(out);
     return true;
   }
 
@@ -43,23 +44,25 @@ class Toggles {
       case Toggle::Kind::swap: return swap(t.a, t.y, out);
       case Toggle::Kind::relocate: return relocate(t.y, other(t), out);
       case Toggle::Kind::transfer: return transfer(t.y, other(t), out);
+      case Toggle::Kind::begin: return begin(t.a, t.y, out);
     }
     return false;
   }
   bool is_taken(std::int32_t i) const { return p_.taken().has(i); }
 
   bool trade(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
-    if (is_taken(x) && is_taken(y)) return moves_.exchange(x, y, q);
+    if (is_taken(x) && is_taken(y))
+      return p_.track_of(x) != p_.track_of(y) && splices_.exchange(x, y, q);
     if (!is_taken(x) && !is_taken(y)) return false;
-    return is_taken(x) ? moves_.replace(x, y, q) : moves_.replace(y, x, q);
+    return is_taken(x) ? splices_.replace(x, y, q) : splices_.replace(y, x, q);
   }
 
   bool swap(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
     if (!is_taken(x) || !is_taken(y)) return false;
     const std::int32_t k = p_.track_of(x), l = p_.track_of(y);
     if (k == l || !goes_on(y, x) || !goes_on(x, y)) return false;
-    moves_.append(q.edit(k, p_.place_of(x)), l, p_.place_of(y));
-    moves_.append(q.edit(l, p_.place_of(y)), k, p_.place_of(x));
+    splices_.append(q.edit(k, p_.place_of(x)), l, p_.place_of(y));
+    splices_.append(q.edit(l, p_.place_of(y)), k, p_.place_of(x));
     return true;
   }
   // Whether a track may go on with y in place of x; as its first y must not be its last.
@@ -79,14 +82,14 @@ class Toggles {
   }
 
   bool relocate(std::int32_t y, std::int32_t to, Change<Filter>& q) const {
-    if (to < 0 || !moves_.may_go(y)) return false;
+    if (to < 0 || !splices_.may_go(y)) return false;
     const std::int32_t next = p_.after(to);
     if (next >= 0 && !p_.window().is_linkable(y, next)) return false;
-    moves_.take_out(y, q);
+    splices_.take_out(y, q);
     const std::int32_t k = p_.track_of(to);
     Edit<Filter>& e = q.edit(k, p_.place_of(to) + 1);
     p_.append(e, y);
-    moves_.append(e, k, p_.place_of(to) + 1);
+    splices_.append(e, k, p_.place_of(to) + 1);
     return true;
   }
 
@@ -94,12 +97,36 @@ class Toggles {
     const std::int32_t k = p_.track_of(y);
     if (to < 0 || p_.after(to) >= 0 || p_.track(k).n_gone + p_.place_of(y) < 2) return false;
     q.edit(k, p_.place_of(y));
-    moves_.append(q.edit(p_.track_of(to), p_.place_of(to) + 1), k, p_.place_of(y));
+    splices_.append(q.edit(p_.track_of(to), p_.place_of(to) + 1), k, p_.place_of(y));
     return true;
   }
 
+  bool begin(std::int32_t a, std::int32_t y, Change<Filter>& q) const {
+    if (p_.is_free(a)) {
+      if (p_.is_free(y)) {
+        Edit<Filter>& e = q.edit(-1, 0);
+        p_.append(e, a);
+        p_.append(e, y);
+        return true;
+      }
+      if (!is_taken(y) || !is_first(y)) return false;
+      Edit<Filter>& e = q.edit(p_.track_of(y), 0);
+      p_.append(e, a);
+      splices_.append(e, e.track, 0);
+      return true;
+    }
+    if (!is_taken(a) || !is_first(a) || p_.after(a) != y) return false;
+    const std::int32_t k = p_.track_of(a);
+    Edit<Filter>& e = q.edit(k, 0);
+    if (p_.track(k).size() > 2) splices_.append(e, k, 1);
+    return true;
+  }
+  bool is_first(std::int32_t i) const {
+    return p_.place_of(i) == 0 && p_.track(p_.track_of(i)).n_gone == 0;
+  }
+
   const Partition<Filter>& p_;
-  const Moves<Filter>& moves_;
+  Splices<Filter> splices_;
 };
 
 }  // namespace asterism

@@ -173,16 +173,20 @@ class Walker {
     };
     for (const auto& [from, to] : group.doubts) {
       const std::int32_t a = local(from), y = local(to);
-      if (a < 0 || y < 0 || p.track_of(a) < 0) continue;
-      const std::int32_t x = p.after(a), c = p.track_of(y) < 0 ? -1 : p.before(y);
-      if (x == y) continue;
+      if (a < 0 || y < 0) continue;
+      const std::int32_t x = p.track_of(a) < 0 ? -1 : p.after(a);
+      const std::int32_t c = p.track_of(y) < 0 ? -1 : p.before(y);
+      if (p.track_of(a) < 0 || x == y) {
+        add_hot({Toggle::Kind::begin, y, a});
+        continue;
+      }
       if (c >= 0) {
         add_hot({Toggle::Kind::relocate, y, a, c});
         if (x < 0) add_hot({Toggle::Kind::transfer, y, a, c});
       }
       if (x < 0 || p.is_frozen(x)) continue;
       add_hot({Toggle::Kind::swap, y, x});
-      if (p.window()[x].frame == p.window()[y].frame) add_hot({Toggle::Kind::trade, y, x});
+      add_hot({Toggle::Kind::trade, y, x});
     }
     for (std::int32_t i = 0; i < n; ++i) local_[p.origin(i)] = -1;
   }
