@@ -55,7 +55,7 @@ def smooth(n: int, frames: int, seed: int) -> tuple[am.Tracks, am.TrackingModel]
     now = float(np.prod(places[0].max(0) - places[0].min(0) + 0.6))
     assert now <= float(np.prod(size))
     model = am.TrackingModel(
-        motion=am.DWNA(acceleration_sigma=0.004, velocity_sigma=0.04),
+        motion=am.DWNA(acceleration_sigma=0.006, velocity_sigma=0.04),
         sensor=am.Sensor(noise_sigma=0.005, p_detection=0.9, clutter_density=0.1 * n / now),
         population=am.Population(
             birth_density=0.05 / now, p_disappear=0.001, max_speed=0.12, max_gap=8

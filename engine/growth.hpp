@@ -42,6 +42,7 @@ class Growth {
     own_ = edit.track;
     keep_ = edit.keep;
     double log_p = 0;
+    std::int32_t n_same = keep_;  // detections from the first that are as before
     for (;; is_forced = false) {
       const bool is_first = edit.tail.nodes.empty();
       const std::int32_t i =
@@ -50,7 +51,14 @@ class Growth {
       const std::int32_t j = opt_.is_informed ? draw_informed(i, state, is_forced, random, log_p)
                                               : draw_uniform(i, is_forced, random, log_p);
       if (j < 0) return log_p;
-      p_.append(edit, j);
+      const auto place = keep_ + static_cast<std::int32_t>(edit.tail.nodes.size());
+      if (n_same == place && own_ >= 0 && place < p_.track(own_).size() &&
+          p_.track(own_).nodes[place] == j) {
+        p_.append_same(edit, j);
+        ++n_same;
+      } else {
+        p_.append(edit, j);
+      }
     }
   }
 

@@ -43,6 +43,7 @@ class Moves {
   }
 
   double log_reverse(const Change<Filter>& q) {
+    if (q.n_edits == 0) return q.log_forward;  // the way back is the same
     const Edit<Filter>& first = q.edits[0];
     const auto n_tail = static_cast<std::int32_t>(first.tail.nodes.size());
     const std::int32_t n_new = first.keep + n_tail;
@@ -211,7 +212,14 @@ class Moves {
     q.with = least_updated(k) + random.below(n_cuts);
     Edit<Filter>& e = q.edit(k, q.with);
     q.log_forward += growth_.grow(e, must_grow(k, q.with), random);
+    if (is_as_it_is(e)) q.n_edits = 0;
     return true;
+  }
+
+  bool is_as_it_is(const Edit<Filter>& e) const {
+    const auto& nodes = p_.track(e.track).nodes;
+    return e.keep + e.tail.nodes.size() == nodes.size() &&
+           std::equal(e.tail.nodes.begin(), e.tail.nodes.end(), nodes.begin() + e.keep);
   }
 
   // The link is a → b. Another track goes on with d after a; and b goes on where d did: after the c

@@ -145,6 +145,13 @@ class Partition {
     tail.nodes.push_back(j);
   }
 
+  // The same for the detection that follows in the track now, where the edit changes nothing before.
+  void append_same(Edit<Filter>& edit, std::int32_t j) const {
+    edit.tail.nodes.push_back(j);
+    edit.tail.states.push_back(state_[j]);
+    edit.tail.scores.push_back(score_[j]);
+  }
+
   // Takes the edits over. A track that keeps nothing is gone, its number free for others.
   void apply(std::span<Edit<Filter>> edits) {
     for (Edit<Filter>& edit : edits) {
