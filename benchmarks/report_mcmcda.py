@@ -91,6 +91,28 @@ def rows_of(max_gap: int, seeds: int) -> list[list[str]]:
     return rows
 
 
+def speed(max_gap: int, seeds: int) -> list[list[str]]:
+    """Microseconds a move, everything in Python counted: with one motion, on one core."""
+    some: list[tuple[am.Tracks, am.TrackingModel]] = []
+    for truth, model in clips(seeds, max_gap):
+        motion = model.motion
+        if isinstance(motion, am.InteractingMotions):
+            motion = motion.models[0]
+        some.append((truth, dataclasses.replace(model, motion=motion)))
+    rows: list[list[str]] = []
+    ways = {"uniform growth": REPORT, "informed growth": WHOLE}
+    for name, options in ways.items():
+        method = am.MCMCDA(moves=1000 / 8.8, **{**options, "at_doubts": 0})
+        each: list[float] = []
+        for truth, model in some:
+            start = time.perf_counter()
+            tracks = am.track(truth.detections, method, model=model, seed=1)
+            each.append(1e6 * (time.perf_counter() - start) / tracks.info["moves"])
+        rows.append([f"d̄ = {max_gap}, {name}", f"{np.median(each):.2f}", f"{min(each):.2f}"])
+        print(*rows[-1], flush=True)
+    return rows
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=20)
@@ -101,6 +123,8 @@ def main() -> None:
     lines: list[str] = []
     for max_gap in (2, 4):
         lines += [f"d̄ = {max_gap}:", "", *table(head, rows_of(max_gap, options.seeds)), ""]
+    rows = [row for max_gap in (2, 4) for row in speed(max_gap, options.seeds)]
+    lines += [*table(["µs a move, one motion", "median", "least"], rows), ""]
     lines += [f"Means over {options.seeds} seeds. {conditions()}."]
     publish(lines, options.markdown)
 
