@@ -12,4 +12,5 @@ NB_MODULE(_engine, module) {
   bind_camera(module);
   bind_solvers(module);
   bind_chain(module);
+  bind_stitcher(module);
 }

@@ -8,3 +8,4 @@ void bind_trackers(nanobind::module_& module);
 void bind_camera(nanobind::module_& module);
 void bind_solvers(nanobind::module_& module);
 void bind_chain(nanobind::module_& module);
+void bind_stitcher(nanobind::module_& module);

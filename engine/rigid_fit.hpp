@@ -1,0 +1,126 @@
+// The rigid motion that takes some points nearest to others (least squares; Horn 1987 in space).
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+#include "kalman.hpp"
+
+namespace asterism {
+
+// b = R (a - from) + to
+struct RigidFit {
+  std::array<double, 9> R{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  Point from{}, to{};
+  double rms = 0;  // along an axis, of what the fit leaves, for as many numbers as it was not free in
+
+  Point operator()(const Point& a) const {
+    Point b = to;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) b[i] += R[3 * i + j] * (a[j] - from[j]);
+    return b;
+  }
+};
+
+struct RigidPair {
+  Point a{}, b{};
+  double weight = 1;
+};
+
+// Fewer pairs than determine a rotation (three in space, two in the plane) are moved alone.
+inline std::size_t least_for_rotation(int D) { return static_cast<std::size_t>(std::max(D, 1)); }
+
+namespace rigid {
+
+// The unit vector that makes vᵀ M v greatest, by Jacobi's rotations.
+inline std::array<double, 4> top_vector(std::array<std::array<double, 4>, 4> M) {
+  std::array<std::array<double, 4>, 4> V{};
+  for (int i = 0; i < 4; ++i) V[i][i] = 1;
+  for (int sweep = 0; sweep < 12; ++sweep) {
+    double off = 0, on = 0;
+    for (int i = 0; i < 4; ++i) {
+      on += M[i][i] * M[i][i];
+      for (int j = i + 1; j < 4; ++j) off += M[i][j] * M[i][j];
+    }
+    if (off <= 1e-30 * on) break;
+    for (int p = 0; p < 3; ++p)
+      for (int q = p + 1; q < 4; ++q) {
+        if (M[p][q] == 0) continue;
+        const double theta = 0.5 * std::atan2(2 * M[p][q], M[q][q] - M[p][p]);
+        const double c = std::cos(theta), s = std::sin(theta);
+        for (int k = 0; k < 4; ++k) {
+          const double x = M[k][p], y = M[k][q];
+          M[k][p] = c * x - s * y;
+          M[k][q] = s * x + c * y;
+        }
+        for (int k = 0; k < 4; ++k) {
+          const double x = M[p][k], y = M[q][k];
+          M[p][k] = c * x - s * y;
+          M[q][k] = s * x + c * y;
+          const double v = V[k][p], w = V[k][q];
+          V[k][p] = c * v - s * w;
+          V[k][q] = s * v + c * w;
+        }
+      }
+  }
+  int best = 0;
+  for (int i = 1; i < 4; ++i)
+    if (M[i][i] > M[best][best]) best = i;
+  return {V[0][best], V[1][best], V[2][best], V[3][best]};
+}
+
+inline std::array<double, 9> rotation(const std::array<double, 4>& q) {
+  const auto [w, x, y, z] = q;
+  return {w * w + x * x - y * y - z * z, 2 * (x * y - w * z),           2 * (x * z + w * y),
+          2 * (x * y + w * z),           w * w - x * x + y * y - z * z, 2 * (y * z - w * x),
+          2 * (x * z - w * y),           2 * (y * z + w * x),           w * w - x * x - y * y + z * z};
+}
+
+}  // namespace rigid
+
+inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D) {
+  RigidFit fit;
+  double all = 0;
+  for (const RigidPair& p : pairs) {
+    all += p.weight;
+    for (int d = 0; d < D; ++d) {
+      fit.from[d] += p.weight * p.a[d];
+      fit.to[d] += p.weight * p.b[d];
+    }
+  }
+  for (int d = 0; d < D; ++d) {
+    fit.from[d] /= all;
+    fit.to[d] /= all;
+  }
+  const bool can_turn = D > 1 && pairs.size() >= least_for_rotation(D);
+  if (can_turn) {
+    double S[3][3] = {};
+    for (const RigidPair& p : pairs)
+      for (int i = 0; i < D; ++i)
+        for (int j = 0; j < D; ++j)
+          S[i][j] += p.weight * (p.a[i] - fit.from[i]) * (p.b[j] - fit.to[j]);
+    if (D == 2) {
+      const double angle = std::atan2(S[0][1] - S[1][0], S[0][0] + S[1][1]);
+      const double c = std::cos(angle), s = std::sin(angle);
+      fit.R = {c, -s, 0, s, c, 0, 0, 0, 1};
+    } else {
+      const double yz = S[1][2] - S[2][1], zx = S[2][0] - S[0][2], xy = S[0][1] - S[1][0];
+      fit.R = rigid::rotation(rigid::top_vector(
+          {{{S[0][0] + S[1][1] + S[2][2], yz, zx, xy},
+            {yz, S[0][0] - S[1][1] - S[2][2], S[0][1] + S[1][0], S[2][0] + S[0][2]},
+            {zx, S[0][1] + S[1][0], S[1][1] - S[0][0] - S[2][2], S[1][2] + S[2][1]},
+            {xy, S[2][0] + S[0][2], S[1][2] + S[2][1], S[2][2] - S[0][0] - S[1][1]}}}));
+    }
+  }
+  double left = 0;
+  for (const RigidPair& p : pairs) left += p.weight * squared_distance(fit(p.a), p.b, D);
+  const double n = static_cast<double>(pairs.size()) * D;
+  const double free = n - (can_turn ? 0.5 * D * (D + 1) : D);
+  fit.rms = std::sqrt(left / all / D * n / std::max(free, 1.0));
+  return fit;
+}
+
+}  // namespace asterism
