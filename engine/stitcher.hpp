@@ -94,7 +94,11 @@ class Stitcher {
   // before it was decided upon, and of others.
   static constexpr double kShort = -3, kLong = 2;
   // A link is cut where the neighbours, which knew it well so far, now give it no more than this.
-  static constexpr double kKnownWell = 6, kContradicted = 3;
+  static constexpr double kKnownWell = 6, kContradicted = 3, kDoubted = 3;
+  static constexpr double kKnownFirst = 10;
+  static constexpr double kTrusted = 2;          // of the markers on average: there are bodies
+  static constexpr double kLeastMotion = 0.005;  // weight of the motion where the body is trusted
+  static constexpr std::int64_t kTrustLag = 12, kTrustEvery = 4;
 
   struct Sight {
     std::int64_t frame = 0;
@@ -115,7 +119,7 @@ class Stitcher {
     MotionState state;
     double alone = 0;  // log likelihood of its second detection and those after
     std::vector<Continuation> continuations;
-    double known = 0;  // how well its neighbours knew its links, on average
+    double known = kKnownFirst;  // how well its neighbours knew its links, on average
   };
   struct Marker {
     std::int32_t fragment = -1;
@@ -125,6 +129,7 @@ class Stitcher {
     std::vector<Seen> around;    // when it was seen last, the steadiest first
     std::vector<double> weight;  // of these
     bool is_hidden = false;
+    double trust = 3;  // how well its neighbours carried it lately, while it was seen
   };
   struct Frame {
     std::vector<std::pair<std::int32_t, Point>> seen;  // fragment, place
@@ -181,6 +186,18 @@ class Stitcher {
     return id;
   }
 
+  // Whether neighbours carry the markers that are seen, on the whole.
+  bool has_bodies() const {
+    double sum = 0;
+    std::size_t n = 0;
+    for (const auto& [k, marker] : markers_)
+      if (!marker.is_hidden) {
+        sum += marker.trust;
+        ++n;
+      }
+    return n > 0 && sum > kTrusted * static_cast<double>(n);
+  }
+
   // Links that the neighbours contradict.
   void cut_links(std::span<const Point> points, std::span<const std::int64_t> labels,
                  std::span<std::int32_t> fragment_of) {
@@ -197,7 +214,9 @@ class Stitcher {
       if (!weigh_link(own, gain)) continue;
       if (gain < kContradicted && f.known > kKnownWell) {
         ++n_cuts_;
+        const double known = f.known - kDoubted;
         own.first = fragment_of[i] = begin(labels[i]);
+        fragments_.at(own.first).known = known;
       } else {
         f.known += 0.2 * (gain - f.known);
       }
@@ -344,6 +363,35 @@ class Stitcher {
     for (const auto& [id, x] : frames_.back().seen)
       if (const std::int32_t k = fragments_.at(id).marker; k >= 0) seen_.push_back({k, x});
     neighbours_.add(seen_);
+    judge();
+  }
+  // While a marker is seen, where its neighbours would have carried it in a while is a test of them.
+  void judge() {
+    const int D = m_.axis.D;
+    const Frame* then = frame(now_ - kTrustLag);
+    if (then == nullptr) return;
+    list_markers(*then);
+    now_place_.clear();
+    for (const Seen& one : seen_) now_place_[one.marker] = one.at;
+    for (const Seen& one : seen_) {
+      if ((now_ + one.marker) % kTrustEvery != 0) continue;
+      const auto before = place_.find(one.marker);
+      if (before == place_.end()) continue;
+      steady_.clear();
+      for (const Bond& bond : neighbours_.of(one.marker))
+        if (place_.contains(bond.other) && now_place_.contains(bond.other))
+          steady_.emplace_back(neighbours_.unsteadiness(bond), bond.other);
+      if (steady_.empty()) continue;
+      const std::size_t n = std::min(kFitted, steady_.size());
+      std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n), steady_.end());
+      pairs_.clear();
+      for (std::size_t r = 0; r < n; ++r)
+        pairs_.push_back({place_.at(steady_[r].second), now_place_.at(steady_[r].second), 1 / square(steady_[r].first)});
+      Marker& marker = markers_.at(one.marker);
+      const double gain = carry(pairs_, before->second, D, 4 * opt_.noise).log_density(one.at) -
+                          log_elsewhere(one.at, frames_.back(), marker.fragment);
+      marker.trust += 0.2 * (std::clamp(gain, -20.0, 20.0) - marker.trust);
+    }
   }
 
   template <typename Decide>
@@ -372,7 +420,7 @@ class Stitcher {
     if (!scored_.empty()) out.marker = best_of(f, id, out.probability);
     if (out.marker == Decision::kOpen) {
       const bool is_short = f.last - f.first + 1 < opt_.confirm;
-      out.marker = is_short && is_beside(f, id) ? Decision::kGhost : n_markers_++;
+      out.marker = is_short && (has_bodies() || is_beside(f, id)) ? Decision::kGhost : n_markers_++;
       out.probability = 1 / (1 + std::exp(std::min(most, 500.0)));
     }
     f.marker = out.marker;
@@ -430,9 +478,11 @@ class Stitcher {
     if (!marker.is_hidden || marker.last >= f.first) return never;
     const bool is_short = f.last - f.first + 1 < opt_.confirm && f.last < now_;
     const double body = body_score(f, id, marker), motion = motion_score(f, id, k);
-    const double more = std::max(body, motion), less = std::min(body, motion);
+    const double at_rest = std::clamp(1 / (1 + std::exp(marker.trust)), kLeastMotion, 0.5);
+    const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
+    const double more = std::max(a, b), less = std::min(a, b);
     if (more == never) return never;
-    return more + std::log1p(std::exp(less - more)) - std::log(2.0) + (is_short ? kShort : kLong);
+    return more + std::log1p(std::exp(less - more)) + (is_short ? kShort : kLong);
   }
   double body_score(const Fragment& f, std::int32_t id, const Marker& marker) {
     const int D = m_.axis.D;
@@ -501,6 +551,8 @@ class Stitcher {
   std::unordered_map<std::int32_t, Point> place_;
   std::vector<std::pair<double, std::int32_t>> nearest_;
   std::vector<RigidPair> pairs_;
+  std::unordered_map<std::int32_t, Point> now_place_;
+  std::vector<std::pair<double, std::int32_t>> steady_;
   std::vector<Seen> seen_;
   std::vector<std::int32_t> due_, match_;
   std::vector<std::pair<std::int32_t, double>> scored_;
