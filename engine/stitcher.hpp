@@ -142,6 +142,9 @@ class Stitcher {
                : nullptr;
   }
   bool is_over(const Fragment& f) const { return now_ - f.last > opt_.max_gap; }
+  bool is_short(const Fragment& f) const {
+    return is_over(f) && f.last - f.first + 1 < opt_.confirm;
+  }
 
   void move_on(const MotionStep& step) {
     for (auto& [id, f] : fragments_) {
@@ -399,7 +402,7 @@ class Stitcher {
     due_.clear();
     for (const auto& [id, f] : fragments_)
       if (f.marker == Decision::kOpen &&
-          (is_end || is_over(f) || now_ - f.first + 1 >= opt_.confirm))
+          (is_end || is_over(f) || (f.last == now_ && now_ - f.first + 1 >= opt_.confirm)))
         due_.push_back(id);
     std::sort(due_.begin(), due_.end(), [&](std::int32_t a, std::int32_t b) {
       return std::pair(fragments_.at(a).first, a) < std::pair(fragments_.at(b).first, b);
@@ -419,8 +422,7 @@ class Stitcher {
     }
     if (!scored_.empty()) out.marker = best_of(f, id, out.probability);
     if (out.marker == Decision::kOpen) {
-      const bool is_short = f.last - f.first + 1 < opt_.confirm;
-      out.marker = is_short && (has_bodies() || is_beside(f, id)) ? Decision::kGhost : n_markers_++;
+      out.marker = is_short(f) && (has_bodies() || is_beside(f, id)) ? Decision::kGhost : n_markers_++;
       out.probability = 1 / (1 + std::exp(std::min(most, 500.0)));
     }
     f.marker = out.marker;
@@ -476,13 +478,12 @@ class Stitcher {
   double score(const Fragment& f, std::int32_t id, std::int32_t k, const Marker& marker) {
     constexpr double never = -std::numeric_limits<double>::infinity();
     if (!marker.is_hidden || marker.last >= f.first) return never;
-    const bool is_short = f.last - f.first + 1 < opt_.confirm && f.last < now_;
     const double body = body_score(f, id, marker), motion = motion_score(f, id, k);
     const double at_rest = std::clamp(1 / (1 + std::exp(marker.trust)), kLeastMotion, 0.5);
     const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
     const double more = std::max(a, b), less = std::min(a, b);
     if (more == never) return never;
-    return more + std::log1p(std::exp(less - more)) + (is_short ? kShort : kLong);
+    return more + std::log1p(std::exp(less - more)) + (is_short(f) ? kShort : kLong);
   }
   double body_score(const Fragment& f, std::int32_t id, const Marker& marker) {
     const int D = m_.axis.D;
