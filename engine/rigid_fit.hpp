@@ -49,8 +49,9 @@ inline std::array<double, 4> top_vector(std::array<std::array<double, 4>, 4> M) 
     for (int p = 0; p < 3; ++p)
       for (int q = p + 1; q < 4; ++q) {
         if (M[p][q] == 0) continue;
-        const double theta = 0.5 * std::atan2(2 * M[p][q], M[q][q] - M[p][p]);
-        const double c = std::cos(theta), s = std::sin(theta);
+        const double theta = (M[q][q] - M[p][p]) / (2 * M[p][q]);
+        const double t = std::copysign(1 / (std::abs(theta) + std::sqrt(theta * theta + 1)), theta);
+        const double c = 1 / std::sqrt(t * t + 1), s = t * c;
         for (int k = 0; k < 4; ++k) {
           const double x = M[k][p], y = M[k][q];
           M[k][p] = c * x - s * y;

@@ -69,7 +69,7 @@ class Stitcher {
     ++now_;
     move_on(step);
     take_in(points, labels, fragment_of);
-    cut_links(points, labels, fragment_of);
+    cut_links(labels, fragment_of);
     for (std::size_t i = 0; i < points.size(); ++i)
       if (fragment_of[i] >= 0) see(fragment_of[i], points[i]);
     hide();
@@ -132,7 +132,40 @@ class Stitcher {
     double trust = 3;  // how well its neighbours carried it lately, while it was seen
   };
   struct Frame {
-    std::vector<std::pair<std::int32_t, Point>> seen;  // fragment, place
+    struct One {
+      std::int32_t fragment = 0;
+      Point at{};
+      std::int32_t point = 0;  // its number in the frame
+    };
+    std::vector<One> seen;  // in order of fragments
+
+    const Point* find(std::int32_t fragment) const {
+      const auto at = std::lower_bound(seen.begin(), seen.end(), fragment,
+                                       [](const One& one, std::int32_t id) { return one.fragment < id; });
+      return at != seen.end() && at->fragment == fragment ? &at->at : nullptr;
+    }
+    void sort() {
+      std::sort(seen.begin(), seen.end(),
+                [](const One& a, const One& b) { return a.fragment < b.fragment; });
+    }
+  };
+  // Where the markers are in a frame.
+  class Places {
+   public:
+    void clear() { ++stamp_; }
+    void set(std::int32_t marker, const Point& at) {
+      if (static_cast<std::int32_t>(at_.size()) <= marker) at_.resize(marker + 1);
+      at_[marker] = {stamp_, at};
+    }
+    const Point* find(std::int32_t marker) const {
+      return marker < static_cast<std::int32_t>(at_.size()) && at_[marker].first == stamp_
+                 ? &at_[marker].second
+                 : nullptr;
+    }
+
+   private:
+    std::int64_t stamp_ = 0;
+    std::vector<std::pair<std::int64_t, Point>> at_;
   };
 
   const Frame* frame(std::int64_t t) const {
@@ -168,7 +201,9 @@ class Stitcher {
     }
     frames_.emplace_back();
     for (std::size_t i = 0; i < points.size(); ++i)
-      if (fragment_of[i] >= 0) frames_.back().seen.emplace_back(fragment_of[i], points[i]);
+      if (fragment_of[i] >= 0)
+        frames_.back().seen.push_back({fragment_of[i], points[i], static_cast<std::int32_t>(i)});
+    frames_.back().sort();
     while (static_cast<std::int64_t>(frames_.size()) > opt_.confirm + opt_.max_gap + 2)
       frames_.pop_front();
   }
@@ -202,59 +237,62 @@ class Stitcher {
   }
 
   // Links that the neighbours contradict.
-  void cut_links(std::span<const Point> points, std::span<const std::int64_t> labels,
-                 std::span<std::int32_t> fragment_of) {
-    std::vector<std::pair<std::int32_t, Point>>& seen = frames_.back().seen;
-    std::size_t s = 0;
+  void cut_links(std::span<const std::int64_t> labels, std::span<std::int32_t> fragment_of) {
+    Frame& now = frames_.back();
+    cut_.clear();
     common_from_ = kNever;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (fragment_of[i] < 0) continue;
-      std::pair<std::int32_t, Point>& own = seen[s++];
-      Fragment& f = fragments_.at(own.first);
+    for (Frame::One& one : now.seen) {
+      Fragment& f = fragments_.at(one.fragment);
       if (f.n == 0 || frame(f.last) == nullptr) continue;
       list_common(f.last);
       double gain = 0;
-      if (!weigh_link(own, gain)) continue;
+      if (!weigh_link(one, f.last, gain)) continue;
       if (gain < kContradicted && f.known > kKnownWell) {
-        ++n_cuts_;
-        const double known = f.known - kDoubted;
-        own.first = fragment_of[i] = begin(labels[i]);
-        fragments_.at(own.first).known = known;
+        cut_.push_back(&one);
       } else {
         f.known += 0.2 * (gain - f.known);
       }
     }
+    if (cut_.empty()) return;
+    n_cuts_ += static_cast<std::int64_t>(cut_.size());
+    for (Frame::One* one : cut_) {
+      const double known = fragments_.at(one->fragment).known - kDoubted;
+      one->fragment = fragment_of[one->point] = begin(labels[one->point]);
+      fragments_.at(one->fragment).known = known;
+    }
+    now.sort();
   }
   // Fragments that are seen both then and now.
   void list_common(std::int64_t then) {
     if (common_from_ == then) return;
     common_from_ = then;
     common_.clear();
-    place_.clear();
-    for (const auto& [id, at] : frame(then)->seen) place_[id] = at;
-    for (const auto& [id, at] : frames_.back().seen)
-      if (const auto before = place_.find(id); before != place_.end())
-        common_.push_back({id, {before->second, at, 1}});
+    const auto& before = frame(then)->seen;
+    auto a = before.begin();
+    for (const auto& b : frames_.back().seen) {
+      while (a != before.end() && a->fragment < b.fragment) ++a;
+      if (a != before.end() && a->fragment == b.fragment)
+        common_.push_back({b.fragment, {a->at, b.at, 1}});
+    }
   }
-  bool weigh_link(const std::pair<std::int32_t, Point>& own, double& gain) {
+  bool weigh_link(const Frame::One& own, std::int64_t when, double& gain) {
     const int D = m_.axis.D;
     if (common_.size() < least_for_rotation(D) + 2) return false;
-    const Point then = place_.at(own.first);
+    const Point then = *frame(when)->find(own.fragment);
     nearest_.clear();
     for (std::int32_t k = 0; k < static_cast<std::int32_t>(common_.size()); ++k)
-      if (common_[k].first != own.first)
+      if (common_[k].first != own.fragment)
         nearest_.emplace_back(squared_distance(common_[k].second.a, then, D), k);
     const std::size_t n = std::min(kFitted, nearest_.size());
-    std::nth_element(nearest_.begin(), nearest_.begin() + static_cast<std::ptrdiff_t>(n - 1),
-                     nearest_.end());
-    std::sort(nearest_.begin(), nearest_.begin() + static_cast<std::ptrdiff_t>(n));
+    std::partial_sort(nearest_.begin(), nearest_.begin() + static_cast<std::ptrdiff_t>(n),
+                      nearest_.end());
     pairs_.clear();
     for (std::size_t k = 0; k < n; ++k) {
       pairs_.push_back(common_[nearest_[k].second].second);
       pairs_.back().weight = 1 / (nearest_[k].first + nearest_.front().first + square(40 * opt_.noise));
     }
-    gain = carry(pairs_, then, D, 3 * opt_.noise).log_density(own.second) -
-           log_elsewhere(own.second, frames_.back(), own.first);
+    gain = carry(pairs_, then, D, 3 * opt_.noise).log_density(own.at) -
+           log_elsewhere(own.at, frames_.back(), own.fragment);
     return true;
   }
   static double square(double x) { return x * x; }
@@ -265,8 +303,10 @@ class Stitcher {
     const int D = m_.axis.D;
     const double radius2 = square(opt_.ghost_radius);
     double beside = 0;
-    for (const auto& [id, x] : at.seen)
-      if (id != own) beside += std::exp(-0.5 * squared_distance(x, y, D) / radius2);
+    for (const auto& one : at.seen) {
+      const double far = squared_distance(one.at, y, D) / radius2;
+      if (one.fragment != own && far < 40) beside += std::exp(-0.5 * far);
+    }
     const double n = std::max<double>(static_cast<double>(at.seen.size()), 1);
     return std::log(1 / volume_ +
                     beside / n / std::pow(2 * std::numbers::pi * radius2, 0.5 * D));
@@ -278,8 +318,8 @@ class Stitcher {
       if (at == nullptr) continue;
       ++n;
       n_beside += std::any_of(at->seen.begin(), at->seen.end(), [&](const auto& other) {
-        return other.first != own &&
-               squared_distance(other.second, sight.at, m_.axis.D) < square(3 * opt_.ghost_radius);
+        return other.fragment != own &&
+               squared_distance(other.at, sight.at, m_.axis.D) < square(3 * opt_.ghost_radius);
       });
     }
     return 2 * n_beside > n;
@@ -340,10 +380,10 @@ class Stitcher {
     const Frame* then = frame(marker.last);
     if (then == nullptr) return;
     std::vector<std::pair<double, Seen>> found;
-    list_markers(*then);
+    list_markers(*then, places_);
     for (const Bond& bond : neighbours_.of(k))
-      if (const auto at = place_.find(bond.other); at != place_.end() && bond.other != k)
-        found.push_back({neighbours_.unsteadiness(bond), {bond.other, at->second}});
+      if (const Point* at = places_.find(bond.other); at != nullptr && bond.other != k)
+        found.push_back({neighbours_.unsteadiness(bond), {bond.other, *at}});
     std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
       return std::pair(a.first, a.second.marker) < std::pair(b.first, b.second.marker);
     });
@@ -353,18 +393,17 @@ class Stitcher {
       marker.weight.push_back(1 / square(unsteady));
     }
   }
-  // Where the markers are in a frame.
-  void list_markers(const Frame& at) {
-    common_from_ = kNever;
-    place_.clear();
-    for (const auto& [id, x] : at.seen)
-      if (const auto f = fragments_.find(id); f != fragments_.end() && f->second.marker >= 0)
-        place_[f->second.marker] = x;
+  void list_markers(const Frame& at, Places& places) const {
+    places.clear();
+    for (const auto& one : at.seen)
+      if (const auto f = fragments_.find(one.fragment); f != fragments_.end() && f->second.marker >= 0)
+        places.set(f->second.marker, one.at);
   }
   void learn() {
     seen_.clear();
-    for (const auto& [id, x] : frames_.back().seen)
-      if (const std::int32_t k = fragments_.at(id).marker; k >= 0) seen_.push_back({k, x});
+    for (const auto& one : frames_.back().seen)
+      if (const std::int32_t k = fragments_.at(one.fragment).marker; k >= 0)
+        seen_.push_back({k, one.at});
     neighbours_.add(seen_);
     judge();
   }
@@ -373,25 +412,25 @@ class Stitcher {
     const int D = m_.axis.D;
     const Frame* then = frame(now_ - kTrustLag);
     if (then == nullptr) return;
-    list_markers(*then);
-    now_place_.clear();
-    for (const Seen& one : seen_) now_place_[one.marker] = one.at;
+    list_markers(*then, places_);
+    list_markers(frames_.back(), places_now_);
     for (const Seen& one : seen_) {
       if ((now_ + one.marker) % kTrustEvery != 0) continue;
-      const auto before = place_.find(one.marker);
-      if (before == place_.end()) continue;
+      const Point* before = places_.find(one.marker);
+      if (before == nullptr) continue;
       steady_.clear();
       for (const Bond& bond : neighbours_.of(one.marker))
-        if (place_.contains(bond.other) && now_place_.contains(bond.other))
+        if (places_.find(bond.other) != nullptr && places_now_.find(bond.other) != nullptr)
           steady_.emplace_back(neighbours_.unsteadiness(bond), bond.other);
       if (steady_.empty()) continue;
       const std::size_t n = std::min(kFitted, steady_.size());
       std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n), steady_.end());
       pairs_.clear();
       for (std::size_t r = 0; r < n; ++r)
-        pairs_.push_back({place_.at(steady_[r].second), now_place_.at(steady_[r].second), 1 / square(steady_[r].first)});
+        pairs_.push_back({*places_.find(steady_[r].second), *places_now_.find(steady_[r].second),
+                          1 / square(steady_[r].first)});
       Marker& marker = markers_.at(one.marker);
-      const double gain = carry(pairs_, before->second, D, 4 * opt_.noise).log_density(one.at) -
+      const double gain = carry(pairs_, *before, D, 4 * opt_.noise).log_density(one.at) -
                           log_elsewhere(one.at, frames_.back(), marker.fragment);
       marker.trust += 0.2 * (std::clamp(gain, -20.0, 20.0) - marker.trust);
     }
@@ -434,13 +473,8 @@ class Stitcher {
     marker.at = f.sights.back().at;
     marker.state = f.state;
     marker.is_hidden = false;
-    for (const auto& [own, x] : frames_.back().seen)
-      if (own == id) marker.at = x;
-    if (f.last < now_) {
-      for (const auto& [own, x] : frame(f.last)->seen)
-        if (own == id) marker.at = x;
-      remember_around(out.marker, marker);
-    }
+    if (const Frame* last = frame(f.last); last != nullptr) marker.at = *last->find(id);
+    if (f.last < now_) remember_around(out.marker, marker);
     f.sights.clear();
     f.continuations.clear();
     return out;
@@ -493,11 +527,11 @@ class Stitcher {
     for (std::size_t s = 0; s < f.sights.size(); s += every) {
       const Frame* at = frame(f.sights[s].frame);
       if (at == nullptr) continue;
-      list_markers(*at);
+      list_markers(*at, places_);
       pairs_.clear();
       for (std::size_t r = 0; r < marker.around.size() && pairs_.size() < kFitted; ++r)
-        if (const auto now = place_.find(marker.around[r].marker); now != place_.end())
-          pairs_.push_back({marker.around[r].at, now->second, marker.weight[r]});
+        if (const Point* now = places_.find(marker.around[r].marker); now != nullptr)
+          pairs_.push_back({marker.around[r].at, *now, marker.weight[r]});
       if (pairs_.empty()) continue;
       sum += carry(pairs_, marker.at, D, 4 * opt_.noise).log_density(f.sights[s].at) -
              log_elsewhere(f.sights[s].at, *at, id);
@@ -549,10 +583,10 @@ class Stitcher {
   // While a frame is worked on.
   std::int64_t common_from_ = kNever;
   std::vector<std::pair<std::int32_t, RigidPair>> common_;
-  std::unordered_map<std::int32_t, Point> place_;
   std::vector<std::pair<double, std::int32_t>> nearest_;
+  std::vector<Frame::One*> cut_;
   std::vector<RigidPair> pairs_;
-  std::unordered_map<std::int32_t, Point> now_place_;
+  Places places_, places_now_;
   std::vector<std::pair<double, std::int32_t>> steady_;
   std::vector<Seen> seen_;
   std::vector<std::int32_t> due_, match_;
