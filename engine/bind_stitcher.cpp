@@ -66,9 +66,28 @@ nb::tuple run(Stitcher& stitcher, const MotionModel& m, const In<double>& times,
                         probability.give({n}));
 }
 
+// (R, from, to, rms) of the rigid motion that takes points to others.
+nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weights) {
+  require(a.ndim() == 2 && a.shape(1) >= 1 && a.shape(1) <= kMaxAxes && b.ndim() == 2 &&
+              b.shape(0) == a.shape(0) && b.shape(1) == a.shape(1) && weights.ndim() == 1 &&
+              weights.size() == a.shape(0) && a.shape(0) > 0,
+          "a and b: shape (n, D); weights: shape (n,)");
+  const auto D = static_cast<int>(a.shape(1));
+  const std::vector<Point> from = to_points(a, D), to = to_points(b, D);
+  std::vector<RigidPair> pairs;
+  for (std::size_t k = 0; k < from.size(); ++k) pairs.push_back({from[k], to[k], weights.data()[k]});
+  const RigidFit found = fit_rigid(pairs, D);
+  Owned<double> R(9), x(3), y(3);
+  std::copy(found.R.begin(), found.R.end(), R.data.get());
+  std::copy(found.from.begin(), found.from.end(), x.data.get());
+  std::copy(found.to.begin(), found.to.end(), y.data.get());
+  return nb::make_tuple(R.give({3, 3}), x.give({3}), y.give({3}), found.rms);
+}
+
 }  // namespace
 
 void bind_stitcher(nb::module_& module) {
+  module.def("fit_rigid", &fit, "a"_a, "b"_a, "weights"_a);
   nb::class_<Stitcher>(module, "Stitcher")
       .def(
           "__init__",

@@ -424,3 +424,36 @@ class Chain:
     ) -> list[
         tuple[int, int, NDArray[np.int64], NDArray[np.int64], float, float, float, bool, float]
     ]: ...
+
+# (R, from, to, rms): b = R (a - from) + to, in three axes.
+def fit_rigid(
+    a: NDArray[np.float64], b: NDArray[np.float64], weights: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]: ...
+
+class Stitcher:
+    def __init__(
+        self,
+        motion: MotionModel,
+        *,
+        noise: float,
+        ghost_radius: float,
+        confirm: int,
+        max_gap: int,
+        max_hidden: int,
+    ) -> None: ...
+    # (fragment of each point, and of each fragment its marker, the fragment before, how probably)
+    def run(
+        self,
+        motion: MotionModel,
+        times: NDArray[np.float64],
+        kind: NDArray[np.int32],
+        F: NDArray[np.float64],
+        Q: NDArray[np.float64],
+        offsets: NDArray[np.int64],
+        points: NDArray[np.float64],
+        labels: NDArray[np.int64],
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]: ...
+    @property
+    def n_cuts(self) -> int: ...
+    @property
+    def n_markers(self) -> int: ...

@@ -16,6 +16,7 @@ from asterism.app.film import film
 from asterism.app.info import info
 from asterism.app.methods import methods, scenes
 from asterism.app.simulate import simulate
+from asterism.app.stitch import stitch
 from asterism.app.track import track
 
 __all__ = ["app"]
@@ -47,6 +48,18 @@ def _root(  # pyright: ignore[reportUnusedFunction]
     del version
 
 
-for _command in (track, evaluate, info, estimate, methods, corrupt, simulate, scenes, film, demo):
+for _command in (
+    track,
+    stitch,
+    evaluate,
+    info,
+    estimate,
+    methods,
+    corrupt,
+    simulate,
+    scenes,
+    film,
+    demo,
+):
     app.command()(_command)
 app.add_typer(camera)

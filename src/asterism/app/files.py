@@ -1,16 +1,18 @@
-"""Where commands may write."""
+"""Where commands may write, and the files that several of them read."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from asterism.errors import ParameterError
+from asterism.errors import FormatError, ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
-__all__ = ["check_outputs"]
+    import asterism as am
+
+__all__ = ["check_outputs", "read_model"]
 
 
 def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | None]) -> None:
@@ -46,3 +48,19 @@ def _identity(path: Path) -> object:
         status = path.stat()
         return status.st_dev, status.st_ino
     return path.resolve()
+
+
+def read_model(path: Path) -> am.TrackingModel:
+    """Read a model from TOML.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be read, or is no model.
+    """
+    import asterism as am
+
+    try:
+        return am.TrackingModel.from_toml(path)
+    except OSError as error:
+        raise FormatError(path, "opening", "a model in TOML", error.strerror) from error

@@ -63,6 +63,8 @@ class Job:
         For the methods that draw.
     start : bool
         Whether to begin with the tracks that the capture carries.
+    stitch : bool
+        Whether tracks are made into markers through gaps of any length.
     format : str
         Format of the result, a key of `asterism.io.FORMATS`.
     """
@@ -74,6 +76,7 @@ class Job:
     model: am.TrackingModel
     seed: int
     start: bool
+    stitch: bool
     format: str
 
     def to_toml(self) -> str:
@@ -88,6 +91,7 @@ class Job:
                     "name": self.method,
                     "seed": self.seed,
                     "start": self.start,
+                    "stitch": self.stitch,
                     # TOML has no null.
                     "options": {k: NONE if v is None else v for k, v in self.options.items()},
                 },
@@ -122,6 +126,7 @@ class Job:
                     for k, v in _table(_table(values, "method"), "options").items()
                 },
                 start=_table(values, "method").get("start", False) is True,
+                stitch=_table(values, "method").get("stitch", False) is True,
                 model=am.TrackingModel.from_dict(_table(values, "model")),
                 seed=_table(values, "method").get("seed", 0),
                 format=_text(values, "output", "format"),

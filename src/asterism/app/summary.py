@@ -12,9 +12,10 @@ import numpy as np
 import asterism as am
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
-__all__ = ["Gap", "Summary", "summarize"]
+__all__ = ["Gap", "Summary", "stitching_rows", "summarize"]
 
 DOUBTFUL = 0.9
 
@@ -97,6 +98,7 @@ class Summary:
             ("clutter", str(self.n_clutter)),
             ("gaps bridged", str(self.n_gaps)),
             *((("longest gaps"), gap) if i == 0 else ("", gap) for i, gap in enumerate(gaps)),
+            *stitching_rows(self.info),
             *self._doubts(),
             *self._posterior(),
             ("time", f"{self.seconds:.3g} s, {self.frames_per_second:,.0f} frames/s"),
@@ -133,6 +135,14 @@ class Summary:
         return dataclasses.asdict(self)
 
 
+def stitching_rows(info: Mapping[str, float]) -> list[tuple[str, str]]:
+    """Give what was made of fragments, if anything was."""
+    if "joins" not in info:
+        return []
+    text = f"{info['joins']:.0f} times; {info['cuts']:.0f} links cut, {info['ghosts']:.0f} ghosts"
+    return [("markers found again", text)]
+
+
 def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> Summary:
     """Count what a tracking did.
 
@@ -156,7 +166,7 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
     length = frame[before + 1] - frame[before]
     n_labelled = len(order)
     info = dict(tracks.info)
-    log_posterior = info.pop("log_posterior")
+    log_posterior = info.pop("log_posterior", -math.inf)
     return Summary(
         input=str(d.path),
         output=str(out),

@@ -47,6 +47,13 @@ _Start = Annotated[
         "--start", help="Begin with the tracks that IN carries, and repair them (mcmcda)."
     ),
 ]
+_Stitch = Annotated[
+    bool,
+    typer.Option(
+        "--stitch",
+        help="Give up hidden markers early, and tell by their neighbours which comes back.",
+    ),
+]
 _Run = Annotated[
     Path | None,
     typer.Option(
@@ -72,6 +79,7 @@ def track(
     model: _Model = None,
     seed: _Seed = None,
     start: _Start = False,
+    stitch: _Stitch = False,
     run: _Run = None,
     overwrite: _Overwrite = False,
     repeat: _From = None,
@@ -93,12 +101,14 @@ def track(
 
         asterism track pieces.c3d --method mcmcda --start
 
+        asterism track trial.c3d --stitch
+
         asterism track trial.c3d --run runs/first
 
         asterism track --from runs/first/run.toml -o again.c3d
     """
     import asterism as am
-    from asterism.app.files import check_outputs
+    from asterism.app.files import check_outputs, read_model
     from asterism.app.run_folder import FILES, Job, check_folder, sha256_of
     from asterism.app.tracking import carry_out, default_output, output_format
 
@@ -108,7 +118,7 @@ def track(
     estimate: am.ModelEstimate | None = None
     if repeat is not None:
         settings = {"--method": method, "--option": option, "--model": model, "--seed": seed,
-                    "--start": start or None}  # fmt: skip
+                    "--start": start or None, "--stitch": stitch or None}  # fmt: skip
         given_too = [name for name, value in settings.items() if value not in (None, [])]
         job, capture = _repeated(repeat, source, given_too)
         job = dataclasses.replace(job, format=output_format(capture, out, format or job.format))
@@ -117,7 +127,7 @@ def track(
             raise ParameterError("IN", "a capture to track", "nothing", "asterism track --help")
         name, options = resolved_method(method or "gnn", option or [])
         check_number("--seed", seed or 0, above=0, closed=True, integer=True)
-        given = None if model is None else _read_model(model)
+        given = None if model is None else read_model(model)
         capture = am.read(source)
         chosen_format = output_format(capture, out, format)
         if start and not (capture.labels >= 0).any():
@@ -128,7 +138,8 @@ def track(
             given = estimate.model
         job = Job(
             source=source, sha256=sha256_of(source), method=name, options=options,
-            model=given, seed=seed or 0, start=start, format=chosen_format,
+            model=am.fragment_model(given) if stitch else given, seed=seed or 0, start=start,
+            stitch=stitch, format=chosen_format,
         )  # fmt: skip
     if out is None:
         out = default_output(job.source, job.format)
@@ -160,15 +171,6 @@ def resolved_method(name: str, texts: list[str]) -> tuple[str, dict[str, Any]]:
     given = parsed(f"method {name}", texts, known)
     made = am.method_by_name(name, **given)
     return name, {option: getattr(made, option) for option in known}
-
-
-def _read_model(path: Path) -> am.TrackingModel:
-    import asterism as am
-
-    try:
-        return am.TrackingModel.from_toml(path)
-    except OSError as error:
-        raise FormatError(path, "opening", "a model in TOML", error.strerror) from error
 
 
 def _repeated(path: Path, source: Path | None, settings: list[str]) -> tuple[Any, am.Capture]:

@@ -117,6 +117,8 @@ def _carry_out(job: Job, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
             capture, method, model=job.model, seed=job.seed, progress=advance,
             start=capture.tracks if job.start else None,
         )  # fmt: skip
+    if job.stitch:
+        tracks = am.stitch(tracks, job.model).tracks
     seconds = time.perf_counter() - start
     if capture.n_points and not tracks.n_tracks:
         log.warning(

@@ -1,0 +1,246 @@
+"""Fragments of tracks made into markers.
+
+A marker that was hidden comes back as a stranger. Which it is, its neighbours know: bodies move
+almost rigidly, so that those that keep their distance carry a hidden marker with them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism import _engine
+from asterism.errors import ParameterError, check_number
+from asterism.model import TrackingModel, Tracks
+from asterism.model.compiled import motion_model, steps_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["Join", "Stitching", "stitch"]
+
+GHOST = -2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Join:
+    """Two fragments that are one marker.
+
+    Parameters
+    ----------
+    marker : int
+        The track of the result.
+    last, first : int
+        Frames in which it was seen last, and first again.
+    probability : float
+        That it is the same marker, against all others that were hidden, a new one and a ghost.
+    """
+
+    marker: int
+    last: int
+    first: int
+    probability: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stitching:
+    """What was made of fragments.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        The markers: labels for the same detections.
+    fragments : ndarray of int, shape (N,)
+        Fragment of each detection, -1 for clutter.
+    markers : ndarray of int, shape (F,)
+        Track of each fragment; -2 for a ghost, which is clutter now.
+    after : ndarray of int, shape (F,)
+        The fragment that each goes on with, -1 where a marker begins.
+    probabilities : ndarray, shape (F,)
+        Of what was decided of each fragment.
+    n_cuts : int
+        Links inside the tracks that came in which the neighbours contradict.
+    """
+
+    tracks: Tracks
+    fragments: NDArray[np.int32]
+    markers: NDArray[np.int32]
+    after: NDArray[np.int32]
+    probabilities: NDArray[np.float64]
+    n_cuts: int
+
+    @property
+    def n_ghosts(self) -> int:
+        """Fragments that were found to be no marker."""
+        return int((self.markers == GHOST).sum())
+
+    @cached_property
+    def joins(self) -> tuple[Join, ...]:
+        """Every join, in order of time."""
+        frame = self.tracks.detections.frame_of
+        inside = self.fragments >= 0
+        n = len(self.markers)
+        first = np.full(n, np.iinfo(np.int64).max)
+        last = np.full(n, -1)
+        np.minimum.at(first, self.fragments[inside], frame[inside])
+        np.maximum.at(last, self.fragments[inside], frame[inside])
+        found = np.flatnonzero((self.after >= 0) & (self.markers >= 0))
+        order = found[np.lexsort((found, first[found]))]
+        return tuple(
+            Join(
+                marker=int(self.markers[f]),
+                last=int(last[self.after[f]]),
+                first=int(first[f]),
+                probability=float(self.probabilities[f]),
+            )
+            for f in order
+        )
+
+    def __repr__(self) -> str:
+        return (
+            f"Stitching({self.tracks.n_tracks} tracks, {len(self.joins)} joins, "
+            f"{self.n_cuts} cuts, {self.n_ghosts} ghosts)"
+        )
+
+
+def stitch(
+    tracks: Tracks,
+    model: TrackingModel,
+    *,
+    confirm: int = 15,
+    ghost_radius: float = 0.03,
+    max_hidden: int | None = None,
+) -> Stitching:
+    """Make markers of fragments: tell which track goes on with which, through gaps of any length.
+
+    A track that has been seen for `confirm` frames, or is over, is weighed against every marker
+    that is hidden. Its *body*: neighbours that keep their distance, seen before and now, are
+    fitted rigidly, and carry the hidden marker to where it must be now, as surely as they fit and
+    as they did before while it could be seen. Its *motion*: the filter of the model through the
+    gap. Against both stands that it is new, or a ghost beside a marker. Tracks that are open at
+    the same time compete. Inside a track, a link that the neighbours contradict is cut first.
+
+    Short tracks are the better fragments: let the tracker give up early, as `identify` does.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Fragments, from any method or from a file.
+    model : TrackingModel
+        Motion, noise, and the longest gap within a fragment.
+    confirm : int
+        Frames until it is decided what a fragment is. One that is over sooner, goes on with
+        nothing, and is beside a marker or among bodies, is a ghost.
+    ghost_radius : float
+        Ghosts are about so far from their marker, metres.
+    max_hidden : int, optional
+        Frames after which a hidden marker is forgotten; never by default.
+
+    Returns
+    -------
+    Stitching
+
+    Raises
+    ------
+    ParameterError
+        If an argument is out of range.
+
+    Notes
+    -----
+    Rigid fits are weighted least squares [1]_. How far a body carries a marker wrongly is taken as
+    Student's t with three degrees of freedom, whose scale is what the fit leaves.
+
+    References
+    ----------
+    .. [1] Horn, Closed-form solution of absolute orientation using unit quaternions, 1987.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.person(seed=1)
+    >>> hidden = am.simulate.sense(truth, burst=am.simulate.Burst(), seed=1)
+    >>> model = am.fragment_model(am.estimate_model(hidden.detections).model)
+    >>> am.stitch(am.track(hidden.detections, model=model), model)  # doctest: +ELLIPSIS
+    Stitching(... tracks, ... joins, ... cuts, ... ghosts)
+    """
+    if not isinstance(tracks, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("tracks", "Tracks", type(tracks).__name__, "try am.track(detections)")
+    if not isinstance(model, TrackingModel):  # pyright: ignore[reportUnnecessaryIsInstance]
+        hint = "try am.estimate_model(detections).model"
+        raise ParameterError("model", "a TrackingModel", type(model).__name__, hint)
+    check_number("confirm", confirm, above=2, below=100_000, closed=True, integer=True)
+    check_number("ghost_radius", ghost_radius, above=0, below=1e6)
+    if max_hidden is not None:
+        check_number("max_hidden", max_hidden, above=1, below=1e9, closed=True, integer=True)
+    d = tracks.detections
+    motion = motion_model(model, d.n_axes)
+    stitcher = _engine.Stitcher(
+        motion,
+        noise=model.sensor.noise_sigma,
+        ghost_radius=ghost_radius,
+        confirm=confirm,
+        max_gap=model.population.max_gap,
+        max_hidden=max_hidden or 0,
+    )
+    kind, F, Q = steps_of(model.motion, d.times)
+    fragments, markers, after, probabilities = stitcher.run(
+        motion, d.times, kind, F, Q, d.offsets, d.points, tracks.labels
+    )
+    labels = np.full(d.n_points, -1, dtype=np.int64)
+    inside = fragments >= 0
+    labels[inside] = np.maximum(markers[fragments[inside]], -1)
+    n_markers = int(markers.max(initial=-1)) + 1
+    n_joins = int(((after >= 0) & (markers >= 0)).sum())
+    result = Tracks(
+        detections=d,
+        labels=labels,
+        names=_names(tracks, fragments, markers, n_markers),
+        confidence=_confidence(tracks, fragments, after, probabilities),
+        info={
+            # The model knows no gap so long: the fragments' posterior is not that of the markers.
+            **{name: value for name, value in tracks.info.items() if name != "log_posterior"},
+            "joins": n_joins,
+            "cuts": stitcher.n_cuts,
+            "ghosts": int((markers == GHOST).sum()),
+        },
+    )
+    return Stitching(
+        tracks=result, fragments=fragments, markers=markers, after=after,
+        probabilities=probabilities, n_cuts=stitcher.n_cuts,
+    )  # fmt: skip
+
+
+def _names(
+    tracks: Tracks, fragments: NDArray[np.int32], markers: NDArray[np.int32], n_markers: int
+) -> tuple[str | None, ...]:
+    """Give each marker the first name that any of its fragments has."""
+    names: list[str | None] = [None] * n_markers
+    if any(tracks.names):
+        track = np.full(len(markers), -1)
+        inside = fragments >= 0
+        track[fragments[inside]] = tracks.labels[inside]
+        for fragment in np.flatnonzero(markers >= 0):
+            marker = markers[fragment]
+            names[marker] = names[marker] or tracks.names[track[fragment]]
+    return tuple(names)
+
+
+def _confidence(
+    tracks: Tracks,
+    fragments: NDArray[np.int32],
+    after: NDArray[np.int32],
+    probabilities: NDArray[np.float64],
+) -> NDArray[np.float64] | None:
+    """Where the method has any, the first detection of a join is held no surer than the join."""
+    if tracks.confidence is None:
+        return None
+    confidence = tracks.confidence.copy()
+    inside = np.flatnonzero(fragments >= 0)
+    _, at = np.unique(fragments[inside], return_index=True)
+    first = inside[at]
+    joined = first[after[fragments[first]] >= 0]
+    confidence[joined] = np.minimum(confidence[joined], probabilities[fragments[joined]])
+    return confidence
