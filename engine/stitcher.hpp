@@ -241,6 +241,7 @@ class Stitcher {
     Frame& now = frames_.back();
     cut_.clear();
     common_from_ = kNever;
+    list_markers(now, places_now_);
     for (Frame::One& one : now.seen) {
       Fragment& f = fragments_.at(one.fragment);
       if (f.n == 0 || frame(f.last) == nullptr) continue;
@@ -267,6 +268,7 @@ class Stitcher {
     if (common_from_ == then) return;
     common_from_ = then;
     common_.clear();
+    list_markers(*frame(then), places_);
     const auto& before = frame(then)->seen;
     auto a = before.begin();
     for (const auto& b : frames_.back().seen) {
@@ -279,10 +281,18 @@ class Stitcher {
     const int D = m_.axis.D;
     if (common_.size() < least_for_rotation(D) + 2) return false;
     const Point then = *frame(when)->find(own.fragment);
+    const std::int32_t marker = fragments_.at(own.fragment).marker;
+    if (marker < 0 || !pair_steadiest(marker) || pairs_.size() < kFitted)
+      pair_nearest(own.fragment, then);
+    gain = carry(pairs_, then, D, 3 * opt_.noise).log_density(own.at) -
+           log_elsewhere(own.at, frames_.back(), own.fragment);
+    return true;
+  }
+  void pair_nearest(std::int32_t own, const Point& then) {
     nearest_.clear();
     for (std::int32_t k = 0; k < static_cast<std::int32_t>(common_.size()); ++k)
-      if (common_[k].first != own.fragment)
-        nearest_.emplace_back(squared_distance(common_[k].second.a, then, D), k);
+      if (common_[k].first != own)
+        nearest_.emplace_back(squared_distance(common_[k].second.a, then, m_.axis.D), k);
     const std::size_t n = std::min(kFitted, nearest_.size());
     std::partial_sort(nearest_.begin(), nearest_.begin() + static_cast<std::ptrdiff_t>(n),
                       nearest_.end());
@@ -291,9 +301,6 @@ class Stitcher {
       pairs_.push_back(common_[nearest_[k].second].second);
       pairs_.back().weight = 1 / (nearest_[k].first + nearest_.front().first + square(40 * opt_.noise));
     }
-    gain = carry(pairs_, then, D, 3 * opt_.noise).log_density(own.at) -
-           log_elsewhere(own.at, frames_.back(), own.fragment);
-    return true;
   }
   static double square(double x) { return x * x; }
 
@@ -407,6 +414,21 @@ class Stitcher {
     neighbours_.add(seen_);
     judge();
   }
+  // The steadiest neighbours that are in both `places_` and `places_now_`.
+  bool pair_steadiest(std::int32_t marker) {
+    steady_.clear();
+    pairs_.clear();
+    for (const Bond& bond : neighbours_.of(marker))
+      if (places_.find(bond.other) != nullptr && places_now_.find(bond.other) != nullptr)
+        steady_.emplace_back(neighbours_.unsteadiness(bond), bond.other);
+    const std::size_t n = std::min(kFitted, steady_.size());
+    std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n),
+                      steady_.end());
+    for (std::size_t r = 0; r < n; ++r)
+      pairs_.push_back({*places_.find(steady_[r].second), *places_now_.find(steady_[r].second),
+                        1 / square(steady_[r].first)});
+    return n > 0;
+  }
   // While a marker is seen, where its neighbours would have carried it in a while is a test of them.
   void judge() {
     const int D = m_.axis.D;
@@ -418,17 +440,7 @@ class Stitcher {
       if ((now_ + one.marker) % kTrustEvery != 0) continue;
       const Point* before = places_.find(one.marker);
       if (before == nullptr) continue;
-      steady_.clear();
-      for (const Bond& bond : neighbours_.of(one.marker))
-        if (places_.find(bond.other) != nullptr && places_now_.find(bond.other) != nullptr)
-          steady_.emplace_back(neighbours_.unsteadiness(bond), bond.other);
-      if (steady_.empty()) continue;
-      const std::size_t n = std::min(kFitted, steady_.size());
-      std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n), steady_.end());
-      pairs_.clear();
-      for (std::size_t r = 0; r < n; ++r)
-        pairs_.push_back({*places_.find(steady_[r].second), *places_now_.find(steady_[r].second),
-                          1 / square(steady_[r].first)});
+      if (!pair_steadiest(one.marker)) continue;
       Marker& marker = markers_.at(one.marker);
       const double gain = carry(pairs_, *before, D, 4 * opt_.noise).log_density(one.at) -
                           log_elsewhere(one.at, frames_.back(), marker.fragment);
