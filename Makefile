@@ -43,6 +43,8 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/several_frames.py --markdown docs/tables/several_frames.md
 	$(BIN)/python benchmarks/scenes.py --seeds 5 --markdown docs/tables/scenes.md
 	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md
+	$(BIN)/python benchmarks/identity.py --markdown docs/tables/identity.md \
+	  --methods gnn "smp, window=3" mcmcda
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
 # beside the package, never installed.

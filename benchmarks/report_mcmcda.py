@@ -100,9 +100,9 @@ def speed(max_gap: int, seeds: int) -> list[list[str]]:
             motion = motion.models[0]
         some.append((truth, dataclasses.replace(model, motion=motion)))
     rows: list[list[str]] = []
-    ways = {"uniform growth": REPORT, "informed growth": WHOLE}
-    for name, options in ways.items():
-        method = am.MCMCDA(moves=1000 / 8.8, **{**options, "at_doubts": 0})
+    informed: dict[str, Any] = {**WHOLE, "at_doubts": 0}
+    for name, options in {"uniform growth": REPORT, "informed growth": informed}.items():
+        method = am.MCMCDA(moves=1000 / 8.8, **options)
         each: list[float] = []
         for truth, model in some:
             start = time.perf_counter()

@@ -388,3 +388,60 @@ def test_a_model_that_fits_nothing_is_told_of(scene, capsys):
     assert "no track was believed" in capsys.readouterr().err
     assert main(["track", "in.csv", "-o", "out.csv", "--model", "model.toml"]) == 0
     assert "no track was believed" not in capsys.readouterr().err
+
+
+def hidden_person(folder):
+    """Record a person of whom markers are hidden for a while, beside ghosts."""
+    line = "simulate person -o person.csv --seed 1 -q"
+    assert main(line.split()) == 0
+    spoil = "--burst 5:5-60 --ghosts 3:1-10 --noise 0.0003 --seed 1 -q"
+    assert main(["corrupt", "person.csv", "-o", "p.c3d", "--truth", "pt.c3d", *spoil.split()]) == 0
+    return folder
+
+
+def test_track_finds_hidden_markers_again(scene, capsys):
+    hidden_person(scene)
+    run("track p.c3d -o alone.c3d", capsys)
+    out = run("track p.c3d -o found.c3d --stitch --run r", capsys)
+    assert "markers found again" in out
+    truth = am.read_tracks("pt.c3d")
+    alone, found = (am.evaluate(am.read_tracks(f), truth) for f in ("alone.c3d", "found.c3d"))
+    assert found.idf1 > 0.985 > alone.idf1
+    # The run repeats it, and says what the library says.
+    run("track --from r/run.toml -o again.c3d", capsys)
+    assert Path("again.c3d").read_bytes() == Path("found.c3d").read_bytes()
+    model = am.fragment_model(am.estimate_model(am.read("p.c3d")).model)
+    expected = am.identify(am.read("p.c3d"), am.GNN(), model=model).tracks
+    assert am.evaluate(am.read_tracks("found.c3d"), expected).idf1 == 1
+
+
+def test_stitch_says_what_it_joined(scene, capsys):
+    hidden_person(scene)
+    run("track p.c3d -o pieces.c3d", capsys)
+    out = run("stitch pieces.c3d -o markers.c3d", capsys)
+    assert "least sure" in out
+    told = json.loads(run("stitch pieces.c3d -o markers.csv --json", capsys))
+    assert told["n_joins"] == len(told["joins"]) > 10
+    assert told["n_tracks"] < told["n_tracks_before"]
+    truth = am.read_tracks("pt.c3d")
+    before, after = (
+        am.evaluate(am.read_tracks(f), truth).idf1 for f in ("pieces.c3d", "markers.c3d")
+    )
+    assert after > 0.98 > before
+    assert run("stitch pieces.c3d -o quiet.c3d -q", capsys) == ""
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("stitch in.csv -o out.csv", "asterism track --stitch"),
+        ("stitch truth.csv -o truth.csv", "a file of its own"),
+        ("stitch truth.csv -o out.csv --confirm 1", "confirm"),
+        ("stitch truth.csv -o out.csv --ghost-radius 0", "ghost_radius"),
+        ("stitch truth.csv -o out.csv --model none.toml", "none.toml"),
+        ("stitch nothing.csv -o out.csv", "nothing.csv"),
+    ],
+)
+def test_what_stitch_refuses(scene, capsys, line, says):
+    assert says in refused(line, capsys)
+    assert not Path("out.csv").exists()

@@ -60,7 +60,7 @@ def demo(
         job = Job(
             source=out / "capture.c3d", sha256=sha256_of(out / "capture.c3d"), method=name,
             options=resolved_method(name, [])[1], model=estimate.model, seed=seed, start=False,
-            format="c3d",
+            stitch=False, format="c3d",
         )  # fmt: skip
         tracks, summary = carry_out(job, capture, folder / "tracked.c3d", folder)
         am.write(tracks, folder / "tracked.csv")

@@ -1,0 +1,136 @@
+"""Identity through occlusion: captures corrupted in four ways, each method alone and stitched.
+
+As captured; 10 % missing, 10 % clutter, 0.3 mm of noise; bursts (up to 5 markers hidden at a time
+for 5 to 60 frames, up to 3 ghosts within 5 cm of a marker for 1 to 10 frames, 0.3 mm of noise); the
+second at half the rate. The identity of a marker counts across its gaps: the floors are the truth,
+broken at every gap of more than 10, and of more than 60 frames.
+
+    python benchmarks/identity.py [--data FOLDER] [--only NAME] [--methods NAME …] [--markdown FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+import asterism as am
+from asterism.simulate import Burst, Ghosts
+from captures import captures, corrupted, named_only
+from methods import METHODS
+from report import conditions, publish, table
+
+
+def bursts(truth: am.Tracks) -> am.Tracks:
+    return am.simulate.sense(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
+
+
+def half_rate(truth: am.Tracks) -> am.Tracks:
+    return am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=3e-4, stride=2, seed=1)
+
+
+CONDITIONS = {
+    "as captured": named_only,
+    "10 %/10 %": corrupted,
+    "bursts": bursts,
+    "10 %/10 %, half rate": half_rate,
+}
+
+
+class Figures:
+    """What is measured of one way over all captures."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[float, ...]] = []
+
+    def add(self, e: am.Evaluation, ms: float) -> None:
+        """Count one capture, stitched in so many milliseconds a frame."""
+        self.rows.append((e.idf1, e.switches_per_1000, e.clutter_labelled_percent, ms))
+
+    def text(self) -> list[str]:
+        """Give the means, and the median of the times."""
+        rows = np.array(self.rows)
+        ghosts = rows[:, 2][~np.isnan(rows[:, 2])]
+        return [
+            f"{rows[:, 0].mean():.4f}",
+            f"{rows[:, 1].mean():.2f}",
+            f"{ghosts.mean():.1f}" if len(ghosts) else "–",
+            f"{np.median(rows[:, 3]):.3f}",
+        ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    parser.add_argument("--data", type=Path, default=beside)
+    parser.add_argument("--only", default="")
+    parser.add_argument("--methods", nargs="*", default=list(METHODS))
+    parser.add_argument("--markdown", type=Path)
+    options = parser.parse_args()
+    found: dict[tuple[str, str, str], Figures] = {}
+    floors: dict[tuple[str, int], list[float]] = {}
+    each: list[list[str]] = []
+    for path in captures(options.data):
+        capture = am.read(path) if options.only in path.name else None
+        if capture is None or not any(capture.names):
+            continue
+        for condition, make in CONDITIONS.items():
+            truth = make(capture.tracks)
+            d = truth.detections
+            model = am.estimate_model(d).model
+            short = am.fragment_model(model)
+            row = [path.name, condition]
+            for gap in (10, 60):
+                value = am.evaluate(am.floor(truth, gap), truth).idf1
+                floors.setdefault((condition, gap), []).append(value)
+                row.append(f"{value:.3f}")
+            for name in options.methods:
+                alone = am.evaluate(am.track(d, METHODS[name], model=model, seed=0), truth)
+                fragments = am.track(d, METHODS[name], model=short, seed=0)
+                start = time.perf_counter()
+                tracks = am.stitch(fragments, short).tracks
+                ms = 1e3 * (time.perf_counter() - start) / d.n_frames
+                e = am.evaluate(tracks, truth)
+                found.setdefault((condition, name, "alone"), Figures()).add(alone, np.nan)
+                found.setdefault((condition, name, "stitched"), Figures()).add(e, ms)
+                row.append(
+                    f"{alone.idf1:.3f} ({alone.switches_per_1000:.1f}) → "
+                    f"{e.idf1:.3f} ({e.switches_per_1000:.1f})"
+                )
+            each.append(row)
+            print(*row, sep=" | ", flush=True)
+    means: list[list[str]] = []
+    for condition in CONDITIONS:
+        at = [f"{np.mean(floors[condition, gap]):.4f}" for gap in (10, 60)]
+        means.append([condition, "floor at 10 frames", at[0], "", "", ""])
+        means.append([condition, "floor at 60 frames", at[1], "", "", ""])
+        for name in options.methods:
+            for way in ("alone", "stitched"):
+                figures = found[condition, name, way].text()
+                means.append(
+                    [condition, f"{name}, {way}", *figures[:3], figures[3].replace("nan", "–")]
+                )
+    lines = ["Means over the captures:", ""]
+    head = [
+        "",
+        "",
+        "IDF1",
+        "switches a 1000",
+        "ghosts and clutter labelled, %",
+        "stitching, ms a frame",
+    ]
+    lines += [
+        *table(head, means),
+        "",
+        "IDF1, and switches for 1000 detections, alone → stitched:",
+        "",
+    ]
+    lines += table(["capture", "condition", "floor 10", "floor 60", *options.methods], each)
+    lines += ["", f"{conditions()}."]
+    publish(lines, options.markdown)
+
+
+if __name__ == "__main__":
+    main()
