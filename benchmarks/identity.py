@@ -11,6 +11,7 @@ broken at every gap of more than 10, and of more than 60 frames.
 from __future__ import annotations
 
 import argparse
+import itertools
 import time
 from pathlib import Path
 
@@ -61,6 +62,39 @@ class Figures:
         ]
 
 
+class Joins:
+    """How often joins are right that were held for so probable."""
+
+    EDGES = (0, 0.5, 0.7, 0.9, 0.97, 0.99, 0.999, 1)
+
+    def __init__(self) -> None:
+        self.said: list[float] = []
+        self.is_right: list[bool] = []
+
+    def add(self, found: am.Stitching, truth: am.Tracks) -> None:
+        """Count the joins of one capture; right is what the marker was for the most part so far."""
+        frame = truth.detections.frame_of
+        for join in found.joins:
+            own = found.tracks.labels == join.marker
+            before = np.bincount(truth.labels[own & (frame <= join.last)] + 1).argmax() - 1
+            now = truth.labels[own & (frame == join.first)][0]
+            self.said.append(join.probability)
+            self.is_right.append(bool(before == now >= 0))
+
+    def rows(self) -> list[list[str]]:
+        """Give a row for each range of probability."""
+        said, is_right = np.array(self.said), np.array(self.is_right)
+        rows: list[list[str]] = []
+        for low, high in itertools.pairwise(self.EDGES):
+            inside = (said >= low) & (said < high)
+            if inside.any():
+                rows.append(
+                    [f"{100 * low:g} to {100 * high:g} %", str(int(inside.sum())),
+                     f"{100 * said[inside].mean():.1f}", f"{100 * is_right[inside].mean():.1f}"]
+                )  # fmt: skip
+        return rows
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -71,6 +105,7 @@ def main() -> None:
     options = parser.parse_args()
     found: dict[tuple[str, str, str], Figures] = {}
     floors: dict[tuple[str, int], list[float]] = {}
+    joins = {name: Joins() for name in options.methods}
     each: list[list[str]] = []
     for path in captures(options.data):
         capture = am.read(path) if options.only in path.name else None
@@ -90,9 +125,11 @@ def main() -> None:
                 alone = am.evaluate(am.track(d, METHODS[name], model=model, seed=0), truth)
                 fragments = am.track(d, METHODS[name], model=short, seed=0)
                 start = time.perf_counter()
-                tracks = am.stitch(fragments, short).tracks
+                stitching = am.stitch(fragments, short)
                 ms = 1e3 * (time.perf_counter() - start) / d.n_frames
-                e = am.evaluate(tracks, truth)
+                e = am.evaluate(stitching.tracks, truth)
+                if condition == "bursts":
+                    joins[name].add(stitching, truth)
                 found.setdefault((condition, name, "alone"), Figures()).add(alone, np.nan)
                 found.setdefault((condition, name, "stitched"), Figures()).add(e, ms)
                 row.append(
@@ -121,12 +158,11 @@ def main() -> None:
         "ghosts and clutter labelled, %",
         "stitching, ms a frame",
     ]
-    lines += [
-        *table(head, means),
-        "",
-        "IDF1, and switches for 1000 detections, alone → stitched:",
-        "",
-    ]
+    lines += [*table(head, means), ""]
+    for name in options.methods:
+        lines += [f"Joins of {name} in bursts, by how probable they were held:", ""]
+        lines += [*table(["held for", "joins", "mean, %", "right, %"], joins[name].rows()), ""]
+    lines += ["IDF1, and switches for 1000 detections, alone → stitched:", ""]
     lines += table(["capture", "condition", "floor 10", "floor 60", *options.methods], each)
     lines += ["", f"{conditions()}."]
     publish(lines, options.markdown)
