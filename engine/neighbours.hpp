@@ -53,6 +53,11 @@ class Neighbours {
     for (const Seen& one : seen) place_[one.marker] = -1;
   }
 
+  // A marker that will not be asked for again.
+  void forget(std::int32_t marker) {
+    if (marker < static_cast<std::int32_t>(bonds_.size())) std::vector<Bond>().swap(bonds_[marker]);
+  }
+
   std::span<const Bond> of(std::int32_t marker) const {
     if (marker >= static_cast<std::int32_t>(bonds_.size())) return {};
     return bonds_[marker];

@@ -580,8 +580,14 @@ class Stitcher {
       at = fragments_.erase(at);
     }
     if (opt_.max_hidden == 0) return;
-    for (auto at = markers_.begin(); at != markers_.end();)
-      at = now_ - at->second.last > opt_.max_hidden ? markers_.erase(at) : std::next(at);
+    for (auto at = markers_.begin(); at != markers_.end();) {
+      if (now_ - at->second.last <= opt_.max_hidden) {
+        ++at;
+        continue;
+      }
+      neighbours_.forget(at->first);
+      at = markers_.erase(at);
+    }
   }
 
   MotionModel m_;
