@@ -1,0 +1,116 @@
+// Fragments of tracks, the markers that are made of them, and the frames in which they were seen lately.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <utility>
+#include <vector>
+
+#include "modes.hpp"
+#include "neighbours.hpp"
+
+namespace asterism {
+
+// What was decided of a fragment.
+struct Decision {
+  static constexpr std::int32_t kOpen = -1, kGhost = -2;
+  std::int32_t fragment = 0;
+  std::int32_t marker = kOpen;
+  std::int32_t after = -1;      // the fragment that it goes on with, -1 of a new marker
+  double probability = 1;       // that it does
+};
+
+struct Sight {
+  std::int64_t frame = 0;
+  Point at{};
+};
+// A hidden marker's own motion, gone on with by a fragment.
+struct Continuation {
+  std::int32_t marker = 0;
+  MotionState state;
+  double log_likelihood = 0;
+};
+struct Fragment {
+  std::int64_t label = -1;
+  std::int32_t marker = Decision::kOpen;
+  std::int64_t first = 0, last = 0;
+  std::int32_t n = 0;
+  std::vector<Sight> sights;  // until it is decided upon
+  MotionState state;
+  double alone = 0;  // log likelihood of its second detection and those after
+  std::vector<Continuation> continuations;
+  double known = 10;  // how well its neighbours knew its links, on average
+};
+struct Marker {
+  std::int32_t fragment = -1;
+  std::int64_t last = 0;
+  Point at{};
+  MotionState state;           // now
+  std::vector<Seen> around;    // when it was seen last, the steadiest first
+  std::vector<double> weight;  // of these
+  bool is_hidden = false;
+  double trust = 3;  // how well its neighbours carried it lately, while it was seen
+};
+struct Frame {
+  struct One {
+    std::int32_t fragment = 0;
+    Point at{};
+    std::int32_t point = 0;  // its number in the frame
+  };
+  std::vector<One> seen;  // in order of fragments
+
+  const Point* find(std::int32_t fragment) const {
+    const auto at = std::lower_bound(seen.begin(), seen.end(), fragment,
+                                     [](const One& one, std::int32_t id) { return one.fragment < id; });
+    return at != seen.end() && at->fragment == fragment ? &at->at : nullptr;
+  }
+  void sort() {
+    std::sort(seen.begin(), seen.end(),
+              [](const One& a, const One& b) { return a.fragment < b.fragment; });
+  }
+};
+// Where the markers are in a frame.
+class Places {
+ public:
+  void clear() { ++stamp_; }
+  void set(std::int32_t marker, const Point& at) {
+    if (static_cast<std::int32_t>(at_.size()) <= marker) at_.resize(marker + 1);
+    at_[marker] = {stamp_, at};
+  }
+  const Point* find(std::int32_t marker) const {
+    return marker < static_cast<std::int32_t>(at_.size()) && at_[marker].first == stamp_
+               ? &at_[marker].second
+               : nullptr;
+  }
+
+ private:
+  std::int64_t stamp_ = 0;
+  std::vector<std::pair<std::int64_t, Point>> at_;
+};
+
+
+class RecentFrames {
+ public:
+  std::int64_t now() const { return now_; }
+  Frame& newest() { return frames_.back(); }
+  const Frame& newest() const { return frames_.back(); }
+  // None where it is too long ago.
+  const Frame* find(std::int64_t t) const {
+    const std::int64_t back = now_ - t;
+    return back >= 0 && back < static_cast<std::int64_t>(frames_.size())
+               ? &frames_[frames_.size() - 1 - static_cast<std::size_t>(back)]
+               : nullptr;
+  }
+  void add(std::size_t n_kept) {
+    ++now_;
+    frames_.emplace_back();
+    while (frames_.size() > n_kept) frames_.pop_front();
+  }
+
+ private:
+  std::int64_t now_ = -1;
+  std::deque<Frame> frames_;
+};
+
+}  // namespace asterism
