@@ -124,6 +124,16 @@ def test_it_does_no_harm(scene, noise):
     assert np.mean(stitched) > np.mean(plain) - 0.002
 
 
+def test_where_neighbours_carry_nobody_motion_decides():
+    found: list[float] = []
+    for seed in range(4):
+        made = am.simulate.smooth(seed=seed)
+        hidden = Burst(n=4, shortest=5, longest=12)
+        truth = am.simulate.sense(made, burst=hidden, noise=0.005, seed=seed)
+        found.append(am.evaluate(am.identify(truth.detections).tracks, truth).idf1)
+    assert np.mean(found) > 0.99  # 0.987 where the bodies are always believed
+
+
 def test_a_link_that_the_neighbours_contradict_is_cut():
     truth = am.simulate.sense(PERSON(seed=2), noise=3e-4, seed=2)
     d = truth.detections
