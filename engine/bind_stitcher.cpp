@@ -1,10 +1,11 @@
 // Fragments made into markers, as Python sees it.
 #include <chrono>
+#include <tuple>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "live_stitcher.hpp"
 #include "motion_arrays.hpp"
-#include "stitcher.hpp"
 
 using namespace nb::literals;
 using namespace asterism;
@@ -66,6 +67,68 @@ nb::tuple run(Stitcher& stitcher, const MotionModel& m, const In<double>& times,
                         probability.give({n}));
 }
 
+// One frame of a stream, on a copy: (new state, markers, earlier detections whose marker changes, their
+// markers).
+nb::tuple step(const LiveStitcher& before, const In<double>& F, const In<double>& Q,
+               const In<double>& points, const In<std::int64_t>& labels,
+               const In<std::int64_t>& revised, const In<std::int64_t>& revised_labels) {
+  const MotionModel& m = before.motion();
+  const std::size_t size = static_cast<std::size_t>(m.M) * m.axis.n * m.axis.n;
+  require(F.size() == size && Q.size() == size, "F and Q: shape (modes, n, n)");
+  const std::vector<Point> frame = to_points(points, m.axis.D);
+  require(labels.ndim() == 1 && labels.size() == frame.size(), "labels: one for each point");
+  require(revised.ndim() == 1 && revised_labels.ndim() == 1 &&
+              revised.size() == revised_labels.size(),
+          "revised_labels: one for each of revised");
+  using Change = std::pair<std::int64_t, std::int64_t>;
+  std::vector<Change> changes(revised.size()), told;
+  for (std::size_t i = 0; i < changes.size(); ++i)
+    changes[i] = {revised.data()[i], revised_labels.data()[i]};
+  LiveStitcher after(before);
+  Owned<std::int64_t> own(frame.size());
+  {
+    nb::gil_scoped_release release;
+    const std::int64_t first = before.n_seen();
+    after.step(motion_step(m, F.data(), Q.data()), frame, {labels.data(), frame.size()}, changes,
+               [&](std::int64_t detection, std::int64_t marker) {
+                 if (detection < first)
+                   told.emplace_back(detection, marker);
+                 else
+                   own.data[detection - first] = marker;
+               });
+  }
+  Owned<std::int64_t> which(told.size()), markers(told.size());
+  for (std::size_t i = 0; i < told.size(); ++i)
+    std::tie(which.data[i], markers.data[i]) = told[i];
+  return nb::make_tuple(std::move(after), own.give({frame.size()}), which.give({told.size()}),
+                        markers.give({told.size()}));
+}
+
+// (marker, other, frames in which both were seen, mean distance, its variance) of all bonds.
+nb::tuple bonds(const Stitcher& stitcher) {
+  std::vector<std::int32_t> own;
+  std::vector<Bond> all;
+  const Neighbours& neighbours = stitcher.neighbours();
+  for (std::int32_t k = 0; k < stitcher.n_markers(); ++k)
+    for (const Bond& bond : neighbours.of(k)) {
+      own.push_back(k);
+      all.push_back(bond);
+    }
+  const std::size_t n = all.size();
+  Owned<std::int32_t> marker(n), other(n);
+  Owned<std::int64_t> frames(n);
+  Owned<double> mean(n), variance(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    marker.data[i] = own[i];
+    other.data[i] = all[i].other;
+    frames.data[i] = all[i].n;
+    mean.data[i] = all[i].mean;
+    variance.data[i] = all[i].variance;
+  }
+  return nb::make_tuple(marker.give({n}), other.give({n}), frames.give({n}), mean.give({n}),
+                        variance.give({n}));
+}
+
 // (R, from, to, rms) of the rigid motion that takes points to others.
 nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weights) {
   require(a.ndim() == 2 && a.shape(1) >= 1 && a.shape(1) <= kMaxAxes && b.ndim() == 2 &&
@@ -88,18 +151,31 @@ nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weight
 
 void bind_stitcher(nb::module_& module) {
   module.def("fit_rigid", &fit, "a"_a, "b"_a, "weights"_a);
-  nb::class_<Stitcher>(module, "Stitcher")
+  nb::class_<StitchOptions>(module, "StitchOptions")
       .def(
           "__init__",
-          [](Stitcher* self, const MotionModel& m, double noise, double ghost_radius,
-             std::int64_t confirm, std::int64_t max_gap, std::int64_t max_hidden) {
-            new (self) Stitcher(m, {noise, ghost_radius, confirm, max_gap, max_hidden});
+          [](StitchOptions* self, double noise, double ghost_radius, std::int64_t confirm,
+             std::int64_t max_gap, std::int64_t max_hidden) {
+            new (self) StitchOptions{noise, ghost_radius, confirm, max_gap, max_hidden};
           },
-          "motion"_a, nb::kw_only(), "noise"_a, "ghost_radius"_a, "confirm"_a, "max_gap"_a,
-          "max_hidden"_a)
+          nb::kw_only(), "noise"_a, "ghost_radius"_a, "confirm"_a, "max_gap"_a, "max_hidden"_a);
+  nb::class_<Stitcher>(module, "Stitcher")
+      .def(nb::init<const MotionModel&, const StitchOptions&>(), "motion"_a, "options"_a)
       // (fragment of each point, and of each fragment its marker, the fragment before, how probably).
       .def("run", &run, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a, "points"_a,
            "labels"_a)
+      .def("bonds", &bonds)
       .def_prop_ro("n_cuts", &Stitcher::n_cuts)
       .def_prop_ro("n_markers", &Stitcher::n_markers);
+  nb::class_<LiveStitcher>(module, "LiveStitcher")
+      .def(nb::init<const MotionModel&, const StitchOptions&, std::int64_t>(), "motion"_a,
+           "options"_a, nb::kw_only(), "lag"_a)
+      .def("step", &step, "F"_a, "Q"_a, "points"_a, "labels"_a, "revised"_a, "revised_labels"_a)
+      .def_prop_ro("n_seen", &LiveStitcher::n_seen)
+      .def_prop_ro("n_joins", &LiveStitcher::n_joins)
+      .def_prop_ro("n_ghosts", &LiveStitcher::n_ghosts)
+      .def_prop_ro("n_cuts", [](const LiveStitcher& self) { return self.stitcher().n_cuts(); })
+      .def_prop_ro("n_markers", [](const LiveStitcher& self) { return self.stitcher().n_markers(); })
+      .def_prop_ro("n_remembered",
+                   [](const LiveStitcher& self) { return self.stitcher().n_remembered(); });
 }

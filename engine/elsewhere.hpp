@@ -51,4 +51,11 @@ class Elsewhere {
   double volume_ = 1;
 };
 
+// What has been seen, as far as it is remembered.
+struct Sightings {
+  Fragments fragments;
+  RecentFrames frames;
+  Elsewhere elsewhere;
+};
+
 }  // namespace asterism

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -41,6 +42,7 @@ struct Fragment {
   double alone = 0;  // log likelihood of its second detection and those after
   std::vector<Continuation> continuations;
   double known = 10;  // how well its neighbours knew its links, on average
+  std::int32_t guess = -1;  // the hidden marker that it may be, while nothing is decided
 };
 struct Marker {
   std::int32_t fragment = -1;
@@ -52,6 +54,9 @@ struct Marker {
   bool is_hidden = false;
   double trust = 3;  // how well its neighbours carried it lately, while it was seen
 };
+using Fragments = std::map<std::int32_t, Fragment>;
+using Markers = std::map<std::int32_t, Marker>;
+
 struct Frame {
   struct One {
     std::int32_t fragment = 0;
@@ -70,25 +75,6 @@ struct Frame {
               [](const One& a, const One& b) { return a.fragment < b.fragment; });
   }
 };
-// Where the markers are in a frame.
-class Places {
- public:
-  void clear() { ++stamp_; }
-  void set(std::int32_t marker, const Point& at) {
-    if (static_cast<std::int32_t>(at_.size()) <= marker) at_.resize(marker + 1);
-    at_[marker] = {stamp_, at};
-  }
-  const Point* find(std::int32_t marker) const {
-    return marker < static_cast<std::int32_t>(at_.size()) && at_[marker].first == stamp_
-               ? &at_[marker].second
-               : nullptr;
-  }
-
- private:
-  std::int64_t stamp_ = 0;
-  std::vector<std::pair<std::int64_t, Point>> at_;
-};
-
 
 class RecentFrames {
  public:

@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "fresh.hpp"
 #include "kalman.hpp"
 
 namespace asterism {
@@ -19,6 +21,25 @@ namespace asterism {
 struct Seen {
   std::int32_t marker = 0;
   Point at{};
+};
+
+// Where the markers of a frame are.
+class Places {
+ public:
+  void clear() { ++stamp_; }
+  void set(std::int32_t marker, const Point& at) {
+    if (static_cast<std::int32_t>(at_.size()) <= marker) at_.resize(marker + 1);
+    at_[marker] = {stamp_, at};
+  }
+  const Point* find(std::int32_t marker) const {
+    return marker < static_cast<std::int32_t>(at_.size()) && at_[marker].first == stamp_
+               ? &at_[marker].second
+               : nullptr;
+  }
+
+ private:
+  std::int64_t stamp_ = 0;
+  std::vector<std::pair<std::int64_t, Point>> at_;
 };
 
 struct Bond {
@@ -37,30 +58,23 @@ class Neighbours {
   // The markers that are seen in a frame.
   void add(std::span<const Seen> seen) {
     ++n_frames_;
-    for (std::int32_t s = 0; s < static_cast<std::int32_t>(seen.size()); ++s) {
-      if (static_cast<std::int32_t>(bonds_.size()) <= seen[s].marker) {
-        bonds_.resize(seen[s].marker + 1);
-        place_.resize(seen[s].marker + 1, -1);
-      }
-      place_[seen[s].marker] = s;
-    }
+    places_.clear();
+    for (const Seen& one : seen) places_.set(one.marker, one.at);
     for (const Seen& one : seen) {
       std::vector<Bond>& bonds = bonds_[one.marker];
-      if (bonds.empty() || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one);
+      if (bonds.empty() || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one, bonds);
       for (Bond& bond : bonds)
-        if (const std::int32_t s = place_[bond.other]; s >= 0) measure(one.at, seen[s].at, bond);
+        if (const Point* other = places_.find(bond.other)) measure(one.at, *other, bond);
     }
-    for (const Seen& one : seen) place_[one.marker] = -1;
   }
 
   // A marker that will not be asked for again.
-  void forget(std::int32_t marker) {
-    if (marker < static_cast<std::int32_t>(bonds_.size())) std::vector<Bond>().swap(bonds_[marker]);
-  }
+  void forget(std::int32_t marker) { bonds_.erase(marker); }
 
   std::span<const Bond> of(std::int32_t marker) const {
-    if (marker >= static_cast<std::int32_t>(bonds_.size())) return {};
-    return bonds_[marker];
+    const auto at = bonds_.find(marker);
+    if (at == bonds_.end()) return {};
+    return at->second;
   }
   // How far the other may be off after a while, roughly: what was seen of it, and what was not yet.
   double unsteadiness(const Bond& bond) const {
@@ -82,14 +96,13 @@ class Neighbours {
   }
 
   // The nearest others are tried; where there is no room, instead of the least steady.
-  void look_around(std::span<const Seen> seen, const Seen& one) {
+  void look_around(std::span<const Seen> seen, const Seen& one, std::vector<Bond>& bonds) {
     near_.clear();
     for (const Seen& other : seen)
       if (other.marker != one.marker)
         near_.push_back({squared_distance(one.at, other.at, D_), other.marker});
-    const std::size_t n = std::min(bonds_[one.marker].empty() ? kMost : kNearest, near_.size());
+    const std::size_t n = std::min(bonds.empty() ? kMost : kNearest, near_.size());
     std::partial_sort(near_.begin(), near_.begin() + static_cast<std::ptrdiff_t>(n), near_.end());
-    std::vector<Bond>& bonds = bonds_[one.marker];
     for (std::size_t k = 0; k < n; ++k) {
       const std::int32_t other = near_[k].second;
       if (std::any_of(bonds.begin(), bonds.end(), [&](const Bond& b) { return b.other == other; }))
@@ -108,8 +121,8 @@ class Neighbours {
   int D_;
   double noise_;
   std::int64_t n_frames_ = 0;
-  std::vector<std::vector<Bond>> bonds_;
-  std::vector<std::int32_t> place_;  // of a marker in the frame
+  std::map<std::int32_t, std::vector<Bond>> bonds_;
+  Fresh<Places> places_;
   std::vector<std::pair<double, std::int32_t>> near_;
 };
 

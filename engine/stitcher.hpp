@@ -19,7 +19,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <span>
 #include <unordered_map>
 #include <utility>
@@ -29,6 +28,7 @@
 #include "bodies.hpp"
 #include "elsewhere.hpp"
 #include "fragments.hpp"
+#include "fresh.hpp"
 #include "modes.hpp"
 
 namespace asterism {
@@ -46,13 +46,14 @@ class Stitcher {
   Stitcher(const MotionModel& m, const StitchOptions& options)
       : m_(m),
         opt_(options),
-        elsewhere_(m.axis.D, options.noise, options.ghost_radius),
-        bodies_(m.axis.D, options.noise, fragments_, frames_, elsewhere_) {}
-  Stitcher(const Stitcher&) = delete;  // its parts look at each other
-  Stitcher& operator=(const Stitcher&) = delete;
+        so_far_{{}, {}, {m.axis.D, options.noise, options.ghost_radius}},
+        bodies_(m.axis.D, options.noise) {}
 
+  const MotionModel& motion() const { return m_; }
   std::int32_t n_fragments() const { return n_fragments_; }
   std::int32_t n_markers() const { return n_markers_; }
+  std::size_t n_remembered() const { return markers_.size(); }
+  const Neighbours& neighbours() const { return bodies_.neighbours(); }
   std::int64_t n_cuts() const { return n_cuts_; }
 
   // One frame: its points, and of each the label that the tracker gave it, -1 for none. Writes the
@@ -61,7 +62,7 @@ class Stitcher {
   void step(const MotionStep& step, std::span<const Point> points,
             std::span<const std::int64_t> labels, std::span<std::int32_t> fragment_of,
             Decide&& decide) {
-    frames_.add(static_cast<std::size_t>(opt_.confirm + opt_.max_gap + 2));
+    so_far_.frames.add(static_cast<std::size_t>(opt_.confirm + opt_.max_gap + 2));
     move_on(step);
     take_in(points, labels, fragment_of);
     cut_links(labels, fragment_of);
@@ -71,6 +72,39 @@ class Stitcher {
     learn();
     decide_due(false, decide);
     forget();
+  }
+  // Which marker a fragment is, kGhost of one that is none, of one that is open what it may be.
+  std::int32_t marker_of(std::int32_t fragment) const {
+    const Fragment& f = so_far_.fragments.at(fragment);
+    return f.marker == Decision::kOpen ? f.guess : f.marker;
+  }
+  bool is_open(std::int32_t fragment) const {
+    return so_far_.fragments.at(fragment).marker == Decision::kOpen;
+  }
+  // The fragment that a detection with this label would go on with, -1 if it would begin one.
+  std::int32_t fragment_with(std::int64_t label) const {
+    const auto at = of_label_.find(label);
+    return at != of_label_.end() && may_go_on(at->second) ? at->second : -1;
+  }
+  // What the fragments that are open may be, if nothing were to come any more.
+  void guess() {
+    w_.open.clear();
+    for (auto& [id, f] : so_far_.fragments) {
+      f.guess = -1;
+      if (f.marker == Decision::kOpen && f.n > 0) w_.open.push_back(id);
+    }
+    w_.candidates.clear();
+    for (std::int32_t row = 0; row < static_cast<std::int32_t>(w_.open.size()); ++row) {
+      const Fragment& f = so_far_.fragments.at(w_.open[row]);
+      for (const auto& [k, marker] : markers_)
+        if (const double gain = score(f, w_.open[row], k, marker); gain > 0)
+          w_.candidates.push_back({row, k, gain, 0});
+    }
+    if (w_.candidates.empty()) return;
+    w_.match.assign(w_.open.size(), -1);
+    w_.assignment.solve(w_.candidates, w_.match);
+    for (std::size_t row = 0; row < w_.open.size(); ++row)
+      so_far_.fragments.at(w_.open[row]).guess = w_.match[row];
   }
   // After the last frame.
   template <typename Decide>
@@ -90,14 +124,14 @@ class Stitcher {
   static constexpr double kLeastMotion = 0.005;  // weight of the motion where the body is trusted
   static constexpr double kWorth = 0.4;  // of the log odds, in a probability
 
-  std::int64_t now() const { return frames_.now(); }
+  std::int64_t now() const { return so_far_.frames.now(); }
   bool is_over(const Fragment& f) const { return now() - f.last > opt_.max_gap; }
   bool is_short(const Fragment& f) const {
     return is_over(f) && f.last - f.first + 1 < opt_.confirm;
   }
 
   void move_on(const MotionStep& step) {
-    for (auto& [id, f] : fragments_) {
+    for (auto& [id, f] : so_far_.fragments) {
       if (f.marker >= 0) continue;  // the marker has its state
       predict(m_, step, f.state);
       if (f.n < kMotionSights)
@@ -110,28 +144,25 @@ class Stitcher {
   void take_in(std::span<const Point> points, std::span<const std::int64_t> labels,
                std::span<std::int32_t> fragment_of) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      fragment_of[i] = -1;
-      if (labels[i] < 0) continue;
-      const auto at = of_label_.find(labels[i]);
-      const bool goes_on = at != of_label_.end() && may_go_on(at->second);
-      fragment_of[i] = goes_on ? at->second : begin(labels[i]);
+      fragment_of[i] = labels[i] < 0 ? -1 : fragment_with(labels[i]);
+      if (labels[i] >= 0 && fragment_of[i] < 0) fragment_of[i] = begin(labels[i]);
     }
     for (std::size_t i = 0; i < points.size(); ++i)
       if (fragment_of[i] >= 0)
-        frames_.newest().seen.push_back({fragment_of[i], points[i], static_cast<std::int32_t>(i)});
-    frames_.newest().sort();
+        so_far_.frames.newest().seen.push_back({fragment_of[i], points[i], static_cast<std::int32_t>(i)});
+    so_far_.frames.newest().sort();
   }
   // A marker may have been found again elsewhere, or the fragment may be long over.
   bool may_go_on(std::int32_t id) const {
-    const auto at = fragments_.find(id);
-    if (at == fragments_.end() || is_over(at->second)) return false;
+    const auto at = so_far_.fragments.find(id);
+    if (at == so_far_.fragments.end() || is_over(at->second)) return false;
     if (at->second.marker < 0) return at->second.marker == Decision::kOpen;
     const auto marker = markers_.find(at->second.marker);
     return marker != markers_.end() && marker->second.fragment == id;
   }
   std::int32_t begin(std::int64_t label) {
     const std::int32_t id = n_fragments_++;
-    Fragment& f = fragments_[id];
+    Fragment& f = so_far_.fragments[id];
     f.label = label;
     f.first = f.last = now();
     of_label_[label] = id;
@@ -141,9 +172,9 @@ class Stitcher {
   bool is_beside(const Fragment& f, std::int32_t own) const {
     std::size_t n = 0, n_beside = 0;
     for (const Sight& sight : f.sights)
-      if (const Frame* at = frames_.find(sight.frame); at != nullptr) {
+      if (const Frame* at = so_far_.frames.find(sight.frame); at != nullptr) {
         ++n;
-        n_beside += elsewhere_.is_beside(sight.at, *at, own);
+        n_beside += so_far_.elsewhere.is_beside(sight.at, *at, own);
       }
     return 2 * n_beside > n;
   }
@@ -162,32 +193,32 @@ class Stitcher {
 
   // Links that the neighbours contradict.
   void cut_links(std::span<const std::int64_t> labels, std::span<std::int32_t> fragment_of) {
-    Frame& now = frames_.newest();
-    cut_.clear();
-    bodies_.begin_links();
+    Frame& now = so_far_.frames.newest();
+    w_.cut.clear();
+    bodies_.begin_links(so_far_);
     for (Frame::One& one : now.seen) {
-      Fragment& f = fragments_.at(one.fragment);
-      if (f.n == 0 || frames_.find(f.last) == nullptr) continue;
+      Fragment& f = so_far_.fragments.at(one.fragment);
+      if (f.n == 0 || so_far_.frames.find(f.last) == nullptr) continue;
       double gain = 0;
-      if (!bodies_.link(one, f.last, gain)) continue;
+      if (!bodies_.link(so_far_, one, f.last, gain)) continue;
       if (gain < kContradicted && f.known > kKnownWell) {
-        cut_.push_back(&one);
+        w_.cut.push_back(&one);
       } else {
         f.known += 0.2 * (gain - f.known);
       }
     }
-    if (cut_.empty()) return;
-    n_cuts_ += static_cast<std::int64_t>(cut_.size());
-    for (Frame::One* one : cut_) {
-      const double known = fragments_.at(one->fragment).known - kDoubted;
+    if (w_.cut.empty()) return;
+    n_cuts_ += static_cast<std::int64_t>(w_.cut.size());
+    for (Frame::One* one : w_.cut) {
+      const double known = so_far_.fragments.at(one->fragment).known - kDoubted;
       one->fragment = fragment_of[one->point] = begin(labels[one->point]);
-      fragments_.at(one->fragment).known = known;
+      so_far_.fragments.at(one->fragment).known = known;
     }
     now.sort();
   }
   void see(std::int32_t id, const Point& y) {
-    elsewhere_.add(y);
-    Fragment& f = fragments_.at(id);
+    so_far_.elsewhere.add(y);
+    Fragment& f = so_far_.fragments.at(id);
     if (f.marker >= 0) {
       Marker& marker = markers_.at(f.marker);
       if (marker.is_hidden) {
@@ -220,39 +251,39 @@ class Stitcher {
   // Markers that are not seen any more remember who was around them.
   void hide() {
     for (auto& [k, marker] : markers_)
-      if (!marker.is_hidden && marker.last < now()) bodies_.remember_around(k, marker);
+      if (!marker.is_hidden && marker.last < now()) bodies_.remember_around(so_far_, k, marker);
   }
   void learn() {
-    seen_.clear();
-    for (const auto& one : frames_.newest().seen)
-      if (const std::int32_t k = fragments_.at(one.fragment).marker; k >= 0)
-        seen_.push_back({k, one.at});
-    bodies_.learn(seen_, markers_);
+    w_.seen.clear();
+    for (const auto& one : so_far_.frames.newest().seen)
+      if (const std::int32_t k = so_far_.fragments.at(one.fragment).marker; k >= 0)
+        w_.seen.push_back({k, one.at});
+    bodies_.learn(so_far_, w_.seen, markers_);
   }
   template <typename Decide>
   void decide_due(bool is_end, Decide&& decide) {
-    due_.clear();
-    for (const auto& [id, f] : fragments_)
+    w_.due.clear();
+    for (const auto& [id, f] : so_far_.fragments)
       if (f.marker == Decision::kOpen &&
           (is_end || is_over(f) || (f.last == now() && now() - f.first + 1 >= opt_.confirm)))
-        due_.push_back(id);
-    std::sort(due_.begin(), due_.end(), [&](std::int32_t a, std::int32_t b) {
-      return std::pair(fragments_.at(a).first, a) < std::pair(fragments_.at(b).first, b);
+        w_.due.push_back(id);
+    std::sort(w_.due.begin(), w_.due.end(), [&](std::int32_t a, std::int32_t b) {
+      return std::pair(so_far_.fragments.at(a).first, a) < std::pair(so_far_.fragments.at(b).first, b);
     });
-    for (const std::int32_t id : due_) decide(decide_upon(id));
+    for (const std::int32_t id : w_.due) decide(decide_upon(id));
   }
 
   Decision decide_upon(std::int32_t id) {
-    Fragment& f = fragments_.at(id);
+    Fragment& f = so_far_.fragments.at(id);
     Decision out{id};
     double most = -std::numeric_limits<double>::infinity();
-    scored_.clear();
+    w_.scored.clear();
     for (const auto& [k, marker] : markers_) {
       const double gain = score(f, id, k, marker);
       most = std::max(most, gain);
-      if (gain > 0) scored_.emplace_back(k, gain);
+      if (gain > 0) w_.scored.emplace_back(k, gain);
     }
-    if (!scored_.empty()) out.marker = best_of(f, id, out.probability);
+    if (!w_.scored.empty()) out.marker = best_of(f, id, out.probability);
     if (out.marker == Decision::kOpen) {
       out.marker = is_short(f) && (has_bodies() || is_beside(f, id)) ? Decision::kGhost : n_markers_++;
       out.probability = 1 / (1 + odds(most));
@@ -266,8 +297,8 @@ class Stitcher {
     marker.at = f.sights.back().at;
     marker.state = f.state;
     marker.is_hidden = false;
-    if (const Frame* last = frames_.find(f.last); last != nullptr) marker.at = *last->find(id);
-    if (f.last < now()) bodies_.remember_around(out.marker, marker);
+    if (const Frame* last = so_far_.frames.find(f.last); last != nullptr) marker.at = *last->find(id);
+    if (f.last < now()) bodies_.remember_around(so_far_, out.marker, marker);
     f.sights.clear();
     f.continuations.clear();
     return out;
@@ -279,37 +310,37 @@ class Stitcher {
 
   // Which hidden marker it is, if all that is open takes what fits best; and how probably.
   std::int32_t best_of(const Fragment& f, std::int32_t id, double& probability) {
-    candidates_.clear();
-    rivals_.assign(scored_.size(), 1);  // Σ of the odds of all that may be this marker, and of none
+    w_.candidates.clear();
+    w_.rivals.assign(w_.scored.size(), 1);  // Σ of the odds of all that may be this marker, and of none
     double all = 1;
-    for (std::int32_t c = 0; c < static_cast<std::int32_t>(scored_.size()); ++c) {
-      candidates_.push_back({0, c, scored_[c].second, 0});
-      all += odds(scored_[c].second);
+    for (std::int32_t c = 0; c < static_cast<std::int32_t>(w_.scored.size()); ++c) {
+      w_.candidates.push_back({0, c, w_.scored[c].second, 0});
+      all += odds(w_.scored[c].second);
     }
     std::int32_t row = 0;
-    for (const auto& [other, g] : fragments_) {
+    for (const auto& [other, g] : so_far_.fragments) {
       if (other == id || g.marker != Decision::kOpen || g.n == 0 || g.last < f.first) continue;
       ++row;
-      for (std::int32_t c = 0; c < static_cast<std::int32_t>(scored_.size()); ++c) {
-        const double gain = score(g, other, scored_[c].first, markers_.at(scored_[c].first));
+      for (std::int32_t c = 0; c < static_cast<std::int32_t>(w_.scored.size()); ++c) {
+        const double gain = score(g, other, w_.scored[c].first, markers_.at(w_.scored[c].first));
         if (!(gain > 0)) continue;
-        candidates_.push_back({row, c, gain, 0});
-        rivals_[c] += odds(gain);
+        w_.candidates.push_back({row, c, gain, 0});
+        w_.rivals[c] += odds(gain);
       }
     }
-    match_.assign(row + 1, -1);
-    assignment_.solve(candidates_, match_);
-    if (match_[0] < 0) return Decision::kOpen;
-    const double own = odds(scored_[match_[0]].second);
-    probability = own / (all + rivals_[match_[0]] - 1);
-    return scored_[match_[0]].first;
+    w_.match.assign(row + 1, -1);
+    w_.assignment.solve(w_.candidates, w_.match);
+    if (w_.match[0] < 0) return Decision::kOpen;
+    const double own = odds(w_.scored[w_.match[0]].second);
+    probability = own / (all + w_.rivals[w_.match[0]] - 1);
+    return w_.scored[w_.match[0]].first;
   }
 
   // Log odds that a fragment is a hidden marker come back.
   double score(const Fragment& f, std::int32_t id, std::int32_t k, const Marker& marker) {
     constexpr double never = -std::numeric_limits<double>::infinity();
     if (!marker.is_hidden || marker.last >= f.first) return never;
-    const double body = bodies_.log_odds(f, id, marker), motion = motion_score(f, id, k);
+    const double body = bodies_.log_odds(so_far_, f, id, marker), motion = motion_score(f, id, k);
     const double at_rest = std::clamp(1 / (1 + std::exp(marker.trust)), kLeastMotion, 0.5);
     const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
     const double more = std::max(a, b), less = std::min(a, b);
@@ -319,14 +350,14 @@ class Stitcher {
   double motion_score(const Fragment& f, std::int32_t id, std::int32_t k) {
     for (const Continuation& c : f.continuations)
       if (c.marker == k)
-        if (const Frame* at = frames_.find(f.first); at != nullptr)
-          return c.log_likelihood - f.alone - elsewhere_.log_density(f.sights.front().at, *at, id);
+        if (const Frame* at = so_far_.frames.find(f.first); at != nullptr)
+          return c.log_likelihood - f.alone - so_far_.elsewhere.log_density(f.sights.front().at, *at, id);
     return -std::numeric_limits<double>::infinity();
   }
 
   // Fragments that can not go on, and markers that have been hidden for long.
   void forget() {
-    for (auto at = fragments_.begin(); at != fragments_.end();) {
+    for (auto at = so_far_.fragments.begin(); at != so_far_.fragments.end();) {
       const Fragment& f = at->second;
       const bool is_gone = f.marker != Decision::kOpen &&
                            now() - f.last > opt_.confirm + 2 * opt_.max_gap + 2;
@@ -336,7 +367,7 @@ class Stitcher {
       }
       if (const auto of = of_label_.find(f.label); of != of_label_.end() && of->second == at->first)
         of_label_.erase(of);
-      at = fragments_.erase(at);
+      at = so_far_.fragments.erase(at);
     }
     if (opt_.max_hidden == 0) return;
     for (auto at = markers_.begin(); at != markers_.end();) {
@@ -349,25 +380,25 @@ class Stitcher {
     }
   }
 
+  struct Memory {
+    std::vector<Frame::One*> cut;
+    std::vector<Seen> seen;
+    std::vector<std::int32_t> due, open, match;
+    std::vector<std::pair<std::int32_t, double>> scored;
+    std::vector<double> rivals;
+    std::vector<Candidate> candidates;
+    Assignment assignment;
+  };
+
   MotionModel m_;
   StitchOptions opt_;
   std::int32_t n_fragments_ = 0, n_markers_ = 0;
   std::int64_t n_cuts_ = 0;
-  RecentFrames frames_;
-  std::map<std::int32_t, Fragment> fragments_;
-  std::map<std::int32_t, Marker> markers_;
+  Sightings so_far_;
+  Markers markers_;
   std::unordered_map<std::int64_t, std::int32_t> of_label_;
-  Elsewhere elsewhere_;
   Bodies bodies_;
-
-  // While a frame is worked on.
-  std::vector<Frame::One*> cut_;
-  std::vector<Seen> seen_;
-  std::vector<std::int32_t> due_, match_;
-  std::vector<std::pair<std::int32_t, double>> scored_;
-  std::vector<double> rivals_;
-  std::vector<Candidate> candidates_;
-  Assignment assignment_;
+  Fresh<Memory> w_;  // while a frame is worked on
 };
 
 }  // namespace asterism

@@ -77,6 +77,7 @@ if TYPE_CHECKING:
     from asterism.io.observations import read_observations as read_observations
     from asterism.io.observations import write_observations as write_observations
     from asterism.label import Join as Join
+    from asterism.label import Stitched as Stitched
     from asterism.label import Stitching as Stitching
     from asterism.label import fragment_model as fragment_model
     from asterism.label import identify as identify
@@ -174,7 +175,7 @@ _PUBLIC = {
         "method_by_name",
         "track",
     ),
-    "label": ("Join", "Stitching", "fragment_model", "identify", "stitch"),
+    "label": ("Join", "Stitched", "Stitching", "fragment_model", "identify", "stitch"),
     "solve": (
         "JointMarginals",
         "KBestAssignments",

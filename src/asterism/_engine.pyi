@@ -430,10 +430,9 @@ def fit_rigid(
     a: NDArray[np.float64], b: NDArray[np.float64], weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]: ...
 
-class Stitcher:
+class StitchOptions:
     def __init__(
         self,
-        motion: MotionModel,
         *,
         noise: float,
         ghost_radius: float,
@@ -441,6 +440,9 @@ class Stitcher:
         max_gap: int,
         max_hidden: int,
     ) -> None: ...
+
+class Stitcher:
+    def __init__(self, motion: MotionModel, options: StitchOptions) -> None: ...
     # (fragment of each point, and of each fragment its marker, the fragment before, how probably)
     def run(
         self,
@@ -453,7 +455,42 @@ class Stitcher:
         points: NDArray[np.float64],
         labels: NDArray[np.int64],
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]: ...
+    # (marker, other, frames, mean distance, its variance)
+    def bonds(
+        self,
+    ) -> tuple[
+        NDArray[np.int32],
+        NDArray[np.int32],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+    ]: ...
     @property
     def n_cuts(self) -> int: ...
     @property
     def n_markers(self) -> int: ...
+
+class LiveStitcher:
+    def __init__(self, motion: MotionModel, options: StitchOptions, *, lag: int) -> None: ...
+    # (new state, markers, earlier detections whose marker changes, their markers)
+    def step(
+        self,
+        F: NDArray[np.float64],
+        Q: NDArray[np.float64],
+        points: NDArray[np.float64],
+        labels: NDArray[np.int64],
+        revised: NDArray[np.int64],
+        revised_labels: NDArray[np.int64],
+    ) -> tuple[LiveStitcher, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]: ...
+    @property
+    def n_seen(self) -> int: ...
+    @property
+    def n_joins(self) -> int: ...
+    @property
+    def n_ghosts(self) -> int: ...
+    @property
+    def n_cuts(self) -> int: ...
+    @property
+    def n_markers(self) -> int: ...
+    @property
+    def n_remembered(self) -> int: ...

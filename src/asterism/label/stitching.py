@@ -20,7 +20,7 @@ from asterism.model.compiled import motion_model, steps_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Join", "Stitching", "stitch"]
+__all__ = ["Join", "Stitching", "check_options", "stitch", "stitch_options"]
 
 GHOST = -2
 
@@ -171,20 +171,10 @@ def stitch(
     if not isinstance(model, TrackingModel):  # pyright: ignore[reportUnnecessaryIsInstance]
         hint = "try am.estimate_model(detections).model"
         raise ParameterError("model", "a TrackingModel", type(model).__name__, hint)
-    check_number("confirm", confirm, above=2, below=100_000, closed=True, integer=True)
-    check_number("ghost_radius", ghost_radius, above=0, below=1e6)
-    if max_hidden is not None:
-        check_number("max_hidden", max_hidden, above=1, below=1e9, closed=True, integer=True)
+    check_options(confirm, ghost_radius, max_hidden)
     d = tracks.detections
     motion = motion_model(model, d.n_axes)
-    stitcher = _engine.Stitcher(
-        motion,
-        noise=model.sensor.noise_sigma,
-        ghost_radius=ghost_radius,
-        confirm=confirm,
-        max_gap=model.population.max_gap,
-        max_hidden=max_hidden or 0,
-    )
+    stitcher = _engine.Stitcher(motion, stitch_options(model, confirm, ghost_radius, max_hidden))
     kind, F, Q = steps_of(model.motion, d.times)
     fragments, markers, after, probabilities = stitcher.run(
         motion, d.times, kind, F, Q, d.offsets, d.points, tracks.labels
@@ -211,6 +201,27 @@ def stitch(
         tracks=result, fragments=fragments, markers=markers, after=after,
         probabilities=probabilities, n_cuts=stitcher.n_cuts,
     )  # fmt: skip
+
+
+def check_options(confirm: int, ghost_radius: float, max_hidden: int | None) -> None:
+    """Raise `ParameterError` if an option of `stitch` is out of range."""
+    check_number("confirm", confirm, above=2, below=100_000, closed=True, integer=True)
+    check_number("ghost_radius", ghost_radius, above=0, below=1e6)
+    if max_hidden is not None:
+        check_number("max_hidden", max_hidden, above=1, below=1e9, closed=True, integer=True)
+
+
+def stitch_options(
+    model: TrackingModel, confirm: int, ghost_radius: float, max_hidden: int | None
+) -> _engine.StitchOptions:
+    """Give the options of `stitch` as the engine takes them."""
+    return _engine.StitchOptions(
+        noise=model.sensor.noise_sigma,
+        ghost_radius=ghost_radius,
+        confirm=confirm,
+        max_gap=model.population.max_gap,
+        max_hidden=max_hidden or 0,
+    )
 
 
 def _names(
