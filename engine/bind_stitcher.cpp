@@ -155,15 +155,27 @@ void bind_stitcher(nb::module_& module) {
       .def(
           "__init__",
           [](StitchOptions* self, double noise, double ghost_radius, std::int64_t confirm,
-             std::int64_t max_gap, std::int64_t max_hidden) {
-            new (self) StitchOptions{noise, ghost_radius, confirm, max_gap, max_hidden};
+             std::int64_t max_gap, std::int64_t max_hidden, bool may_cut) {
+            new (self) StitchOptions{noise, ghost_radius, confirm, max_gap, max_hidden, may_cut};
           },
-          nb::kw_only(), "noise"_a, "ghost_radius"_a, "confirm"_a, "max_gap"_a, "max_hidden"_a);
+          nb::kw_only(), "noise"_a, "ghost_radius"_a, "confirm"_a, "max_gap"_a, "max_hidden"_a,
+          "may_cut"_a);
   nb::class_<Stitcher>(module, "Stitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&>(), "motion"_a, "options"_a)
       // (fragment of each point, and of each fragment its marker, the fragment before, how probably).
       .def("run", &run, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a, "points"_a,
            "labels"_a)
+      .def(
+          "advise",
+          [](Stitcher& self, const In<std::int64_t>& labels, const In<std::int64_t>& before,
+             const In<double>& weights) {
+            require(labels.ndim() == 1 && before.size() == labels.size() &&
+                        weights.size() == labels.size(),
+                    "labels, before and weights: shape (n,)");
+            for (std::size_t i = 0; i < labels.size(); ++i)
+              self.advise(labels.data()[i], {before.data()[i], weights.data()[i]});
+          },
+          "labels"_a, "before"_a, "weights"_a)
       .def("bonds", &bonds)
       .def_prop_ro("n_cuts", &Stitcher::n_cuts)
       .def_prop_ro("n_markers", &Stitcher::n_markers);

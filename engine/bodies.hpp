@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -50,52 +51,67 @@ class Bodies {
     return true;
   }
 
-  // A marker that is not seen any more remembers who was around it.
+  // A marker that is not seen any more remembers who was around it. What was seen last of it may be
+  // a ghost beside it already, so that some earlier frames are remembered too.
   void remember_around(const Sightings& s, std::int32_t k, Marker& marker) {
     marker.is_hidden = true;
-    marker.around.clear();
-    marker.weight.clear();
-    const Frame* then = s.frames.find(marker.last);
-    if (then == nullptr) return;
-    std::vector<std::pair<double, Seen>> found;
-    list_markers(s, *then, w_.places);
-    for (const Bond& bond : neighbours_.of(k))
-      if (const Point* at = w_.places.find(bond.other); at != nullptr && bond.other != k)
-        found.push_back({neighbours_.unsteadiness(bond), {bond.other, *at}});
-    std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
-      return std::pair(a.first, a.second.marker) < std::pair(b.first, b.second.marker);
-    });
-    if (found.size() > kRemembered) found.resize(kRemembered);
-    for (const auto& [unsteady, seen] : found) {
-      marker.around.push_back(seen);
-      marker.weight.push_back(1 / square(unsteady));
+    marker.anchors.clear();
+    for (const std::int64_t back : kAnchors) {
+      const Frame* then = s.frames.find(marker.last - back);
+      if (then == nullptr) continue;
+      list_markers(s, *then, w_.places);
+      const Point* own = w_.places.find(k);
+      if (own == nullptr) continue;
+      w_.found.clear();
+      for (const Bond& bond : neighbours_.of(k))
+        if (const Point* at = w_.places.find(bond.other); at != nullptr && bond.other != k)
+          w_.found.push_back({neighbours_.unsteadiness(bond), {bond.other, *at}});
+      std::sort(w_.found.begin(), w_.found.end(), [](const auto& a, const auto& b) {
+        return std::pair(a.first, a.second.marker) < std::pair(b.first, b.second.marker);
+      });
+      if (w_.found.size() > kRemembered) w_.found.resize(kRemembered);
+      Anchor& anchor = marker.anchors.emplace_back();
+      anchor.at = *own;
+      for (const auto& [unsteady, seen] : w_.found) {
+        anchor.around.push_back(seen);
+        anchor.weight.push_back(1 / square(unsteady));
+      }
     }
   }
-  // How well the neighbours of a hidden marker carry it to where a fragment is.
+  // How well the neighbours of a hidden marker carry it to where a fragment is: from each anchor on
+  // the mean over some looks at the fragment but the worst, which may be at a ghost; any anchor may be
+  // the right one.
   double log_odds(const Sightings& s, const Fragment& f, std::int32_t id, const Marker& marker) {
-    double sum = 0;
-    int n = 0;
     const std::size_t every = std::max<std::size_t>(f.sights.size() / kLooks, 1);
+    w_.looks.assign(marker.anchors.size(), {});
     for (std::size_t i = 0; i < f.sights.size(); i += every) {
       const Frame* at = s.frames.find(f.sights[i].frame);
       if (at == nullptr) continue;
       list_markers(s, *at, w_.places);
-      w_.pairs.clear();
-      for (std::size_t r = 0; r < marker.around.size() && w_.pairs.size() < kFitted; ++r)
-        if (const Point* now = w_.places.find(marker.around[r].marker); now != nullptr)
-          w_.pairs.push_back({marker.around[r].at, *now, marker.weight[r]});
-      if (w_.pairs.empty()) continue;
-      sum += carry(w_.pairs, marker.at, D_, 4 * noise_).log_density(f.sights[i].at) -
-             s.elsewhere.log_density(f.sights[i].at, *at, id);
-      ++n;
+      const double not_carried = s.elsewhere.log_density(f.sights[i].at, *at, id);
+      for (std::size_t a = 0; a < marker.anchors.size(); ++a) {
+        const Anchor& anchor = marker.anchors[a];
+        w_.pairs.clear();
+        for (std::size_t r = 0; r < anchor.around.size() && w_.pairs.size() < kFitted; ++r)
+          if (const Point* now = w_.places.find(anchor.around[r].marker); now != nullptr)
+            w_.pairs.push_back({anchor.around[r].at, *now, anchor.weight[r]});
+        if (w_.pairs.empty()) continue;
+        w_.looks[a].add(carry(w_.pairs, anchor.at, D_, 4 * noise_).log_density(f.sights[i].at) -
+                        not_carried);
+      }
     }
-    return n > 0 ? sum / n : -std::numeric_limits<double>::infinity();
+    double most = -std::numeric_limits<double>::infinity(), total = 0;
+    for (const Looks& looks : w_.looks) most = std::max(most, looks.mean());
+    if (most == -std::numeric_limits<double>::infinity()) return most;
+    for (const Looks& looks : w_.looks) total += std::exp(looks.mean() - most);
+    return most + std::log(total / static_cast<double>(w_.looks.size()));
   }
 
  private:
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min() / 2;
   static constexpr std::size_t kFitted = 6;       // neighbours that a fit is made of
   static constexpr std::size_t kRemembered = 16;  // neighbours of a hidden marker
+  static constexpr std::array<std::int64_t, 3> kAnchors{0, 4, 10};  // frames before it was seen last
   static constexpr std::size_t kLooks = 3;        // frames of a fragment in which it is compared
   static constexpr std::int64_t kTrustLag = 12, kTrustEvery = 4;  // frames
 
@@ -170,10 +186,26 @@ class Bodies {
         places.set(f->second.marker, one.at);
   }
 
+  struct Looks {
+    double sum = 0, worst = 0;
+    int n = 0;
+
+    void add(double gain) {
+      sum += gain;
+      worst = n == 0 ? gain : std::min(worst, gain);
+      ++n;
+    }
+    double mean() const {
+      if (n == 0) return -std::numeric_limits<double>::infinity();
+      return n > 2 ? (sum - worst) / (n - 1) : sum / n;
+    }
+  };
   struct Memory {
     std::int64_t common_from = kNever;
     std::vector<std::pair<std::int32_t, RigidPair>> common;
     std::vector<std::pair<double, std::int32_t>> nearest, steady;
+    std::vector<std::pair<double, Seen>> found;
+    std::vector<Looks> looks;
     std::vector<RigidPair> pairs;
     Places places, places_now;
   };

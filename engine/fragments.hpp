@@ -44,13 +44,18 @@ struct Fragment {
   double known = 10;  // how well its neighbours knew its links, on average
   std::int32_t guess = -1;  // the hidden marker that it may be, while nothing is decided
 };
+// Where a marker was before it was hidden, and who was around it, the steadiest first.
+struct Anchor {
+  Point at{};
+  std::vector<Seen> around;
+  std::vector<double> weight;  // of these
+};
 struct Marker {
   std::int32_t fragment = -1;
+  std::int64_t label = -1;  // of that
   std::int64_t last = 0;
-  Point at{};
-  MotionState state;           // now
-  std::vector<Seen> around;    // when it was seen last, the steadiest first
-  std::vector<double> weight;  // of these
+  MotionState state;            // now
+  std::vector<Anchor> anchors;  // while it is hidden
   bool is_hidden = false;
   double trust = 3;  // how well its neighbours carried it lately, while it was seen
 };

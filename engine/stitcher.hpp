@@ -13,6 +13,8 @@
 // new marker; if it was short and beside another, a ghost.
 //
 // A link inside a fragment is weighed by its neighbours too; where they contradict, it is cut.
+//
+// Whoever has gone through the take in the other direction may advise.
 #pragma once
 
 #include <algorithm>
@@ -39,6 +41,14 @@ struct StitchOptions {
   std::int64_t confirm = 15;     // frames until a fragment is decided upon
   std::int64_t max_gap = 0;      // frames after which an unseen fragment is over
   std::int64_t max_hidden = 0;   // frames after which a marker is forgotten; 0: never
+  bool may_cut = true;           // links that the neighbours contradict
+};
+
+// The label of the marker that a fragment is thought to go on with, and how much that is worth: log
+// odds for that marker, half of it against all others.
+struct Advice {
+  std::int64_t goes_on_with = 0;
+  double weight = 0;
 };
 
 class Stitcher {
@@ -55,6 +65,9 @@ class Stitcher {
   std::size_t n_remembered() const { return markers_.size(); }
   const Neighbours& neighbours() const { return bodies_.neighbours(); }
   std::int64_t n_cuts() const { return n_cuts_; }
+
+  // What is thought already of fragments that begin with a label.
+  void advise(std::int64_t label, const Advice& advice) { advice_[label] = advice; }
 
   // One frame: its points, and of each the label that the tracker gave it, -1 for none. Writes the
   // fragment of each, and tells `decide(decision)`.
@@ -117,12 +130,12 @@ class Stitcher {
   static constexpr std::int64_t kMotionFrames = 120;  // a motion is believed no longer than that
   // Log odds that a fragment is a marker come back, before anything is compared: of one that was over
   // before it was decided upon, and of others.
-  static constexpr double kShort = -3, kLong = 2;
+  static constexpr double kShort = -8, kLong = 2;
   // A link is cut where the neighbours, which knew it well so far, now give it no more than this.
   static constexpr double kKnownWell = 6, kContradicted = 3, kDoubted = 3;
   static constexpr double kTrusted = 2;          // of the markers on average: there are bodies
   static constexpr double kLeastMotion = 0.005;  // weight of the motion where the body is trusted
-  static constexpr double kWorth = 0.4;  // of the log odds, in a probability
+  static constexpr double kWorth = 0.25;  // of the log odds, in a probability
 
   std::int64_t now() const { return so_far_.frames.now(); }
   bool is_over(const Fragment& f) const { return now() - f.last > opt_.max_gap; }
@@ -201,7 +214,7 @@ class Stitcher {
       if (f.n == 0 || so_far_.frames.find(f.last) == nullptr) continue;
       double gain = 0;
       if (!bodies_.link(so_far_, one, f.last, gain)) continue;
-      if (gain < kContradicted && f.known > kKnownWell) {
+      if (opt_.may_cut && gain < kContradicted && f.known > kKnownWell) {
         w_.cut.push_back(&one);
       } else {
         f.known += 0.2 * (gain - f.known);
@@ -223,10 +236,9 @@ class Stitcher {
       Marker& marker = markers_.at(f.marker);
       if (marker.is_hidden) {
         marker.is_hidden = false;
-        marker.around.clear();
+        marker.anchors.clear();
       }
       marker.last = f.last = now();
-      marker.at = y;
       update(m_, Prediction(m_, marker.state), y, marker.state);
       ++f.n;
       return;
@@ -293,11 +305,10 @@ class Stitcher {
     Marker& marker = markers_[out.marker];
     out.after = marker.fragment;
     marker.fragment = id;
+    marker.label = f.label;
     marker.last = f.last;
-    marker.at = f.sights.back().at;
     marker.state = f.state;
     marker.is_hidden = false;
-    if (const Frame* last = so_far_.frames.find(f.last); last != nullptr) marker.at = *last->find(id);
     if (f.last < now()) bodies_.remember_around(so_far_, out.marker, marker);
     f.sights.clear();
     f.continuations.clear();
@@ -345,7 +356,13 @@ class Stitcher {
     const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
     const double more = std::max(a, b), less = std::min(a, b);
     if (more == never) return never;
-    return more + std::log1p(std::exp(less - more)) + (is_short(f) ? kShort : kLong);
+    return more + std::log1p(std::exp(less - more)) + (is_short(f) ? kShort : kLong) +
+           advised(f, marker);
+  }
+  double advised(const Fragment& f, const Marker& marker) const {
+    const auto at = advice_.find(f.label);
+    if (at == advice_.end()) return 0;
+    return marker.label == at->second.goes_on_with ? at->second.weight : -0.5 * at->second.weight;
   }
   double motion_score(const Fragment& f, std::int32_t id, std::int32_t k) {
     for (const Continuation& c : f.continuations)
@@ -397,6 +414,7 @@ class Stitcher {
   Sightings so_far_;
   Markers markers_;
   std::unordered_map<std::int64_t, std::int32_t> of_label_;
+  std::unordered_map<std::int64_t, Advice> advice_;
   Bodies bodies_;
   Fresh<Memory> w_;  // while a frame is worked on
 };

@@ -153,7 +153,7 @@ def test_whoever_cuts_nothing_and_hides_nothing_changes_nothing():
     truth = am.simulate.sense(PERSON(seed=3), noise=3e-4, seed=3)
     model = am.estimate_model(truth.detections).model
     found = am.stitch(truth, model)
-    assert found.n_cuts <= 2
+    assert found.n_cuts <= 4  # in two passes over 15 847 links
     assert am.evaluate(found.tracks, truth).idf1 > 0.9999
     assert set(found.tracks.names) == set(truth.names)
 

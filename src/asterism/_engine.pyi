@@ -439,10 +439,17 @@ class StitchOptions:
         confirm: int,
         max_gap: int,
         max_hidden: int,
+        may_cut: bool,
     ) -> None: ...
 
 class Stitcher:
     def __init__(self, motion: MotionModel, options: StitchOptions) -> None: ...
+    def advise(
+        self,
+        labels: NDArray[np.int64],
+        before: NDArray[np.int64],
+        weights: NDArray[np.float64],
+    ) -> None: ...
     # (fragment of each point, and of each fragment its marker, the fragment before, how probably)
     def run(
         self,

@@ -14,8 +14,8 @@ import numpy as np
 
 from asterism import _engine
 from asterism.errors import ParameterError, check_number
+from asterism.label.passes import go_through
 from asterism.model import TrackingModel, Tracks
-from asterism.model.compiled import motion_model, steps_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -123,6 +123,9 @@ def stitch(
     gap. Against both stands that it is new, or a ghost beside a marker. Tracks that are open at
     the same time compete. Inside a track, a link that the neighbours contradict is cut first.
 
+    The take is gone through forward, backward and forward again; what one pass finds advises the
+    next.
+
     Short tracks are the better fragments: let the tracker give up early, as `identify` does.
 
     Parameters
@@ -173,12 +176,16 @@ def stitch(
         raise ParameterError("model", "a TrackingModel", type(model).__name__, hint)
     check_options(confirm, ghost_radius, max_hidden)
     d = tracks.detections
-    motion = motion_model(model, d.n_axes)
-    stitcher = _engine.Stitcher(motion, stitch_options(model, confirm, ghost_radius, max_hidden))
-    kind, F, Q = steps_of(model.motion, d.times)
-    fragments, markers, after, probabilities = stitcher.run(
-        motion, d.times, kind, F, Q, d.offsets, d.points, tracks.labels
-    )
+    # What is learnt late helps early: each pass advises the next, in the other direction. The last
+    # leaves the fragments as they are.
+    limits = (model, confirm, ghost_radius, max_hidden)
+    options = stitch_options(*limits)
+    first = go_through(d, tracks.labels, model, options)
+    back = go_through(d, first.fragments, model, options, before=first, backward=True)
+    options = stitch_options(*limits, may_cut=False)
+    found = go_through(d, back.fragments, model, options, before=back)
+    fragments, markers, after = found.fragments, found.markers, found.after
+    n_cuts = first.n_cuts + back.n_cuts
     labels = np.full(d.n_points, -1, dtype=np.int64)
     inside = fragments >= 0
     labels[inside] = np.maximum(markers[fragments[inside]], -1)
@@ -188,18 +195,18 @@ def stitch(
         detections=d,
         labels=labels,
         names=_names(tracks, fragments, markers, n_markers),
-        confidence=_confidence(tracks, fragments, after, probabilities),
+        confidence=_confidence(tracks, fragments, after, found.probabilities),
         info={
             # The model knows no gap so long: the fragments' posterior is not that of the markers.
             **{name: value for name, value in tracks.info.items() if name != "log_posterior"},
             "joins": n_joins,
-            "cuts": stitcher.n_cuts,
+            "cuts": n_cuts,
             "ghosts": int((markers == GHOST).sum()),
         },
     )
     return Stitching(
         tracks=result, fragments=fragments, markers=markers, after=after,
-        probabilities=probabilities, n_cuts=stitcher.n_cuts,
+        probabilities=found.probabilities, n_cuts=n_cuts,
     )  # fmt: skip
 
 
@@ -212,7 +219,11 @@ def check_options(confirm: int, ghost_radius: float, max_hidden: int | None) -> 
 
 
 def stitch_options(
-    model: TrackingModel, confirm: int, ghost_radius: float, max_hidden: int | None
+    model: TrackingModel,
+    confirm: int,
+    ghost_radius: float,
+    max_hidden: int | None,
+    may_cut: bool = True,
 ) -> _engine.StitchOptions:
     """Give the options of `stitch` as the engine takes them."""
     return _engine.StitchOptions(
@@ -221,6 +232,7 @@ def stitch_options(
         confirm=confirm,
         max_gap=model.population.max_gap,
         max_hidden=max_hidden or 0,
+        may_cut=may_cut,
     )
 
 
