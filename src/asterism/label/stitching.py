@@ -52,7 +52,7 @@ class Stitching:
     Parameters
     ----------
     tracks : Tracks
-        The markers: labels for the same detections.
+        The markers: labels for the same detections, without those that were filled.
     fragments : ndarray of int, shape (N,)
         Fragment of each detection, -1 for clutter.
     markers : ndarray of int, shape (F,)
@@ -128,7 +128,7 @@ def stitch(
     Parameters
     ----------
     tracks : Tracks
-        Fragments, from any method or from a file.
+        Fragments, from any method or from a file; points that were filled are left out.
     model : TrackingModel
         Motion, noise, and the longest gap within a fragment.
     confirm : int
@@ -175,6 +175,7 @@ def stitch(
     check_number("ghost_radius", ghost_radius, above=0, below=1e6)
     if max_hidden is not None:
         check_number("max_hidden", max_hidden, above=1, below=1e9, closed=True, integer=True)
+    tracks = tracks.measured()
     d = tracks.detections
     motion = motion_model(model, d.n_axes)
     stitcher = _engine.Stitcher(
