@@ -5,7 +5,6 @@ Symbols: W frames, n of them at the ends and L hidden; k the covariance over tim
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -84,17 +83,16 @@ def bridges(times: NDArray[np.float64], is_end: NDArray[np.bool_]) -> Bridges:
     length = (t[:, -1] - t[:, 0]) * (~is_end).mean()
     between = np.abs(ends[:, :, None] - ends[:, None, :])
     across = np.abs(hidden[:, :, None] - ends[:, None, :])
-    weights: list[NDArray[np.float64]] = []
-    shares: list[NDArray[np.float64]] = []
-    for span in SPANS:
-        tau = span * length[:, None, None]
-        K, k = _matern(between / tau), _matern(across / tau)
-        for noise, offset in itertools.product(NOISES, OFFSETS):
-            A = K + offset + noise * np.eye(K.shape[1])
-            w = np.linalg.solve(A, (k + offset).swapaxes(1, 2)).swapaxes(1, 2)
-            weights.append(w)
-            shares.append(1 - (w[-1] * (k[-1] + offset)).sum(axis=1) / (1 + offset))
-    return Bridges(weights=np.stack(weights), left=shares[CAREFUL] / shares[CAREFUL].max())
+    # All ways at once: (span, noise, offset) before (B, L, n).
+    tau = np.array(SPANS)[:, None, None, None, None, None] * length[:, None, None]
+    noise = np.array(NOISES)[:, None, None, None, None] * np.eye(ends.shape[1])
+    offset = np.array(OFFSETS)[:, None, None, None]
+    K, k = _matern(between / tau) + noise + offset, _matern(across / tau) + 0 * noise[..., :1, :1] + offset
+    weights = np.linalg.solve(K, k.swapaxes(-1, -2)).swapaxes(-1, -2)
+    weights = weights.reshape(-1, *weights.shape[-3:])
+    k = k.reshape(weights.shape)[CAREFUL, -1]
+    left = (1 + OFFSETS[0] - (weights[CAREFUL, -1] * k).sum(axis=1)).clip(min=0)
+    return Bridges(weights=weights, left=left / left.max())
 
 
 def _matern(ratio: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Estimate", "Estimates", "Take", "estimate"]
 
-MOST_WINDOWS = 96
+MOST_WINDOWS, LEAST_WINDOWS, MOST_HIDDEN = 64, 16, 1200
+"""Windows that are wanted, fewer of long gaps: so many that they hide `MOST_HIDDEN` frames."""
 MOST_HELPERS = 14
 """Markers that the pattern looks at; the steadiest `MOST_NEIGHBOURS` of them are the body."""
 MOST_NEIGHBOURS = 6
@@ -39,7 +40,7 @@ LEAST_SHARE = 0.5
 """… and share of the marker's frames: for a helper seen rarely, much else would go unused."""
 LEAST_PATTERN = 40
 """Frames from which a pattern may be learnt."""
-MOST_LEARNT = 1000
+MOST_LEARNT = 600
 """Frames spread over the take, from which body and pattern are learnt beside the windows'."""
 NEAREST_ENDS = 3
 """Frames on each side in which every helper must have been seen."""
@@ -124,7 +125,8 @@ def estimate(take: Take, span: Span) -> Estimates:
     ends = ends[known[ends]]
     frames = np.sort(np.concatenate([ends, span.hidden]))
     is_end = (frames < span.first) | (frames > span.last)
-    windows = held_out(known, frames, MOST_WINDOWS)
+    most = max(LEAST_WINDOWS, min(MOST_WINDOWS, MOST_HIDDEN // span.length))
+    windows = held_out(known, frames, most)
     spread = np.flatnonzero(known)
     spread = spread[:: -(-len(spread) // MOST_LEARNT)]
     rows = np.unique(np.concatenate([windows.ravel(), frames, spread]))
@@ -147,6 +149,7 @@ def estimate(take: Take, span: Span) -> Estimates:
         room = _Room(body=body.of(at[:, ~is_end].ravel()), mean=mean)
         places = places - mean
         rigid = np.full(span.length, (places[is_known] ** 2).mean())
+        rigid *= _caution(is_known.sum() / span.length)
         found.append(
             _carried("body", np.zeros((*every.shape, X.shape[2])), places[at], is_end, ways, room,
                      rigid)
@@ -212,6 +215,15 @@ def _usual_jump(
     is_next = np.diff(rows[is_known]) == 1
     missed = np.linalg.norm(y[2:] - 2 * y[1:-1] + y[:-2], axis=1)[is_next[1:] & is_next[:-1]]
     return float(np.quantile(missed, 0.99)) if len(missed) else np.inf
+
+
+def _caution(m: float) -> float:
+    """What a variance learnt from m stretches foretells of another: ``(m + 1) / (m - 1)`` of it.
+
+    As long as the gap, stretches are taken to be independent; of less than one nothing is known,
+    and 0.2 in the denominator stands for that.
+    """
+    return (m + 1) / max(m - 1, 0.2)
 
 
 def _smoother(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["Pattern", "learn_pattern"]
 
 MOST_FOLDS = 8
-RIDGES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+RIDGES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 """Strengths that are tried, in mean variances of a feature."""
 
 

@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Fill", "settle"]
 
-LEAST_WINDOWS = 8
-LEAST_APART = 2
-OWN_WINDOWS = 2.0
-"""What the estimators say of themselves counts as much as so many windows, none in another."""
+LEAST_WINDOWS, LEAST_APART = 8, 2
+"""Windows that are needed, and so many of them may hide nothing that another hides."""
+OWN_WINDOWS = 0.5
+"""What the estimators say of themselves counts as much as so many windows that are apart."""
 CAUTION = 10.0
 """Windows that it takes to believe in half of what disagreement tells."""
+TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,14 +62,7 @@ def settle(found: Estimates) -> Fill:
     H, L, _ = found.truth.shape
     n = n_apart(found.windows, L)
     if H < LEAST_WINDOWS or n < LEAST_APART:
-        best = int(np.argmin(own.mean(axis=1)))
-        return Fill(
-            points=values[best, -1],
-            stds=np.sqrt(own[best]),
-            weights=np.eye(len(own))[best],
-            rms=np.full(len(own), np.nan),
-            n_windows=0,
-        )
+        return _at_their_word(values[:, -1], own)
     errors = values[:, :-1] - found.truth
     weights = _weights(errors)
     mixed = np.einsum("j,jhld->hld", weights, values)
@@ -84,7 +78,23 @@ def settle(found: Estimates) -> Fill:
     )
 
 
-TINY = 1e-300
+def _at_their_word(values: NDArray[np.float64], own: NDArray[np.float64]) -> Fill:
+    """Take the estimator that is surest of itself, and doubt it where another says otherwise.
+
+    The first, the smoother, is not asked where there are others: over a gap that is long for its
+    take it is sure of what it cannot know.
+    """
+    J = len(own)
+    asked = np.arange(J)[min(1, J - 1) :]
+    best = int(asked[np.argmin(own[asked].mean(axis=1))])
+    apart = ((values[asked] - values[best]) ** 2).mean(axis=(0, 2))
+    return Fill(
+        points=values[best],
+        stds=np.sqrt(own[best] + _smoothed(apart)),
+        weights=np.eye(J)[best],
+        rms=np.full(J, np.nan),
+        n_windows=0,
+    )
 
 
 def _weights(errors: NDArray[np.float64]) -> NDArray[np.float64]:
