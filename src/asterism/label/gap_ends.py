@@ -28,7 +28,7 @@ CAREFUL = SPANS.index(0.4) * len(NOISES) * len(OFFSETS) + NOISES.index(1e-4) * l
 
 LEAST_ENDS = 4
 """Frames at each end that are believed whatever they do."""
-JUMP = 4.0
+JUMP = 8.0
 """A marker has flickered that jumps so many times farther than is usual."""
 
 
@@ -87,7 +87,10 @@ def bridges(times: NDArray[np.float64], is_end: NDArray[np.bool_]) -> Bridges:
     tau = np.array(SPANS)[:, None, None, None, None, None] * length[:, None, None]
     noise = np.array(NOISES)[:, None, None, None, None] * np.eye(ends.shape[1])
     offset = np.array(OFFSETS)[:, None, None, None]
-    K, k = _matern(between / tau) + noise + offset, _matern(across / tau) + 0 * noise[..., :1, :1] + offset
+    K, k = (
+        _matern(between / tau) + noise + offset,
+        _matern(across / tau) + 0 * noise[..., :1, :1] + offset,
+    )
     weights = np.linalg.solve(K, k.swapaxes(-1, -2)).swapaxes(-1, -2)
     weights = weights.reshape(-1, *weights.shape[-3:])
     k = k.reshape(weights.shape)[CAREFUL, -1]
@@ -117,7 +120,8 @@ def is_steady(
     span : Span
         The gap.
     usual : float
-        How far a place hardly ever is from what the two before it foretell, metres.
+        How far a place is from what the two before it foretell in the worst of ten frames, metres;
+        of a hundred would be worse, but a marker that flickers often would set its own measure.
 
     Returns
     -------

@@ -210,11 +210,11 @@ def _helpers(
 def _usual_jump(
     places: NDArray[np.float64], rows: NDArray[np.int64], is_known: NDArray[np.bool_]
 ) -> float:
-    """How far a place is off what the two before it foretell, in the worst of a hundred frames."""
+    """How far a place is off what the two before it foretell, in the worst of ten frames."""
     y = places[is_known]
     is_next = np.diff(rows[is_known]) == 1
     missed = np.linalg.norm(y[2:] - 2 * y[1:-1] + y[:-2], axis=1)[is_next[1:] & is_next[:-1]]
-    return float(np.quantile(missed, 0.99)) if len(missed) else np.inf
+    return float(np.quantile(missed, 0.9)) if len(missed) else np.inf
 
 
 def _caution(m: float) -> float:

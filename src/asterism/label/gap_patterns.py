@@ -84,7 +84,7 @@ def learn_pattern(
     # Of all but one fold, and of all.
     G = np.concatenate([G.sum(axis=0) - G, G.sum(axis=0)[None]])
     g = np.concatenate([g.sum(axis=0) - g, g.sum(axis=0)[None]])
-    scale = np.trace(G[-1, :p, :p]) / p + np.finfo(float).tiny
+    scale = max(np.trace(G[-1, :p, :p]) / p, 1e-12)  # one helper is at the very middle of its body
     each = np.append(np.full(p, scale), 1e-9)
     least, best, used = np.inf, g, RIDGES[-1]
     for ridge in RIDGES:
@@ -94,7 +94,7 @@ def learn_pattern(
             least, best, used = float((off**2).mean()), B, ridge
     found = A @ best + mean_y
     # Frames as near to each other as the gap is long tell the same: together they count for one.
-    leverage = (A * np.linalg.solve(G[-1] + used * np.diag(each), A.T).T).sum(axis=1)
+    leverage = (A * np.linalg.solve(G[-1] + used * np.diag(each), A.T).T).sum(axis=1).clip(min=0)
     return Pattern(
         by_fold=found[:-1], by_all=found[-1], fold=fold, variances=least * (1 + length * leverage)
     )

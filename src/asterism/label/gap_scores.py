@@ -22,8 +22,8 @@ __all__ = ["Fill", "settle"]
 
 LEAST_WINDOWS, LEAST_APART = 8, 2
 """Windows that are needed, and so many of them may hide nothing that another hides."""
-OWN_WINDOWS = 0.5
-"""What the estimators say of themselves counts as much as so many windows that are apart."""
+OWN_WINDOWS = 0.25
+"""What the estimators say of themselves counts as much as this part of a window that is apart from others."""
 CAUTION = 10.0
 """Windows that it takes to believe in half of what disagreement tells."""
 TINY = 1e-300
