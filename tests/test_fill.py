@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 from pathlib import Path
 
 import ezc3d
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -75,7 +76,7 @@ def test_gaps_are_those_between_detections(rows):
         t = np.flatnonzero(seen[:, k])
         expected += [
             Span(track=k, first=int(a) + 1, last=int(b) - 1)
-            for a, b in zip(t[:-1], t[1:], strict=True)
+            for a, b in itertools.pairwise(t)
             if b > a + 1
         ]
     assert find_gaps(seen) == expected

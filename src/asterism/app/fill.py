@@ -77,7 +77,7 @@ def fill(
     with progress("filling") as advance:
         found = am.fill(tracks, model=given, longest=longest, progress=advance)
     am.write(found.tracks, out, format=format, unflagged=unflagged)
-    figures = _figures(found) | {"input": str(source), "output": str(out)}
+    figures: dict[str, Any] = _figures(found) | {"input": str(source), "output": str(out)}
     if json:
         print_json(figures | {"gaps": [_plain(gap, capture) for gap in found.gaps]})
     elif not quiet:

@@ -51,8 +51,8 @@ def track(
     -------
     Tracks
         Labels for the same detections, without those that were filled; tracks are numbered in the
-        order in which they were believed. ``info["log_posterior"]`` is what every method is measured by (`log_posterior`),
-        the rest of ``info`` is the method's own.
+        order in which they were believed. ``info["log_posterior"]`` is what every method is
+        measured by (`log_posterior`), the rest of ``info`` is the method's own.
 
     Raises
     ------

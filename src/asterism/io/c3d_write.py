@@ -212,7 +212,7 @@ def _mark_filled(
     channels: NDArray[np.int64],
     filled: NDArray[np.bool_],
 ) -> None:
-    """Give filled points the word 0, and measured ones a residual of a step where they have none."""
+    """Give filled points the word 0, and measured ones a residual of at least a step."""
     words = block[rows, channels, 3]
     words[words % 256 == 0] += 1
     words[filled] = 0

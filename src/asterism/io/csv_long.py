@@ -1,11 +1,11 @@
 """Asterism's own CSV: one row a detection, and nothing is lost.
 
 Columns ``frame, time_s, x_m, y_m, z_m, track, name, confidence, filled, std``; ``z_m`` is absent in
-2-D, the last three where there is nothing of the kind. ``filled`` is 1 for a point that was not
-measured, ``std`` the standard deviation of a coordinate in metres, 0 where not known. Clutter is track -1. A row without coordinates is a frame
-without points; a row without frame and time declares a track that has no detection. Floats are
-written with as many digits as give back the same bits. Tabs and line ends in a name become
-blanks.
+2-D, the last three where there is nothing of the kind. Clutter is track -1; ``filled`` is 1 for a
+point that was not measured; ``std`` is the standard deviation of a coordinate in metres, 0 where it
+is not known. A row without coordinates is a frame without points; a row without frame and time
+declares a track that has no detection. Floats are written with as many digits as give back the same
+bits. Tabs and line ends in a name become blanks.
 """
 
 from __future__ import annotations

@@ -268,7 +268,7 @@ def _with(tracks: Tracks, fills: Sequence[tuple[Span, Fill]]) -> Tracks:
 def _ends(
     tracks: Tracks, fills: Sequence[tuple[Span, Fill]]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Detections at both ends of the gap, for every filled point."""
+    """Find the detections at both ends of the gap, for every filled point."""
     order, offsets = tracks.by_track
     frame_of = tracks.detections.frame_of
     before: list[int] = []

@@ -87,12 +87,10 @@ def bridges(times: NDArray[np.float64], is_end: NDArray[np.bool_]) -> Bridges:
     tau = np.array(SPANS)[:, None, None, None, None, None] * length[:, None, None]
     noise = np.array(NOISES)[:, None, None, None, None] * np.eye(ends.shape[1])
     offset = np.array(OFFSETS)[:, None, None, None]
-    K, k = (
-        _matern(between / tau) + noise + offset,
-        _matern(across / tau) + 0 * noise[..., :1, :1] + offset,
-    )
-    weights = np.linalg.solve(K, k.swapaxes(-1, -2)).swapaxes(-1, -2)
-    weights = weights.reshape(-1, *weights.shape[-3:])
+    K = _matern(between / tau) + noise + offset
+    k = np.broadcast_to(_matern(across / tau) + offset, (*K.shape[:-2], *across.shape[1:]))
+    solved = np.linalg.solve(K, k.swapaxes(-1, -2)).swapaxes(-1, -2)
+    weights: NDArray[np.float64] = solved.reshape(-1, *solved.shape[-3:])
     k = k.reshape(weights.shape)[CAREFUL, -1]
     left = (1 + OFFSETS[0] - (weights[CAREFUL, -1] * k).sum(axis=1)).clip(min=0)
     return Bridges(weights=weights, left=left / left.max())

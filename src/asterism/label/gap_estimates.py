@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Estimate", "Estimates", "Take", "estimate"]
 
-MOST_WINDOWS, LEAST_WINDOWS, MOST_HIDDEN = 64, 16, 1200
+MOST_WINDOWS, LEAST_WINDOWS, MOST_HIDDEN = 40, 16, 1200
 """Windows that are wanted, fewer of long gaps: so many that they hide `MOST_HIDDEN` frames."""
 MOST_HELPERS = 14
 """Markers that the pattern looks at; the steadiest `MOST_NEIGHBOURS` of them are the body."""
@@ -40,7 +40,7 @@ LEAST_SHARE = 0.5
 """… and share of the marker's frames: for a helper seen rarely, much else would go unused."""
 LEAST_PATTERN = 40
 """Frames from which a pattern may be learnt."""
-MOST_LEARNT = 600
+MOST_LEARNT = 500
 """Frames spread over the take, from which body and pattern are learnt beside the windows'."""
 NEAREST_ENDS = 3
 """Frames on each side in which every helper must have been seen."""
@@ -218,7 +218,7 @@ def _usual_jump(
 
 
 def _caution(m: float) -> float:
-    """What a variance learnt from m stretches foretells of another: ``(m + 1) / (m - 1)`` of it.
+    """Give the factor of a variance learnt from m stretches for another: ``(m + 1) / (m - 1)``.
 
     As long as the gap, stretches are taken to be independent; of less than one nothing is known,
     and 0.2 in the denominator stands for that.

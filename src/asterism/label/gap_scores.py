@@ -23,7 +23,7 @@ __all__ = ["Fill", "settle"]
 LEAST_WINDOWS, LEAST_APART = 8, 2
 """Windows that are needed, and so many of them may hide nothing that another hides."""
 OWN_WINDOWS = 0.25
-"""What the estimators say of themselves counts as much as this part of a window that is apart from others."""
+"""What estimators say of themselves counts for this part of a window that is apart."""
 CAUTION = 10.0
 """Windows that it takes to believe in half of what disagreement tells."""
 TINY = 1e-300
@@ -120,8 +120,8 @@ def _weights(errors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _smoothed(profile: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Running mean over an eighth of the gap on each side, so that chance makes no waves."""
-    k = len(profile) // 8
+    """Take the running mean over an eighth of the gap, so that chance makes no waves."""
+    k = len(profile) // 16
     padded = np.pad(profile, k, mode="edge")
     total = np.concatenate([[0], np.cumsum(padded)])
     return np.maximum((total[2 * k + 1 :] - total[: -2 * k - 1]) / (2 * k + 1), 0)
