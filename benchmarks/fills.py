@@ -3,8 +3,8 @@
 Of markers that are seen around them, stretches of 10, 30, 60 and 120 frames are hidden, up to three
 at a time, at random places (seeded), and filled by `am.fill`, by a cubic spline through ten frames
 on each side, and by Kinetics Toolkit's `fill_missing_samples` (linear, its default, and cubic). The
-gaps that the captures have themselves stay. A marker is *bonded* if the distance to three others or more
-varies by less than 10 mm (half of the middle 68 %).
+gaps that the captures have themselves stay. A marker is *bonded* if the distance to three others or
+more varies by less than 10 mm (half of the middle 68 %).
 
     python benchmarks/fills.py [--data FOLDER] [--only NAME] [--rounds N] [--markdown FILE]
 """
@@ -61,7 +61,7 @@ def chosen(
     n_hidden = np.zeros(T, dtype=int)
     found: list[tuple[int, int, int]] = []
     for _ in range(40 * MOST):
-        if len(found) == MOST or T < length + 2 * ENDS:
+        if len(found) == MOST or length + 2 * ENDS > T:
             break
         k, first = int(rng.integers(K)), int(rng.integers(ENDS, T - length - ENDS + 1))
         around = slice(first - ENDS, first + length + ENDS)

@@ -90,14 +90,14 @@ def bridges(times: NDArray[np.float64], is_end: NDArray[np.bool_]) -> Bridges:
     K = _matern(between / tau) + noise + offset
     k = np.broadcast_to(_matern(across / tau) + offset, (*K.shape[:-2], *across.shape[1:]))
     solved = np.linalg.solve(K, k.swapaxes(-1, -2)).swapaxes(-1, -2)
-    weights: NDArray[np.float64] = solved.reshape(-1, *solved.shape[-3:])
+    weights = solved.astype(np.float64, copy=False).reshape(-1, *solved.shape[-3:])
     k = k.reshape(weights.shape)[CAREFUL, -1]
     left = (1 + OFFSETS[0] - (weights[CAREFUL, -1] * k).sum(axis=1)).clip(min=0)
     return Bridges(weights=weights, left=left / left.max())
 
 
 def _matern(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
-    r = np.sqrt(5) * ratio
+    r: NDArray[np.float64] = np.sqrt(5) * ratio
     return np.exp(-r) * (1 + r + r**2 / 3)
 
 

@@ -49,8 +49,8 @@ def learn_pattern(
     """Learn a marker's place from those of others, by ridge regression.
 
     The frames are cut into up to `MOST_FOLDS` runs no shorter than the gap, if two can be had; each
-    is foretold by what was learnt from the others, and the ridge is that which foretells best. It is
-    a pattern of low rank, as that of [1]_: directions in which the others vary less than the ridge
+    is foretold by what was learnt from the others, and the ridge is that which foretells best. The
+    pattern is of low rank, as that of [1]_: directions in which the others vary less than the ridge
     count for nothing.
 
     Parameters
