@@ -208,8 +208,9 @@ def test_weights_are_the_best_of_a_fine_grid(seed, J):
 
 @pytest.mark.parametrize("n_axes", [2, 3])
 @pytest.mark.parametrize("length", [1, 10, 60])
-def test_a_rigid_body_carries_its_marker_exactly(n_axes, length):
-    truth = rigid(n_axes=n_axes)
+@pytest.mark.parametrize("n_markers", [4, 6])  # three neighbours are flat, and easily mirrored
+def test_a_rigid_body_carries_its_marker_exactly(n_axes, length, n_markers):
+    truth = rigid(n_markers, n_axes=n_axes)
     filling = am.fill(hidden_at(truth, (2, 100, 99 + length)), model=MODEL)
     e, std = errors(filling, truth)
     assert len(e) == length
@@ -378,12 +379,16 @@ def test_points_filled_before_are_no_measurements():
     d = once.tracks.detections
     for got in (
         am.track(d, model=MODEL),
-        am.track(d, am.MCMCDA(), model=MODEL, seed=1, start=once.tracks),
         am.stitch(once.tracks, MODEL).tracks,
         am.simulate.sense(once.tracks),
     ):
         assert got.detections.n_points == truth.detections.n_points
         assert got.detections.filled is None
+    starts = (
+        am.track(d, am.MCMCDA(), model=MODEL, seed=1, start=once.tracks),
+        am.track(truth.detections, am.MCMCDA(), model=MODEL, seed=1, start=truth),
+    )
+    np.testing.assert_array_equal(starts[0].labels, starts[1].labels)
     assert am.estimate_model(d).model == am.estimate_model(truth.detections).model
 
 

@@ -33,8 +33,8 @@ __all__ = [
 UNNAMED, CLUTTER = "track without a name", "clutter"
 OURS = "ASTERISM"
 """Group of parameters of our own. FILLED: that samples whose residual and cameras are 0 were
-filled, and all others measured, as the format would always have it, but few files keep to. RESIDUALS:
-whether the residuals of the others say more than that."""
+filled, and all others measured, as the format would always have it, but few files keep to.
+RESIDUALS: whether the residuals of the others say more than that."""
 
 
 def read(path: Path) -> Capture:
