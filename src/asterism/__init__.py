@@ -76,9 +76,12 @@ if TYPE_CHECKING:
     from asterism.io.calibration import write_rig as write_rig
     from asterism.io.observations import read_observations as read_observations
     from asterism.io.observations import write_observations as write_observations
+    from asterism.label import Filling as Filling
+    from asterism.label import Gap as Gap
     from asterism.label import Join as Join
     from asterism.label import Stitched as Stitched
     from asterism.label import Stitching as Stitching
+    from asterism.label import fill as fill
     from asterism.label import fragment_model as fragment_model
     from asterism.label import identify as identify
     from asterism.label import stitch as stitch
@@ -175,7 +178,17 @@ _PUBLIC = {
         "method_by_name",
         "track",
     ),
-    "label": ("Join", "Stitched", "Stitching", "fragment_model", "identify", "stitch"),
+    "label": (
+        "Filling",
+        "Gap",
+        "Join",
+        "Stitched",
+        "Stitching",
+        "fill",
+        "fragment_model",
+        "identify",
+        "stitch",
+    ),
     "solve": (
         "JointMarginals",
         "KBestAssignments",

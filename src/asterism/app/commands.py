@@ -12,6 +12,7 @@ from asterism.app.corrupt import corrupt
 from asterism.app.demo import demo
 from asterism.app.estimate import estimate
 from asterism.app.evaluate import evaluate
+from asterism.app.fill import fill
 from asterism.app.film import film
 from asterism.app.info import info
 from asterism.app.methods import methods, scenes
@@ -51,6 +52,7 @@ def _root(  # pyright: ignore[reportUnusedFunction]
 for _command in (
     track,
     stitch,
+    fill,
     evaluate,
     info,
     estimate,

@@ -80,7 +80,8 @@ def estimate_model(detections: Detections) -> ModelEstimate:
     Parameters
     ----------
     detections : Detections
-        A capture of at least a few frames in which markers can be followed.
+        A capture of at least a few frames in which markers can be followed; points that were filled
+        are left out.
 
     Returns
     -------
@@ -91,6 +92,7 @@ def estimate_model(detections: Detections) -> ModelEstimate:
     ParameterError
         If there are too few detections, or none that can be linked from frame to frame.
     """
+    detections = detections.measured()
     if detections.n_frames < 3 or detections.n_points < 3:
         raise ParameterError(
             "detections",

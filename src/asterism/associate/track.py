@@ -50,9 +50,9 @@ def track(
     Returns
     -------
     Tracks
-        Labels for the same detections; tracks are numbered in the order in which they were
-        believed. ``info["log_posterior"]`` is what every method is measured by (`log_posterior`),
-        the rest of ``info`` is the method's own.
+        Labels for the same detections, without those that were filled; tracks are numbered in the
+        order in which they were believed. ``info["log_posterior"]`` is what every method is
+        measured by (`log_posterior`), the rest of ``info`` is the method's own.
 
     Raises
     ------
@@ -68,13 +68,19 @@ def track(
     _check_type(
         "detections", detections, Detections, "tracks.detections, or Detections.from_frames"
     )
+    if start is not None:
+        labels = _labels_of(start, detections)
+        if detections.filled is not None:
+            labels = labels[~detections.filled]
+    else:
+        labels = None
+    detections = detections.measured()
     method = GNN() if method is None else method
     _check_type("method", method, Method, "GNN()")
     if model is None:
         model = estimate_model(detections).model
     _check_type("model", model, TrackingModel, "estimate_model(detections).model")
     state = method.init(model, n_axes=detections.n_axes, seed=seed)
-    labels = None if start is None else _labels_of(start, detections)
     state, labels, confidence = method.run(state, detections, progress=progress, start=labels)
     info = dict(state.info)
     tracks = Tracks(detections=detections, labels=labels, confidence=confidence, info=info)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CLUTTER",
+    "OURS",
     "UNNAMED",
     "channel_descriptions",
     "channel_names",
@@ -30,6 +31,10 @@ __all__ = [
 
 # What a writer here puts in POINT:DESCRIPTIONS, so that reading gives back the very same tracks.
 UNNAMED, CLUTTER = "track without a name", "clutter"
+OURS = "ASTERISM"
+"""Group of parameters of our own. FILLED: that samples whose residual and cameras are 0 were
+filled, and all others measured, as the format would always have it, but few files keep to.
+RESIDUALS: whether the residuals of the others say more than that."""
 
 
 def read(path: Path) -> Capture:
@@ -75,6 +80,10 @@ def read(path: Path) -> Capture:
     for array in (points, labels):
         array.flags.writeable = False  # nobody else has them: no need to copy
     cameras, residuals = _seen_by(file, seen, PER_METRE[unit])
+    ours = file.group(OURS)
+    filled = file.points[..., 3][seen] == 0 if ours.counts("FILLED")[:1] == [1] else None
+    if filled is not None and ours.counts("RESIDUALS")[:1] == [0]:
+        residuals = None
     return Capture(
         times=np.arange(len(seen)) / (rate or 1.0),
         offsets=np.concatenate([[0], np.cumsum(seen.sum(axis=1))]),
@@ -87,6 +96,7 @@ def read(path: Path) -> Capture:
         channels=np.nonzero(seen)[1],
         cameras=cameras,
         residuals=residuals,
+        filled=filled,
         labels=labels,
         names=identity_names,
         modelled=tuple(name for name, gone in zip(names, modelled, strict=True) if gone),

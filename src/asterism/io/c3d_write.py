@@ -11,6 +11,7 @@ import asterism
 from asterism.errors import FormatError, ParameterError
 from asterism.io.c3d import (
     CLUTTER,
+    OURS,
     UNNAMED,
     channel_descriptions,
     channel_names,
@@ -61,7 +62,9 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     detections were read from a C3D its unit, analog channels, events, computed points and all
     other parameters are kept, and so are the residuals and cameras of its points. A sample that
     is not there is written as 0, 0, 0 with residual -1, which is what other programs expect. Of
-    the cameras that saw a point C3D has room for the first seven.
+    the cameras that saw a point C3D has room for the first seven. A point that was filled has
+    residual 0, which is what C3D has for it, and then every measured one has at least a step; a
+    parameter of ours says that it is so.
     """
     d = tracks.detections
     rate = fixed_rate(d, "C3D")
@@ -97,6 +100,8 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
             "tracks", f"at most {0xFFFF} channels in a C3D", len(names), "write CSV instead"
         )
     _set_parameters(groups, names, descriptions, d.n_frames, first_frame, rate, unit, scale)
+    filled = d.filled if d.filled is not None and d.filled.any() else None
+    _set_filled(groups, filled is not None, d.residuals is not None)
     n_blocks = len(build(groups)) // BLOCK
     point = groups["POINT"].parameters  # the number of blocks is known now, and does not change
     point["DATA_START"] = Parameter.of_integers([2 + n_blocks], point["DATA_START"])
@@ -129,6 +134,9 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         if source is not None:
             _keep_residuals(block, d, channels, rows, source)
             block[:, n_own:] = source.points[rows][:, computed]
+        if filled is not None:
+            mine = np.arange(int(d.offsets[rows.start]), int(d.offsets[rows.stop]))
+            _mark_filled(block, d.frame_of[mine] - rows.start, channels[mine], filled[mine])
         file.write(np.hstack([block.reshape(len(block), -1), analog[rows]]).tobytes())
     # Data fill whole blocks; but where the counts overflow some readers go by the file's length.
     if d.n_frames <= 0xFFFF:
@@ -184,6 +192,31 @@ def _keep_residuals(
     frames = d.frame_of[mine]
     words = source.points[frames, d.channels[mine], 3]
     block[frames - rows.start, channels[mine], 3] = words
+
+
+def _set_filled(groups: dict[str, Group], any_filled: bool, has_residuals: bool) -> None:
+    """Say whether residuals tell filled points; what an older file said of them is forgotten."""
+    old = groups.pop(OURS, Group())
+    for key in ("FILLED", "RESIDUALS"):
+        old.parameters.pop(key, None)
+    if any_filled:
+        old.parameters["FILLED"] = Parameter.of_integers([1])
+        old.parameters["RESIDUALS"] = Parameter.of_integers([int(has_residuals)])
+    if old.parameters:
+        groups[OURS] = old
+
+
+def _mark_filled(
+    block: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    channels: NDArray[np.int64],
+    filled: NDArray[np.bool_],
+) -> None:
+    """Give filled points the word 0, and measured ones a residual of at least a step."""
+    words = block[rows, channels, 3]
+    words[words % 256 == 0] += 1
+    words[filled] = 0
+    block[rows, channels, 3] = words
 
 
 def _set_parameters(

@@ -1,10 +1,11 @@
 """Asterism's own CSV: one row a detection, and nothing is lost.
 
-Columns ``frame, time_s, x_m, y_m, z_m, track, name, confidence``; ``z_m`` is absent in 2-D,
-``confidence`` where there is none. Clutter is track -1. A row without coordinates is a frame
-without points; a row without frame and time declares a track that has no detection. Floats are
-written with as many digits as give back the same bits. Tabs and line ends in a name become
-blanks.
+Columns ``frame, time_s, x_m, y_m, z_m, track, name, confidence, filled, std``; ``z_m`` is absent in
+2-D, the last three where there is nothing of the kind. Clutter is track -1; ``filled`` is 1 for a
+point that was not measured; ``std`` is the standard deviation of a coordinate in metres, 0 where it
+is not known. A row without coordinates is a frame without points; a row without frame and time
+declares a track that has no detection. Floats are written with as many digits as give back the same
+bits. Tabs and line ends in a name become blanks.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["read", "read_tracks", "sniff", "write"]
 
-_COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "track", "name", "confidence")
+_COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "track", "name", "confidence", "filled", "std")
 _REQUIRED = ("frame", "time_s", "x_m", "y_m")
 _CHUNK = 4096  # lines or frames at a time
 _MOST_TRACKS = 10**6  # a number beyond it is a mistake, and would fill the memory
@@ -75,7 +76,7 @@ def _load(path: Path) -> tuple[Capture, Tracks]:
         raise FormatError(path, "line 1", f"the columns {', '.join(_COLUMNS)}", got)
     numbers, texts = columns_of(path, lines, header, ("name",))
     nothing = np.full(len(lines) - 1, np.nan)
-    numbers = dict.fromkeys(("track", "confidence"), nothing) | numbers
+    numbers = dict.fromkeys(("track",), nothing) | numbers
     names = texts.get("name", [""] * len(nothing))
     frame, time = numbers["frame"], numbers["time_s"]
     track = _whole(path, "track", np.nan_to_num(numbers["track"], nan=-1.0), -1, _MOST_TRACKS)
@@ -107,10 +108,15 @@ def _load(path: Path) -> tuple[Capture, Tracks]:
     counts = np.bincount(index[is_point], minlength=len(begins))
     numbered = _whole(path, "frame", frame[rows[begins]], -(2**53), 2**53)
     track_names = _names(path, track, names)
+    filled = numbers.get("filled")
+    if filled is not None:
+        filled = _whole(path, "filled", filled[kept], 0, 1).astype(np.bool_)
     capture = Capture(
         times=times,
         offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
         points=points[kept],
+        filled=filled,
+        stds=numbers["std"][kept] if "std" in header else None,
         path=path,
         format="csv",
         first_frame=int(numbered[0]) if len(numbered) else 1,
@@ -148,7 +154,7 @@ def _names(path: Path, track: NDArray[np.int64], names: list[str]) -> tuple[str 
 
 
 def write(tracks: Tracks, file: IO[bytes]) -> None:
-    """Write tracks; `read_tracks` gives back the same labels, names, confidence and points.
+    """Write tracks; `read_tracks` gives back the same labels, names, confidence, points and flags.
 
     Parameters
     ----------
@@ -158,9 +164,10 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         Where to.
     """
     d = tracks.detections
-    has_confidence = tracks.confidence is not None
-    header = [c for c in _COLUMNS if (c != "z_m" or d.n_axes == 3) and c != "confidence"]
-    header += ["confidence"] * has_confidence
+    filled = None if d.filled is None else d.filled.astype(np.int64)
+    more = {"confidence": tracks.confidence, "filled": filled, "std": d.stds}
+    last = {name: values for name, values in more.items() if values is not None}
+    header = [c for c in _COLUMNS if (c != "z_m" or d.n_axes == 3) and c not in more] + [*last]
     file.write((",".join(header) + "\n").encode())
     tails = [f"{k},{quoted(plain(name or ''))}" for k, name in enumerate(tracks.names)] + ["-1,"]
     first = d.first_frame if isinstance(d, Capture) else 1
@@ -172,13 +179,12 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         columns = [map(starts.__getitem__, d.frame_of[rows].tolist())]
         columns += [map(repr, d.points[rows, axis].tolist()) for axis in range(d.n_axes)]
         columns.append(map(tails.__getitem__, tracks.labels[rows].tolist()))
-        if tracks.confidence is not None:
-            columns.append(map(repr, tracks.confidence[rows].tolist()))
+        columns += [map(repr, values[rows].tolist()) for values in last.values()]
         lines = list(map(",".join, zip(*columns, strict=True)))
         # Backwards, so that the places of the others stay right.
         for t in begin + np.flatnonzero(d.counts[begin:end] == 0)[::-1]:
             lines.insert(int(d.offsets[t]) - rows.start, starts[t] + blank)
         file.write("".join(f"{line}\n" for line in lines).encode())
     for k in np.flatnonzero(tracks.lengths == 0):
-        line = "," * (2 + d.n_axes) + tails[k] + "," * has_confidence
+        line = "," * (2 + d.n_axes) + tails[k] + "," * len(last)
         file.write(f"{line}\n".encode())

@@ -83,7 +83,12 @@ def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
 
 
 def write(
-    tracks: Tracks, path: str | Path, *, format: str | None = None, overwrite_input: bool = False
+    tracks: Tracks,
+    path: str | Path,
+    *,
+    format: str | None = None,
+    overwrite_input: bool = False,
+    unflagged: bool = False,
 ) -> None:
     """Write tracks to a file; it is there as a whole afterwards, or untouched.
 
@@ -97,12 +102,14 @@ def write(
         Key of `FORMATS`; by default it is told by the ending of the name.
     overwrite_input : bool
         Allow `path` to be the file that the detections were read from.
+    unflagged : bool
+        Allow points that were filled in a format in which nothing tells them from measured ones.
 
     Raises
     ------
     ParameterError
         If `path` is the input and that was not allowed, its ending is unknown, or the format
-        cannot hold these tracks.
+        cannot hold these tracks, or cannot tell which of their points were filled.
     FormatError
         If the file cannot be written, or its source cannot be read again.
     """
@@ -125,6 +132,12 @@ def write(
         raise ParameterError(
             "path", "another file than the one that was read", str(path),
             "overwrite_input=True if you mean it",
+        )  # fmt: skip
+    if source.filled is not None and source.filled.any() and not (chosen.keeps_filled or unflagged):
+        able = ", ".join(f.name for f in known if f.keeps_filled)
+        raise ParameterError(
+            "format", f"one that tells filled points from measured ones: {able}",
+            repr(chosen.name), "unflagged=True if they need not be told apart",
         )  # fmt: skip
     with replacing(path) as file:
         chosen.write(tracks, file)

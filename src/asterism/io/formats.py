@@ -36,6 +36,8 @@ class Format:
         Writes `Tracks` to an open binary file; None where the format is only read.
     read_tracks : callable or None
         Path to `Tracks`, for a format that holds more than a `Capture` can.
+    keeps_filled : bool
+        Whether filled points are told from measured ones in it.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Format:
     read: Callable[[Path], Capture]
     write: Callable[[Tracks, IO[bytes]], None] | None = None
     read_tracks: Callable[[Path], Tracks] | None = None
+    keeps_filled: bool = False
 
 
 FORMATS: dict[str, Format] = {
@@ -57,6 +60,7 @@ FORMATS: dict[str, Format] = {
             sniff=c3d.sniff,
             read=c3d.read,
             write=c3d_write.write,
+            keeps_filled=True,
         ),
         Format(
             name="trc",
@@ -74,6 +78,7 @@ FORMATS: dict[str, Format] = {
             read=csv_long.read,
             write=csv_long.write,
             read_tracks=csv_long.read_tracks,
+            keeps_filled=True,
         ),
         Format(
             name="csv-wide",

@@ -52,7 +52,7 @@ class Stitching:
     Parameters
     ----------
     tracks : Tracks
-        The markers: labels for the same detections.
+        The markers: labels for the same detections, without those that were filled.
     fragments : ndarray of int, shape (N,)
         Fragment of each detection, -1 for clutter.
     markers : ndarray of int, shape (F,)
@@ -131,7 +131,7 @@ def stitch(
     Parameters
     ----------
     tracks : Tracks
-        Fragments, from any method or from a file.
+        Fragments, from any method or from a file; points that were filled are left out.
     model : TrackingModel
         Motion, noise, and the longest gap within a fragment.
     confirm : int
@@ -175,6 +175,7 @@ def stitch(
         hint = "try am.estimate_model(detections).model"
         raise ParameterError("model", "a TrackingModel", type(model).__name__, hint)
     check_options(confirm, ghost_radius, max_hidden)
+    tracks = tracks.measured()
     d = tracks.detections
     # What is learnt late helps early: each pass advises the next, in the other direction. The last
     # leaves the fragments as they are.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -65,6 +65,8 @@ class Capture(Detections):
     names: tuple[str | None, ...] = ()
     modelled: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    PER_POINT: ClassVar[tuple[str, ...]] = (*Detections.PER_POINT, "channels", "labels")
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -5,9 +5,9 @@ Nothing here says which point is which marker; that is a `Tracks`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -42,6 +42,10 @@ class Detections:
         Which cameras saw each point, where known: bit i for camera i, up to 62.
     residuals : array_like, shape (N,), optional
         How far their rays pass by each point, where known, metres.
+    filled : array_like of bool, shape (N,), optional
+        Which points were not measured but estimated, as `asterism.fill` does; none by default.
+    stds : array_like, shape (N,), optional
+        Standard deviation of each coordinate where it is known, metres; 0 where it is not.
 
     Raises
     ------
@@ -62,6 +66,11 @@ class Detections:
     points: NDArray[np.float64]
     cameras: NDArray[np.int64] | None = None
     residuals: NDArray[np.float64] | None = None
+    filled: NDArray[np.bool_] | None = None
+    stds: NDArray[np.float64] | None = None
+
+    PER_POINT: ClassVar[tuple[str, ...]] = ("points", "cameras", "residuals", "filled", "stds")
+    """Fields with an entry for each point: whoever adds or drops points does so in all of them."""
 
     def __post_init__(self) -> None:
         times = keep_array("times", self.times, ("T",))
@@ -91,10 +100,16 @@ class Detections:
             )
         for name, array in (("times", times), ("offsets", offsets), ("points", points)):
             object.__setattr__(self, name, array)
-        for name, kind in (("cameras", np.int64), ("residuals", np.float64)):
+        kinds = {
+            "cameras": np.int64,
+            "residuals": np.float64,
+            "filled": np.bool_,
+            "stds": np.float64,
+        }
+        for name, kind in kinds.items():
             if getattr(self, name) is not None:
                 array = keep_array(name, getattr(self, name), (len(points),), dtype=kind)
-                if array.size and array.min() < 0:
+                if kind is not np.bool_ and array.size and array.min() < 0:
                     raise ParameterError(name, "numbers ≥ 0", array.min())
                 object.__setattr__(self, name, array)
 
@@ -165,6 +180,28 @@ class Detections:
             points = dense[is_seen]
             points.flags.writeable = False  # nobody else has it: no need to copy
         return cls(times=times, offsets=offsets, points=points)
+
+    def measured(self) -> Self:
+        """Leave out what was filled.
+
+        The one place where it is: whoever takes points for measurements (`estimate_model`,
+        `track`, `stitch`, `fill`, `simulate.sense`) asks for these.
+
+        Returns
+        -------
+        Detections
+            Of the same kind and frames; itself where nothing was filled.
+        """
+        if self.filled is None or not self.filled.any():
+            return self
+        kept = ~self.filled
+        changes: dict[str, Any] = {
+            name: getattr(self, name)[kept]
+            for name in self.PER_POINT
+            if getattr(self, name) is not None
+        }
+        changes["offsets"] = np.concatenate([[0], np.cumsum(kept)])[self.offsets]
+        return replace(self, **changes | {"filled": None})
 
     @property
     def n_frames(self) -> int:

@@ -6,7 +6,7 @@ the points: the labels lie beside the detections that they speak of.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
@@ -130,6 +130,15 @@ class Tracks:
             labels=labels,
             names=tuple(names) if names else (None,) * n_markers,
         )
+
+    def measured(self) -> Self:
+        """Leave out what was filled, as `Detections.measured` does; itself where nothing was."""
+        d = self.detections.measured()
+        if d is self.detections or self.detections.filled is None:
+            return self
+        kept = ~self.detections.filled
+        confidence = None if self.confidence is None else self.confidence[kept]
+        return replace(self, detections=d, labels=self.labels[kept], confidence=confidence)
 
     @property
     def n_tracks(self) -> int:

@@ -137,6 +137,7 @@ def sense(
     """
     switches = {name: value for name, value in locals().items() if name != "truth"}
     _check(truth, switches)
+    truth = truth.measured()
     (
         rng_missing, rng_burst, rng_noise, rng_clutter, rng_ghosts, rng_order,
         rng_spread, rng_visits, rng_nearby, rng_doubled, rng_dropped, rng_jitter, rng_views,
@@ -350,6 +351,7 @@ def _detections(
         points=mixed.places,
         cameras=None,
         residuals=None,
+        stds=None,
         # The rest of the file (analog channels, events) goes by its own frames: at another rate a
         # writer must not take it over.
         format=source.format if is_whole else "",
