@@ -257,12 +257,13 @@ void bind_trackers(nb::module_& module) {
             require(chains >= 1 && threads >= 1, "chains and threads: at least 1");
             require(split_by >= 0 && split_by <= 3, "split_by: 0 to 3");
             require(bonds == 0 || (bonds >= 2 && bonds <= 4), "bonds: 0, 2, 3 or 4");
-            new (self) McmcOptions{window, is_whole, moves, deadline, has_assignment, confidence, chains,
-                                   threads, {static_cast<SplitBy>(split_by), doubt, distance},
-                                   {bonds, window, tolerance}};
+            new (self) McmcOptions{
+                window,     is_whole, moves,   deadline, has_assignment,
+                confidence, chains,   threads, {static_cast<SplitBy>(split_by), doubt, distance},
+                {bonds, window, tolerance}};
           },
-          nb::kw_only(), "window"_a, "is_whole"_a, "moves"_a, "deadline"_a, "has_assignment"_a, "confidence"_a,
-          "chains"_a, "threads"_a, "split_by"_a, "doubt"_a, "distance"_a, "bonds"_a, "tolerance"_a);
+          nb::kw_only(), "window"_a, "is_whole"_a, "moves"_a, "deadline"_a, "has_assignment"_a,
+          "confidence"_a, "chains"_a, "threads"_a, "split_by"_a, "doubt"_a, "distance"_a, "bonds"_a, "tolerance"_a);
 
   nb::class_<LifeOptions>(module, "LifeOptions")
       .def(
@@ -279,7 +280,8 @@ void bind_trackers(nb::module_& module) {
           [](ChainOptions* self, const In<double>& weights, bool is_informed, double stop,
              double floor, bool has_first_rules, bool is_ascent, double share_at_doubts) {
             require(weights.ndim() == 1 && weights.size() == kMoves, "weights: one for each move");
-            new (self) ChainOptions{{is_informed, stop, floor}, {}, has_first_rules, is_ascent, share_at_doubts};
+            new (self) ChainOptions{
+                {is_informed, stop, floor}, {}, has_first_rules, is_ascent, share_at_doubts};
             std::copy_n(weights.data(), kMoves, self->weights.begin());
           },
           nb::kw_only(), "weights"_a, "is_informed"_a, "stop"_a, "floor"_a, "has_first_rules"_a,

@@ -79,20 +79,16 @@ class McmcTracker {
   void finish(Label&& label, std::function<bool(double)> goes_on) {
     Partition<Filter>& p = partition_;
     p.thaw();
-    FrameStats stats;
-    const Split split = split_up({}, stats);
-    const std::vector<double> weights = weights_of(split.groups, [](const Group& g) { return g.n_open; });
+    shares_.clear();
     double all = 0;
-    for (const double weight : weights) all += weight;
+    for (const Group& group : Splitter<Filter>(p, opt_.split).split(doubts_, {}).groups)
+      all += static_cast<double>(group.n_open);
     Watch watch(all * (opt_.moves + opt_.confidence) * opt_.n_chains, std::move(goes_on));
-    walks_.search(p, split.groups, Budgets(weights, opt_.moves, &watch), seed_of(2), stats.chain);
-    if (has_confidence() && !watch.is_stopped()) {
-      const Split again = Splitter<Filter>(p, opt_.split).split(doubts_, {});
-      const auto now = weights_of(again.groups, [](const Group& g) { return g.n_open; });
-      shares_.clear();
-      keep_shares(walks_.sample(p, again.groups, Budgets(now, opt_.confidence, &watch), seed_of(3),
-                                stats.chain));
-    }
+    const auto allowed = [&](std::span<const Group> groups, double moves, double) {
+      return Budgets(weights_of(groups, [](const Group& g) { return g.n_open; }), moves, &watch);
+    };
+    FrameStats stats;
+    walk({}, allowed, 2, stats, [&] { return has_confidence() && !watch.is_stopped(); });
     stats.n_confirmed = p.tracks().size();
     total_.add(stats);
     next_id_ = 0;
@@ -142,19 +138,30 @@ class McmcTracker {
     start_.begin(p, doubts_, stats.chain, stats.n_candidates);
     const Bonds bonds = BondFinder<Filter>(p, opt_.bonds).find();
     stats.chain.n_sure = bonds.n_sure;
-    const Split split = split_up(bonds.is_sure, stats);
-    walks_.search(p, split.groups, budgets(split.groups, opt_.moves, arrival, has_confidence() ? 0.5 : 1),
-                  seed_of(0), stats.chain);
-    if (has_confidence() && !opt_.is_whole) {
-      // The search may have made other tracks.
-      const Split now = Splitter<Filter>(p, opt_.split).split(doubts_, bonds.is_sure);
-      keep_shares(walks_.sample(p, now.groups, budgets(now.groups, opt_.confidence, arrival, 1),
-                                seed_of(1), stats.chain));
-    }
+    const auto allowed = [&](std::span<const Group> groups, double moves, double share) {
+      return budgets(groups, moves, arrival, share);
+    };
+    walk(bonds.is_sure, allowed, 0, stats, [&] { return has_confidence() && !opt_.is_whole; });
     stats.n_confirmed = p.tracks().size();
     stats.n_pending = p.free().size() + p.taken().size();
     total_.add(stats);
     return stats;
+  }
+
+  // Looks for the best partition, and then for how probable it is, if it `is_asked`. `allowed(groups,
+  // moves, share of the time)` is how long.
+  template <typename Allowed, typename IsAsked>
+  void walk(const std::vector<char>& is_sure, Allowed&& allowed, std::uint64_t phase,
+            FrameStats& stats, IsAsked&& is_asked) {
+    const Split split = split_up(is_sure, stats);
+    walks_.search(partition_, split.groups,
+                  allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1), seed_of(phase),
+                  stats.chain);
+    if (!is_asked()) return;
+    // The search may have made other tracks.
+    const Split now = Splitter<Filter>(partition_, opt_.split).split(doubts_, is_sure);
+    keep_shares(walks_.sample(partition_, now.groups, allowed(now.groups, opt_.confidence, 1),
+                              seed_of(phase + 1), stats.chain));
   }
 
   Split split_up(const std::vector<char>& is_sure, FrameStats& stats) {
@@ -261,11 +268,10 @@ class McmcTracker {
     for (const std::int32_t k : p.tracks().items())
       if (p.track(k).n_frozen > 0) next_id_ = std::max(next_id_, id_of(k) + 1);
     while (window.first() + window.max_gap() <= settled) {
-      for (const std::int32_t i : window.frame(window.first()).ids)
-        {
-          if (i < static_cast<std::int32_t>(said_.size())) said_[i] = {};
-          if (i < static_cast<std::int32_t>(shares_.size())) shares_[i] = {};
-        }
+      for (const std::int32_t i : window.frame(window.first()).ids) {
+        if (i < static_cast<std::int32_t>(said_.size())) said_[i] = {};
+        if (i < static_cast<std::int32_t>(shares_.size())) shares_[i] = {};
+      }
       p.drop_frame();
     }
   }

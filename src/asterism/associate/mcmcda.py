@@ -268,10 +268,7 @@ class MCMCDA(EngineMethod):
         start: NDArray[np.int64] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; see `Method.run`."""
-        from asterism import _engine
-
-        tracker = state.tracker.copy()
-        assert isinstance(tracker, (_engine.OneMotionTracker, _engine.SeveralMotionsTracker))
+        tracker = _own_copy(state)
         if start is not None:
             tracker.start_from(np.ascontiguousarray(start, dtype=np.int64))
         state = replace(state, tracker=tracker)
@@ -292,8 +289,7 @@ class MCMCDA(EngineMethod):
         )
         labels = np.concatenate([np.full(n_before, -1, dtype=np.int64), labels])
         confidence = np.zeros(len(labels) if sure is not None else 0)
-        tracker = state.tracker.copy()
-        assert isinstance(tracker, (_engine.OneMotionTracker, _engine.SeveralMotionsTracker))
+        tracker = _own_copy(state)
         tracker.finish(labels, confidence, lambda share: tell(part + (1 - part) * share))
         tell(1.0)
         state = replace(state, tracker=tracker)
@@ -328,6 +324,14 @@ class MCMCDA(EngineMethod):
                 "disagreements": chain.n_doubtful,
             }
         return about
+
+
+def _own_copy(state: EngineState) -> _engine.OneMotionTracker | _engine.SeveralMotionsTracker:
+    from asterism import _engine
+
+    tracker = state.tracker.copy()
+    assert isinstance(tracker, (_engine.OneMotionTracker, _engine.SeveralMotionsTracker))
+    return tracker
 
 
 def _checked_seed(seed: int | None) -> int:
