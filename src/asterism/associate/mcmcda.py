@@ -160,6 +160,7 @@ class MCMCDA(EngineMethod):
     distance: float | None = None
     bonds: Literal[0, 2, 3, 4] = 0
     bond_tolerance: float | None = None
+    bond_weight: float = 0.0
     proposal: Literal["informed", "uniform"] = "informed"
     move_weights: Literal["uniform", "report"] | Mapping[str, float] = "uniform"
     at_doubts: float = 0.5
@@ -186,6 +187,7 @@ class MCMCDA(EngineMethod):
         check_number("threads", self.threads, above=1, below=1024, closed=True, integer=True)
         check_number("at_doubts", self.at_doubts, above=0, below=0.99, closed=True)
         check_number("doubt", self.doubt, above=0, closed=True)
+        check_number("bond_weight", self.bond_weight, above=0, below=100, closed=True)
         if self.bond_tolerance is not None:
             check_number("bond_tolerance", self.bond_tolerance, above=0)
         if repr(self.bonds) not in ("0", "2", "3", "4"):
@@ -243,6 +245,7 @@ class MCMCDA(EngineMethod):
             distance=self.distance or 0.0,
             bonds=self.bonds,
             tolerance=self.bond_tolerance or 6 * math.sqrt(2) * model.sensor.noise_sigma,
+            bond_weight=self.bond_weight,
         )
         is_one = len(model.motion.modes) == 1
         make = _engine.OneMotionTracker if is_one else _engine.SeveralMotionsTracker
@@ -316,6 +319,8 @@ class MCMCDA(EngineMethod):
             about |= {"given_links": chain.n_given, "refused_links": chain.n_refused}
         if self.bonds:
             about["sure_tracks"] = chain.n_sure
+        if self.bond_weight > 0:
+            about |= {"bonds": stats.n_bonds, "bond_score": stats.bond_score}
         if self.confidence > 0:
             about |= {
                 "confidence_moves": chain.n_sampled,
