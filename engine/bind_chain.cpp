@@ -42,7 +42,7 @@ class Chain {
       s.partition().add_frame(time, motion_step(m_, F.data(), Q.data()), frame, n_seen_);
     });
     n_seen_ += static_cast<std::int64_t>(frame.size());
-    read_bonds();
+    visit([](auto& s) { s.weigh_bonds({}); });  // they are of the detections so far
   }
 
   void freeze(std::int64_t frame) {
@@ -78,10 +78,16 @@ class Chain {
     const std::size_t n = lengths.size() / 2;
     require(pairs.size() == 2 * n && lengths.size() == 2 * n, "pairs and lengths: shape (n, 2)");
     require(static_cast<std::int64_t>(known.size()) == n_seen_, "known: one for each detection");
-    const auto of_number = [&](std::int64_t number) { return known.data()[number]; };
-    std::int64_t n_markers = 0;
-    for (std::size_t i = 0; i < known.size(); ++i)
-      n_markers = std::max(n_markers, known.data()[i] + 1);
+    std::vector<char> is_known;
+    for (std::size_t i = 0; i < known.size(); ++i) {
+      if (known.data()[i] < 0) continue;
+      const auto marker = static_cast<std::size_t>(known.data()[i]);
+      require(marker < known.size(), "known: markers 0, 1 and so on");
+      if (is_known.size() <= marker) is_known.resize(marker + 1, false);
+      require(!is_known[marker], "known: one detection for each marker");
+      is_known[marker] = true;
+    }
+    const auto n_markers = static_cast<std::int32_t>(is_known.size());
     std::vector<BondGraph::Pair> all(n);
     for (std::size_t k = 0; k < n; ++k) {
       const std::int64_t a = pairs.data()[2 * k], b = pairs.data()[2 * k + 1];
@@ -95,9 +101,8 @@ class Chain {
       std::vector<std::int32_t> by_id(s.partition().window().n_ids(), -1);
       for (std::size_t i = 0; i < by_id.size(); ++i)
         by_id[i] = static_cast<std::int32_t>(
-            of_number(s.partition().window()[static_cast<std::int32_t>(i)].number));
-      s.weigh_bonds(BondTerm<Filter>(
-          BondGraph(static_cast<std::int32_t>(n_markers), all, weight), std::move(by_id)));
+            known.data()[s.partition().window()[static_cast<std::int32_t>(i)].number]);
+      s.weigh_bonds(BondTerm<Filter>(BondGraph(n_markers, all, weight), std::move(by_id)));
     });
     read_bonds();
   }

@@ -91,7 +91,7 @@ class McmcTracker {
       return Budgets(weights_of(groups, [](const Group& g) { return g.n_open; }), moves, &watch);
     };
     FrameStats stats;
-    BondTerm<Filter> bonds = settled_bonds_.whole_term(p);
+    BondTerm<Filter> bonds = settled_bonds_.term(p);
     walk({}, bonds, allowed, 2, stats, [&] { return has_confidence() && !watch.is_stopped(); });
     total_.bond_score = 0;
     tell_bonds(bonds, p.window().now(), stats);

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -19,7 +21,7 @@ class SettledBonds {
  public:
   // What bonds say of a marker in a frame is within ± `weight` nats; none are learnt where that is 0.
   SettledBonds(const MotionModel& m, double weight)
-      : weight_(weight), neighbours_(m.axis.D, std::sqrt(m.axis.r)) {}
+      : weight_(weight), r_(m.axis.r), neighbours_(m.axis.D, std::sqrt(m.axis.r)) {}
 
   bool is_on() const { return weight_ > 0; }
 
@@ -37,63 +39,64 @@ class SettledBonds {
     if (is_on()) neighbours_.forget(static_cast<std::int32_t>(id));
   }
 
-  // What they say of the open frames.
+  // What they say of a partition. A track is known for the last of it that is settled; in a whole
+  // take, of which nothing is settled any more, for its first.
   BondTerm<Filter> term(const Partition<Filter>& p) const {
     if (!is_on()) return {};
-    std::vector<std::int32_t> known(p.window().n_ids(), -1);
+    const bool is_open = p.frozen() < p.window().first();
     std::vector<std::pair<std::int32_t, std::int32_t>> tracks;  // number, detection known for it
     for (const std::int32_t k : p.tracks().items())
-      if (const auto& t = p.track(k); t.n_frozen > 0)
+      if (const auto& t = p.track(k); t.id >= 0 && (is_open || t.n_frozen > 0))
         tracks.emplace_back(static_cast<std::int32_t>(t.id), t.nodes[t.first_open()]);
-    return make_term(p, std::move(tracks), std::move(known));
-  }
-  // What they say of a whole take, of which nothing is settled any more: tracks are known for their
-  // first detections.
-  BondTerm<Filter> whole_term(const Partition<Filter>& p) const {
-    if (!is_on()) return {};
+    std::sort(tracks.begin(), tracks.end());
     std::vector<std::int32_t> known(p.window().n_ids(), -1);
-    std::vector<std::pair<std::int32_t, std::int32_t>> tracks;
-    for (const std::int32_t k : p.tracks().items())
-      tracks.emplace_back(static_cast<std::int32_t>(p.track(k).id), p.track(k).nodes.front());
-    return make_term(p, std::move(tracks), std::move(known));
+    for (std::size_t a = 0; a < tracks.size(); ++a)
+      known[tracks[a].second] = static_cast<std::int32_t>(a);
+    BondTerm<Filter> out(
+        BondGraph(static_cast<std::int32_t>(tracks.size()), pairs_of(tracks), weight_),
+        std::move(known));
+    out.read(p);
+    return out;
   }
 
  private:
   static constexpr std::size_t kSteadiest = 6;  // bonds of a marker
   static constexpr std::int64_t kLeast = 30;    // frames until a bond is one
   // A distance that is known no better than by this share of itself is none that is kept.
-  static constexpr double kLoose = 0.2;
+  static constexpr double kLoose = 0.3;
 
   struct Found {
     BondGraph::Pair pair;
     std::int64_t n = 0;
   };
 
-  BondTerm<Filter> make_term(const Partition<Filter>& p,
-                             std::vector<std::pair<std::int32_t, std::int32_t>> tracks,
-                             std::vector<std::int32_t> known) const {
-    std::sort(tracks.begin(), tracks.end());
-    const auto n = static_cast<std::int32_t>(tracks.size());
-    std::vector<Found> found;
-    std::vector<std::pair<double, Found>> own;
-    for (std::int32_t a = 0; a < n; ++a) {
-      known[tracks[a].second] = a;
+  // s of a bond: three times what its distance varied by, and what bodies bend by that was not seen
+  // yet. Where it is ranked its unsteadiness asks whom to trust; here it is how far off is too far.
+  double spread(const Bond& bond) const {
+    const double unseen = bond.mean * (0.02 + 1 / static_cast<double>(bond.n));
+    return std::sqrt(9 * (bond.variance + r_) + unseen * unseen);
+  }
+
+  // The steadiest bonds of each of these tracks with others of them.
+  std::vector<BondGraph::Pair> pairs_of(
+      std::span<const std::pair<std::int32_t, std::int32_t>> tracks) const {
+    std::vector<Found> found, own;
+    for (std::int32_t a = 0; a < static_cast<std::int32_t>(tracks.size()); ++a) {
       own.clear();
       for (const Bond& bond : neighbours_.of(tracks[a].first)) {
-        const double scale = neighbours_.unsteadiness(bond);
+        const double scale = spread(bond);
         if (bond.n < kLeast || scale > kLoose * bond.mean) continue;
         const auto at = std::lower_bound(tracks.begin(), tracks.end(), std::pair(bond.other, -1));
         if (at == tracks.end() || at->first != bond.other) continue;
         const auto b = static_cast<std::int32_t>(at - tracks.begin());
-        own.push_back({scale, {{std::min(a, b), std::max(a, b), bond.mean, scale}, bond.n}});
+        own.push_back({{std::min(a, b), std::max(a, b), bond.mean, scale}, bond.n});
       }
-      const std::size_t most = std::min(kSteadiest, own.size());
-      std::partial_sort(own.begin(), own.begin() + static_cast<std::ptrdiff_t>(most), own.end(),
-                        [](const auto& x, const auto& y) {
-                          return std::tuple(x.first, x.second.pair.a, x.second.pair.b) <
-                                 std::tuple(y.first, y.second.pair.a, y.second.pair.b);
-                        });
-      for (std::size_t r = 0; r < most; ++r) found.push_back(own[r].second);
+      std::sort(own.begin(), own.end(), [](const Found& x, const Found& y) {
+        return std::tuple(x.pair.scale, x.pair.a, x.pair.b) <
+               std::tuple(y.pair.scale, y.pair.a, y.pair.b);
+      });
+      own.resize(std::min(kSteadiest, own.size()));
+      found.insert(found.end(), own.begin(), own.end());
     }
     // Of two that know each other, what was learnt longer.
     std::stable_sort(found.begin(), found.end(), [](const Found& x, const Found& y) {
@@ -103,12 +106,10 @@ class SettledBonds {
     for (const Found& one : found)
       if (pairs.empty() || pairs.back().a != one.pair.a || pairs.back().b != one.pair.b)
         pairs.push_back(one.pair);
-    BondTerm<Filter> out(BondGraph(n, pairs, weight_), std::move(known));
-    out.read(p);
-    return out;
+    return pairs;
   }
 
-  double weight_;
+  double weight_, r_;
   Neighbours neighbours_;
   std::vector<Seen> seen_;
 };

@@ -57,8 +57,9 @@ class Bonds:
 
 
 def some_bonds(
-    d: am.Detections, seed: int, *, settled: int | None = None, weight: float = 4.0, most: int = 4
-) -> Bonds:
+    d: am.Detections, seed: int, *, settled: int | None = None, weight: float = 10.0,
+    most: int = 4, of: type[Bonds] = Bonds,
+) -> Bonds:  # fmt: skip
     """Give bonds of a few detections, all with each other.
 
     Those of the settled frame, of which each is a marker; otherwise of any frame.
@@ -73,4 +74,4 @@ def some_bonds(
         (float(np.linalg.norm(d.points[own[a]] - d.points[own[c]])), float(rng.uniform(0.02, 0.05)))
         for a, c in pairs
     ]
-    return Bonds(pairs, lengths, weight, known.tolist(), -1 if settled is None else settled)
+    return of(pairs, lengths, weight, known.tolist(), -1 if settled is None else settled)
