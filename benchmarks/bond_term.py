@@ -1,8 +1,8 @@
-"""Distance bonds in the posterior of MCMCDA: what they win, what they cost, and where they do no harm.
+"""Distance bonds in the posterior of MCMCDA: what they win, what they cost, what they spoil.
 
 The hard crossing (`crossing.py`) and smooth paths (`smooth.py`); scenes in which nobody keeps a
-distance; and real captures corrupted in bursts with ghosts (`identity.py`), as fragments that are
-stitched and, with ``--alone``, tracked by themselves. Captures are looked for in ``../shared/data``.
+distance; and real captures (in ``../shared/data``) corrupted in bursts with ghosts (`identity.py`):
+fragments that are stitched and, with ``--alone``, tracks by themselves.
 
     python benchmarks/bond_term.py [--weights W …] [--scenes N] [--seeds N] [--data FOLDER]
                                    [--only NAME …] [--alone] [--markdown FILE]
@@ -43,9 +43,7 @@ def scene(case: str, seed: int) -> Problem:
 
 
 def bursts(capture: am.Capture, seed: int) -> am.Tracks:
-    return am.simulate.sense(
-        capture.tracks, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed
-    )
+    return am.simulate.sense(capture.tracks, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
 
 
 class Figures:
@@ -122,7 +120,7 @@ def corrupted(
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
-    parser.add_argument("--weights", type=float, nargs="*", default=[0.0, 5.0])
+    parser.add_argument("--weights", type=float, nargs="*", default=[0.0, 2.0])
     parser.add_argument("--scenes", type=int, default=32)
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--data", type=Path, default=beside)
@@ -155,9 +153,11 @@ def main() -> None:
             each.append([f"{path.name}, {way}, {weight:g}", *figures.text()])
             means.setdefault((way, weight), Figures()).rows += figures.rows
     lines = [f"Simulated scenes ({options.scenes} crossings, {few} of the others):", ""]
-    lines += [*table(HEAD, scenes), "", *sure, ""] if scenes else []
+    if scenes:
+        lines += [*table(HEAD, scenes), "", "Links of the hard crossing:", "", *sure, ""]
     lines += [f"Captures in bursts, means of {options.seeds} seeds:", ""]
-    lines += table(HEAD, [[f"all, {w}, {b:g}", *f.text()] for (w, b), f in means.items()] + each)
+    rows = [[f"all, {way}, {weight:g}", *f.text()] for (way, weight), f in means.items()]
+    lines += table(HEAD, rows + each)
     lines += ["", f"{conditions()}."]
     publish(lines, options.markdown)
 

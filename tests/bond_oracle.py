@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-import asterism as am
+if TYPE_CHECKING:
+    import asterism as am
 
 
 @dataclass

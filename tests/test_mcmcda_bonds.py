@@ -197,7 +197,8 @@ def test_whoever_keeps_no_distance_is_left_alone():
     for seed in range(3):
         truth = wanderers(np.random.default_rng(seed), n_frames=120)
         tracks = [
-            am.track(truth.detections, am.MCMCDA(bond_weight=w), model=small_model()) for w in (0, 5)
+            am.track(truth.detections, am.MCMCDA(bond_weight=w), model=small_model())
+            for w in (0, 5)
         ]
         idf1 = [am.evaluate(t, truth).idf1 for t in tracks]
         assert idf1[1] >= idf1[0] - 0.001

@@ -121,6 +121,9 @@ class MCMCDA(EngineMethod):
         two by two, are sure: the walk leaves them as they are. 0 for none.
     bond_tolerance : float or None
         Metres by which a distance that is kept may vary; by default 6√2 times the noise.
+    bond_weight : float
+        Nats by which distances to other markers may speak for a detection, or against it; 0 for
+        none. What the walk samples is then the posterior with a term more (see Notes).
     proposal : {"informed", "uniform"}
         How moves lengthen a track: detections drawn by what they add to the score, or all alike
         with a fixed probability to stop, as in the report.
@@ -139,6 +142,26 @@ class MCMCDA(EngineMethod):
     assignment : bool
         Whether the walk begins at the exact assignment of a new frame; otherwise its detections are
         nobody's at first, as in the report.
+
+    Notes
+    -----
+    With a `bond_weight` w the walk is over log π(ω) + B(ω), with
+
+        B(ω) = Σ_t Σ_AC w/n_AC · (1 − z²)/(1 + z²),    z = (|y_A(t) − y_C(t)| − μ) / s,
+
+    over the open frames t and the bonded markers A, C that both have a detection there. A distance
+    as it should be speaks for both, one that is off by s says nothing, one that is farther off
+    speaks against both; n_AC is the number of bonds of that one which has more (at least 3), so
+    that whatever bonds say of a detection lies within ±w. A track is the marker that it was when it
+    was last settled; tracks of which nothing is settled have no bonds. Bonds are learnt from
+    settled frames: of each marker the six that kept their distance best, over 30 frames or more, μ
+    being the mean, s three times the spread and 2 % of μ. They do not change while a walk lasts.
+    Neighbours in other groups are where they are when it begins.
+
+    The confidence, the best partition and ``info["rhat"]`` are of this posterior;
+    ``info["log_posterior"]`` of `track` stays that of the common model, by which methods are
+    compared. ``info["bonds"]`` are the bonds in the last frame, ``info["bond_score"]`` what they
+    said of all settled frames together, in nats.
 
     Examples
     --------
