@@ -66,7 +66,9 @@ class Figures:
         error = rows[:, 0].std() / np.sqrt(len(rows))
         means = rows.mean(axis=0)
         first = f"{means[0]:.4f} ± {error:.4f}"
-        return [first, *(f"{x:.{n}f}" for x, n in zip(means[1:], (2, 2, 2, 1, 2), strict=True))]
+        rest = [f"{x:.{n}f}" for x, n in zip(means[1:], (2, 2, 2, 1, 2), strict=True)]
+        # A marker that is joined over a long gap is no track of the model.
+        return [first, *("–" if x == "-inf" else x for x in rest)]
 
 
 def simulated(
@@ -131,7 +133,7 @@ def main() -> None:
     weights: list[float] = options.weights
     few = max(options.scenes // 8, 1) if options.scenes else 0
     scenes: list[list[str]] = []
-    sure: list[list[str]] = []
+    sure: list[str] = []
     for name, make, n, end_odds in (
         ("hard crossing", crossing, options.scenes, 1.0),
         ("smooth, 53 markers", partial(smooth, 53, 300), few, 1.0),
