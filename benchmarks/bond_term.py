@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 Problem = tuple[am.Tracks, am.TrackingModel]
 
-CAPTURES = ("HC030A22", "JA1Gait35", "tennis", "mocap36", "runway_13", "testdata")
+CAPTURES = ("JA1Gait35", "tennis", "mocap36", "runway_13", "testdata")
 HEAD = ("bond_weight", "IDF1", "switches a 1000", "ghosts and clutter labelled, %", "% wrong",
         "log posterior", "ms a frame")  # fmt: skip
 
