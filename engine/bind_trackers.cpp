@@ -222,7 +222,9 @@ void bind_trackers(nb::module_& module) {
       .def_ro("n_nodes", &FrameStats::n_nodes)
       .def_ro("gap", &FrameStats::gap)
       .def_ro("n_merged", &FrameStats::n_merged)
-      .def_ro("chain", &FrameStats::chain);
+      .def_ro("chain", &FrameStats::chain)
+      .def_ro("n_bonds", &FrameStats::n_bonds)
+      .def_ro("bond_score", &FrameStats::bond_score);
 
   nb::class_<ChainStats>(module, "ChainStats")
       .def_ro("n_search", &ChainStats::n_search)
@@ -252,17 +254,20 @@ void bind_trackers(nb::module_& module) {
           [](McmcOptions* self, std::int32_t window, bool is_whole, double moves, double deadline,
              bool has_assignment, double confidence, std::int32_t chains, std::int32_t threads,
              std::int32_t split_by, double doubt, double distance, std::int32_t bonds,
-             double tolerance) {
+             double tolerance, double bond_weight) {
             require(window >= 1, "window: at least 1");
             require(chains >= 1 && threads >= 1, "chains and threads: at least 1");
             require(split_by >= 0 && split_by <= 3, "split_by: 0 to 3");
+            require(bond_weight >= 0, "bond_weight: at least 0");
             require(bonds == 0 || (bonds >= 2 && bonds <= 4), "bonds: 0, 2, 3 or 4");
-            new (self) McmcOptions{window, is_whole, moves, deadline, has_assignment, confidence, chains,
-                                   threads, {static_cast<SplitBy>(split_by), doubt, distance},
-                                   {bonds, window, tolerance}};
+            new (self) McmcOptions{
+                window,     is_whole, moves,   deadline, has_assignment,
+                confidence, chains,   threads, {static_cast<SplitBy>(split_by), doubt, distance},
+                {bonds, window, tolerance}, bond_weight};
           },
-          nb::kw_only(), "window"_a, "is_whole"_a, "moves"_a, "deadline"_a, "has_assignment"_a, "confidence"_a,
-          "chains"_a, "threads"_a, "split_by"_a, "doubt"_a, "distance"_a, "bonds"_a, "tolerance"_a);
+          nb::kw_only(), "window"_a, "is_whole"_a, "moves"_a, "deadline"_a, "has_assignment"_a,
+          "confidence"_a, "chains"_a, "threads"_a, "split_by"_a, "doubt"_a, "distance"_a, "bonds"_a, "tolerance"_a,
+          "bond_weight"_a);
 
   nb::class_<LifeOptions>(module, "LifeOptions")
       .def(
@@ -279,7 +284,8 @@ void bind_trackers(nb::module_& module) {
           [](ChainOptions* self, const In<double>& weights, bool is_informed, double stop,
              double floor, bool has_first_rules, bool is_ascent, double share_at_doubts) {
             require(weights.ndim() == 1 && weights.size() == kMoves, "weights: one for each move");
-            new (self) ChainOptions{{is_informed, stop, floor}, {}, has_first_rules, is_ascent, share_at_doubts};
+            new (self) ChainOptions{
+                {is_informed, stop, floor}, {}, has_first_rules, is_ascent, share_at_doubts};
             std::copy_n(weights.data(), kMoves, self->weights.begin());
           },
           nb::kw_only(), "weights"_a, "is_informed"_a, "stop"_a, "floor"_a, "has_first_rules"_a,

@@ -73,6 +73,8 @@ struct FrameStats {
   double gap = 0;
   std::int64_t n_merged = 0;  // hypotheses that became part of a similar one
   ChainStats chain;
+  std::int64_t n_bonds = 0;  // of markers, at the end
+  double bond_score = 0;     // nats that they said of what was settled
 
   void add(const FrameStats& next) {
     add_work(next);
@@ -80,6 +82,8 @@ struct FrameStats {
     n_tentative = next.n_tentative;
     n_pending = next.n_pending;
     n_branches = next.n_branches;
+    n_bonds = next.n_bonds;
+    bond_score += next.bond_score;
   }
 
   // What it took, without what there is at the end.

@@ -21,6 +21,7 @@
 #include "doubts.hpp"
 #include "frame_start.hpp"
 #include "live_tracks.hpp"
+#include "settled_bonds.hpp"
 #include "split.hpp"
 #include "walks.hpp"
 
@@ -36,6 +37,7 @@ struct McmcOptions {
   std::int32_t n_chains = 1, n_threads = 1;
   SplitOptions split;
   BondOptions bonds;
+  double bond_weight = 0;  // nats by which bonds may speak for a marker in a frame, or against it
 };
 
 template <typename Filter>
@@ -47,7 +49,8 @@ class McmcTracker {
         opt_(options),
         seed_(seed),
         start_(options.has_assignment, options.split.doubt),
-        walks_(chain, options.n_chains, options.n_threads) {}
+        walks_(chain, options.n_chains, options.n_threads),
+        settled_bonds_(m, options.bond_weight) {}
 
   template <typename Label>
   FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
@@ -79,20 +82,19 @@ class McmcTracker {
   void finish(Label&& label, std::function<bool(double)> goes_on) {
     Partition<Filter>& p = partition_;
     p.thaw();
-    FrameStats stats;
-    const Split split = split_up({}, stats);
-    const std::vector<double> weights = weights_of(split.groups, [](const Group& g) { return g.n_open; });
+    shares_.clear();
     double all = 0;
-    for (const double weight : weights) all += weight;
+    for (const Group& group : Splitter<Filter>(p, opt_.split).split(doubts_, {}).groups)
+      all += static_cast<double>(group.n_open);
     Watch watch(all * (opt_.moves + opt_.confidence) * opt_.n_chains, std::move(goes_on));
-    walks_.search(p, split.groups, Budgets(weights, opt_.moves, &watch), seed_of(2), stats.chain);
-    if (has_confidence() && !watch.is_stopped()) {
-      const Split again = Splitter<Filter>(p, opt_.split).split(doubts_, {});
-      const auto now = weights_of(again.groups, [](const Group& g) { return g.n_open; });
-      shares_.clear();
-      keep_shares(walks_.sample(p, again.groups, Budgets(now, opt_.confidence, &watch), seed_of(3),
-                                stats.chain));
-    }
+    const auto allowed = [&](std::span<const Group> groups, double moves, double) {
+      return Budgets(weights_of(groups, [](const Group& g) { return g.n_open; }), moves, &watch);
+    };
+    FrameStats stats;
+    BondTerm<Filter> bonds = settled_bonds_.term(p);
+    walk({}, bonds, allowed, 2, stats, [&] { return has_confidence() && !watch.is_stopped(); });
+    total_.bond_score = 0;
+    tell_bonds(bonds, p.window().now(), stats);
     stats.n_confirmed = p.tracks().size();
     total_.add(stats);
     next_id_ = 0;
@@ -140,21 +142,43 @@ class McmcTracker {
     ++n_frames_;
     FrameStats stats;
     start_.begin(p, doubts_, stats.chain, stats.n_candidates);
-    const Bonds bonds = BondFinder<Filter>(p, opt_.bonds).find();
-    stats.chain.n_sure = bonds.n_sure;
-    const Split split = split_up(bonds.is_sure, stats);
-    walks_.search(p, split.groups, budgets(split.groups, opt_.moves, arrival, has_confidence() ? 0.5 : 1),
-                  seed_of(0), stats.chain);
-    if (has_confidence() && !opt_.is_whole) {
-      // The search may have made other tracks.
-      const Split now = Splitter<Filter>(p, opt_.split).split(doubts_, bonds.is_sure);
-      keep_shares(walks_.sample(p, now.groups, budgets(now.groups, opt_.confidence, arrival, 1),
-                                seed_of(1), stats.chain));
-    }
+    const Bonds sure = BondFinder<Filter>(p, opt_.bonds).find();
+    stats.chain.n_sure = sure.n_sure;
+    BondTerm<Filter> bonds = settled_bonds_.term(p);
+    const auto allowed = [&](std::span<const Group> groups, double moves, double share) {
+      return budgets(groups, moves, arrival, share);
+    };
+    walk(sure.is_sure, bonds, allowed, 0, stats,
+         [&] { return has_confidence() && !opt_.is_whole; });
+    tell_bonds(bonds, p.window().now() - opt_.window, stats);
     stats.n_confirmed = p.tracks().size();
     stats.n_pending = p.free().size() + p.taken().size();
     total_.add(stats);
     return stats;
+  }
+
+  // Looks for the best partition, and then for how probable it is, if it `is_asked`. `allowed(groups,
+  // moves, share of the time)` is how long.
+  template <typename Allowed, typename IsAsked>
+  void walk(const std::vector<char>& is_sure, BondTerm<Filter>& bonds, Allowed&& allowed,
+            std::uint64_t phase, FrameStats& stats, IsAsked&& is_asked) {
+    const Split split = split_up(is_sure, stats);
+    walks_.search(partition_, bonds, split.groups,
+                  allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1), seed_of(phase),
+                  stats.chain);
+    bonds.read(partition_);
+    if (!is_asked()) return;
+    // The search may have made other tracks.
+    const Split now = Splitter<Filter>(partition_, opt_.split).split(doubts_, is_sure);
+    keep_shares(walks_.sample(partition_, bonds, now.groups, allowed(now.groups, opt_.confidence, 1),
+                              seed_of(phase + 1), stats.chain));
+  }
+
+  // What bonds say of the open frames up to this one.
+  void tell_bonds(const BondTerm<Filter>& bonds, std::int64_t last, FrameStats& stats) const {
+    if (!bonds.is_on()) return;
+    stats.n_bonds = bonds.graph().n_pairs();
+    for (std::int64_t t = oldest_open(); t <= last; ++t) stats.bond_score += bonds.total(t);
   }
 
   Split split_up(const std::vector<char>& is_sure, FrameStats& stats) {
@@ -254,18 +278,21 @@ class McmcTracker {
     const DetectionWindow& window = p.window();
     const std::int64_t settled = window.now() - opt_.window;
     if (settled < oldest_open()) return;
+    const std::int64_t first = oldest_open();
     p.freeze(settled);
-    if (opt_.is_whole) return;
-    doubts_.keep(static_cast<std::size_t>(window.now() - settled));
     // Numbers of tracks that are settled now are theirs.
     for (const std::int32_t k : p.tracks().items())
       if (p.track(k).n_frozen > 0) next_id_ = std::max(next_id_, id_of(k) + 1);
+    for (std::int64_t t = first; t <= settled; ++t) settled_bonds_.learn(p, t);
+    if (opt_.is_whole) return;
+    doubts_.keep(static_cast<std::size_t>(window.now() - settled));
     while (window.first() + window.max_gap() <= settled) {
-      for (const std::int32_t i : window.frame(window.first()).ids)
-        {
-          if (i < static_cast<std::int32_t>(said_.size())) said_[i] = {};
-          if (i < static_cast<std::int32_t>(shares_.size())) shares_[i] = {};
-        }
+      for (const std::int32_t i : window.frame(window.first()).ids) {
+        if (i < static_cast<std::int32_t>(said_.size())) said_[i] = {};
+        if (i < static_cast<std::int32_t>(shares_.size())) shares_[i] = {};
+        if (const std::int32_t k = p.track_of(i); k >= 0 && p.track(k).size() == 1)
+          settled_bonds_.forget(id_of(k));
+      }
       p.drop_frame();
     }
   }
@@ -290,6 +317,7 @@ class McmcTracker {
   std::uint64_t seed_;
   FrameStart<Filter> start_;
   Walks<Filter> walks_;
+  SettledBonds<Filter> settled_bonds_;
   Doubts doubts_;
   // By detection of the window: how probable it is that it follows what it follows; and what was told.
   struct Share {

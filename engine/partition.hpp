@@ -218,7 +218,8 @@ class Partition {
     }
     for (; i < static_cast<std::int32_t>(origin_.size()); ++i) free_.add(i);
   }
-  std::int32_t origin(std::int32_t i) const { return origin_[i]; }
+  // Number of a detection in the whole; its own in what is no part.
+  std::int32_t origin(std::int32_t i) const { return origin_.empty() ? i : origin_[i]; }
 
   // Takes over what a part, which was taken of these tracks, has come to.
   void take_over(const Partition& part, std::span<const std::int32_t> tracks) {

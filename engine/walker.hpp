@@ -15,6 +15,7 @@
 #include "marginals.hpp"
 #include "sampler.hpp"
 #include "split.hpp"
+#include "trace.hpp"
 
 namespace asterism {
 
@@ -37,9 +38,10 @@ class Walker {
         hot_share_(options.share_at_doubts) {}
 
   // Looks for the best; returns what it is better by than the start, and stays there.
-  double search(const Partition<Filter>& whole, const Group& group, std::uint64_t seed,
-                const Budget& budget, ChainStats& stats) {
+  double search(const Partition<Filter>& whole, const BondTerm<Filter>& bonds, const Group& group,
+                std::uint64_t seed, const Budget& budget, ChainStats& stats) {
     sampler_.partition().take_part(whole, group.tracks, group.free);
+    sampler_.weigh_bonds(bonds);
     sampler_.begin(seed);
     sampler_.weigh_above(sampler_.kOnlyWhatMayBeTaken);
     sampler_.begin_best();
@@ -55,9 +57,11 @@ class Walker {
   const Partition<Filter>& partition() const { return sampler_.partition(); }
 
   // How probable the partition is that it begins at.
-  void sample(const Partition<Filter>& whole, const Group& group, std::uint64_t seed, const Budget& budget, Halves& out, ChainStats& stats) {
+  void sample(const Partition<Filter>& whole, const BondTerm<Filter>& bonds, const Group& group,
+              std::uint64_t seed, const Budget& budget, Halves& out, ChainStats& stats) {
     Partition<Filter>& p = sampler_.partition();
     p.take_part(whole, group.tracks, group.free);
+    sampler_.weigh_bonds(bonds);
     sampler_.begin(seed);
     sampler_.begin_best();
     list_hot(group);
@@ -98,47 +102,6 @@ class Walker {
  private:
   // Moves less probable than this before the way back is weighed need not be known when refused.
   static constexpr double kLookedAtAbove = -9;
-
-  // The log posterior along a walk: mean, variance, and from the means of batches how many
-  // independent draws it is worth.
-  class Trace {
-   public:
-    void begin(std::int64_t n) {
-      batch_ = std::max<std::int64_t>(n / kBatches, 1);
-      n_ = in_batch_ = 0;
-      sum_ = sum2_ = batch_sum_ = 0;
-    }
-    void add(double x) {
-      ++n_;
-      sum_ += x;
-      sum2_ += x * x;
-      batch_sum_ += x;
-      if (++in_batch_ < batch_) return;
-      means_.push_back(batch_sum_ / static_cast<double>(batch_));
-      batch_sum_ = 0;
-      in_batch_ = 0;
-    }
-    double mean() const { return sum_ / static_cast<double>(n_); }
-    double variance() const {
-      return std::max(sum2_ / static_cast<double>(n_) - mean() * mean(), 0.0);
-    }
-    double ess_of_halves(std::int64_t n) const {
-      double mean = 0, between = 0;
-      for (const double x : means_) mean += x / static_cast<double>(means_.size());
-      for (const double x : means_) between += (x - mean) * (x - mean);
-      between /= std::max<double>(static_cast<double>(means_.size()) - 1, 1);
-      const double all = variance();
-      if (!(between > 0) || !(all > 0)) return static_cast<double>(n);
-      return std::min(static_cast<double>(n), static_cast<double>(n) * all /
-                                                  (static_cast<double>(batch_) * between));
-    }
-
-   private:
-    static constexpr std::int64_t kBatches = 10;
-    std::vector<double> means_;
-    std::int64_t batch_ = 1, n_ = 0, in_batch_ = 0;
-    double sum_ = 0, sum2_ = 0, batch_sum_ = 0;
-  };
 
   struct Hot {
     Toggle toggle;

@@ -202,6 +202,10 @@ def test_no_input_is_written_to(scene, capsys):
         ("track in.csv --option delete_odds", "NAME=VALUE"),
         ("track in.csv --option delete_odds=many", "delete_odds: expected a number, got 'many'"),
         ("track in.csv --option delete_odds=0.5", "delete_odds: expected a number > 1"),
+        (
+            "track in.csv --method mcmcda --option bond_weight=-2",
+            "bond_weight: expected a number in [0, 100]",
+        ),
         ("track in.csv --method smp --option proposers=track", "did you mean 'tracks'?"),
         ("track in.csv --seed -1", "--seed"),
         ("track in.csv --format c3", "one that holds tracks"),

@@ -160,9 +160,11 @@ def test_gains_and_values_are_those_of_the_posterior_and_refused_moves_change_no
     assert n_refused > 500
 
 
-def total_variation(d, model, chain, n, *, settled=None):
-    """Distance of what a chain visits and the enumerated posterior."""
+def total_variation(d, model, chain, n, *, settled=None, more=None):
+    """Distance of what a chain visits and the enumerated posterior, with what `more` adds to it."""
     partitions, totals = every_partition(d, model)
+    if more is not None:
+        totals = totals + [more(tracks) for tracks in partitions]
     p = np.exp(totals - totals.max())
     if settled is not None:
         frozen, labels = settled
