@@ -46,6 +46,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/identity.py --markdown docs/tables/identity.md \
 	  --methods gnn "smp, window=3" mcmcda
 	$(BIN)/python benchmarks/fills.py --markdown docs/tables/fills.md
+	$(BIN)/python benchmarks/recognition.py --markdown docs/tables/recognition.md
 	$(BIN)/python benchmarks/bond_term.py --markdown docs/tables/bond_term.md
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built

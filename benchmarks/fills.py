@@ -22,7 +22,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 import asterism as am
-from asterism.label.gap_bodies import steadiness
+from asterism.label.distances import distances_from
 from captures import captures, named_only
 from report import conditions, publish, table
 
@@ -77,10 +77,10 @@ def by_kinetics_toolkit(
 ) -> NDArray[np.float64]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # on import, of what else could be installed
-        import kineticstoolkit as ktk
+        import kineticstoolkit as ktk  # pyright: ignore[reportMissingImports]  # of the benchmarks
 
         names = [str(k) for k in range(positions.shape[1])]
-        series = ktk.TimeSeries(  # pyright: ignore[reportPrivateImportUsage]
+        series = ktk.TimeSeries(  # pyright: ignore
             time=times, data={name: positions[:, k] for k, name in enumerate(names)}
         )
         filled = series.fill_missing_samples(0, method=method)
@@ -122,7 +122,7 @@ def measure(name: str, truth: am.Tracks, length: int, seed: int) -> tuple[list[S
         at, true = slice(first, stop), whole[first:stop, k]
         ends = np.r_[first - ENDS : first, stop : stop + ENDS]
         spline = CubicSpline(d.times[ends], hidden[ends, k])(d.times[at])
-        spreads = steadiness(whole[:, k], np.delete(whole, k, axis=1))
+        spreads = distances_from(whole[:, k], np.delete(whole, k, axis=1)).spread
         found.append(
             Stretch(
                 capture=name,

@@ -104,31 +104,6 @@ nb::tuple step(const LiveStitcher& before, const In<double>& F, const In<double>
                         markers.give({told.size()}));
 }
 
-// (marker, other, frames in which both were seen, mean distance, its variance) of all bonds.
-nb::tuple bonds(const Stitcher& stitcher) {
-  std::vector<std::int32_t> own;
-  std::vector<Bond> all;
-  const Neighbours& neighbours = stitcher.neighbours();
-  for (std::int32_t k = 0; k < stitcher.n_markers(); ++k)
-    for (const Bond& bond : neighbours.of(k)) {
-      own.push_back(k);
-      all.push_back(bond);
-    }
-  const std::size_t n = all.size();
-  Owned<std::int32_t> marker(n), other(n);
-  Owned<std::int64_t> frames(n);
-  Owned<double> mean(n), variance(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    marker.data[i] = own[i];
-    other.data[i] = all[i].other;
-    frames.data[i] = all[i].n;
-    mean.data[i] = all[i].mean;
-    variance.data[i] = all[i].variance;
-  }
-  return nb::make_tuple(marker.give({n}), other.give({n}), frames.give({n}), mean.give({n}),
-                        variance.give({n}));
-}
-
 // (R, from, to, rms) of the rigid motion that takes points to others.
 nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weights) {
   require(a.ndim() == 2 && a.shape(1) >= 1 && a.shape(1) <= kMaxAxes && b.ndim() == 2 &&
@@ -176,7 +151,6 @@ void bind_stitcher(nb::module_& module) {
               self.advise(labels.data()[i], {before.data()[i], weights.data()[i]});
           },
           "labels"_a, "before"_a, "weights"_a)
-      .def("bonds", &bonds)
       .def_prop_ro("n_cuts", &Stitcher::n_cuts)
       .def_prop_ro("n_markers", &Stitcher::n_markers);
   nb::class_<LiveStitcher>(module, "LiveStitcher")

@@ -22,8 +22,6 @@ class Bodies {
  public:
   Bodies(int D, double noise) : D_(D), noise_(noise), neighbours_(D, noise) {}
 
-  const Neighbours& neighbours() const { return neighbours_; }
-
   // The markers of the newest frame.
   void learn(const Sightings& s, std::span<const Seen> seen, Markers& markers) {
     neighbours_.add(seen);

@@ -63,7 +63,6 @@ class Stitcher {
   std::int32_t n_fragments() const { return n_fragments_; }
   std::int32_t n_markers() const { return n_markers_; }
   std::size_t n_remembered() const { return markers_.size(); }
-  const Neighbours& neighbours() const { return bodies_.neighbours(); }
   std::int64_t n_cuts() const { return n_cuts_; }
 
   // What is thought already of fragments that begin with a label.

@@ -449,3 +449,50 @@ def test_stitch_says_what_it_joined(scene, capsys):
 def test_what_stitch_refuses(scene, capsys, line, says):
     assert says in refused(line, capsys)
     assert not Path("out.csv").exists()
+
+
+def test_bonds_of_one_take_name_the_next(scene, capsys):
+    hidden_person(scene)
+    out = run("bonds person.csv -o subject.toml", capsys)
+    assert "rigid clusters" in out
+    told = json.loads(run("bonds person.csv --json", capsys))
+    assert told["n_bonds"] > told["n_rigid"] > 50
+    assert len(told["clusters"]) > 5
+    run("track p.c3d --stitch -o tracked.c3d", capsys)
+    out = run("recognize tracked.c3d --bonds subject.toml -o named.c3d", capsys)
+    assert "markers not found" in out
+    truth, named = am.read_tracks("person.csv"), am.read("named.c3d")
+    names = [name for name in named.names if name]
+    assert set(names) <= set(truth.names)
+    assert len(names) > 0.95 * truth.n_tracks
+    told = json.loads(run("recognize tracked.c3d --bonds subject.toml -o n.csv --json", capsys))
+    assert told["n_recognized"] == len(told["names"]) >= len(names)
+    assert {one["name"] for one in told["names"]} == set(names)
+    # The names are right: each point that has one lies where that marker was.
+    places = truth.positions()
+    number = {name: k for k, name in enumerate(truth.names)}
+    off = [
+        np.linalg.norm(point - places[frame, number[named.names[label]]])
+        for point, frame, label in zip(named.points, named.frame_of, named.labels, strict=True)
+        if label >= 0 and named.names[label]
+    ]
+    assert np.quantile(off, 0.99) < 0.002
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("bonds in.csv", "asterism track"),
+        ("bonds truth.csv -o truth.csv", "a file of its own"),
+        ("bonds truth.csv --neighbours 0", "neighbours"),
+        ("recognize in.csv --bonds b.toml -o out.csv", "asterism track --stitch"),
+        ("recognize truth.csv --bonds none.toml -o out.csv", "none.toml"),
+        ("recognize truth.csv --bonds truth.csv -o out.csv", "TOML"),
+        ("recognize truth.csv --bonds b.toml -o b.toml", "a file of its own"),
+        ("recognize truth.csv -o out.csv", "--bonds"),
+    ],
+)
+def test_what_bonds_and_recognize_refuse(scene, capsys, line, says):
+    if "b.toml" in line:
+        am.learn_bonds(am.read_tracks("truth.csv")).to_toml("b.toml")
+    assert says in refused(line, capsys)

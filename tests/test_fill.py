@@ -18,7 +18,8 @@ import asterism as am
 from asterism import _engine
 from asterism.app import main
 from asterism.io.c3d_layout import read_c3d
-from asterism.label.gap_bodies import fit_body, steadiness
+from asterism.label.distances import distances_from
+from asterism.label.gap_bodies import fit_body
 from asterism.label.gap_ends import CAREFUL, NOISES, OFFSETS, SPANS, bridges, is_steady
 from asterism.label.gap_patterns import RIDGES, learn_pattern
 from asterism.label.gap_scores import _weights
@@ -124,14 +125,14 @@ def test_bodies_are_the_rigid_fits_of_the_engine(n_axes):
     assert (np.linalg.det(body.turns) > 0).all()
 
 
-def test_steadiness_is_half_the_middle_of_the_distances():
+def test_the_spread_is_half_the_middle_of_the_distances():
     rng = np.random.default_rng(1)
     marker, others = rng.normal(size=(501, 3)), rng.normal(size=(501, 4, 3))
     others[:200, 1] = np.nan
     others[:, 3] = np.nan
     distance = np.linalg.norm(others - marker[:, None], axis=2)
     low, high = np.nanquantile(distance[:, :3], [0.16, 0.84], axis=0)
-    found = steadiness(marker, others)
+    found = distances_from(marker, others).spread
     np.testing.assert_allclose(found[:3], (high - low) / 2, rtol=0.05)
     assert np.isnan(found[3])
 

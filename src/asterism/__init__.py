@@ -76,14 +76,18 @@ if TYPE_CHECKING:
     from asterism.io.calibration import write_rig as write_rig
     from asterism.io.observations import read_observations as read_observations
     from asterism.io.observations import write_observations as write_observations
+    from asterism.label import Bonds as Bonds
     from asterism.label import Filling as Filling
     from asterism.label import Gap as Gap
     from asterism.label import Join as Join
+    from asterism.label import Recognition as Recognition
     from asterism.label import Stitched as Stitched
     from asterism.label import Stitching as Stitching
     from asterism.label import fill as fill
     from asterism.label import fragment_model as fragment_model
     from asterism.label import identify as identify
+    from asterism.label import learn_bonds as learn_bonds
+    from asterism.label import recognize as recognize
     from asterism.label import stitch as stitch
     from asterism.model import DWNA as DWNA
     from asterism.model import DWPA as DWPA
@@ -179,14 +183,18 @@ _PUBLIC = {
         "track",
     ),
     "label": (
+        "Bonds",
         "Filling",
         "Gap",
         "Join",
+        "Recognition",
         "Stitched",
         "Stitching",
         "fill",
         "fragment_model",
         "identify",
+        "learn_bonds",
+        "recognize",
         "stitch",
     ),
     "solve": (

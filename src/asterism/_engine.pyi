@@ -477,16 +477,6 @@ class Stitcher:
         points: NDArray[np.float64],
         labels: NDArray[np.int64],
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]: ...
-    # (marker, other, frames, mean distance, its variance)
-    def bonds(
-        self,
-    ) -> tuple[
-        NDArray[np.int32],
-        NDArray[np.int32],
-        NDArray[np.int64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-    ]: ...
     @property
     def n_cuts(self) -> int: ...
     @property

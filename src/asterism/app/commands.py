@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 import asterism
+from asterism.app.bonds import bonds
 from asterism.app.camera import app as camera
 from asterism.app.corrupt import corrupt
 from asterism.app.demo import demo
@@ -16,6 +17,7 @@ from asterism.app.fill import fill
 from asterism.app.film import film
 from asterism.app.info import info
 from asterism.app.methods import methods, scenes
+from asterism.app.recognize import recognize
 from asterism.app.simulate import simulate
 from asterism.app.stitch import stitch
 from asterism.app.track import track
@@ -53,6 +55,8 @@ for _command in (
     track,
     stitch,
     fill,
+    bonds,
+    recognize,
     evaluate,
     info,
     estimate,

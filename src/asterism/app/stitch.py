@@ -53,6 +53,7 @@ def stitch(
         asterism stitch tracks.csv -o markers.csv --json
     """
     import asterism as am
+    from asterism.app.bonds import bond_figures, bond_rows
     from asterism.app.files import check_outputs, read_model
     from asterism.app.tracking import output_format
 
@@ -89,13 +90,14 @@ def stitch(
             {"marker": j.marker, "last": j.last, "first": j.first, "probability": j.probability}
             for j in found.joins
         ]
-        print_json(figures | {"joins": joins})
+        print_json(figures | bond_figures(found.bonds) | {"joins": joins})
     elif not quiet:
         rows = [
             ("tracks", f"{figures['n_tracks']}, of {figures['n_tracks_before']}"),
             ("markers found again", str(len(found.joins))),
             ("links cut", str(found.n_cuts)),
             ("ghosts", str(found.n_ghosts)),
+            *bond_rows(found.bonds),
             *_least_sure(found, capture),
             ("written", str(out)),
         ]

@@ -13,7 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Body", "fit_body", "steadiness"]
+__all__ = ["Body", "fit_body"]
 
 ROUNDS = 2
 """Times that the shape of the body is averaged anew; a third changes it by nothing to speak of."""
@@ -48,30 +48,6 @@ class Body:
     def of(self, frames: NDArray[np.int64]) -> Body:
         """Give the body of some of the frames, in any order."""
         return Body(turns=self.turns[frames], middles=self.middles[frames])
-
-
-def steadiness(marker: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much each other marker changes its distance: half the middle 68 %, metres.
-
-    Parameters
-    ----------
-    marker : ndarray, shape (F, D)
-        Positions, NaN where not seen.
-    others : ndarray, shape (F, n, D)
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        NaN for those that were never seen beside it.
-    """
-    distance = np.sqrt(((others - marker[:, None]) ** 2).sum(axis=2))
-    n = np.isfinite(distance).sum(axis=0)
-    ordered = np.sort(distance, axis=0)  # NaN goes last
-    low, high = (
-        ordered[np.minimum((share * n).astype(int), len(ordered) - 1), np.arange(len(n))]
-        for share in (0.16, 0.84)
-    )
-    return (high - low) / 2
 
 
 def fit_body(points: NDArray[np.float64], weights: NDArray[np.float64]) -> Body:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.filter import smooth
-from asterism.label.gap_bodies import Body, fit_body, steadiness
+from asterism.label.distances import distances_from
+from asterism.label.gap_bodies import Body, fit_body
 from asterism.label.gap_ends import CAREFUL, Bridges, bridges, is_steady
 from asterism.label.gap_patterns import learn_pattern
 from asterism.label.gaps import held_out, usable_ends
@@ -198,7 +199,7 @@ def _helpers(
     is_there[k] = False
     others = np.flatnonzero(is_there)
     compared = mine[:: -(-len(mine) // MOST_COMPARED)]
-    spreads = steadiness(X[compared, k], X[compared][:, others])
+    spreads = distances_from(X[compared, k], X[compared][:, others]).spread
     steadiest = np.argsort(spreads, kind="stable")[:MOST_HELPERS]
     others, spreads = others[steadiest], spreads[steadiest]
     # As many as leave most of the frames in which they were all seen.

@@ -89,17 +89,17 @@ def go_through(
     times, offsets, points = detections.times, detections.offsets, detections.points
     labels = labels.astype(np.int64)
     if backward:
-        times, offsets, points, labels = (
-            -times[::-1], detections.n_points - offsets[::-1], points[::-1], labels[::-1],
-        )  # fmt: skip
+        times = np.ascontiguousarray(-times[::-1])
+        offsets = np.ascontiguousarray(detections.n_points - offsets[::-1])
+        points = np.ascontiguousarray(points[::-1])
+        labels = np.ascontiguousarray(labels[::-1])
     motion = motion_model(model, detections.n_axes)
     stitcher = _engine.Stitcher(motion, options)
     if before is not None:
         before.advise(stitcher)
     kind, F, Q = steps_of(model.motion, times)
-    arrays = (np.ascontiguousarray(a) for a in (offsets, points, labels))
     fragments, markers, after, probabilities = stitcher.run(
-        motion, np.ascontiguousarray(times), kind, F, Q, *arrays
+        motion, times, kind, F, Q, offsets, points, labels
     )
     return Pass(
         fragments=fragments[::-1] if backward else fragments,

@@ -14,6 +14,7 @@ import numpy as np
 
 from asterism import _engine
 from asterism.errors import ParameterError, check_number
+from asterism.label.bonds import Bonds, learn_bonds
 from asterism.label.passes import go_through
 from asterism.model import TrackingModel, Tracks
 
@@ -98,6 +99,11 @@ class Stitching:
             )
             for f in order
         )
+
+    @cached_property
+    def bonds(self) -> Bonds:
+        """Which of the markers keep their distances, and rigid clusters of them."""
+        return learn_bonds(self.tracks)
 
     def __repr__(self) -> str:
         return (

@@ -1,0 +1,89 @@
+"""``asterism recognize``: tracks named after the markers of an earlier take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from asterism.app.console import Json, Quiet, print_json, print_table
+from asterism.errors import ParameterError
+
+__all__ = ["recognize"]
+
+_In = Annotated[Path, typer.Argument(metavar="IN", help="Tracks to name.")]
+_Bonds = Annotated[
+    Path, typer.Option("--bonds", metavar="TOML", help="What `asterism bonds` wrote.")
+]
+_Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
+_SURE = 0.9
+
+
+def recognize(
+    source: _In,
+    bonds: _Bonds,
+    out: _Out,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Name the tracks of a take after the markers of an earlier one, by the distances they keep.
+
+    Names that IN has play no part. Pieces of one marker are made one track.
+
+    For example:
+
+        asterism bonds labelled.c3d -o subject.toml
+
+        asterism track next.c3d --stitch -o tracked.c3d
+
+        asterism recognize tracked.c3d --bonds subject.toml -o named.c3d
+    """
+    import asterism as am
+    from asterism.app.files import check_outputs
+    from asterism.app.tracking import output_format
+
+    check_outputs({"-o": out}, [source, bonds])
+    known = am.Bonds.from_toml(bonds)
+    capture = am.read(source)
+    if not (capture.labels >= 0).any():
+        hint = "asterism track --stitch makes them first"
+        raise ParameterError("IN", "a capture with tracks", f"none in {source}", hint)
+    format = output_format(capture, out, None)
+    tracks = capture.tracks.measured()
+    found = am.recognize(tracks, known)
+    am.write(found.tracks, out, format=format)
+    has = found.markers >= 0
+    seen = {known.names[k] for k in found.markers[has]}
+    missing = [name for name in known.names if name not in seen]
+    doubtful = sorted(
+        (float(p), known.names[k])
+        for p, k in zip(found.probabilities[has], found.markers[has], strict=True)
+        if p < _SURE
+    )
+    if json:
+        print_json(
+            {
+                "input": str(source),
+                "output": str(out),
+                "n_tracks": int((tracks.lengths > 0).sum()),
+                "n_recognized": found.n_recognized,
+                "names": [
+                    {"track": k, "name": known.names[marker], "probability": float(p)}
+                    for k, (marker, p) in enumerate(
+                        zip(found.markers, found.probabilities, strict=True)
+                    )
+                    if marker >= 0
+                ],
+                "not_found": missing,
+            }
+        )
+    elif not quiet:
+        doubts = ", ".join(f"{name} {100 * p:.0f} %" for p, name in doubtful)
+        rows = [
+            ("tracks named", f"{found.n_recognized} of {int((tracks.lengths > 0).sum())}"),
+            ("markers not found", ", ".join(missing) or "none"),
+            (f"less than {_SURE:.0%} sure", doubts or "none"),
+            ("written", str(out)),
+        ]
+        print_table(rows, title="Recognized")
