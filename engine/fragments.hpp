@@ -43,6 +43,7 @@ struct Fragment {
   std::vector<Continuation> continuations;
   double known = 10;  // how well its neighbours knew its links, on average
   std::int32_t guess = -1;  // the hidden marker that it may be, while nothing is decided
+  std::vector<std::pair<std::int32_t, double>> guesses;  // all that it may be, and what speaks for it
 };
 // Where a marker was before it was hidden, and who was around it, the steadiest first.
 struct Anchor {

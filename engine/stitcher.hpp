@@ -18,6 +18,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -98,7 +99,8 @@ class Stitcher {
     const auto at = of_label_.find(label);
     return at != of_label_.end() && may_go_on(at->second) ? at->second : -1;
   }
-  // What the fragments that are open may be, if nothing were to come any more.
+  // What the fragments that are open may be, if nothing were to come any more. They are compared anew
+  // when twice as much has been seen of them.
   void guess() {
     w_.open.clear();
     for (auto& [id, f] : so_far_.fragments) {
@@ -107,9 +109,15 @@ class Stitcher {
     }
     w_.candidates.clear();
     for (std::int32_t row = 0; row < static_cast<std::int32_t>(w_.open.size()); ++row) {
-      const Fragment& f = so_far_.fragments.at(w_.open[row]);
-      for (const auto& [k, marker] : markers_)
-        if (const double gain = score(f, w_.open[row], k, marker); gain > 0)
+      Fragment& f = so_far_.fragments.at(w_.open[row]);
+      if (std::has_single_bit(static_cast<std::uint32_t>(f.n)) && f.last == now()) {
+        f.guesses.clear();
+        for (const auto& [k, marker] : markers_)
+          if (const double gain = score(f, w_.open[row], k, marker); gain > 0)
+            f.guesses.emplace_back(k, gain);
+      }
+      for (const auto& [k, gain] : f.guesses)
+        if (const auto at = markers_.find(k); at != markers_.end() && at->second.is_hidden)
           w_.candidates.push_back({row, k, gain, 0});
     }
     if (w_.candidates.empty()) return;
