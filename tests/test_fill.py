@@ -19,11 +19,11 @@ from asterism import _engine
 from asterism.app import main
 from asterism.io.c3d_layout import read_c3d
 from asterism.label.distances import distances_from
-from asterism.label.gap_bodies import fit_body
-from asterism.label.gap_ends import CAREFUL, NOISES, OFFSETS, SPANS, bridges, is_steady
-from asterism.label.gap_patterns import RIDGES, learn_pattern
-from asterism.label.gap_scores import _weights
-from asterism.label.gaps import Span, find_gaps, held_out, n_apart, usable_ends
+from asterism.label.gap.bodies import fit_body
+from asterism.label.gap.ends import CAREFUL, NOISES, OFFSETS, SPANS, bridges, is_steady
+from asterism.label.gap.patterns import RIDGES, learn_pattern
+from asterism.label.gap.scores import _weights
+from asterism.label.gap.spans import Span, find_gaps, held_out, n_apart, usable_ends
 from asterism.simulate import Burst
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"

@@ -1,6 +1,6 @@
 """Gaps of tracks filled: where a marker was while nobody saw it, and how sure that is.
 
-Three estimators (`asterism.label.gap_estimates`) are tried where the truth is known, on stretches
+Three estimators (`asterism.label.gap.estimates`) are tried where the truth is known, on stretches
 of the same take in which as much is hidden on purpose; their errors there decide how they are
 weighed, and how far the fill may be off.
 
@@ -16,9 +16,9 @@ import numpy as np
 
 from asterism.associate import estimate_model
 from asterism.errors import ParameterError, check_number
-from asterism.label.gap_estimates import Take, estimate
-from asterism.label.gap_scores import Fill, settle
-from asterism.label.gaps import Span, find_gaps
+from asterism.label.gap.estimates import Take, estimate
+from asterism.label.gap.scores import Fill, settle
+from asterism.label.gap.spans import Span, find_gaps
 from asterism.model import TrackingModel, Tracks
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from asterism.label.gap_estimates import Estimates
+    from asterism.label.gap.estimates import Estimates
 
 __all__ = ["ESTIMATORS", "Filling", "Gap", "fill"]
 

@@ -16,16 +16,16 @@ import numpy as np
 
 from asterism.filter import smooth
 from asterism.label.distances import distances_from
-from asterism.label.gap_bodies import Body, fit_body
-from asterism.label.gap_ends import CAREFUL, Bridges, bridges, is_steady
-from asterism.label.gap_patterns import learn_pattern
-from asterism.label.gaps import held_out, usable_ends
+from asterism.label.gap.bodies import Body, fit_body
+from asterism.label.gap.ends import CAREFUL, Bridges, bridges, is_steady
+from asterism.label.gap.patterns import learn_pattern
+from asterism.label.gap.spans import held_out, usable_ends
 from asterism.model import Detections, Tracks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.label.gaps import Span
+    from asterism.label.gap.spans import Span
     from asterism.model import TrackingModel
 
 __all__ = ["Estimate", "Estimates", "Take", "estimate"]

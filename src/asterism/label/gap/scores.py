@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.label.gaps import n_apart
+from asterism.label.gap.spans import n_apart
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.label.gap_estimates import Estimates
+    from asterism.label.gap.estimates import Estimates
 
 __all__ = ["Fill", "settle"]
 

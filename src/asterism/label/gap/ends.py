@@ -13,7 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.label.gaps import Span
+    from asterism.label.gap.spans import Span
 
 __all__ = ["CAREFUL", "Bridges", "bridges", "is_steady"]
 
