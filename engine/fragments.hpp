@@ -41,7 +41,7 @@ struct Fragment {
   MotionState state;
   double alone = 0;  // log likelihood of its second detection and those after
   std::vector<Continuation> continuations;
-  double known = 10;  // how well its neighbours knew its links, on average
+  double known = 0;  // how well its neighbours knew its links, on average
   std::int32_t guess = -1;  // the hidden marker that it may be, while nothing is decided
   std::vector<std::pair<std::int32_t, double>> guesses;  // all that it may be, and what speaks for it
 };

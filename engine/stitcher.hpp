@@ -138,8 +138,8 @@ class Stitcher {
   // Log odds that a fragment is a marker come back, before anything is compared: of one that was over
   // before it was decided upon, and of others.
   static constexpr double kShort = -8, kLong = 2;
-  // A link is cut where the neighbours, which knew it well so far, now give it no more than this.
-  static constexpr double kKnownWell = 6, kContradicted = 3, kDoubted = 3;
+  // A link is cut where the neighbours now give it no more than this, and that much less than so far.
+  static constexpr double kContradicted = 3, kFall = 8, kDoubted = 3;
   static constexpr double kTrusted = 2;          // of the markers on average: there are bodies
   static constexpr double kLeastMotion = 0.005;  // weight of the motion where the body is trusted
   static constexpr double kWorth = 0.25;  // of the log odds, in a probability
@@ -184,6 +184,7 @@ class Stitcher {
     const std::int32_t id = n_fragments_++;
     Fragment& f = so_far_.fragments[id];
     f.label = label;
+    f.known = usual_;
     f.first = f.last = now();
     of_label_[label] = id;
     return id;
@@ -221,10 +222,11 @@ class Stitcher {
       if (f.n == 0 || so_far_.frames.find(f.last) == nullptr) continue;
       double gain = 0;
       if (!bodies_.link(so_far_, one, f.last, gain)) continue;
-      if (opt_.may_cut && gain < kContradicted && f.known > kKnownWell) {
+      if (opt_.may_cut && gain < std::min(kContradicted, f.known - kFall)) {
         w_.cut.push_back(&one);
       } else {
         f.known += 0.2 * (gain - f.known);
+        usual_ += 0.01 * (gain - usual_);
       }
     }
     if (w_.cut.empty()) return;
@@ -418,6 +420,7 @@ class Stitcher {
   StitchOptions opt_;
   std::int32_t n_fragments_ = 0, n_markers_ = 0;
   std::int64_t n_cuts_ = 0;
+  double usual_ = 0;  // how well neighbours know a link
   Sightings so_far_;
   Markers markers_;
   std::unordered_map<std::int64_t, std::int32_t> of_label_;

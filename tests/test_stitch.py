@@ -103,7 +103,7 @@ def test_joins_are_right_as_often_as_they_say():
 
 @pytest.mark.parametrize(
     ("scene", "noise"),
-    [("cube", 0.005), ("wander", 0.005), ("swarm", 3e-4), ("fingers", 3e-4), ("juggler", 3e-4)],
+    [("cube", 0.005), ("wander", 0.005), ("swarm", 3e-4), ("fingers", 3e-4), ("juggler", 3e-4), ("smooth", 0.005)],
 )
 def test_it_does_no_harm(scene, noise):
     plain: list[float] = []
@@ -121,7 +121,7 @@ def test_it_does_no_harm(scene, noise):
         plain.append(am.evaluate(tracks, truth).idf1)
         found = am.identify(truth.detections, model=model)
         stitched.append(am.evaluate(found.tracks, truth).idf1)
-    assert np.mean(stitched) > np.mean(plain) - 0.002
+    assert np.mean(stitched) > np.mean(plain) - 0.001
 
 
 def test_where_neighbours_carry_nobody_motion_decides():
