@@ -103,7 +103,14 @@ def test_joins_are_right_as_often_as_they_say():
 
 @pytest.mark.parametrize(
     ("scene", "noise"),
-    [("cube", 0.005), ("wander", 0.005), ("swarm", 3e-4), ("fingers", 3e-4), ("juggler", 3e-4), ("smooth", 0.005)],
+    [
+        ("cube", 0.005),
+        ("wander", 0.005),
+        ("swarm", 3e-4),
+        ("fingers", 3e-4),
+        ("juggler", 3e-4),
+        ("smooth", 0.005),
+    ],
 )
 def test_it_does_no_harm(scene, noise):
     plain: list[float] = []
