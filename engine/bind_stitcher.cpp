@@ -82,8 +82,11 @@ nb::tuple step(const LiveStitcher& before, const In<double>& F, const In<double>
           "revised_labels: one for each of revised");
   using Change = std::pair<std::int64_t, std::int64_t>;
   std::vector<Change> changes(revised.size()), told;
-  for (std::size_t i = 0; i < changes.size(); ++i)
+  for (std::size_t i = 0; i < changes.size(); ++i) {
     changes[i] = {revised.data()[i], revised_labels.data()[i]};
+    require(changes[i].first >= 0 && changes[i].first < before.n_seen(),
+            "revised: detections of earlier frames");
+  }
   LiveStitcher after(before);
   Owned<std::int64_t> own(frame.size());
   {
@@ -104,8 +107,8 @@ nb::tuple step(const LiveStitcher& before, const In<double>& F, const In<double>
                         markers.give({told.size()}));
 }
 
-// (R, from, to, rms) of the rigid motion that takes points to others.
-nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weights) {
+std::vector<RigidPair> to_pairs(const In<double>& a, const In<double>& b,
+                                const In<double>& weights) {
   require(a.ndim() == 2 && a.shape(1) >= 1 && a.shape(1) <= kMaxAxes && b.ndim() == 2 &&
               b.shape(0) == a.shape(0) && b.shape(1) == a.shape(1) && weights.ndim() == 1 &&
               weights.size() == a.shape(0) && a.shape(0) > 0,
@@ -114,7 +117,12 @@ nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weight
   const std::vector<Point> from = to_points(a, D), to = to_points(b, D);
   std::vector<RigidPair> pairs;
   for (std::size_t k = 0; k < from.size(); ++k) pairs.push_back({from[k], to[k], weights.data()[k]});
-  const RigidFit found = fit_rigid(pairs, D);
+  return pairs;
+}
+
+// (R, from, to, rms) of the rigid motion that takes points to others.
+nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weights) {
+  const RigidFit found = fit_rigid(to_pairs(a, b, weights), static_cast<int>(a.shape(1)));
   Owned<double> R(9), x(3), y(3);
   std::copy(found.R.begin(), found.R.end(), R.data.get());
   std::copy(found.from.begin(), found.from.end(), x.data.get());
@@ -122,10 +130,77 @@ nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weight
   return nb::make_tuple(R.give({3, 3}), x.give({3}), y.give({3}), found.rms);
 }
 
+// (where they carry what was at `then`, how far it may be off, log densities at some points).
+nb::tuple carried(const In<double>& a, const In<double>& b, const In<double>& weights,
+                  const In<double>& then, double noise, const In<double>& points) {
+  const std::vector<RigidPair> pairs = to_pairs(a, b, weights);
+  const auto D = static_cast<int>(a.shape(1));
+  const std::vector<Point> was = to_points(then, D), at = to_points(points, D);
+  require(was.size() == 1, "then: shape (1, D)");
+  const Carried found = carry(pairs, was[0], D, noise);
+  Owned<double> place(kMaxAxes), densities(at.size());
+  std::copy(found.at.begin(), found.at.end(), place.data.get());
+  for (std::size_t i = 0; i < at.size(); ++i) densities.data[i] = found.log_density(at[i]);
+  return nb::make_tuple(place.give({kMaxAxes}), found.scale, densities.give({at.size()}));
+}
+
+// Log density of each of some points of a frame among the others, where some were seen before.
+Out<double> densities_elsewhere(const In<double>& before, const In<double>& points, double noise,
+                                double ghost_radius) {
+  require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
+          "points: shape (n, D)");
+  const auto D = static_cast<int>(points.shape(1));
+  Elsewhere elsewhere(D, noise, ghost_radius);
+  for (const Point& y : to_points(before, D)) elsewhere.add(y);
+  Frame frame;
+  for (const Point& y : to_points(points, D))
+    frame.seen.push_back({static_cast<std::int32_t>(frame.seen.size()), y});
+  Owned<double> densities(frame.seen.size());
+  for (const auto& one : frame.seen)
+    densities.data[one.fragment] = elsewhere.log_density(one.at, frame, one.fragment);
+  return densities.give({frame.seen.size()});
+}
+
+void add_frame(Neighbours& neighbours, const In<std::int32_t>& markers, const In<double>& points) {
+  require(points.ndim() == 2 && markers.ndim() == 1 && markers.size() == points.shape(0),
+          "markers: one for each point");
+  const std::vector<Point> at = to_points(points, static_cast<int>(points.shape(1)));
+  std::vector<Seen> seen;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    require(markers.data()[i] >= 0, "markers: numbers from 0");
+    seen.push_back({markers.data()[i], at[i]});
+  }
+  neighbours.add(seen);
+}
+
+// (the others, frames seen together, mean distances, their variances, unsteadiness).
+nb::tuple bonds_of(const Neighbours& neighbours, std::int32_t marker) {
+  const std::span<const Bond> bonds = neighbours.of(marker);
+  const std::size_t n = bonds.size();
+  Owned<std::int64_t> others(n), frames(n);
+  Owned<double> means(n), variances(n), unsteadiness(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    others.data[k] = bonds[k].other;
+    frames.data[k] = bonds[k].n;
+    means.data[k] = bonds[k].mean;
+    variances.data[k] = bonds[k].variance;
+    unsteadiness.data[k] = neighbours.unsteadiness(bonds[k]);
+  }
+  return nb::make_tuple(others.give({n}), frames.give({n}), means.give({n}), variances.give({n}),
+                        unsteadiness.give({n}));
+}
+
 }  // namespace
 
 void bind_stitcher(nb::module_& module) {
   module.def("fit_rigid", &fit, "a"_a, "b"_a, "weights"_a);
+  module.def("carried", &carried, "a"_a, "b"_a, "weights"_a, "then"_a, "noise"_a, "points"_a);
+  module.def("densities_elsewhere", &densities_elsewhere, "before"_a, "points"_a, nb::kw_only(),
+             "noise"_a, "ghost_radius"_a);
+  nb::class_<Neighbours>(module, "Neighbours")
+      .def(nb::init<int, double>(), "n_axes"_a, "noise"_a)
+      .def("add", &add_frame, "markers"_a, "points"_a)
+      .def("of", &bonds_of, "marker"_a);
   nb::class_<StitchOptions>(module, "StitchOptions")
       .def(
           "__init__",

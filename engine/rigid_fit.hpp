@@ -88,7 +88,7 @@ inline bool top_vector_from(double bound, const Matrix4& M, std::array<double, 4
     for (int j = 0; j < 4; ++j) left += shifted[i][j] * v[j];
     left2 += left * left;
   }
-  if (!(left2 <= 1e-26 * bound * bound * length2)) return false;
+  if (!(length2 > 0 && left2 <= 1e-26 * bound * bound * length2)) return false;
   for (double& each : v) each /= std::sqrt(length2);
   return true;
 }

@@ -9,7 +9,7 @@
 //   motion  its own filter goes on through the gap
 //
 // against what else it may be: a new marker anywhere, or a ghost beside a marker. Fragments that are
-// open at the same time compete for the hidden markers (an assignment). One that nothing explains is a
+// seen at the same time compete for the hidden markers (an assignment). One that nothing explains is a
 // new marker; if it was short and beside another, a ghost.
 //
 // A link inside a fragment is weighed by its neighbours too; where they contradict, it is cut.
@@ -339,7 +339,8 @@ class Stitcher {
     }
     std::int32_t row = 0;
     for (const auto& [other, g] : so_far_.fragments) {
-      if (other == id || g.marker != Decision::kOpen || g.n == 0 || g.last < f.first) continue;
+      if (other == id || g.marker != Decision::kOpen || g.n == 0) continue;
+      if (g.last < f.first || g.first > f.last) continue;  // both may be the same marker
       ++row;
       for (std::int32_t c = 0; c < static_cast<std::int32_t>(w_.scored.size()); ++c) {
         const double gain = score(g, other, w_.scored[c].first, markers_.at(w_.scored[c].first));

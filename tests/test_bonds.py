@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.spatial.transform import Rotation
 
 import asterism as am
@@ -183,6 +185,13 @@ def test_strangers_have_no_name():
     assert (found.probabilities[6:] == 0).all()
 
 
+def test_names_by_number_are_nobody_elses():
+    # Recognized in a take without names, a marker has the name of another one's number.
+    places = np.tile(np.random.default_rng(8).uniform(size=(4, 3)), (30, 1, 1))
+    take = am.Tracks.from_dense(np.arange(30) / 100, places, [None, "T000", "T004", None])
+    assert am.learn_bonds(take).names == ("T005", "T000", "T004", "T003")
+
+
 def test_takes_without_anything_to_tell():
     bonds = am.learn_bonds(am.simulate.person(seed=1))
     nobody = am.Tracks.from_dense(np.arange(5) / 100, np.full((5, 2, 3), np.nan))
@@ -207,3 +216,83 @@ def test_two_axes_will_do():
 def test_options_out_of_range_are_refused(wrong):
     with pytest.raises(am.ParameterError, match=next(iter(wrong))):
         am.learn_bonds(am.simulate.cube(seed=1), **wrong)
+
+
+def test_of_two_at_once_only_one_is_the_marker():
+    shape = np.random.default_rng(9).uniform(-0.3, 0.3, (8, 3))
+    t, places = moving(np.vstack([shape, shape[2] + 0.004]), noise=1e-4)
+    bonds = am.learn_bonds(am.Tracks.from_dense(t, places[:, :8]))
+    found = am.recognize(am.Tracks.from_dense(t, places), bonds)
+    assert sorted(found.markers) == [-1, *range(8)]
+    assert found.markers[2] == 2 or found.markers[8] == 2
+    assert found.tracks.n_tracks == 9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_names_are_as_probable_as_among_all_ways_of_naming(seed):
+    rng = np.random.default_rng(seed)
+    shape, t = rng.uniform(0, 0.06, (4, 2)), np.arange(60) / 100
+    before, take = (
+        am.Tracks.from_dense(t, shape + rng.normal(scale=noise, size=(60, 4, 2)))
+        for noise in (0.001, 0.002)
+    )
+    bonds, own = am.learn_bonds(before), am.learn_bonds(take)
+    said = np.zeros((4, 4, 4, 4))
+    for (i, j), (a, b) in itertools.product(enumerate(own.pairs), enumerate(bonds.pairs)):
+        off = own.distances[i] - bonds.distances[a]
+        varied = own.spreads[i] ** 2 + bonds.spreads[a] ** 2
+        s = np.sqrt([varied + 0.0005**2, varied + (0.004 + 0.015 * bonds.distances[a]) ** 2])
+        best = np.clip((stats.t(3).logpdf(off / s) - np.log(s) + np.log(2)).max(), -3, 7)
+        for k, m in (j, j[::-1]):
+            said[k, m, *b] = said[k, m, *b[::-1]] = best
+    ways = [
+        way
+        for way in itertools.product(range(-1, 4), repeat=4)
+        if len(named := [m for m in way if m >= 0]) == len(set(named))
+    ]
+    score = np.array(
+        [
+            sum(
+                said[k, m, way[k], way[m]]
+                for k, m in itertools.combinations(range(4), 2)
+                if min(way[k], way[m]) >= 0
+            )
+            for way in ways
+        ]
+    )
+    weights = np.exp(0.25 * (score - score.max()))
+    best = np.array(ways[int(np.argmax(score))])
+    probable = (np.array(ways) == best).T @ weights / weights.sum()
+    found = am.recognize(take, bonds)
+    np.testing.assert_array_equal(found.markers, best)
+    np.testing.assert_allclose(found.probabilities, probable, atol=2e-3)
+
+
+def test_a_body_may_be_elsewhere_in_the_next_take():
+    rng = np.random.default_rng(3)
+    t, body = moving(rng.uniform(-0.3, 0.3, (8, 3)), noise=1e-4)
+    _, stick = moving(np.array([[0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]]), seed=1, noise=1e-4)
+    learnt = am.learn_bonds(am.Tracks.from_dense(t, np.concatenate([body, stick], axis=1)))
+    inside = (learnt.pairs[:, 0] < 8) == (learnt.pairs[:, 1] < 8)
+    kept = {n: getattr(learnt, n)[inside] for n in ("pairs", "distances", "spreads", "frames")}
+    bonds = dataclasses.replace(learnt, **kept)
+    take = am.Tracks.from_dense(t, np.concatenate([body, stick + np.array([3, 0, 0])], axis=1))
+    np.testing.assert_array_equal(am.recognize(take, bonds).markers, np.arange(11))
+
+
+def test_who_comes_when_a_marker_has_gone_is_not_yet_that_marker():
+    rng = np.random.default_rng(6)
+    t, places = moving(rng.uniform(-0.3, 0.3, (7, 3)))
+    bonds = am.learn_bonds(am.Tracks.from_dense(t, places[:, :6]))
+    places[:, 6] = 1 + np.cumsum(rng.normal(scale=0.02, size=(len(t), 3)), axis=0)
+    places[60:, 5] = places[:60, 6] = np.nan
+    found = am.recognize(am.Tracks.from_dense(t, places), bonds)
+    np.testing.assert_array_equal(found.markers, [0, 1, 2, 3, 4, 5, -1])
+
+
+def test_frames_of_long_takes_are_counted_though_not_all_are_looked_at():
+    places = np.tile([[0.0, 0, 0], [1, 0, 0], [0, 2, 0]], (2400, 1, 1))
+    places[30:, 2] = np.nan
+    bonds = am.learn_bonds(am.Tracks.from_dense(np.arange(2400) / 100, places))
+    np.testing.assert_array_equal(bonds.pairs, [[0, 1], [0, 2], [1, 2]])
+    np.testing.assert_array_equal(bonds.frames, [2400, 30, 30])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -18,6 +19,14 @@ PERSON = am.simulate.person
 def disturbed(seed, *, scene=PERSON, **more):
     truth = scene(seed=seed)
     return am.simulate.sense(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed, **more)
+
+
+@functools.cache
+def person(seed):
+    """A disturbed person, its model, and its markers as `identify` finds them."""
+    truth = disturbed(seed)
+    model = am.estimate_model(truth.detections).model
+    return truth, model, am.identify(truth.detections, model=model)
 
 
 def kabsch(a, b, w):
@@ -67,13 +76,19 @@ def test_too_few_pairs_are_moved_and_not_turned(n):
     assert rms == pytest.approx(0, abs=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("method", [am.SMP(window=3), am.GNN(), am.MCMCDA(confidence=0)])
-def test_hidden_markers_of_a_person_are_found_again(seed, method):
-    truth = disturbed(seed)
-    model = am.estimate_model(truth.detections).model
+@pytest.mark.parametrize(
+    ("method", "seed"),
+    [
+        *((am.SMP(window=3), seed) for seed in range(4)),
+        *((am.GNN(), seed) for seed in range(4)),
+        *((am.MCMCDA(confidence=0), seed) for seed in range(2)),
+    ],
+)
+def test_hidden_markers_of_a_person_are_found_again(method, seed):
+    truth, model, found = person(seed)
     lost = am.evaluate(am.track(truth.detections, method, model=model, seed=1), truth)
-    found = am.identify(truth.detections, method, model=model, seed=1)
+    if method != am.SMP(window=3):
+        found = am.identify(truth.detections, method, model=model, seed=1)
     e = am.evaluate(found.tracks, truth)
     assert e.idf1 > 0.985 > 0.96 > lost.idf1
     assert e.switches_per_1000 < 0.5
@@ -84,8 +99,7 @@ def test_joins_are_right_as_often_as_they_say():
     right: list[bool] = []
     sure: list[float] = []
     for seed in range(8):
-        truth = disturbed(seed)
-        found = am.identify(truth.detections)
+        truth, _, found = person(seed)
         frame = truth.detections.frame_of
         for join in found.joins:
             own = found.tracks.labels == join.marker
@@ -115,7 +129,7 @@ def test_joins_are_right_as_often_as_they_say():
 def test_it_does_no_harm(scene, noise):
     plain: list[float] = []
     stitched: list[float] = []
-    for seed in range(4):
+    for seed in range(2):
         truth = am.simulate.sense(
             am.simulate.SCENES[scene].make(seed=seed),
             missing=0.1,
@@ -166,8 +180,8 @@ def test_whoever_cuts_nothing_and_hides_nothing_changes_nothing():
 
 
 def test_names_and_confidence_stay():
-    truth = disturbed(1)
-    model = am.fragment_model(am.estimate_model(truth.detections).model)
+    truth, model, _ = person(1)
+    model = am.fragment_model(model)
     fragments = am.track(truth.detections, am.MCMCDA(), model=model, seed=1)
     named = dataclasses.replace(fragments, names=tuple(f"t{k}" for k in range(fragments.n_tracks)))
     found = am.stitch(named, model)
@@ -181,9 +195,18 @@ def test_names_and_confidence_stay():
         assert found.tracks.names[marker] == f"t{fragments.labels[first]}"
 
 
+def test_no_two_markers_have_one_name():
+    # The label goes on 0.3 m beside, with what is no longer the marker.
+    places = np.tile(np.random.default_rng(1).uniform(-0.4, 0.4, (8, 3)), (200, 1, 1))
+    places[100:, 3] += [0.3, 0, 0]
+    take = am.Tracks.from_dense(np.arange(200) / 100, places, "ABCDEFGH")
+    found = am.stitch(take, person(1)[1])
+    assert found.tracks.names == (*"ABCDEFGH", None)
+    assert len(found.bonds.names) == 9
+
+
 def test_labels_come_from_fragments_and_joins_from_both():
-    truth = disturbed(4)
-    found = am.identify(truth.detections)
+    _, _, found = person(4)
     fragment, labels = found.fragments, found.tracks.labels
     assert ((labels >= 0) <= (fragment >= 0)).all()
     assert (labels[fragment >= 0] == np.maximum(found.markers[fragment[fragment >= 0]], -1)).all()
@@ -198,8 +221,8 @@ def test_labels_come_from_fragments_and_joins_from_both():
 
 
 def test_the_same_input_gives_the_same():
-    truth = disturbed(5)
-    one, two = (am.identify(truth.detections) for _ in range(2))
+    truth, model, one = person(5)
+    two = am.identify(truth.detections, model=model)
     np.testing.assert_array_equal(one.tracks.labels, two.tracks.labels)
     np.testing.assert_array_equal(one.probabilities, two.probabilities)
 
@@ -237,9 +260,8 @@ def test_little_or_nothing(n_frames):
 
 
 def test_a_marker_that_is_forgotten_is_new():
-    truth = disturbed(6)
-    remembered = am.identify(truth.detections)
-    forgotten = am.identify(truth.detections, max_hidden=30)
+    truth, model, remembered = person(6)
+    forgotten = am.identify(truth.detections, model=model, max_hidden=30)
     longest = max(join.first - join.last for join in forgotten.joins)
     assert longest <= 30 + 15
     assert forgotten.tracks.n_tracks > remembered.tracks.n_tracks

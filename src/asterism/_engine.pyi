@@ -445,6 +445,39 @@ def fit_rigid(
     a: NDArray[np.float64], b: NDArray[np.float64], weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]: ...
 
+# (where they carry what was at `then`, how far it may be off, log densities at some points)
+def carried(
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    then: NDArray[np.float64],
+    noise: float,
+    points: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]: ...
+
+# Log density of each of some points of a frame among the others, where some were seen before.
+def densities_elsewhere(
+    before: NDArray[np.float64],
+    points: NDArray[np.float64],
+    *,
+    noise: float,
+    ghost_radius: float,
+) -> NDArray[np.float64]: ...
+
+class Neighbours:
+    def __init__(self, n_axes: int, noise: float) -> None: ...
+    def add(self, markers: NDArray[np.int32], points: NDArray[np.float64]) -> None: ...
+    # (the others, frames seen together, mean distances, their variances, unsteadiness)
+    def of(
+        self, marker: int
+    ) -> tuple[
+        NDArray[np.int64],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+    ]: ...
+
 class StitchOptions:
     def __init__(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import tomllib
 from dataclasses import dataclass
 from functools import cached_property
@@ -191,6 +192,7 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = 20) -> Bon
     ----------
     tracks : Tracks
         A take, with names where they are known; a track without one is called ``T000``, ``T001`` …
+        by its number, or by a higher one where another has that name.
     neighbours : int
         Bonds that each marker has at least, where there are so many.
     least : int
@@ -229,12 +231,21 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = 20) -> Bon
     chosen = (chosen | chosen.T) & np.isfinite(cost)
     i, j = np.nonzero(np.triu(chosen))
     return Bonds(
-        names=tuple(name or f"T{k:03d}" for k, name in enumerate(tracks.names)),
+        names=_all_names(tracks.names),
         places=_pose(positions, between.middle),
         pairs=np.stack([i, j], axis=1),
         distances=between.middle[i, j],
         spreads=between.spread[i, j],
         frames=between.n_frames[i, j] * every,
+    )
+
+
+def _all_names(names: tuple[str | None, ...]) -> tuple[str, ...]:
+    """Name what has none by its number, or by the next that nobody has."""
+    numbered = (name for k in itertools.count(len(names)) if (name := f"T{k:03d}") not in names)
+    return tuple(
+        name or (own if (own := f"T{k:03d}") not in names else next(numbered))
+        for k, name in enumerate(names)
     )
 
 

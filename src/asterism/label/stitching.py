@@ -246,15 +246,16 @@ def stitch_options(
 def _names(
     tracks: Tracks, fragments: NDArray[np.int32], markers: NDArray[np.int32], n_markers: int
 ) -> tuple[str | None, ...]:
-    """Give each marker the first name that any of its fragments has."""
+    """Give each marker the first name that any of its fragments has and no other marker."""
     names: list[str | None] = [None] * n_markers
     if any(tracks.names):
         track = np.full(len(markers), -1)
         inside = fragments >= 0
         track[fragments[inside]] = tracks.labels[inside]
         for fragment in np.flatnonzero(markers >= 0):
-            marker = markers[fragment]
-            names[marker] = names[marker] or tracks.names[track[fragment]]
+            marker, name = markers[fragment], tracks.names[track[fragment]]
+            if names[marker] is None and name not in names:
+                names[marker] = name
     return tuple(names)
 
 
