@@ -1,0 +1,114 @@
+// One camera and its image points in one frame, the lens undone once for all of them.
+//
+//   n = (x, y)   normalised coordinates, X_c / Z_c and Y_c / Z_c
+//   D            derivative of the pixel by n, at the point
+//   W            information of n: Dᵀ D / σ², so that eᵀ W e is the squared distance in pixels over
+//                σ², to first order in the distance
+//   J            derivative of n by the world coordinates of a place
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "symmetric3.hpp"
+
+namespace asterism {
+
+// What is known of the images of a camera. Densities are by pixel².
+struct ImageSense {
+  double sigma = 0.3;        // px, each axis
+  double p_detection = 0.9;  // of a place in view
+  double clutter = 1e-7;     // density of image points that are of no point in space
+
+  // What a view adds to the log likelihood ratio of a point, but for its distance and its miss.
+  double gain() const {
+    constexpr double kTwoPi = 6.283185307179586;
+    return std::log(p_detection / (clutter * kTwoPi * sigma * sigma));
+  }
+  double miss() const { return std::log1p(-p_detection); }
+};
+
+struct ImagePoint {
+  Plane n;
+  double wxx, wxy, wyy;  // W
+  double spread;         // largest standard deviation of n
+  std::int32_t number;   // in the frame, over all cameras
+
+  double squared(Plane e) const { return wxx * e.x * e.x + 2 * wxy * e.x * e.y + wyy * e.y * e.y; }
+};
+
+// A place as a camera has it.
+struct Sight {
+  Plane n;
+  Vec3 jx, jy;  // rows of J
+  double depth;
+};
+
+class ImagePoints {
+ public:
+  ImagePoints(const Camera& of, const ImageSense& known)
+      : camera(&of), sense(known), center(of.center()), r0_(of.row(0)), r1_(of.row(1)),
+        r2_(of.row(2)) {}
+
+  // Takes the points of a frame; those that no ray leads to are left out.
+  void take(std::span<const double> pixels, std::int32_t first) {
+    points.clear();
+    normalised_.resize(pixels.size());
+    camera->undistort(pixels, normalised_);
+    const double w = 1 / (sense.sigma * sense.sigma);
+    for (std::size_t i = 0; i < pixels.size() / 2; ++i) {
+      const Plane n{normalised_[2 * i], normalised_[2 * i + 1]};
+      if (!std::isfinite(n.x) || !std::isfinite(n.y)) continue;
+      const Jacobian2 D = camera->slope(n);
+      if (!std::isfinite(D.xx)) continue;
+      ImagePoint p{n, w * (D.xx * D.xx + D.yx * D.yx), w * (D.xx * D.xy + D.yx * D.yy),
+                   w * (D.xy * D.xy + D.yy * D.yy), 0, first + static_cast<std::int32_t>(i)};
+      const double half = (p.wxx + p.wyy) / 2, det = p.wxx * p.wyy - p.wxy * p.wxy;
+      p.spread = 1 / std::sqrt(det / (half + std::sqrt(std::max(half * half - det, 0.0))));
+      points.push_back(p);
+    }
+    std::sort(points.begin(), points.end(), [](const ImagePoint& a, const ImagePoint& b) {
+      return a.n.x != b.n.x ? a.n.x < b.n.x : a.n.y < b.n.y;
+    });
+    dx.resize(points.size()), dy.resize(points.size()), dz.resize(points.size());
+    widest = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Plane n = points[i].n;
+      const double s = 1 / std::sqrt(n.x * n.x + n.y * n.y + 1);
+      const Vec3 d = s * n.x * r0_ + s * n.y * r1_ + s * r2_;
+      dx[i] = d.x, dy[i] = d.y, dz[i] = d.z;
+      widest = std::max(widest, points[i].spread);
+    }
+  }
+
+  Vec3 ray(std::size_t i) const { return {dx[i], dy[i], dz[i]}; }
+
+  Sight sight(Vec3 X) const {
+    const Vec3 c = camera->to_camera(X);
+    const Plane n{c.x / c.z, c.y / c.z};
+    const double s = 1 / c.z;
+    return {n, s * (r0_ - n.x * r2_), s * (r1_ - n.y * r2_), c.z};
+  }
+
+  // Whether the camera could see the place: in range, in the image, within the lens model.
+  bool could_see(Vec3 X) const {
+    const double place[3] = {X.x, X.y, X.z};
+    double pixel[2], depth[1];
+    Reason reason[1];
+    camera->project(place, pixel, depth, reason);
+    return reason[0] == Reason::visible;
+  }
+
+  const Camera* camera;
+  ImageSense sense;
+  Vec3 center;
+  std::vector<ImagePoint> points;   // by n.x
+  std::vector<double> dx, dy, dz;   // unit vectors of their rays, world
+  double widest = 0;                // largest spread
+
+ private:
+  Vec3 r0_, r1_, r2_;
+  std::vector<double> normalised_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,71 @@
+// One frame of many views: which image points are of one point in space, and where that is.
+#pragma once
+
+#include "candidate_choice.hpp"
+
+namespace asterism {
+
+struct FoundPoint {
+  Vec3 X;
+  double score;
+  std::vector<std::int32_t> uses;  // numbers of its image points, rising
+};
+
+struct FrameSummary {
+  std::int64_t n_candidates = 0;
+  ChoiceSummary choice;
+};
+
+class ManyViews {
+ public:
+  ManyViews(std::span<const Camera* const> cameras, std::span<const ImageSense> senses,
+            const CandidateOptions& options)
+      : options_(options) {
+    for (std::size_t c = 0; c < cameras.size(); ++c) images_.emplace_back(*cameras[c], senses[c]);
+  }
+
+  // `pixels` of all cameras, those of camera c from offsets[c] to offsets[c + 1] (from any start).
+  std::vector<PointCandidate> candidates(std::span<const double> pixels,
+                                         std::span<const std::int64_t> offsets,
+                                         std::span<const Vec3> priors) {
+    for (std::size_t c = 0; c < images_.size(); ++c) {
+      const auto from = static_cast<std::size_t>(offsets[c] - offsets[0]);
+      const auto n = static_cast<std::size_t>(offsets[c + 1] - offsets[c]);
+      images_[c].take(pixels.subspan(2 * from, 2 * n), static_cast<std::int32_t>(from));
+    }
+    return PointCandidates(images_, options_).find(priors);
+  }
+
+  std::vector<std::int32_t> uses(const PointCandidate& c) const {
+    std::vector<std::int32_t> out;
+    for (const View v : c.views) out.push_back(images_[v.camera].points[v.point].number);
+    return out;
+  }
+
+  std::vector<FoundPoint> solve(std::span<const double> pixels, std::span<const std::int64_t> offsets,
+                                std::span<const Vec3> priors, std::int64_t max_nodes,
+                                FrameSummary& summary) {
+    const std::vector<PointCandidate> all = candidates(pixels, offsets, priors);
+    std::vector<std::vector<std::int32_t>> used;
+    std::vector<double> scores;
+    for (const PointCandidate& c : all) {
+      used.push_back(uses(c));
+      scores.push_back(c.score);
+    }
+    summary.n_candidates += static_cast<std::int64_t>(all.size());
+    CandidateChoice choice(used, scores, pixels.size() / 2);
+    std::vector<FoundPoint> found;
+    for (const std::int32_t k : choice.solve(max_nodes, summary.choice))
+      found.push_back({all[k].X, all[k].score, std::move(used[k])});
+    std::sort(found.begin(), found.end(), [](const FoundPoint& a, const FoundPoint& b) {
+      return a.X.x != b.X.x ? a.X.x < b.X.x : a.X.y < b.X.y;
+    });
+    return found;
+  }
+
+ private:
+  CandidateOptions options_;
+  std::vector<ImagePoints> images_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,286 @@
+"""Which image points of several cameras are one point in space, and where: frame by frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from asterism import _engine
+from asterism.camera import Observations, Rig
+from asterism.errors import ParameterError, check_array, check_number
+from asterism.model import Detections
+from asterism.model.detections import FARTHEST
+from asterism.reconstruct.image_model import ImageModel
+from asterism.reconstruct.reconstruction import Reconstruction, Views
+from asterism.reconstruct.triangulation import Triangulation, triangulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["matched_rig", "reconstruct"]
+
+_CHUNK = 128  # frames at a time: progress is told, and a stop heard, between them
+
+
+def reconstruct(
+    observations: Observations,
+    rig: Rig,
+    model: ImageModel | None = None,
+    *,
+    min_views: int = 2,
+    gate: float = 4.0,
+    volume: tuple[ArrayLike, ArrayLike] | None = None,
+    prior: Detections | None = None,
+    max_nodes: int = 2000,
+    n_threads: int = 1,
+    advance: Callable[[int], None] | None = None,
+) -> Reconstruction:
+    """Make points in space of unnamed image points.
+
+    A set of image points of different cameras is weighed by the likelihood that one point made
+    them, its place integrated out, against that of their being clutter; a camera that could see
+    the place and did not costs a miss. Pairs of rays that meet are the seeds of such sets. Of all
+    sets that are likelier than clutter those are chosen that together are the likeliest and share
+    no image point: S-dimensional assignment [1]_, exact but for what `info` says. Each is
+    triangulated on the pixels as they were measured (`triangulate`).
+
+    Parameters
+    ----------
+    observations : Observations
+        What the cameras saw.
+    rig : Rig
+        The cameras, found by their names. Those that observed nothing at all, in a rig of more,
+        are not asked.
+    model : ImageModel, optional
+        What the images are like. By default it is estimated (`estimate_images`).
+    min_views : int
+        Fewest cameras that a point needs, 2 or more.
+    gate : float
+        Standard deviations within which an image point may be of a place.
+    volume : (low, high), each array_like of shape (3,), optional
+        Corners of the box, world metres, beyond which there are no points.
+    prior : Detections, optional
+        3-D places where points are expected, for each frame of the observations; they are tried
+        first, and claim nothing that the images do not bear out.
+    max_nodes : int
+        Most nodes of the search for the best choice in a group of sets that share image points.
+    n_threads : int
+        Frames at a time; the result does not depend on it.
+    advance : callable, optional
+        Told the number of frames that are done.
+
+    Returns
+    -------
+    Reconstruction
+
+    Raises
+    ------
+    ParameterError
+        If a camera is not in the rig, there are under two, or the prior is of other frames.
+
+    References
+    ----------
+    .. [1] S. Deb, M. Yeddanapudi, K. Pattipati, Y. Bar-Shalom: A generalized S-D assignment
+       algorithm for multisensor-multitarget state estimation. IEEE Transactions on Aerospace and
+       Electronic Systems 33, 1997.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=3, height=2, target=(0, 0, 0))
+    >>> scene = am.simulate.cube(seed=1, frames=10)
+    >>> am.reconstruct(am.simulate.film(scene, rig).observations, rig).detections
+    Detections(10 frames, 80 points, 3-D, 0 to 9 s)
+    """
+    used, numbers = matched_rig(observations, rig)
+    check_number("min_views", min_views, above=2, below=len(used), closed=True, integer=True)
+    check_number("gate", gate, above=0)
+    check_number("max_nodes", max_nodes, above=1, closed=True, integer=True)
+    check_number("n_threads", n_threads, above=1, below=1024, closed=True, integer=True)
+    low, high = _box(volume)
+    if model is None:
+        from asterism.reconstruct.images_from_clip import estimate_images
+
+        model = estimate_images(observations, rig, gate=gate, volume=volume)
+    sigma, p_detection, clutter = model.of(used)
+    solver = _engine.ViewSolver(
+        cameras=[camera.engine for camera in used],
+        sigma=sigma,
+        p_detection=p_detection,
+        clutter=clutter,
+        log_density=float(np.log(model.density)),
+        gate=float(gate),
+        min_views=int(min_views),
+        low=low,
+        high=high,
+    )
+    expected = _expected(prior, observations)
+    pieces: list[_Piece] = []
+    C, T = observations.n_cameras, observations.n_frames
+    for begin in range(0, T, _CHUNK):
+        end = min(begin + _CHUNK, T)
+        rows = slice(int(expected.offsets[begin]), int(expected.offsets[end]))
+        found = solver.reconstruct(
+            observations.pixels,
+            np.ascontiguousarray(observations.offsets[begin * C : end * C + 1]),
+            np.ascontiguousarray(expected.points[rows]),
+            np.ascontiguousarray(expected.offsets[begin : end + 1] - rows.start),
+            int(max_nodes),
+            int(n_threads),
+        )
+        pieces.append(_piece(found, observations, used, sigma))
+        if advance is not None:
+            advance(end)
+    return _joined(pieces, observations, numbers, model)
+
+
+def matched_rig(observations: Observations, rig: Rig) -> tuple[Rig, NDArray[np.int64]]:
+    """Give the cameras that observed, in the observations' order, and their numbers in the rig.
+
+    Raises
+    ------
+    ParameterError
+        If one is not in the rig, or there are under two.
+    """
+    if not isinstance(observations, Observations):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("observations", "Observations", type(observations).__name__)
+    if not isinstance(rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("rig", "a Rig", type(rig).__name__)
+    names = observations.cameras
+    unknown = [name for name in names if name not in rig.names]
+    if unknown:
+        expected = f"the cameras of the observations ({', '.join(names)})"
+        got = f"{', '.join(rig.names)}: no {', '.join(unknown)}"
+        raise ParameterError("rig", expected, got)
+    if len(names) < 2:
+        hint = "depth needs a second view"
+        raise ParameterError("observations", "two cameras or more", len(names), hint)
+    numbers = np.array([rig.names.index(name) for name in names])
+    return Rig(tuple(rig[int(i)] for i in numbers)), numbers
+
+
+class _Piece(NamedTuple):
+    """What was found in some frames."""
+
+    solved: Triangulation
+    residuals: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    n_views: NDArray[np.int64]
+    cameras: NDArray[np.int64]
+    blobs: NDArray[np.int64]
+    figures: NDArray[np.float64]
+
+
+def _box(
+    volume: tuple[ArrayLike, ArrayLike] | None,
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    if volume is None:
+        return (-FARTHEST,) * 3, (FARTHEST,) * 3
+    if not isinstance(volume, (tuple, list)) or len(volume) != 2:  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("volume", "two corners, low and high", repr(volume))
+    low, high = (check_array("volume", corner, (3,)) for corner in volume)
+    if (high <= low).any():
+        raise ParameterError("volume", f"a corner beyond {low.tolist()}", high.tolist())
+    (a, b, c), (d, e, f) = low.tolist(), high.tolist()
+    return (a, b, c), (d, e, f)
+
+
+def _expected(prior: Detections | None, observations: Observations) -> Detections:
+    if prior is None:
+        offsets = np.zeros(observations.n_frames + 1, dtype=np.int64)
+        return Detections(times=observations.times, offsets=offsets, points=np.empty((0, 3)))
+    if not isinstance(prior, Detections):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("prior", "Detections", type(prior).__name__)
+    if prior.n_axes != 3:
+        raise ParameterError("prior", "places in 3-D", f"{prior.n_axes}-D ones")
+    if not np.array_equal(prior.times, observations.times):
+        raise ParameterError("prior", "the times of the observations", "others")
+    return prior
+
+
+def _piece(
+    found: tuple[NDArray[np.float64], ...],
+    observations: Observations,
+    rig: Rig,
+    sigma: NDArray[np.float64],
+) -> _Piece:
+    """Triangulate what the engine matched, on the pixels as they were measured."""
+    points, scores, counts, starts, blobs, figures, gap = found
+    n_views = np.diff(starts)
+    of = np.repeat(np.arange(len(points)), n_views)
+    cameras = observations.camera_of[blobs]
+    pixels = np.full((len(rig), len(points), 2), np.nan)
+    pixels[cameras, of] = observations.pixels[blobs]
+    solved = triangulate(pixels, rig, sigma_px=sigma, start=points)
+    squares = np.zeros(len(points))
+    for c, camera in enumerate(rig):
+        own = cameras == c
+        away = solved.points[of[own]] - camera.center
+        rays = camera.rays(observations.pixels[blobs[own]])
+        squares[of[own]] += (np.cross(away, rays) ** 2).sum(axis=1)
+    return _Piece(
+        solved=solved,
+        residuals=np.sqrt(squares / np.maximum(n_views, 1)),
+        scores=scores,
+        counts=counts,
+        n_views=n_views,
+        cameras=cameras,
+        blobs=blobs,
+        figures=np.append(figures, gap),
+    )
+
+
+def _joined(
+    pieces: list[_Piece],
+    observations: Observations,
+    numbers: NDArray[np.int64],
+    model: ImageModel,
+) -> Reconstruction:
+    def all_of(arrays: list[NDArray[np.float64]], *shape: int) -> NDArray[np.float64]:
+        return np.concatenate([np.empty((0, *shape), arrays[0].dtype if arrays else float), *arrays])
+
+    points = all_of([p.solved.points for p in pieces], 3)
+    covariances = all_of([p.solved.covariances for p in pieces], 3, 3)
+    scores, residuals = all_of([p.scores for p in pieces]), all_of([p.residuals for p in pieces])
+    counts = all_of([p.counts for p in pieces]).astype(np.int64)
+    n_views = all_of([p.n_views for p in pieces]).astype(np.int64)
+    cameras = all_of([p.cameras for p in pieces]).astype(np.int64)
+    blobs = all_of([p.blobs for p in pieces]).astype(np.int64)
+    # What the pixels themselves leave without a place or a depth is none.
+    is_sound = np.isfinite(covariances).all(axis=(1, 2)) & (np.abs(points) <= FARTHEST).all(axis=1)
+    of = np.repeat(np.arange(len(points)), n_views)
+    offsets = np.concatenate([[0], np.cumsum(is_sound)])[np.append(0, np.cumsum(counts))]
+    masks = np.bincount(of, weights=2.0 ** numbers[cameras], minlength=len(points))
+    kept = is_sound[of]
+    covariances = covariances[is_sound]
+    figures = np.sum([np.zeros(4), *(p.figures for p in pieces)], axis=0)
+    n_candidates, n_searched, n_cut, gap = figures.tolist()
+    detections = Detections(
+        times=observations.times,
+        offsets=offsets.astype(np.int64),
+        points=points[is_sound],
+        cameras=masks[is_sound].astype(np.int64) if numbers.max() <= 62 else None,
+        residuals=residuals[is_sound],
+        stds=np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 3),
+        covariances=(covariances + np.swapaxes(covariances, 1, 2)) / 2,
+    )
+    return Reconstruction(
+        detections=detections,
+        views=Views(
+            offsets=np.concatenate([[0], np.cumsum(n_views[is_sound])]).astype(np.int64),
+            cameras=cameras[kept],
+            blobs=blobs[kept],
+        ),
+        scores=scores[is_sound],
+        model=model,
+        info={
+            "n_candidates": int(n_candidates),
+            "n_searched": int(n_searched),
+            "n_cut": int(n_cut),
+            "gap": gap,
+        },
+    )
