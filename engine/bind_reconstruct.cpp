@@ -27,7 +27,7 @@ struct ViewSolver {
     require(sigma.size() == C && p_detection.size() == C && clutter.size() == C,
             "sigma, p_detection, clutter: one for each camera");
     for (std::size_t c = 0; c < C; ++c)
-      senses.push_back({sigma.data()[c], p_detection.data()[c], clutter.data()[c]});
+      senses.emplace_back(sigma.data()[c], p_detection.data()[c], clutter.data()[c]);
   }
 
   ManyViews views() const { return ManyViews(cameras, senses, options); }

@@ -16,21 +16,21 @@ namespace asterism {
 
 // What is known of the images of a camera. Densities are by pixel².
 struct ImageSense {
-  double sigma = 0.3;        // px, each axis
-  double p_detection = 0.9;  // of a place in view
-  double clutter = 1e-7;     // density of image points that are of no point in space
+  double sigma;  // px, each axis
+  double gain;   // what a view adds to the log likelihood ratio of a point, but for its distance
+  double miss;   // what no view adds, where there could be one
 
-  // What a view adds to the log likelihood ratio of a point, but for its distance and its miss.
-  double gain() const {
-    constexpr double kTwoPi = 6.283185307179586;
-    return std::log(p_detection / (clutter * kTwoPi * sigma * sigma));
-  }
-  double miss() const { return std::log1p(-p_detection); }
+  // `clutter`: density of image points that are of no point in space.
+  ImageSense(double sigma_px, double p_detection, double clutter)
+      : sigma(sigma_px),
+        gain(std::log(p_detection / (clutter * 6.283185307179586 * sigma_px * sigma_px))),
+        miss(std::log1p(-p_detection)) {}
 };
 
 struct ImagePoint {
   Plane n;
   double wxx, wxy, wyy;  // W
+  double vxx, vxy, vyy;  // its inverse
   double spread;         // largest standard deviation of n
   std::int32_t number;   // in the frame, over all cameras
 
@@ -62,14 +62,18 @@ class ImagePoints {
       const Jacobian2 D = camera->slope(n);
       if (!std::isfinite(D.xx)) continue;
       ImagePoint p{n, w * (D.xx * D.xx + D.yx * D.yx), w * (D.xx * D.xy + D.yx * D.yy),
-                   w * (D.xy * D.xy + D.yy * D.yy), 0, first + static_cast<std::int32_t>(i)};
-      const double half = (p.wxx + p.wyy) / 2, det = p.wxx * p.wyy - p.wxy * p.wxy;
-      p.spread = 1 / std::sqrt(det / (half + std::sqrt(std::max(half * half - det, 0.0))));
+                   w * (D.xy * D.xy + D.yy * D.yy), 0, 0, 0, 0,
+                   first + static_cast<std::int32_t>(i)};
+      const double det = p.wxx * p.wyy - p.wxy * p.wxy;
+      p.vxx = p.wyy / det, p.vxy = -p.wxy / det, p.vyy = p.wxx / det;
+      const double half = (p.vxx + p.vyy) / 2, apart = (p.vxx - p.vyy) / 2;
+      p.spread = std::sqrt(half + std::sqrt(apart * apart + p.vxy * p.vxy));
       points.push_back(p);
     }
     std::sort(points.begin(), points.end(), [](const ImagePoint& a, const ImagePoint& b) {
       return a.n.x != b.n.x ? a.n.x < b.n.x : a.n.y < b.n.y;
     });
+    make_table();
     dx.resize(points.size()), dy.resize(points.size()), dz.resize(points.size());
     widest = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -79,6 +83,14 @@ class ImagePoints {
       dx[i] = d.x, dy[i] = d.y, dz[i] = d.z;
       widest = std::max(widest, points[i].spread);
     }
+  }
+
+  // A point before which all are left of x, hardly any between.
+  std::vector<ImagePoint>::const_iterator right_of(double x) const {
+    const double at = (x - left_) * cells_;
+    if (!(at > 0)) return points.begin();
+    if (at >= static_cast<double>(starts_.size())) return points.end();
+    return points.begin() + starts_[static_cast<std::size_t>(at)];
   }
 
   Vec3 ray(std::size_t i) const { return {dx[i], dy[i], dz[i]}; }
@@ -107,7 +119,26 @@ class ImagePoints {
   double widest = 0;                // largest spread
 
  private:
+  // Where the points of each of many even strips begin.
+  void make_table() {
+    starts_.clear();
+    if (points.empty()) return;
+    left_ = points.front().n.x;
+    const double width = points.back().n.x - left_;
+    const auto n = 4 * points.size();
+    cells_ = width > 0 ? static_cast<double>(n) / width : 0;
+    std::int32_t at = 0;
+    for (std::size_t cell = 0; cell <= n; ++cell) {
+      while (at < static_cast<std::int32_t>(points.size()) &&
+             (points[at].n.x - left_) * cells_ < static_cast<double>(cell))
+        ++at;
+      starts_.push_back(at);
+    }
+  }
+
   Vec3 r0_, r1_, r2_;
+  std::vector<std::int32_t> starts_;
+  double left_ = 0, cells_ = 0;
   std::vector<double> normalised_;
 };
 

@@ -47,6 +47,7 @@ class PointCandidates {
     for (const ImagePoints& c : cameras_)
       for (const ImagePoint& p : c.points) n = std::max<std::size_t>(n, p.number + 1);
     strong_of_.resize(n);
+    for (std::size_t k = 0; k < cameras_.size(); ++k) all_.push_back(static_cast<std::int32_t>(k));
   }
 
   // All candidates that are likelier than clutter.
@@ -58,7 +59,7 @@ class PointCandidates {
       PointCandidate c;
       c.views = {{seed.a, seed.i}, {seed.b, seed.j}};
       c.X = seed.X;
-      if (fit(c) && c.squared <= gate2_) grow(c);
+      if (inform(c)) grow(c);
     }
     add_remainders();
     return std::move(found_);
@@ -78,8 +79,7 @@ class PointCandidates {
         add(p, s, A, g);
         c.squared += p.squared({p.n.x - s.n.x, p.n.y - s.n.y});
       }
-      const double flattest = A.trace();
-      if (!(A.determinant() > 1e-12 * flattest * flattest * flattest)) return false;
+      if (!is_regular(A)) return false;
       const Vec3 step = A.inverse() * g;
       c.information = A;
       c.X = c.X + step;
@@ -97,14 +97,14 @@ class PointCandidates {
     constexpr double kLogTwoPi = 1.8378770664093453;
     double s = options_.log_density + 1.5 * kLogTwoPi -
                0.5 * std::log(c.information.determinant()) - c.squared / 2;
-    for (const View v : c.views) s += cameras_[v.camera].sense.gain();
+    for (const View v : c.views) s += cameras_[v.camera].sense.gain;
     if (s <= 0) return s;  // misses only lower it
     std::size_t at = 0;
     for (std::size_t k = 0; k < cameras_.size() && s > 0; ++k) {
       if (at < c.views.size() && c.views[at].camera == static_cast<std::int32_t>(k))
         ++at;
       else if (cameras_[k].could_see(c.X))
-        s += cameras_[k].sense.miss();
+        s += cameras_[k].sense.miss;
     }
     return s;
   }
@@ -192,10 +192,37 @@ class PointCandidates {
   }
 
   void grow(PointCandidate& c) {
-    const bool is_sure_first[] = {true, false, false};
-    for (const bool is_sure : is_sure_first) extend(c, is_sure);
+    std::vector<std::int32_t>& asked = asked_;
+    asked = all_;
+    extend(c, asked, false);
+    extend(c, asked, true);
     prune(c);
+    if (c.views.size() >= 3 && c.views.size() < all_.size()) {
+      // The place is sure now, and may bring others into the gate.
+      const std::size_t n = c.views.size();
+      asked = all_;
+      extend(c, asked, true);
+      if (c.views.size() > n) prune(c);
+    }
     keep(c);
+  }
+
+  // The information of a seed's place; false where its two rays leave the depth open.
+  bool inform(PointCandidate& c) const {
+    Vec3 g{0, 0, 0};
+    for (const View v : c.views) {
+      const Sight s = cameras_[v.camera].sight(c.X);
+      if (!(s.depth > 0)) return false;
+      add(cameras_[v.camera].points[v.point], s, c.information, g);
+    }
+    if (!is_regular(c.information)) return false;
+    c.X = c.X + c.information.inverse() * g;
+    return true;
+  }
+
+  static bool is_regular(const Symmetric3& A) {
+    const double size = A.trace();
+    return A.determinant() > 1e-12 * size * size * size;
   }
 
   // A place where a point is expected: what lies nearest to it in each image.
@@ -220,42 +247,48 @@ class PointCandidates {
     grow(c);
   }
 
-  // Adds a view in every camera that has none, where one lies within the gate; with `is_sure` only
-  // where it is the only one.
-  void extend(PointCandidate& c, bool is_sure) const {
-    for (std::int32_t k = 0; k < static_cast<std::int32_t>(cameras_.size()); ++k) {
+  // Adds a view in each of `asked` that has none, where one lies within the gate; those where several
+  // do are left in `asked`, unless the nearest of them is to be taken.
+  void extend(PointCandidate& c, std::vector<std::int32_t>& asked, bool takes_nearest) const {
+    Symmetric3 P = c.information.inverse();
+    std::size_t n_left = 0;
+    for (const std::int32_t k : asked) {
       const auto at = std::lower_bound(c.views.begin(), c.views.end(), k,
                                        [](View v, std::int32_t camera) { return v.camera < camera; });
       if (at != c.views.end() && at->camera == k) continue;
       const ImagePoints& camera = cameras_[k];
       const Sight s = camera.sight(c.X);
       if (!(s.depth > 0)) continue;
-      const Symmetric3 P = c.information.inverse();
       const Vec3 px = P * s.jx, py = P * s.jy;
       const double sxx = dot(s.jx, px), sxy = dot(s.jx, py), syy = dot(s.jy, py);
-      const double reach = options_.gate * std::sqrt(sxx + camera.widest * camera.widest);
-      const auto from = std::lower_bound(
-          camera.points.begin(), camera.points.end(), s.n.x - reach,
-          [](const ImagePoint& p, double x) { return p.n.x < x; });
+      const double width2 = camera.widest * camera.widest;
+      const double reach = options_.gate * std::sqrt(sxx + width2), height2 = gate2_ * (syy + width2);
+      const auto from = camera.right_of(s.n.x - reach);
       std::int32_t best = -1, n_inside = 0;
       double least = gate2_;
       for (auto p = from; p != camera.points.end() && p->n.x <= s.n.x + reach; ++p) {
-        const double det = p->wxx * p->wyy - p->wxy * p->wxy;
-        const double cxx = sxx + p->wyy / det, cxy = sxy - p->wxy / det, cyy = syy + p->wxx / det;
         const double ex = p->n.x - s.n.x, ey = p->n.y - s.n.y;
+        if (ey * ey > height2) continue;
+        const double cxx = sxx + p->vxx, cxy = sxy + p->vxy, cyy = syy + p->vyy;
         const double r2 =
             (cyy * ex * ex - 2 * cxy * ex * ey + cxx * ey * ey) / (cxx * cyy - cxy * cxy);
         if (r2 > gate2_) continue;
         ++n_inside;
         if (r2 <= least) least = r2, best = static_cast<std::int32_t>(p - camera.points.begin());
       }
-      if (best < 0 || (is_sure && n_inside > 1)) continue;
+      if (best < 0) continue;
+      if (n_inside > 1 && !takes_nearest) {
+        asked[n_left++] = k;
+        continue;
+      }
       c.views.insert(at, {k, best});
       // One step with the new view alone: the others are at their minimum.
       Vec3 g{0, 0, 0};
       add(camera.points[best], s, c.information, g);
-      c.X = c.X + c.information.inverse() * g;
+      P = c.information.inverse();
+      c.X = c.X + P * g;
     }
+    asked.resize(n_left);
   }
 
   // Drops the worst view as long as it is beyond the gate.
@@ -340,7 +373,7 @@ class PointCandidates {
           [v](View w) { return v.camera == w.camera && v.point == w.point; });
       if (is_shared) {
         const ImageSense& sense = cameras_[v.camera].sense;
-        lost += sense.gain() - sense.miss() - squared_of(found_[i], v) / 2;
+        lost += sense.gain - sense.miss - squared_of(found_[i], v) / 2;
       } else {
         rest.views.push_back(v);
       }
@@ -354,6 +387,7 @@ class PointCandidates {
   std::span<const ImagePoints> cameras_;
   CandidateOptions options_;
   double gate2_;
+  std::vector<std::int32_t> all_, asked_;  // cameras
   std::vector<Seed> seeds_;
   std::vector<PointCandidate> found_;
   std::unordered_multimap<std::uint64_t, std::int32_t> by_hash_;

@@ -99,6 +99,13 @@ if TYPE_CHECKING:
     from asterism.model import Tracks as Tracks
     from asterism.model.posterior import log_posterior as log_posterior
     from asterism.model.posterior import track_scores as track_scores
+    from asterism.reconstruct import ImageModel as ImageModel
+    from asterism.reconstruct import Reconstruction as Reconstruction
+    from asterism.reconstruct import Triangulation as Triangulation
+    from asterism.reconstruct import Views as Views
+    from asterism.reconstruct import estimate_images as estimate_images
+    from asterism.reconstruct import reconstruct as reconstruct
+    from asterism.reconstruct import triangulate as triangulate
     from asterism.solve import JointMarginals as JointMarginals
     from asterism.solve import KBestAssignments as KBestAssignments
     from asterism.solve import MultidimensionalAssignment as MultidimensionalAssignment
@@ -188,6 +195,15 @@ _PUBLIC = {
         "fragment_model",
         "identify",
         "stitch",
+    ),
+    "reconstruct": (
+        "ImageModel",
+        "Reconstruction",
+        "Triangulation",
+        "Views",
+        "estimate_images",
+        "reconstruct",
+        "triangulate",
     ),
     "solve": (
         "JointMarginals",

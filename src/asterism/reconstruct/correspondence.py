@@ -8,7 +8,7 @@ import numpy as np
 
 from asterism import _engine
 from asterism.camera import Observations, Rig
-from asterism.errors import ParameterError, check_array, check_number
+from asterism.errors import ParameterError, check_number
 from asterism.model import Detections
 from asterism.model.detections import FARTHEST
 from asterism.reconstruct.image_model import ImageModel
@@ -18,7 +18,7 @@ from asterism.reconstruct.triangulation import Triangulation, triangulate
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
 __all__ = ["matched_rig", "reconstruct"]
 
@@ -32,7 +32,6 @@ def reconstruct(
     *,
     min_views: int = 2,
     gate: float = 4.0,
-    volume: tuple[ArrayLike, ArrayLike] | None = None,
     prior: Detections | None = None,
     max_nodes: int = 2000,
     n_threads: int = 1,
@@ -60,8 +59,6 @@ def reconstruct(
         Fewest cameras that a point needs, 2 or more.
     gate : float
         Standard deviations within which an image point may be of a place.
-    volume : (low, high), each array_like of shape (3,), optional
-        Corners of the box, world metres, beyond which there are no points.
     prior : Detections, optional
         3-D places where points are expected, for each frame of the observations; they are tried
         first, and claim nothing that the images do not bear out.
@@ -100,12 +97,12 @@ def reconstruct(
     check_number("gate", gate, above=0)
     check_number("max_nodes", max_nodes, above=1, closed=True, integer=True)
     check_number("n_threads", n_threads, above=1, below=1024, closed=True, integer=True)
-    low, high = _box(volume)
     if model is None:
         from asterism.reconstruct.images_from_clip import estimate_images
 
-        model = estimate_images(observations, rig, gate=gate, volume=volume)
+        model = estimate_images(observations, rig, gate=gate)
     sigma, p_detection, clutter = model.of(used)
+    low, high = model.box(used)
     solver = _engine.ViewSolver(
         cameras=[camera.engine for camera in used],
         sigma=sigma,
@@ -173,20 +170,6 @@ class _Piece(NamedTuple):
     cameras: NDArray[np.int64]
     blobs: NDArray[np.int64]
     figures: NDArray[np.float64]
-
-
-def _box(
-    volume: tuple[ArrayLike, ArrayLike] | None,
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    if volume is None:
-        return (-FARTHEST,) * 3, (FARTHEST,) * 3
-    if not isinstance(volume, (tuple, list)) or len(volume) != 2:  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("volume", "two corners, low and high", repr(volume))
-    low, high = (check_array("volume", corner, (3,)) for corner in volume)
-    if (high <= low).any():
-        raise ParameterError("volume", f"a corner beyond {low.tolist()}", high.tolist())
-    (a, b, c), (d, e, f) = low.tolist(), high.tolist()
-    return (a, b, c), (d, e, f)
 
 
 def _expected(prior: Detections | None, observations: Observations) -> Detections:

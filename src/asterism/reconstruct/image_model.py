@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import check_number
+from asterism.errors import ParameterError, check_array, check_number
 from asterism.reconstruct.triangulation import per_camera
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from asterism.camera import Rig
 
-__all__ = ["CameraNumbers", "ImageModel"]
+__all__ = ["CameraNumbers", "ImageModel", "widest_base"]
+
+_REACH = 10  # base lines; beyond, depth is worth nothing
 
 CameraNumbers = float | tuple[float, ...]
 """One number for all cameras, or one for each."""
@@ -36,7 +38,10 @@ class ImageModel:
         Expected image points a camera and frame that belong to no point in space: false ones, and
         those of markers that no other camera sees.
     density : float
-        Points in space by cubic metre, where there are any.
+        Points in space by cubic metre of the volume.
+    volume : (low, high), each 3 floats, optional
+        Corners of the box in which there are points, world metres. By default one about the cameras,
+        ten times as wide each way as the two that are farthest apart.
 
     Raises
     ------
@@ -48,6 +53,7 @@ class ImageModel:
     p_detection: CameraNumbers = 0.9
     clutter: CameraNumbers = 1.0
     density: float = 10.0
+    volume: tuple[ArrayLike, ArrayLike] | None = None
 
     def __post_init__(self) -> None:
         for name in ("sigma_px", "p_detection", "clutter"):
@@ -61,6 +67,13 @@ class ImageModel:
             else:
                 check_number(name, value, above=0, below=below)
         check_number("density", self.density, above=0)
+        if self.volume is not None:
+            if not isinstance(self.volume, (tuple, list)) or len(self.volume) != 2:  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise ParameterError("volume", "two corners, low and high", repr(self.volume))
+            low, high = (check_array("volume", corner, (3,)).tolist() for corner in self.volume)
+            if not np.all(np.less(low, high)):
+                raise ParameterError("volume", f"a corner beyond {low}", high)
+            object.__setattr__(self, "volume", (tuple(low), tuple(high)))
 
     def of(self, rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Give noise, probability of detection and clutter by pixel², each of shape (C,)."""
@@ -70,3 +83,20 @@ class ImageModel:
             per_camera("p_detection", self.p_detection, rig, below=1.0),
             per_camera("clutter", self.clutter, rig) / area,
         )
+
+    def box(self, rig: Rig) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Give the corners of the volume, world metres, whether it is given or not."""
+        if self.volume is not None:
+            low, high = (np.asarray(corner).tolist() for corner in self.volume)
+        else:
+            centers = np.stack([camera.center for camera in rig])
+            middle = centers.mean(axis=0)
+            reach = _REACH * widest_base(rig)
+            low, high = (middle - reach).tolist(), (middle + reach).tolist()
+        return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+
+
+def widest_base(rig: Rig) -> float:
+    """Give the distance between the two cameras that are farthest apart, metres."""
+    centers = np.stack([camera.center for camera in rig])
+    return float(np.linalg.norm(centers[:, None] - centers, axis=-1).max())
