@@ -57,8 +57,8 @@ std::vector<Vec3> places(const In<double>& points) {
 //  counts (4,): candidates, parts searched, parts cut; and what the best choice may be worth more).
 nb::tuple reconstruct(const ViewSolver& solver, const In<double>& pixels,
                       const In<std::int64_t>& offsets, const In<double>& priors,
-                      const In<std::int64_t>& prior_offsets, std::int64_t max_nodes,
-                      std::int32_t n_threads) {
+                      const In<std::int64_t>& prior_offsets, double merge,
+                      std::int64_t max_nodes, std::int32_t n_threads) {
   const std::span<const std::int64_t> cells = checked(pixels, offsets);
   const std::size_t C = solver.cameras.size();
   require((cells.size() - 1) % C == 0, "offsets: shape (T * C + 1,)");
@@ -80,7 +80,7 @@ nb::tuple reconstruct(const ViewSolver& solver, const In<double>& pixels,
       const auto first = static_cast<std::size_t>(prior_offsets.data()[t]);
       const auto last = static_cast<std::size_t>(prior_offsets.data()[t + 1]);
       found[t] = workers[worker].solve({pixels.data() + 2 * from, 2 * n}, own,
-                                       std::span(expected).subspan(first, last - first), max_nodes,
+                                       std::span(expected).subspan(first, last - first), merge, max_nodes,
                                        summaries[t]);
     });
   }
@@ -168,7 +168,7 @@ void bind_reconstruct(nb::module_& module) {
            nb::kw_only(), "cameras"_a, "sigma"_a, "p_detection"_a, "clutter"_a, "log_density"_a,
            "gate"_a, "min_views"_a, "low"_a, "high"_a, nb::keep_alive<1, 2>())
       .def("reconstruct", &reconstruct, "pixels"_a, "offsets"_a, "priors"_a, "prior_offsets"_a,
-           "max_nodes"_a, "n_threads"_a)
+           "merge"_a, "max_nodes"_a, "n_threads"_a)
       .def("candidates", &candidates, "pixels"_a, "offsets"_a);
   module.def("choose_candidates", &choose, "scores"_a, "first"_a, "views"_a, "max_nodes"_a);
 }

@@ -32,7 +32,9 @@ struct ImagePoint {
   double wxx, wxy, wyy;  // W
   double vxx, vxy, vyy;  // its inverse
   double spread;         // largest standard deviation of n
+  double gain;           // what it adds to the log likelihood ratio, but for its distance
   std::int32_t number;   // in the frame, over all cameras
+  bool is_shared = false;
 
   double squared(Plane e) const { return wxx * e.x * e.x + 2 * wxy * e.x * e.y + wyy * e.y * e.y; }
 };
@@ -62,7 +64,7 @@ class ImagePoints {
       const Jacobian2 D = camera->slope(n);
       if (!std::isfinite(D.xx)) continue;
       ImagePoint p{n, w * (D.xx * D.xx + D.yx * D.yx), w * (D.xx * D.xy + D.yx * D.yy),
-                   w * (D.xy * D.xy + D.yy * D.yy), 0, 0, 0, 0,
+                   w * (D.xy * D.xy + D.yy * D.yy), 0, 0, 0, 0, sense.gain,
                    first + static_cast<std::int32_t>(i)};
       const double det = p.wxx * p.wyy - p.wxy * p.wxy;
       p.vxx = p.wyy / det, p.vxy = -p.wxy / det, p.vyy = p.wxx / det;
@@ -70,6 +72,7 @@ class ImagePoints {
       p.spread = std::sqrt(half + std::sqrt(apart * apart + p.vxy * p.vxy));
       points.push_back(p);
     }
+    n_free = points.size();
     std::sort(points.begin(), points.end(), [](const ImagePoint& a, const ImagePoint& b) {
       return a.n.x != b.n.x ? a.n.x < b.n.x : a.n.y < b.n.y;
     });
@@ -82,6 +85,23 @@ class ImagePoints {
       const Vec3 d = s * n.x * r0_ + s * n.y * r1_ + s * r2_;
       dx[i] = d.x, dy[i] = d.y, dz[i] = d.z;
       widest = std::max(widest, points[i].spread);
+    }
+  }
+
+  // Lets another point in space share an image point that is taken: its image may have merged with
+  // it. That explains why there is no other, and says where the place is, but only to sigma pixels.
+  // The image point itself is explained already, so it gains nothing.
+  void share(const std::vector<char>& is_taken, double sigma) {
+    const double wider = sigma / sense.sigma;
+    n_free = points.size();
+    for (ImagePoint& p : points) {
+      if (!is_taken[p.number]) continue;
+      p.is_shared = true, p.gain = 0;
+      --n_free;
+      p.wxx /= wider * wider, p.wxy /= wider * wider, p.wyy /= wider * wider;
+      p.vxx *= wider * wider, p.vxy *= wider * wider, p.vyy *= wider * wider;
+      p.spread *= wider;
+      widest = std::max(widest, p.spread);
     }
   }
 
@@ -117,6 +137,7 @@ class ImagePoints {
   std::vector<ImagePoint> points;   // by n.x
   std::vector<double> dx, dy, dz;   // unit vectors of their rays, world
   double widest = 0;                // largest spread
+  std::size_t n_free = 0;           // of the points: not shared
 
  private:
   // Where the points of each of many even strips begin.

@@ -42,21 +42,21 @@ class ManyViews {
     return out;
   }
 
+  // The best choice of points; then, with merge > 0, those that it left because their images have
+  // merged with others, as far as `merge` pixels (one standard deviation) from where they belong.
   std::vector<FoundPoint> solve(std::span<const double> pixels, std::span<const std::int64_t> offsets,
-                                std::span<const Vec3> priors, std::int64_t max_nodes,
+                                std::span<const Vec3> priors, double merge, std::int64_t max_nodes,
                                 FrameSummary& summary) {
-    const std::vector<PointCandidate> all = candidates(pixels, offsets, priors);
-    std::vector<std::vector<std::int32_t>> used;
-    std::vector<double> scores;
-    for (const PointCandidate& c : all) {
-      used.push_back(uses(c));
-      scores.push_back(c.score);
-    }
-    summary.n_candidates += static_cast<std::int64_t>(all.size());
-    CandidateChoice choice(used, scores, pixels.size() / 2);
     std::vector<FoundPoint> found;
-    for (const std::int32_t k : choice.solve(max_nodes, summary.choice))
-      found.push_back({all[k].X, all[k].score, std::move(used[k])});
+    choose(candidates(pixels, offsets, priors), pixels.size() / 2, max_nodes, summary, found);
+    std::vector<char> is_taken(pixels.size() / 2, 0);
+    for (const FoundPoint& p : found)
+      for (const std::int32_t use : p.uses) is_taken[use] = 1;
+    const bool is_any_left = std::find(is_taken.begin(), is_taken.end(), 0) != is_taken.end();
+    if (merge > 0 && !found.empty() && is_any_left) {
+      for (ImagePoints& camera : images_) camera.share(is_taken, std::max(merge, camera.sense.sigma));
+      choose(PointCandidates(images_, options_).find(priors), is_taken.size(), max_nodes, summary, found);
+    }
     std::sort(found.begin(), found.end(), [](const FoundPoint& a, const FoundPoint& b) {
       return a.X.x != b.X.x ? a.X.x < b.X.x : a.X.y < b.X.y;
     });
@@ -64,6 +64,20 @@ class ManyViews {
   }
 
  private:
+  void choose(const std::vector<PointCandidate>& all, std::size_t n_points, std::int64_t max_nodes,
+              FrameSummary& summary, std::vector<FoundPoint>& found) const {
+    std::vector<std::vector<std::int32_t>> used;
+    std::vector<double> scores;
+    for (const PointCandidate& c : all) {
+      used.push_back(uses(c));
+      scores.push_back(c.score);
+    }
+    summary.n_candidates += static_cast<std::int64_t>(all.size());
+    CandidateChoice choice(used, scores, n_points);
+    for (const std::int32_t k : choice.solve(max_nodes, summary.choice))
+      found.push_back({all[k].X, all[k].score, std::move(used[k])});
+  }
+
   CandidateOptions options_;
   std::vector<ImagePoints> images_;
 };

@@ -97,7 +97,7 @@ class PointCandidates {
     constexpr double kLogTwoPi = 1.8378770664093453;
     double s = options_.log_density + 1.5 * kLogTwoPi -
                0.5 * std::log(c.information.determinant()) - c.squared / 2;
-    for (const View v : c.views) s += cameras_[v.camera].sense.gain;
+    for (const View v : c.views) s += cameras_[v.camera].points[v.point].gain;
     if (s <= 0) return s;  // misses only lower it
     std::size_t at = 0;
     for (std::size_t k = 0; k < cameras_.size() && s > 0; ++k) {
@@ -139,6 +139,7 @@ class PointCandidates {
         const Vec3 base = B.center - A.center;
         height.resize(B.points.size());
         for (std::size_t i = 0; i < A.points.size(); ++i) {
+          if (A.points[i].is_shared && B.n_free == 0) continue;
           // How far the rays of b are out of the plane of this ray and the base line.
           const Vec3 d = A.ray(i), m = cross(base, d);
           const double m2 = dot(m, m);
@@ -162,6 +163,7 @@ class PointCandidates {
   void try_seed(std::int32_t a, std::size_t i, std::int32_t b, std::size_t j, Vec3 base,
                 double height, double m2) {
     const ImagePoints &A = cameras_[a], &B = cameras_[b];
+    if (A.points[i].is_shared && B.points[j].is_shared) return;
     const Vec3 d = A.ray(i), e = B.ray(j);
     const double de = dot(d, e), sine2 = 1 - de * de;
     if (!(sine2 > 1e-9)) return;
@@ -317,7 +319,10 @@ class PointCandidates {
   // Keeps a candidate that has been fitted, unless it is there already.
   void keep(PointCandidate& c) {
     if (static_cast<std::int32_t>(c.views.size()) < std::max(options_.min_views, 2)) return;
-    if (!is_inside(c.X)) return;
+    const bool is_own = std::any_of(c.views.begin(), c.views.end(), [this](View v) {
+      return !cameras_[v.camera].points[v.point].is_shared;
+    });
+    if (!is_own || !is_inside(c.X)) return;
     c.score = score(c);
     if (!(c.score > 0)) return;
     std::uint64_t hash = 1469598103934665603u;
@@ -372,8 +377,8 @@ class PointCandidates {
           found_[rival].views.begin(), found_[rival].views.end(),
           [v](View w) { return v.camera == w.camera && v.point == w.point; });
       if (is_shared) {
-        const ImageSense& sense = cameras_[v.camera].sense;
-        lost += sense.gain - sense.miss - squared_of(found_[i], v) / 2;
+        const ImagePoints& camera = cameras_[v.camera];
+        lost += camera.points[v.point].gain - camera.sense.miss - squared_of(found_[i], v) / 2;
       } else {
         rest.views.push_back(v);
       }

@@ -387,6 +387,7 @@ class ViewSolver:
         offsets: NDArray[np.int64],
         priors: NDArray[np.float64],
         prior_offsets: NDArray[np.int64],
+        merge: float,
         max_nodes: int,
         n_threads: int,
     ) -> tuple[

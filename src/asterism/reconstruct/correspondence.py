@@ -32,6 +32,7 @@ def reconstruct(
     *,
     min_views: int = 2,
     gate: float = 4.0,
+    merge_px: float = 1.0,
     prior: Detections | None = None,
     max_nodes: int = 2000,
     n_threads: int = 1,
@@ -59,6 +60,10 @@ def reconstruct(
         Fewest cameras that a point needs, 2 or more.
     gate : float
         Standard deviations within which an image point may be of a place.
+    merge_px : float
+        How far the middle of two merged images may be from where each belongs, one standard
+        deviation, pixels. A point that the choice left may share image points that are taken, but
+        needs one of its own; what two points share counts so much less in both. 0 for no sharing.
     prior : Detections, optional
         3-D places where points are expected, for each frame of the observations; they are tried
         first, and claim nothing that the images do not bear out.
@@ -95,6 +100,7 @@ def reconstruct(
     used, numbers = matched_rig(observations, rig)
     check_number("min_views", min_views, above=2, below=len(used), closed=True, integer=True)
     check_number("gate", gate, above=0)
+    check_number("merge_px", merge_px, above=0, closed=True)
     check_number("max_nodes", max_nodes, above=1, closed=True, integer=True)
     check_number("n_threads", n_threads, above=1, below=1024, closed=True, integer=True)
     if model is None:
@@ -125,10 +131,11 @@ def reconstruct(
             np.ascontiguousarray(observations.offsets[begin * C : end * C + 1]),
             np.ascontiguousarray(expected.points[rows]),
             np.ascontiguousarray(expected.offsets[begin : end + 1] - rows.start),
+            float(merge_px),
             int(max_nodes),
             int(n_threads),
         )
-        pieces.append(_piece(found, observations, used, sigma))
+        pieces.append(_piece(found, observations, used, sigma, float(merge_px)))
         if advance is not None:
             advance(end)
     return _joined(pieces, observations, numbers, model)
@@ -190,6 +197,7 @@ def _piece(
     observations: Observations,
     rig: Rig,
     sigma: NDArray[np.float64],
+    merge_px: float,
 ) -> _Piece:
     """Triangulate what the engine matched, on the pixels as they were measured."""
     points, scores, counts, starts, blobs, figures, gap = found
@@ -198,7 +206,11 @@ def _piece(
     cameras = observations.camera_of[blobs]
     pixels = np.full((len(rig), len(points), 2), np.nan)
     pixels[cameras, of] = observations.pixels[blobs]
-    solved = triangulate(pixels, rig, sigma_px=sigma, start=points)
+    noise = np.repeat(sigma[:, None], len(points), axis=1)
+    is_shared = Views(offsets=starts, cameras=cameras, blobs=blobs).is_shared
+    own = (cameras[is_shared], of[is_shared])
+    noise[own] = np.maximum(noise[own], merge_px)
+    solved = triangulate(pixels, rig, sigma_px=noise, start=points)
     squares = np.zeros(len(points))
     for c, camera in enumerate(rig):
         own = cameras == c

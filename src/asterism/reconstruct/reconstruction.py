@@ -59,6 +59,14 @@ class Views:
         """Point of each view, shape (V,)."""
         return np.repeat(np.arange(len(self.offsets) - 1), self.counts)
 
+    @property
+    def is_shared(self) -> NDArray[np.bool_]:
+        """Whether another point was made of the same image point too, shape (V,)."""
+        if not len(self.blobs):
+            return np.zeros(0, dtype=bool)
+        first = int(self.blobs.min())
+        return np.bincount(self.blobs - first)[self.blobs - first] > 1
+
     def of(self, point: int) -> list[tuple[int, int]]:
         """Give (camera, blob) of each view of a point."""
         rows = slice(int(self.offsets[point]), int(self.offsets[point + 1]))

@@ -61,8 +61,8 @@ def triangulate(
         What each camera saw of each point; NaN where nothing.
     rig : Rig
         The C cameras.
-    sigma_px : array_like, shape () or (C,)
-        Standard deviation of an image point, pixels per axis; of all cameras, or of each.
+    sigma_px : array_like, shape (), (C,) or (C, N)
+        Standard deviation of an image point, pixels per axis: of all, of each camera's, or of each.
     start : array_like, shape (N, 3), optional
         Places to begin at instead, world metres.
 
@@ -91,7 +91,12 @@ def triangulate(
     z = check_array("pixels", pixels, (len(_checked(rig)), "N", 2), finite=False)
     if np.isinf(z).any():
         raise ParameterError("pixels", "finite numbers, or NaN for nothing", "infinities")
-    sigma = per_camera("sigma_px", sigma_px, rig)
+    if np.ndim(sigma_px) == 2:
+        sigma = check_array("sigma_px", sigma_px, z.shape[:2])
+        if (sigma <= 0).any():
+            raise ParameterError("sigma_px", "numbers > 0", float(sigma.min()))
+    else:
+        sigma = per_camera("sigma_px", sigma_px, rig)[:, None]
     rays = np.stack([camera.rays(p) for camera, p in zip(rig, z, strict=True)])
     is_seen = np.isfinite(rays[..., 0])
     n_views = is_seen.sum(axis=0)
@@ -100,7 +105,7 @@ def triangulate(
     else:
         points = check_array("start", start, (z.shape[1], 3), finite=False).copy()
     points[n_views < 2] = np.nan
-    weights = np.where(is_seen, sigma[:, None] ** -2.0, 0.0)
+    weights = np.where(is_seen, sigma**-2.0, 0.0)
     points = _descended(points, z, weights, rig)
     points[~np.isfinite(_cost(points, z, weights, rig))] = np.nan
     information, _ = _normal_equations(points, z, weights, rig)
