@@ -236,7 +236,9 @@ def _joined(
     model: ImageModel,
 ) -> Reconstruction:
     def all_of(arrays: list[NDArray[np.float64]], *shape: int) -> NDArray[np.float64]:
-        return np.concatenate([np.empty((0, *shape), arrays[0].dtype if arrays else float), *arrays])
+        return np.concatenate(
+            [np.empty((0, *shape), arrays[0].dtype if arrays else float), *arrays]
+        )
 
     points = all_of([p.solved.points for p in pieces], 3)
     covariances = all_of([p.solved.covariances for p in pieces], 3, 3)

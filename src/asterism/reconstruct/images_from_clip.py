@@ -80,7 +80,7 @@ def estimate_images(
         share = 0.0
         for part in _ROUNDS:
             some = _sample(seen, max(round(part * seen.n_frames), 1))
-            made = reconstruct(some, used, model, gate=gate)
+            made = reconstruct(some, used, model, gate=gate, merge_px=0.0)
             share = len(made.views.blobs) / max(some.n_points, 1)
             if not made.detections.n_points:
                 break
@@ -96,9 +96,8 @@ def _sample(observations: Observations, n: int) -> Observations:
     """Cut out frames in which two cameras saw something, spread evenly."""
     o, C = observations, observations.n_cameras
     useful = np.flatnonzero((o.counts > 0).sum(axis=1) >= 2)
-    frames = useful[np.unique(np.linspace(0, len(useful) - 1, n).round().astype(int))]
-    if not len(useful):
-        frames = useful
+    n = min(n, len(useful))
+    frames = useful[np.unique(np.linspace(0, max(len(useful) - 1, 0), n).round().astype(int))]
     rows = [np.arange(o.offsets[t * C], o.offsets[(t + 1) * C]) for t in frames.tolist()]
     chosen = np.concatenate([np.empty(0, dtype=np.int64), *rows])
     counts = o.counts[frames].ravel()

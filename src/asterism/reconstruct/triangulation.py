@@ -166,14 +166,14 @@ def _descended(
     reach = np.stack([np.linalg.norm(points - camera.center, axis=1) for camera in rig]).max(axis=0)
     damping = np.zeros(len(points))
     cost = _cost(points, z, weights, rig)
-    active = np.flatnonzero(np.isfinite(cost))
+    active = np.flatnonzero(np.isfinite(cost))  # NaN stays NaN
     for _ in range(_ROUNDS):
         if not len(active):
             break
         A, g = _normal_equations(points[active], z[:, active], weights[:, active], rig)
         diagonal = np.trace(A, axis1=1, axis2=2) / 3
-        # 1e-15 keeps what all rays leave open (one line) where it is.
-        A += ((damping[active] + 1e-15) * diagonal)[:, None, None] * np.eye(3)
+        # 1e-13 keeps what all rays leave open (one line) where it is.
+        A += ((damping[active] + 1e-13) * diagonal)[:, None, None] * np.eye(3)
         step = np.linalg.solve(A, g[..., None])[..., 0]
         there = points[active] + step
         new = _cost(there, z[:, active], weights[:, active], rig)
@@ -193,7 +193,7 @@ def _cost(
     """Give the weighted sum of squares in pixels; infinite where a camera cannot see a place."""
     off = ((z - rig.project(points).pixels) ** 2).sum(axis=-1) * weights
     cost = np.where(weights > 0, off, 0.0).sum(axis=0)
-    return np.where(np.isfinite(cost), cost, np.inf)
+    return np.where(np.isfinite(cost) & np.isfinite(points[:, 0]), cost, np.inf)
 
 
 def _normal_equations(
