@@ -1,4 +1,4 @@
-"""From many views to points: against every set of image points, exact without noise, and hard cases."""
+"""From many views to points: against all sets of image points, exact without noise, hard cases."""
 
 from __future__ import annotations
 
@@ -189,10 +189,7 @@ def test_the_order_of_image_points_and_the_world_do_not_matter(seed):
     assert there.n_points == made.detections.n_points
     expected = made.detections.points @ T[:3, :3].T + T[:3, 3]
     for t in range(2):
-        a, b = (
-            there.frame(t),
-            expected[made.detections.offsets[t] : made.detections.offsets[t + 1]],
-        )
+        a, b = there.frame(t), expected[made.detections.frame_of == t]
         nearest = np.linalg.norm(a[:, None] - b, axis=-1).min(axis=1)
         assert nearest.max(initial=0) < 1e-7
 
@@ -249,7 +246,7 @@ def test_no_image_point_is_used_twice_unless_images_have_merged():
 
 
 def test_merged_images_are_shared():
-    # Two cameras; the first has both markers on one ray but for a pixel, the second tells them apart.
+    # The first of two cameras has both markers on one ray but for a pixel, the second does not.
     rig = am.Rig.ring(4, radius=4, height=1)[:2]
     camera = rig[0]
     pair = np.array([[0.3, 0.0, 1.0], [-0.3, 0.0, 1.0]])

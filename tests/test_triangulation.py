@@ -1,4 +1,4 @@
-"""Places from their images: against SciPy and OpenCV, exact without noise, as good as can be with."""
+"""Places from their images: against SciPy and OpenCV, exact without noise, the bound with it."""
 
 from __future__ import annotations
 

@@ -59,9 +59,11 @@ if TYPE_CHECKING:
     from asterism.errors import ParameterError as ParameterError
     from asterism.errors import SolverLimit as SolverLimit
     from asterism.evaluate import Evaluation as Evaluation
+    from asterism.evaluate import PointScores as PointScores
     from asterism.evaluate import calibration as calibration
     from asterism.evaluate import evaluate as evaluate
     from asterism.evaluate import floor as floor
+    from asterism.evaluate import point_scores as point_scores
     from asterism.filter import States as States
     from asterism.filter import filter_states as filter_states
     from asterism.filter import smooth as smooth
@@ -213,7 +215,7 @@ _PUBLIC = {
         "joint_marginals",
         "k_best_assignments",
     ),
-    "evaluate": ("Evaluation", "calibration", "evaluate", "floor"),
+    "evaluate": ("Evaluation", "PointScores", "calibration", "evaluate", "floor", "point_scores"),
     "io": ("FORMATS", "CaptureInfo", "describe", "read", "read_tracks", "write"),
     "io.calibration": ("CALIBRATIONS", "read_rig", "write_rig"),
     "io.observations": ("read_observations", "write_observations"),

@@ -47,7 +47,7 @@ class Detections:
     stds : array_like, shape (N,), optional
         Standard deviation of each coordinate where it is known, metres; 0 where it is not.
     covariances : array_like, shape (N, D, D), optional
-        Covariance of each point, m², where several cameras tell it; all zeros where it is not known.
+        Covariance of each point, m², where several cameras tell it; all zeros where not.
 
     Raises
     ------

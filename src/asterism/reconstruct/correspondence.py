@@ -11,14 +11,15 @@ from asterism.camera import Observations, Rig
 from asterism.errors import ParameterError, check_number
 from asterism.model import Detections
 from asterism.model.detections import FARTHEST
-from asterism.reconstruct.image_model import ImageModel
 from asterism.reconstruct.reconstruction import Reconstruction, Views
-from asterism.reconstruct.triangulation import Triangulation, triangulate
+from asterism.reconstruct.triangulation import triangulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+
+    from asterism.reconstruct.image_model import ImageModel
 
 __all__ = ["matched_rig", "reconstruct"]
 
@@ -122,23 +123,33 @@ def reconstruct(
     )
     expected = _expected(prior, observations)
     pieces: list[_Piece] = []
+    figures, gap = np.zeros(3, dtype=np.int64), 0.0
     C, T = observations.n_cameras, observations.n_frames
-    for begin in range(0, T, _CHUNK):
+    for begin in range(0, max(T, 1), _CHUNK):
         end = min(begin + _CHUNK, T)
-        rows = slice(int(expected.offsets[begin]), int(expected.offsets[end]))
-        found = solver.reconstruct(
+        first, last = int(expected.offsets[begin]), int(expected.offsets[end])
+        points, scores, counts, starts, blobs, counted, open_ = solver.reconstruct(
             observations.pixels,
             np.ascontiguousarray(observations.offsets[begin * C : end * C + 1]),
-            np.ascontiguousarray(expected.points[rows]),
-            np.ascontiguousarray(expected.offsets[begin : end + 1] - rows.start),
+            np.ascontiguousarray(expected.points[first:last]),
+            np.ascontiguousarray(expected.offsets[begin : end + 1] - first),
             float(merge_px),
             int(max_nodes),
             int(n_threads),
         )
+        figures, gap = figures + counted, gap + open_
+        found = _Found(points, scores, counts, starts, blobs)
         pieces.append(_piece(found, observations, used, sigma, float(merge_px)))
         if advance is not None:
             advance(end)
-    return _joined(pieces, observations, numbers, model)
+    n_candidates, n_searched, n_cut = (int(n) for n in figures)
+    info = {
+        "n_candidates": n_candidates,
+        "n_searched": n_searched,
+        "n_cut": n_cut,
+        "gap": gap,
+    }
+    return _joined(pieces, observations, numbers, model, info)
 
 
 def matched_rig(observations: Observations, rig: Rig) -> tuple[Rig, NDArray[np.int64]]:
@@ -166,17 +177,27 @@ def matched_rig(observations: Observations, rig: Rig) -> tuple[Rig, NDArray[np.i
     return Rig(tuple(rig[int(i)] for i in numbers)), numbers
 
 
-class _Piece(NamedTuple):
-    """What was found in some frames."""
+class _Found(NamedTuple):
+    """What the engine matched: points, their scores, how many by frame, and their views (CSR)."""
 
-    solved: Triangulation
-    residuals: NDArray[np.float64]
+    points: NDArray[np.float64]
     scores: NDArray[np.float64]
     counts: NDArray[np.int64]
+    starts: NDArray[np.int64]
+    blobs: NDArray[np.int64]
+
+
+class _Piece(NamedTuple):
+    """What was found in some frames: an entry for each point, frame or view."""
+
+    points: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    residuals: NDArray[np.float64]
+    scores: NDArray[np.float64]
     n_views: NDArray[np.int64]
+    counts: NDArray[np.int64]
     cameras: NDArray[np.int64]
     blobs: NDArray[np.int64]
-    figures: NDArray[np.float64]
 
 
 def _expected(prior: Detections | None, observations: Observations) -> Detections:
@@ -193,23 +214,18 @@ def _expected(prior: Detections | None, observations: Observations) -> Detection
 
 
 def _piece(
-    found: tuple[NDArray[np.float64], ...],
-    observations: Observations,
-    rig: Rig,
-    sigma: NDArray[np.float64],
-    merge_px: float,
+    found: _Found, observations: Observations, rig: Rig, sigma: NDArray[np.float64], merge_px: float
 ) -> _Piece:
     """Triangulate what the engine matched, on the pixels as they were measured."""
-    points, scores, counts, starts, blobs, figures, gap = found
-    n_views = np.diff(starts)
-    of = np.repeat(np.arange(len(points)), n_views)
+    points, scores, counts, starts, blobs = found
     cameras = observations.camera_of[blobs]
+    views = Views(offsets=starts, cameras=cameras, blobs=blobs)
+    of = views.point_of
     pixels = np.full((len(rig), len(points), 2), np.nan)
     pixels[cameras, of] = observations.pixels[blobs]
     noise = np.repeat(sigma[:, None], len(points), axis=1)
-    is_shared = Views(offsets=starts, cameras=cameras, blobs=blobs).is_shared
-    own = (cameras[is_shared], of[is_shared])
-    noise[own] = np.maximum(noise[own], merge_px)
+    merged = (cameras[views.is_shared], of[views.is_shared])
+    noise[merged] = np.maximum(noise[merged], merge_px)
     solved = triangulate(pixels, rig, sigma_px=noise, start=points)
     squares = np.zeros(len(points))
     for c, camera in enumerate(rig):
@@ -218,14 +234,14 @@ def _piece(
         rays = camera.rays(observations.pixels[blobs[own]])
         squares[of[own]] += (np.cross(away, rays) ** 2).sum(axis=1)
     return _Piece(
-        solved=solved,
-        residuals=np.sqrt(squares / np.maximum(n_views, 1)),
+        points=solved.points,
+        covariances=solved.covariances,
+        residuals=np.sqrt(squares / np.maximum(views.counts, 1)),
         scores=scores,
+        n_views=views.counts,
         counts=counts,
-        n_views=n_views,
         cameras=cameras,
         blobs=blobs,
-        figures=np.append(figures, gap),
     )
 
 
@@ -234,50 +250,32 @@ def _joined(
     observations: Observations,
     numbers: NDArray[np.int64],
     model: ImageModel,
+    info: dict[str, float],
 ) -> Reconstruction:
-    def all_of(arrays: list[NDArray[np.float64]], *shape: int) -> NDArray[np.float64]:
-        return np.concatenate(
-            [np.empty((0, *shape), arrays[0].dtype if arrays else float), *arrays]
-        )
-
-    points = all_of([p.solved.points for p in pieces], 3)
-    covariances = all_of([p.solved.covariances for p in pieces], 3, 3)
-    scores, residuals = all_of([p.scores for p in pieces]), all_of([p.residuals for p in pieces])
-    counts = all_of([p.counts for p in pieces]).astype(np.int64)
-    n_views = all_of([p.n_views for p in pieces]).astype(np.int64)
-    cameras = all_of([p.cameras for p in pieces]).astype(np.int64)
-    blobs = all_of([p.blobs for p in pieces]).astype(np.int64)
+    all_of = _Piece(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
     # What the pixels themselves leave without a place or a depth is none.
-    is_sound = np.isfinite(covariances).all(axis=(1, 2)) & (np.abs(points) <= FARTHEST).all(axis=1)
-    of = np.repeat(np.arange(len(points)), n_views)
-    offsets = np.concatenate([[0], np.cumsum(is_sound)])[np.append(0, np.cumsum(counts))]
-    masks = np.bincount(of, weights=2.0 ** numbers[cameras], minlength=len(points))
+    is_known = np.isfinite(all_of.covariances).reshape(-1, 9).all(axis=-1)
+    is_sound = np.logical_and(is_known, (np.abs(all_of.points) <= FARTHEST).all(axis=-1))
+    of = np.repeat(np.arange(len(is_sound)), all_of.n_views)
     kept = is_sound[of]
-    covariances = covariances[is_sound]
-    figures = np.sum([np.zeros(4), *(p.figures for p in pieces)], axis=0)
-    n_candidates, n_searched, n_cut, gap = figures.tolist()
+    before = np.concatenate([[0], np.cumsum(is_sound)])
+    masks = np.zeros(len(is_sound), dtype=np.int64)
+    np.bitwise_or.at(masks, of, 1 << np.minimum(numbers[all_of.cameras], 62))
+    P = all_of.covariances[is_sound]
     detections = Detections(
         times=observations.times,
-        offsets=offsets.astype(np.int64),
-        points=points[is_sound],
-        cameras=masks[is_sound].astype(np.int64) if numbers.max() <= 62 else None,
-        residuals=residuals[is_sound],
-        stds=np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 3),
-        covariances=(covariances + np.swapaxes(covariances, 1, 2)) / 2,
+        offsets=before[np.append(0, np.cumsum(all_of.counts))],
+        points=all_of.points[is_sound],
+        cameras=masks[is_sound] if numbers.max() <= 62 else None,
+        residuals=all_of.residuals[is_sound],
+        stds=np.sqrt(np.trace(P, axis1=1, axis2=2) / 3),
+        covariances=(P + np.swapaxes(P, 1, 2)) / 2,
+    )
+    views = Views(
+        offsets=np.append(0, np.cumsum(all_of.n_views[is_sound])),
+        cameras=all_of.cameras[kept],
+        blobs=all_of.blobs[kept],
     )
     return Reconstruction(
-        detections=detections,
-        views=Views(
-            offsets=np.concatenate([[0], np.cumsum(n_views[is_sound])]).astype(np.int64),
-            cameras=cameras[kept],
-            blobs=blobs[kept],
-        ),
-        scores=scores[is_sound],
-        model=model,
-        info={
-            "n_candidates": int(n_candidates),
-            "n_searched": int(n_searched),
-            "n_cut": int(n_cut),
-            "gap": gap,
-        },
+        detections=detections, views=views, scores=all_of.scores[is_sound], model=model, info=info
     )

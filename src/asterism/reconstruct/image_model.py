@@ -40,8 +40,8 @@ class ImageModel:
     density : float
         Points in space by cubic metre of the volume.
     volume : (low, high), each 3 floats, optional
-        Corners of the box in which there are points, world metres. By default one about the cameras,
-        ten times as wide each way as the two that are farthest apart.
+        Corners of the box in which there are points, world metres. By default one about the
+        cameras, that reaches ten times the distance of the two farthest apart each way.
 
     Raises
     ------

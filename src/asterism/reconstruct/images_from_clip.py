@@ -98,7 +98,8 @@ def _sample(observations: Observations, n: int) -> Observations:
     useful = np.flatnonzero((o.counts > 0).sum(axis=1) >= 2)
     n = min(n, len(useful))
     frames = useful[np.unique(np.linspace(0, max(len(useful) - 1, 0), n).round().astype(int))]
-    rows = [np.arange(o.offsets[t * C], o.offsets[(t + 1) * C]) for t in frames.tolist()]
+    starts = o.offsets[::C].tolist()
+    rows = [np.arange(starts[t], starts[t + 1]) for t in frames.tolist()]
     chosen = np.concatenate([np.empty(0, dtype=np.int64), *rows])
     counts = o.counts[frames].ravel()
     return Observations(

@@ -110,8 +110,8 @@ def triangulate(
     points[~np.isfinite(_cost(points, z, weights, rig))] = np.nan
     information, _ = _normal_equations(points, z, weights, rig)
     covariances = np.full(information.shape, np.nan)
-    is_known = np.isfinite(points).all(axis=1)
-    is_known[is_known] = np.linalg.cond(information[is_known]) < _FLATTEST
+    known = np.flatnonzero(np.isfinite(points[:, 0]))
+    is_known = known[np.linalg.cond(information[known]) < _FLATTEST]
     covariances[is_known] = np.linalg.inv(information[is_known])
     residuals = np.where(is_seen[..., None], z - rig.project(points).pixels, np.nan)
     return Triangulation(
