@@ -46,6 +46,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/identity.py --markdown docs/tables/identity.md \
 	  --methods gnn "smp, window=3" mcmcda
 	$(BIN)/python benchmarks/fills.py --markdown docs/tables/fills.md
+	$(BIN)/python benchmarks/reconstruction.py --markdown docs/tables/reconstruction.md
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
 # beside the package, never installed.

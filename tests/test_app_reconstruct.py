@@ -108,3 +108,25 @@ def test_point_scores_by_hand():
     assert am.point_scores(one, near).n_found == 1
     with pytest.raises(am.ParameterError, match="truth"):
         am.point_scores(one, truth)
+
+
+def test_the_map_of_a_rig(film, tmp_path, capsys):
+    picture = tmp_path / "map.png"
+    arguments = ["camera", "map", str(film / "rig.toml"), "--spacing", "0.5"]
+    assert main([*arguments, "-o", str(picture), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    errors = [s["rms_error_mm"] for s in said["suggestions"]]
+    assert len(errors) == 3
+    assert errors == sorted(errors)
+    assert errors[0] < said["rms_error_mm"]
+    assert main([*arguments, "--low", "-1,-1,-1", "--high", "1,1,1", "--suggest", "1"]) == 0
+    assert "One more camera" in capsys.readouterr().out
+    for wrong in (
+        ["--low", "0,0,0"],
+        ["--low", "0,0", "--high", "1,1,1"],
+        ["--low", "1,1,1", "--high", "0,0,0"],
+        ["--suggest", "-1"],
+        ["-o", str(tmp_path / "map.txt")],
+    ):
+        assert main([*arguments, *wrong]) == 2

@@ -101,13 +101,17 @@ if TYPE_CHECKING:
     from asterism.model import Tracks as Tracks
     from asterism.model.posterior import log_posterior as log_posterior
     from asterism.model.posterior import track_scores as track_scores
+    from asterism.reconstruct import CameraSuggestion as CameraSuggestion
     from asterism.reconstruct import ImageModel as ImageModel
     from asterism.reconstruct import Reconstruction as Reconstruction
     from asterism.reconstruct import Triangulation as Triangulation
+    from asterism.reconstruct import TriangulationMap as TriangulationMap
     from asterism.reconstruct import Views as Views
     from asterism.reconstruct import estimate_images as estimate_images
     from asterism.reconstruct import reconstruct as reconstruct
+    from asterism.reconstruct import suggest_cameras as suggest_cameras
     from asterism.reconstruct import triangulate as triangulate
+    from asterism.reconstruct import triangulation_map as triangulation_map
     from asterism.solve import JointMarginals as JointMarginals
     from asterism.solve import KBestAssignments as KBestAssignments
     from asterism.solve import MultidimensionalAssignment as MultidimensionalAssignment
@@ -199,13 +203,17 @@ _PUBLIC = {
         "stitch",
     ),
     "reconstruct": (
+        "CameraSuggestion",
         "ImageModel",
         "Reconstruction",
         "Triangulation",
+        "TriangulationMap",
         "Views",
         "estimate_images",
         "reconstruct",
+        "suggest_cameras",
         "triangulate",
+        "triangulation_map",
     ),
     "solve": (
         "JointMarginals",

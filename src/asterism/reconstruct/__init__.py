@@ -15,15 +15,25 @@ from asterism.reconstruct.image_model import ImageModel
 from asterism.reconstruct.images_from_clip import estimate_images
 from asterism.reconstruct.reconstruction import Reconstruction, Views
 from asterism.reconstruct.triangulation import Triangulation, triangulate
+from asterism.reconstruct.uncertainty import (
+    CameraSuggestion,
+    TriangulationMap,
+    suggest_cameras,
+    triangulation_map,
+)
 
 __all__ = [
+    "CameraSuggestion",
     "ImageModel",
     "Reconstruction",
     "Triangulation",
+    "TriangulationMap",
     "Views",
     "estimate_images",
     "reconstruct",
+    "suggest_cameras",
     "triangulate",
+    "triangulation_map",
 ]
 
 
