@@ -204,10 +204,12 @@ def myptv(folder: Path) -> list[str]:
         made = am.reconstruct(o, rig, min_views=least)
         seconds = time.perf_counter() - start
         n, n_same = myptv_matches(folder, o, made)
+        stds = made.detections.stds
+        assert stds is not None
         three = int((made.views.counts == 3).sum())
         rows.append([
             f"min_views={least} ({seconds:.2f} s)", f"{made.detections.n_points}, {three} of 3",
-            f"{n_same} of {n}", f"{1e3 * float(np.median(made.detections.stds)):.3f}",
+            f"{n_same} of {n}", f"{1e3 * float(np.median(stds)):.3f}",
             f"{100 * lasting(made.detections):.1f}",
         ])  # fmt: skip
     return table(

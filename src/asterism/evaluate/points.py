@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from asterism.errors import ParameterError, check_array, check_number
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
     from asterism.model import Detections, Tracks
 
@@ -105,7 +105,7 @@ def point_scores(
         got = f"{truth.detections.n_frames} frames, {truth.detections.n_axes}-D"
         raise ParameterError("truth", expected, got)
     X = truth.positions()
-    is_there = np.isfinite(X).all(axis=-1)
+    is_there: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(X), axis=-1)
     if counted is None:
         ought = is_there
     else:
