@@ -48,6 +48,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/fills.py --markdown docs/tables/fills.md
 	$(BIN)/python benchmarks/recognition.py --markdown docs/tables/recognition.md
 	$(BIN)/python benchmarks/bond_term.py --markdown docs/tables/bond_term.md
+	$(BIN)/python benchmarks/reconstruction.py --markdown docs/tables/reconstruction.md
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
 # beside the package, never installed.

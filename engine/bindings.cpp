@@ -13,4 +13,5 @@ NB_MODULE(_engine, module) {
   bind_solvers(module);
   bind_chain(module);
   bind_stitcher(module);
+  bind_reconstruct(module);
 }

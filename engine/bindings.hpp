@@ -9,3 +9,4 @@ void bind_camera(nanobind::module_& module);
 void bind_solvers(nanobind::module_& module);
 void bind_chain(nanobind::module_& module);
 void bind_stitcher(nanobind::module_& module);
+void bind_reconstruct(nanobind::module_& module);

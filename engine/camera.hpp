@@ -116,26 +116,35 @@ class Camera {
     }
   }
 
+  // Row k of R.
+  Vec3 row(std::size_t k) const { return {R_[3 * k], R_[3 * k + 1], R_[3 * k + 2]}; }
+
+  // Derivative of a pixel by its normalised coordinates, B D A; NaN where there is no pixel.
+  Jacobian2 slope(Plane n) const {
+    const Plane ideal = A_(n);
+    Plane bent = ideal;
+    lens_.distort({&bent.x, 1}, {&bent.y, 1});
+    if (!std::isfinite(bent.x)) return {kNaN, kNaN, kNaN, kNaN};
+    const Jacobian2 D = lens_.distort_slope(ideal, bent);
+    const double m00 = D.xx * A_.a + D.xy * A_.d, m01 = D.xx * A_.b + D.xy * A_.e;
+    const double m10 = D.yx * A_.a + D.yy * A_.d, m11 = D.yx * A_.b + D.yy * A_.e;
+    return {B_.a * m00 + B_.b * m10, B_.a * m01 + B_.b * m11, B_.d * m00 + B_.e * m10,
+            B_.d * m01 + B_.e * m11};
+  }
+
   // Derivative of a point's pixel by its world coordinates, row by row; NaN where it has no pixel.
   std::array<double, 6> jacobian(Vec3 point) const {
     const Vec3 c = to_camera(point);
     std::array<double, 6> J;
     J.fill(kNaN);
     if (!(c.z > z_least_)) return J;
-    const Plane n{c.x / c.z, c.y / c.z}, ideal = A_(n);
-    Plane bent = ideal;
-    lens_.distort({&bent.x, 1}, {&bent.y, 1});
-    if (!std::isfinite(bent.x)) return J;
-    const Jacobian2 D = lens_.distort_slope(ideal, bent);
-    // d l_d / d n = D A, d pixel / d n = B D A
-    const double m00 = D.xx * A_.a + D.xy * A_.d, m01 = D.xx * A_.b + D.xy * A_.e;
-    const double m10 = D.yx * A_.a + D.yy * A_.d, m11 = D.yx * A_.b + D.yy * A_.e;
-    const double g00 = B_.a * m00 + B_.b * m10, g01 = B_.a * m01 + B_.b * m11;
-    const double g10 = B_.d * m00 + B_.e * m10, g11 = B_.d * m01 + B_.e * m11;
+    const Plane n{c.x / c.z, c.y / c.z};
+    const Jacobian2 G = slope(n);
+    if (!std::isfinite(G.xx)) return J;
     for (std::size_t k = 0; k < 3; ++k) {
       const double dx = (R_[k] - n.x * R_[6 + k]) / c.z, dy = (R_[3 + k] - n.y * R_[6 + k]) / c.z;
-      J[k] = g00 * dx + g01 * dy;
-      J[3 + k] = g10 * dx + g11 * dy;
+      J[k] = G.xx * dx + G.xy * dy;
+      J[3 + k] = G.yx * dx + G.yy * dy;
     }
     return J;
   }

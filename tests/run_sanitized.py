@@ -24,6 +24,7 @@ TESTS = (
     "test_joint_events.py",
     "test_k_best.py",
     "test_set_packing.py",
+    "test_reconstruct.py",
     "test_mht.py",
     "test_chain.py",
 )

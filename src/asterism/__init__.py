@@ -59,9 +59,11 @@ if TYPE_CHECKING:
     from asterism.errors import ParameterError as ParameterError
     from asterism.errors import SolverLimit as SolverLimit
     from asterism.evaluate import Evaluation as Evaluation
+    from asterism.evaluate import PointScores as PointScores
     from asterism.evaluate import calibration as calibration
     from asterism.evaluate import evaluate as evaluate
     from asterism.evaluate import floor as floor
+    from asterism.evaluate import point_scores as point_scores
     from asterism.filter import States as States
     from asterism.filter import filter_states as filter_states
     from asterism.filter import smooth as smooth
@@ -103,6 +105,17 @@ if TYPE_CHECKING:
     from asterism.model import Tracks as Tracks
     from asterism.model.posterior import log_posterior as log_posterior
     from asterism.model.posterior import track_scores as track_scores
+    from asterism.reconstruct import CameraSuggestion as CameraSuggestion
+    from asterism.reconstruct import ImageModel as ImageModel
+    from asterism.reconstruct import Reconstruction as Reconstruction
+    from asterism.reconstruct import Triangulation as Triangulation
+    from asterism.reconstruct import TriangulationMap as TriangulationMap
+    from asterism.reconstruct import Views as Views
+    from asterism.reconstruct import estimate_images as estimate_images
+    from asterism.reconstruct import reconstruct as reconstruct
+    from asterism.reconstruct import suggest_cameras as suggest_cameras
+    from asterism.reconstruct import triangulate as triangulate
+    from asterism.reconstruct import triangulation_map as triangulation_map
     from asterism.solve import JointMarginals as JointMarginals
     from asterism.solve import KBestAssignments as KBestAssignments
     from asterism.solve import MultidimensionalAssignment as MultidimensionalAssignment
@@ -197,6 +210,19 @@ _PUBLIC = {
         "recognize",
         "stitch",
     ),
+    "reconstruct": (
+        "CameraSuggestion",
+        "ImageModel",
+        "Reconstruction",
+        "Triangulation",
+        "TriangulationMap",
+        "Views",
+        "estimate_images",
+        "reconstruct",
+        "suggest_cameras",
+        "triangulate",
+        "triangulation_map",
+    ),
     "solve": (
         "JointMarginals",
         "KBestAssignments",
@@ -205,7 +231,7 @@ _PUBLIC = {
         "joint_marginals",
         "k_best_assignments",
     ),
-    "evaluate": ("Evaluation", "calibration", "evaluate", "floor"),
+    "evaluate": ("Evaluation", "PointScores", "calibration", "evaluate", "floor", "point_scores"),
     "io": ("FORMATS", "CaptureInfo", "describe", "read", "read_tracks", "write"),
     "io.calibration": ("CALIBRATIONS", "read_rig", "write_rig"),
     "io.observations": ("read_observations", "write_observations"),

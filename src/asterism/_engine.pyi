@@ -372,6 +372,49 @@ def project(
     clearance: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8], NDArray[np.int32]]: ...
 
+class ViewSolver:
+    def __init__(
+        self,
+        *,
+        cameras: Sequence[Camera],
+        sigma: NDArray[np.float64],
+        p_detection: NDArray[np.float64],
+        clutter: NDArray[np.float64],
+        log_density: float,
+        gate: float,
+        min_views: int,
+        low: tuple[float, float, float],
+        high: tuple[float, float, float],
+    ) -> None: ...
+    def reconstruct(
+        self,
+        pixels: NDArray[np.float64],
+        offsets: NDArray[np.int64],
+        priors: NDArray[np.float64],
+        prior_offsets: NDArray[np.int64],
+        merge: float,
+        max_nodes: int,
+        n_threads: int,
+    ) -> tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+        NDArray[np.int64],
+        NDArray[np.int64],
+        NDArray[np.int64],
+        float,
+    ]: ...
+    def candidates(
+        self, pixels: NDArray[np.float64], offsets: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]: ...
+
+def choose_candidates(
+    scores: NDArray[np.float64],
+    first: NDArray[np.int64],
+    views: NDArray[np.int64],
+    max_nodes: int,
+) -> tuple[NDArray[np.int64], bool, float]: ...
+
 class ChainOptions:
     def __init__(
         self,

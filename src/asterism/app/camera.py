@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from asterism.app.camera_map import map_
 from asterism.app.console import Json, Quiet, print_json, print_table
 from asterism.errors import ParameterError
 
@@ -260,3 +261,6 @@ def _sightings(points: list[str], names: tuple[str, ...], units: str | None) -> 
             camera, file = None, text
         found += read_sightings(Path(file), names, camera=camera, units=units)
     return found
+
+
+app.command("map")(map_)

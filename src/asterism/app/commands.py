@@ -9,6 +9,7 @@ import typer
 import asterism
 from asterism.app.bonds import bonds
 from asterism.app.camera import app as camera
+from asterism.app.chain import chain
 from asterism.app.corrupt import corrupt
 from asterism.app.demo import demo
 from asterism.app.estimate import estimate
@@ -18,6 +19,7 @@ from asterism.app.film import film
 from asterism.app.info import info
 from asterism.app.methods import methods, scenes
 from asterism.app.recognize import recognize
+from asterism.app.reconstruct import reconstruct
 from asterism.app.simulate import simulate
 from asterism.app.stitch import stitch
 from asterism.app.track import track
@@ -65,6 +67,8 @@ for _command in (
     simulate,
     scenes,
     film,
+    reconstruct,
+    chain,
     demo,
 ):
     app.command()(_command)

@@ -17,6 +17,7 @@ from asterism.evaluate.gospa import GospaScores, gospa_scores
 from asterism.evaluate.hota import HotaScores, hota_scores
 from asterism.evaluate.ideal import floor
 from asterism.evaluate.identity import IdentityScores, identity_scores
+from asterism.evaluate.points import PointScores, point_scores
 from asterism.evaluate.reliability import Calibration, calibration
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "GospaScores",
     "HotaScores",
     "IdentityScores",
+    "PointScores",
     "align",
     "association_scores",
     "calibration",
@@ -37,6 +39,7 @@ __all__ = [
     "gospa_scores",
     "hota_scores",
     "identity_scores",
+    "point_scores",
     "right_links",
 ]
 

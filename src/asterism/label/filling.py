@@ -230,10 +230,12 @@ def _with(tracks: Tracks, fills: Sequence[tuple[Span, Fill]]) -> Tracks:
     frames = np.concatenate([span.hidden for span, _ in fills])
     labels = np.repeat([span.track for span, _ in fills], [span.length for span, _ in fills])
     before, after = _ends(tracks, fills)
+    stds = np.concatenate([made.stds for _, made in fills])
     new: dict[str, Any] = {
         "points": np.concatenate([made.points for _, made in fills]).reshape(-1, D),
         "filled": np.ones(len(frames), dtype=bool),
-        "stds": np.concatenate([made.stds for _, made in fills]),
+        "stds": stds,
+        "covariances": stds[:, None, None] ** 2 * np.eye(D),
         "cameras": np.zeros(len(frames), dtype=np.int64),
         "residuals": np.zeros(len(frames)),
         "channels": np.full(len(frames), -1),

@@ -46,6 +46,8 @@ class Detections:
         Which points were not measured but estimated, as `asterism.fill` does; none by default.
     stds : array_like, shape (N,), optional
         Standard deviation of each coordinate where it is known, metres; 0 where it is not.
+    covariances : array_like, shape (N, D, D), optional
+        Covariance of each point, m², where several cameras tell it; all zeros where not.
 
     Raises
     ------
@@ -68,8 +70,16 @@ class Detections:
     residuals: NDArray[np.float64] | None = None
     filled: NDArray[np.bool_] | None = None
     stds: NDArray[np.float64] | None = None
+    covariances: NDArray[np.float64] | None = None
 
-    PER_POINT: ClassVar[tuple[str, ...]] = ("points", "cameras", "residuals", "filled", "stds")
+    PER_POINT: ClassVar[tuple[str, ...]] = (
+        "points",
+        "cameras",
+        "residuals",
+        "filled",
+        "stds",
+        "covariances",
+    )
     """Fields with an entry for each point: whoever adds or drops points does so in all of them."""
 
     def __post_init__(self) -> None:
@@ -112,6 +122,11 @@ class Detections:
                 if kind is not np.bool_ and array.size and array.min() < 0:
                     raise ParameterError(name, "numbers ≥ 0", array.min())
                 object.__setattr__(self, name, array)
+        if self.covariances is not None:
+            D = points.shape[1]
+            P = keep_array("covariances", self.covariances, (len(points), D, D))
+            _check_covariances(P)
+            object.__setattr__(self, "covariances", P)
 
     @classmethod
     def from_frames(cls, times: ArrayLike, frames: Sequence[ArrayLike]) -> Self:
@@ -252,3 +267,13 @@ class Detections:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.summary()})"
+
+
+def _check_covariances(P: NDArray[np.float64]) -> None:
+    """Raise unless all matrices are symmetric and none is negative, but for rounding."""
+    if not len(P):
+        return
+    size = np.abs(P).max(axis=(1, 2))
+    is_even = (np.abs(P - np.swapaxes(P, 1, 2)).max(axis=(1, 2)) <= 1e-9 * size).all()
+    if not is_even or (np.linalg.eigvalsh(P)[:, 0] < -1e-9 * size).any():
+        raise ParameterError("covariances", "symmetric matrices, none negative", "others")

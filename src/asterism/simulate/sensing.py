@@ -352,6 +352,7 @@ def _detections(
         cameras=None,
         residuals=None,
         stds=None,
+        covariances=None,
         # The rest of the file (analog channels, events) goes by its own frames: at another rate a
         # writer must not take it over.
         format=source.format if is_whole else "",

@@ -1,0 +1,281 @@
+"""Which image points of several cameras are one point in space, and where: frame by frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from asterism import _engine
+from asterism.camera import Observations, Rig
+from asterism.errors import ParameterError, check_number
+from asterism.model import Detections
+from asterism.model.detections import FARTHEST
+from asterism.reconstruct.reconstruction import Reconstruction, Views
+from asterism.reconstruct.triangulation import triangulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from asterism.reconstruct.image_model import ImageModel
+
+__all__ = ["matched_rig", "reconstruct"]
+
+_CHUNK = 128  # frames at a time: progress is told, and a stop heard, between them
+
+
+def reconstruct(
+    observations: Observations,
+    rig: Rig,
+    model: ImageModel | None = None,
+    *,
+    min_views: int = 2,
+    gate: float = 4.0,
+    merge_px: float = 1.0,
+    prior: Detections | None = None,
+    max_nodes: int = 2000,
+    n_threads: int = 1,
+    advance: Callable[[int], None] | None = None,
+) -> Reconstruction:
+    """Make points in space of unnamed image points.
+
+    A set of image points of different cameras is weighed by the likelihood that one point made
+    them, its place integrated out, against that of their being clutter; a camera that could see
+    the place and did not costs a miss. Pairs of rays that meet are the seeds of such sets. Of all
+    sets that are likelier than clutter those are chosen that together are the likeliest and share
+    no image point: S-dimensional assignment [1]_, exact but for what `info` says. Each is
+    triangulated on the pixels as they were measured (`triangulate`).
+
+    Parameters
+    ----------
+    observations : Observations
+        What the cameras saw.
+    rig : Rig
+        The cameras, found by their names. Those that observed nothing at all, in a rig of more,
+        are not asked.
+    model : ImageModel, optional
+        What the images are like. By default it is estimated (`estimate_images`).
+    min_views : int
+        Fewest cameras that a point needs, 2 or more.
+    gate : float
+        Standard deviations within which an image point may be of a place.
+    merge_px : float
+        How far the middle of two merged images may be from where each belongs, one standard
+        deviation, pixels. A point that the choice left may share image points that are taken, but
+        needs one of its own; what two points share counts so much less in both. 0 for no sharing.
+    prior : Detections, optional
+        3-D places where points are expected, for each frame of the observations; they are tried
+        first, and claim nothing that the images do not bear out.
+    max_nodes : int
+        Most nodes of the search for the best choice in a group of sets that share image points.
+    n_threads : int
+        Frames at a time; the result does not depend on it.
+    advance : callable, optional
+        Told the number of frames that are done.
+
+    Returns
+    -------
+    Reconstruction
+
+    Raises
+    ------
+    ParameterError
+        If a camera is not in the rig, there are under two, or the prior is of other frames.
+
+    References
+    ----------
+    .. [1] S. Deb, M. Yeddanapudi, K. Pattipati, Y. Bar-Shalom: A generalized S-D assignment
+       algorithm for multisensor-multitarget state estimation. IEEE Transactions on Aerospace and
+       Electronic Systems 33, 1997.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=3, height=2, target=(0, 0, 0))
+    >>> scene = am.simulate.cube(seed=1, frames=10)
+    >>> am.reconstruct(am.simulate.film(scene, rig).observations, rig).detections
+    Detections(10 frames, 80 points, 3-D, 0 to 9 s)
+    """
+    used, numbers = matched_rig(observations, rig)
+    check_number("min_views", min_views, above=2, below=len(used), closed=True, integer=True)
+    check_number("gate", gate, above=0)
+    check_number("merge_px", merge_px, above=0, closed=True)
+    check_number("max_nodes", max_nodes, above=1, closed=True, integer=True)
+    check_number("n_threads", n_threads, above=1, below=1024, closed=True, integer=True)
+    if model is None:
+        from asterism.reconstruct.images_from_clip import estimate_images
+
+        model = estimate_images(observations, rig, gate=gate)
+    sigma, p_detection, clutter = model.of(used)
+    low, high = model.box(used)
+    solver = _engine.ViewSolver(
+        cameras=[camera.engine for camera in used],
+        sigma=sigma,
+        p_detection=p_detection,
+        clutter=clutter,
+        log_density=float(np.log(model.density)),
+        gate=float(gate),
+        min_views=int(min_views),
+        low=low,
+        high=high,
+    )
+    expected = _expected(prior, observations)
+    pieces: list[_Piece] = []
+    figures, gap = np.zeros(3, dtype=np.int64), 0.0
+    C, T = observations.n_cameras, observations.n_frames
+    for begin in range(0, max(T, 1), _CHUNK):
+        end = min(begin + _CHUNK, T)
+        first, last = int(expected.offsets[begin]), int(expected.offsets[end])
+        points, scores, counts, starts, blobs, counted, open_ = solver.reconstruct(
+            observations.pixels,
+            np.ascontiguousarray(observations.offsets[begin * C : end * C + 1]),
+            np.ascontiguousarray(expected.points[first:last]),
+            np.ascontiguousarray(expected.offsets[begin : end + 1] - first),
+            float(merge_px),
+            int(max_nodes),
+            int(n_threads),
+        )
+        figures, gap = figures + counted, gap + open_
+        found = _Found(points, scores, counts, starts, blobs)
+        pieces.append(_piece(found, observations, used, sigma, float(merge_px)))
+        if advance is not None:
+            advance(end)
+    n_candidates, n_searched, n_cut = (int(n) for n in figures)
+    info = {
+        "n_candidates": n_candidates,
+        "n_searched": n_searched,
+        "n_cut": n_cut,
+        "gap": gap,
+    }
+    return _joined(pieces, observations, numbers, model, info)
+
+
+def matched_rig(observations: Observations, rig: Rig) -> tuple[Rig, NDArray[np.int64]]:
+    """Give the cameras that observed, in the observations' order, and their numbers in the rig.
+
+    Raises
+    ------
+    ParameterError
+        If one is not in the rig, or there are under two.
+    """
+    if not isinstance(observations, Observations):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("observations", "Observations", type(observations).__name__)
+    if not isinstance(rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("rig", "a Rig", type(rig).__name__)
+    names = observations.cameras
+    unknown = [name for name in names if name not in rig.names]
+    if unknown:
+        expected = f"the cameras of the observations ({', '.join(names)})"
+        got = f"{', '.join(rig.names)}: no {', '.join(unknown)}"
+        raise ParameterError("rig", expected, got)
+    if len(names) < 2:
+        hint = "depth needs a second view"
+        raise ParameterError("observations", "two cameras or more", len(names), hint)
+    numbers = np.array([rig.names.index(name) for name in names])
+    return Rig(tuple(rig[int(i)] for i in numbers)), numbers
+
+
+class _Found(NamedTuple):
+    """What the engine matched: points, their scores, how many by frame, and their views (CSR)."""
+
+    points: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    starts: NDArray[np.int64]
+    blobs: NDArray[np.int64]
+
+
+class _Piece(NamedTuple):
+    """What was found in some frames: an entry for each point, frame or view."""
+
+    points: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    residuals: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    n_views: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    cameras: NDArray[np.int64]
+    blobs: NDArray[np.int64]
+
+
+def _expected(prior: Detections | None, observations: Observations) -> Detections:
+    if prior is None:
+        offsets = np.zeros(observations.n_frames + 1, dtype=np.int64)
+        return Detections(times=observations.times, offsets=offsets, points=np.empty((0, 3)))
+    if not isinstance(prior, Detections):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("prior", "Detections", type(prior).__name__)
+    if prior.n_axes != 3:
+        raise ParameterError("prior", "places in 3-D", f"{prior.n_axes}-D ones")
+    if not np.array_equal(prior.times, observations.times):
+        raise ParameterError("prior", "the times of the observations", "others")
+    return prior
+
+
+def _piece(
+    found: _Found, observations: Observations, rig: Rig, sigma: NDArray[np.float64], merge_px: float
+) -> _Piece:
+    """Triangulate what the engine matched, on the pixels as they were measured."""
+    points, scores, counts, starts, blobs = found
+    cameras = observations.camera_of[blobs]
+    views = Views(offsets=starts, cameras=cameras, blobs=blobs)
+    of = views.point_of
+    pixels = np.full((len(rig), len(points), 2), np.nan)
+    pixels[cameras, of] = observations.pixels[blobs]
+    noise = np.repeat(sigma[:, None], len(points), axis=1)
+    merged = (cameras[views.is_shared], of[views.is_shared])
+    noise[merged] = np.maximum(noise[merged], merge_px)
+    solved = triangulate(pixels, rig, sigma_px=noise, start=points)
+    squares = np.zeros(len(points))
+    for c, camera in enumerate(rig):
+        own = cameras == c
+        away = solved.points[of[own]] - camera.center
+        rays = camera.rays(observations.pixels[blobs[own]])
+        squares[of[own]] += (np.cross(away, rays) ** 2).sum(axis=1)
+    return _Piece(
+        points=solved.points,
+        covariances=solved.covariances,
+        residuals=np.sqrt(squares / np.maximum(views.counts, 1)),
+        scores=scores,
+        n_views=views.counts,
+        counts=counts,
+        cameras=cameras,
+        blobs=blobs,
+    )
+
+
+def _joined(
+    pieces: list[_Piece],
+    observations: Observations,
+    numbers: NDArray[np.int64],
+    model: ImageModel,
+    info: dict[str, float],
+) -> Reconstruction:
+    all_of = _Piece(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
+    # What the pixels themselves leave without a place or a depth is none.
+    is_known = np.isfinite(all_of.covariances).reshape(-1, 9).all(axis=-1)
+    is_sound = np.logical_and(is_known, (np.abs(all_of.points) <= FARTHEST).all(axis=-1))
+    of = np.repeat(np.arange(len(is_sound)), all_of.n_views)
+    kept = is_sound[of]
+    before = np.concatenate([[0], np.cumsum(is_sound)])
+    masks = np.zeros(len(is_sound), dtype=np.int64)
+    np.bitwise_or.at(masks, of, 1 << np.minimum(numbers[all_of.cameras], 62))
+    P = all_of.covariances[is_sound]
+    detections = Detections(
+        times=observations.times,
+        offsets=before[np.append(0, np.cumsum(all_of.counts))],
+        points=all_of.points[is_sound],
+        cameras=masks[is_sound] if numbers.max() <= 62 else None,
+        residuals=all_of.residuals[is_sound],
+        stds=np.sqrt(np.trace(P, axis1=1, axis2=2) / 3),
+        covariances=(P + np.swapaxes(P, 1, 2)) / 2,
+    )
+    views = Views(
+        offsets=np.append(0, np.cumsum(all_of.n_views[is_sound])),
+        cameras=all_of.cameras[kept],
+        blobs=all_of.blobs[kept],
+    )
+    return Reconstruction(
+        detections=detections, views=views, scores=all_of.scores[is_sound], model=model, info=info
+    )
