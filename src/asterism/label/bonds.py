@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import tomllib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from asterism.errors import FormatError, ParameterError, check_number, keep_array
 from asterism.label.distances import distances_between
 from asterism.model import Tracks
+from asterism.model.toml_file import read_toml, write_toml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -119,8 +119,6 @@ class Bonds:
 
     def to_toml(self, path: str | Path | None = None) -> str:
         """Give the bonds as TOML text, and write it to `path` where one is given."""
-        import tomli_w
-
         markers: list[dict[str, Any]] = []
         for name, place in zip(self.names, self.places, strict=True):
             own: dict[str, Any] = {"name": name}
@@ -139,13 +137,7 @@ class Bonds:
             )
         ]
         content = {"format": FORMAT, "axes": self.places.shape[1], "marker": markers, "bond": bonds}
-        text = tomli_w.dumps(content)
-        if path is not None:
-            path = Path(path)
-            unfinished = path.with_name(f".{path.name}.part")
-            unfinished.write_text(text, encoding="utf-8")
-            unfinished.replace(path)
-        return text
+        return write_toml(content, path)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
@@ -157,14 +149,7 @@ class Bonds:
             If the file cannot be read, is not TOML, or holds no bonds.
         """
         path = Path(path)
-        try:
-            content = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise FormatError(path, "the file", "bonds in TOML", error.strerror) from error
-        except UnicodeDecodeError as error:
-            raise FormatError(path, f"byte {error.start}", "UTF-8 text", error.reason) from error
-        except tomllib.TOMLDecodeError as error:
-            raise FormatError(path, "the file", "TOML", str(error)) from error
+        content = read_toml(path, "bonds in TOML")
         if content.get("format") != FORMAT:
             got = content.get("format", "none")
             raise FormatError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
@@ -16,6 +15,7 @@ from asterism.model.linear_motion import LinearMotion
 from asterism.model.motion import DWNA, DWPA, Motion, RandomWalk
 from asterism.model.population import Population
 from asterism.model.sensor import Sensor
+from asterism.model.toml_file import read_toml, write_toml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -119,15 +119,7 @@ class TrackingModel:
         str
             The text.
         """
-        import tomli_w
-
-        text = tomli_w.dumps(self.to_dict())
-        if path is not None:
-            path = Path(path)
-            unfinished = path.with_name(f".{path.name}.part")
-            unfinished.write_text(text, encoding="utf-8")
-            unfinished.replace(path)
-        return text
+        return write_toml(self.to_dict(), path)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
@@ -138,17 +130,13 @@ class TrackingModel:
         FormatError
             If the file is not TOML or does not hold a model.
         """
-        path = Path(path)
+        content = read_toml(path, "a model file")
         try:
-            return cls.from_dict(tomllib.loads(path.read_text(encoding="utf-8")))
-        except OSError as error:
-            raise FormatError(path, "the file", "a model file", error.strerror) from error
-        except UnicodeDecodeError as error:
-            raise FormatError(path, f"byte {error.start}", "UTF-8 text", error.reason) from error
-        except tomllib.TOMLDecodeError as error:
-            raise FormatError(path, "the file", "TOML", str(error)) from error
+            return cls.from_dict(content)
         except ParameterError as error:
-            raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
+            raise FormatError(
+                Path(path), error.name, error.expected, error.got, error.hint
+            ) from error
 
 
 _TABLES = ("motion", "sensor", "population")

@@ -1,0 +1,46 @@
+"""TOML files, read with errors that name the file and written as a whole."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from asterism.errors import FormatError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ["read_toml", "write_toml"]
+
+
+def write_toml(content: Mapping[str, Any], path: str | Path | None) -> str:
+    """Give TOML text, and write it to `path` where one is given."""
+    import tomli_w
+
+    text = tomli_w.dumps(content)
+    if path is not None:
+        path = Path(path)
+        unfinished = path.with_name(f".{path.name}.part")
+        unfinished.write_text(text, encoding="utf-8")
+        unfinished.replace(path)
+    return text
+
+
+def read_toml(path: str | Path, what: str) -> dict[str, Any]:
+    """Read a TOML file that should hold `what`.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be read, or is not TOML.
+    """
+    path = Path(path)
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FormatError(path, "the file", what, error.strerror) from error
+    except UnicodeDecodeError as error:
+        raise FormatError(path, f"byte {error.start}", "UTF-8 text", error.reason) from error
+    except tomllib.TOMLDecodeError as error:
+        raise FormatError(path, "the file", "TOML", str(error)) from error
