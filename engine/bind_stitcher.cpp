@@ -213,6 +213,7 @@ void bind_stitcher(nb::module_& module) {
   nb::class_<Stitcher>(module, "Stitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&>(), "motion"_a, "options"_a)
       // (fragment of each point, and of each fragment its marker, the fragment before, how probably).
+      .def_prop_ro_static("WORTH", [](nb::handle) { return Claims::kWorth; })
       .def("run", &run, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a, "points"_a,
            "labels"_a)
       .def(

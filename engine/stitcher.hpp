@@ -18,17 +18,15 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <cstdint>
-#include <limits>
 #include <span>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
-#include "assignment.hpp"
 #include "bodies.hpp"
+#include "claims.hpp"
 #include "elsewhere.hpp"
 #include "fragments.hpp"
 #include "fresh.hpp"
@@ -43,13 +41,6 @@ struct StitchOptions {
   std::int64_t max_gap = 0;      // frames after which an unseen fragment is over
   std::int64_t max_hidden = 0;   // frames after which a marker is forgotten; 0: never
   bool may_cut = true;           // links that the neighbours contradict
-};
-
-// The label of the marker that a fragment is thought to go on with, and how much that is worth: log
-// odds for that marker, half of it against all others.
-struct Advice {
-  std::int64_t goes_on_with = 0;
-  double weight = 0;
 };
 
 class Stitcher {
@@ -67,7 +58,7 @@ class Stitcher {
   std::int64_t n_cuts() const { return n_cuts_; }
 
   // What is thought already of fragments that begin with a label.
-  void advise(std::int64_t label, const Advice& advice) { advice_[label] = advice; }
+  void advise(std::int64_t label, const Advice& advice) { claims_.advise(label, advice); }
 
   // One frame: its points, and of each the label that the tracker gave it, -1 for none. Writes the
   // fragment of each, and tells `decide(decision)`.
@@ -99,32 +90,9 @@ class Stitcher {
     const auto at = of_label_.find(label);
     return at != of_label_.end() && may_go_on(at->second) ? at->second : -1;
   }
-  // What the fragments that are open may be, if nothing were to come any more. They are compared anew
-  // when twice as much has been seen of them.
+  // What the fragments that are open may be, if nothing were to come any more.
   void guess() {
-    w_.open.clear();
-    for (auto& [id, f] : so_far_.fragments) {
-      f.guess = -1;
-      if (f.marker == Decision::kOpen && f.n > 0) w_.open.push_back(id);
-    }
-    w_.candidates.clear();
-    for (std::int32_t row = 0; row < static_cast<std::int32_t>(w_.open.size()); ++row) {
-      Fragment& f = so_far_.fragments.at(w_.open[row]);
-      if (std::has_single_bit(static_cast<std::uint32_t>(f.n)) && f.last == now()) {
-        f.guesses.clear();
-        for (const auto& [k, marker] : markers_)
-          if (const double gain = score(f, w_.open[row], k, marker); gain > 0)
-            f.guesses.emplace_back(k, gain);
-      }
-      for (const auto& [k, gain] : f.guesses)
-        if (const auto at = markers_.find(k); at != markers_.end() && at->second.is_hidden)
-          w_.candidates.push_back({row, k, gain, 0});
-    }
-    if (w_.candidates.empty()) return;
-    w_.match.assign(w_.open.size(), -1);
-    w_.assignment.solve(w_.candidates, w_.match);
-    for (std::size_t row = 0; row < w_.open.size(); ++row)
-      so_far_.fragments.at(w_.open[row]).guess = w_.match[row];
+    claims_.guess(so_far_, markers_, bodies_, [this](const Fragment& f) { return is_short(f); });
   }
   // After the last frame.
   template <typename Decide>
@@ -135,14 +103,9 @@ class Stitcher {
  private:
   static constexpr std::int32_t kMotionSights = 4;   // detections by which motions are compared
   static constexpr std::int64_t kMotionFrames = 120;  // a motion is believed no longer than that
-  // Log odds that a fragment is a marker come back, before anything is compared: of one that was over
-  // before it was decided upon, and of others.
-  static constexpr double kShort = -8, kLong = 2;
   // A link is cut where the neighbours now give it no more than this, and that much less than so far.
   static constexpr double kContradicted = 3, kFall = 8, kDoubted = 3;
   static constexpr double kTrusted = 2;          // of the markers on average: there are bodies
-  static constexpr double kLeastMotion = 0.005;  // weight of the motion where the body is trusted
-  static constexpr double kWorth = 0.25;  // of the log odds, in a probability
 
   std::int64_t now() const { return so_far_.frames.now(); }
   bool is_over(const Fragment& f) const { return now() - f.last > opt_.max_gap; }
@@ -297,18 +260,10 @@ class Stitcher {
   Decision decide_upon(std::int32_t id) {
     Fragment& f = so_far_.fragments.at(id);
     Decision out{id};
-    double most = -std::numeric_limits<double>::infinity();
-    w_.scored.clear();
-    for (const auto& [k, marker] : markers_) {
-      const double gain = score(f, id, k, marker);
-      most = std::max(most, gain);
-      if (gain > 0) w_.scored.emplace_back(k, gain);
-    }
-    if (!w_.scored.empty()) out.marker = best_of(f, id, out.probability);
-    if (out.marker == Decision::kOpen) {
+    std::tie(out.marker, out.probability) = claims_.best(
+        so_far_, markers_, bodies_, id, [this](const Fragment& g) { return is_short(g); });
+    if (out.marker == Decision::kOpen)
       out.marker = is_short(f) && (has_bodies() || is_beside(f, id)) ? Decision::kGhost : n_markers_++;
-      out.probability = 1 / (1 + odds(most));
-    }
     f.marker = out.marker;
     if (out.marker < 0) return out;
     Marker& marker = markers_[out.marker];
@@ -322,64 +277,6 @@ class Stitcher {
     f.sights.clear();
     f.continuations.clear();
     return out;
-  }
-
-  // Neighbours bend together, and the looks at a fragment see the same bend: what they say is worth
-  // less than their sum. How much less was measured on captures whose truth is known.
-  static double odds(double gain) { return std::exp(std::min(kWorth * gain, 500.0)); }
-
-  // Which hidden marker it is, if all that is open takes what fits best; and how probably.
-  std::int32_t best_of(const Fragment& f, std::int32_t id, double& probability) {
-    w_.candidates.clear();
-    w_.rivals.assign(w_.scored.size(), 1);  // Σ of the odds of all that may be this marker, and of none
-    double all = 1;
-    for (std::int32_t c = 0; c < static_cast<std::int32_t>(w_.scored.size()); ++c) {
-      w_.candidates.push_back({0, c, w_.scored[c].second, 0});
-      all += odds(w_.scored[c].second);
-    }
-    std::int32_t row = 0;
-    for (const auto& [other, g] : so_far_.fragments) {
-      if (other == id || g.marker != Decision::kOpen || g.n == 0) continue;
-      if (g.last < f.first || g.first > f.last) continue;  // both may be the same marker
-      ++row;
-      for (std::int32_t c = 0; c < static_cast<std::int32_t>(w_.scored.size()); ++c) {
-        const double gain = score(g, other, w_.scored[c].first, markers_.at(w_.scored[c].first));
-        if (!(gain > 0)) continue;
-        w_.candidates.push_back({row, c, gain, 0});
-        w_.rivals[c] += odds(gain);
-      }
-    }
-    w_.match.assign(row + 1, -1);
-    w_.assignment.solve(w_.candidates, w_.match);
-    if (w_.match[0] < 0) return Decision::kOpen;
-    const double own = odds(w_.scored[w_.match[0]].second);
-    probability = own / (all + w_.rivals[w_.match[0]] - 1);
-    return w_.scored[w_.match[0]].first;
-  }
-
-  // Log odds that a fragment is a hidden marker come back.
-  double score(const Fragment& f, std::int32_t id, std::int32_t k, const Marker& marker) {
-    constexpr double never = -std::numeric_limits<double>::infinity();
-    if (!marker.is_hidden || marker.last >= f.first) return never;
-    const double body = bodies_.log_odds(so_far_, f, id, marker), motion = motion_score(f, id, k);
-    const double at_rest = std::clamp(1 / (1 + std::exp(marker.trust)), kLeastMotion, 0.5);
-    const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
-    const double more = std::max(a, b), less = std::min(a, b);
-    if (more == never) return never;
-    return more + std::log1p(std::exp(less - more)) + (is_short(f) ? kShort : kLong) +
-           advised(f, marker);
-  }
-  double advised(const Fragment& f, const Marker& marker) const {
-    const auto at = advice_.find(f.label);
-    if (at == advice_.end()) return 0;
-    return marker.label == at->second.goes_on_with ? at->second.weight : -0.5 * at->second.weight;
-  }
-  double motion_score(const Fragment& f, std::int32_t id, std::int32_t k) {
-    for (const Continuation& c : f.continuations)
-      if (c.marker == k)
-        if (const Frame* at = so_far_.frames.find(f.first); at != nullptr)
-          return c.log_likelihood - f.alone - so_far_.elsewhere.log_density(f.sights.front().at, *at, id);
-    return -std::numeric_limits<double>::infinity();
   }
 
   // Fragments that can not go on, and markers that have been hidden for long.
@@ -410,11 +307,7 @@ class Stitcher {
   struct Memory {
     std::vector<Frame::One*> cut;
     std::vector<Seen> seen;
-    std::vector<std::int32_t> due, open, match;
-    std::vector<std::pair<std::int32_t, double>> scored;
-    std::vector<double> rivals;
-    std::vector<Candidate> candidates;
-    Assignment assignment;
+    std::vector<std::int32_t> due;
   };
 
   MotionModel m_;
@@ -425,8 +318,8 @@ class Stitcher {
   Sightings so_far_;
   Markers markers_;
   std::unordered_map<std::int64_t, std::int32_t> of_label_;
-  std::unordered_map<std::int64_t, Advice> advice_;
   Bodies bodies_;
+  Claims claims_;
   Fresh<Memory> w_;  // while a frame is worked on
 };
 

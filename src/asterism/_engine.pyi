@@ -534,6 +534,7 @@ class StitchOptions:
     ) -> None: ...
 
 class Stitcher:
+    WORTH: float
     def __init__(self, motion: MotionModel, options: StitchOptions) -> None: ...
     def advise(
         self,

@@ -20,10 +20,6 @@ __all__ = ["Pass", "go_through"]
 LEAST_ADVICE, MOST_ADVICE = 1.0, 5.0
 """Log odds that a join of the pass before is worth to the next."""
 
-WORTH = 0.25
-"""Of the log odds of neighbours, in a probability; the engine's own."""
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Pass:
     """What a pass found.
@@ -52,7 +48,7 @@ class Pass:
         """Tell a pass in the other direction, over these fragments, which of them were joined."""
         joined = np.flatnonzero((self.after >= 0) & (self.markers >= 0))
         p = np.clip(self.probabilities[joined], 1e-9, 1 - 1e-9)
-        weights = np.clip(np.log(p / (1 - p)) / WORTH, LEAST_ADVICE, MOST_ADVICE)
+        weights = np.clip(np.log(p / (1 - p)) / _engine.Stitcher.WORTH, LEAST_ADVICE, MOST_ADVICE)
         stitcher.advise(self.after[joined].astype(np.int64), joined.astype(np.int64), weights)
 
 
