@@ -1,12 +1,5 @@
 // Which image points of different cameras may be of one point in space.
 //
-//   X, Λ     place and its information, Σ Jᵀ W J
-//   r²       squared distance of an image point from that of X, in its standard deviations
-//   score    log likelihood ratio of "one point, of density ρ, made these" against "clutter did",
-//            the place integrated out (Laplace):
-//            log ρ + log((2π)^{3/2} |Λ|^{-1/2}) + Σ_seen (log(P_d / (λ 2πσ²)) - r²/2)
-//              + Σ_{could see, did not} log(1 - P_d)
-//
 // Pairs of rays that meet within the gate are seeds. A seed's place tells where the other cameras
 // must have it: first the cameras where the gate holds one point alone, then those where the nearest
 // of several is taken. A pair that is in a found candidate of three views is no seed again.
@@ -17,20 +10,9 @@
 #include <vector>
 
 #include "image_points.hpp"
+#include "point_fit.hpp"
 
 namespace asterism {
-
-struct View {
-  std::int32_t camera, point;  // of `ImagePoints::points`
-};
-
-struct PointCandidate {
-  std::vector<View> views;  // by camera
-  Vec3 X{};
-  Symmetric3 information;
-  double squared = 0;  // Σ r²
-  double score = 0;
-};
 
 struct CandidateOptions {
   double log_density = 0;    // log ρ, of points by m³
@@ -42,7 +24,10 @@ struct CandidateOptions {
 class PointCandidates {
  public:
   PointCandidates(std::span<const ImagePoints> cameras, const CandidateOptions& options)
-      : cameras_(cameras), options_(options), gate2_(options.gate * options.gate) {
+      : cameras_(cameras),
+        options_(options),
+        fit_(cameras, options.log_density),
+        gate2_(options.gate * options.gate) {
     std::size_t n = 0;
     for (const ImagePoints& c : cameras_)
       for (const ImagePoint& p : c.points) n = std::max<std::size_t>(n, p.number + 1);
@@ -59,54 +44,10 @@ class PointCandidates {
       PointCandidate c;
       c.views = {{seed.a, seed.i}, {seed.b, seed.j}};
       c.X = seed.X;
-      if (inform(c)) grow(c);
+      if (fit_.inform(c)) grow(c);
     }
     add_remainders();
     return std::move(found_);
-  }
-
-  // Best place of a candidate from where it is; false where there is none.
-  bool fit(PointCandidate& c) const {
-    for (int round = 0; round < 8; ++round) {
-      Symmetric3 A;
-      Vec3 g{0, 0, 0};
-      c.squared = 0;
-      for (const View v : c.views) {
-        const ImagePoints& camera = cameras_[v.camera];
-        const ImagePoint& p = camera.points[v.point];
-        const Sight s = camera.sight(c.X);
-        if (!(s.depth > 0)) return false;
-        add(p, s, A, g);
-        c.squared += p.squared({p.n.x - s.n.x, p.n.y - s.n.y});
-      }
-      if (!is_regular(A)) return false;
-      const Vec3 step = A.inverse() * g;
-      c.information = A;
-      c.X = c.X + step;
-      const double gained = dot(step, g);  // by so much the squares fall, to first order
-      if (!std::isfinite(gained)) return false;
-      if (gained < 1e-4) {
-        c.squared = std::max(c.squared - gained, 0.0);
-        return true;
-      }
-    }
-    return false;
-  }
-
-  double score(const PointCandidate& c) const {
-    constexpr double kLogTwoPi = 1.8378770664093453;
-    double s = options_.log_density + 1.5 * kLogTwoPi -
-               0.5 * std::log(c.information.determinant()) - c.squared / 2;
-    for (const View v : c.views) s += cameras_[v.camera].points[v.point].gain;
-    if (s <= 0) return s;  // misses only lower it
-    std::size_t at = 0;
-    for (std::size_t k = 0; k < cameras_.size() && s > 0; ++k) {
-      if (at < c.views.size() && c.views[at].camera == static_cast<std::int32_t>(k))
-        ++at;
-      else if (cameras_[k].could_see(c.X))
-        s += cameras_[k].sense.miss;
-    }
-    return s;
   }
 
  private:
@@ -115,12 +56,6 @@ class PointCandidates {
     double squared;           // of the gap between the rays, to order them
     Vec3 X;
   };
-
-  static void add(const ImagePoint& p, const Sight& s, Symmetric3& A, Vec3& g) {
-    const double ex = p.n.x - s.n.x, ey = p.n.y - s.n.y;
-    A.add(s.jx, p.wxx), A.add(s.jy, p.wyy), A.add(s.jx, s.jy, p.wxy);
-    g = g + (p.wxx * ex + p.wxy * ey) * s.jx + (p.wxy * ex + p.wyy * ey) * s.jy;
-  }
 
   std::int32_t number(View v) const { return cameras_[v.camera].points[v.point].number; }
 
@@ -209,24 +144,6 @@ class PointCandidates {
     keep(c);
   }
 
-  // The information of a seed's place; false where its two rays leave the depth open.
-  bool inform(PointCandidate& c) const {
-    Vec3 g{0, 0, 0};
-    for (const View v : c.views) {
-      const Sight s = cameras_[v.camera].sight(c.X);
-      if (!(s.depth > 0)) return false;
-      add(cameras_[v.camera].points[v.point], s, c.information, g);
-    }
-    if (!is_regular(c.information)) return false;
-    c.X = c.X + c.information.inverse() * g;
-    return true;
-  }
-
-  static bool is_regular(const Symmetric3& A) {
-    const double size = A.trace();
-    return A.determinant() > 1e-12 * size * size * size;
-  }
-
   // A place where a point is expected: what lies nearest to it in each image.
   void grow_from_place(Vec3 X) {
     PointCandidate c;
@@ -243,7 +160,7 @@ class PointCandidates {
       }
       if (best >= 0) c.views.push_back({static_cast<std::int32_t>(k), best});
     }
-    if (c.views.size() < 2 || !fit(c)) return;
+    if (c.views.size() < 2 || !fit_.fit(c)) return;
     prune(c);
     if (c.views.size() < 2) return;
     grow(c);
@@ -284,11 +201,8 @@ class PointCandidates {
         continue;
       }
       c.views.insert(at, {k, best});
-      // One step with the new view alone: the others are at their minimum.
-      Vec3 g{0, 0, 0};
-      add(camera.points[best], s, c.information, g);
+      PointFit::step(c, camera.points[best], s);
       P = c.information.inverse();
-      c.X = c.X + P * g;
     }
     asked.resize(n_left);
   }
@@ -296,24 +210,17 @@ class PointCandidates {
   // Drops the worst view as long as it is beyond the gate.
   void prune(PointCandidate& c) const {
     while (c.views.size() >= 2) {
-      if (!fit(c)) {
+      if (!fit_.fit(c)) {
         c.views.clear();
         return;
       }
       double most = gate2_;
       std::size_t worst = c.views.size();
       for (std::size_t i = 0; i < c.views.size(); ++i)
-        if (const double r2 = squared_of(c, c.views[i]); r2 > most) most = r2, worst = i;
+        if (const double r2 = fit_.squared_of(c, c.views[i]); r2 > most) most = r2, worst = i;
       if (worst == c.views.size()) return;
       c.views.erase(c.views.begin() + static_cast<std::ptrdiff_t>(worst));
     }
-  }
-
-  double squared_of(const PointCandidate& c, View v) const {
-    const ImagePoints& camera = cameras_[v.camera];
-    const Sight s = camera.sight(c.X);
-    const ImagePoint& p = camera.points[v.point];
-    return p.squared({p.n.x - s.n.x, p.n.y - s.n.y});
   }
 
   // Keeps a candidate that has been fitted, unless it is there already.
@@ -323,7 +230,7 @@ class PointCandidates {
       return !cameras_[v.camera].points[v.point].is_shared;
     });
     if (!is_own || !is_inside(c.X)) return;
-    c.score = score(c);
+    c.score = fit_.score(c);
     if (!(c.score > 0)) return;
     std::uint64_t hash = 1469598103934665603u;
     for (const View v : c.views) hash = (hash ^ static_cast<std::uint64_t>(number(v))) * 1099511628211u;
@@ -378,19 +285,20 @@ class PointCandidates {
           [v](View w) { return v.camera == w.camera && v.point == w.point; });
       if (is_shared) {
         const ImagePoints& camera = cameras_[v.camera];
-        lost += camera.points[v.point].gain - camera.sense.miss - squared_of(found_[i], v) / 2;
+        lost += camera.points[v.point].gain - camera.sense.miss - fit_.squared_of(found_[i], v) / 2;
       } else {
         rest.views.push_back(v);
       }
     }
     if (static_cast<std::int32_t>(rest.views.size()) < std::max(options_.min_views, 2)) return;
     if (found_[rival].score - lost < -kMargin) return;
-    if (fit(rest)) keep(rest);
+    if (fit_.fit(rest)) keep(rest);
   }
 
   static constexpr double kFar = 30;  // standard deviations, of an image point from where it is expected
   std::span<const ImagePoints> cameras_;
   CandidateOptions options_;
+  PointFit fit_;
   double gate2_;
   std::vector<std::int32_t> all_, asked_;  // cameras
   std::vector<Seed> seeds_;

@@ -20,6 +20,7 @@ __all__ = ["Pass", "go_through"]
 LEAST_ADVICE, MOST_ADVICE = 1.0, 5.0
 """Log odds that a join of the pass before is worth to the next."""
 
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Pass:
     """What a pass found.
