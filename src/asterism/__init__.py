@@ -64,8 +64,10 @@ if TYPE_CHECKING:
     from asterism.evaluate import evaluate as evaluate
     from asterism.evaluate import floor as floor
     from asterism.evaluate import point_scores as point_scores
+    from asterism.filter import GateGroups as GateGroups
     from asterism.filter import States as States
     from asterism.filter import filter_states as filter_states
+    from asterism.filter import gate_groups as gate_groups
     from asterism.filter import smooth as smooth
     from asterism.io import FORMATS as FORMATS
     from asterism.io import CaptureInfo as CaptureInfo
@@ -122,14 +124,23 @@ if TYPE_CHECKING:
     from asterism.solve import assign_multidimensional as assign_multidimensional
     from asterism.solve import joint_marginals as joint_marginals
     from asterism.solve import k_best_assignments as k_best_assignments
+    from asterism.view import figure_bytes as figure_bytes
+    from asterism.view import plot_axes as plot_axes
+    from asterism.view import plot_compare as plot_compare
+    from asterism.view import plot_confidence as plot_confidence
     from asterism.view import plot_coverage as plot_coverage
     from asterism.view import plot_depth as plot_depth
     from asterism.view import plot_errors as plot_errors
+    from asterism.view import plot_groups as plot_groups
     from asterism.view import plot_image as plot_image
     from asterism.view import plot_lens as plot_lens
+    from asterism.view import plot_posterior as plot_posterior
     from asterism.view import plot_presence as plot_presence
+    from asterism.view import plot_projections as plot_projections
+    from asterism.view import plot_reliability as plot_reliability
     from asterism.view import plot_rig as plot_rig
     from asterism.view import plot_trajectories as plot_trajectories
+    from asterism.view import view as view
 
 __version__ = "0.1.0"
 
@@ -176,7 +187,7 @@ _PUBLIC = {
         "Tracks",
     ),
     "model.posterior": ("log_posterior", "track_scores"),
-    "filter": ("States", "filter_states", "smooth"),
+    "filter": ("GateGroups", "States", "filter_states", "gate_groups", "smooth"),
     "associate": (
         "GNN",
         "METHODS",
@@ -236,14 +247,23 @@ _PUBLIC = {
     "io.calibration": ("CALIBRATIONS", "read_rig", "write_rig"),
     "io.observations": ("read_observations", "write_observations"),
     "view": (
+        "figure_bytes",
+        "plot_axes",
+        "plot_compare",
+        "plot_confidence",
         "plot_coverage",
         "plot_depth",
         "plot_errors",
+        "plot_groups",
         "plot_image",
         "plot_lens",
+        "plot_posterior",
         "plot_presence",
+        "plot_projections",
+        "plot_reliability",
         "plot_rig",
         "plot_trajectories",
+        "view",
     ),
 }
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}

@@ -18,11 +18,13 @@ from asterism.app.fill import fill
 from asterism.app.film import film
 from asterism.app.info import info
 from asterism.app.methods import methods, scenes
+from asterism.app.plot import plot
 from asterism.app.recognize import recognize
 from asterism.app.reconstruct import reconstruct
 from asterism.app.simulate import simulate
 from asterism.app.stitch import stitch
 from asterism.app.track import track
+from asterism.app.view import view
 
 __all__ = ["app"]
 
@@ -69,6 +71,8 @@ for _command in (
     film,
     reconstruct,
     chain,
+    plot,
+    view,
     demo,
 ):
     app.command()(_command)

@@ -96,18 +96,10 @@ def _experiment(out: Path, seed: int) -> am.Tracks:
 
 
 def _draw(tracks: am.Tracks, truth: am.Tracks, folder: Path) -> None:
-    import numpy as np
-
-    import asterism as am
-    from asterism.evaluate import align
+    from asterism.app.files import truth_of_each
     from asterism.view import plot_errors, plot_presence, plot_trajectories
 
-    # The file has its own order and rounding: the truth of its detections, one by one.
-    both = align(tracks, truth)
-    is_ours = both.i_tracks >= 0
-    labels = np.full(tracks.detections.n_points, -1)
-    labels[both.i_tracks[is_ours]] = both.truth_labels[is_ours]
-    same = am.Tracks(detections=tracks.detections, labels=labels, names=truth.names)
+    same = truth_of_each(tracks, truth)
     for name, axes in (
         ("trajectories", plot_trajectories(tracks)),
         ("presence", plot_presence(tracks)),

@@ -20,8 +20,6 @@ _ByFrame = Annotated[
     Path | None, typer.Option(metavar="FILE.csv", help="Write the scores frame by frame.")
 ]
 
-_MARKS_CLUTTER = ("c3d", "csv")  # as Asterism writes them
-
 
 def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Json = False) -> None:
     """Score labels against the truth, detection by detection.
@@ -37,32 +35,16 @@ def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Js
         asterism evaluate tracks.csv truth.c3d --json --by-frame frames.csv
     """
     import asterism as am
-    from asterism.app.files import check_outputs
+    from asterism.app.files import check_outputs, read_labels
 
     check_outputs({"--by-frame": by_frame}, [labels, truth])
-    scores = am.evaluate(_read_labels(labels), am.read_tracks(truth))
+    scores = am.evaluate(read_labels(labels), am.read_tracks(truth))
     if by_frame is not None:
         _write_by_frame(scores, by_frame)
     if json:
         print_json(scores.to_dict())
     else:
         console().print(str(scores), markup=False, soft_wrap=True)
-
-
-def _read_labels(path: Path) -> am.Tracks:
-    """Read tracks; unnamed ones among named ones are clutter where the format cannot say so."""
-    import numpy as np
-
-    import asterism as am
-
-    tracks = am.read_tracks(path)
-    has_name = np.array([name is not None for name in tracks.names], dtype=bool)
-    source = tracks.detections
-    says_so = isinstance(source, am.Capture) and source.format in _MARKS_CLUTTER
-    if says_so or not has_name.any():
-        return tracks
-    number = np.append(np.where(has_name, np.arange(len(has_name)), -1), -1)
-    return am.Tracks(detections=source, labels=number[tracks.labels], names=tracks.names)
 
 
 def _write_by_frame(scores: am.Evaluation, path: Path) -> None:

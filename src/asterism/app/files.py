@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 
     import asterism as am
 
-__all__ = ["check_outputs", "read_model"]
+__all__ = ["check_outputs", "read_labels", "read_model", "truth_of_each"]
+
+_MARKS_CLUTTER = ("c3d", "csv")  # as Asterism writes them
 
 
 def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | None]) -> None:
@@ -64,3 +66,39 @@ def read_model(path: Path) -> am.TrackingModel:
         return am.TrackingModel.from_toml(path)
     except OSError as error:
         raise FormatError(path, "opening", "a model in TOML", error.strerror) from error
+
+
+def read_labels(path: Path) -> am.Tracks:
+    """Read tracks; unnamed ones among named ones are clutter where the format cannot say so."""
+    import numpy as np
+
+    import asterism as am
+
+    tracks = am.read_tracks(path)
+    has_name = np.array([name is not None for name in tracks.names], dtype=bool)
+    source = tracks.detections
+    says_so = isinstance(source, am.Capture) and source.format in _MARKS_CLUTTER
+    if says_so or not has_name.any():
+        return tracks
+    number = np.append(np.where(has_name, np.arange(len(has_name)), -1), -1)
+    return am.Tracks(detections=source, labels=number[tracks.labels], names=tracks.names)
+
+
+def truth_of_each(tracks: am.Tracks, truth: am.Tracks) -> am.Tracks:
+    """Give the truth of each detection of `tracks`, one by one: files have an order of their own.
+
+    Raises
+    ------
+    ParameterError
+        If the two are not of the same capture.
+    """
+    import numpy as np
+
+    import asterism as am
+    from asterism.evaluate import align
+
+    both = align(tracks, truth)
+    is_ours = both.i_tracks >= 0
+    labels = np.full(tracks.detections.n_points, -1)
+    labels[both.i_tracks[is_ours]] = both.truth_labels[is_ours]
+    return am.Tracks(detections=tracks.detections, labels=labels, names=truth.names)

@@ -1,5 +1,6 @@
-"""Kalman filter and smoother over many tracks at once."""
+"""Kalman filter and smoother over many tracks at once, and the gates about what they foresee."""
 
+from asterism.filter.gates import GateGroups, gate_groups
 from asterism.filter.kalman import States, filter_states, smooth
 
-__all__ = ["States", "filter_states", "smooth"]
+__all__ = ["GateGroups", "States", "filter_states", "gate_groups", "smooth"]

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.errors import ParameterError
-from asterism.view.style import CLUTTER, CYCLE, GRID, INK, MISSED, RIGHT, WRONG, new_axes, tidy
+from asterism.view.rows import axes_for, frame_rows, rows_of, strip_above
+from asterism.view.style import CLUTTER, CYCLE, INK, MISSED, RIGHT, WRONG
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from asterism.model import Tracks
 
 __all__ = ["plot_errors", "plot_presence"]
-
-_MOST_NAMES = 60  # rows that can be named legibly
 
 
 def plot_presence(tracks: Tracks, ax: Axes | None = None) -> Axes:
@@ -36,12 +35,12 @@ def plot_presence(tracks: Tracks, ax: Axes | None = None) -> Axes:
     Axes
         Seconds across, one row a track; the counts are in an inset above.
     """
-    rows = _rows(tracks)
-    axes = ax if ax is not None else _axes_for(rows)
+    rows = rows_of(tracks)
+    axes = ax if ax is not None else axes_for(rows)
     order, _ = tracks.by_track
     colours = np.array(CYCLE, dtype=object)[tracks.labels[order] % len(CYCLE)]
     _draw_bars(axes, tracks, rows, colours)
-    above = _above(axes)
+    above = strip_above(axes)
     _draw_counts(above, tracks, tracks.labels < 0, CLUTTER)
     above.set_ylabel("clutter", fontsize=8, color=INK)
     n_seen = len(np.unique(tracks.labels[order]))
@@ -88,11 +87,11 @@ def plot_errors(tracks: Tracks, truth: Tracks, ax: Axes | None = None) -> Axes:
     is_right[is_labelled] = (marker_of[tracks.labels[is_labelled]] == truth.labels[is_labelled]) & (
         truth.labels[is_labelled] >= 0
     )
-    rows = _rows(tracks)
-    axes = ax if ax is not None else _axes_for(rows)
+    rows = rows_of(tracks)
+    axes = ax if ax is not None else axes_for(rows)
     order, _ = tracks.by_track
     _draw_bars(axes, tracks, rows, np.where(is_right[order], RIGHT, WRONG).astype(object))
-    above = _above(axes)
+    above = strip_above(axes)
     is_wrong = is_labelled & ~is_right
     is_missed = ~is_labelled & (truth.labels >= 0)
     _draw_counts(above, tracks, is_wrong | is_missed, MISSED, "no label")
@@ -106,20 +105,6 @@ def plot_errors(tracks: Tracks, truth: Tracks, ax: Axes | None = None) -> Axes:
     share = 100 * is_wrong.sum() / max(int(is_labelled.sum()), 1)
     above.set_title(f"{share:.2g} % of the labels wrong", fontsize=11, color=INK, loc="left")
     return axes
-
-
-def _rows(tracks: Tracks) -> NDArray[np.int64]:
-    """Row of each track, shape (K,), by first frame and then by number; -1 where it is empty."""
-    order, offsets = tracks.by_track
-    there = np.flatnonzero(tracks.lengths)
-    first = tracks.detections.frame_of[order[offsets[there]]]
-    rows = np.full(tracks.n_tracks, -1)
-    rows[there[np.argsort(first, kind="stable")]] = np.arange(len(there))
-    return rows
-
-
-def _axes_for(rows: NDArray[np.int64]) -> Axes:
-    return new_axes(height=float(np.clip(2.0 + 0.16 * (rows.max(initial=0) + 1), 3.5, 11.0)))
 
 
 def _commonest_marker(tracks: Tracks, truth: Tracks) -> NDArray[np.int64]:
@@ -159,30 +144,7 @@ def _draw_bars(
         list(corners), facecolors=colours[begins].tolist(), edgecolors="face", linewidths=0.25
     )
     axes.add_collection(bars)
-    n_rows = int(rows.max(initial=-1)) + 1
-    axes.set_ylim(n_rows - 0.3, -0.7)
-    if d.n_frames:
-        axes.set_xlim(d.times[0] - half, d.times[-1] + half)
-    axes.set_xlabel("time [s]", color=INK)
-    axes.grid(axis="x", color=GRID, linewidth=0.8)
-    tidy(axes)
-    if n_rows <= _MOST_NAMES:
-        there = np.flatnonzero(rows >= 0)
-        names = [tracks.names[k] or f"{k}" for k in there]
-        axes.set_yticks(rows[there], names, fontsize=7)
-        axes.tick_params(axis="y", length=0)
-    axes.set_ylabel("track, by first frame", color=INK)
-
-
-def _above(axes: Any) -> Any:
-    """Make axes above others, over the same times."""
-    inches = axes.get_position().height * axes.figure.get_figheight()
-    above = axes.inset_axes((0.0, 1.0 + 0.1 / inches, 1.0, 0.55 / inches), sharex=axes)
-    tidy(above)
-    above.tick_params(axis="x", labelbottom=False, length=0)
-    above.tick_params(axis="y", labelsize=7)
-    above.yaxis.get_major_locator().set_params(integer=True, nbins=2)
-    return above
+    frame_rows(axes, tracks, rows)
 
 
 def _draw_counts(

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from asterism.errors import ParameterError
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
 
 __all__ = [
@@ -16,7 +22,9 @@ __all__ = [
     "MISSED",
     "RIGHT",
     "WRONG",
+    "given_axes",
     "new_axes",
+    "new_panels",
     "tidy",
 ]
 
@@ -43,6 +51,36 @@ def new_axes(*, solid: bool = False, height: float = 5.0) -> Axes:
 
     figure = Figure(figsize=(8.0, height), layout="constrained", dpi=120)
     return figure.add_subplot(projection="3d" if solid else None)
+
+
+def new_panels(n_rows: int, n_columns: int = 1, *, width: float, height: float) -> list[Axes]:
+    """Make a figure of several panels without pyplot and give their axes, row by row.
+
+    Parameters
+    ----------
+    n_rows, n_columns : int
+        How they lie.
+    width, height : float
+        Of the figure, inches.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained", dpi=120)
+    return list(np.ravel(figure.subplots(n_rows, n_columns, squeeze=False)))
+
+
+def given_axes(ax: Sequence[Axes], n: int, what: str) -> list[Axes]:
+    """Give axes that a caller passed as a list, or raise if they are not `n`.
+
+    Raises
+    ------
+    ParameterError
+        If there are more or fewer; `what` says what each is for.
+    """
+    axes = list(np.ravel(np.asarray(ax, dtype=object)))
+    if len(axes) != n:
+        raise ParameterError("ax", f"{n} axes, one for each {what}", len(axes))
+    return axes
 
 
 def tidy(axes: Axes) -> None:

@@ -1,0 +1,51 @@
+"""``asterism view``: tracks and cameras in Rerun's viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from asterism.app.console import Quiet, print_table
+
+_Tracked = Annotated[Path, typer.Argument(metavar="TRACKED", help="File with tracks.")]
+_Rig = Annotated[
+    str | None,
+    typer.Option(metavar="RIG", help="Cameras to show: a calibration, or ring8 and the like."),
+]
+_Save = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.rrd", help="Write the scene, and open no viewer."),
+]
+
+
+def view(tracked: _Tracked, rig: _Rig = None, save: _Save = None, quiet: Quiet = False) -> None:
+    """Look at tracks in space and time: turn, zoom, play, choose what is shown.
+
+    Needs Rerun: pip install 'asterism[view]'. The viewer listens to this machine alone, and its
+    usage statistics are switched off.
+
+    For example:
+
+        asterism view trial.tracked.c3d
+
+        asterism view trial.tracked.csv --rig walk.xcp --save scene.rrd
+    """
+    import asterism as am
+    from asterism.app.files import check_outputs, read_labels
+    from asterism.app.recording import rig_from
+    from asterism.errors import ParameterError
+
+    check_outputs({"--save": save}, [tracked, None if rig is None else Path(rig)])
+    if save is not None and save.suffix.lower() != ".rrd":
+        raise ParameterError("--save", "a name ending in .rrd", str(save))
+    tracks = read_labels(tracked)
+    cameras: am.Rig | None = None
+    if rig is not None:
+        if tracks.detections.n_axes != 3:
+            raise ParameterError("--rig", "tracks in 3-D", f"{tracked}, in 2-D")
+        cameras, _ = rig_from(rig, tracks.detections.points)
+    am.view(tracks, rig=cameras, path=save)
+    if save is not None and not quiet:
+        print_table([("written", save)])
