@@ -51,7 +51,7 @@ _Moves = Annotated[
     list[float] | None,
     typer.Option(
         help="Moves for each detection in doubt: posterior; may be repeated.",
-        show_default="0, 1, 3, 10, 30, 100",
+        show_default="0.3, 1, 3, 10, 30, 100",
     ),
 ]
 _Seeds = Annotated[

@@ -165,7 +165,7 @@ def _posterior(asked: Request) -> Any:
 
     capture = am.read(asked.file).measured()
     model = _model(asked, capture)
-    moves = sorted(set(asked.moves or (0, 1, 3, 10, 30, 100)))
+    moves = sorted(set(asked.moves or (0.3, 1, 3, 10, 30, 100)))
     seeds = asked.seeds or 3
     values: list[list[float]] = []
     with progress("walking", seeds * len(moves)) as advance:
@@ -178,10 +178,7 @@ def _posterior(asked: Request) -> Any:
                 found = am.track(capture, method, model=model, seed=seed)
                 values[-1].append(found.info["log_posterior"])
                 advance(sum(map(len, values)))
-    others = {
-        name: am.track(capture, am.method_by_name(name), model=model).info["log_posterior"]
-        for name in ("gnn",)
-    }
+    others = {"gnn": am.track(capture, am.GNN(), model=model).info["log_posterior"]}
     return am.plot_posterior(moves, values, others=others)
 
 

@@ -12,7 +12,7 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from asterism.view.compare import plot_compare, plot_posterior
+from asterism.view.compare import plot_compare
 from asterism.view.confidence import plot_confidence, plot_reliability
 from asterism.view.coverage import plot_coverage
 from asterism.view.export import figure_bytes
@@ -20,6 +20,7 @@ from asterism.view.groups import plot_groups
 from asterism.view.image import plot_depth, plot_image
 from asterism.view.lens import plot_lens
 from asterism.view.over_time import plot_axes
+from asterism.view.posterior import plot_posterior
 from asterism.view.presence import plot_errors, plot_presence
 from asterism.view.projections import plot_projections
 from asterism.view.rig import plot_rig

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
     from asterism.evaluate import Calibration
     from asterism.model import Tracks
@@ -64,7 +65,7 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
         draw_bar(axes, drawn, "confidence", ticks=np.linspace(0, 1, 6))
         # White between the rows, so that neighbours do not run into each other.
         for edge in np.arange(1, len(cells)) - 0.5:
-            axes.axhline(edge, color="white", linewidth=1.0)
+            axes.axhline(edge, color="white", linewidth=2.0)
     frame_rows(axes, tracks, rows)
     axes.grid(visible=False)
     above = strip_above(axes)
@@ -101,8 +102,9 @@ def plot_reliability(
     Returns
     -------
     Axes
-        A point for each bin that holds labels, with its standard error, over the mean confidence
-        there; on the diagonal confidence means what it says. How many labels there are in each bin
+        A point for each bin that holds labels over the mean confidence there, with the range of
+        true shares that are within a standard error of it (Wilson's, so that few labels look like
+        few); on the diagonal confidence means what it says. How many labels there are in each bin
         is in an inset above.
 
     Raises
@@ -125,28 +127,39 @@ def plot_reliability(
         used = part.counts > 0
         share, n = part.right[used], part.counts[used]
         told = f"{name}: " if name else ""
+        low, high = _interval(share, n)
         axes.errorbar(
-            part.confidence[used], share, yerr=np.sqrt(share * (1 - share) / n), marker="o",
-            markersize=4, linewidth=1.2, color=colour, label=f"{told}error {part.ece:.3f}",
+            part.confidence[used], share, yerr=(share - low, high - share), marker="o",
+            markersize=4, linewidth=1.0, color=colour, label=f"{told}error {part.ece:.3f}",
         )  # fmt: skip
         above.stairs(part.counts, part.edges, color=colour, linewidth=1.2)
-    above.set_ylim(bottom=0.7)
+    above.set_ylim(bottom=0.5)
     above.set_ylabel("labels", fontsize=8, color=INK)
     above.grid(axis="y", color=GRID, linewidth=0.8)
     axes.grid(color=GRID, linewidth=0.8)
     axes.set_xlabel("confidence", color=INK)
     axes.set_ylabel("share that is right", color=INK)
-    legend = axes.legend(loc="upper left", frameon=False, fontsize=8, labelcolor=INK)
+    legend = axes.legend(loc="best", frameon=False, fontsize=8, labelcolor=INK)
     for text in legend.get_texts():
         text.set_parse_math(False)
     return axes
+
+
+def _interval(
+    share: NDArray[np.float64], n: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the ends of Wilson's interval of one standard error about shares of `n`."""
+    middle = (share + 0.5 / n) / (1 + 1 / n)
+    half = np.sqrt(share * (1 - share) / n + 0.25 / n**2) / (1 + 1 / n)
+    # Rounding must not put the share itself outside.
+    return np.minimum(middle - half, share), np.maximum(middle + half, share)
 
 
 def _is_mapping(value: object) -> bool:
     return hasattr(value, "items")
 
 
-def _edges(times: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+def _edges(times: NDArray[np.float64]) -> NDArray[np.float64]:
     """Give the ends of the frames, shape (T + 1,): half way to the next, wherever that is."""
     if len(times) == 1:
         return np.array([times[0] - 0.5, times[0] + 0.5])

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_groups"]
 
+ALONE = "#D4D4D4"  # tracks that are in nobody's way: quiet
 # Least number of tracks in a group of each colour.
 _SIZES = {1: "1 track", 2: "2", 3: "3 to 4", 5: "5 to 8", 9: "9 or more"}
 
@@ -34,7 +35,7 @@ def plot_groups(groups: GateGroups, ax: Axes | None = None) -> Axes:
     -------
     Axes
         Seconds across; tracks, stacked by the size of their group, the largest groups at the
-        bottom and darkest.
+        bottom and darkest, those alone grey.
     """
     import matplotlib
 
@@ -45,12 +46,13 @@ def plot_groups(groups: GateGroups, ax: Axes | None = None) -> Axes:
     used = int(size.max(initial=0)) + 1
     counts = np.zeros((len(least), T))
     np.add.at(counts, (size, groups.frames), groups.n_tracks)
-    colours = matplotlib.colormaps[GRADIENT](np.linspace(0.95, 0.05, len(least)))
+    graded = matplotlib.colormaps[GRADIENT](np.linspace(0.85, 0.05, len(least) - 1))
+    colours = [ALONE, *map(tuple, graded)]
     base = np.zeros(T)
     for i in range(used - 1, -1, -1):
         top = base + counts[i]
         axes.fill_between(
-            groups.times, base, top, step="mid", color=tuple(colours[i]), linewidth=0,
+            groups.times, base, top, step="mid", color=colours[i], linewidth=0,
             label=list(_SIZES.values())[i],
         )  # fmt: skip
         base = top

@@ -101,7 +101,9 @@ def _log(rr: Any, recording: Any, tracks: Tracks, rig: Rig | None) -> None:
     is_clutter = tracks.labels < 0
     if is_clutter.any():
         recording.log(
-            "world/clutter", rr.Points3D.from_fields(colors=CLUTTER, radii=radius / 2), static=True
+            "world/clutter",
+            rr.Points3D.from_fields(colors=_rgb(CLUTTER), radii=radius / 2),
+            static=True,
         )
         counts = np.bincount(d.frame_of[is_clutter], minlength=d.n_frames)
         dots = rr.Points3D.columns(positions=points[is_clutter])
@@ -144,7 +146,7 @@ def _log_marker(
     counts = np.repeat([1, 0], [len(frames), len(ends)])[in_order]
     marker = rr.new_entity_path(["world", "markers", name])
     look = rr.Points3D.from_fields(
-        colors=colour, radii=radius, labels=name,
+        colors=_rgb(colour), radii=radius, labels=name,
         show_labels=np.count_nonzero(tracks.lengths) <= _MOST_LABELS,
     )  # fmt: skip
     recording.log(marker, look, static=True)
@@ -153,7 +155,7 @@ def _log_marker(
     if len(gaps):
         bridge = rr.new_entity_path(["world", "gaps", name])
         recording.log(
-            bridge, rr.LineStrips3D.from_fields(colors=colour, radii=radius / 6), static=True
+            bridge, rr.LineStrips3D.from_fields(colors=_rgb(colour), radii=radius / 6), static=True
         )
         rows = np.stack([frames[gaps] + 1, frames[gaps + 1]], axis=1).ravel()
         strips = np.stack([places[gaps], places[gaps + 1]], axis=1)
@@ -161,7 +163,7 @@ def _log_marker(
         recording.send_columns(bridge, _times(rr, tracks, rows), lines)
     if tracks.confidence is not None:
         curve = rr.new_entity_path(["confidence", name])
-        recording.log(curve, rr.SeriesLines(colors=colour, names=name), static=True)
+        recording.log(curve, rr.SeriesLines(colors=_rgb(colour), names=name), static=True)
         sure = rr.Scalars.columns(scalars=tracks.confidence[members])
         recording.send_columns(curve, _times(rr, tracks, frames), sure)
 
@@ -178,7 +180,8 @@ def _log_trails(
     if not len(goes_on):
         return
     strips = np.stack([points[order[goes_on]], points[order[goes_on + 1]]], axis=1)
-    colours = [CYCLE[k % len(CYCLE)] for k in track[goes_on].tolist()]
+    palette = np.array([_rgb(colour) for colour in CYCLE], dtype=np.uint8)
+    colours = palette[track[goes_on] % len(CYCLE)]
     counts = np.bincount(frame[goes_on] + 1, minlength=d.n_frames)
     recording.log("world/trails", rr.LineStrips3D.from_fields(radii=radius / 5), static=True)
     lines = rr.LineStrips3D.columns(strips=strips, colors=colours).partition(counts)
@@ -217,6 +220,12 @@ def _blueprint(tracks: Tracks) -> Any:
     return rrb.Blueprint(
         rrb.Vertical(*parts, row_shares=[3, 1][: len(parts)]), rrb.TimePanel(timeline="time")
     )
+
+
+def _rgb(colour: str) -> tuple[int, int, int]:
+    """Give a colour of the style, ``#RRGGBB``, as Rerun takes it."""
+    red, green, blue = bytes.fromhex(colour[1:])
+    return red, green, blue
 
 
 def _names(tracks: Tracks) -> list[str]:

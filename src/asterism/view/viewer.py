@@ -8,7 +8,6 @@ import secrets
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 from asterism.errors import FormatError
 
@@ -31,44 +30,52 @@ def open_viewer(recording: Path) -> None:
         If the viewer ends with an error, where there is no screen say.
     """
     switch_off_statistics(_settings_file())
-    # By its own name on the path it might be another installation's.
-    command = [sys.executable, "-m", "rerun", str(recording), "--bind", _HERE, "--port", "auto"]
-    done = subprocess.run(command, check=False, capture_output=True, text=True)
-    if done.returncode:
-        lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
-        hint = "without a screen, save the scene and open it elsewhere"
-        raise FormatError("rerun", "opening", "a window", lines[-1], hint)
+    _rerun("opening", "a window", str(recording), "--bind", _HERE, "--port", "auto")
 
 
 def switch_off_statistics(settings: Path) -> None:
-    """Write into the viewer's settings that it is to send no usage statistics.
-
-    Its own command for it, ``rerun analytics disable``, would count itself first.
+    """See to it that the viewer sends no usage statistics, now and from then on.
 
     Parameters
     ----------
     settings : Path
-        The viewer's ``analytics.json``; made where there is none, otherwise kept but for the one
-        entry.
+        The viewer's ``analytics.json``; all but the one entry is kept.
+
+    Raises
+    ------
+    FormatError
+        If that cannot be done: sooner no viewer than one that talks.
     """
-    values: dict[str, Any] = {"analytics_id": "", "metadata": {}}
     try:
-        found = json.loads(settings.read_text(encoding="utf-8"))
-        values |= found if isinstance(found, dict) else {}
+        values = json.loads(settings.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        pass  # none yet, or none that the viewer could read either
-    if values.get("analytics_enabled") is False:
-        return
-    values["analytics_enabled"] = False
-    temporary = settings.with_name(f".{secrets.token_hex(8)}.part")
-    try:
-        settings.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(json.dumps(values), encoding="utf-8")
-        temporary.replace(settings)
-    except OSError as error:
-        # Sooner no viewer than one that talks.
-        what = error.strerror or str(error)
-        raise FormatError(settings, "writing", "a file that can be written", what) from error
+        values = None
+    if not isinstance(values, dict) or "analytics_enabled" not in values:
+        # There are no settings yet, and the first session of all sends nothing.
+        _rerun("switching off", "no usage statistics", "analytics", "disable")
+    elif values["analytics_enabled"] is not False:
+        # Later ones do: the viewer's own command for it would count itself. Only this entry is
+        # touched, as settings that lack another are thrown away, with statistics on again.
+        values["analytics_enabled"] = False
+        temporary = settings.with_name(f".{secrets.token_hex(8)}.part")
+        try:
+            temporary.write_text(json.dumps(values), encoding="utf-8")
+            temporary.replace(settings)
+        except OSError as error:
+            what = error.strerror or str(error)
+            raise FormatError(settings, "writing", "a file that can be written", what) from error
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+def _rerun(place: str, expected: str, *arguments: str) -> None:
+    """Run the viewer's program; that of this Python, where another may lie on the path."""
+    command = [sys.executable, "-m", "rerun", *arguments]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    if done.returncode:
+        lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        hint = "without a screen, save the scene and open it elsewhere"
+        raise FormatError("rerun", place, expected, lines[-1], hint)
 
 
 def _settings_file() -> Path:
