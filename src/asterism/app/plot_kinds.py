@@ -94,10 +94,10 @@ def _errors(asked: Request) -> Any:
 def _reliability(asked: Request) -> Any:
     import asterism as am
     from asterism.app.files import truth_of_each
-    from asterism.evaluate import right_links
+    from asterism.evaluate import Calibration, right_links
 
     truth = _truth(asked)
-    parts: dict[str, am.evaluate.Calibration] = {}
+    parts: dict[str, Calibration] = {}
     for name, file in _named(asked.files).items():
         tracks = _sure(file)
         assert tracks.confidence is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +13,6 @@ from asterism.view.rows import axes_for, frame_rows, rows_of, strip_above
 from asterism.view.style import CLUTTER, CYCLE, GRADIENT, GRID, INK, new_axes, tidy
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
@@ -112,7 +111,7 @@ def plot_reliability(
     ParameterError
         If there is nothing to draw.
     """
-    parts = calibration if _is_mapping(calibration) else {"": calibration}
+    parts = calibration if isinstance(calibration, Mapping) else {"": calibration}
     if not parts:
         raise ParameterError("calibration", "at least one", "none")
     axes: Any = ax if ax is not None else new_axes(height=6.0)
@@ -153,10 +152,6 @@ def _interval(
     half = np.sqrt(share * (1 - share) / n + 0.25 / n**2) / (1 + 1 / n)
     # Rounding must not put the share itself outside.
     return np.minimum(middle - half, share), np.maximum(middle + half, share)
-
-
-def _is_mapping(value: object) -> bool:
-    return hasattr(value, "items")
 
 
 def _edges(times: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""A picture as bytes, the same whenever and wherever it is made."""
+"""A picture as bytes, the same whenever it is made."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None, "Creator": None},
 }
 # TrueType in PDF: text that can be searched and edited, and that journals accept.
-_OPTIONS = {"svg.hashsalt": "asterism", "pdf.fonttype": 42}
+_OPTIONS: Any = {"svg.hashsalt": "asterism", "pdf.fonttype": 42}
 
 
 def figure_bytes(picture: Figure | Axes | Sequence[Axes], ending: str) -> bytes:
-    """Render a picture; the same picture gives the same bytes.
+    """Render a picture; one that is made anew from the same data gives the same bytes.
 
     Parameters
     ----------
@@ -61,5 +61,5 @@ def figure_bytes(picture: Figure | Axes | Sequence[Axes], ending: str) -> bytes:
     figure = getattr(first, "figure", first)
     file = io.BytesIO()
     with matplotlib.rc_context(_OPTIONS):
-        figure.savefig(file, format=ending, metadata=_METADATA[ending], bbox_inches="tight")
+        figure.savefig(file, format=ending, metadata=_METADATA[ending])
     return file.getvalue()

@@ -230,8 +230,12 @@ def _rgb(colour: str) -> tuple[int, int, int]:
 
 def _names(tracks: Tracks) -> list[str]:
     """Give every track a name of its own: its number where it has none."""
-    found: list[str] = []
+    found: dict[str, None] = {}
     for k, name in enumerate(tracks.names):
-        chosen = name or f"track {k}"
-        found.append(chosen if chosen not in found else f"{chosen} ({k})")
-    return found
+        base = chosen = name or f"track {k}"
+        n = 1
+        while chosen in found:
+            n += 1
+            chosen = f"{base} ({n})"
+        found[chosen] = None
+    return list(found)

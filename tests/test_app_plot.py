@@ -1,0 +1,188 @@
+"""The command that draws: every kind, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.app import main
+from asterism.app.plot_kinds import KINDS
+
+# Of each kind what follows its name, in the folder below.
+LINES = {
+    "trajectories": "run",
+    "axes": "run/in.tracked.csv",
+    "presence": "truth.csv",
+    "confidence": "run",
+    "errors": "run --truth truth.csv",
+    "reliability": "run run/in.tracked.csv --truth truth.csv",
+    "compare": "run truth.csv --truth truth.csv",
+    "projections": "truth.csv --rig ring3",
+    "image": "truth.csv --rig ring3 --frame 5",
+    "posterior": "in.csv --model model.toml --moves 1 --moves 4 --seeds 2",
+    "groups": "run --model model.toml",
+    "rig": "rig.toml",
+    "lens": "rig.toml --camera cam2",
+}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with a capture, its truth, a model, a finished run of mcmcda, and cameras."""
+    folder = tmp_path_factory.mktemp("made")
+    scene = am.simulate.crossing(frames=20, rate=50, seed=3)
+    truth = am.simulate.sense(scene, missing=0.1, clutter=0.1, noise=0.003, seed=1)
+    am.write(truth, folder / "truth.csv")
+    nobody = np.full(truth.detections.n_points, -1)
+    am.write(am.Tracks(detections=truth.detections, labels=nobody), folder / "in.csv")
+    am.estimate_model(truth.detections).model.to_toml(folder / "model.toml")
+    rig = am.Rig.ring(3, radius=4, height=2, target=(0, 0, 0))
+    am.write_rig(rig, folder / "rig.toml")
+    film = am.simulate.film(scene, rig)
+    am.write_observations(film.observations, folder / "film.csv")
+    line = f"{folder}/in.csv --model {folder}/model.toml --method mcmcda --run {folder}/run -q"
+    assert main(["track", *line.split()]) == 0
+    return folder
+
+
+@pytest.fixture
+def work(made, tmp_path, monkeypatch):
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(line, capsys):
+    capsys.readouterr()
+    code = main(["plot", *line.split()])
+    out, err = capsys.readouterr()
+    assert code == 0, err
+    return out
+
+
+def refused(line, capsys):
+    capsys.readouterr()
+    code = main(["plot", *line.split()])
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert out == ""
+    assert "Traceback" not in err
+    return err
+
+
+def test_every_kind_is_tried():
+    assert set(LINES) == set(KINDS)
+
+
+@pytest.mark.parametrize("kind", LINES)
+def test_each_kind_is_drawn_the_same_twice(work, capsys, kind):
+    assert run(f"{kind} {LINES[kind]} -o a.svg", capsys) == "written  a.svg\n"
+    first = (work / "a.svg").read_bytes()
+    assert first.startswith(b"<?xml")
+    assert run(f"{kind} {LINES[kind]} -o a.svg -q", capsys) == ""
+    assert (work / "a.svg").read_bytes() == first
+
+
+@pytest.mark.parametrize("ending", ["pdf", "png", "svg"])
+def test_the_ending_decides(work, capsys, ending):
+    run(f"presence truth.csv -o a.{ending}", capsys)
+    start = {"pdf": b"%PDF", "png": b"\x89PNG", "svg": b"<?xml"}[ending]
+    assert (work / f"a.{ending}").read_bytes().startswith(start)
+    assert not list(work.glob(".*"))
+
+
+def test_the_picture_lies_beside_what_it_shows(work, capsys):
+    run("presence truth.csv", capsys)
+    assert (work / "truth.presence.pdf").is_file()
+    made = json.loads(run("presence run --json", capsys))
+    assert made["kind"] == "presence"
+    assert (work / "run.presence.pdf").is_file()
+
+
+def test_compare_takes_the_time_from_the_run(work, capsys, monkeypatch):
+    taken = {}
+    before = am.plot_compare
+
+    def plot_compare(scores, milliseconds):
+        taken.update(scores=scores, milliseconds=milliseconds)
+        return before(scores, milliseconds=milliseconds)
+
+    monkeypatch.setattr(am, "plot_compare", plot_compare)
+    run("compare run truth.csv --truth truth.csv -o a.png", capsys)
+    summary = json.loads((work / "run/summary.json").read_text())
+    assert taken["milliseconds"] == {"run": pytest.approx(1e3 / summary["frames_per_second"])}
+    assert taken["scores"]["truth"].idf1 == 1
+
+
+def test_errors_are_those_of_the_file(work, capsys, monkeypatch):
+    """The truth is found detection by detection, though a file has an order of its own."""
+    seen = []
+    before = am.plot_errors
+    monkeypatch.setattr(am, "plot_errors", lambda *a: seen.append(before(*a)) or seen[-1])
+    run("errors truth.csv --truth truth.csv -o a.png", capsys)
+    (above,) = seen[0].child_axes
+    assert above.get_title(loc="left") == "0 % of the labels wrong"
+
+
+def test_observations_of_a_film_are_drawn_as_they_are(work, capsys, monkeypatch):
+    seen = []
+    before = am.plot_projections
+    monkeypatch.setattr(am, "plot_projections", lambda *a: seen.extend(a) or before(*a))
+    run("projections film.csv --rig rig.toml -o a.png", capsys)
+    np.testing.assert_array_equal(seen[0].pixels, am.read_observations("film.csv").pixels)
+    line = "projections film.csv --rig no.toml -o a.png"
+    assert "no.toml: opening: expected a calibration" in refused(line, capsys)
+
+
+def test_help_lists_every_kind(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
+    text = run("--help", capsys)
+    for name, kind in KINDS.items():
+        assert f"{name}  {kind.about[:40]}" in text
+    assert "[bold" not in text
+    assert "KINDS" not in text
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("presenc truth.csv", "did you mean 'presence'?"),
+        ("errors run", "--truth: expected a file, which errors needs, got nothing"),
+        ("projections truth.csv", "--rig: expected"),
+        ("confidence truth.csv", "tracks with a confidence"),
+        ("reliability run truth.csv --truth truth.csv", "truth.csv, which has none"),
+        ("presence truth.csv --truth truth.csv", "for errors, reliability, compare"),
+        ("presence truth.csv in.csv", "one file for presence"),
+        ("presence truth.csv -o a.jpg", "a name ending in .pdf, .svg or .png"),
+        ("presence truth.csv -o a", "a name ending in .pdf, .svg or .png"),
+        ("presence truth.csv -o no/a.pdf", "in a folder that exists"),
+        ("errors run --truth truth.csv -o truth.csv", "-o: expected"),
+        ("presence nothing.csv", "nothing.csv"),
+        ("presence .", "summary.json: expected a finished run"),
+        ("errors run --truth rig.toml", "rig.toml"),
+        ("image in.csv --rig ring3", "points in tracks"),
+        ("image truth.csv --rig ring3 --frame 99", "--frame: expected 1 to 20, got 99"),
+        ("lens rig.toml --camera cam9", "one of cam1, cam2, cam3"),
+        ("posterior in.csv --moves -1", "--moves"),
+        ("posterior in.csv --seeds 0", "--seeds"),
+        ("compare run run --truth truth.csv", "different files"),
+        ("groups run --model rig.toml", "rig.toml"),
+    ],
+)
+def test_what_plot_refuses(work, capsys, line, message):
+    before = {path: path.read_bytes() for path in work.rglob("*") if path.is_file()}
+    err = refused(line, capsys)
+    assert message in err
+    assert err.strip().count("\n") == 0
+    assert {p: p.read_bytes() for p in work.rglob("*") if p.is_file()} == before
+
+
+def test_an_input_is_not_overwritten(work, capsys):
+    (work / "truth.csv").rename(work / "truth.pdf")
+    shutil.copy(work / "run/in.tracked.csv", work / "a.csv")
+    err = refused("errors a.csv --truth truth.pdf -o truth.pdf", capsys)
+    assert "the input truth.pdf" in err
