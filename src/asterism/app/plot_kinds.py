@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asterism.errors import FormatError, ParameterError
+from asterism.app.plot_inputs import (
+    is_observations,
+    model_for,
+    named,
+    solid_tracks,
+    summary_of,
+    sure_tracks,
+    tracks_of,
+)
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -62,32 +70,32 @@ class Kind:
 def _trajectories(asked: Request) -> Any:
     import asterism as am
 
-    return am.plot_trajectories(_tracks(asked.file))
+    return am.plot_trajectories(tracks_of(asked.file))
 
 
 def _axes(asked: Request) -> Any:
     import asterism as am
 
-    return am.plot_axes(_tracks(asked.file))
+    return am.plot_axes(tracks_of(asked.file))
 
 
 def _presence(asked: Request) -> Any:
     import asterism as am
 
-    return am.plot_presence(_tracks(asked.file))
+    return am.plot_presence(tracks_of(asked.file))
 
 
 def _confidence(asked: Request) -> Any:
     import asterism as am
 
-    return am.plot_confidence(_sure(asked.file))
+    return am.plot_confidence(sure_tracks(asked.file))
 
 
 def _errors(asked: Request) -> Any:
     import asterism as am
     from asterism.app.files import truth_of_each
 
-    tracks = _tracks(asked.file)
+    tracks = tracks_of(asked.file)
     return am.plot_errors(tracks, truth_of_each(tracks, _truth(asked)))
 
 
@@ -98,8 +106,8 @@ def _reliability(asked: Request) -> Any:
 
     truth = _truth(asked)
     parts: dict[str, Calibration] = {}
-    for name, file in _named(asked.files).items():
-        tracks = _sure(file)
+    for name, file in named(asked.files).items():
+        tracks = sure_tracks(file)
         assert tracks.confidence is not None
         links, is_right = right_links(tracks.labels, truth_of_each(tracks, truth).labels)
         parts[name] = am.calibration(tracks.confidence[links], is_right)
@@ -115,9 +123,9 @@ def _compare(asked: Request) -> Any:
     truth = _truth(asked)
     scores: dict[str, am.Evaluation] = {}
     times: dict[str, float] = {}
-    for name, file in _named(asked.files).items():
-        scores[name] = am.evaluate(_tracks(file), truth)
-        pace = _summary(file).get("frames_per_second")
+    for name, file in named(asked.files).items():
+        scores[name] = am.evaluate(tracks_of(file), truth)
+        pace = summary_of(file).get("frames_per_second")
         if pace:
             times[name] = 1e3 / float(pace)
     return am.plot_compare(scores, milliseconds=times)
@@ -127,7 +135,7 @@ def _projections(asked: Request) -> Any:
     import asterism as am
     from asterism.app.recording import rig_from
 
-    if _is_observations(asked.file):
+    if is_observations(asked.file):
         seen = am.read_observations(asked.file)
         # A ring or a wall is placed about points in space, of which there are none here.
         rig = am.read_rig(Path(asked.rig or ""))
@@ -135,7 +143,7 @@ def _projections(asked: Request) -> Any:
         from asterism.app.console import progress
         from asterism.app.filming import film_all
 
-        truth = _solid(asked)
+        truth = solid_tracks(asked.file)
         rig, _ = rig_from(asked.rig or "", truth.detections.points[truth.labels >= 0])
         with progress("filming", truth.detections.n_frames) as advance:
             seen = film_all(truth, rig, advance).observations
@@ -147,7 +155,7 @@ def _image(asked: Request) -> Any:
     from asterism.app.film_pictures import contact_sheet
     from asterism.app.recording import rig_from
 
-    truth = _solid(asked)
+    truth = solid_tracks(asked.file)
     rig, _ = rig_from(asked.rig or "", truth.detections.points[truth.labels >= 0])
     d = truth.detections
     first = d.first_frame if isinstance(d, am.Capture) else 0
@@ -164,7 +172,7 @@ def _posterior(asked: Request) -> Any:
     from asterism.app.console import progress
 
     capture = am.read(asked.file).measured()
-    model = _model(asked, capture)
+    model = model_for(asked.model, capture)
     moves = sorted(set(asked.moves or (0.3, 1, 3, 10, 30, 100)))
     seeds = asked.seeds or 3
     values: list[list[float]] = []
@@ -185,8 +193,8 @@ def _posterior(asked: Request) -> Any:
 def _groups(asked: Request) -> Any:
     import asterism as am
 
-    tracks = _tracks(asked.file)
-    return am.plot_groups(am.gate_groups(tracks, _model(asked, tracks.detections)))
+    tracks = tracks_of(asked.file)
+    return am.plot_groups(am.gate_groups(tracks, model_for(asked.model, tracks.detections)))
 
 
 def _rig(asked: Request) -> Any:
@@ -205,6 +213,13 @@ def _lens(asked: Request) -> Any:
     axes: Any = am.plot_lens(rig[rig.names.index(name)])
     axes.set_title(f"{name}: {axes.get_title(loc='left')}", loc="left", parse_math=False)
     return axes
+
+
+def _truth(asked: Request) -> am.Tracks:
+    import asterism as am
+
+    assert asked.truth is not None
+    return am.read_tracks(asked.truth)
 
 
 _TRUTH, _RIG = frozenset({"truth"}), frozenset({"rig"})
@@ -246,91 +261,3 @@ KINDS: dict[str, Kind] = {
     ),
 }  # fmt: skip
 """By the name on the command line, which is also that of the function: `am.plot_<kind>`."""
-
-
-def _tracks(path: Path) -> am.Tracks:
-    """Read a tracking: a file, or the folder of a run."""
-    from asterism.app.files import read_labels
-
-    return read_labels(_result(path))
-
-
-def _sure(path: Path) -> am.Tracks:
-    """Read a tracking that has a confidence."""
-    tracks = _tracks(path)
-    if tracks.confidence is None:
-        hint = "asterism track --method mcmcda -o FILE.csv writes one; other formats have no place"
-        raise ParameterError("FILES", "tracks with a confidence", f"{path}, which has none", hint)
-    return tracks
-
-
-def _truth(asked: Request) -> am.Tracks:
-    import asterism as am
-
-    assert asked.truth is not None
-    return am.read_tracks(asked.truth)
-
-
-def _solid(asked: Request) -> am.Tracks:
-    """Read tracks that cameras can look at."""
-    import asterism as am
-
-    truth = am.read_tracks(asked.file)
-    if not (truth.labels >= 0).any():
-        hint = "asterism track makes tracks of points without names"
-        raise ParameterError("FILES", "points in tracks", f"{asked.file}, which has none", hint)
-    if truth.detections.n_axes != 3:
-        raise ParameterError("FILES", "points in 3-D", f"{asked.file}, in 2-D")
-    return truth
-
-
-def _model(asked: Request, detections: am.Detections) -> am.TrackingModel:
-    import asterism as am
-    from asterism.app.console import progress
-    from asterism.app.files import read_model
-
-    if asked.model is not None:
-        return read_model(asked.model)
-    with progress("estimating the model"):
-        return am.estimate_model(detections).model
-
-
-def _is_observations(path: Path) -> bool:
-    """Tell the observations of a film, CSV by camera, from a capture in CSV."""
-    try:
-        with path.open(encoding="utf-8", errors="replace") as file:
-            columns = {word.strip().lower() for word in file.readline().split(",")}
-    except OSError as error:
-        raise FormatError(path, "opening", "a file", error.strerror) from error
-    return {"camera", "u", "v"} <= columns
-
-
-def _summary(path: Path) -> dict[str, Any]:
-    """Give the summary of a run folder; nothing of a mere file."""
-    from asterism.app.run_folder import SUMMARY
-
-    if not path.is_dir():
-        return {}
-    try:
-        return json.loads((path / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        hint = "asterism track --run makes one"
-        raise FormatError(path, SUMMARY, "a finished run", error, hint) from error
-
-
-def _result(path: Path) -> Path:
-    """Give the file that a run wrote, which lies in its folder wherever that is now."""
-    return path / Path(_summary(path)["output"]).name if path.is_dir() else path
-
-
-def _named(paths: Sequence[Path]) -> dict[str, Path]:
-    """Name files and folders shortly, and apart."""
-    found: dict[str, Path] = {}
-    for path in paths:
-        name = path.resolve().name if path.is_dir() else path.stem
-        if name in found:
-            name = str(path)
-        if name in found:
-            raise ParameterError("FILES", "different files", f"{path} twice")
-        found[name] = path
-    return found
