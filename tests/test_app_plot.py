@@ -181,6 +181,11 @@ def test_what_plot_refuses(work, capsys, line, message):
     assert {p: p.read_bytes() for p in work.rglob("*") if p.is_file()} == before
 
 
+def test_a_folder_that_is_no_run(work, capsys):
+    (work / "run/summary.json").write_text("{}")
+    assert "expected a finished run, got no word of its output" in refused("presence run", capsys)
+
+
 def test_an_input_is_not_overwritten(work, capsys):
     (work / "truth.csv").rename(work / "truth.pdf")
     shutil.copy(work / "run/in.tracked.csv", work / "a.csv")

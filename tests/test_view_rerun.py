@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 
@@ -159,7 +160,11 @@ def test_a_saved_scene_can_be_read_and_leaves_no_scraps(rr, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["scene.rrd"]
     command = [sys.executable, "-m", "rerun", "rrd", "verify", str(tmp_path / "scene.rrd")]
     # With settings of its own: nobody's are touched by a test.
-    env = {"HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path), "APPDATA": str(tmp_path)}
+    env = os.environ | {
+        "HOME": str(tmp_path),
+        "XDG_CONFIG_HOME": str(tmp_path),
+        "APPDATA": str(tmp_path),
+    }
     subprocess.run(command, check=True, timeout=120, capture_output=True, env=env)
 
 

@@ -81,11 +81,14 @@ def summary_of(path: Path) -> dict[str, Any]:
 
     if not path.is_dir():
         return {}
+    hint = "asterism track --run makes one"
     try:
-        return json.loads((path / SUMMARY).read_text(encoding="utf-8"))
+        found = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        hint = "asterism track --run makes one"
         raise FormatError(path, SUMMARY, "a finished run", error, hint) from error
+    if not isinstance(found, dict) or "output" not in found:
+        raise FormatError(path, SUMMARY, "a finished run", "no word of its output", hint)
+    return found
 
 
 def _result(path: Path) -> Path:
