@@ -225,14 +225,15 @@ void bind_trackers(nb::module_& module) {
       .def(
           "__init__",
           [](ChainOptions* self, const In<double>& weights, bool is_informed, double stop,
-             double floor, bool has_first_rules, bool is_ascent, double share_at_doubts) {
+             double floor, bool has_first_rules, bool is_ascent, double share_at_doubts,
+             bool is_draw) {
             require(weights.ndim() == 1 && weights.size() == kMoves, "weights: one for each move");
             new (self) ChainOptions{
-                {is_informed, stop, floor}, {}, has_first_rules, is_ascent, share_at_doubts};
+                {is_informed, stop, floor}, {}, has_first_rules, is_ascent, share_at_doubts, is_draw};
             std::copy_n(weights.data(), kMoves, self->weights.begin());
           },
           nb::kw_only(), "weights"_a, "is_informed"_a, "stop"_a, "floor"_a, "has_first_rules"_a,
-          "is_ascent"_a, "share_at_doubts"_a = 0.0);
+          "is_ascent"_a, "share_at_doubts"_a = 0.0, "is_draw"_a = false);
 
   bind_tracker<FrameTracker>(module, "FrameTracker")
       .def(

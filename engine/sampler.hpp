@@ -30,6 +30,8 @@ struct ChainOptions {
   bool is_ascent = false;
   // So often a move is drawn at a link in doubt, where there is any (walker.hpp).
   double share_at_doubts = 0;
+  // What is kept of a walk is where it ends, a draw from the posterior, and not the best it met.
+  bool is_draw = false;
 };
 
 template <typename Filter>

@@ -35,9 +35,11 @@ class Walker {
   Walker(Partition<Filter> empty, const ChainOptions& options)
       : sampler_(std::move(empty), options, 0),
         marginals_(sampler_.partition()),
-        hot_share_(options.share_at_doubts) {}
+        hot_share_(options.share_at_doubts),
+        is_draw_(options.is_draw) {}
 
-  // Looks for the best; returns what it is better by than the start, and stays there.
+  // Looks for the best; returns what it is better by than the start, and stays there. Or draws: stays
+  // where it ends, which counts as better than anything.
   double search(const Partition<Filter>& whole, const BondTerm<Filter>& bonds, const Group& group,
                 std::uint64_t seed, const Budget& budget, ChainStats& stats) {
     sampler_.partition().take_part(whole, group.tracks, group.free);
@@ -49,9 +51,10 @@ class Walker {
     const auto look_at_none = [](const Change<Filter>&, bool) {};
     std::int64_t n = 0;
     for (; !budget.is_over(n); ++n) step(look_at_none);
-    sampler_.restore_best();
     stats.n_search += n;
     add_counts(stats);
+    if (is_draw_) return std::numeric_limits<double>::infinity();
+    sampler_.restore_best();
     return sampler_.most();
   }
   const Partition<Filter>& partition() const { return sampler_.partition(); }
@@ -172,6 +175,7 @@ class Walker {
   Sampler<Filter> sampler_;
   Marginals<Filter> marginals_;
   double hot_share_;
+  bool is_draw_;
   std::vector<Hot> hot_;
   std::vector<std::int32_t> local_;
 };

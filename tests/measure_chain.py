@@ -18,8 +18,8 @@ from functools import partial
 
 from bond_oracle import some_bonds
 from chain_oracle import make_chain
-from partition_oracle import every_partition
-from test_chain import problem_of_size, total_variation
+from partition_oracle import every_partition, problem_of_size
+from test_chain import total_variation
 
 
 def main() -> None:

@@ -72,3 +72,13 @@ def tiny_model(rng: np.random.Generator) -> am.TrackingModel:
         max_gap=int(rng.integers(1, 5)),
         termination=str(rng.choice(["marginal", "last"])),
     )
+
+
+def problem_of_size(least, most, seed, n_axes):
+    """The first problem from a seed on that has so many partitions."""
+    while True:
+        rng = np.random.default_rng(seed)
+        d, model = tiny_problem(rng, 5, 3, n_axes), tiny_model(rng)
+        if d.n_points >= 8 and least <= len(every_partition(d, model)[0]) <= most:
+            return d, model
+        seed += 1

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 
-import numpy as np
 import pytest
 
 import asterism as am
@@ -203,7 +202,7 @@ def test_same_bytes_in_every_process(tmp_path):
     assert results[0] == results[1]
 
 
-def test_help_is_instant():
+def test_help_loads_nothing_heavy():
     script = (
         "import sys\nfrom asterism.app import main\nmain(['--help'])\n"
         "heavy = ('scipy', 'ezc3d', 'matplotlib', 'pandas', 'asterism._engine')\n"
@@ -211,9 +210,3 @@ def test_help_is_instant():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    took = []
-    for _ in range(3):
-        start_time = time.perf_counter()
-        subprocess.run([*ASTERISM, "--help"], capture_output=True, check=True)
-        took.append(time.perf_counter() - start_time)
-    assert np.min(took) < 1.0  # half a second on a quiet machine

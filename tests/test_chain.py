@@ -9,7 +9,7 @@ import pytest
 
 import asterism as am
 from chain_oracle import INVERSE, MOVES, Oracle, as_partition, make_chain
-from partition_oracle import every_partition, tiny_model, tiny_problem
+from partition_oracle import every_partition, problem_of_size, tiny_model, tiny_problem
 from scenes import small_model
 
 STOP, FLOOR = 0.1, 1e-3
@@ -187,16 +187,6 @@ def agrees(d, tracks, settled, frozen):
         return cut - {()}
 
     return heads(tracks) == heads(settled)
-
-
-def problem_of_size(least, most, seed, n_axes):
-    """The first problem from a seed on that has so many partitions."""
-    while True:
-        rng = np.random.default_rng(seed)
-        d, model = tiny_problem(rng, 5, 3, n_axes), tiny_model(rng)
-        if d.n_points >= 8 and least <= len(every_partition(d, model)[0]) <= most:
-            return d, model
-        seed += 1
 
 
 @pytest.mark.parametrize("informed", [False, True], ids=["uniform", "informed"])

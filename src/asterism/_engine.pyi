@@ -426,6 +426,7 @@ class ChainOptions:
         has_first_rules: bool,
         is_ascent: bool,
         share_at_doubts: float = 0.0,
+        is_draw: bool = False,
     ) -> None: ...
 
 # One for models with one motion, one for those with several.

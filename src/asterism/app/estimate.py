@@ -12,8 +12,21 @@ from asterism.app.console import Json, Quiet, print_json, print_table, progress
 _In = Annotated[Path, typer.Argument(metavar="IN", help="Capture.")]
 _Out = Annotated[Path | None, typer.Option("--out", "-o", help="TOML file for the model.")]
 
+_Open = Annotated[
+    bool,
+    typer.Option(
+        "--open", help="Markers come and go for good: learn how often, from drawn partitions."
+    ),
+]
 
-def estimate(source: _In, out: _Out = None, quiet: Quiet = False, json: Json = False) -> None:
+
+def estimate(
+    source: _In,
+    out: _Out = None,
+    open_population: _Open = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
     """Estimate noise, motion, misses and clutter from the points themselves.
 
     For example:
@@ -21,6 +34,8 @@ def estimate(source: _In, out: _Out = None, quiet: Quiet = False, json: Json = F
         asterism estimate trial.c3d
 
         asterism estimate trial.c3d -o model.toml
+
+        asterism estimate arena.csv --open -o model.toml
     """
     import asterism as am
     from asterism.app.files import check_outputs
@@ -29,12 +44,12 @@ def estimate(source: _In, out: _Out = None, quiet: Quiet = False, json: Json = F
     check_outputs({"--out": out}, [source])
     capture = am.read(source)
     with progress("estimating the model"):
-        found = am.estimate_model(capture)
+        found = am.estimate_model(capture, population="open" if open_population else "closed")
     if out is not None:
         write_text(out, found.model.to_toml())
     if json:
         reasons = [{"parameter": p, "value": v, "why": why} for p, v, why in found.reasons]
-        print_json({"model": found.model.to_dict(), "reasons": reasons})
+        print_json({"model": found.model.to_dict(), "stds": found.stds, "reasons": reasons})
     elif not quiet:
         print_table(found.reasons, ("parameter", "value", "why"))
         if out is not None:

@@ -6,7 +6,8 @@ from asterism.associate.mcmcda import MCMCDA
 from asterism.associate.mda import MDA
 from asterism.associate.method import Method, Update
 from asterism.associate.mht import MHT, HypothesisCluster
-from asterism.associate.model_from_clip import ModelEstimate, estimate_model
+from asterism.associate.model_estimate import ModelEstimate
+from asterism.associate.model_from_clip import estimate_model
 from asterism.associate.registry import METHODS, method_by_name
 from asterism.associate.smp import SMP
 from asterism.associate.tomht import TOMHT

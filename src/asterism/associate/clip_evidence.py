@@ -80,6 +80,46 @@ class Evidence:
     speeds: NDArray[np.float64]
     velocity_rms: float
 
+    @classmethod
+    def of(cls, tracks: list[Tracks]) -> Evidence:
+        """Count in the tracks of each piece.
+
+        Raises
+        ------
+        ParameterError
+            If they have hardly any links.
+        """
+        misses = clutter = 0
+        speeds: list[NDArray[np.float64]] = []
+        squares: list[NDArray[np.float64]] = []
+        for found in tracks:
+            d = found.detections
+            order, _ = found.by_track
+            frame = d.frame_of[order]
+            is_link = np.diff(found.labels[order]) == 0
+            dt = np.diff(d.times[frame])[is_link]
+            moves = np.diff(d.points[order], axis=0)[is_link]
+            misses += int((np.diff(frame)[is_link] - 1).sum())
+            clutter += int((found.labels < 0).sum())
+            speeds.append(np.linalg.norm(moves, axis=1) / dt)
+            squares.append(((moves / dt[:, None]) ** 2).mean(axis=1))
+        n_links = sum(map(len, speeds))
+        if n_links < LEAST_LINKS:
+            raise ParameterError(
+                "detections",
+                f"tracks with at least {LEAST_LINKS} links in all, to estimate a model from",
+                f"{n_links}",
+                "give a model",
+            )
+        return cls(
+            tracks=tracks,
+            n_misses=misses,
+            n_clutter=clutter,
+            n_frames=sum(found.detections.n_frames for found in tracks),
+            speeds=np.concatenate(speeds),
+            velocity_rms=math.sqrt(float(np.concatenate(squares).mean())),
+        )
+
     @property
     def n_links(self) -> int:
         """Number of pairs of consecutive detections in tracks."""
@@ -95,38 +135,8 @@ def gather_evidence(pieces: list[Detections], model: TrackingModel) -> Evidence:
         If hardly anything could be followed.
     """
     method = GNN()
-    tracks: list[Tracks] = []
-    misses = clutter = 0
-    speeds: list[NDArray[np.float64]] = []
-    squares: list[NDArray[np.float64]] = []
+    found: list[Tracks] = []
     for piece in pieces:
         state = method.init(model, n_axes=piece.n_axes)
-        found = Tracks(detections=piece, labels=method.run(state, piece)[1])
-        tracks.append(found)
-        order, _ = found.by_track
-        frame = piece.frame_of[order]
-        is_link = np.diff(found.labels[order]) == 0
-        dt = np.diff(piece.times[frame])[is_link]
-        moves = np.diff(piece.points[order], axis=0)[is_link]
-        misses += int((np.diff(frame)[is_link] - 1).sum())
-        clutter += int((found.labels < 0).sum())
-        speeds.append(np.linalg.norm(moves, axis=1) / dt)
-        squares.append(((moves / dt[:, None]) ** 2).mean(axis=1))
-    evidence = Evidence(
-        tracks=tracks,
-        n_misses=misses,
-        n_clutter=clutter,
-        n_frames=sum(piece.n_frames for piece in pieces),
-        speeds=np.concatenate(speeds),
-        velocity_rms=math.sqrt(float(np.concatenate(squares).mean()))
-        if any(map(len, squares))
-        else 0.0,
-    )
-    if evidence.n_links < LEAST_LINKS:
-        raise ParameterError(
-            "detections",
-            f"tracks with at least {LEAST_LINKS} links in all, to estimate a model from",
-            f"{evidence.n_links}",
-            "give a model",
-        )
-    return evidence
+        found.append(Tracks(detections=piece, labels=method.run(state, piece)[1]))
+    return Evidence.of(found)

@@ -136,6 +136,10 @@ class MCMCDA(EngineMethod):
     chain : {"metropolis", "ascent"}
         The report draws from the best partition so far and weighs against the last one taken
         ("ascent"): that climbs and does not sample.
+    keep : {"best", "draw"}
+        What is kept of a walk: the best partition that it met, or the one where it ends, which is
+        drawn from the posterior of the open frames given the settled ones. Draws with different
+        seeds show what the data leave open; a model is estimated from them.
     first_rules : bool
         The report's: nothing but births while there is no track, and neither merge nor switch while
         there is one.
@@ -188,6 +192,7 @@ class MCMCDA(EngineMethod):
     move_weights: Literal["uniform", "report"] | Mapping[str, float] = "uniform"
     at_doubts: float = 0.5
     chain: Literal["metropolis", "ascent"] = "metropolis"
+    keep: Literal["best", "draw"] = "best"
     first_rules: bool = False
     assignment: bool = True
 
@@ -218,6 +223,7 @@ class MCMCDA(EngineMethod):
         for name, choices in (
             ("proposal", ("informed", "uniform")),
             ("chain", ("metropolis", "ascent")),
+            ("keep", ("best", "draw")),
             ("groups", SPLITS),
         ):
             if getattr(self, name) not in choices:
@@ -232,6 +238,9 @@ class MCMCDA(EngineMethod):
         if is_by_distance != (self.distance is not None):
             wanted = "a length in metres" if is_by_distance else "none, or groups by distance"
             raise ParameterError("distance", wanted, repr(self.distance))
+        if self.keep == "draw" and self.chain == "ascent":
+            hint = "only the metropolis chain samples"
+            raise ParameterError("keep", "'best' with the ascent", "'draw'", hint)
         for name in ("confidence", "at_doubts"):
             if self.chain == "ascent" and getattr(self, name) > 0:
                 raise ParameterError(
@@ -253,6 +262,7 @@ class MCMCDA(EngineMethod):
             has_first_rules=self.first_rules,
             is_ascent=self.chain == "ascent",
             share_at_doubts=self.at_doubts,
+            is_draw=self.keep == "draw",
         )
         options = _engine.McmcOptions(
             window=FIRST_PASS if self.window is None else int(self.window),

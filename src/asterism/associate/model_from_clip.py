@@ -2,7 +2,8 @@
 
 Unambiguous links (mutual nearest neighbours far from any other choice) give the first scales. Then,
 a few times over: track with the model so far, and re-estimate each parameter from the tracks. The
-motion and the noise are those that make the tracks' detections most likely one step ahead.
+motion and the noise are those that make the tracks' detections most likely one step ahead. Where
+markers come and go, stochastic EM follows: partitions drawn from the posterior in place of tracks.
 
 What this file is not: a fit to truth. Names in the capture are never looked at.
 """
@@ -10,14 +11,24 @@ What this file is not: a fit to truth. Names in the capture are never looked at.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from asterism.associate.clip_evidence import Region, gather_evidence
+from asterism.associate.clip_evidence import Evidence, Region, gather_evidence
 from asterism.associate.clip_links import first_scales
-from asterism.associate.motion_fit import FitBounds, MotionFit, fit_motion, simpler_motion
+from asterism.associate.clip_rates import Counts, Rates
+from asterism.associate.model_estimate import ModelEstimate, motion_levels, reasons_for
+from asterism.associate.motion_fit import (
+    WORTH,
+    FitBounds,
+    MotionFit,
+    fit_motion,
+    fit_one_motion,
+    polish,
+)
+from asterism.associate.open_population import draw_rates
 from asterism.errors import ParameterError
 from asterism.model import (
     DWNA,
@@ -26,12 +37,13 @@ from asterism.model import (
     Population,
     Sensor,
     TrackingModel,
+    Tracks,
 )
+from asterism.model.posterior import track_scores
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from asterism.associate.clip_evidence import Evidence
     from asterism.associate.clip_links import Scales
 
 __all__ = ["ModelEstimate", "estimate_model"]
@@ -53,28 +65,9 @@ LONGEST_GAP = 60
 """Frames; a longer gap is not bridged for the motion's sake."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class ModelEstimate:
-    """A model estimated from a clip, with the reason for each value.
-
-    Parameters
-    ----------
-    model : TrackingModel
-        The model.
-    reasons : tuple of (str, str, str)
-        Parameter, value with unit, and why.
-    """
-
-    model: TrackingModel
-    reasons: tuple[tuple[str, str, str], ...]
-
-    def __str__(self) -> str:
-        width = max(len(name) for name, _, _ in self.reasons)
-        value = max(len(text) for _, text, _ in self.reasons)
-        return "\n".join(f"{n:<{width}}  {v:<{value}}  {why}" for n, v, why in self.reasons)
-
-
-def estimate_model(detections: Detections) -> ModelEstimate:
+def estimate_model(
+    detections: Detections, *, population: Literal["closed", "open"] = "closed"
+) -> ModelEstimate:
     """Estimate the generative model from unlabelled detections.
 
     Parameters
@@ -82,6 +75,11 @@ def estimate_model(detections: Detections) -> ModelEstimate:
     detections : Detections
         A capture of at least a few frames in which markers can be followed; points that were filled
         are left out.
+    population : {"closed", "open"}
+        Whether the markers are the same throughout, or come and go for good. A marker that goes
+        cannot be told from one that hides for long, so this is not estimated: closed, the clip is
+        taken to have one birth and one death, and tracks are held through long gaps; open, their
+        rates are learnt with the rest by stochastic EM.
 
     Returns
     -------
@@ -92,6 +90,8 @@ def estimate_model(detections: Detections) -> ModelEstimate:
     ParameterError
         If there are too few detections, or none that can be linked from frame to frame.
     """
+    if population not in ("closed", "open"):
+        raise ParameterError("population", "'closed' or 'open'", repr(population))
     detections = detections.measured()
     if detections.n_frames < 3 or detections.n_points < 3:
         raise ParameterError(
@@ -115,15 +115,53 @@ def estimate_model(detections: Detections) -> ModelEstimate:
     evidence = gather_evidence(pieces, _wider(model))
     for _ in range(N_ROUNDS):
         fit = fit_motion(evidence.tracks, model, fit, bounds)
-        model = _model(fit, evidence, scales, region)
+        model = _model(fit, _rates(evidence), evidence, scales, region)
         evidence = gather_evidence(pieces, _wider(model))
-    fit = simpler_motion(evidence.tracks, model, fit, bounds)
     least_noise = max(scales.noise_floor, min(LEAST_NOISE, scales.spacing / 100))
-    fit = replace(fit, noise=max(fit.noise, least_noise))
-    # Motion is learnt with a wider model, but the rates are those of the model itself.
-    evidence = gather_evidence(pieces, _model(fit, evidence, scales, region))
-    model = _model(fit, evidence, scales, region)
-    return ModelEstimate(model=model, reasons=_reasons(model, evidence, region, least_noise))
+    bounds = replace(bounds, least_noise=least_noise)
+
+    # Motion is learnt with a wider model, but the rates are those of the model itself, and so are
+    # the tracks by which motions are compared.
+    def tried(trial: MotionFit, evidence: Evidence) -> tuple[float, MotionFit, Evidence]:
+        trial = replace(trial, noise=max(trial.noise, least_noise))
+        found = gather_evidence(pieces, _model(trial, _rates(evidence), evidence, scales, region))
+        model = _model(trial, _rates(found), found, scales, region)
+        return _log_evidence(found, model, region), trial, found
+
+    three = tried(fit, evidence)
+    # One motion is learnt from tracks of its own, from the quietest on: those of three have jolts,
+    # true or wrong, that it would have to explain.
+    one = tried(replace(fit, levels=fit.levels[:1], stay=1.0), evidence)
+    for _ in range(N_ROUNDS):
+        one = tried(fit_one_motion(one[2].tracks, model, one[1], bounds), one[2])
+    is_worth = three[0] - one[0] > WORTH * sum(p.n_points for p in pieces)
+    _, fit, evidence = three if is_worth else one
+    counts = (_counts(evidence),)
+    rates = _rates(evidence)
+    if population == "open":
+
+        def model_of(fit: MotionFit, rates: Rates, tracks: list[Tracks] | None) -> TrackingModel:
+            seen = evidence if tracks is None else Evidence.of(tracks)
+            return _model(fit, rates, seen, scales, region)
+
+        drawn = draw_rates(pieces, fit, rates, bounds, model_of)
+        fit, rates, counts, evidence = (
+            drawn.fit,
+            drawn.rates,
+            drawn.counts,
+            Evidence.of(drawn.tracks),
+        )
+    fit, sure = polish(evidence.tracks, _model(fit, rates, evidence, scales, region), fit, bounds)
+    model = _model(fit, rates, evidence, scales, region)
+    stds = _stds(counts, region, is_open=population == "open")
+    stds |= _motion_stds(fit, model, sure, least_noise)
+    mean = sum(counts, Counts()) * (1 / len(counts))
+    reasons = reasons_for(
+        model, stds, n_axes=region.n_axes, n_links=evidence.n_links, n_misses=mean.misses,
+        n_clutter=mean.clutter, n_frames=evidence.n_frames, least_noise=least_noise,
+        events=(mean.births, mean.deaths) if population == "open" else None,
+    )  # fmt: skip
+    return ModelEstimate(model=model, reasons=reasons, stds=stds)
 
 
 def _pieces(detections: Detections) -> Iterator[Detections]:
@@ -175,79 +213,92 @@ def _wider(model: TrackingModel) -> TrackingModel:
     return model
 
 
-def _model(fit: MotionFit, evidence: Evidence, scales: Scales, region: Region) -> TrackingModel:
-    # Each rate with one event more than was seen: nothing is impossible after a finite clip. A
-    # marker that comes or goes for good looks like a track that broke, so the clip is taken to have
-    # one birth and one death, as most have.
-    cells = region.volume * evidence.n_frames
-    n_links = evidence.n_links
+def _counts(evidence: Evidence) -> Counts:
+    """Count as of a closed population, in which a track that ends is one that broke."""
+    return Counts(
+        hits=evidence.n_links,
+        misses=evidence.n_misses,
+        steps=evidence.n_links,
+        clutter=evidence.n_clutter,
+        frames=evidence.n_frames,
+    )
+
+
+def _rates(evidence: Evidence) -> Rates:
+    return _counts(evidence).rates()
+
+
+def _model(
+    fit: MotionFit, rates: Rates, evidence: Evidence, scales: Scales, region: Region
+) -> TrackingModel:
     top = float(np.quantile(evidence.speeds, 0.9999))
-    p_detection = min((n_links + 1) / (n_links + evidence.n_misses + 2), 0.999)
     return TrackingModel(
         motion=fit.motion(max(evidence.velocity_rms, top / 4, 1e-9)),
         sensor=Sensor(
             noise_sigma=fit.noise,
-            p_detection=p_detection,
-            clutter_density=(evidence.n_clutter + 1) / cells,
+            p_detection=rates.p_detection,
+            clutter_density=rates.clutter / region.volume,
         ),
         population=Population(
-            birth_density=1 / cells,
-            p_disappear=1 / (n_links + 2),
+            birth_density=rates.births / region.volume,
+            p_disappear=rates.p_disappear,
             max_speed=2 * top + 4 * fit.noise / scales.step,
-            max_gap=_bridgeable(fit.levels, p_detection, n_links, scales),
+            max_gap=_bridgeable(fit, rates.p_detection, evidence.n_links, scales),
         ),
     )
 
 
-def _bridgeable(levels: tuple[float, ...], p_detection: float, n_links: int, scales: Scales) -> int:
+def _stds(counts: tuple[Counts, ...], region: Region, *, is_open: bool) -> dict[str, float]:
+    """Give what rates vary by within a partition, and from one drawn partition to the next."""
+    within = (sum(counts, Counts()) * (1 / len(counts))).stds()
+    each = [c.rates() for c in counts]
+
+    def std(name: str) -> float:
+        between = np.var([getattr(r, name) for r in each]) * (1 + 1 / len(each))
+        return float(np.hypot(getattr(within, name), np.sqrt(between)))
+
+    stds = {"p_detection": std("p_detection"), "clutter_density": std("clutter") / region.volume}
+    if is_open:
+        stds |= {"birth_density": std("births") / region.volume, "p_disappear": std("p_disappear")}
+    return stds
+
+
+def _log_evidence(evidence: Evidence, model: TrackingModel, region: Region) -> float:
+    """Log of the joint density of points and tracks, clutter included, under a model."""
+    sensor, population = model.sensor, model.population
+    log_clutter = math.log(sensor.clutter_density)
+    events = (sensor.clutter_density + population.birth_density) * region.volume
+    total = -events * evidence.n_frames
+    for found in evidence.tracks:
+        scores = track_scores(found, model)
+        # What the model forbids breaks; as clutter it is counted at its worst.
+        total += float(scores[np.isfinite(scores)].sum()) + log_clutter * len(found.labels)
+    return total
+
+
+def _motion_stds(
+    fit: MotionFit, model: TrackingModel, sure: tuple[float, ...] | None, least_noise: float
+) -> dict[str, float]:
+    if sure is None:
+        return {}
+    levels = motion_levels(model)[2]
+    names = ["motion"] if len(levels) == 1 else [f"motion_{k + 1}" for k in range(len(levels))]
+    stds = {n: s * x for n, s, x in zip(names, sure[1:], levels, strict=True)}
+    return stds if fit.noise <= least_noise else {"noise_sigma": sure[0] * fit.noise} | stds
+
+
+def _bridgeable(fit: MotionFit, p_detection: float, n_links: int, scales: Scales) -> int:
     """Find d̄: how many frames a track can coast before it may be where its neighbour is.
 
-    The position of a marker that coasts for k frames is known to ``σ_a Δ² √(k³ / 3)`` (DWNA);
-    d̄ is where that reaches the spacing of the points, at most `LONGEST_GAP`, and long enough that
-    less than one run of independent misses in the clip is longer.
+    The position of a marker that coasts for k frames is known to ``σ_a Δ² √(k³ / 3)`` (DWNA) or
+    ``σ_w √(k Δ)`` (random walk); d̄ is where that reaches the spacing of the points, at most
+    `LONGEST_GAP`, and long enough that less than one run of independent misses in the clip is
+    longer.
     """
-    drift = levels[len(levels) // 2] * scales.step**2
-    reach = (3 * (scales.spacing / drift) ** 2) ** (1 / 3)
+    level = fit.levels[len(fit.levels) // 2]
+    if fit.kind == "random_walk":
+        reach = (scales.spacing / level) ** 2 / scales.step
+    else:
+        reach = (3 * (scales.spacing / (level * scales.step**2)) ** 2) ** (1 / 3)
     needed = 1 - math.log(2 * n_links) / math.log(1 - p_detection)
     return max(3, round(max(min(reach, LONGEST_GAP), min(needed, 2 * LONGEST_GAP))))
-
-
-def _reasons(
-    model: TrackingModel, evidence: Evidence, region: Region, least_noise: float
-) -> tuple[tuple[str, str, str], ...]:
-    sensor, population = model.sensor, model.population
-    levels = [
-        f"{mode.acceleration_sigma:.3g}" for mode in model.motion.modes if isinstance(mode, DWNA)
-    ]
-    unit = "m³" if region.n_axes == 3 else "m²"
-    why_noise = f"most likely one step ahead, {evidence.n_links} links"
-    if sensor.noise_sigma <= least_noise:
-        why_noise = "the least that is believed; the capture shows less, as smoothed ones do"
-    one = "one motion explains them as well as three"
-    many = f"{len(levels)} motions that a marker changes between, together most likely"
-    return (
-        ("noise σ", f"{sensor.noise_sigma * 1e3:.3g} mm", why_noise),
-        ("acceleration σ_a", f"{', '.join(levels)} m/s²", one if len(levels) == 1 else many),
-        (
-            "maximal speed v̄",
-            f"{population.max_speed:.3g} m/s",
-            "twice the speed that 1 link in 10 000 exceeds",
-        ),
-        (
-            "detection P_d",
-            f"{sensor.p_detection:.4f}",
-            f"{evidence.n_misses} misses inside tracks of {evidence.n_links} links",
-        ),
-        (
-            "clutter λ_f",
-            f"{sensor.clutter_density:.3g} /{unit}",
-            f"{evidence.n_clutter} points in no track, {evidence.n_frames} frames",
-        ),
-        ("births λ_b", f"{population.birth_density:.2g} /{unit}", "one in the clip"),
-        ("deaths p_z", f"{population.p_disappear:.2g}", "one in the clip"),
-        (
-            "maximal gap d̄",
-            f"{population.max_gap} frames",
-            "until a coasting marker may be as far off as its neighbour is",
-        ),
-    )

@@ -1,35 +1,48 @@
 """Motion and noise that make tracks most likely one step ahead.
 
 Maximum likelihood through the very filter that will be used: the log densities of the innovations
-are summed over the tracks and climbed by a simplex search. A marker may have one DWNA motion, or
-change between three: quiet, busy, and the short jolts of an impact that would otherwise lose it.
-The Bayesian information criterion decides (Schwarz 1978), with a margin for wrong links.
+are summed over the tracks and climbed by a simplex search. A marker may have one motion (DWNA
+or a random walk), or change between three DWNA: quiet, busy, and the short jolts of an impact that
+would otherwise lose it. How sharply the likelihood falls about the parameters tells how sure they
+are.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from asterism.filter import filter_states
-from asterism.model import DWNA, Detections, InteractingMotions, Motion, TrackingModel, Tracks
+from asterism.model import (
+    DWNA,
+    Detections,
+    InteractingMotions,
+    Motion,
+    RandomWalk,
+    TrackingModel,
+    Tracks,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-__all__ = ["FitBounds", "MotionFit", "fit_motion", "simpler_motion"]
+__all__ = ["WORTH", "FitBounds", "MotionFit", "fit_motion", "fit_one_motion", "polish"]
 
+Kind = Literal["dwna", "random_walk"]
+KINDS: tuple[Kind, ...] = ("dwna", "random_walk")
 FIT_POINTS = 4000
 """Detections, in whole tracks' pieces spread over the clip, on which the likelihood is computed."""
 PIECE_POINTS = 60
 WORTH = 0.05
-"""Nats a detection that three motions must win over one. The few wrong links that tracks contain
-are jolts to the fit; where there are no others they win less than this."""
+"""Nats a detection that a motion must win over a simpler one. The few wrong links that tracks
+contain are jolts to the fit; where there are no others they win less than this."""
+FARTHEST = 0.3
+"""Longest step, of a logarithm, that is taken to the summit of a likelihood."""
 JOLT = 0.1
 """Of the changes from quiet or busy, the share that are jolts; a jolt lasts two frames."""
 
@@ -43,17 +56,23 @@ class MotionFit:
     noise : float
         σ, metres.
     levels : tuple of float
-        σ_a of each motion, m/s², rising; one or three: quiet, busy, jolt.
+        One or, of DWNA, three: quiet, busy, jolt. σ_a of DWNA, rising, m/s²; σ_w of a random walk,
+        m/√s.
     stay : float
         Probability that a marker stays quiet, or busy, for another frame; 1 with one motion.
+    kind : {"dwna", "random_walk"}
+        Of motion.
     """
 
     noise: float
     levels: tuple[float, ...]
-    stay: float
+    stay: float = 1.0
+    kind: Kind = "dwna"
 
     def motion(self, velocity_sigma: float) -> Motion:
         """Make the motion model; `velocity_sigma` is the prior of a velocity coordinate, m/s."""
+        if self.kind == "random_walk":
+            return RandomWalk(walk_sigma=self.levels[0])
         models = tuple(
             DWNA(acceleration_sigma=a, velocity_sigma=velocity_sigma) for a in self.levels
         )
@@ -138,18 +157,83 @@ def fit_motion(
     return _search(tracks, model, unpack, first, [0.4, 0.4, 0.4, 0.4, 0.8])[0]
 
 
-def simpler_motion(
-    tracks: list[Tracks], model: TrackingModel, fit: MotionFit, bounds: FitBounds
+def fit_one_motion(
+    tracks: list[Tracks], model: TrackingModel, start: MotionFit, bounds: FitBounds
 ) -> MotionFit:
-    """Give one motion in place of three if it explains the tracks as well."""
+    """Fit one motion of each kind to tracks, and give the kind that explains them best.
 
-    def unpack(x: NDArray[np.float64]) -> MotionFit:
-        return bounds.fit(x[0], (x[1],), 1.0)
+    A random walk must win `WORTH`. DWPA is left out: on smoothed captures it foresees the next frame
+    better, and loses every gap.
+    """
+    velocity = model.velocity_sigma(tracks[0].detections.n_axes)
+    middle = math.log(start.levels[len(start.levels) // 2])
+    best, best_cost = start, math.inf
+    for kind in KINDS:
 
-    first = [math.log(fit.noise), math.log(fit.levels[1])]
-    plain, plain_cost, n = _search(tracks, model, unpack, first, [0.4, 0.7])
-    gain = plain_cost - _cost(_sample(tracks), model, fit)
-    return fit if gain > max(0.5 * 3 * math.log(n) / n, WORTH) else plain
+        def unpack(x: NDArray[np.float64], kind: Kind = kind) -> MotionFit:
+            plain = bounds.fit(x[0], (x[1],), 1.0)
+            level = math.exp(x[1]) if kind == "random_walk" else plain.levels[0]
+            return replace(plain, levels=(level,), kind=kind)
+
+        level = middle
+        if kind == "random_walk":
+            level = math.log(velocity) + math.log(tracks[0].detections.step or 1.0) / 2
+        plain, cost = _search(tracks, model, unpack, [math.log(start.noise), level], [0.4, 0.7])
+        if cost < best_cost - WORTH:
+            best, best_cost = plain, cost
+    return best
+
+
+def polish(
+    tracks: list[Tracks], model: TrackingModel, fit: MotionFit, bounds: FitBounds
+) -> tuple[MotionFit, tuple[float, ...] | None]:
+    """Take a Newton step to the summit of the likelihood, and tell how sure the parameters are.
+
+    Returns
+    -------
+    fit : MotionFit
+        At the summit, within the bounds.
+    stds : tuple of float or None
+        Standard deviations of the logarithms of the noise and of each level, from the inverse of
+        the observed information; None where the likelihood has no summit.
+    """
+    sample = _sample(tracks)
+    n = int((sample.lengths - 1).sum())
+    first = np.log([fit.noise, *fit.levels])
+
+    def at(x: NDArray[np.float64]) -> MotionFit:
+        noise, *levels = map(float, np.exp(x))
+        return replace(fit, noise=noise, levels=tuple(levels))
+
+    def cost(x: NDArray[np.float64]) -> float:
+        return len(sample.labels) * _cost(sample, model, at(x))
+
+    h = 1 / math.sqrt(n)  # about a standard deviation
+    steps = h * np.eye(len(first))
+    middle = cost(first)
+    up, down = (np.array([cost(first + sign * e) for e in steps]) for sign in (1, -1))
+    gradient = (up - down) / (2 * h)
+    information: NDArray[Any] = np.diag(up - 2 * middle + down)
+    for a, b in zip(*np.tril_indices(len(first), -1), strict=True):
+        corners = [
+            s * t * cost(first + s * steps[a] + t * steps[b]) for s in (1, -1) for t in (1, -1)
+        ]
+        information[a, b] = information[b, a] = sum(corners) / 4
+    information = information / h**2
+    if not np.isfinite(information).all() or np.linalg.eigvalsh(information)[0] <= 0:
+        return fit, None
+    stds = tuple(map(float, np.sqrt(np.diag(np.linalg.inv(information)))))
+    step = np.linalg.solve(information, gradient).astype(np.float64)
+    if np.abs(step).max() > FARTHEST or cost(first - step) > middle:
+        return fit, stds
+    summit = at(first - step)
+    return replace(
+        summit,
+        noise=max(summit.noise, bounds.least_noise),
+        levels=summit.levels
+        if fit.kind == "random_walk"
+        else tuple(min(a, bounds.most_acceleration) for a in summit.levels),
+    ), stds
 
 
 def _search(
@@ -158,7 +242,7 @@ def _search(
     unpack: Callable[[NDArray[np.float64]], MotionFit],
     first: list[float],
     spread: list[float],
-) -> tuple[MotionFit, float, int]:
+) -> tuple[MotionFit, float]:
     from scipy.optimize import minimize
 
     sample = _sample(tracks)
@@ -177,7 +261,7 @@ def _search(
             "fatol": 3e-3,
         },
     )
-    return unpack(found.x), float(found.fun), len(sample.labels)
+    return unpack(found.x), float(found.fun)
 
 
 def _cost(sample: Tracks, model: TrackingModel, fit: MotionFit) -> float:

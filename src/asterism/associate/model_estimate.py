@@ -1,0 +1,134 @@
+"""What is told of an estimated model: each value, how sure it is, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from asterism.model import DWNA, RandomWalk
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from asterism.model import TrackingModel
+
+__all__ = ["ModelEstimate", "motion_levels", "reasons_for"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelEstimate:
+    """A model estimated from a clip, with the reason for each value.
+
+    Parameters
+    ----------
+    model : TrackingModel
+        The model.
+    reasons : tuple of (str, str, str)
+        Parameter, value with unit and standard deviation, and why.
+    stds : mapping of str to float
+        Standard deviation of each parameter that the clip tells of, in the parameter's unit:
+        ``noise_sigma``, ``motion`` (of its σ; ``motion_1`` and so on of several), ``p_detection``,
+        ``clutter_density``, and of an open population ``birth_density`` and ``p_disappear``.
+        Parameters at a bound, and bounds themselves, are not in it.
+    """
+
+    model: TrackingModel
+    reasons: tuple[tuple[str, str, str], ...]
+    stds: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def __str__(self) -> str:
+        width = max(len(name) for name, _, _ in self.reasons)
+        value = max(len(text) for _, text, _ in self.reasons)
+        return "\n".join(f"{n:<{width}}  {v:<{value}}  {why}" for n, v, why in self.reasons)
+
+
+def motion_levels(model: TrackingModel) -> tuple[str, str, tuple[float, ...]]:
+    """Name the σ of a motion, its unit, and give that of each mode."""
+    modes = model.motion.modes
+    if isinstance(modes[0], RandomWalk):
+        return "walk σ_w", "m/√s", (modes[0].walk_sigma,)
+    levels = tuple(mode.acceleration_sigma for mode in modes if isinstance(mode, DWNA))
+    return "acceleration σ_a", "m/s²", levels
+
+
+def reasons_for(
+    model: TrackingModel,
+    stds: Mapping[str, float],
+    *,
+    n_axes: int,
+    n_links: int,
+    n_misses: float,
+    n_clutter: float,
+    n_frames: int,
+    events: tuple[float, float] | None,
+    least_noise: float,
+) -> tuple[tuple[str, str, str], ...]:
+    """Say why each value is what it is.
+
+    Parameters
+    ----------
+    model : TrackingModel
+        The model.
+    stds : mapping of str to float
+        As in `ModelEstimate`.
+    n_axes : int
+        2 or 3.
+    n_links, n_misses, n_clutter, n_frames
+        What was counted.
+    events : (float, float) or None
+        Births and deaths that were counted; None of a closed population.
+    least_noise : float
+        The least that is believed, metres.
+    """
+    sensor, population = model.sensor, model.population
+    name, unit, levels = motion_levels(model)
+    volume = "m³" if n_axes == 3 else "m²"
+
+    def sure(key: str, scale: float = 1.0) -> str:
+        return f" ± {stds[key] * scale:.1g}" if key in stds else ""
+
+    why_noise = f"most likely one step ahead, {n_links} links"
+    if sensor.noise_sigma <= least_noise:
+        why_noise = "the least that is believed; the capture shows less, as smoothed ones do"
+    keys = ["motion"] if len(levels) == 1 else [f"motion_{k + 1}" for k in range(len(levels))]
+    values = ", ".join(f"{x:.3g}{sure(key)}" for x, key in zip(levels, keys, strict=True))
+    one = f"one {type(model.motion).__name__} explains them as well as three motions"
+    many = f"{len(levels)} motions that a marker changes between, together most likely"
+    births, deaths = ("one in the clip",) * 2
+    if events is not None:
+        births = f"about {events[0]:.0f} after the first frame, in drawn partitions"
+        deaths = f"about {events[1]:.0f} in drawn partitions"
+    return (
+        (
+            "noise σ",
+            f"{sensor.noise_sigma * 1e3:.3g}{sure('noise_sigma', 1e3)} mm",
+            why_noise,
+        ),
+        (name, f"{values} {unit}", one if len(levels) == 1 else many),
+        (
+            "maximal speed v̄",
+            f"{population.max_speed:.3g} m/s",
+            "twice the speed that 1 link in 10 000 exceeds",
+        ),
+        (
+            "detection P_d",
+            f"{sensor.p_detection:.4f}{sure('p_detection')}",
+            f"{n_misses:.0f} misses inside tracks of {n_links} links",
+        ),
+        (
+            "clutter λ_f",
+            f"{sensor.clutter_density:.3g}{sure('clutter_density')} /{volume}",
+            f"{n_clutter:.0f} points in no track, {n_frames} frames",
+        ),
+        (
+            "births λ_b",
+            f"{population.birth_density:.2g}{sure('birth_density')} /{volume}",
+            births,
+        ),
+        ("deaths p_z", f"{population.p_disappear:.2g}{sure('p_disappear')}", deaths),
+        (
+            "maximal gap d̄",
+            f"{population.max_gap} frames",
+            "until a coasting marker may be as far off as its neighbour is",
+        ),
+    )
