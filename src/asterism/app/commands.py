@@ -20,6 +20,7 @@ from asterism.app.info import info
 from asterism.app.methods import methods, scenes
 from asterism.app.recognize import recognize
 from asterism.app.reconstruct import reconstruct
+from asterism.app.report import report
 from asterism.app.simulate import simulate
 from asterism.app.stitch import stitch
 from asterism.app.track import track
@@ -59,6 +60,7 @@ for _command in (
     fill,
     bonds,
     recognize,
+    report,
     evaluate,
     info,
     estimate,

@@ -40,7 +40,7 @@ def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Js
     from asterism.app.files import check_outputs
 
     check_outputs({"--by-frame": by_frame}, [labels, truth])
-    scores = am.evaluate(_read_labels(labels), am.read_tracks(truth))
+    scores = am.evaluate(read_labels(labels), am.read_tracks(truth))
     if by_frame is not None:
         _write_by_frame(scores, by_frame)
     if json:
@@ -49,7 +49,7 @@ def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Js
         console().print(str(scores), markup=False, soft_wrap=True)
 
 
-def _read_labels(path: Path) -> am.Tracks:
+def read_labels(path: Path) -> am.Tracks:
     """Read tracks; unnamed ones among named ones are clutter where the format cannot say so."""
     import numpy as np
 

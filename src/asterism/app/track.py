@@ -14,6 +14,7 @@ from asterism.errors import FormatError, ParameterError, check_number
 
 if TYPE_CHECKING:
     import asterism as am
+    from asterism.app.run_folder import Job
 
 log = logging.getLogger(__name__)
 
@@ -67,6 +68,9 @@ _From = Annotated[
         "--from", metavar="RUN.TOML", help="Repeat a run; IN says where its input is now."
     ),
 ]
+_Report = Annotated[
+    Path | None, typer.Option("--report", metavar="PAGE", help="Page with a player to write too.")
+]
 _Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let DIR hold files already.")]
 
 
@@ -83,6 +87,7 @@ def track(
     run: _Run = None,
     overwrite: _Overwrite = False,
     repeat: _From = None,
+    report: _Report = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -103,6 +108,8 @@ def track(
 
         asterism track trial.c3d --stitch
 
+        asterism track trial.c3d --report trial.html
+
         asterism track trial.c3d --run runs/first
 
         asterism track --from runs/first/run.toml -o again.c3d
@@ -112,7 +119,7 @@ def track(
     from asterism.app.run_folder import FILES, Job, check_folder, sha256_of
     from asterism.app.tracking import carry_out, default_output, output_format
 
-    check_outputs({"-o": out}, [source, model, repeat])
+    check_outputs({"-o": out, "--report": report}, [source, model, repeat])
     if run is not None:
         check_folder(run, overwrite=overwrite)
     estimate: am.ModelEstimate | None = None
@@ -144,18 +151,22 @@ def track(
     if out is None:
         out = default_output(job.source, job.format)
         out = out if run is None else run / out.name
+    check_outputs({"-o": out, "--report": report}, [job.source, model, repeat])
     if run is not None:
         run.mkdir(parents=True, exist_ok=True)
         written = {"--run": out} | {f"--run ({name})": run / name for name in FILES}
-        check_outputs(written, [job.source, model, repeat])
+        check_outputs(written | {"--report": report}, [job.source, model, repeat])
     talks = not (quiet or json)
     if talks:
         _print_capture(capture)
         if estimate is not None:
             print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
-    _, summary = carry_out(job, capture, out, run)
+    tracks, summary = carry_out(job, capture, out, run)
+    if report is not None:
+        _write_report(tracks, report, job, summary.rows(), estimate)
     if talks:
-        print_table(summary.rows(), title=f"\nTracked with {job.method}")
+        rows = summary.rows() + ([("report", str(report))] if report is not None else [])
+        print_table(rows, title=f"\nTracked with {job.method}")
     if json:
         print_json(summary.to_dict() | {"options": job.options, "model": job.model.to_dict()})
 
@@ -192,6 +203,28 @@ def _repeated(path: Path, source: Path | None, settings: list[str]) -> tuple[Any
             "a run can only be repeated with the same input",
         )  # fmt: skip
     return job, am.read(job.source)
+
+
+def _write_report(
+    tracks: am.Tracks,
+    page: Path,
+    job: Job,
+    rows: list[tuple[str, str]],
+    estimate: am.ModelEstimate | None,
+) -> None:
+    """Write the page, with the method, its figures and the model."""
+    import asterism as am
+
+    options = ", ".join(f"{name}={value}" for name, value in job.options.items())
+    told = [("method", job.method + (", then stitched" if job.stitch else ""))]
+    told += [("options", options)] if options else []
+    told += rows
+    if estimate is None:
+        told.append(("model", "given, not estimated"))
+    else:
+        told += [(f"model: {name}", f"{value}: {why}") for name, value, why in estimate.reasons]
+    with progress("writing the report"):
+        am.report(tracks, page, summary=told)
 
 
 def _print_capture(capture: am.Capture) -> None:

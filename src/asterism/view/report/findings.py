@@ -1,0 +1,169 @@
+"""What to look at first: where tracks are most likely wrong, with the reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.view.report.contents import Verdict
+from asterism.view.report.names import track_names
+from asterism.view.report.runs import gaps_of
+from asterism.view.report.strange_steps import strange_steps
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from asterism.model import Tracks
+    from asterism.view.report.contents import Judgement
+
+__all__ = ["DOUBTFUL", "Finding", "find_troubles"]
+
+DOUBTFUL = 0.9
+"""Confidence below which a label is doubtful."""
+LONG = 0.1
+"""Seconds from which a gap is long."""
+_TOGETHER = 0.1  # seconds by which stretches of one trouble are apart at most
+_WEIGHT = {  # what each kind counts beside the others
+    "wrong marker": 100.0, "likely swap": 50.0, "jump": 10.0, "low confidence": 4.0,
+    "begun midway": 3.0, "ends early": 2.0, "long gap": 1.0, "missed": 1.0,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """A place that deserves a look.
+
+    Parameters
+    ----------
+    kind : str
+        Such as ``"likely swap"``.
+    track : int
+        The track, -1 where it is not about one.
+    frame : int
+        Where to look, counted from 0.
+    weight : float
+        How bad it may be; only good for sorting.
+    reason : str
+        What was seen, for people.
+    """
+
+    kind: str
+    track: int
+    frame: int
+    weight: float
+    reason: str
+
+
+def find_troubles(tracks: Tracks, judgement: Judgement | None = None) -> list[Finding]:
+    """Look through tracks for what is most likely wrong.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        What was found.
+    judgement : Judgement, optional
+        What the truth says; then the wrong ones are known, and said.
+
+    Returns
+    -------
+    list of Finding
+        The worst first.
+    """
+    found = [*_doubts(tracks), *_gaps(tracks), *_ends(tracks), *_steps(tracks)]
+    if judgement is not None:
+        found += [*_wrong(tracks, judgement), *_missed(tracks, judgement)]
+    return sorted(found, key=lambda f: (-f.weight, f.frame, f.track))
+
+
+def _finding(kind: str, track: int, frame: int, size: float, reason: str) -> Finding:
+    return Finding(
+        kind=kind, track=int(track), frame=int(frame), weight=_WEIGHT[kind] * size, reason=reason
+    )
+
+
+def _stretches(
+    tracks: Tracks, members: NDArray[np.int64]
+) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    """Group detections of one track that are close in time; give each group in time order."""
+    if not len(members):
+        return
+    d = tracks.detections
+    members = members[np.lexsort((d.frame_of[members], tracks.labels[members]))]
+    track, time = tracks.labels[members], d.times[d.frame_of[members]]
+    near = max(_TOGETHER, 1.5 * d.step)
+    cuts = np.flatnonzero((np.diff(track) != 0) | (np.diff(time) > near)) + 1
+    for group in np.split(members, cuts):
+        yield int(tracks.labels[group[0]]), group
+
+
+def _doubts(tracks: Tracks) -> Iterator[Finding]:
+    if tracks.confidence is None:
+        return
+    c, frame = tracks.confidence, tracks.detections.frame_of
+    for track, group in _stretches(tracks, np.flatnonzero((tracks.labels >= 0) & (c < DOUBTFUL))):
+        least = group[np.argmin(c[group])]
+        reason = f"held with {c[least]:.0%} at least" + (
+            f"; {len(group)} points below {DOUBTFUL:.0%}" if len(group) > 1 else ""
+        )
+        yield _finding("low confidence", track, frame[least], float((1 - c[group]).sum()), reason)
+
+
+def _gaps(tracks: Tracks) -> Iterator[Finding]:
+    gaps = gaps_of(tracks)
+    for k, first, n, seconds in zip(*gaps, strict=True):
+        if seconds >= LONG:
+            reason = f"not seen for {seconds:.3g} s ({n} frames), then taken up again"
+            yield _finding("long gap", k, first + n, float(seconds), reason)
+
+
+def _ends(tracks: Tracks) -> Iterator[Finding]:
+    """Tracks that begin or end in the middle: often one marker in two pieces."""
+    d = tracks.detections
+    order, starts = tracks.by_track
+    for k in np.flatnonzero(tracks.lengths):
+        first, last = (d.frame_of[order[i]] for i in (starts[k], starts[k + 1] - 1))
+        since, left = d.times[first] - d.times[0], d.times[-1] - d.times[last]
+        if since >= LONG:
+            reason = f"begins {since:.3g} s after the start: a marker found again, or a ghost?"
+            yield _finding("begun midway", k, first, 1.0, reason)
+        if left >= LONG:
+            reason = f"ends {left:.3g} s before the end"
+            yield _finding("ends early", k, last, 1.0, reason)
+
+
+def _steps(tracks: Tracks) -> Iterator[Finding]:
+    names, frame = track_names(tracks), tracks.detections.frame_of
+    for step in strange_steps(tracks):
+        k = int(tracks.labels[step.detection])
+        size = f"{1e3 * step.off:.0f} mm off where it was heading, {step.ratio:.0f} × its usual"
+        if step.other >= 0:
+            reason = f"{size}; that is where {names[step.other]} was heading, and the other way"
+            yield _finding("likely swap", k, frame[step.detection], 1.0, reason)
+        else:
+            yield _finding("jump", k, frame[step.detection], min(step.ratio / 50, 2.0), size)
+
+
+def _wrong(tracks: Tracks, judgement: Judgement) -> Iterator[Finding]:
+    members = np.flatnonzero((judgement.verdicts == Verdict.WRONG) & (tracks.labels >= 0))
+    for track, group in _stretches(tracks, members):
+        marker = int(judgement.markers[group[0]])
+        truly = "no marker" if marker < 0 else judgement.names[marker] or f"marker {marker}"
+        n = f"{len(group)} points are" if len(group) > 1 else "is"
+        frame = tracks.detections.frame_of[group[0]]
+        yield _finding("wrong marker", track, frame, float(len(group)), f"{n} truly {truly}")
+
+
+def _missed(tracks: Tracks, judgement: Judgement) -> Iterator[Finding]:
+    members = np.flatnonzero(judgement.verdicts == Verdict.MISSED)
+    frame = tracks.detections.frame_of[members]
+    marker = judgement.markers[members]
+    for k in np.unique(marker):
+        its = np.sort(frame[marker == k])
+        for group in np.split(its, np.flatnonzero(np.diff(its) > 2) + 1):
+            name = judgement.names[k] or f"marker {k}"
+            reason = f"{name} taken for clutter in {len(group)} frame{'s' * (len(group) > 1)}"
+            yield _finding("missed", -1, group[0], float(len(group)), reason)
