@@ -15,14 +15,16 @@ from pathlib import Path
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 FLAGS = (
-    "--headless --no-sandbox --disable-gpu --enable-unsafe-swiftshader --disable-quic "
-    "--no-first-run --disable-background-networking --disable-component-update --disable-sync "
-    "--hide-scrollbars --force-color-profile=srgb --remote-debugging-pipe"
-).split()
+    "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader",
+    "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--hide-scrollbars",
+    "--force-color-profile=srgb", "--remote-debugging-pipe",
+)  # fmt: skip
 # The browser reads commands from file 3 and answers on file 4.
 _LAUNCH = (
     "import os, sys; r, w = map(int, sys.argv[1:3]); "
-    "a, b = os.dup(r), os.dup(w); os.dup2(a, 3); os.dup2(b, 4); os.execv(sys.argv[3], sys.argv[3:])"
+    "a, b = os.dup(r), os.dup(w); os.dup2(a, 3); os.dup2(b, 4); "
+    "os.set_inheritable(3, True); os.set_inheritable(4, True); os.execv(sys.argv[3], sys.argv[3:])"
 )
 _PATIENCE = 60.0
 
@@ -34,9 +36,10 @@ class Browser:
         self.profile = tempfile.mkdtemp(prefix="profile")
         read_commands, self.commands = os.pipe()
         self.answers, write_answers = os.pipe()
+        pipes = (str(read_commands), str(write_answers))
+        profile = f"--user-data-dir={self.profile}"
         self.process = subprocess.Popen(
-            [sys.executable, "-c", _LAUNCH, str(read_commands), str(write_answers), CHROMIUM]
-            + [*FLAGS, f"--user-data-dir={self.profile}"],
+            [sys.executable, "-c", _LAUNCH, *pipes, CHROMIUM, *FLAGS, profile],
             pass_fds=(read_commands, write_answers),
             stderr=subprocess.DEVNULL,
         )
@@ -73,8 +76,8 @@ class Browser:
         first, _, self.buffer = self.buffer.partition(b"\0")
         return json.loads(first)
 
-    def page(self, path, *, width=1280, height=900, dark=False, scale=1):
-        """Open a file and wait until its player is ready."""
+    def page(self, path, *, width=1280, height=900, dark=False, scale=1, before=""):
+        """Open a file, after a script of ours, and wait until its player is ready."""
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         page = Page(self, session, target)
@@ -86,6 +89,7 @@ class Browser:
         )  # fmt: skip
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         page.call("Emulation.setEmulatedMedia", features=[scheme])
+        page.call("Page.addScriptToEvaluateOnNewDocument", source=before)
         page.call("Page.navigate", url=Path(path).resolve().as_uri())
         page.wait("document.body?.dataset.ready === 'true'")
         return page
@@ -151,6 +155,7 @@ class Page:
             e["entry"]
             for e in self.events("Log.entryAdded")
             if e["entry"]["level"] in ("error", "warning")
+            and "GL Driver Message" not in e["entry"]["text"]  # that screenshots take time
         ]
         return [json.dumps(e)[:800] for e in (*thrown, *printed, *logged)]
 
@@ -174,9 +179,7 @@ class Page:
         """Click at a place of the window."""
         self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
         for kind in ("mousePressed", "mouseReleased"):
-            self.call(
-                "Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1
-            )
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def screenshot(self, path=None, *, whole=False):
         """Give a PNG of the window or of the whole page, and write it to `path`."""

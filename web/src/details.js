@@ -22,7 +22,7 @@ export class Details {
     this.row("Track", `${k}, ${capture.starts[k + 1] - capture.starts[k]} points`);
     this.row("Now", this.now(there, point));
     const shown = place.slice(0, capture.axes).map((x) => (1000 * x).toFixed(1));
-    this.row("Place", there === ABSENT ? "–" : `${shown.join(", ")} mm`);
+    this.row("Place, mm", there === ABSENT ? "–" : shown.join(", "));
     if (capture.confidence) this.row("Confidence", point < 0 ? "–" : percent(capture.confidence[point]));
     if (capture.marker) this.row("Truly", this.truly(point));
   }
@@ -46,7 +46,7 @@ export class Details {
     if (!this.rows.has(name)) {
       const [pair, term, value] = ["div", "dt", "dd"].map((tag) => document.createElement(tag));
       term.textContent = name;
-      value.dataset.about = name.toLowerCase();
+      value.dataset.about = name.split(",")[0].toLowerCase();
       pair.append(term, value);
       this.list.append(pair);
       this.rows.set(name, value);

@@ -57,6 +57,15 @@ export class CameraImage {
     this.places = new Places(capture);
   }
 
+  /** Pixel of a track in the image of the chosen camera, null where it is not seen. */
+  pixelOf(track) {
+    const place = [0, 0, 0];
+    const pixel = [0, 0];
+    const there = this.places.find(track, this.state.frame, place, 0);
+    const isIn = there !== ABSENT && this.lenses[this.state.camera].project(...place, pixel);
+    return isIn ? pixel : null;
+  }
+
   /** Draw the image of the chosen camera. */
   draw() {
     const { capture, state, canvas } = this;

@@ -65,7 +65,7 @@ async function start() {
   if (stage) byId("scale").textContent = `squares of ${size(stage.floor.cell)}`;
   if (stage && capture.T && capture.positions.length) told.hidden = true;
   else if (stage) told.textContent = capture.T ? "No point in any frame." : "Nothing was recorded.";
-  globalThis.asterism = script(capture, state, stage);
+  globalThis.asterism = script(capture, state, stage, image);
   document.body.dataset.ready = "true";
 }
 
@@ -100,7 +100,7 @@ function size(metres) {
 }
 
 /** What may be asked and told from the console: `asterism.seek(120)`. */
-function script(capture, state, stage) {
+function script(capture, state, stage, image) {
   return {
     capture,
     state: () => ({ frame: state.frame, chosen: state.chosen, playing: state.playing }),
@@ -113,6 +113,8 @@ function script(capture, state, stage) {
       const p = stage.onCanvas(stage.place(n, stage.point));
       return [p.x, p.y];
     },
+    /** Where a track is in the image of the chosen camera, pixels; null where it is not. */
+    pixel: (track) => image?.pixelOf(track) ?? null,
   };
 }
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.label import learn_bonds
-from asterism.model import Tracks
 from asterism.view.report import Connections
 from asterism.view.report.thinning import thinned
+
+if TYPE_CHECKING:
+    from asterism.model import Tracks
 
 __all__ = ["connections_of"]
 
@@ -18,6 +21,8 @@ MOST_MARKERS = 200
 MOST_FRAMES = 500
 EACH = 2
 """Bonds of a marker that are drawn beside those that hold the body together."""
+FARTHEST = 8.0
+"""Longest bond that is drawn, in usual distances from a marker to its nearest bonded one."""
 BEND = 0.1
 """Share of its length that a bond may vary by, as a standard deviation."""
 _NO_PAIRS = np.empty((0, 2), dtype=np.int64)
@@ -50,6 +55,11 @@ def connections_of(tracks: Tracks) -> Connections:
     )
     order = np.argsort(bonds.distances, kind="stable")
     steady = order[bonds.spreads[order] <= BEND * bonds.distances[order]]
+    nearest = np.full(len(longest), np.inf)
+    for side in bonds.pairs[steady].T:
+        np.minimum.at(nearest, side, bonds.distances[steady])
+    usual = np.median(nearest[np.isfinite(nearest)]) if len(steady) else 0.0
+    steady = steady[bonds.distances[steady] <= FARTHEST * usual]
     n_drawn = np.zeros(len(longest), dtype=np.int64)
     body = np.arange(len(longest))  # which markers are joined already
     chosen: list[tuple[int, int]] = []

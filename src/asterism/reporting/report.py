@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import FormatError, ParameterError
+from asterism.errors import ParameterError
 from asterism.io.atomic import replacing
 from asterism.model import Capture, Tracks
 from asterism.reporting.connections import connections_of
@@ -22,6 +22,8 @@ __all__ = ["report"]
 
 _Y_UP = ("motive_csv", "trc")
 """Formats of programs in which y is up."""
+_BY_THE_GROUND, _OFF_THE_GROUND = 0.1, 0.3  # metres
+_FRAMES_FOR_UP = 500
 
 
 def report(
@@ -56,7 +58,8 @@ def report(
         Of the page; the name of the file that was tracked unless given.
     up : "x", "y" or "z", optional
         The axis that points up. Unless given, it is the one that is up in the images of the `rig`;
-        without a rig y for TRC and Motive's CSV, and z for all else. The page can change it.
+        without a rig y for TRC, for Motive's CSV and where the lowest points stay by y = 0 and far
+        from z = 0; and z for all else. The page says which, and can change it.
     overwrite_input : bool
         Allow `path` to be the file that the detections were read from.
 
@@ -120,7 +123,21 @@ def _up(
     d = tracks.detections
     if isinstance(d, Capture) and d.format in _Y_UP:
         return "y", "The y axis points up, as in most files of this format."
+    if d.n_axes == 3 and _stands_on_y(tracks):
+        text = "The y axis is taken to point up: the lowest points stay near y = 0, far from z = 0."
+        return "y", f"{text} It can be changed under the player."
     return "z", "The z axis is taken to point up; change it under the player if another does."
+
+
+def _stands_on_y(tracks: Tracks) -> bool:
+    """Whether what is lowest stays by the ground y = 0, and nowhere near z = 0."""
+    d = tracks.detections
+    frames = range(0, d.n_frames, max(1, d.n_frames // _FRAMES_FOR_UP))
+    lowest = [d.frame(t).min(axis=0) for t in frames if len(d.frame(t))]
+    if not lowest:
+        return False
+    _, y, z = np.abs(np.median(lowest, axis=0))
+    return bool(y < _BY_THE_GROUND and z > _OFF_THE_GROUND)
 
 
 def _oddities(tracks: Tracks) -> list[str]:

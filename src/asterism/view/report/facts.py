@@ -103,7 +103,9 @@ def cards(facts: Facts) -> list[tuple[str, str, str]]:
         ("clutter", f"{facts.n_clutter:,}", "points taken for clutter"),
     ]
     if facts.n_doubtful is not None:
-        found.append(("doubtful", f"{facts.n_doubtful:,}", f"labels held below {100 * DOUBTFUL:.0f} %"))
+        found.append(
+            ("doubtful", f"{facts.n_doubtful:,}", f"labels held below {100 * DOUBTFUL:.0f}\xa0%")
+        )
     if facts.n_filled:
         found.append(("filled", f"{facts.n_filled:,}", "points filled in, not measured"))
     return found

@@ -10,7 +10,7 @@ import numpy as np
 from asterism.view.report.contents import Verdict
 from asterism.view.report.names import track_names
 from asterism.view.report.runs import gaps_of
-from asterism.view.report.strange_steps import strange_steps
+from asterism.view.report.strange_steps import StrangeStep, strange_steps
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -137,24 +137,38 @@ def _ends(tracks: Tracks) -> Iterator[Finding]:
 
 def _steps(tracks: Tracks) -> Iterator[Finding]:
     names, frame = track_names(tracks), tracks.detections.frame_of
+    jumps: dict[int, StrangeStep] = {}
     for step in strange_steps(tracks):
         k = int(tracks.labels[step.detection])
-        size = f"{1e3 * step.off:.0f} mm off where it was heading, {step.ratio:.0f} × its usual"
         if step.other >= 0:
-            reason = f"{size}; that is where {names[step.other]} was heading, and the other way"
+            reason = f"{_off(step)}; that is where {names[step.other]} was heading, and vice versa"
             yield _finding("likely swap", k, frame[step.detection], 1.0, reason)
         else:
-            yield _finding("jump", k, frame[step.detection], min(step.ratio / 50, 2.0), size)
+            jumps[step.detection] = step
+    for k, group in _stretches(tracks, np.array(sorted(jumps), dtype=np.int64)):
+        worst = max((jumps[int(i)] for i in group), key=lambda step: step.off)
+        reason = _off(worst) + (f"; {len(group)} such steps" if len(group) > 1 else "")
+        yield _finding("jump", k, frame[worst.detection], min(worst.ratio / 50, 2.0), reason)
+
+
+def _off(step: StrangeStep) -> str:
+    return f"{1e3 * step.off:.0f} mm off where it was heading, {step.ratio:.0f} × its usual"
 
 
 def _wrong(tracks: Tracks, judgement: Judgement) -> Iterator[Finding]:
     members = np.flatnonzero((judgement.verdicts == Verdict.WRONG) & (tracks.labels >= 0))
     for track, group in _stretches(tracks, members):
-        marker = int(judgement.markers[group[0]])
-        truly = "no marker" if marker < 0 else judgement.names[marker] or f"marker {marker}"
-        n = f"{len(group)} points are" if len(group) > 1 else "is"
+        n = f"{len(group)} points are" if len(group) > 1 else "1 point is"
         frame = tracks.detections.frame_of[group[0]]
-        yield _finding("wrong marker", track, frame, float(len(group)), f"{n} truly {truly}")
+        truly = _name(judgement, int(judgement.markers[group[0]]))
+        right = np.flatnonzero((tracks.labels == track) & (judgement.verdicts == Verdict.RIGHT))
+        mostly = _name(judgement, int(judgement.markers[right[0]]) if len(right) else -1)
+        reason = f"{n} truly {truly}; the track is mostly {mostly}"
+        yield _finding("wrong marker", track, frame, float(len(group)), reason)
+
+
+def _name(judgement: Judgement, marker: int) -> str:
+    return "no marker" if marker < 0 else judgement.names[marker] or f"marker {marker}"
 
 
 def _missed(tracks: Tracks, judgement: Judgement) -> Iterator[Finding]:
@@ -164,6 +178,6 @@ def _missed(tracks: Tracks, judgement: Judgement) -> Iterator[Finding]:
     for k in np.unique(marker):
         its = np.sort(frame[marker == k])
         for group in np.split(its, np.flatnonzero(np.diff(its) > 2) + 1):
-            name = judgement.names[k] or f"marker {k}"
-            reason = f"{name} taken for clutter in {len(group)} frame{'s' * (len(group) > 1)}"
+            n = f"{len(group)} frames" if len(group) > 1 else "1 frame"
+            reason = f"{_name(judgement, int(k))} taken for clutter in {n}"
             yield _finding("missed", -1, group[0], float(len(group)), reason)

@@ -106,10 +106,10 @@ def packed(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str
     text = json.dumps({**header, "arrays": kinds}, ensure_ascii=True, allow_nan=False).encode()
     planes = [_planes(array) for array in arrays.values()]
     content = b"".join([len(text).to_bytes(4, "little"), text, *planes])
-    return base64.b64encode(zlib.compress(content, 9)).decode()
+    return base64.b64encode(zlib.compress(content, 6)).decode()
 
 
 def _planes(array: NDArray[Any]) -> bytes:
     flat = np.ascontiguousarray(array).ravel()
     little = flat.astype(flat.dtype.newbyteorder("<"), copy=False)
-    return little.view(np.uint8).reshape(len(flat), -1).T.tobytes()
+    return little.view(np.uint8).reshape(len(flat), flat.itemsize).T.tobytes()

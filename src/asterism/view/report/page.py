@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from collections import Counter
 from importlib import resources
 from typing import TYPE_CHECKING
 
@@ -137,7 +138,9 @@ def _top(contents: Contents) -> Markup:
 def _list(findings: Sequence[Finding], contents: Contents, stride: int) -> Markup:
     """Give what to look at first, each with its reason."""
     if not findings:
-        text = "Nothing stands out: no doubt, no long gap, no strange step."
+        sure = contents.tracks.confidence is not None
+        text = "Nothing stands out: no long gap, no strange step, no track begun midway"
+        text += ", no doubtful label." if sure else "."
         return element("p", text, class_="quiet", id="findings-count")
     names, times = track_names(contents.tracks), contents.tracks.detections.times
     shown = [
@@ -157,10 +160,13 @@ def _list(findings: Sequence[Finding], contents: Contents, stride: int) -> Marku
         )
         for f in findings[:MOST_LISTED]
     ]
+    kinds = Counter(f.kind for f in findings)
+    parts = ", ".join(f"{kind} {n:,}" for kind, n in kinds.most_common())
     n = len(findings)
-    count = f"The {len(shown)} worst of {n:,} places." if n > len(shown) else f"{n} places."
+    count = f"{n:,} places" if n > 1 else "One place"
+    count += f", the {len(shown)} worst below" if n > len(shown) else ""
     return joined(
-        element("p", count if n > 1 else "One place.", class_="quiet", id="findings-count"),
+        element("p", f"{count}: {parts}.", class_="quiet", id="findings-count"),
         element("ol", *shown, id="findings"),
     )
 
@@ -183,16 +189,28 @@ def _scores(contents: Contents) -> Markup:
         text = f"{judged.n_elsewhere:,} points of markers are in the truth only; they count as "
         lost = element("p", text + "missed above, and cannot be drawn.", class_="quiet")
     return element(
-        "section", element("h2", "Against the truth"), element("table", *rows), lost, class_="judged"
+        "section",
+        element("h2", "Against the truth"),
+        element("table", *rows),
+        lost,
+        class_="judged",
     )
 
 
 def _made(contents: Contents) -> Markup:
-    told = (*contents.summary, *((k, f"{v:g}") for k, v in contents.tracks.info.items()))
-    if not told:
+    info = [(name, f"{value:,.6g}") for name, value in contents.tracks.info.items()]
+    if not (contents.summary or info):
         return Markup()
-    rows = [element("tr", element("th", a, scope="row"), element("td", b)) for a, b in told]
-    return element("section", element("h2", "How it was made"), element("table", *rows))
+    parts = [_table(contents.summary)] if contents.summary else []
+    if info:
+        told = element("summary", "What the method tells of itself")
+        parts.append(element("details", told, _table(info)))
+    return element("section", element("h2", "How it was made"), *parts)
+
+
+def _table(rows: Sequence[tuple[str, str]]) -> Markup:
+    lines = (element("tr", element("th", a, scope="row"), element("td", b)) for a, b in rows)
+    return element("table", *lines)
 
 
 def _drawn(contents: Contents, play: Played) -> Markup:
@@ -218,8 +236,9 @@ def _drawn(contents: Contents, play: Played) -> Markup:
         )
     if contents.rig is not None:
         told.append(
-            f"In the images of the cameras points are within {max(play.lens_error, 0.01):.2f} pixels "
-            "of the calibrated lens. What a body hides from a camera is not known here."
+            "In the images of the cameras points are within "
+            f"{max(play.lens_error, 0.01):.2f} pixels of the calibrated lens. "
+            "What a body hides from a camera is not known here."
         )
     items = [element("li", text) for text in told]
     return element("section", element("h2", "What is drawn"), element("ul", *items, id="notes"))

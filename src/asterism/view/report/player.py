@@ -36,7 +36,7 @@ def player(contents: Contents, findings: Markup) -> Markup:
         "div",
         element(
             "canvas", id="scene", tabindex=0, role="img",
-            aria_label="Markers in space. Drag to turn, choose a marker with a click or with [ and ].",
+            aria_label="Markers in space. Drag to turn; a click or [ and ] choose a marker.",
         ),
         element("canvas", id="names", aria_hidden="true"),
         element("p", hint, class_="hint", aria_hidden="true"),
@@ -187,7 +187,8 @@ HELP = element(
     "details",
     element("summary", "Keys"),
     element(
-        "dl", *(element("div", element("dt", element("kbd", k)), element("dd", v)) for k, v in _KEYS)
+        "dl",
+        *(element("div", element("dt", element("kbd", k)), element("dd", v)) for k, v in _KEYS),
     ),
     class_="keys",
     id="keys",

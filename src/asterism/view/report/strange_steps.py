@@ -17,8 +17,9 @@ __all__ = ["StrangeStep", "strange_steps"]
 
 USUAL = 12.0
 """A step is strange that is off by more than so many times the median of its track …"""
-LEAST = 0.005
-"""… and by more than so many metres."""
+LEAST = 0.25
+"""… and by more than so many times the usual distance of a point from its nearest neighbour."""
+_FRAMES_FOR_NEAREST = 100
 MOST = 2000
 """Strange steps that are looked at, the largest first; a capture with more is beyond a list."""
 
@@ -58,12 +59,13 @@ def strange_steps(tracks: Tracks) -> Iterator[StrangeStep]:
     Yields
     ------
     StrangeStep
-        The farthest first; a change of places once, in the track with the lower number.
+        The farthest first; a change of places once, in the track that is farther off.
     """
     heading, off = _headings(tracks)
     usual = _medians(tracks, off)
+    least = LEAST * _nearest(tracks)
     ratio = off / np.maximum(usual, 1e-5)
-    strange = np.flatnonzero((ratio > USUAL) & (off > LEAST))
+    strange = np.flatnonzero((ratio > USUAL) & (off > least))
     strange = strange[np.argsort(-off[strange], kind="stable")][:MOST]
     explained: set[int] = set()
     for i in strange:
@@ -75,13 +77,13 @@ def strange_steps(tracks: Tracks) -> Iterator[StrangeStep]:
             # What comes after a change of places is strange twice more: the way back to a line.
             explained |= {int(i), j}
             other = int(tracks.labels[j])
-        elif _follows_a_strange_one(tracks, ratio, off, int(i)):
+        elif _follows_a_strange_one(tracks, (ratio > USUAL) & (off > least), int(i)):
             continue
         yield StrangeStep(int(i), other, float(off[i]), float(ratio[i]))
 
 
 def _headings(tracks: Tracks) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where each track was heading, shape (N, D), and how far off it is, shape (N,); NaN unknown."""
+    """Where tracks were heading, (N, D), and how far off they are, (N,); NaN where unknown."""
     d = tracks.detections
     order, _ = tracks.by_track
     heading = np.full(d.points.shape, np.nan)
@@ -106,9 +108,7 @@ def _medians(tracks: Tracks, off: NDArray[np.float64]) -> NDArray[np.float64]:
     return usual
 
 
-def _partner(
-    tracks: Tracks, heading: NDArray[np.float64], off: NDArray[np.float64], i: int
-) -> int:
+def _partner(tracks: Tracks, heading: NDArray[np.float64], off: NDArray[np.float64], i: int) -> int:
     """Give the detection of the same frame that explains this one by a change of places, or -1."""
     d = tracks.detections
     t = int(d.frame_of[i])
@@ -123,12 +123,23 @@ def _partner(
     return int(others[best]) if share[best] < 0.5 else -1
 
 
-def _follows_a_strange_one(
-    tracks: Tracks, ratio: NDArray[np.float64], off: NDArray[np.float64], i: int
-) -> bool:
+def _follows_a_strange_one(tracks: Tracks, is_strange: NDArray[np.bool_], i: int) -> bool:
     """Whether one of the two steps before was as strange: a jump bends the two after it too."""
     order, starts = tracks.by_track
     k = tracks.labels[i]
     place = starts[k] + np.searchsorted(order[starts[k] : starts[k + 1]], i)
     before = order[max(starts[k], place - 2) : place]
-    return bool(((ratio[before] > USUAL) & (off[before] > LEAST)).any())
+    return bool(is_strange[before].any())
+
+
+def _nearest(tracks: Tracks) -> float:
+    """Give the median distance from a point to the one nearest to it, metres."""
+    from scipy.spatial import cKDTree
+
+    d = tracks.detections
+    found: list[NDArray[np.float64]] = []
+    for t in range(0, d.n_frames, max(1, d.n_frames // _FRAMES_FOR_NEAREST)):
+        points = d.frame(t)[tracks.labels[d.offsets[t] : d.offsets[t + 1]] >= 0]
+        if len(points) > 1:
+            found.append(cKDTree(points).query(points, 2)[0][:, 1])
+    return float(np.median(np.concatenate(found))) if found else 0.02

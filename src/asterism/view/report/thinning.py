@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 __all__ = ["MOST_POINTS", "every_nth", "stride_for", "thinned"]
 
 MOST_POINTS = 3_000_000
-"""Points that a page holds, some 25 MB of it; beyond, a browser takes seconds to open it."""
+"""Points that a page holds, 10 to 20 MB of it; with more a browser takes long to open it."""
 
 
 def stride_for(n_points: int) -> int:
-    """Give which share of the frames to keep: every first, second, third …"""
+    """Give which share of the frames to keep: every first, second, third …."""
     return max(1, -(-n_points // MOST_POINTS))
 
 
