@@ -14,7 +14,7 @@ import asterism as am
 from browser import CHROMIUM, Browser
 from report_cases import HOSTILE, spoilt_person
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
 
 K = am.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
 

@@ -1,4 +1,7 @@
-/** Bundle the player into the Python package; the same sources give the same bytes. */
+/**
+ * Bundle the player into the Python package; the same sources give the same bytes.
+ * With --check nothing is written: it fails where the package holds another bundle.
+ */
 
 import { readFile, rename, writeFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
@@ -28,7 +31,14 @@ const { outputFiles } = await build({
 
 for (const { path, text } of outputFiles) {
   const name = path.split(/[\\/]/).at(-1);
-  await writeFile(`${target}${name}.part`, text);
-  await rename(`${target}${name}.part`, `${target}${name}`);
-  console.log(`${name}: ${text.length} bytes`);
+  if (process.argv.includes("--check")) {
+    const held = await readFile(`${target}${name}`, "utf8").catch(() => "");
+    if (held === text) continue;
+    console.error(`${name} is not what web/src makes: run \`make web\` and commit it`);
+    process.exitCode = 1;
+  } else {
+    await writeFile(`${target}${name}.part`, text);
+    await rename(`${target}${name}.part`, `${target}${name}`);
+    console.log(`${name}: ${text.length} characters`);
+  }
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from asterism.view.report import Contents, page
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from asterism.view.report.contents import Axis
 
 __all__ = ["report"]
 
@@ -34,7 +36,7 @@ def report(
     rig: Rig | None = None,
     summary: Iterable[tuple[str, str]] = (),
     title: str | None = None,
-    up: Literal["x", "y", "z"] | None = None,
+    up: Axis | None = None,
     overwrite_input: bool = False,
 ) -> None:
     """Write tracks as one self-contained HTML page with a player.
@@ -109,16 +111,15 @@ def report(
         file.write(text)
 
 
-def _up(
-    tracks: Tracks, rig: Rig | None, asked: Literal["x", "y", "z"] | None
-) -> tuple[Literal["x", "y", "z"], str]:
+def _up(tracks: Tracks, rig: Rig | None, asked: Axis | None) -> tuple[Axis, str]:
     """Choose the axis that points up, and say how it is known."""
     if asked is not None:
         return asked, f"The {asked} axis points up, as was asked for."
     if rig is not None:
         # An image has its rows from top to bottom.
         mean = np.mean([-camera.T_camera_world[1, :3] for camera in rig.cameras], axis=0)
-        axis = "xyz"[int(np.argmax(np.abs(mean)))]
+        axes: tuple[Axis, ...] = ("x", "y", "z")
+        axis = axes[int(np.argmax(np.abs(mean)))]
         return axis, f"The {axis} axis points up: it does so in the images of the cameras."
     d = tracks.detections
     if isinstance(d, Capture) and d.format in _Y_UP:

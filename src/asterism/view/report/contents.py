@@ -13,9 +13,10 @@ if TYPE_CHECKING:
     from asterism.camera import Rig
     from asterism.model import Tracks
 
-__all__ = ["Connections", "Contents", "Judgement", "Score", "Verdict"]
+__all__ = ["Axis", "Connections", "Contents", "Judgement", "Score", "Verdict"]
 
 Axis = Literal["x", "y", "z"]
+"""The axis that points up."""
 
 
 class Verdict(IntEnum):

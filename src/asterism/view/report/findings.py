@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -79,7 +79,7 @@ def find_troubles(tracks: Tracks, judgement: Judgement | None = None) -> list[Fi
     return sorted(found, key=lambda f: (-f.weight, f.frame, f.track))
 
 
-def _finding(kind: str, track: int, frame: int, size: float, reason: str) -> Finding:
+def _finding(kind: str, track: Any, frame: Any, size: float, reason: str) -> Finding:
     return Finding(
         kind=kind, track=int(track), frame=int(frame), weight=_WEIGHT[kind] * size, reason=reason
     )

@@ -41,7 +41,7 @@ class Grid(NamedTuple):
         """Give the cell of each point, shape (N, 3), and whether it is on the grid, shape (N,)."""
         cells = np.rint((points - self.low) / self.step)
         is_on = ((cells >= 0) & (cells <= STEPS)).all(axis=1)
-        return np.clip(cells, 0, STEPS).astype(np.int64), is_on
+        return np.clip(cells, 0, STEPS).astype(np.int64), np.asarray(is_on)
 
 
 def grid_over(points: NDArray[np.float64], margin: float) -> Grid:

@@ -101,7 +101,7 @@ def _policy(script: str, style: str) -> str:
 
 
 def _bundled(name: str) -> str:
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return resources.files("asterism.view.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def _by_trouble(contents: Contents, findings: Sequence[Finding]) -> NDArray[np.int64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -134,12 +134,13 @@ def _follows_a_strange_one(tracks: Tracks, is_strange: NDArray[np.bool_], i: int
 
 def _nearest(tracks: Tracks) -> float:
     """Give the median distance from a point to the one nearest to it, metres."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     d = tracks.detections
     found: list[NDArray[np.float64]] = []
     for t in range(0, d.n_frames, max(1, d.n_frames // _FRAMES_FOR_NEAREST)):
         points = d.frame(t)[tracks.labels[d.offsets[t] : d.offsets[t + 1]] >= 0]
         if len(points) > 1:
-            found.append(cKDTree(points).query(points, 2)[0][:, 1])
+            tree: Any = KDTree(points)
+            found.append(tree.query(points, 2)[0][:, 1])
     return float(np.median(np.concatenate(found))) if found else 0.02
