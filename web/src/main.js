@@ -85,9 +85,9 @@ function tell(capture, state) {
   const [first, stride] = capture.header.frame;
   const slider = byId("frame");
   slider.value = state.frame;
-  const time = capture.T ? capture.times[state.frame].toFixed(3) : "–";
-  const number = capture.T ? first + state.frame * stride : "–";
-  byId("clock").textContent = `${time} s · frame ${number}`;
+  const time = capture.T ? capture.times[state.frame].toFixed(3) : "";
+  const number = first + state.frame * stride;
+  byId("clock").textContent = capture.T ? `${time} s · frame ${number}` : "no frame";
   slider.setAttribute("aria-valuetext", `frame ${number}, ${time} seconds`);
   const play = byId("play");
   play.textContent = state.playing ? "❚❚" : "▶";

@@ -1,8 +1,8 @@
 /** The scene: markers, lines and surroundings, seen from where the reader turns them. */
 
 import {
-  ColorManagement, Group, LinearSRGBColorSpace, PerspectiveCamera, Quaternion, Scene,
-  Vector3, WebGLRenderer,
+  ColorManagement, Group, LinearSRGBColorSpace, MOUSE, PerspectiveCamera, Quaternion, Scene,
+  TOUCH, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
@@ -50,7 +50,11 @@ export class Stage {
     this.markers.uniforms.radius.value = Math.min(0.014, 0.009 * this.size);
     this.controls = new OrbitControls(this.view, canvas);
     this.controls.enableDamping = false;
-    this.controls.enableRotate = capture.axes === 3;
+    if (capture.axes === 2) {
+      this.controls.enableRotate = false;
+      this.controls.mouseButtons.LEFT = MOUSE.PAN;
+      this.controls.touches.ONE = TOUCH.PAN;
+    }
     this.controls.screenSpacePanning = true;
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => this.redraw());
@@ -78,16 +82,35 @@ export class Stage {
     const middle = new Vector3(...low.map((l, i) => (l + high[i]) / 2));
     this.root.localToWorld(middle);
     const from = this.capture.axes === 2 ? new Vector3(0, 0, 1) : SEEN_FROM;
-    const half = Math.tan((this.view.fov * Math.PI) / 360);
-    const narrow = Math.min(1, this.view.aspect);
-    const away = (0.5 * this.size) / (half * (this.capture.axes === 2 ? narrow : Math.max(0.6, narrow)));
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((n) =>
+      this.root.localToWorld(new Vector3(...[0, 1, 2].map((i) => ((n >> i) & 1 ? high[i] : low[i])))),
+    );
     this.controls.target.copy(middle);
-    this.view.position.copy(middle).addScaledVector(from, Math.max(away, 0.05));
+    let [near, away] = [0.3 * this.size, 20 * this.size];
+    for (let n = 0; n < 20; n++) {
+      const tried = (near + away) / 2;
+      if (this.holds(corners, middle, from, tried)) away = tried;
+      else near = tried;
+    }
+    this.view.position.copy(middle).addScaledVector(from, away);
     this.view.near = away / 200;
     this.view.far = away * 100;
     this.view.updateProjectionMatrix();
     this.controls.update();
     this.redraw();
+  }
+
+  /** Whether all corners are in view from so far away, with some room to the edges. */
+  holds(corners, middle, from, away) {
+    this.view.position.copy(middle).addScaledVector(from, away);
+    this.view.lookAt(middle);
+    this.view.near = away / 1000;
+    this.view.updateProjectionMatrix();
+    this.view.updateMatrixWorld();
+    return corners.every((corner) => {
+      const { x, y, z } = this.point.copy(corner).project(this.view);
+      return Math.abs(x) < 0.86 && Math.abs(y) < 0.8 && z < 1;
+    });
   }
 
   resize() {

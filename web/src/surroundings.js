@@ -1,22 +1,19 @@
 /** What stands about the markers: the floor with its axes, and the cameras. */
 
-import { Color, Vector3 } from "three";
+import { Vector3 } from "three";
 
 import { Lines } from "./lines.js";
 
-const AXES = ["#c0392b", "#2e8b57", "#2f6fd0"];
-
-/** A floor of squares with a round size, and the three axes in one of its corners. */
+/** A floor of squares with a round size. */
 export class Floor extends Lines {
   constructor(capture) {
     super(400);
     this.capture = capture;
-    this.letters = [];
   }
 
   /**
    * @param {string} up axis that points up
-   * @param {Color} ink
+   * @param {import("three").Color} ink
    */
   draw(up, ink) {
     this.clear();
@@ -44,14 +41,6 @@ export class Floor extends Lines {
     for (let y = from[1]; y <= to[1] + 1e-9; y += this.cell) {
       line(place(from[0], y), place(to[0], y), ink, Math.abs(y) < 1e-9 ? 0.4 : 0.16);
     }
-    const corner = place(from[0], from[1]);
-    this.letters = [0, 1, 2].slice(0, flat ? 2 : 3).map((i) => {
-      const tip = [...corner];
-      tip[i] += 1.5 * this.cell;
-      line(corner, tip, new Color(AXES[i]), 1);
-      tip[i] += 0.3 * this.cell;
-      return { text: "xyz"[i], place: new Vector3(...tip), colour: AXES[i] };
-    });
     this.done();
   }
 }

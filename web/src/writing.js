@@ -24,9 +24,7 @@ export class Writing {
     const paper = css("--stage");
     const ink = css("--ink");
     const muted = css("--muted");
-    for (const { text, place, colour } of stage.floor.letters) {
-      this.write(pen, text, this.at(place), colour, paper, 0);
-    }
+    this.drawAxes(pen, paper);
     for (const { text, place, chosen } of state.show.cameras ? stage.frustums.letters : []) {
       this.write(pen, text, this.at(place), chosen ? css("--accent") : muted, paper, 6);
     }
@@ -38,6 +36,28 @@ export class Writing {
       const p = stage.onCanvas(stage.place(n, this.point));
       pen.font = isMarked ? `600 ${FONT}` : FONT;
       this.write(pen, capture.header.names[k], p, isMarked ? ink : muted, paper, 10);
+    }
+  }
+
+  /** Which way the axes of the capture point, in a corner where they are always seen. */
+  drawAxes(pen, paper) {
+    const { root, view, capture, canvas } = this.stage;
+    const turned = view.quaternion.clone().invert().multiply(root.quaternion);
+    const [x, y] = [canvas.clientWidth - 48, 50];
+    const arrows = ["--x", "--y", "--z"].slice(0, capture.axes).map((name, i) => {
+      const way = new Vector3().setComponent(i, 1).applyQuaternion(turned);
+      return { way, text: "xyz"[i], colour: css(name) };
+    });
+    arrows.sort((a, b) => a.way.z - b.way.z);
+    pen.lineWidth = 2;
+    for (const { way, text, colour } of arrows) {
+      pen.strokeStyle = colour;
+      pen.beginPath();
+      pen.moveTo(x, y);
+      pen.lineTo(x + 28 * way.x, y - 28 * way.y);
+      pen.stroke();
+      this.write(pen, text, { x: x + 38 * way.x - 3, y: y - 38 * way.y, z: 0 }, colour, paper, 0);
+      pen.lineWidth = 2;
     }
   }
 

@@ -168,7 +168,9 @@ def track(
         rows = summary.rows() + ([("report", str(report))] if report is not None else [])
         print_table(rows, title=f"\nTracked with {job.method}")
     if json:
-        print_json(summary.to_dict() | {"options": job.options, "model": job.model.to_dict()})
+        page = {} if report is None else {"report": str(report)}
+        told = {"options": job.options, "model": job.model.to_dict()}
+        print_json(summary.to_dict() | told | page)
 
 
 def resolved_method(name: str, texts: list[str]) -> tuple[str, dict[str, Any]]:

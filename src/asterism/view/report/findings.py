@@ -152,7 +152,7 @@ def _steps(tracks: Tracks) -> Iterator[Finding]:
 
 
 def _off(step: StrangeStep) -> str:
-    return f"{1e3 * step.off:.0f} mm off where it was heading, {step.ratio:.0f} × its usual"
+    return f"{1e3 * step.off:.0f} mm off its course, {step.ratio:.0f} × as much as usual"
 
 
 def _wrong(tracks: Tracks, judgement: Judgement) -> Iterator[Finding]:
@@ -162,8 +162,9 @@ def _wrong(tracks: Tracks, judgement: Judgement) -> Iterator[Finding]:
         frame = tracks.detections.frame_of[group[0]]
         truly = _name(judgement, int(judgement.markers[group[0]]))
         right = np.flatnonzero((tracks.labels == track) & (judgement.verdicts == Verdict.RIGHT))
-        mostly = _name(judgement, int(judgement.markers[right[0]]) if len(right) else -1)
-        reason = f"{n} truly {truly}; the track is mostly {mostly}"
+        reason = f"{n} truly {truly}"
+        if len(right):
+            reason += f"; the track is mostly {_name(judgement, int(judgement.markers[right[0]]))}"
         yield _finding("wrong marker", track, frame, float(len(group)), reason)
 
 

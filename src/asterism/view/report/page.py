@@ -139,6 +139,10 @@ def _list(findings: Sequence[Finding], contents: Contents, stride: int) -> Marku
     """Give what to look at first, each with its reason."""
     if not findings:
         sure = contents.tracks.confidence is not None
+        if not (contents.tracks.labels >= 0).any():
+            return element(
+                "p", "There is no track to look at.", class_="quiet", id="findings-count"
+            )
         text = "Nothing stands out: no long gap, no strange step, no track begun midway"
         text += ", no doubtful label." if sure else "."
         return element("p", text, class_="quiet", id="findings-count")

@@ -29,9 +29,8 @@ _KEYS = (
 def player(contents: Contents, findings: Markup) -> Markup:
     """Make the player, its timeline and the list of what to look at."""
     solid = contents.tracks.detections.n_axes == 3
-    hint = ("Drag to turn" if solid else "Drag with two fingers or the right button to move") + (
-        ", scroll to come nearer, click a marker to choose it."
-    )
+    does = "turn" if solid else "move"
+    hint = f"Drag to {does}, scroll to come nearer, click a marker to choose it."
     stage = element(
         "div",
         element(
