@@ -57,8 +57,8 @@ def main(captures: Path) -> None:
             height=860, dark=True,
         )  # fmt: skip
         draw(
-            browser, "rat", "asterism.seek(900); document.querySelector('.times').scrollIntoView("
-            "{block: 'end'})", width=1240, height=1020,
+            browser, "rat", "asterism.seek(900); document.querySelector('.left').scrollIntoView()",
+            width=1240, height=960,
         )  # fmt: skip
         draw(
             browser, "person", "document.querySelector('#findings button').click()",

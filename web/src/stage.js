@@ -42,12 +42,12 @@ export class Stage {
     this.floor = new Floor(capture);
     this.trails = new Trails(capture, places);
     this.lines = new Connections(capture, places);
-    this.frustums = new Frustums(capture, 0.09 * this.size);
+    this.frustums = new Frustums(capture, this.size);
     this.markers = new Markers(capture, places);
     for (const part of [this.floor, this.frustums, this.lines, this.trails, this.markers]) {
       this.root.add(part.object);
     }
-    this.markers.uniforms.radius.value = Math.min(0.014, 0.009 * this.size);
+    this.markers.uniforms.radius.value = Math.max(capture.header.radius, 0.002 * this.size);
     this.controls = new OrbitControls(this.view, canvas);
     this.controls.enableDamping = false;
     if (capture.axes === 2) {

@@ -56,7 +56,12 @@ export class Frustums extends Lines {
   constructor(capture, size) {
     super(8 * capture.header.cameras.length);
     this.cameras = capture.header.cameras;
-    this.size = size;
+    const [low, high] = capture.header.box;
+    const away = this.cameras.map((camera) =>
+      Math.hypot(...camera.centre.map((x, i) => x - (low[i] + high[i]) / 2)),
+    );
+    // To be seen from where all of them are, but never larger than the scene.
+    this.size = Math.min(0.3 * size, 0.07 * Math.max(size, ...away));
   }
 
   draw(chosen, shown, ink, accent) {

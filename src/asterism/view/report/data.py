@@ -9,6 +9,7 @@ import numpy as np
 from asterism.model import Capture
 from asterism.view.report.lenses import SIDE, camera_header, lens_table
 from asterism.view.report.names import track_names
+from asterism.view.report.nearest import usual_distance
 from asterism.view.report.packing import grid_over, packed, residuals
 from asterism.view.report.runs import runs_of
 from asterism.view.report.thinning import every_nth, stride_for, thinned
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Played", "played"]
 
 _MARGIN = 0.25  # about the labelled points, for clutter
+_RADIUS = 0.012  # of markers as they are drawn, metres; less where they are close
 
 
 class Played(NamedTuple):
@@ -102,6 +104,7 @@ def played(contents: Contents, order: NDArray[np.int64]) -> Played:
         "grid": [grid.low.tolist(), grid.step.tolist()],
         "box": _box(points[labelled] if len(labelled) else points),
         "up": contents.up,
+        "radius": min(_RADIUS, 0.25 * usual_distance(tracks)),
         "names": track_names(tracks),
         "markers": [] if judged is None else list(judged.names),
         "frame": [_first_frame(full), stride],

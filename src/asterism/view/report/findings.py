@@ -158,13 +158,13 @@ def _off(step: StrangeStep) -> str:
 def _wrong(tracks: Tracks, judgement: Judgement) -> Iterator[Finding]:
     members = np.flatnonzero((judgement.verdicts == Verdict.WRONG) & (tracks.labels >= 0))
     for track, group in _stretches(tracks, members):
-        n = f"{len(group)} points are" if len(group) > 1 else "1 point is"
+        n = f"{len(group)} points are truly" if len(group) > 1 else "1 point is truly"
         frame = tracks.detections.frame_of[group[0]]
         truly = _name(judgement, int(judgement.markers[group[0]]))
         right = np.flatnonzero((tracks.labels == track) & (judgement.verdicts == Verdict.RIGHT))
-        reason = f"{n} truly {truly}"
+        reason = f"{n} {truly}"
         if len(right):
-            reason += f"; the track is mostly {_name(judgement, int(judgement.markers[right[0]]))}"
+            reason += f"; its marker is {_name(judgement, int(judgement.markers[right[0]]))}"
         yield _finding("wrong marker", track, frame, float(len(group)), reason)
 
 

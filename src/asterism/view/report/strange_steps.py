@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from asterism.view.report.nearest import usual_distance
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,7 +21,6 @@ USUAL = 12.0
 """A step is strange that is off by more than so many times the median of its track …"""
 LEAST = 0.25
 """… and by more than so many times the usual distance of a point from its nearest neighbour."""
-_FRAMES_FOR_NEAREST = 100
 MOST = 2000
 """Strange steps that are looked at, the largest first; a capture with more is beyond a list."""
 
@@ -63,7 +64,7 @@ def strange_steps(tracks: Tracks) -> Iterator[StrangeStep]:
     """
     heading, off = _headings(tracks)
     usual = _medians(tracks, off)
-    least = LEAST * _nearest(tracks)
+    least = LEAST * usual_distance(tracks)
     ratio = off / np.maximum(usual, 1e-5)
     strange = np.flatnonzero((ratio > USUAL) & (off > least))
     strange = strange[np.argsort(-off[strange], kind="stable")][:MOST]
@@ -130,17 +131,3 @@ def _follows_a_strange_one(tracks: Tracks, is_strange: NDArray[np.bool_], i: int
     place = starts[k] + np.searchsorted(order[starts[k] : starts[k + 1]], i)
     before = order[max(starts[k], place - 2) : place]
     return bool(is_strange[before].any())
-
-
-def _nearest(tracks: Tracks) -> float:
-    """Give the median distance from a point to the one nearest to it, metres."""
-    from scipy.spatial import KDTree
-
-    d = tracks.detections
-    found: list[NDArray[np.float64]] = []
-    for t in range(0, d.n_frames, max(1, d.n_frames // _FRAMES_FOR_NEAREST)):
-        points = d.frame(t)[tracks.labels[d.offsets[t] : d.offsets[t + 1]] >= 0]
-        if len(points) > 1:
-            tree: Any = KDTree(points)
-            found.append(tree.query(points, 2)[0][:, 1])
-    return float(np.median(np.concatenate(found))) if found else 0.02
