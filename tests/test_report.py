@@ -214,7 +214,7 @@ def test_gaps_ends_and_doubts_are_found_with_their_reasons():
     assert told["begun midway", 1].frame == 120
     assert told["ends early", 2].frame == 149
     assert told["low confidence", 3].frame == 12
-    assert "50%" in told["low confidence", 3].reason
+    assert "50 %" in told["low confidence", 3].reason
 
 
 def test_connections_are_those_that_keep_their_distance():

@@ -28,15 +28,23 @@ export class Writing {
     for (const { text, place, chosen } of state.show.cameras ? stage.frustums.letters : []) {
       this.write(pen, text, this.at(place), chosen ? css("--accent") : muted, paper, 6);
     }
-    let left = MOST_NAMES;
-    for (let n = 0; n < markers.count; n++) {
-      const k = markers.tracks[n];
-      const isMarked = k >= 0 && (k === state.chosen || k === state.hovered);
-      if (k < 0 || !(isMarked || (state.show.names && left-- > 0))) continue;
+    const taken = [];
+    const name = (n, font, colour, mustBe) => {
       const p = stage.onCanvas(stage.place(n, this.point));
-      pen.font = isMarked ? `600 ${FONT}` : FONT;
-      this.write(pen, capture.header.names[k], p, isMarked ? ink : muted, paper, 10);
-    }
+      const text = capture.header.names[markers.tracks[n]];
+      pen.font = font;
+      const [x, y, width] = [p.x, p.y, pen.measureText(text).width + 10];
+      const covers = (o) => Math.abs(o.y - y) < 12 && o.x < x + width && x < o.x + o.width;
+      if (!mustBe && taken.some(covers)) return; // one over the other nobody can read
+      taken.push({ x, y, width });
+      this.write(pen, text, p, colour, paper, 10);
+    };
+    const dots = [...markers.tracks.subarray(0, markers.count).keys()];
+    const isMarked = (k) => k >= 0 && (k === state.chosen || k === state.hovered);
+    for (const n of dots) if (isMarked(markers.tracks[n])) name(n, `600 ${FONT}`, ink, true);
+    if (!state.show.names) return;
+    const others = dots.filter((n) => markers.tracks[n] >= 0 && !isMarked(markers.tracks[n]));
+    for (const n of others.slice(0, MOST_NAMES)) name(n, FONT, muted, false);
   }
 
   /** Which way the axes of the capture point, in a corner where they are always seen. */

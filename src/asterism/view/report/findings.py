@@ -106,8 +106,8 @@ def _doubts(tracks: Tracks) -> Iterator[Finding]:
     c, frame = tracks.confidence, tracks.detections.frame_of
     for track, group in _stretches(tracks, np.flatnonzero((tracks.labels >= 0) & (c < DOUBTFUL))):
         least = group[np.argmin(c[group])]
-        reason = f"held with {c[least]:.0%} at least" + (
-            f"; {len(group)} points below {DOUBTFUL:.0%}" if len(group) > 1 else ""
+        reason = f"held with {100 * c[least]:.0f} % at the worst" + (
+            f"; {len(group)} points below {100 * DOUBTFUL:.0f} %" if len(group) > 1 else ""
         )
         yield _finding("low confidence", track, frame[least], float((1 - c[group]).sum()), reason)
 
