@@ -35,10 +35,17 @@ def person(tmp_path_factory):
     order, starts = tracks.by_track
     confidence = tracks.confidence.copy()
     confidence[order[starts[0] + 20 : starts[0] + 30]] = 0.4  # that the first is to be looked at
-    tracks = dataclasses.replace(tracks, confidence=confidence)
+    labels = tracks.labels.copy()
+    labels[order[starts[7] + 40 : starts[7] + 49]] = -1  # that there is a long gap
+    tracks = dataclasses.replace(tracks, confidence=confidence, labels=labels)
     ring = am.Rig.ring(8, radius=4, height=2.5).cameras
     lens = am.BrownConrady(k1=-0.2)
-    rig = am.Rig(tuple(dataclasses.replace(c, K=K, lens=lens) for c in ring))
+    ring = tuple(dataclasses.replace(c, K=K, lens=lens) for c in ring)
+    # One amid the points: some are behind it, some too near, some too far.
+    amid = am.Camera.look_at(
+        (0, 0, 1), (2, 0.1, 1), K=K, size_px=(1280, 1024), near=0.3, far=1.2, name="amid"
+    )
+    rig = am.Rig((*ring, amid))
     path = tmp_path_factory.mktemp("person") / "page.html"
     am.report(tracks, path, truth=truth, rig=rig, title=HOSTILE[0])
     return path, tracks, truth, rig
@@ -175,10 +182,12 @@ def test_a_click_chooses_the_marker_under_it(opened, person):
 def test_gaps_are_bridged_straight(opened, person):
     tracks = person[1]
     places = tracks.positions()
-    k = next(k for k in range(tracks.n_tracks) if np.isnan(places[50:60, k, 0]).any())
-    t = 50 + int(np.flatnonzero(np.isnan(places[50:60, k, 0]))[0])
+    k = 7
     seen = np.flatnonzero(np.isfinite(places[:, k, 0]))
-    a, b = seen[seen < t][-1], seen[seen > t][0]
+    longest = int(np.argmax(np.diff(seen)))
+    a, b = int(seen[longest]), int(seen[longest + 1])
+    assert b - a > 8
+    t = a + 2
     expected = places[a, k] + (t - a) / (b - a) * (places[b, k] - places[a, k])
     opened.run(f"asterism.choose({k}); asterism.seek({t})")
     told = opened.run("document.querySelector('[data-about=place]').textContent")
