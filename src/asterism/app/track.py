@@ -151,7 +151,8 @@ def track(
     if out is None:
         out = default_output(job.source, job.format)
         out = out if run is None else run / out.name
-    check_outputs({"-o": out, "--report": report}, [job.source, model, repeat])
+    files = {"--report": report} if run is not None else {"-o": out, "--report": report}
+    check_outputs(files, [job.source, model, repeat])
     if run is not None:
         run.mkdir(parents=True, exist_ok=True)
         written = {"--run": out} | {f"--run ({name})": run / name for name in FILES}
