@@ -39,7 +39,10 @@ export function connect({ capture, state, stage, timeline }) {
   );
 
   function go(button) {
-    for (const other of found) other.toggleAttribute("aria-current", other === button);
+    for (const other of found) {
+      if (other === button) other.setAttribute("aria-current", "true");
+      else other.removeAttribute("aria-current");
+    }
     state.play(false);
     const track = Number(button.dataset.track);
     state.choose(track);

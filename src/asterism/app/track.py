@@ -15,6 +15,7 @@ from asterism.errors import FormatError, ParameterError, check_number
 if TYPE_CHECKING:
     import asterism as am
     from asterism.app.run_folder import Job
+    from asterism.app.summary import Summary
 
 log = logging.getLogger(__name__)
 
@@ -164,7 +165,7 @@ def track(
             print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
     tracks, summary = carry_out(job, capture, out, run)
     if report is not None:
-        _write_report(tracks, report, job, summary.rows(), estimate)
+        _write_report(tracks, report, job, summary, estimate)
     if talks:
         rows = summary.rows() + ([("report", str(report))] if report is not None else [])
         print_table(rows, title=f"\nTracked with {job.method}")
@@ -212,7 +213,7 @@ def _write_report(
     tracks: am.Tracks,
     page: Path,
     job: Job,
-    rows: list[tuple[str, str]],
+    summary: Summary,
     estimate: am.ModelEstimate | None,
 ) -> None:
     """Write the page, with the method, its figures and the model."""
@@ -221,13 +222,18 @@ def _write_report(
     options = ", ".join(f"{name}={value}" for name, value in job.options.items())
     told = [("method", job.method + (", then stitched" if job.stitch else ""))]
     told += [("options", options)] if options else []
-    told += rows
+    told += summary.rows()
+    made = f"Tracked with {job.method}{', then stitched,' * job.stitch} in {summary.seconds:.2g} s "
+    made += f"({summary.frames_per_second:,.0f} frames a second). The model was "
     if estimate is None:
         told.append(("model", "given, not estimated"))
+        made += "given."
     else:
         told += [(f"model: {name}", f"{value}: {why}") for name, value, why in estimate.reasons]
+        shown = ", ".join(f"{name} {value}" for name, value, _ in estimate.reasons)
+        made += f"estimated from the capture: {shown}."
     with progress("writing the report"):
-        am.report(tracks, page, summary=told)
+        am.report(tracks, page, made=made, summary=told)
 
 
 def _print_capture(capture: am.Capture) -> None:

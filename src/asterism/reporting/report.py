@@ -34,6 +34,7 @@ def report(
     *,
     truth: Tracks | None = None,
     rig: Rig | None = None,
+    made: str = "",
     summary: Iterable[tuple[str, str]] = (),
     title: str | None = None,
     up: Axis | None = None,
@@ -54,6 +55,8 @@ def report(
         What is so, as for `evaluate`: wrong labels are marked, and the scores explained.
     rig : Rig, optional
         The cameras, drawn in the scene; the player looks through each. Only with 3-D tracks.
+    made : str
+        How the tracks were made, in a sentence or two: by which method, under which model.
     summary : iterable of (str, str)
         What else is to be told about how the tracks were made: names and values.
     title : str, optional
@@ -98,6 +101,7 @@ def report(
     contents = Contents(
         title=title or "Tracks",
         tracks=tracks,
+        made=made,
         summary=tuple((str(name), str(text)) for name, text in summary),
         warnings=(*warnings, *(rig.warnings if rig is not None else ()), *_oddities(tracks)),
         up=axis,

@@ -98,6 +98,8 @@ class Contents:
         Usually the name of the capture.
     tracks : Tracks
         2-D or 3-D.
+    made : str
+        How the tracks were made, a sentence or two for the top; may be empty.
     summary : tuple of (str, str)
         What was done, as names and values.
     warnings : tuple of str
@@ -116,6 +118,7 @@ class Contents:
 
     title: str
     tracks: Tracks
+    made: str
     summary: tuple[tuple[str, str], ...]
     warnings: tuple[str, ...]
     up: Axis

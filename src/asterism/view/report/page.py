@@ -130,6 +130,7 @@ def _top(contents: Contents) -> Markup:
         element("p", "Asterism", class_="brand"),
         element("h1", element("bdi", contents.title)),
         element("p", in_words(facts, contents.tracks.detections.n_axes), class_="lead"),
+        element("p", contents.made, class_="made") if contents.made else "",
         element("dl", *numbers, class_="cards"),
         element("ul", *warnings, class_="warnings", aria_label="Warnings") if warnings else "",
     )
