@@ -188,6 +188,15 @@ def test_two_tracks_that_change_places_are_found():
     assert "where b was heading" in found[0].reason
 
 
+def test_a_pair_that_changes_places_often_is_told_once():
+    places = straight(apart=0.05)
+    for t in (60, 90, 120):
+        places[t:, [1, 2]] = places[t:, [2, 1]]
+    found = find_troubles(tracks_of(places))
+    assert [(f.kind, f.frame) for f in found] == [("likely swap", 60)]
+    assert "3 times in all" in found[0].reason
+
+
 def test_a_jump_is_found_once_and_nothing_else():
     places = straight()
     places[77:, 2, 2] += 0.1

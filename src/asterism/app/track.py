@@ -230,8 +230,8 @@ def _write_report(
         made += "given."
     else:
         told += [(f"model: {name}", f"{value}: {why}") for name, value, why in estimate.reasons]
-        shown = ", ".join(f"{name} {value}" for name, value, _ in estimate.reasons)
-        made += f"estimated from the capture: {shown}."
+        name, value, _ = estimate.reasons[0]
+        made += f"estimated from the capture ({name} {value}; all of it is below)."
     with progress("writing the report"):
         am.report(tracks, page, made=made, summary=told)
 

@@ -138,13 +138,19 @@ def _ends(tracks: Tracks) -> Iterator[Finding]:
 def _steps(tracks: Tracks) -> Iterator[Finding]:
     names, frame = track_names(tracks), tracks.detections.frame_of
     jumps: dict[int, StrangeStep] = {}
+    swaps: dict[tuple[int, int], list[StrangeStep]] = {}
     for step in strange_steps(tracks):
         k = int(tracks.labels[step.detection])
         if step.other >= 0:
-            reason = f"{_off(step)}; that is where {names[step.other]} was heading, and vice versa"
-            yield _finding("likely swap", k, frame[step.detection], 1.0, reason)
+            swaps.setdefault((min(k, step.other), max(k, step.other)), []).append(step)
         else:
             jumps[step.detection] = step
+    for steps in swaps.values():
+        first = min(steps, key=lambda step: step.detection)
+        reason = f"{_off(first)}; that is where {names[first.other]} was heading, and vice versa"
+        reason += f"; {len(steps)} times in all" if len(steps) > 1 else ""
+        k = tracks.labels[first.detection]
+        yield _finding("likely swap", k, frame[first.detection], 1.0, reason)
     for k, group in _stretches(tracks, np.array(sorted(jumps), dtype=np.int64)):
         worst = max((jumps[int(i)] for i in group), key=lambda step: step.off)
         reason = _off(worst) + (f"; {len(group)} such steps" if len(group) > 1 else "")
