@@ -164,6 +164,8 @@ def test_judgement_counts_as_the_evaluation_does(person):
     assert e.wrong_percent > 0
     found = [f for f in find_troubles(swapped, judged) if f.kind == "wrong marker"]
     assert {3, 8} <= {f.track for f in found}
+    n_switches = sum(f.kind == "switch" for f in find_troubles(swapped, judged))
+    assert n_switches == e.switches >= 4
 
 
 def test_detections_that_only_the_truth_has_are_told(tmp_path, person):

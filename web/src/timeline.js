@@ -1,5 +1,7 @@
 /** When each track was there, how surely, and where it was wrong: one strip a track. */
 
+import { Color } from "three";
+
 import { cleared, FONT } from "./flat.js";
 import { frameAt } from "./places.js";
 import { css } from "./theme.js";
@@ -7,10 +9,16 @@ import { css } from "./theme.js";
 const ROW = 15;
 const RULER = 20;
 const NAMES = 96; // width of the names
-const DOUBTFUL = 230; // of 255: below, a label is doubtful
+const LEVELS = 16; // of doubt
 
-// What a cell of a strip shows; the worst of its frames counts.
-const [NONE, SPAN, SURE, DOUBT, WRONG] = [0, 1, 2, 3, 4];
+// What a cell of a strip shows; the worst of its frames counts. From SURE on doubt grows.
+const [NONE, SPAN, SURE, WRONG] = [0, 1, 2, 2 + LEVELS];
+
+/** Level of doubt: none at a confidence of 1, the most at a half and below. */
+function doubt(confidence) {
+  const share = Math.min(1, (255 - confidence) / 127.5);
+  return SURE + Math.round((LEVELS - 1) * Math.sqrt(share));
+}
 
 export class Timeline {
   constructor(capture, state, { box, canvas, rows }) {
@@ -78,7 +86,7 @@ export class Timeline {
           const point = capture.runStart[r] + t - first;
           let value = SURE;
           if (capture.verdict?.[point] === 1) value = WRONG;
-          else if (capture.confidence && capture.confidence[point] < DOUBTFUL) value = DOUBT;
+          else if (capture.confidence) value = doubt(capture.confidence[point]);
           // A short capture has several cells a frame.
           const stop = t + 1 < end ? cell[t + 1] : cell[Math.min(t + 1, capture.T - 1)];
           for (let i = cell[t]; i < Math.max(stop, cell[t] + 1); i++) worst(i, value);
@@ -99,7 +107,11 @@ export class Timeline {
     const { capture, box, cells } = this;
     const pen = cleared(this.canvas, this.width, box.clientHeight);
     const top = box.scrollTop;
-    const colours = [null, css("--span"), css("--sure"), css("--doubt"), css("--wrong")];
+    const [sure, least] = [new Color(css("--sure")), new Color(css("--doubt"))];
+    const levels = [...Array(LEVELS).keys()].map(
+      (i) => `#${sure.clone().lerp(least, i / (LEVELS - 1)).getHexString()}`,
+    );
+    const colours = [null, css("--span"), ...levels, css("--wrong")];
     pen.font = FONT;
     pen.textBaseline = "middle";
     const first = Math.max(0, Math.floor((top - RULER) / ROW));

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.view.report.contents import Verdict
+from asterism.view.report.errors import errors
 from asterism.view.report.names import track_names
 from asterism.view.report.runs import gaps_of
 from asterism.view.report.strange_steps import StrangeStep, strange_steps
+from asterism.view.report.stretches import stretches
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from numpy.typing import NDArray
 
     from asterism.model import Tracks
     from asterism.view.report.contents import Judgement
@@ -26,9 +25,8 @@ DOUBTFUL = 0.9
 """Confidence below which a label is doubtful."""
 LONG = 0.1
 """Seconds from which a gap is long."""
-_TOGETHER = 0.1  # seconds by which stretches of one trouble are apart at most
 _WEIGHT = {  # what each kind counts beside the others
-    "wrong marker": 100.0, "likely swap": 50.0, "jump": 10.0, "low confidence": 4.0,
+    "wrong marker": 100.0, "switch": 80.0, "likely swap": 50.0, "jump": 10.0, "low confidence": 4.0,
     "begun midway": 3.0, "ends early": 2.0, "long gap": 1.0, "missed": 1.0,
 }  # fmt: skip
 
@@ -75,7 +73,10 @@ def find_troubles(tracks: Tracks, judgement: Judgement | None = None) -> list[Fi
     """
     found = [*_doubts(tracks), *_gaps(tracks), *_ends(tracks), *_steps(tracks)]
     if judgement is not None:
-        found += [*_wrong(tracks, judgement), *_missed(tracks, judgement)]
+        found += [
+            _finding(kind, track, frame, size, reason)
+            for kind, track, frame, size, reason in errors(tracks, judgement)
+        ]
     return sorted(found, key=lambda f: (-f.weight, f.frame, f.track))
 
 
@@ -85,26 +86,11 @@ def _finding(kind: str, track: Any, frame: Any, size: float, reason: str) -> Fin
     )
 
 
-def _stretches(
-    tracks: Tracks, members: NDArray[np.int64]
-) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """Group detections of one track that are close in time; give each group in time order."""
-    if not len(members):
-        return
-    d = tracks.detections
-    members = members[np.lexsort((d.frame_of[members], tracks.labels[members]))]
-    track, time = tracks.labels[members], d.times[d.frame_of[members]]
-    near = max(_TOGETHER, 1.5 * d.step)
-    cuts = np.flatnonzero((np.diff(track) != 0) | (np.diff(time) > near)) + 1
-    for group in np.split(members, cuts):
-        yield int(tracks.labels[group[0]]), group
-
-
 def _doubts(tracks: Tracks) -> Iterator[Finding]:
     if tracks.confidence is None:
         return
     c, frame = tracks.confidence, tracks.detections.frame_of
-    for track, group in _stretches(tracks, np.flatnonzero((tracks.labels >= 0) & (c < DOUBTFUL))):
+    for track, group in stretches(tracks, np.flatnonzero((tracks.labels >= 0) & (c < DOUBTFUL))):
         least = group[np.argmin(c[group])]
         reason = f"held with {100 * c[least]:.0f} % at the worst" + (
             f"; {len(group)} points below {100 * DOUBTFUL:.0f} %" if len(group) > 1 else ""
@@ -151,7 +137,7 @@ def _steps(tracks: Tracks) -> Iterator[Finding]:
         reason += f"; {len(steps)} times in all" if len(steps) > 1 else ""
         k = tracks.labels[first.detection]
         yield _finding("likely swap", k, frame[first.detection], 1.0, reason)
-    for k, group in _stretches(tracks, np.array(sorted(jumps), dtype=np.int64)):
+    for k, group in stretches(tracks, np.array(sorted(jumps), dtype=np.int64)):
         worst = max((jumps[int(i)] for i in group), key=lambda step: step.off)
         reason = _off(worst) + (f"; {len(group)} such steps" if len(group) > 1 else "")
         yield _finding("jump", k, frame[worst.detection], min(worst.ratio / 50, 2.0), reason)
@@ -159,32 +145,3 @@ def _steps(tracks: Tracks) -> Iterator[Finding]:
 
 def _off(step: StrangeStep) -> str:
     return f"{1e3 * step.off:.0f} mm off its course, {step.ratio:.0f} × as much as usual"
-
-
-def _wrong(tracks: Tracks, judgement: Judgement) -> Iterator[Finding]:
-    members = np.flatnonzero((judgement.verdicts == Verdict.WRONG) & (tracks.labels >= 0))
-    for track, group in _stretches(tracks, members):
-        n = f"{len(group)} points are truly" if len(group) > 1 else "1 point is truly"
-        frame = tracks.detections.frame_of[group[0]]
-        truly = _name(judgement, int(judgement.markers[group[0]]))
-        right = np.flatnonzero((tracks.labels == track) & (judgement.verdicts == Verdict.RIGHT))
-        reason = f"{n} {truly}"
-        if len(right):
-            reason += f"; its marker is {_name(judgement, int(judgement.markers[right[0]]))}"
-        yield _finding("wrong marker", track, frame, float(len(group)), reason)
-
-
-def _name(judgement: Judgement, marker: int) -> str:
-    return "no marker" if marker < 0 else judgement.names[marker] or f"marker {marker}"
-
-
-def _missed(tracks: Tracks, judgement: Judgement) -> Iterator[Finding]:
-    members = np.flatnonzero(judgement.verdicts == Verdict.MISSED)
-    frame = tracks.detections.frame_of[members]
-    marker = judgement.markers[members]
-    for k in np.unique(marker):
-        its = np.sort(frame[marker == k])
-        for group in np.split(its, np.flatnonzero(np.diff(its) > 2) + 1):
-            n = f"{len(group)} frames" if len(group) > 1 else "1 frame"
-            reason = f"{_name(judgement, int(k))} taken for clutter in {n}"
-            yield _finding("missed", -1, group[0], float(len(group)), reason)

@@ -150,7 +150,7 @@ def _timeline(contents: Contents) -> Markup:
     ]
     signs = [("seen", "seen")]
     if contents.tracks.confidence is not None:
-        signs = [("sure", "sure"), ("doubtful", "doubtful")]
+        signs = [("fading", "confidence, 100 % to 50 %")]
     if contents.judgement is not None:
         signs.append(("wrong", "wrong marker"))
         signs.append(("missed", "missed (in clutter)"))
