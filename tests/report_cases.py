@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import json
 import re
 import zlib
@@ -11,6 +12,7 @@ import numpy as np
 
 import asterism as am
 
+K = am.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
 HOSTILE = (
     "<script>alert(1)</script>",
     "</script><img src=x onerror=alert(2)>",
@@ -60,3 +62,29 @@ def positions(header, arrays):
             before, pace = cell, (0 if i in begins else cell - before)
             found[i, axis] = low + step * cell
     return found
+
+
+def full_page(path):
+    """Write a page with all there can be: truth, cameras with lenses, confidence, hostile names."""
+    truth, tracks = spoilt_person()
+    names = [*HOSTILE, *(f"M{k}" for k in range(tracks.n_tracks - len(HOSTILE)))]
+    tracks = dataclasses.replace(tracks, names=tuple(names))
+    order, starts = tracks.by_track
+    confidence = tracks.confidence.copy()
+    confidence[order[starts[0] + 20 : starts[0] + 30]] = 0.4  # that the first is to be looked at
+    labels = tracks.labels.copy()
+    labels[order[starts[7] + 40 : starts[7] + 49]] = -1  # that there is a long gap
+    tracks = dataclasses.replace(tracks, confidence=confidence, labels=labels)
+    ring = am.Rig.ring(8, radius=4, height=2.5).cameras
+    lens = am.BrownConrady(k1=-0.2)
+    ring = tuple(dataclasses.replace(c, K=K, lens=lens) for c in ring)
+    # One amid the points: some are behind it, some too near, some too far.
+    amid = am.Camera.look_at((0, 0, 1), (2, 0.1, 1), K=K, size_px=(1280, 1024), name="amid")
+    points = tracks.detections.points
+    pose = amid.T_camera_world
+    seen = points[amid.project(points).visible] @ pose[2, :3] + pose[2, 3]
+    near, far = (float(depth) for depth in np.quantile(seen, [0.2, 0.8]))
+    amid = dataclasses.replace(amid, near=near, far=far)
+    rig = am.Rig((*ring, amid))
+    am.report(tracks, path, truth=truth, rig=rig, title=HOSTILE[0])
+    return path, tracks, truth, rig
