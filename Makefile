@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo install test lint types contracts docs bench tables sanitize wheel clean
+.PHONY: demo install test lint types contracts docs bench tables sanitize wheel web web-check clean
 
 demo: $(VENV)/.demo
 	$(BIN)/asterism demo --out demo --overwrite
@@ -63,8 +63,22 @@ wheel: $(VENV)/.python
 	$(BIN)/python -m pip install --quiet build
 	$(BIN)/python -m build --outdir dist
 
+# The player of the report page, from its sources in web/ into the package. Needs Node.js ≥ 20; who
+# only uses or builds the package needs none, because the bundle is committed.
+web: web/node_modules/.made
+	cd web && node build.js
+
+web-check: web/node_modules/.made
+	cd web && node build.js --check
+
+web/node_modules/.made: web/package.json web/package-lock.json
+	@command -v npm > /dev/null || { \
+	  echo "npm is missing: install Node.js 20 or newer (Debian: apt-get install nodejs npm)"; exit 1; }
+	cd web && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+	touch $@
+
 clean:
-	rm -rf $(VENV) build dist site demo
+	rm -rf $(VENV) build dist site demo web/node_modules
 
 # One stamp for each set of extras; a newer pyproject.toml or engine installs again. What builds the
 # engine is in the environment: an isolated build would find it in another place each time and

@@ -118,6 +118,7 @@ if TYPE_CHECKING:
     from asterism.reconstruct import suggest_cameras as suggest_cameras
     from asterism.reconstruct import triangulate as triangulate
     from asterism.reconstruct import triangulation_map as triangulation_map
+    from asterism.reporting import report as report
     from asterism.solve import JointMarginals as JointMarginals
     from asterism.solve import KBestAssignments as KBestAssignments
     from asterism.solve import MultidimensionalAssignment as MultidimensionalAssignment
@@ -246,6 +247,7 @@ _PUBLIC = {
     "io": ("FORMATS", "CaptureInfo", "describe", "read", "read_tracks", "write"),
     "io.calibration": ("CALIBRATIONS", "read_rig", "write_rig"),
     "io.observations": ("read_observations", "write_observations"),
+    "reporting": ("report",),
     "view": (
         "figure_bytes",
         "plot_axes",

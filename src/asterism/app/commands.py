@@ -21,6 +21,7 @@ from asterism.app.methods import methods, scenes
 from asterism.app.plot import plot
 from asterism.app.recognize import recognize
 from asterism.app.reconstruct import reconstruct
+from asterism.app.report import report
 from asterism.app.simulate import simulate
 from asterism.app.stitch import stitch
 from asterism.app.track import track
@@ -61,6 +62,7 @@ for _command in (
     fill,
     bonds,
     recognize,
+    report,
     evaluate,
     info,
     estimate,

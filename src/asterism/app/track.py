@@ -14,6 +14,8 @@ from asterism.errors import FormatError, ParameterError, check_number
 
 if TYPE_CHECKING:
     import asterism as am
+    from asterism.app.run_folder import Job
+    from asterism.app.summary import Summary
 
 log = logging.getLogger(__name__)
 
@@ -67,6 +69,9 @@ _From = Annotated[
         "--from", metavar="RUN.TOML", help="Repeat a run; IN says where its input is now."
     ),
 ]
+_Report = Annotated[
+    Path | None, typer.Option("--report", metavar="PAGE", help="Page with a player to write too.")
+]
 _Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let DIR hold files already.")]
 
 
@@ -83,6 +88,7 @@ def track(
     run: _Run = None,
     overwrite: _Overwrite = False,
     repeat: _From = None,
+    report: _Report = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -103,6 +109,8 @@ def track(
 
         asterism track trial.c3d --stitch
 
+        asterism track trial.c3d --report trial.html
+
         asterism track trial.c3d --run runs/first
 
         asterism track --from runs/first/run.toml -o again.c3d
@@ -112,7 +120,7 @@ def track(
     from asterism.app.run_folder import FILES, Job, check_folder, sha256_of
     from asterism.app.tracking import carry_out, default_output, output_format
 
-    check_outputs({"-o": out}, [source, model, repeat])
+    check_outputs({"-o": out, "--report": report}, [source, model, repeat])
     if run is not None:
         check_folder(run, overwrite=overwrite)
     estimate: am.ModelEstimate | None = None
@@ -144,20 +152,27 @@ def track(
     if out is None:
         out = default_output(job.source, job.format)
         out = out if run is None else run / out.name
+    files = {"--report": report} if run is not None else {"-o": out, "--report": report}
+    check_outputs(files, [job.source, model, repeat])
     if run is not None:
         run.mkdir(parents=True, exist_ok=True)
         written = {"--run": out} | {f"--run ({name})": run / name for name in FILES}
-        check_outputs(written, [job.source, model, repeat])
+        check_outputs(written | {"--report": report}, [job.source, model, repeat])
     talks = not (quiet or json)
     if talks:
         _print_capture(capture)
         if estimate is not None:
             print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
-    _, summary = carry_out(job, capture, out, run)
+    tracks, summary = carry_out(job, capture, out, run)
+    if report is not None:
+        _write_report(tracks, report, job, summary, estimate)
     if talks:
-        print_table(summary.rows(), title=f"\nTracked with {job.method}")
+        rows = summary.rows() + ([("report", str(report))] if report is not None else [])
+        print_table(rows, title=f"\nTracked with {job.method}")
     if json:
-        print_json(summary.to_dict() | {"options": job.options, "model": job.model.to_dict()})
+        page = {} if report is None else {"report": str(report)}
+        told = {"options": job.options, "model": job.model.to_dict()}
+        print_json(summary.to_dict() | told | page)
 
 
 def resolved_method(name: str, texts: list[str]) -> tuple[str, dict[str, Any]]:
@@ -192,6 +207,33 @@ def _repeated(path: Path, source: Path | None, settings: list[str]) -> tuple[Any
             "a run can only be repeated with the same input",
         )  # fmt: skip
     return job, am.read(job.source)
+
+
+def _write_report(
+    tracks: am.Tracks,
+    page: Path,
+    job: Job,
+    summary: Summary,
+    estimate: am.ModelEstimate | None,
+) -> None:
+    """Write the page, with the method, its figures and the model."""
+    import asterism as am
+
+    options = ", ".join(f"{name}={value}" for name, value in job.options.items())
+    told = [("method", job.method + (", then stitched" if job.stitch else ""))]
+    told += [("options", options)] if options else []
+    told += summary.rows()
+    made = f"Tracked with {job.method}{', then stitched,' * job.stitch} in {summary.seconds:.2g} s "
+    made += f"({summary.frames_per_second:,.0f} frames a second). The model was "
+    if estimate is None:
+        told.append(("model", "given, not estimated"))
+        made += "given."
+    else:
+        told += [(f"model: {name}", f"{value}: {why}") for name, value, why in estimate.reasons]
+        name, value, _ = estimate.reasons[0]
+        made += f"estimated from the capture ({name} {value}; all of it is below)."
+    with progress("writing the report"):
+        am.report(tracks, page, made=made, summary=told)
 
 
 def _print_capture(capture: am.Capture) -> None:

@@ -162,8 +162,8 @@ def fit_one_motion(
 ) -> MotionFit:
     """Fit one motion of each kind to tracks, and give the kind that explains them best.
 
-    A random walk must win `WORTH`. DWPA is left out: on smoothed captures it foresees the next frame
-    better, and loses every gap.
+    A random walk must win `WORTH`. DWPA is left out: on smoothed captures it foresees the next
+    frame better, and loses every gap.
     """
     velocity = model.velocity_sigma(tracks[0].detections.n_axes)
     middle = math.log(start.levels[len(start.levels) // 2])

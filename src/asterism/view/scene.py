@@ -57,7 +57,7 @@ def view(tracks: Tracks, *, rig: Rig | None = None, path: str | Path | None = No
     disable`` does it: also for the next time.
     """
     try:
-        import rerun
+        import rerun  # pyright: ignore[reportMissingImports]  # an extra
     except ImportError:
         hint = "pip install 'asterism[view]'"
         raise ParameterError("view", "Rerun, which is optional", "none installed", hint) from None
@@ -201,8 +201,8 @@ def _times(rr: Any, tracks: Tracks, frames: NDArray[np.int64] | None = None) -> 
 
 def _blueprint(tracks: Tracks) -> Any:
     """Give what is shown where: the space, and under it the confidence, if there is any."""
-    import rerun as rr
-    import rerun.blueprint as rrb
+    import rerun as rr  # pyright: ignore[reportMissingImports]
+    import rerun.blueprint as rrb  # pyright: ignore[reportMissingImports]
 
     recent = rr.VisibleTimeRange(
         "time",

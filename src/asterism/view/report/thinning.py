@@ -1,0 +1,59 @@
+"""Captures too long for a page keep every so-manieth frame, and the page says so."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.model import Detections, Tracks
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["MOST_POINTS", "every_nth", "stride_for", "thinned"]
+
+MOST_POINTS = 3_000_000
+"""Points that a page holds, 10 to 20 MB of it; with more a browser takes long to open it."""
+
+
+def stride_for(n_points: int) -> int:
+    """Give which share of the frames to keep: every first, second, third …."""
+    return max(1, -(-n_points // MOST_POINTS))
+
+
+def every_nth(tracks: Tracks, stride: int) -> NDArray[np.int64]:
+    """Give the detections in every `stride`-th frame, indices of shape (M,)."""
+    return np.flatnonzero(tracks.detections.frame_of % stride == 0)
+
+
+def thinned(tracks: Tracks, stride: int) -> Tracks:
+    """Keep every `stride`-th frame; the first stays.
+
+    Parameters
+    ----------
+    tracks : Tracks
+    stride : int
+        1 keeps all.
+
+    Returns
+    -------
+    Tracks
+        Over plain `Detections`, of which only `filled` is kept beside the points.
+    """
+    if stride == 1:
+        return tracks
+    d = tracks.detections
+    kept = every_nth(tracks, stride)
+    less = Detections(
+        times=d.times[::stride],
+        offsets=np.concatenate([[0], np.cumsum(d.counts[::stride])]),
+        points=d.points[kept],
+        filled=None if d.filled is None else d.filled[kept],
+    )
+    return Tracks(
+        detections=less,
+        labels=tracks.labels[kept],
+        names=tracks.names,
+        confidence=None if tracks.confidence is None else tracks.confidence[kept],
+    )

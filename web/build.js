@@ -1,0 +1,44 @@
+/**
+ * Bundle the player into the Python package; the same sources give the same bytes.
+ * With --check nothing is written: it fails where the package holds another bundle.
+ */
+
+import { readFile, rename, writeFile } from "node:fs/promises";
+import { fileURLToPath } from "node:url";
+
+import { build } from "esbuild";
+
+const here = fileURLToPath(new URL(".", import.meta.url));
+const target = fileURLToPath(new URL("../src/asterism/view/report/", import.meta.url));
+const licence = (await readFile(`${here}node_modules/three/LICENSE`, "utf8")).trim();
+
+const { outputFiles } = await build({
+  absWorkingDir: here,
+  entryPoints: { player: "src/main.js" },
+  outdir: "out",
+  bundle: true,
+  minify: true,
+  format: "iife",
+  target: ["es2022"],
+  charset: "ascii",
+  legalComments: "none", // the one there is comes in the banner, in full
+  banner: {
+    js: `/*! Made by \`make web\` from web/src; with three.js:\n\n${licence}\n*/`,
+    css: "/*! Made by `make web` from web/src. */",
+  },
+  write: false,
+});
+
+for (const { path, text } of outputFiles) {
+  const name = path.split(/[\\/]/).at(-1);
+  if (process.argv.includes("--check")) {
+    const held = await readFile(`${target}${name}`, "utf8").catch(() => "");
+    if (held === text) continue;
+    console.error(`${name} is not what web/src makes: run \`make web\` and commit it`);
+    process.exitCode = 1;
+  } else {
+    await writeFile(`${target}${name}.part`, text);
+    await rename(`${target}${name}.part`, `${target}${name}`);
+    console.log(`${name}: ${text.length} characters`);
+  }
+}

@@ -1,0 +1,62 @@
+/** What is known of the chosen marker at this frame. */
+
+import { ABSENT, GAP, Places } from "./places.js";
+
+export class Details {
+  constructor(capture, state, { box, list, follow }) {
+    Object.assign(this, { capture, state, box, list, follow });
+    this.places = new Places(capture);
+    this.rows = new Map();
+  }
+
+  draw() {
+    const { capture, state } = this;
+    const k = state.chosen;
+    this.box.hidden = k < 0;
+    this.follow.checked = state.follow;
+    if (k < 0) return;
+    const place = [0, 0, 0];
+    const there = this.places.find(k, state.frame, place, 0);
+    const point = this.places.point;
+    this.row("Name", capture.header.names[k]);
+    this.row("Track", `${k}, ${capture.starts[k + 1] - capture.starts[k]} points`);
+    this.row("Now", this.now(there, point));
+    const shown = place.slice(0, capture.axes).map((x) => (1000 * x).toFixed(1));
+    this.row("Place, mm", there === ABSENT ? "–" : shown.join(", "));
+    if (capture.confidence) this.row("Confidence", point < 0 ? "–" : percent(capture.confidence[point]));
+    if (capture.marker) this.row("Truly", this.truly(point));
+  }
+
+  now(there, point) {
+    if (there === ABSENT) return "not there";
+    if (there === GAP) return "not seen, drawn between where it was and will be";
+    if (this.capture.filled?.[point]) return "filled in, not measured";
+    return "seen";
+  }
+
+  truly(point) {
+    const { marker, verdict, header } = this.capture;
+    if (point < 0) return "–";
+    const m = marker[point];
+    const name = m < 0 ? "no marker" : header.markers[m] ?? `marker ${m}`;
+    return verdict[point] === 1 ? `${name}: wrong` : name;
+  }
+
+  row(name, text) {
+    if (!this.rows.has(name)) {
+      const [pair, term, value] = ["div", "dt", "dd"].map((tag) => document.createElement(tag));
+      term.textContent = name;
+      value.dataset.about = name.split(",")[0].toLowerCase();
+      pair.append(term, value);
+      this.list.append(pair);
+      this.rows.set(name, value);
+    }
+    const value = this.rows.get(name);
+    if (value.textContent !== text) value.textContent = text;
+  }
+}
+
+function percent(c) {
+  if (c >= 254) return "over 99 %";
+  return `${Math.round((100 * c) / 255)} %`;
+}

@@ -1,0 +1,121 @@
+/** The player of a report: from the data in the page to what moves in it. */
+
+import "./style.css";
+
+import { connect, connectPointer } from "./controls.js";
+import { Details } from "./details.js";
+import { CameraImage } from "./image.js";
+import { Stage } from "./stage.js";
+import { State } from "./state.js";
+import { onTheme } from "./theme.js";
+import { Timeline } from "./timeline.js";
+import { unpack } from "./unpack.js";
+import { Writing } from "./writing.js";
+
+const byId = (id) => document.getElementById(id);
+
+async function start() {
+  const told = byId("state");
+  let capture;
+  try {
+    capture = await unpack(byId("data").textContent);
+  } catch (error) {
+    told.textContent = "This browser cannot unpack the data of the page; one from 2023 on can.";
+    throw error;
+  }
+  byId("data").remove();
+  const state = new State(capture);
+  const stage = staged(capture, state, told);
+  const writing = stage && new Writing(stage, byId("names"));
+  if (stage) stage.drawn = () => writing.draw();
+  const timeline = new Timeline(capture, state, {
+    box: byId("timeline"), canvas: byId("strips"), rows: byId("rows"),
+  });
+  const details = new Details(capture, state, {
+    box: byId("about"), list: byId("chosen"), follow: byId("follow"),
+  });
+  const image = byId("image")
+    ? new CameraImage(capture, state, byId("image"), byId("image-count"))
+    : null;
+  connect({ capture, state, stage, timeline });
+  if (stage) connectPointer(stage, state);
+
+  function draw() {
+    const began = performance.now();
+    tell(capture, state);
+    stage?.update();
+    details.draw();
+    timeline.draw();
+    image?.draw();
+    document.body.dataset.drawn = (performance.now() - began).toFixed(1);
+  }
+  function resize() {
+    stage?.resize();
+    timeline.resize();
+    draw();
+  }
+  state.addEventListener("change", draw);
+  new ResizeObserver(resize).observe(byId("player"));
+  onTheme(() => {
+    stage?.drawFloor();
+    draw();
+  });
+  resize();
+  stage?.fit();
+  if (stage) byId("scale").textContent = `squares of ${size(stage.floor.cell)}`;
+  if (stage && capture.T && capture.positions.length) told.hidden = true;
+  else if (stage) told.textContent = capture.T ? "No point in any frame." : "Nothing was recorded.";
+  globalThis.asterism = script(capture, state, stage, image);
+  document.body.dataset.ready = "true";
+}
+
+/** Make the scene, or say why there is none: all else on the page works without it. */
+function staged(capture, state, told) {
+  try {
+    return new Stage(capture, state, byId("scene"));
+  } catch (error) {
+    told.textContent = "This browser has no WebGL: the scene is missing, all else works.";
+    console.info(error.message);
+    return null;
+  }
+}
+
+/** Show frame and time. */
+function tell(capture, state) {
+  const [first, stride] = capture.header.frame;
+  const slider = byId("frame");
+  slider.value = state.frame;
+  const time = capture.T ? capture.times[state.frame].toFixed(3) : "";
+  const number = first + state.frame * stride;
+  byId("clock").textContent = capture.T ? `${time} s · frame ${number}` : "no frame";
+  slider.setAttribute("aria-valuetext", `frame ${number}, ${time} seconds`);
+  const play = byId("play");
+  play.textContent = state.playing ? "❚❚" : "▶";
+  play.setAttribute("aria-label", state.playing ? "Pause" : "Play");
+}
+
+function size(metres) {
+  if (metres < 0.01) return `${+(1000 * metres).toPrecision(3)} mm`;
+  return metres < 1 ? `${+(100 * metres).toPrecision(3)} cm` : `${+metres.toPrecision(3)} m`;
+}
+
+/** What may be asked and told from the console: `asterism.seek(120)`. */
+function script(capture, state, stage, image) {
+  return {
+    capture,
+    state: () => ({ frame: state.frame, chosen: state.chosen, playing: state.playing }),
+    seek: (frame) => state.seek(frame),
+    choose: (track) => state.choose(track),
+    /** Where a track is on the canvas, CSS pixels; null where it is not. */
+    where: (track) => {
+      const n = stage ? stage.dotOf(track) : -1;
+      if (n < 0) return null;
+      const p = stage.onCanvas(stage.place(n, stage.point));
+      return [p.x, p.y];
+    },
+    /** Where a track is in the image of the chosen camera, pixels; null where it is not. */
+    pixel: (track) => image?.pixelOf(track) ?? null,
+  };
+}
+
+start();

@@ -1,0 +1,74 @@
+/** Where a track is at a frame. */
+
+export const ABSENT = 0;
+export const SEEN = 1;
+export const GAP = 2;
+
+/** Answers for one capture; remembers where it was, so that playing on costs nothing. */
+export class Places {
+  /** @param {import("./unpack.js").Capture} capture */
+  constructor(capture) {
+    this.capture = capture;
+    this.last = Uint32Array.from(capture.runsOf.subarray(0, capture.K));
+    /** The point of the track that was asked for last, -1 in a gap. */
+    this.point = -1;
+  }
+
+  /**
+   * Write the place of track k at frame t into `out`, from `offset` on.
+   * In a gap it is the one on the straight line across it.
+   * @returns {number} ABSENT, SEEN or GAP
+   */
+  find(k, t, out, offset) {
+    const c = this.capture;
+    const r = this.run(k, t);
+    this.point = -1;
+    if (r < 0) return ABSENT;
+    const begin = c.runFirst[r];
+    const end = begin + c.runLength[r];
+    if (t < end) {
+      this.point = c.runStart[r] + t - begin;
+      for (let i = 0; i < 3; i++) out[offset + i] = c.positions[3 * this.point + i];
+      return SEEN;
+    }
+    if (r + 1 >= c.runsOf[k + 1]) return ABSENT;
+    const a = c.runStart[r] + c.runLength[r] - 1;
+    const from = c.times[end - 1];
+    const share = (c.times[t] - from) / (c.times[c.runFirst[r + 1]] - from);
+    for (let i = 0; i < 3; i++) {
+      const here = c.positions[3 * a + i];
+      out[offset + i] = here + share * (c.positions[3 * a + 3 + i] - here);
+    }
+    return GAP;
+  }
+
+  /** The last run of track k that has begun by frame t, -1 before the first. */
+  run(k, t) {
+    const { runsOf, runFirst } = this.capture;
+    const stop = runsOf[k + 1];
+    let low = runsOf[k];
+    if (low === stop || runFirst[low] > t) return -1;
+    const hint = this.last[k];
+    if (runFirst[hint] <= t && (hint + 1 === stop || runFirst[hint + 1] > t)) return hint;
+    let high = stop;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (runFirst[middle] <= t) low = middle;
+      else high = middle;
+    }
+    this.last[k] = low;
+    return low;
+  }
+}
+
+/** The last frame that is not after a time. */
+export function frameAt(times, time) {
+  let low = 0;
+  let high = times.length;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= time) low = middle;
+    else high = middle;
+  }
+  return low;
+}

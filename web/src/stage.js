@@ -1,0 +1,220 @@
+/** The scene: markers, lines and surroundings, seen from where the reader turns them. */
+
+import {
+  ColorManagement, Group, LinearSRGBColorSpace, MOUSE, PerspectiveCamera, Quaternion, Scene,
+  TOUCH, Vector3, WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+
+import { Connections, Trails } from "./lines.js";
+import { Markers } from "./markers.js";
+import { Places } from "./places.js";
+import { Floor, Frustums } from "./surroundings.js";
+import { ink, accent } from "./theme.js";
+
+// Colours go to the screen as they were written, like those of the figures.
+ColorManagement.enabled = false;
+
+const UP = { x: new Vector3(1, 0, 0), y: new Vector3(0, 1, 0), z: new Vector3(0, 0, 1) };
+const SEEN_FROM = new Vector3(0.6, 0.33, 0.9).normalize();
+const NEAR_PX = 16; // a click so far from a dot still means it
+
+export class Stage {
+  /**
+   * @param {import("./unpack.js").Capture} capture
+   * @param {import("./state.js").State} state
+   * @param {HTMLCanvasElement} canvas
+   */
+  constructor(capture, state, canvas) {
+    this.capture = capture;
+    this.state = state;
+    this.canvas = canvas;
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.renderer.setClearColor(0, 0);
+    this.scene = new Scene();
+    this.root = new Group(); // turns the capture's up to the scene's
+    this.scene.add(this.root);
+    this.view = new PerspectiveCamera(capture.axes === 2 ? 20 : 38, 1, 0.01, 1000);
+    const places = new Places(capture);
+    const [low, high] = capture.header.box;
+    this.size = Math.max(0.05, Math.hypot(...high.map((h, i) => h - low[i])));
+    this.floor = new Floor(capture);
+    this.trails = new Trails(capture, places);
+    this.lines = new Connections(capture, places);
+    this.frustums = new Frustums(capture, this.size);
+    this.markers = new Markers(capture, places);
+    for (const part of [this.floor, this.frustums, this.lines, this.trails, this.markers]) {
+      this.root.add(part.object);
+    }
+    this.markers.uniforms.radius.value = Math.max(capture.header.radius, 0.002 * this.size);
+    this.controls = new OrbitControls(this.view, canvas);
+    this.controls.enableDamping = false;
+    if (capture.axes === 2) {
+      this.controls.enableRotate = false;
+      this.controls.mouseButtons.LEFT = MOUSE.PAN;
+      this.controls.touches.ONE = TOUCH.PAN;
+    }
+    this.controls.screenSpacePanning = true;
+    this.controls.zoomToCursor = true;
+    this.controls.addEventListener("change", () => this.redraw());
+    this.followed = new Vector3();
+    this.point = new Vector3();
+    this.setUp(capture.header.up);
+    this.fit();
+  }
+
+  setUp(axis) {
+    this.up = this.capture.axes === 2 ? "z" : axis;
+    const to = this.capture.axes === 2 ? UP.z : UP.y;
+    this.root.quaternion.copy(new Quaternion().setFromUnitVectors(UP[this.up], to));
+    this.root.updateMatrixWorld();
+    this.drawFloor();
+  }
+
+  drawFloor() {
+    this.floor.draw(this.up, ink());
+  }
+
+  /** Show the whole scene. */
+  fit() {
+    const [low, high] = this.capture.header.box;
+    const middle = new Vector3(...low.map((l, i) => (l + high[i]) / 2));
+    this.root.localToWorld(middle);
+    const from = this.capture.axes === 2 ? new Vector3(0, 0, 1) : SEEN_FROM;
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((n) =>
+      this.root.localToWorld(new Vector3(...[0, 1, 2].map((i) => ((n >> i) & 1 ? high[i] : low[i])))),
+    );
+    this.controls.target.copy(middle);
+    let [near, away] = [0.3 * this.size, 20 * this.size];
+    for (let n = 0; n < 20; n++) {
+      const tried = (near + away) / 2;
+      if (this.holds(corners, middle, from, tried)) away = tried;
+      else near = tried;
+    }
+    this.view.position.copy(middle).addScaledVector(from, away);
+    this.view.near = away / 200;
+    this.view.far = away * 100;
+    this.view.updateProjectionMatrix();
+    this.controls.update();
+    this.redraw();
+  }
+
+  /** Whether all corners are in view from so far away, with some room to the edges. */
+  holds(corners, middle, from, away) {
+    this.view.position.copy(middle).addScaledVector(from, away);
+    this.view.lookAt(middle);
+    this.view.near = away / 1000;
+    this.view.updateProjectionMatrix();
+    this.view.updateMatrixWorld();
+    return corners.every((corner) => {
+      const { x, y, z } = this.point.copy(corner).project(this.view);
+      return Math.abs(x) < 0.86 && Math.abs(y) < 0.8 && z < 1;
+    });
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const ratio = Math.min(2, window.devicePixelRatio || 1);
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(width, height, false);
+    this.view.aspect = width / Math.max(1, height);
+    this.view.updateProjectionMatrix();
+    this.markers.uniforms.ratio.value = ratio;
+    this.markers.uniforms.height.value = 0.5 * height * ratio;
+  }
+
+  /** Put everything where it is at the frame, and draw. */
+  update() {
+    const { state } = this;
+    const colour = ink();
+    this.markers.update(state, colour);
+    this.trails.update(state);
+    this.lines.update(state, colour);
+    this.frustums.draw(state.camera, state.show.cameras, colour, accent());
+    this.keepFollowing();
+    this.redraw();
+  }
+
+  keepFollowing() {
+    const { state, controls, view } = this;
+    const n = state.follow ? this.dotOf(state.chosen) : -1;
+    if (n < 0) {
+      this.isFollowing = false;
+      return;
+    }
+    this.place(n, this.point);
+    if (this.isFollowing) {
+      view.position.add(this.point).sub(this.followed);
+    } else {
+      view.position.add(this.point).sub(controls.target);
+    }
+    controls.target.copy(this.point);
+    this.followed.copy(this.point);
+    this.isFollowing = true;
+    controls.update();
+  }
+
+  redraw() {
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => {
+      this.asked = false;
+      this.renderer.render(this.scene, this.view);
+      this.drawn?.();
+    });
+  }
+
+  /** Number of the dot of a track in this frame, -1 if it has none. */
+  dotOf(track) {
+    return track < 0 ? -1 : this.markers.tracks.subarray(0, this.markers.count).indexOf(track);
+  }
+
+  /** Place of a dot in the scene. */
+  place(n, out) {
+    out.fromArray(this.markers.geometry.attributes.position.array, 3 * n);
+    return this.root.localToWorld(out);
+  }
+
+  /** Place of a point of the scene on the canvas, CSS pixels; z > 1 behind the reader. */
+  onCanvas(point) {
+    point.project(this.view);
+    point.x = (0.5 + 0.5 * point.x) * this.canvas.clientWidth;
+    point.y = (0.5 - 0.5 * point.y) * this.canvas.clientHeight;
+    return point;
+  }
+
+  /** The track whose dot is at a place of the canvas, -1 for none. */
+  pick(x, y) {
+    let best = -1;
+    let least = NEAR_PX;
+    for (let n = 0; n < this.markers.count; n++) {
+      if (this.markers.tracks[n] < 0) continue;
+      const p = this.onCanvas(this.place(n, this.point));
+      const off = Math.hypot(p.x - x, p.y - y) + (p.z > 1 ? 1e9 : 0);
+      if (off < least) [best, least] = [this.markers.tracks[n], off];
+    }
+    return best;
+  }
+
+  /** Turn by angles, in radians. */
+  turn(across, along) {
+    if (this.capture.axes === 2) return;
+    const arm = this.view.position.clone().sub(this.controls.target);
+    const polar = Math.acos(Math.min(1, Math.max(-1, arm.y / arm.length())));
+    const next = Math.min(Math.PI - 0.02, Math.max(0.02, polar + along));
+    const right = new Vector3(arm.z, 0, -arm.x).normalize();
+    arm.applyAxisAngle(right, next - polar).applyAxisAngle(UP.y, across);
+    this.view.position.copy(this.controls.target).add(arm);
+    this.controls.update();
+    this.redraw();
+  }
+
+  /** Come nearer (below 1) or go farther. */
+  zoom(factor) {
+    const { target } = this.controls;
+    this.view.position.sub(target).multiplyScalar(factor).add(target);
+    this.controls.update();
+    this.redraw();
+  }
+}

@@ -1,0 +1,66 @@
+/** What the reader has chosen, and who wants to know. */
+
+import { frameAt } from "./places.js";
+
+export class State extends EventTarget {
+  /** @param {import("./unpack.js").Capture} capture */
+  constructor(capture) {
+    super();
+    this.capture = capture;
+    this.frame = 0;
+    this.chosen = -1;
+    this.hovered = -1;
+    this.follow = false;
+    this.playing = false;
+    this.speed = 1;
+    this.camera = 0;
+    this.show = { names: false, lines: true, clutter: true, cameras: true, trails: 0.5 };
+    this.clock = 0; // time of playing, seconds; between frames it is not that of a frame
+    this.before = null;
+  }
+
+  /** Say that something changed; all that listen draw anew. */
+  changed() {
+    this.dispatchEvent(new Event("change"));
+  }
+
+  seek(frame) {
+    const last = Math.max(0, this.capture.T - 1);
+    this.frame = Math.min(last, Math.max(0, Math.round(frame)));
+    this.clock = this.capture.times[this.frame] ?? 0;
+    this.changed();
+  }
+
+  choose(track) {
+    this.chosen = track;
+    if (track < 0) this.follow = false;
+    this.changed();
+  }
+
+  set(changes) {
+    Object.assign(this, changes);
+    this.changed();
+  }
+
+  play(on) {
+    if (on && this.frame >= this.capture.T - 1) this.seek(0);
+    this.playing = on && this.capture.T > 1;
+    this.before = null;
+    this.changed();
+    if (this.playing) requestAnimationFrame((now) => this.tick(now));
+  }
+
+  tick(now) {
+    if (!this.playing) return;
+    const { times, T } = this.capture;
+    if (this.before !== null) this.clock += ((now - this.before) / 1000) * this.speed;
+    this.before = now;
+    const frame = frameAt(times, this.clock);
+    if (frame !== this.frame) {
+      this.frame = frame;
+      this.changed();
+    }
+    if (frame >= T - 1) this.play(false);
+    else requestAnimationFrame((next) => this.tick(next));
+  }
+}
