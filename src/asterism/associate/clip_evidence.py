@@ -80,6 +80,11 @@ class Evidence:
     speeds: NDArray[np.float64]
     velocity_rms: float
 
+    @property
+    def n_lost(self) -> int:
+        """Misses and points in no track: what is left unexplained."""
+        return self.n_misses + self.n_clutter
+
     @classmethod
     def of(cls, tracks: list[Tracks]) -> Evidence:
         """Count in the tracks of each piece.

@@ -61,6 +61,8 @@ no white acceleration, and a tighter filter breaks on it; who is whom never hang
 millimetre, unless points are so close that a hundredth of their spacing is less."""
 SAFE_SHARE = 1 / 6
 """A jolt's σ may move a marker by this share of the points' spacing in a frame."""
+BLIND = 1.1
+"""One motion may leave so many times as many misses and false points as three motions do."""
 LONGEST_GAP = 60
 """Frames; a longer gap is not bridged for the motion's sake."""
 
@@ -124,8 +126,12 @@ def estimate_model(
     # the tracks by which motions are compared.
     def tried(trial: MotionFit, evidence: Evidence) -> tuple[float, MotionFit, Evidence]:
         trial = replace(trial, noise=max(trial.noise, least_noise))
-        found = gather_evidence(pieces, _model(trial, _rates(evidence), evidence, scales, region))
+        by = _model(trial, _rates(evidence), evidence, scales, region)
+        found = gather_evidence(pieces, by)
         model = _model(trial, _rates(found), found, scales, region)
+        # The bounds are those that the tracks were found within.
+        bounds = {"max_speed": by.population.max_speed, "max_gap": by.population.max_gap}
+        model = replace(model, population=replace(model.population, **bounds))
         return _log_evidence(found, model, region), trial, found
 
     three = tried(fit, evidence)
@@ -134,8 +140,10 @@ def estimate_model(
     one = tried(replace(fit, levels=fit.levels[:1], stay=1.0), evidence)
     for _ in range(N_ROUNDS):
         one = tried(fit_one_motion(one[2].tracks, model, one[1], bounds), one[2])
+    # One that loses what three hold is not simpler but blind, however well it foresees the rest.
+    is_blind = one[2].n_lost > BLIND * three[2].n_lost + 1
     is_worth = three[0] - one[0] > WORTH * sum(p.n_points for p in pieces)
-    _, fit, evidence = three if is_worth else one
+    _, fit, evidence = three if is_blind or is_worth else one
     counts = (_counts(evidence),)
     rates = _rates(evidence)
     if population == "open":
@@ -271,7 +279,7 @@ def _log_evidence(evidence: Evidence, model: TrackingModel, region: Region) -> f
     total = -events * evidence.n_frames
     for found in evidence.tracks:
         scores = track_scores(found, model)
-        # What the model forbids breaks; as clutter it is counted at its worst.
+        # A track of one detection, forbidden by the model, counts as the clutter that it is.
         total += float(scores[np.isfinite(scores)].sum()) + log_clutter * len(found.labels)
     return total
 
