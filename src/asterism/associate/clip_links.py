@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Scales", "first_scales"]
 
-LINKED_POINTS = 40_000
+LINKED_POINTS = 15_000
 """Points that are linked to the next frames, in frames spread over the clip."""
 
 
