@@ -175,7 +175,7 @@ class BranchGrower {
       out.push_back(std::move(child));
     };
     live_.within_gate(frame.grid, frame.points, prediction,
-                      prediction.radius(live_.opt.gate, least), parent.last,
+                      prediction.radius(live_.opt.gate, least, frame.grid.r_most()), parent.last,
                       frame.time - parent.last_time, child_with);
     if (static_cast<std::int64_t>(out.size()) > live_.opt.max_candidates) throw CandidateLimit{};
     parent.score += miss;
@@ -192,7 +192,8 @@ class BranchGrower {
     const Prediction prediction(live_.m, state);
     const double log_seen = live_.sm.log_detect - live_.sm.log_clutter;
     // Less is nothing beside the clutter.
-    const double radius = prediction.radius(live_.opt.gate, kNoClaim - log_seen);
+    const double radius = prediction.radius(live_.opt.gate, kNoClaim - log_seen,
+                                             frame.grid.r_most());
     if (radius < 0) return;
     std::array<double, kMaxModes> each{};
     const std::size_t first = frame.claims.size();

@@ -142,7 +142,7 @@ class FrameStart {
       const auto gap = static_cast<int>(window.now() - window[i].frame);
       p.filter().expect(p.motion(), window, p.state(i), window[i].frame, gap, s_.expected);
       const double base = p.gap_score(gap) - p.end_score(i);
-      const double radius = Filter::radius(s_.expected, -base - doubt_);
+      const double radius = Filter::radius(s_.expected, -base - doubt_, places.grid.r_most());
       if (radius < 0) continue;
       places.grid.within(Filter::center(s_.expected), radius, [&](std::int32_t j, double) {
         const double gain = base + Filter::log_likelihood(p.motion(), s_.expected, places.points[j]);
@@ -161,10 +161,13 @@ class FrameStart {
       if (t < std::max(p.frozen() + 1, window.first())) break;
       const DetectionWindow::Frame& before = window.frame(t);
       if (before.ids.empty()) continue;
-      const auto begun = p.filter().begin(p.motion(), Point{}, t);
+      Point begin{};
+      begin.r = before.places->grid.r_most();
+      const auto begun = p.filter().begin(p.motion(), begin, t);
       p.filter().expect(p.motion(), window, begun, t, gap, s_.expected);
       const double radius =
-          Filter::radius(s_.expected, -p.begin_score() - p.gap_score(gap) - doubt_);
+          Filter::radius(s_.expected, -p.begin_score() - p.gap_score(gap) - doubt_,
+                         window.frame(window.now()).places->grid.r_most());
       if (radius < 0) continue;
       for (const std::int32_t j : window.frame(window.now()).ids)
         if (p.is_free(j))
@@ -185,8 +188,11 @@ class FrameStart {
       const auto gap = static_cast<int>(t - window[i].frame);
       p.filter().expect(p.motion(), window, p.state(i), window[i].frame, gap, s_.expected);
       // How much the next detection may make good is seen below.
-      const double radius = Filter::radius(s_.expected, -p.gap_score(gap) - kHindsight * doubt_);
-      if (radius < 0 || frame.ids.empty()) continue;
+      if (frame.ids.empty()) continue;
+      const double radius =
+          Filter::radius(s_.expected, -p.gap_score(gap) - kHindsight * doubt_,
+                         frame.places->grid.r_most());
+      if (radius < 0) continue;
       frame.places->grid.within(Filter::center(s_.expected), radius, [&](std::int32_t n, double) {
         const std::int32_t y = frame.ids[n];
         if (!p.is_free(y) || !window.is_linkable(i, y) || !window.is_linkable(y, j)) return;
@@ -211,7 +217,8 @@ class FrameStart {
     const auto gap = static_cast<int>(window.now() - window[i].frame);
     p.filter().expect(p.motion(), window, p.state(i), window[i].frame, gap, s_.expected);
     const double base = p.score(i) + p.gap_score(gap) - p.score_of(k);
-    const double radius = Filter::radius(s_.expected, -base - doubt_);
+    const double radius =
+        Filter::radius(s_.expected, -base - doubt_, frame.places->grid.r_most());
     if (radius < 0) return;
     frame.places->grid.within(Filter::center(s_.expected), radius, [&](std::int32_t n, double) {
       const std::int32_t j = frame.ids[n];

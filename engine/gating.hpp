@@ -22,6 +22,8 @@ class PointGrid {
   void build(std::span<const Point> points, int D, double cell) {
     points_ = points;
     D_ = D;
+    r_most_ = 0;
+    for (const Point& p : points) r_most_ = std::max(r_most_, p.r);
     is_grid_ = points.size() >= kScanBelow;
     if (!is_grid_) return;
     Point high{};
@@ -58,6 +60,9 @@ class PointGrid {
     for (std::size_t i = 0; i < points.size(); ++i)
       order_[fill_[cell_of_[i]]++] = static_cast<std::int32_t>(i);
   }
+
+  // The most noise that a point has beyond the sensor's.
+  double r_most() const { return r_most_; }
 
   // Calls visit(index, squared distance) for every point within `radius` of `center`, each once,
   // in an order that depends on the points alone.
@@ -102,6 +107,7 @@ class PointGrid {
 
   std::span<const Point> points_;
   int D_ = 0;
+  double r_most_ = 0;
   bool is_grid_ = false;
   Point low_{}, inverse_{};
   std::array<std::int64_t, kMaxAxes> size_{1, 1, 1};

@@ -5,8 +5,9 @@
 //
 //   x  state of one axis (n)         F  transition over a step (n × n, row-major)
 //   P  covariance of one axis        Q  process noise over a step
-//   H  observation (n)               r  variance of a measured coordinate, σ²
-//   S  innovation variance = H P Hᵀ + r, the same on every axis
+//   H  observation (n)               r  variance of a measured coordinate, σ²; a point may bring
+//                                       more of its own, y.r
+//   S  innovation variance = H P Hᵀ + r, the same on every axis; S + y.r of a point
 #pragma once
 
 #include <algorithm>
@@ -21,7 +22,10 @@ namespace asterism {
 inline constexpr int kMaxStates = 3;  // per axis: position, velocity, acceleration
 inline constexpr int kMaxAxes = 3;
 
-using Point = std::array<double, kMaxAxes>;
+// A place, and what the variance of its coordinates is beyond the sensor's.
+struct Point : std::array<double, kMaxAxes> {
+  double r = 0;
+};
 using AxisMatrix = std::array<double, kMaxStates * kMaxStates>;  // row stride is n, not kMaxStates
 using AxisVector = std::array<double, kMaxStates>;
 
@@ -65,6 +69,8 @@ inline AxisState begin_state(const AxisModel& m, const Point& y) {
   for (int d = 0; d < m.D; ++d)
     for (int i = 0; i < m.n; ++i) s.x[d][i] = m.H[i] / hh * y[d];
   s.P = m.P0;
+  for (int i = 0; i < m.n; ++i)
+    for (int j = 0; j < m.n; ++j) s.P[i * m.n + j] += m.H[i] * m.H[j] / (hh * hh) * y.r;
   return s;
 }
 
@@ -125,15 +131,28 @@ inline double log_density(int D, double S, double distance2) {
 }
 
 // What a detection does to a state: the mean moves by K times the innovation, the covariance becomes
-// P whatever the detection is. Joseph form: P stays symmetric and positive over runs of any length.
+// P wherever the detection is. Joseph form: P stays symmetric and positive over runs of any length.
 struct KalmanGain {
   AxisVector K{};
   AxisMatrix P{};
+  double S = 0;
 
+  // What is left of K for a point with noise of its own: the whole for one without.
+  double share(const Point& y) const { return y.r == 0 ? 1 : S / (S + y.r); }
+  // P for such a point, P + K Kᵀ S (1 - share).
+  AxisMatrix covariance(int n, double share) const {
+    AxisMatrix out = P;
+    if (share < 1)
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) out[i * n + j] += K[i] * K[j] * S * (1 - share);
+    return out;
+  }
+
+  KalmanGain() = default;
   KalmanGain(const AxisModel& m, const AxisState& s) {
     with_states(m.n, [&](auto n_states) {
       constexpr int n = n_states;
-      const double S = innovation_variance(m, s);
+      S = innovation_variance(m, s);
       assert(S > 0);
       for (int i = 0; i < n; ++i) {
         for (int j = 0; j < n; ++j) K[i] += s.P[i * n + j] * m.H[j];
@@ -158,9 +177,10 @@ struct KalmanGain {
 inline void update(const AxisModel& m, const Point& y, AxisState& s) {
   const KalmanGain gain(m, s);
   const Point predicted = observed(m, s);
+  const double share = gain.share(y);
   for (int d = 0; d < m.D; ++d)
-    for (int i = 0; i < m.n; ++i) s.x[d][i] += gain.K[i] * (y[d] - predicted[d]);
-  s.P = gain.P;
+    for (int i = 0; i < m.n; ++i) s.x[d][i] += share * gain.K[i] * (y[d] - predicted[d]);
+  s.P = gain.covariance(m.n, share);
 }
 
 // Rauch–Tung–Striebel: carry what the future knows (next, smoothed) back to a filtered state.

@@ -156,8 +156,10 @@ class LiveTracks {
     s_.radii.resize(tracks.size());
     double sum_radii = 0;
     predict_all(step);
+    double r_most = 0;
+    for (const Point& y : points) r_most = std::max(r_most, y.r);
     for (std::size_t i = 0; i < tracks.size(); ++i) {
-      s_.radii[i] = s_.predictions[i].radius(opt.gate, least(i));
+      s_.radii[i] = s_.predictions[i].radius(opt.gate, least(i), r_most);
       sum_radii += std::max(s_.radii[i], 0.0);
     }
     if (tracks.empty() || points.empty()) return;

@@ -158,7 +158,10 @@ struct Prediction {
   double log_likelihood(const Point& point, std::array<double, kMaxModes>& each) const {
     double best = -std::numeric_limits<double>::infinity();
     for (int b = 0; b < M; ++b) {
-      each[b] = log_peak[b] - 0.5 * squared_distance(point, y[b], D) / S[b];
+      const double d2 = squared_distance(point, y[b], D);
+      each[b] = log_peak[b] - 0.5 * d2 / S[b];
+      if (point.r > 0)
+        each[b] = log_peak[b] - 0.5 * (D * std::log1p(point.r / S[b]) + d2 / (S[b] + point.r));
       best = std::max(best, each[b]);
     }
     if (M == 1 || std::isinf(best)) return best;
@@ -168,15 +171,16 @@ struct Prediction {
   }
 
   // A ball about `center` that holds every point whose χ² is at most `gate` in some mode and whose
-  // log likelihood may exceed `least`: its radius, negative where there is none.
-  double radius(double gate, double least) const {
+  // log likelihood may exceed `least`: its radius, negative where there is none. Points may have noise
+  // of their own up to `r_most`.
+  double radius(double gate, double least, double r_most) const {
     double widest = -1;
     for (int b = 0; b < M; ++b) {
       // Of M summands the largest is at least the sum over M.
       const double worth = 2 * (log_peak[b] + std::log(static_cast<double>(M)) - least);
       const double chi2 = std::min(gate, worth);
       if (!(chi2 > 0)) continue;
-      widest = std::max(widest, std::sqrt(chi2 * S[b]) +
+      widest = std::max(widest, std::sqrt(chi2 * (S[b] + r_most)) +
                                     std::sqrt(squared_distance(y[b], center, D)));
     }
     return widest;
@@ -184,7 +188,7 @@ struct Prediction {
 
   bool is_gated(const Point& point, double gate) const {
     for (int b = 0; b < M; ++b)
-      if (squared_distance(point, y[b], D) <= gate * S[b]) return true;
+      if (squared_distance(point, y[b], D) <= gate * (S[b] + point.r)) return true;
     return false;
   }
 };

@@ -47,12 +47,17 @@ inline Timeline timeline(const MotionModel& m, const In<double>& times,
   return line;
 }
 
+// A column more than there are axes is the variance of each point's coordinates beyond the sensor's.
 inline std::vector<Point> to_points(const In<double>& array, int D) {
-  require(array.ndim() == 2 && array.shape(1) == static_cast<std::size_t>(D),
-          "points: shape (N, D)");
+  const auto n_axes = static_cast<std::size_t>(D);
+  require(array.ndim() == 2 && (array.shape(1) == n_axes || array.shape(1) == n_axes + 1),
+          "points: shape (N, D) or (N, D + 1)");
+  const std::size_t width = array.shape(1);
   std::vector<Point> points(array.shape(0), Point{});
-  for (std::size_t i = 0; i < points.size(); ++i)
-    std::copy_n(array.data() + i * D, D, points[i].begin());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    std::copy_n(array.data() + i * width, D, points[i].begin());
+    if (width > n_axes) points[i].r = array.data()[i * width + n_axes];
+  }
   return points;
 }
 

@@ -23,7 +23,8 @@ namespace asterism {
 // One motion: the steps of a gap are taken at once.
 //
 // Covariances depend on the pattern of detections alone, and a chain tries the same patterns again and
-// again. In a part they are remembered: a node is a pattern, and knows those that it leads to.
+// again. In a part they are remembered: a node is a pattern, and knows those that it leads to. Where
+// points have noise of their own, nothing is.
 class OneMotion {
  public:
   struct State : AxisState {
@@ -31,9 +32,8 @@ class OneMotion {
   };
   // What does not depend on where a track is: how sharply it is expected, and what a detection does.
   struct Pattern {
-    double S = 0, log_peak = 0;
-    AxisVector K{};
-    AxisMatrix P{};
+    KalmanGain gain;
+    double log_peak = 0;
   };
   struct Expected {
     AxisState state;
@@ -58,7 +58,7 @@ class OneMotion {
   State begin(const MotionModel& m, const Point& y, std::int64_t frame) {
     State state;
     static_cast<AxisState&>(state) = begin_state(m.axis, y);
-    if (!is_remembered_) return state;
+    if (!is_remembered_ || y.r > 0) return state;
     std::int32_t& root = roots_[frame - first_];
     if (root < 0) root = add({});
     state.node = root;
@@ -79,27 +79,31 @@ class OneMotion {
     }
     if (out.node < 0) out.own = pattern(m, step, from);
     const Pattern& known = pattern_of(out);
-    out.S = known.S;
+    out.S = known.gain.S;
     out.log_peak = known.log_peak;
     predict_mean(m.axis, step, from, out.state);
     out.center = observed(m.axis, out.state);
   }
 
   static const Point& center(const Expected& e) { return e.center; }
-  static double radius(const Expected& e, double log_likelihood) {
+  static double radius(const Expected& e, double log_likelihood, double r_most) {
     const double half = e.log_peak - log_likelihood;
-    return half < 0 ? -1 : std::sqrt(2 * e.S * half);
+    return half < 0 ? -1 : std::sqrt(2 * (e.S + r_most) * half);
   }
   static double log_likelihood(const MotionModel& m, const Expected& e, const Point& y) {
-    return e.log_peak - 0.5 * squared_distance(y, e.center, m.axis.D) / e.S;
+    const double d2 = squared_distance(y, e.center, m.axis.D);
+    if (y.r > 0)
+      return e.log_peak - 0.5 * (m.axis.D * std::log1p(y.r / e.S) + d2 / (e.S + y.r));
+    return e.log_peak - 0.5 * d2 / e.S;
   }
   double take(const MotionModel& m, const Expected& e, const Point& y, State& out) const {
-    const Pattern& known = pattern_of(e);
+    const KalmanGain& gain = pattern_of(e).gain;
+    const double share = gain.share(y);
     static_cast<AxisState&>(out) = e.state;
     for (int d = 0; d < m.axis.D; ++d)
-      for (int i = 0; i < m.axis.n; ++i) out.x[d][i] += known.K[i] * (y[d] - e.center[d]);
-    out.P = known.P;
-    out.node = e.node;
+      for (int i = 0; i < m.axis.n; ++i) out.x[d][i] += share * gain.K[i] * (y[d] - e.center[d]);
+    out.P = gain.covariance(m.axis.n, share);
+    out.node = y.r > 0 ? -1 : e.node;
     return log_likelihood(m, e, y);
   }
 
@@ -118,13 +122,8 @@ class OneMotion {
   static Pattern pattern(const MotionModel& m, const AxisStep& step, const AxisState& from) {
     AxisState s = from;
     predict(m.axis, step, s);
-    Pattern out;
-    out.S = innovation_variance(m.axis, s);
-    out.log_peak = log_density(m.axis.D, out.S, 0);
     const KalmanGain gain(m.axis, s);
-    out.K = gain.K;
-    out.P = gain.P;
-    return out;
+    return {gain, log_density(m.axis.D, gain.S, 0)};
   }
 
   bool is_remembered_ = false;
@@ -157,8 +156,8 @@ class SeveralMotions {
     out.prediction = Prediction(m, out.state);
   }
   static const Point& center(const Expected& e) { return e.prediction.center; }
-  static double radius(const Expected& e, double log_likelihood) {
-    return e.prediction.radius(std::numeric_limits<double>::infinity(), log_likelihood);
+  static double radius(const Expected& e, double log_likelihood, double r_most) {
+    return e.prediction.radius(std::numeric_limits<double>::infinity(), log_likelihood, r_most);
   }
   static double log_likelihood(const MotionModel&, const Expected& e, const Point& y) {
     std::array<double, kMaxModes> each{};

@@ -2,8 +2,9 @@
 // probability that it is the track's, and brought back to one Gaussian (Bar-Shalom & Tse 1975).
 //
 //   u_j, u_0  probability of detection j and of none, which sum to 1      ν_j = y_j - ŷ
-//   x = x̂ + K Σ u_j ν_j
-//   P = u_0 P̂ + (1 - u_0) P⁺ + K Kᵀ (Σ u_j |ν_j|² - |Σ u_j ν_j|²) / D
+//   a_j       what is left of the gain for a detection with noise of its own, else 1
+//   x = x̂ + K Σ u_j a_j ν_j
+//   P = u_0 P̂ + (1 - u_0) P⁺ + K Kᵀ ((Σ u_j |a_j ν_j|² - |Σ u_j a_j ν_j|²) / D + S Σ u_j (1 - a_j))
 //
 // The axes share one covariance, so the spread of the innovations is shared out evenly among them.
 // Each mode of the motion takes its own share of every detection.
@@ -27,13 +28,15 @@ inline void update_axis(const AxisModel& m, std::span<const WeightedPoint> point
   const KalmanGain gain(m, s);
   const Point predicted = observed(m, s);
   Point mean{};
-  double square = 0;
+  double square = 0, wider = 0;
   for (const auto& [y, weight] : points) {
-    for (int d = 0; d < m.D; ++d) mean[d] += weight * (y[d] - predicted[d]);
-    square += weight * squared_distance(y, predicted, m.D);
+    const double share = gain.share(y);
+    for (int d = 0; d < m.D; ++d) mean[d] += weight * share * (y[d] - predicted[d]);
+    square += weight * share * share * squared_distance(y, predicted, m.D);
+    wider += weight * gain.S * (1 - share);
   }
   for (int d = 0; d < m.D; ++d) square -= mean[d] * mean[d];
-  const double spread = std::max(square, 0.0) / m.D;
+  const double spread = std::max(square, 0.0) / m.D + wider;
   for (int d = 0; d < m.D; ++d)
     for (int i = 0; i < m.n; ++i) s.x[d][i] += gain.K[i] * mean[d];
   for (int i = 0; i < m.n; ++i)

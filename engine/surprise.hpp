@@ -18,10 +18,10 @@ inline double chi2_tail(int D, double x) {
 
 // ν ᵀ S⁻¹ ν; of a mixture, the χ² value that is as seldom exceeded as this point's distance.
 inline double surprise(const Prediction& p, const Point& y) {
-  if (p.M == 1) return squared_distance(y, p.y[0], p.D) / p.S[0];
+  if (p.M == 1) return squared_distance(y, p.y[0], p.D) / (p.S[0] + y.r);
   double beyond = 0;
   for (int b = 0; b < p.M; ++b)
-    beyond += p.w[b] * chi2_tail(p.D, squared_distance(y, p.y[b], p.D) / p.S[b]);
+    beyond += p.w[b] * chi2_tail(p.D, squared_distance(y, p.y[b], p.D) / (p.S[b] + y.r));
   beyond = std::clamp(beyond, 1e-300, 1.0);
   if (p.D == 2) return -2 * std::log(beyond);
   // Newton on the log of the tail, from above, where it is concave.

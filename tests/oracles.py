@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from asterism.model import TrackingModel
 
 
-def kalman(model: TrackingModel, times, frames, points):
+def kalman(model: TrackingModel, times, frames, points, extra=None):
     """Textbook filter of one track with one mode: full state of all axes, full covariances.
+
+    A detection i may have noise of its own, of variance `extra[i]` on every axis.
 
     Returns the filtered means and covariances of each frame of the track, the predicted ones, the
     transitions into each frame, and the log density of each detection.
@@ -25,10 +27,10 @@ def kalman(model: TrackingModel, times, frames, points):
     n = len(motion.observation)
     eye = np.eye(D)
     H = np.kron(eye, motion.observation)
-    R = model.sensor.noise_sigma**2 * eye
+    extra = np.zeros(len(points)) if extra is None else extra
     h = motion.observation
     x = np.concatenate([h / (h @ h) * p for p in points[0]])
-    P = np.kron(eye, model.initial_covariance(D))
+    P = np.kron(eye, model.initial_covariance(D) + extra[0] * np.outer(h, h) / (h @ h) ** 2)
     means, covariances, predicted, transitions = [x], [P], [(x, P)], [np.eye(n * D)]
     log_densities = [0.0]
     i = 1
@@ -40,7 +42,7 @@ def kalman(model: TrackingModel, times, frames, points):
         predicted.append((x, P))
         transitions.append(F)
         if frames[i] == t:
-            S = H @ P @ H.T + R
+            S = H @ P @ H.T + (model.sensor.noise_sigma**2 + extra[i]) * eye
             log_densities.append(multivariate_normal(H @ x, S).logpdf(points[i]))
             K = P @ H.T @ np.linalg.inv(S)
             x = x + K @ (points[i] - H @ x)

@@ -30,7 +30,8 @@ TESTS = (
 )
 LEFT_OUT = (
     "hundred_thousand or memory or many_points or blackboard or partitions or beside_birth or "
-    "unequal_shares or several_motions or settled_frames or known_mistakes or calibrated"
+    "unequal_shares or several_motions or settled_frames or known_mistakes or calibrated or "
+    "bisection or changed_lens or lens_apart or term_by_term or stable_and_best or exact_solver"
 )
 """Too slow (a blackboard is Python, a posterior is sampled for millions of moves), or measuring
 memory that the sanitizers inflate."""

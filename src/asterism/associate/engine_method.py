@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.associate.method import Method, Update, checked_frame, refuse_start
+from asterism.associate.method import (
+    Method,
+    Update,
+    checked_covariances,
+    checked_frame,
+    refuse_start,
+)
 from asterism.errors import ParameterError, SolverLimit
 
 if TYPE_CHECKING:
@@ -115,13 +121,20 @@ class EngineMethod(Method[EngineState]):
         return EngineState(model=model, n_axes=n_axes, tracker=tracker, about=self._about)
 
     def step(
-        self, state: EngineState, time: float, points: ArrayLike
+        self,
+        state: EngineState,
+        time: float,
+        points: ArrayLike,
+        *,
+        covariances: ArrayLike | None = None,
     ) -> tuple[EngineState, Update]:
         """Take the next frame; see `Method.step`."""
-        from asterism.model.compiled import no_transition, transition
+        from asterism.model.compiled import no_transition, transition, with_noise
 
         before = state.tracker
         frame = checked_frame(time, before.last_time, points, state.n_axes)
+        if covariances is not None:
+            frame = with_noise(frame, checked_covariances(covariances, frame))
         # The first frame has no step before it, and no track that would take it.
         dt = time - before.last_time if before.n_frames else None
         motion = state.model.motion
@@ -151,9 +164,10 @@ class EngineMethod(Method[EngineState]):
         start: NDArray[np.int64] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; the same labels as the loop over `step`."""
-        from asterism.model.compiled import steps_of
+        from asterism.model.compiled import steps_of, with_noise
 
         refuse_start(start)
+        points = with_noise(detections.points, detections.covariances)
         tracker = state.tracker.copy()
         times, offsets = detections.times, detections.offsets
         first = tracker.n_seen
@@ -167,7 +181,7 @@ class EngineMethod(Method[EngineState]):
         kind, F, Q = steps_of(state.model.motion, known)
         for t in range(0, detections.n_frames, FRAMES_A_CALL):
             end = min(t + FRAMES_A_CALL, detections.n_frames)
-            some = detections.points[offsets[t] : offsets[end]]
+            some = points[offsets[t] : offsets[end]]
             starts = offsets[t : end + 1] - offsets[t]
             kinds = kind[n_before + t : n_before + end]
             try:

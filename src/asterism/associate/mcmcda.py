@@ -288,12 +288,17 @@ class MCMCDA(EngineMethod):
         return make(motion_model(model, n_axes), score, chain, options, _checked_seed(seed))
 
     def step(
-        self, state: EngineState, time: float, points: ArrayLike
+        self,
+        state: EngineState,
+        time: float,
+        points: ArrayLike,
+        *,
+        covariances: ArrayLike | None = None,
     ) -> tuple[EngineState, Update]:
         """Take the next frame; see `Method.step`."""
         if self.window is None:
             raise ParameterError("window", "a number of frames", "None", "a stream has no end")
-        return super().step(state, time, points)
+        return super().step(state, time, points, covariances=covariances)
 
     def run(
         self,

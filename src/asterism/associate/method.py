@@ -94,7 +94,14 @@ class Method(ABC, Generic[State]):
         """
 
     @abstractmethod
-    def step(self, state: State, time: float, points: ArrayLike) -> tuple[State, Update]:
+    def step(
+        self,
+        state: State,
+        time: float,
+        points: ArrayLike,
+        *,
+        covariances: ArrayLike | None = None,
+    ) -> tuple[State, Update]:
         """Take the next frame.
 
         Parameters
@@ -105,6 +112,9 @@ class Method(ABC, Generic[State]):
             Seconds, later than the frame before.
         points : array_like, shape (n, D)
             Metres; may be empty.
+        covariances : array_like, shape (n, D, D), optional
+            Of the points, m²: noise that is theirs beyond the sensor's. Tracks have one variance
+            for all axes, so the mean over the axes is taken.
 
         Returns
         -------
@@ -148,9 +158,12 @@ class Method(ABC, Generic[State]):
         first = state.n_seen
         labels = np.full(first + detections.n_points, -1, dtype=np.int64)
         confidence: NDArray[np.float64] | None = None
+        noise = detections.covariances
         for t, (time, points) in enumerate(detections):
-            state, update = self.step(state, time, points)
-            frame = slice(first + detections.offsets[t], first + detections.offsets[t + 1])
+            a, b = detections.offsets[t], detections.offsets[t + 1]
+            own = None if noise is None else noise[a:b]
+            state, update = self.step(state, time, points, covariances=own)
+            frame = slice(first + a, first + b)
             labels[frame] = update.labels
             labels[update.revised] = update.revised_labels
             if update.confidence is not None:
@@ -192,3 +205,21 @@ def checked_frame(
     if array.size == 0:
         return np.empty((0, n_axes))
     return check_array("points", array, ("n", n_axes))
+
+
+def checked_covariances(covariances: ArrayLike, frame: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Check the covariances of a frame's points.
+
+    Raises
+    ------
+    ParameterError
+        If they are not finite matrices, one for each point, or a variance is negative.
+    """
+    n, D = frame.shape
+    array = np.asarray(covariances, dtype=np.float64)
+    if array.size == 0 and n == 0:
+        return np.empty((0, D, D))
+    array = check_array("covariances", array, (n, D, D))
+    if (np.diagonal(array, axis1=1, axis2=2) < 0).any():
+        raise ParameterError("covariances", "variances ≥ 0", "a negative one")
+    return array

@@ -182,12 +182,7 @@ def _pieces(detections: Detections) -> Iterator[Detections]:
     # Spread over the points, not over the frames, which may be empty for long.
     seeds = np.linspace(0, n - 1, max(1, min(N_PIECES, T // length))).astype(int)
     for start in np.unique(np.minimum(detections.frame_of[seeds], T - length)):
-        a, b = detections.offsets[start], detections.offsets[start + length]
-        yield Detections(
-            times=detections.times[start : start + length],
-            offsets=detections.offsets[start : start + length + 1] - a,
-            points=detections.points[a:b],
-        )
+        yield detections.part(int(start), int(start) + length)
 
 
 def _first_model(fit: MotionFit, scales: Scales, region: Region) -> TrackingModel:

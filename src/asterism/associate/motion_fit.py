@@ -286,6 +286,7 @@ def _sample(tracks: list[Tracks]) -> Tracks:
     points: list[NDArray[np.float64]] = []
     counts: list[NDArray[np.int64]] = []
     labels: list[NDArray[np.int64]] = []
+    noise: list[NDArray[np.float64]] = []
     n_cut = n_kept = 0
     start = 0.0
     for found in tracks:
@@ -300,6 +301,8 @@ def _sample(tracks: list[Tracks]) -> Tracks:
         labels.append(piece[is_kept] + n_kept)
         n_kept += int(piece.max(initial=-1)) + 1
         points.append(d.points[is_kept])
+        if d.covariances is not None:
+            noise.append(d.covariances[is_kept])
         counts.append(np.bincount(d.frame_of[is_kept], minlength=d.n_frames))
         times.append(d.times - d.times[0] + start)
         start = float(times[-1][-1]) + max(d.step, 1e-6)
@@ -307,5 +310,6 @@ def _sample(tracks: list[Tracks]) -> Tracks:
         times=np.concatenate(times),
         offsets=np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64),
         points=np.concatenate(points),
+        covariances=np.concatenate(noise) if noise else None,
     )
     return Tracks(detections=detections, labels=np.concatenate(labels))

@@ -106,10 +106,4 @@ def _some(pieces: list[Detections]) -> list[Detections]:
         return chosen
     whole = chosen[0]
     T = max(3, int(np.searchsorted(whole.offsets, DRAWN_POINTS)))
-    return [
-        Detections(
-            times=whole.times[:T],
-            offsets=whole.offsets[: T + 1],
-            points=whole.points[: whole.offsets[T]],
-        )
-    ]
+    return [whole.part(0, T)]

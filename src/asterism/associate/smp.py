@@ -105,7 +105,12 @@ class SMP(FrameByFrame):
         )
 
     def step(
-        self, state: EngineState, time: float, points: ArrayLike
+        self,
+        state: EngineState,
+        time: float,
+        points: ArrayLike,
+        *,
+        covariances: ArrayLike | None = None,
     ) -> tuple[EngineState, Update]:
         """Take the next frame; see `Method.step`.
 
@@ -116,7 +121,7 @@ class SMP(FrameByFrame):
         """
         if self.strict and state.tracker.n_frames:
             _check_number(len(np.asarray(points)), state.n_ids, f"in the frame at {time:g} s")
-        return super().step(state, time, points)
+        return super().step(state, time, points, covariances=covariances)
 
     def run(
         self,

@@ -83,6 +83,8 @@ def track(
     state = method.init(model, n_axes=detections.n_axes, seed=seed)
     state, labels, confidence = method.run(state, detections, progress=progress, start=labels)
     info = dict(state.info)
+    if detections.covariances is not None:
+        info["isotropic_noise"] = True  # tracks have one variance for all axes
     tracks = Tracks(detections=detections, labels=labels, confidence=confidence, info=info)
     info["log_posterior"] = log_posterior(tracks, model)
     return tracks

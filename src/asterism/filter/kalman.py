@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism import _engine
-from asterism.model.compiled import motion_model, steps_of
+from asterism.model.compiled import motion_model, steps_of, with_noise
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -61,9 +61,9 @@ def _states(tracks: Tracks, model: TrackingModel, *, smoothed: bool) -> States:
     order, offsets = tracks.by_track
     frames = d.frame_of[order]
     kind, F, Q = steps_of(model.motion, d.times)
+    points = with_noise(d.points, d.covariances)[order]
     means, covariances, rows, densities = _engine.filter_tracks(
-        motion_model(model, d.n_axes), d.points[order], frames, offsets, d.times, kind, F, Q,
-        smoothed,
+        motion_model(model, d.n_axes), points, frames, offsets, d.times, kind, F, Q, smoothed
     )  # fmt: skip
     first = np.zeros(tracks.n_tracks, dtype=np.int64)
     has_any = tracks.lengths > 0

@@ -131,11 +131,16 @@ class Stitched(Method[StitchedState]):
         return StitchedState(fragments=fragments, stitcher=stitcher, model=model, n_axes=n_axes)
 
     def step(
-        self, state: StitchedState, time: float, points: ArrayLike
+        self,
+        state: StitchedState,
+        time: float,
+        points: ArrayLike,
+        *,
+        covariances: ArrayLike | None = None,
     ) -> tuple[StitchedState, Update]:
         """Take the next frame; see `Method.step`."""
         frame = checked_frame(time, state.last_time, points, state.n_axes)
-        fragments, found = self.method.step(state.fragments, time, frame)
+        fragments, found = self.method.step(state.fragments, time, frame, covariances=covariances)
         motion, dt = state.model.motion, time - state.last_time
         F, Q = no_transition(motion) if dt == float("inf") else transition(motion, dt)
         stitcher, labels, revised, revised_labels = state.stitcher.step(

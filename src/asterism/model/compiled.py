@@ -26,6 +26,7 @@ __all__ = [
     "score_model",
     "steps_of",
     "transition",
+    "with_noise",
 ]
 
 SPEED_MARGIN_SIGMAS = 6.0
@@ -104,3 +105,29 @@ def steps_of(
     spacing, kind = np.unique(_to_nanosecond(np.diff(times)), return_inverse=True)
     F, Q = _of_modes(motion, spacing)
     return np.concatenate([[0], kind]).astype(np.int32), F, Q
+
+
+def with_noise(
+    points: NDArray[np.float64], covariances: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Give points as the engine takes them, with the noise that is theirs beyond the sensor's.
+
+    The axes of a track share one covariance, so of the covariance of a point the mean variance of
+    its coordinates is taken: exact for isotropic ones.
+
+    Parameters
+    ----------
+    points : ndarray, shape (N, D)
+        Metres.
+    covariances : ndarray, shape (N, D, D), or None
+        Of the points, m².
+
+    Returns
+    -------
+    ndarray, shape (N, D) or (N, D + 1)
+        With a column more where there are covariances.
+    """
+    if covariances is None:
+        return points
+    variances = np.trace(covariances, axis1=1, axis2=2) / points.shape[1]
+    return np.column_stack([points, variances])

@@ -47,7 +47,8 @@ class Detections:
     stds : array_like, shape (N,), optional
         Standard deviation of each coordinate where it is known, metres; 0 where it is not.
     covariances : array_like, shape (N, D, D), optional
-        Covariance of each point, m², where several cameras tell it; all zeros where not.
+        Covariance of each point, m², where several cameras tell it; all zeros where not. Trackers
+        add it to the sensor's noise.
 
     Raises
     ------
@@ -217,6 +218,17 @@ class Detections:
         }
         changes["offsets"] = np.concatenate([[0], np.cumsum(kept)])[self.offsets]
         return replace(self, **changes | {"filled": None})
+
+    def part(self, first: int, end: int) -> Detections:
+        """Give the frames from `first` to before `end`, with all that is known of their points."""
+        a, b = self.offsets[first], self.offsets[end]
+        known: dict[str, Any] = {
+            name: getattr(self, name)[a:b]
+            for name in self.PER_POINT
+            if getattr(self, name) is not None
+        }
+        offsets = self.offsets[first : end + 1] - a
+        return Detections(times=self.times[first:end], offsets=offsets, **known)
 
     @property
     def n_frames(self) -> int:

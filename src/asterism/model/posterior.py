@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from asterism import _engine
-from asterism.model.compiled import motion_model, score_model, steps_of
+from asterism.model.compiled import motion_model, score_model, steps_of, with_noise
 
 if TYPE_CHECKING:
     import numpy as np
@@ -47,7 +47,7 @@ def track_scores(tracks: Tracks, model: TrackingModel) -> NDArray[np.float64]:
     kind, F, Q = steps_of(model.motion, d.times)
     scores = _engine.score_tracks(
         motion_model(model, d.n_axes), score_model(model),
-        d.points[order], d.frame_of[order], offsets, d.times, kind, F, Q,
+        with_noise(d.points, d.covariances)[order], d.frame_of[order], offsets, d.times, kind, F, Q,
     )  # fmt: skip
     scores[tracks.lengths == 0] = 0.0
     return scores
