@@ -43,12 +43,13 @@ std::span<const std::int64_t> checked(const In<double>& pixels, const In<std::in
   return {offsets.data(), offsets.size()};
 }
 
-std::vector<Vec3> places(const In<double>& points) {
-  require(points.ndim() == 2 && points.shape(1) == 3, "priors: shape (M, 3)");
-  std::vector<Vec3> out;
+// Place and variance of each.
+std::vector<ExpectedPlace> places(const In<double>& points) {
+  require(points.ndim() == 2 && points.shape(1) == 4, "priors: shape (M, 4)");
+  std::vector<ExpectedPlace> out;
   for (std::size_t i = 0; i < points.shape(0); ++i) {
-    const double* const p = points.data() + 3 * i;
-    out.push_back({p[0], p[1], p[2]});
+    const double* const p = points.data() + 4 * i;
+    out.push_back({{p[0], p[1], p[2]}, p[3]});
   }
   return out;
 }
@@ -63,7 +64,7 @@ nb::tuple reconstruct(const ViewSolver& solver, const In<double>& pixels,
   const std::size_t C = solver.cameras.size();
   require((cells.size() - 1) % C == 0, "offsets: shape (T * C + 1,)");
   const std::size_t T = (cells.size() - 1) / C;
-  const std::vector<Vec3> expected = places(priors);
+  const std::vector<ExpectedPlace> expected = places(priors);
   require(prior_offsets.size() == T + 1 && prior_offsets.data()[0] == 0 &&
               prior_offsets.data()[T] == static_cast<std::int64_t>(expected.size()),
           "prior_offsets: shape (T + 1,)");

@@ -23,10 +23,12 @@ struct CandidateOptions {
 
 class PointCandidates {
  public:
-  PointCandidates(std::span<const ImagePoints> cameras, const CandidateOptions& options)
+  PointCandidates(std::span<const ImagePoints> cameras, const CandidateOptions& options,
+                  std::span<const ExpectedPlace> expected)
       : cameras_(cameras),
         options_(options),
-        fit_(cameras, options.log_density),
+        expected_(expected),
+        fit_(cameras, options.log_density, expected),
         gate2_(options.gate * options.gate) {
     std::size_t n = 0;
     for (const ImagePoints& c : cameras_)
@@ -36,8 +38,8 @@ class PointCandidates {
   }
 
   // All candidates that are likelier than clutter.
-  std::vector<PointCandidate> find(std::span<const Vec3> priors) {
-    for (const Vec3 X : priors) grow_from_place(X);
+  std::vector<PointCandidate> find() {
+    for (const ExpectedPlace& e : expected_) grow_from_place(e.X);
     find_seeds();
     for (const Seed& seed : seeds_) {
       if (is_known(seed)) continue;
@@ -298,6 +300,7 @@ class PointCandidates {
   static constexpr double kFar = 30;  // standard deviations, of an image point from where it is expected
   std::span<const ImagePoints> cameras_;
   CandidateOptions options_;
+  std::span<const ExpectedPlace> expected_;
   PointFit fit_;
   double gate2_;
   std::vector<std::int32_t> all_, asked_;  // cameras

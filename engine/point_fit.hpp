@@ -2,7 +2,8 @@
 //
 //   X, Λ     place and its information, Σ Jᵀ W J
 //   r²       squared distance of an image point from that of X, in its standard deviations
-//   score    log likelihood ratio of "one point, of density ρ, made these" against "clutter did",
+//   score    log likelihood ratio of "one point, of density ρ, made these" against "clutter did" (ρ is
+//            higher where one is expected),
 //            the place integrated out (Laplace):
 //            log ρ + log((2π)^{3/2} |Λ|^{-1/2}) + Σ_seen (log(P_d / (λ 2πσ²)) - r²/2)
 //              + Σ_{could see, did not} log(1 - P_d)
@@ -30,11 +31,18 @@ struct PointCandidate {
   double score = 0;
 };
 
+// Where a point is expected, as a tracker says: a Gaussian, the same along every axis.
+struct ExpectedPlace {
+  Vec3 X;
+  double variance;
+};
+
 class PointFit {
  public:
-  // `log_density`: log ρ, of points by m³.
-  PointFit(std::span<const ImagePoints> cameras, double log_density)
-      : cameras_(cameras), log_density_(log_density) {}
+  // `log_density`: log ρ, of points by m³ anywhere; besides, there may be one at each place expected.
+  PointFit(std::span<const ImagePoints> cameras, double log_density,
+           std::span<const ExpectedPlace> expected)
+      : cameras_(cameras), log_density_(log_density), expected_(expected) {}
 
   // Best place of a candidate from where it is; false where there is none.
   bool fit(PointCandidate& c) const {
@@ -89,8 +97,7 @@ class PointFit {
     return p.squared({p.n.x - s.n.x, p.n.y - s.n.y});
   }
   double score(const PointCandidate& c) const {
-    constexpr double kLogTwoPi = 1.8378770664093453;
-    double s = log_density_ + 1.5 * kLogTwoPi -
+    double s = log_density(c) + 1.5 * kLogTwoPi -
                0.5 * std::log(c.information.determinant()) - c.squared / 2;
     for (const View v : c.views) s += cameras_[v.camera].points[v.point].gain;
     if (s <= 0) return s;  // misses only lower it
@@ -105,6 +112,25 @@ class PointFit {
   }
 
  private:
+  static constexpr double kLogTwoPi = 1.8378770664093453;
+  static constexpr double kThere = 0.9;  // probability that an expected point is where it is expected
+  static constexpr double kFar = 6;      // standard deviations
+
+  // log of ρ + Σ 0.9 N(X; expected place, its variance + Λ⁻¹), the place integrated out.
+  double log_density(const PointCandidate& c) const {
+    if (expected_.empty()) return log_density_;
+    const Symmetric3 own = c.information.inverse();
+    double sum = std::exp(log_density_);
+    for (const ExpectedPlace& e : expected_) {
+      const Vec3 off{c.X.x - e.X.x, c.X.y - e.X.y, c.X.z - e.X.z};
+      if (dot(off, off) > kFar * kFar * (e.variance + own.trace())) continue;
+      Symmetric3 S = own;
+      S.xx += e.variance, S.yy += e.variance, S.zz += e.variance;
+      const double squared = dot(off, S.inverse() * off);
+      sum += kThere * std::exp(-1.5 * kLogTwoPi - 0.5 * std::log(S.determinant()) - squared / 2);
+    }
+    return std::log(sum);
+  }
   static void add(const ImagePoint& p, const Sight& s, Symmetric3& A, Vec3& g) {
     const double ex = p.n.x - s.n.x, ey = p.n.y - s.n.y;
     A.add(s.jx, p.wxx), A.add(s.jy, p.wyy), A.add(s.jx, s.jy, p.wxy);
@@ -117,6 +143,7 @@ class PointFit {
 
   std::span<const ImagePoints> cameras_;
   double log_density_;
+  std::span<const ExpectedPlace> expected_;
 };
 
 }  // namespace asterism

@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from asterism.evaluate import point_scores as point_scores
     from asterism.filter import GateGroups as GateGroups
     from asterism.filter import States as States
+    from asterism.filter import expected_places as expected_places
     from asterism.filter import filter_states as filter_states
     from asterism.filter import gate_groups as gate_groups
     from asterism.filter import smooth as smooth
@@ -188,7 +189,7 @@ _PUBLIC = {
         "Tracks",
     ),
     "model.posterior": ("log_posterior", "track_scores"),
-    "filter": ("GateGroups", "States", "filter_states", "gate_groups", "smooth"),
+    "filter": ("GateGroups", "States", "expected_places", "filter_states", "gate_groups", "smooth"),
     "associate": (
         "GNN",
         "METHODS",

@@ -1,6 +1,7 @@
 """Kalman filter and smoother over many tracks at once, and the gates about what they foresee."""
 
+from asterism.filter.expected import expected_places
 from asterism.filter.gates import GateGroups, gate_groups
 from asterism.filter.kalman import States, filter_states, smooth
 
-__all__ = ["GateGroups", "States", "filter_states", "gate_groups", "smooth"]
+__all__ = ["GateGroups", "States", "expected_places", "filter_states", "gate_groups", "smooth"]

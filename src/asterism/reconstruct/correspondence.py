@@ -10,6 +10,7 @@ from asterism import _engine
 from asterism.camera import Observations, Rig
 from asterism.errors import ParameterError, check_number
 from asterism.model import Detections
+from asterism.model.compiled import with_noise
 from asterism.model.detections import FARTHEST
 from asterism.reconstruct.reconstruction import Reconstruction, Views
 from asterism.reconstruct.triangulation import triangulate
@@ -66,8 +67,9 @@ def reconstruct(
         deviation, pixels. A point that the choice left may share image points that are taken, but
         needs one of its own; what two points share counts so much less in both. 0 for no sharing.
     prior : Detections, optional
-        3-D places where points are expected, for each frame of the observations; they are tried
-        first, and claim nothing that the images do not bear out.
+        3-D places where points are expected, with covariances, for each frame of the observations:
+        predicted by a tracker (`asterism.expected_places`). A point is likelier there, to be found
+        in fewer cameras and preferred to a ghost; what no camera saw is not claimed.
     max_nodes : int
         Most nodes of the search for the best choice in a group of sets that share image points.
     n_threads : int
@@ -122,6 +124,7 @@ def reconstruct(
         high=high,
     )
     expected = _expected(prior, observations)
+    places = with_noise(expected.points, expected.covariances)
     pieces: list[_Piece] = []
     figures, gap = np.zeros(3, dtype=np.int64), 0.0
     C, T = observations.n_cameras, observations.n_frames
@@ -131,7 +134,7 @@ def reconstruct(
         points, scores, counts, starts, blobs, counted, open_ = solver.reconstruct(
             observations.pixels,
             np.ascontiguousarray(observations.offsets[begin * C : end * C + 1]),
-            np.ascontiguousarray(expected.points[first:last]),
+            places[first:last],
             np.ascontiguousarray(expected.offsets[begin : end + 1] - first),
             float(merge_px),
             int(max_nodes),
@@ -203,13 +206,22 @@ class _Piece(NamedTuple):
 def _expected(prior: Detections | None, observations: Observations) -> Detections:
     if prior is None:
         offsets = np.zeros(observations.n_frames + 1, dtype=np.int64)
-        return Detections(times=observations.times, offsets=offsets, points=np.empty((0, 3)))
+        return Detections(
+            times=observations.times,
+            offsets=offsets,
+            points=np.empty((0, 3)),
+            covariances=np.empty((0, 3, 3)),
+        )
     if not isinstance(prior, Detections):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ParameterError("prior", "Detections", type(prior).__name__)
     if prior.n_axes != 3:
         raise ParameterError("prior", "places in 3-D", f"{prior.n_axes}-D ones")
     if not np.array_equal(prior.times, observations.times):
         raise ParameterError("prior", "the times of the observations", "others")
+    if prior.covariances is None:
+        raise ParameterError(
+            "prior", "places with covariances", "none", "try expected_places(tracks, model)"
+        )
     return prior
 
 

@@ -1,0 +1,75 @@
+"""Where tracks are expected to be: their predictions, frame by frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.filter.kalman import filter_states
+from asterism.model import Detections
+from asterism.model.compiled import steps_of
+
+if TYPE_CHECKING:
+    from asterism.model import TrackingModel, Tracks
+
+__all__ = ["expected_places"]
+
+
+def expected_places(tracks: Tracks, model: TrackingModel, *, coast: int = 5) -> Detections:
+    """Predict where the marker of each track is in each frame, from the frames before alone.
+
+    For `asterism.reconstruct`, whose image points of a frame may be told apart by where markers were
+    heading.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of an earlier pass, say.
+    model : TrackingModel
+        Its motion and noise are used.
+    coast : int
+        Frames after its last detection for which a track is still predicted.
+
+    Returns
+    -------
+    Detections
+        Of the same frames: in each the places of the tracks that began before it, by track, with
+        covariances (m², the same on every axis). Of several motions the middle one leads.
+    """
+    d = tracks.detections
+    states = filter_states(tracks, model)
+    kind, F, Q = steps_of(model.motion, d.times)
+    H = model.motion.modes[0].observation
+    middle = len(model.motion.modes) // 2
+    frames: list[np.ndarray] = []
+    points: list[np.ndarray] = []
+    variances: list[np.ndarray] = []
+    for k in np.flatnonzero(tracks.lengths):
+        rows = slice(states.offsets[k], states.offsets[k + 1])
+        first, n = int(states.first_frames[k]), int(states.offsets[k + 1] - states.offsets[k])
+        means, P = states.means[rows], states.covariances[rows]
+        # The last state is led on by itself; each earlier one is one step from the next frame.
+        beyond = min(coast, d.n_frames - first - n)
+        step = kind[first + 1 : first + n + beyond]
+        at = np.arange(first + 1, first + n + beyond)
+        x, S = list(means), list(P)
+        for t in range(n, n + beyond - 1):
+            A = F[kind[first + t], middle]
+            x.append(x[-1] @ A.T)
+            S.append(A @ S[-1] @ A.T + Q[kind[first + t], middle])
+        A, B = F[step, middle], Q[step, middle]
+        before, spread = np.array(x)[: len(at)], np.array(S)[: len(at)]
+        frames.append(at)
+        points.append(np.einsum("tij,tdj->tdi", A, before) @ H)
+        variances.append(np.einsum("i,tij,j->t", H, A @ spread @ A.transpose(0, 2, 1) + B, H))
+    at = np.concatenate([*frames, np.empty(0, dtype=np.int64)])
+    order = np.argsort(at, kind="stable")
+    D = d.n_axes
+    var = np.concatenate([*variances, np.empty(0)])[order]
+    return Detections(
+        times=d.times,
+        offsets=np.concatenate([[0], np.cumsum(np.bincount(at, minlength=d.n_frames))]),
+        points=np.concatenate([*points, np.empty((0, D))])[order],
+        covariances=var[:, None, None] * np.eye(D),
+    )
