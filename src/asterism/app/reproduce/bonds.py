@@ -94,7 +94,7 @@ def _three_tracks() -> NDArray[np.float64]:
 def _distances(places: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     """Give the distance of each pair over the window."""
     return {
-        f"τ_{'abc'[i]}–τ_{'abc'[j]}": np.linalg.norm(places[:, i] - places[:, j], axis=1)
+        f"τ_{'abc'[i]}–τ_{'abc'[j]}": np.sqrt(((places[:, i] - places[:, j]) ** 2).sum(axis=1))
         for i, j in ((0, 1), (0, 2), (1, 2))
     }
 
@@ -112,7 +112,9 @@ def _draw(places: NDArray[np.float64]) -> Figure:
     left.set_axis_off()
     for (pair, d), colour in zip(_distances(places).items(), CYCLE[3:], strict=False):
         kept = np.nanmax(d) - np.nanmin(d) <= TOLERANCE and np.isfinite(d).all()
-        right.plot(d, "o-", color=colour, markersize=4, label=f"{pair}: {'kept' if kept else 'not'}")
+        right.plot(
+            d, "o-", color=colour, markersize=4, label=f"{pair}: {'kept' if kept else 'not'}"
+        )
         if kept:
             right.axhspan(d.mean() - TOLERANCE / 2, d.mean() + TOLERANCE / 2, color=GRID)
     right.set_ylim(bottom=0)
@@ -136,8 +138,8 @@ PART = Part(
     title="Bonds: tracks that keep their distances",
     section="§4.2",
     covers="figure 4.2",
-    did="Proposes to take tracks that keep their distance throughout the window as sure, two, three "
-    "or four bonded ones, and to leave them out of the walk.",
+    did="Proposes to take tracks that keep their distance throughout the window as sure, two, "
+    "three or four bonded ones, and to leave them out of the walk.",
     run=run,
     slips=(
         "Equation 4.8 argues that a distance that was kept in a window is kept almost surely; a "

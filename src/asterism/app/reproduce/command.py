@@ -78,7 +78,7 @@ def reproduce(
         for i, name in enumerate(names):
             with progress(f"{name} ({i + 1} of {len(names)})", STEPS) as advance:
                 part = load(name)
-                outcome = part.run(effort, lambda share: advance(round(STEPS * share)))  # noqa: B023
+                outcome = part.run(effort, lambda share: advance(round(STEPS * share)))
                 made = Made(name, part, outcome)
                 write_part(made, out)
             done.append(made)

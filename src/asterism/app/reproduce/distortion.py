@@ -37,7 +37,7 @@ def run(effort: Effort, tell: Tell) -> Outcome:
         for kind, sign in (("barrel", 1), ("pincushion", -1)):
             a1 = sign * rng.uniform(0.05, 0.2)
             camera = _camera(am.ReportRadial(a1=a1, a2=sign * rng.uniform(0, 0.02)))
-            wrong[kind] += np.count_nonzero(sign * np.diff(_magnification(camera)) >= 0)
+            wrong[kind] += int(np.count_nonzero(sign * np.diff(_magnification(camera)) >= 0))
             wrong[kind] += int(sign * _bow(camera) <= 0)
             # The same sign in the other direction, undistorted to distorted.
             bent = _magnification(_camera(am.BrownConrady(k1=a1)))

@@ -85,8 +85,8 @@ def run(effort: Effort, tell: Tell) -> Outcome:
 NOTES = (
     "Both chains do not look enough with 30 moves a frame, and both arrive with more. To draw from "
     "the best partition and to weigh against the one taken last is an ascent: it finds, and does "
-    "not sample, so it gives no confidence. “This is an error in [5]” is itself one: Metropolis and "
-    "Hastings draw from where the chain is.",
+    "not sample, so it gives no confidence. “This is an error in [5]” is itself one: Metropolis "
+    "and Hastings draw from where the chain is.",
 )
 
 PART = Part(

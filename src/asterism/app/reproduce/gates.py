@@ -136,5 +136,7 @@ PART = Part(
     "in which it occurs; a measurement in two validation regions disturbs what treats each target "
     "by itself.",
     run=run,
-    chosen=("The places of figure 2.1, which has no scale; P_d = 0.9, clutter 0.05 a unit of area.",),
+    chosen=(
+        "The places of figure 2.1, which has no scale; P_d = 0.9, clutter 0.05 a unit of area.",
+    ),
 )

@@ -59,7 +59,8 @@ def run(effort: Effort, tell: Tell) -> Outcome:
         ),
         Claim(
             "clusters do better than no split", "an improvement",
-            f"{spread(theirs[CLUSTERS].correct)} % correct, without {spread(theirs[OFF].correct)} %",
+            f"{spread(theirs[CLUSTERS].correct)} % correct, without "
+            f"{spread(theirs[OFF].correct)} %",
             differs(-theirs[CLUSTERS].correct, -theirs[OFF].correct,
                     "points of correct labels lost"),
         ),
@@ -91,8 +92,8 @@ def _draw(clip: Clip) -> Figure:
 
 
 CAPTION = (
-    "Beyond the report: what need not be walked over together. Tracks of a recording of the cube by "
-    "the number of those that share candidates with them, frame by frame (seed 0)."
+    "Beyond the report: what need not be walked over together. Tracks of a recording of the cube "
+    "by the number of those that share candidates with them, frame by frame (seed 0)."
 )
 
 PART = Part(

@@ -82,7 +82,7 @@ def _contents(done: Sequence[Made]) -> list[str]:
         f'<td class="n">{made.counts[0]} of {made.counts[1]}</td></tr>'
         for made in done
     ]
-    return ['<div class="wide"><table>', _head(CONTENTS_HEAD), *rows, "</table></div>"]
+    return ['<div class="wide"><table>', _head(CONTENTS_HEAD, n_words=3), *rows, "</table></div>"]
 
 
 def _part(made: Made, pictures: Mapping[str, str]) -> list[str]:
@@ -93,7 +93,7 @@ def _part(made: Made, pictures: Mapping[str, str]) -> list[str]:
         f'<p class="where">{_words(part.section)}: {_words(part.covers)}</p>',
         f"<p>{_words(part.did)}</p>",
         '<div class="wide"><table class="claims">',
-        _head(CLAIMS_HEAD),
+        _head(CLAIMS_HEAD, n_words=len(CLAIMS_HEAD)),
         *(_claim(c) for c in outcome.claims),
         "</table></div>",
     ]
@@ -125,7 +125,7 @@ def _table(table: Table) -> list[str]:
     ]
     return [
         f'<div class="wide"><table><caption>{_words(table.title)}</caption>',
-        _head(table.head),
+        _head(table.head, n_words=1),
         *rows,
         "</table></div>",
     ]
@@ -138,8 +138,13 @@ def _list(title: str, notes: Sequence[str]) -> list[str]:
     return [*heading, "<ul>", *(f"<li>{_words(note)}</li>" for note in notes), "</ul>"]
 
 
-def _head(cells: Sequence[str]) -> str:
-    return "<tr>" + "".join(f'<th scope="col">{_words(cell)}</th>' for cell in cells) + "</tr>"
+def _head(cells: Sequence[str], *, n_words: int) -> str:
+    """Give the first row of a table whose first columns are words and whose others are figures."""
+    looks = [""] * n_words + [' class="n"'] * (len(cells) - n_words)
+    found = (
+        f'<th scope="col"{look}>{_words(c)}</th>' for c, look in zip(cells, looks, strict=True)
+    )
+    return "<tr>" + "".join(found) + "</tr>"
 
 
 def _words(text: str) -> str:

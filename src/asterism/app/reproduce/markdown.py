@@ -31,7 +31,14 @@ def page_text(done: Sequence[Made], missing: Sequence[str], effort: Effort, imag
     lines += [contents_text(done), "## When something counts as reproduced", ""]
     lines += [f"- **{name}**: {text}" for name, text in RULES.items()]
     for made in done:
-        lines += ["", f'<a id="{made.name}"></a>', "", f"## {made.part.title}", "", part_text(made, images).rstrip()]
+        lines += [
+            "",
+            f'<a id="{made.name}"></a>',
+            "",
+            f"## {made.part.title}",
+            "",
+            part_text(made, images).rstrip(),
+        ]
     return "\n".join([*lines, ""])
 
 
@@ -104,4 +111,3 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]], n_words: int) -> 
 
 def _row(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-

@@ -48,7 +48,9 @@ def run(effort: Effort, tell: Tell) -> Outcome:
         n_hidden += int(is_hidden.sum())
         shares.append(100 * float(is_hidden.mean()))
         plain = [polygons[0], _moved(polygons[0], 0.6)]
-        painted_wrong += int((camera.paint(plain).surface != camera.depth_image(plain).surface).sum())
+        painted_wrong += int(
+            (camera.paint(plain).surface != camera.depth_image(plain).surface).sum()
+        )
         tell((seed + 1) / effort.seeds)
     ring = _ring()
     painting, buffered = camera.paint(ring), camera.depth_image(ring)
@@ -102,12 +104,16 @@ def _polygons(rng: np.random.Generator) -> list[am.Polygon]:
 
 
 def _moved(polygon: am.Polygon, by: float) -> am.Polygon:
-    return am.Polygon(corners=np.asarray(polygon.corners).reshape(-1, 3) + [0.1, by, 0.05])
+    return am.Polygon(
+        corners=np.asarray(polygon.corners).reshape(-1, 3) + np.array([0.1, by, 0.05])
+    )
 
 
 def _ring() -> list[am.Polygon]:
     """Three bars, each in front of the next, about the axis of sight."""
-    bar = np.array([[-0.9, -0.25, -0.55], [0.9, 0.25, -0.55], [0.9, 0.25, -0.2], [-0.9, -0.25, -0.2]])
+    bar = np.array(
+        [[-0.9, -0.25, -0.55], [0.9, 0.25, -0.55], [0.9, 0.25, -0.2], [-0.9, -0.25, -0.2]]
+    )
     bars: list[am.Polygon] = []
     for k in range(3):
         c, s = np.cos(2 * np.pi * k / 3), np.sin(2 * np.pi * k / 3)
@@ -132,7 +138,9 @@ def _draw(camera: am.Camera) -> Figure:
     curtains = [
         am.Polygon(corners=np.array([[-1, -0.9, -0.4], [0.1, -0.9, -0.6], [0.0, -0.9, 0.7]])),
         am.Polygon(
-            corners=np.array([[0.4, -0.3, -0.7], [1.2, -0.3, -0.5], [1.1, -0.3, 0.5], [0.5, -0.3, 0.3]])
+            corners=np.array(
+                [[0.4, -0.3, -0.7], [1.2, -0.3, -0.5], [1.1, -0.3, 0.5], [0.5, -0.3, 0.3]]
+            )
         ),
     ]
     points = np.column_stack(
@@ -166,8 +174,8 @@ PART = Part(
     title="The camera: what hides points",
     section="§3.4",
     covers="figure 3.7, algorithm 1, the painter's algorithm",
-    did="Proposes polygons that hide points: the painter's algorithm, which fails when they overlap "
-    "in a circle; the z-buffer; and the z-test only at the pixels where a point falls, by which "
+    did="Proposes polygons that hide points: the painter's algorithm, which fails when they "
+    "overlap in a circle; the z-buffer; and the z-test only at the pixels where a point falls, by which "
     "polygons act as invisible curtains.",
     run=run,
 )

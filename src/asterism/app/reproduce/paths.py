@@ -50,10 +50,12 @@ def draw_paths(
         axes: Any = figure.add_subplot(rows, min(columns, len(shown)), i + 1, projection="3d")
         _draw(axes, tracks, n_known)
         told = under[i] if under else f"{np.count_nonzero(tracks.lengths)} tracks"
-        axes.set_title(title, fontsize=9, color=INK, pad=12)
-        axes.text2D(0.5, 1.0, told, transform=axes.transAxes, fontsize=8, color=CLUTTER, ha="center")
+        axes.set_title(title, fontsize=9, color=INK, pad=16)
+        axes.text2D(
+            0.5, 1.02, told, transform=axes.transAxes, fontsize=8, color=CLUTTER, ha="center"
+        )
     # 3-D axes leave wide margins, which are let run out of the picture.
-    figure.subplots_adjust(left=0.0, right=1.0, bottom=0.0, top=0.88, wspace=0.0, hspace=0.2)
+    figure.subplots_adjust(left=0.0, right=1.0, bottom=0.0, top=0.86, wspace=0.0, hspace=0.2)
     return figure
 
 
@@ -74,5 +76,5 @@ def _draw(axes: Any, tracks: am.Tracks, n_known: int) -> None:
     marked = d.points[tracks.labels >= 0] if (tracks.labels >= 0).any() else d.points
     low, high = marked.min(axis=0), marked.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.25)
+    axes.set_box_aspect(high - low, zoom=1.12)
     axes.set_axis_off()

@@ -68,9 +68,7 @@ def run(effort: Effort, tell: Tell) -> Outcome:
 
 
 def _walk(seed: int) -> am.Tracks:
-    return am.simulate.walk(
-        n_markers=N_MARKERS, frames=FRAMES, seed=seed, stride=STRIDE, pull=PULL
-    )
+    return am.simulate.walk(n_markers=N_MARKERS, frames=FRAMES, seed=seed, stride=STRIDE, pull=PULL)
 
 
 def _draw() -> Figure:
@@ -100,8 +98,9 @@ def _side(
         order = np.argsort(distance[i])
         colour = CYCLE[i] if names.isupper() else INK
         for rank, j in enumerate(order):
-            axes.plot(*np.array([place, whom[j]]).T, color=CLUTTER, linewidth=2.2 / (1 + rank) ** 1.5,
-                      alpha=0.7, zorder=0)  # fmt: skip
+            width = 2.2 / (1 + rank) ** 1.5
+            line = np.array([place, whom[j]]).T
+            axes.plot(*line, color=CLUTTER, linewidth=width, alpha=0.7, zorder=0)
         axes.plot(*place, "o" if names.islower() else "s", color=colour)
         told = f"{names[i]}: " + " ".join(others[j] for j in order)
         axes.annotate(told, place, xytext=(8, 5), textcoords="offset points", color=colour)

@@ -53,7 +53,8 @@ def run(effort: Effort, tell: Tell) -> Outcome:
               exact(turned, 1e-12, "greatest difference in metres", cases)),
     ]  # fmt: skip
     rows = [["K_u = 1 / pixel width (pixels a metre)", f"{1 / PIXEL_M:g}", f"{right:g} px"],
-            ["K_u = pixel width (as the report says)", f"{PIXEL_M:g}", f"{wrong:g} px"]]  # fmt: skip
+            ["K_u = pixel width (as the report says)", f"{PIXEL_M:g}",
+             f"{wrong:g} px"]]  # fmt: skip
     about = "A point 1 m beside the axis, 4 m away, f = 8 mm, pixels of 5 µm"
     return Outcome(
         claims=claims,
@@ -112,7 +113,7 @@ def _draw() -> Figure:
     K = am.intrinsics(focal_length=FOCAL_M / PIXEL_M, principal_point=(639.5, 511.5))
     camera = am.Camera.look_at((2.2, -2.6, 1.2), (0, 0, 0), K=K, size_px=SIZE)
     figure = Figure(figsize=(11, 4.4), dpi=110)
-    axes: Any = figure.add_axes((-0.04, -0.12, 0.58, 1.2), projection="3d")
+    axes: Any = figure.add_axes((0.0, -0.1, 0.56, 1.2), projection="3d")
     # The image plane is drawn a metre before the centre, or nothing would be seen of it.
     rays = camera.rays(camera.project(points).pixels)
     on_plane = camera.center + rays / (rays @ camera.axis)[:, None]
@@ -128,15 +129,16 @@ def _draw() -> Figure:
         axes.plot(*np.array([camera.center, p]).T, color=CLUTTER, linewidth=0.5)
     axes.plot(*frame.T, color=INK, linewidth=1.0)
     axes.scatter(*camera.center, color=INK, s=18)
-    axes.text(*(camera.center + [0, 0, 0.16]), "optical centre", color=INK, fontsize=9)
+    axes.text(*(camera.center + np.array([0, 0, 0.16])), "optical centre", color=INK, fontsize=9)
     everything = np.vstack([points, frame, camera.center])
     low, high = everything.min(axis=0), everything.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.1)
-    axes.view_init(elev=22, azim=-150)
+    axes.set_box_aspect(high - low, zoom=0.95)
+    axes.view_init(elev=18, azim=-95)
     axes.set_axis_off()
     flat = figure.add_axes((0.6, 0.13, 0.38, 0.76))
-    plot_image(camera, camera.project(points), connections=scene.connections, ax=flat)
+    plot_image(camera, camera.project(points), connections=scene.connections,
+               colours=CYCLE[0], ax=flat)  # fmt: skip
     flat.set_title("the image: origin top left", fontsize=10, color=INK, loc="left")
     return figure
 

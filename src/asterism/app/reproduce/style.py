@@ -6,7 +6,8 @@ from asterism.view.style import CLUTTER, GRID, INK
 
 __all__ = ["STYLE"]
 
-STYLE = """
+STYLE = (
+    """
 :root { color-scheme: light dark; --paper: #ffffff; --ink: #222222; --quiet: #666666;
   --line: #dddddd; --shade: #f5f5f5; --yes: #00694b; --no: #a34700; --link: #005b91; }
 @media (prefers-color-scheme: dark) {
@@ -28,13 +29,14 @@ a { color: var(--link); }
 table { border-collapse: collapse; font-size: .875rem; line-height: 1.4;
   font-variant-numeric: tabular-nums; }
 caption { text-align: left; padding-bottom: .3rem; font-size: .9rem; }
-th, td { text-align: left; vertical-align: top; padding: .3rem 1rem .3rem 0;
+th, td { text-align: left; vertical-align: top; padding: .3rem 1.2rem .3rem 0;
   border-bottom: 1px solid var(--line); }
 th { font-weight: 600; color: var(--quiet); vertical-align: bottom; }
-th + th, td.n { min-width: 3.2rem; }
+td.n, th.n { text-align: right; }
 td.n { white-space: nowrap; }
+th.n { max-width: 7rem; }
 .claims td:last-child { min-width: 16rem; }
-.claims td:nth-child(n+2):nth-child(-n+4) { white-space: nowrap; }
+.claims td:nth-child(n+2):nth-child(-n+4) { min-width: 5.5rem; }
 .yes { color: var(--yes); } .no { color: var(--no); }
 dt { font-weight: 600; } dd { margin: 0 0 .5rem; }
 code { background: var(--shade); padding: .05em .3em; border-radius: 3px; font-size: .92em; }
@@ -49,5 +51,8 @@ svg { fill: var(--ink); }
   svg [fill="GRID"] { fill: var(--line); } svg [stroke="GRID"] { stroke: var(--line); }
   svg [fill="CLUTTER"] { fill: var(--quiet); } svg [stroke="CLUTTER"] { stroke: var(--quiet); }
 }
-""".replace("INK", INK.lower()).replace("GRID", GRID.lower()).replace("CLUTTER", CLUTTER.lower())
+""".replace("INK", INK.lower())
+    .replace("GRID", GRID.lower())
+    .replace("CLUTTER", CLUTTER.lower())
+)
 """Colours that pictures use for paper, ink and grids follow the page."""

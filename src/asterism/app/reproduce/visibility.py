@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from asterism.app.reproduce.part import Effort, Tell
 
-SIZE = (1280, 1024)
+SIZE = (1024, 1280)
 FAR = 6.0
 N_POINTS = 2000
 REASONS = {
@@ -35,7 +35,7 @@ def run(effort: Effort, tell: Tell) -> Outcome:
     counts = dict.fromkeys(REASONS, 0)
     for seed in range(effort.seeds):
         rng = np.random.default_rng(seed)
-        camera = _camera(rng.normal(0, 1, 3) + [0, -2, 0], rng.normal(0, 0.5, 3))
+        camera = _camera(rng.normal((0, -2, 0), 1, 3), rng.normal(0, 0.5, 3))
         points = rng.normal(0, 4, (N_POINTS, 3))
         reason = camera.project(points).reason
         by_hand = _by_hand(camera, points)
@@ -58,7 +58,7 @@ def run(effort: Effort, tell: Tell) -> Outcome:
 
 
 def _camera(place: NDArray[np.float64], target: NDArray[np.float64]) -> am.Camera:
-    K = am.intrinsics(focal_length=900.0, principal_point=(639.5, 511.5))
+    K = am.intrinsics(focal_length=1100.0, principal_point=(511.5, 639.5))
     return am.Camera.look_at(place, target, K=K, size_px=SIZE, far=FAR)
 
 
@@ -79,14 +79,14 @@ def _by_hand(camera: am.Camera, points: NDArray[np.float64]) -> NDArray[np.int64
 
 
 def _draw() -> Figure:
-    scene = am.simulate.person(frames=60, seed=1, activity="run")
+    scene = am.simulate.person(frames=60, seed=1, activity="walk")
     points = scene.positions()[40]
     colours = [CYCLE[(c - 1) % len(CYCLE)] for c in scene.colours]
     middle = points.mean(axis=0)
-    panels = new_panels(1, 2, width=11.0, height=4.6)
+    panels = new_panels(1, 2, width=9.0, height=5.6)
     for axes, (title, off) in zip(
         panels,
-        (("whole", [2.6, -2.2, 0.6]), ("near: some fall outside the image", [1.0, -0.9, 0.5])),
+        (("whole", [0.3, -2.1, 0.2]), ("near: some fall outside the image", [1.1, -0.6, 0.3])),
         strict=True,
     ):
         camera = _camera(middle + off, middle)
@@ -106,8 +106,8 @@ PART = Part(
     title="The camera: visibility and the picture",
     section="§3.3",
     covers="the three reasons, and the plot with a connection matrix",
-    did="Marks points as not visible that fall outside the image, lie behind the image plane or are "
-    "too far, and plots the rest with the lines and colours of a connection matrix.",
+    did="Marks points as not visible that fall outside the image, lie behind the image plane or "
+    "are too far, and plots the rest with the lines and colours of a connection matrix.",
     run=run,
     chosen=(f"“Too far” is {FAR:g} m along the optical axis.",),
 )

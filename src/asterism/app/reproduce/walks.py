@@ -140,5 +140,10 @@ def row(name: str, found: Scores) -> list[str]:
         spread(found.tracks, 1),
         spread(found.missing),
         spread(found.idf1, 3),
-        f"{found.nats.mean():+.1f}" if moves else "0",
+        _nats(found.nats.mean()) if moves else "0",
     ]
+
+
+def _nats(value: float) -> str:
+    text = f"{value:+.1f}"
+    return text.replace("-", "−") if float(text) else "0.0"
