@@ -88,7 +88,8 @@ def reproduce(
         if done:
             write_pages(done, missing, effort, out)
         if missing:
-            log.warning("not made: %s; what is finished is in %s", ", ".join(missing), out)
+            where = f"what is finished is in {out}" if done else "nothing is finished"
+            log.warning("not made: %s; %s", ", ".join(missing), where)
     _tell(done, out, quiet=quiet, json=json)
 
 

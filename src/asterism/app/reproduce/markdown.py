@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from asterism.app.reproduce.pages import Made
     from asterism.app.reproduce.part import Effort
 
-__all__ = ["contents_text", "page_text", "part_text", "times_text"]
+__all__ = ["contents_text", "page_text", "part_text", "rules_text", "times_text"]
 
 
 def page_text(done: Sequence[Made], missing: Sequence[str], effort: Effort, images: str) -> str:
@@ -28,8 +28,7 @@ def page_text(done: Sequence[Made], missing: Sequence[str], effort: Effort, imag
     lines = [f"# {TITLE}", "", about(effort), ""]
     if missing:
         lines += [f"**{stopped(missing)}**", ""]
-    lines += [contents_text(done), "## When something counts as reproduced", ""]
-    lines += [f"- **{name}**: {text}" for name, text in RULES.items()]
+    lines += [contents_text(done), "## When something counts as reproduced", "", rules_text()]
     for made in done:
         lines += [
             "",
@@ -54,6 +53,11 @@ def contents_text(done: Sequence[Made]) -> str:
         for made in done
     ]
     return "\n".join([*_table(CONTENTS_HEAD, rows, 3), "", DRAWN, ""])
+
+
+def rules_text() -> str:
+    """Give the rules by which verdicts are found."""
+    return "\n".join(f"- **{name}**: {text}" for name, text in RULES.items())
 
 
 def part_text(made: Made, images: str) -> str:
@@ -84,15 +88,18 @@ def part_text(made: Made, images: str) -> str:
 
 def times_text(done: Sequence[Made]) -> str:
     """Give the times, which differ from run to run."""
-    rows = [
-        [t.about, t.theirs, f"{t.seconds:.3g} seconds"]
-        for made in done
-        for t in made.outcome.timings
-    ]
+    rows = [[t.about, t.theirs, _time(t.seconds)] for made in done for t in made.outcome.timings]
     if not rows:
         return "Nothing was timed.\n"
     head = ("", "the report (Core 2 Duo, MATLAB)", "ours, on one core")
     return "\n".join([*_table(head, rows, 1), ""])
+
+
+def _time(seconds: float) -> str:
+    for unit, name in ((1.0, "seconds"), (1e-3, "ms"), (1e-6, "µs")):
+        if seconds >= unit:
+            return f"{seconds / unit:.3g} {name}"
+    return f"{seconds:.1g} seconds"
 
 
 def _mark(holds: bool) -> str:

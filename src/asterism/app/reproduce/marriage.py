@@ -151,6 +151,7 @@ def _draw(counts: dict[int, NDArray[np.float64]], worst_of: dict[int, int]) -> F
     axes.plot(n, n**2, ":", color=CYCLE[3], label="n²")
     axes.set_xscale("log")
     axes.set_yscale("log")
+    axes.minorticks_off()
     axes.set_xlabel("n", color=INK)
     axes.set_title("proposals", fontsize=10, color=INK, loc="left")
     axes.legend(frameon=False, fontsize=8, labelcolor=INK)

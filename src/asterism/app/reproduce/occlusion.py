@@ -175,7 +175,7 @@ PART = Part(
     section="§3.4",
     covers="figure 3.7, algorithm 1, the painter's algorithm",
     did="Proposes polygons that hide points: the painter's algorithm, which fails when they "
-    "overlap in a circle; the z-buffer; and the z-test only at the pixels where a point falls, by which "
-    "polygons act as invisible curtains.",
+    "overlap in a circle; the z-buffer; and the z-test only at the pixels where a point falls, by "
+    "which polygons act as invisible curtains.",
     run=run,
 )

@@ -66,6 +66,7 @@ def write_pages(done: Sequence[Made], missing: Sequence[str], effort: Effort, ou
         for picture in made.outcome.pictures
     }
     write_text(out / PARTS / "contents.md", markdown.contents_text(done))
+    write_text(out / PARTS / "rules.md", markdown.rules_text() + "\n")
     write_text(out / MARKDOWN, markdown.page_text(done, missing, effort, IMAGES))
     write_text(out / HTML, html.page_text(done, missing, effort, pictures))
     write_text(out / TIMES, markdown.times_text(done))

@@ -73,6 +73,8 @@ def _draw(axes: Any, tracks: am.Tracks, n_known: int) -> None:
             colour, used = CYCLE[used % len(CYCLE)], used + 1
         if len(members):
             axes.plot(*d.points[members].T, color=colour, linewidth=1.0)
+            # The last point is marked, or who stands still would not be seen.
+            axes.plot(*d.points[members[-1:]].T, "o", color=colour, markersize=2.5)
     marked = d.points[tracks.labels >= 0] if (tracks.labels >= 0).any() else d.points
     low, high = marked.min(axis=0), marked.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 AT = (1, 10, 100, 1000)
 N_AXES = 3
 SETTINGS = ((0.01, 1.0), (0.01, 0.9), (0.01, 0.5), (1e-4, 1.0), (1e-4, 0.5))
-LIVES, QUICK_LIVES = 200_000, 20_000
+LIVES, QUICK_LIVES = 200_000, 10_000
 
 
 def run(effort: Effort, tell: Tell) -> Outcome:

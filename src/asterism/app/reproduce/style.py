@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from asterism.view.style import CLUTTER, GRID, INK
+from asterism.view.style import CLUTTER, CYCLE, GRID, INK
 
 __all__ = ["STYLE"]
 
@@ -48,10 +48,12 @@ svg { fill: var(--ink); }
   svg [fill="#ffffff"] { fill: var(--paper); } svg [stroke="#ffffff"] { stroke: var(--paper); }
   svg [fill="INK"], svg [fill="#000000"] { fill: var(--ink); }
   svg [stroke="INK"], svg [stroke="#000000"] { stroke: var(--ink); }
+  svg [fill="DEEP"] { fill: #3a97d6; } svg [stroke="DEEP"] { stroke: #3a97d6; }
   svg [fill="GRID"] { fill: var(--line); } svg [stroke="GRID"] { stroke: var(--line); }
   svg [fill="CLUTTER"] { fill: var(--quiet); } svg [stroke="CLUTTER"] { stroke: var(--quiet); }
 }
 """.replace("INK", INK.lower())
+    .replace("DEEP", CYCLE[0].lower())
     .replace("GRID", GRID.lower())
     .replace("CLUTTER", CLUTTER.lower())
 )
