@@ -85,7 +85,7 @@ def _three_tracks() -> NDArray[np.float64]:
     middle = np.stack([0.06 * t, 0.25 * np.sin(0.35 * t)], axis=1)
     arm = 0.15 * np.stack([np.cos(0.9 + 0.18 * t), np.sin(0.9 + 0.18 * t)], axis=1)
     free = np.stack([0.05 + 0.055 * t, -0.3 + 0.002 * t**2 + 0.05 * np.sin(t)], axis=1)
-    places: NDArray[np.float64] = np.stack([middle + arm, middle - arm, free], axis=1)
+    places: NDArray[Any] = np.stack([middle + arm, middle - arm, free], axis=1)
     places += rng.normal(0, NOISE, places.shape)
     places[WINDOW // 2, 2] = np.nan  # τ_c misses a measurement
     return places

@@ -30,14 +30,7 @@ def page_text(done: Sequence[Made], missing: Sequence[str], effort: Effort, imag
         lines += [f"**{stopped(missing)}**", ""]
     lines += [contents_text(done), "## When something counts as reproduced", "", rules_text()]
     for made in done:
-        lines += [
-            "",
-            f'<a id="{made.name}"></a>',
-            "",
-            f"## {made.part.title}",
-            "",
-            part_text(made, images).rstrip(),
-        ]
+        lines += ["", part_text(made, images).rstrip()]
     return "\n".join([*lines, ""])
 
 
@@ -61,9 +54,16 @@ def rules_text() -> str:
 
 
 def part_text(made: Made, images: str) -> str:
-    """Give what a part found, without its heading."""
+    """Give a part, with its heading and an anchor of its name."""
     part, outcome = made.part, made.outcome
-    lines = [f"*{part.section}: {part.covers}.* {part.did}", ""]
+    lines = [
+        f'<a id="{made.name}"></a>',
+        "",
+        f"## {part.title}",
+        "",
+        f"*{part.section}: {part.covers}.* {part.did}",
+        "",
+    ]
     rows = [
         [c.about, c.theirs, c.ours, c.floor,
          f"{_mark(c.verdict.holds)}, because {c.verdict.because} ({c.verdict.rule})"]

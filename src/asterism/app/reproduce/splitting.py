@@ -28,17 +28,17 @@ def run(effort: Effort, tell: Tell) -> Outcome:
     lives = (QUICK_LIVES if effort.is_quick else LIVES) // effort.seeds
     last = AT[-2] if effort.is_quick else AT[-1]
     at = [k for k in AT if k <= last]
+    each: list[NDArray[np.float64]] = []
+    for seed in range(effort.seeds):
+        each.append(_lost(lives, last, seed))
+        tell((seed + 1) / effort.seeds)
+    found = np.stack(each, axis=2)  # (settings, now or so far, seeds, frames)
     rows: list[list[str]] = []
-    found: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
-    for i, (alpha, fading) in enumerate(SETTINGS):
-        each = [_lost(alpha, fading, lives, last, seed) for seed in range(effort.seeds)]
-        now, so_far = np.array([a for a, _ in each]), np.array([b for _, b in each])
-        found.append((now, so_far))
-        for what, shares in (("in this frame", now), ("up to it", so_far)):
+    for (alpha, fading), both in zip(SETTINGS, found, strict=True):
+        for what, shares in zip(("in this frame", "up to it"), both, strict=True):
             cells = [f"{100 * shares[:, k - 1].mean():.2f} %" for k in at]
             rows.append([f"α = {100 * alpha:g} %, ρ = {fading:g}, {what}", *cells])
-        tell((i + 1) / len(SETTINGS))
-    now, so_far = (100 * shares for shares in found[0])
+    now, so_far = 100 * found[0]
     claims = [
         Claim(f"true tracks rejected, {when}", "1 %", f"{spread(shares)} %",
               within(1, shares, step=1))
@@ -61,24 +61,30 @@ def run(effort: Effort, tell: Tell) -> Outcome:
     )
 
 
-def _lost(
-    alpha: float, fading: float, lives: int, last: int, seed: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the share beyond the limit in each frame, and lost up to it, shape (last,) each."""
+def _lost(lives: int, last: int, seed: int) -> NDArray[np.float64]:
+    """Give the shares beyond the limit in each frame and lost up to it, of every setting.
+
+    Returns
+    -------
+    ndarray, shape (settings, 2, last)
+        All settings are tried on the same lives.
+    """
     rng = np.random.default_rng(seed)
-    limits = chi2_limits(alpha, N_AXES, fading)
-    total = np.zeros(lives)
-    is_lost = np.zeros(lives, dtype=bool)
-    now, so_far = np.empty((2, last))
+    limits = [chi2_limits(alpha, N_AXES, fading) for alpha, fading in SETTINGS]
+    total = np.zeros((len(SETTINGS), lives))
+    is_lost = np.zeros((len(SETTINGS), lives), dtype=bool)
+    shares = np.empty((len(SETTINGS), 2, last))
     for k in range(last):
-        total = fading * total + rng.chisquare(N_AXES, lives)
-        exceeds = total > limits[min(k, len(limits) - 1)]
-        is_lost |= exceeds
-        now[k], so_far[k] = exceeds.mean(), is_lost.mean()
-    return now, so_far
+        drawn = rng.chisquare(N_AXES, lives)
+        for i, (_, fading) in enumerate(SETTINGS):
+            total[i] = fading * total[i] + drawn
+            exceeds = total[i] > limits[i][min(k, len(limits[i]) - 1)]
+            is_lost[i] |= exceeds
+            shares[i, :, k] = exceeds.mean(), is_lost[i].mean()
+    return shares
 
 
-def _draw(found: list[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Figure:
+def _draw(found: NDArray[np.float64]) -> Figure:
     axes = new_axes(height=3.8)
     for (alpha, fading), (_, so_far), colour in zip(SETTINGS, found, CYCLE, strict=False):
         shares = 100 * so_far.mean(axis=0)
