@@ -99,7 +99,7 @@ def _time(seconds: float) -> str:
     for unit, name in ((1.0, "seconds"), (1e-3, "ms"), (1e-6, "µs")):
         if seconds >= unit:
             return f"{seconds / unit:.3g} {name}"
-    return f"{seconds:.1g} seconds"
+    return f"{seconds / 1e-6:.2g} µs"
 
 
 def _mark(holds: bool) -> str:

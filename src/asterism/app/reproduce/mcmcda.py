@@ -148,7 +148,7 @@ def _notes(floor: dict[int, Scores], ours: dict[tuple[int, int], Scores]) -> lis
         "The floor is the truth, broken at every gap that d̄ does not span: two misses on end "
         "happen to every clip, and what comes after them is a new track to any tracker that keeps "
         f"to d̄ = 2. So {floor[2].tracks.mean():.1f} tracks and {floor[2].strict.mean():.1f} % "
-        "wrong, in the sense in which the report counts, are the best that d̄ = 2 allows; with "
+        "wrong, in the sense in which the report counts, are what d̄ = 2 allows; with "
         f"d̄ = 4 it is {floor[4].tracks.mean():.1f} tracks and {floor[4].strict.mean():.1f} %.",
         "With few moves the report's chain, as it is here, leaves detections without a label "
         "where the report's gave wrong ones.",

@@ -6,7 +6,6 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
 
 import asterism as am
 from asterism.app.reproduce.part import Claim, Outcome, Part, Picture, Table, Timing
@@ -42,7 +41,7 @@ def run(effort: Effort, tell: Tell) -> Outcome:
         hides = depth.hides(seen)
         seconds["z-buffer"] += time.perf_counter() - start
         is_hidden = seen.reason == am.Reason.HIDDEN
-        is_edge = _at_edges(depth.surface, seen.pixels)
+        is_edge = _at_edges(camera, polygons, seen)
         differ += int(((hides != is_hidden) & ~is_edge).sum())
         at_edges += int(((hides != is_hidden) & is_edge).sum())
         n_hidden += int(is_hidden.sum())
@@ -85,8 +84,8 @@ def run(effort: Effort, tell: Tell) -> Outcome:
         pictures=[Picture("report_occlusion", CAPTION, _draw(_camera(QUICK_SIZE)))],
         timings=timings,
         notes=(
-            "At an edge the z-buffer knows the nearest pixel's centre, the ray knows the point "
-            "itself: there, and only there, they may differ.",
+            "The z-buffer knows the nearest pixel's centre, the ray knows the point itself: where "
+            "a pixel about the point is hidden in part, at an edge or on a slope, they may differ.",
         ),
     )
 
@@ -122,12 +121,16 @@ def _ring() -> list[am.Polygon]:
     return bars
 
 
-def _at_edges(surface: NDArray[np.int32], pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Say which points have a pixel with another surface beside theirs."""
-    is_edge = maximum_filter(surface, 3) != minimum_filter(surface, 3)
-    h, w = surface.shape
-    u, v = np.rint(np.nan_to_num(pixels)).astype(int).T
-    return is_edge[np.clip(v, 0, h - 1), np.clip(u, 0, w - 1)]
+def _at_edges(
+    camera: am.Camera, polygons: list[am.Polygon], seen: am.Projection
+) -> NDArray[np.bool_]:
+    """Say which points are finer than pixels: at their depth not all of their pixel is hidden."""
+    is_in: NDArray[np.bool_] = np.isfinite(seen.pixels[:, 0])
+    steps = np.array([(u, v) for u in (-1, -0.5, 0, 0.5, 1) for v in (-1, -0.5, 0, 0.5, 1)])
+    rays = camera.rays(np.where(is_in[:, None], seen.pixels, 0.0)[:, None] + steps)
+    beside = camera.center + rays * (seen.depth[:, None] / (rays @ camera.axis))[..., None]
+    blocked = camera.project(beside, polygons).hidden_by >= 0
+    return is_in & (blocked.any(axis=1) != blocked.all(axis=1))
 
 
 def _draw(camera: am.Camera) -> Figure:

@@ -14,7 +14,7 @@ __all__ = ["RULES", "Verdict", "alike", "differs", "exact", "spread", "within"]
 RULES = {
     "spread": "a figure of the report is that of one run. It is reproduced if it lies between the "
     "2.5 % and the 97.5 % quantile of ours over the seeds, give or take half a unit of the last "
-    "digit printed.",
+    "digit printed if it was rounded; “all correct” was not.",
     "exact": "a statement of mathematics is reproduced if it fails in none of the cases tried, or "
     "if the greatest error stays below the one named.",
     "order": "that one thing does better than another is reproduced if their difference, seed by "
@@ -54,7 +54,7 @@ def within(theirs: float, ours: ArrayLike, *, step: float, digits: int = 2) -> V
     ours : array_like, shape (seeds,)
         Ours, one a seed.
     step : float
-        One unit of the last digit printed.
+        One unit of the last digit printed; 0 for a figure that was not rounded.
     digits : int
         After the point, in the words.
     """

@@ -28,7 +28,7 @@ def about(effort: Effort) -> str:
         f"E. D'Elia, C. Tavian, A. Zugno: Simulation and Multi-Target Tracking, Padua 2010. Its "
         f"figures beside ours, from {kind} with {effort.seeds} seeds. “±” is a standard deviation "
         "over the seeds. The floor is the best that these data allow, where that is not "
-        "everything."
+        "everything. Times differ from run to run and are in `times.md`."
     )
 
 
