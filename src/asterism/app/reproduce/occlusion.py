@@ -155,7 +155,7 @@ def _draw(camera: am.Camera) -> Figure:
                ax=panels[0])  # fmt: skip
     plot_depth(camera.depth_image(curtains), ax=panels[1])
     ring = _ring()
-    colours = ListedColormap(["white", *CYCLE[:3]])
+    colours = ListedColormap(["none", *CYCLE[:3]])  # clear: paper may be dark
     for axes, image in zip(panels[2:], (camera.depth_image(ring), camera.paint(ring)), strict=True):
         axes.imshow(image.surface, cmap=colours, vmin=-1, vmax=2, interpolation="nearest")
         axes.set_axis_off()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from asterism.view.groups import ALONE
 from asterism.view.style import CLUTTER, CYCLE, GRID, INK
 
 __all__ = ["STYLE"]
@@ -49,11 +50,13 @@ svg { fill: var(--ink); }
   svg [fill="INK"], svg [fill="#000000"] { fill: var(--ink); }
   svg [stroke="INK"], svg [stroke="#000000"] { stroke: var(--ink); }
   svg [fill="DEEP"] { fill: #3a97d6; } svg [stroke="DEEP"] { stroke: #3a97d6; }
+  svg [fill="ALONE"] { fill: #55585e; } svg [stroke="ALONE"] { stroke: #55585e; }
   svg [fill="GRID"] { fill: var(--line); } svg [stroke="GRID"] { stroke: var(--line); }
   svg [fill="CLUTTER"] { fill: var(--quiet); } svg [stroke="CLUTTER"] { stroke: var(--quiet); }
 }
 """.replace("INK", INK.lower())
     .replace("DEEP", CYCLE[0].lower())
+    .replace("ALONE", ALONE.lower())
     .replace("GRID", GRID.lower())
     .replace("CLUTTER", CLUTTER.lower())
 )
