@@ -35,9 +35,10 @@ bench: $(VENV)/.bench
 # The tables of scenes and of captures in the docs; the second needs the real captures beside the
 # project.
 tables: $(VENV)/.bench
-	$(BIN)/python benchmarks/report_smp.py --markdown docs/tables/report_smp.md
-	$(BIN)/python benchmarks/chi2_test.py --markdown docs/tables/chi2_test.md
-	$(BIN)/python benchmarks/report_mcmcda.py --markdown docs/tables/report_mcmcda.md
+	$(BIN)/asterism reproduce --overwrite --out build/reproduction
+	for part in build/reproduction/parts/*.md build/reproduction/times.md; do \
+	  cp $$part docs/tables/report_$$(basename $$part); done
+	cp build/reproduction/images/*.svg docs/images
 	$(BIN)/python benchmarks/crossing.py --markdown docs/tables/crossing.md \
 	  --figure docs/images/reliability.png
 	$(BIN)/python benchmarks/several_frames.py --markdown docs/tables/several_frames.md

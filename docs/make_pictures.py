@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import asterism as am
-from asterism import _engine
 from asterism.view import plot_coverage, plot_image, plot_lens, plot_rig
 from asterism.view.style import CYCLE
 
@@ -37,68 +35,6 @@ def crossing(path: Path) -> None:
         low, high = marked.min(axis=0), marked.max(axis=0)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
         axes.set_box_aspect(high - low, zoom=1.12)
-    figure.savefig(path)
-
-
-def proposals(path: Path) -> None:
-    """Draw how many proposals a stable marriage takes, beside n log n and n²."""
-    rng = np.random.default_rng(1)
-    sizes = np.unique(np.geomspace(4, 1024, 13).astype(int))
-    counts: list[list[int]] = []
-    for n in sizes:
-        first = np.arange(n + 1, dtype=np.int64) * n
-        counts.append([])
-        for _ in range(40):
-            lists = np.concatenate([rng.permutation(n) for _ in range(n)]).astype(np.int32)
-            counts[-1].append(_engine.marry(first, lists, rng.random(n * n), int(n))[1])
-    figure = Figure(figsize=(7, 4.2), dpi=110, layout="constrained")
-    axes: Any = figure.subplots()
-    harmonic = np.array([(1 / np.arange(1, n + 1)).sum() for n in sizes])
-    axes.fill_between(
-        sizes, [min(c) for c in counts], [max(c) for c in counts], color=CYCLE[0], alpha=0.25, lw=0,
-        label="least to most of 40 runs",
-    )  # fmt: skip
-    axes.plot(sizes, [np.mean(c) for c in counts], "o-", color=CYCLE[0], label="mean")
-    axes.plot(sizes, sizes * harmonic, "--", color=CYCLE[1], label="$n (1 + 1/2 + … + 1/n)$")
-    axes.plot(sizes, sizes**2, ":", color="#666666", label="$n^2$, the worst case")
-    axes.set(xscale="log", yscale="log", xlabel="tracks and detections, n", ylabel="proposals")
-    axes.set_title("proposals until a stable marriage, random lists", fontsize=11, loc="left")
-    axes.legend(frameon=False)
-    axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path)
-
-
-def perfect_data(path: Path) -> None:
-    """Draw figure 4.3 of the 2010 report: 30 moves a frame on a cube without any disturbance."""
-    scene = am.simulate.cube(frames=100, seed=1)
-    truth = am.simulate.sense(scene, noise=0.005, seed=1)
-    model = am.estimate_model(truth.detections).model
-    population = dataclasses.replace(model.population, max_speed=0.15, max_gap=2)
-    model = dataclasses.replace(model, population=population)
-    report: dict[str, Any] = {
-        "proposal": "uniform", "move_weights": "report", "first_rules": True, "assignment": False,
-        "groups": "whole", "confidence": 0, "end_odds": 1, "at_doubts": 0, "moves": 30 / 8,
-    }  # fmt: skip
-    ways = {
-        "the report's original: true Metropolis": am.MCMCDA(**report),
-        "the report's fixed: ascent": am.MCMCDA(**report, chain="ascent"),
-        "here, as many moves": am.MCMCDA(moves=30 / 8),
-    }
-    figure = Figure(figsize=(11, 3.9), dpi=110)
-    for i, (title, method) in enumerate(ways.items()):
-        tracks = am.track(truth.detections, method, model=model, seed=1)
-        e = am.evaluate(tracks, truth)
-        axes: Any = figure.add_axes((i / 3 - 0.05, -0.29, 0.44, 1.4), projection="3d")
-        am.plot_trajectories(tracks, ax=axes)
-        axes.set_title("", loc="left")
-        axes.set_title("")
-        axes.set_axis_off()
-        figure.text(i / 3 + 0.02, 0.94, title, fontsize=11)
-        figure.text(
-            i / 3 + 0.02, 0.88, fontsize=9, color="#555555",
-            s=f"{tracks.n_tracks} tracks, {e.wrong_percent:.0f} % wrong, "
-            f"{e.missing_percent:.0f} % missing",
-        )  # fmt: skip
     figure.savefig(path)
 
 
@@ -248,5 +184,5 @@ def scenes(path: Path) -> None:
 if __name__ == "__main__":
     images = Path(__file__).parent / "images"
     images.mkdir(exist_ok=True)
-    for picture in (crossing, proposals, perfect_data, lenses, film, rig, scenes):
+    for picture in (crossing, lenses, film, rig, scenes):
         picture(images / f"{picture.__name__}.png")

@@ -279,27 +279,66 @@ def test_min_views_and_volume():
     assert am.reconstruct(o, rig, small).detections.n_points == (X[0, :, 0] < 0).sum()
 
 
+def expected_at(times, X, sigma=0.005):
+    """Places where points are expected, of all frames alike."""
+    d = am.Detections.from_frames(times, list(X))
+    noise = np.broadcast_to(sigma**2 * np.eye(3), (d.n_points, 3, 3))
+    return dataclasses.replace(d, covariances=noise)
+
+
 def test_expected_places_help_and_invent_nothing():
+    # Four cameras of which two see each marker, and much clutter: ghosts are as likely as markers.
+    rng = np.random.default_rng(12)
+    rig = am.Rig.ring(4, radius=4, height=2)
+    X = rng.uniform((-0.5, -0.5, 0.5), (0.5, 0.5, 1.5), (40, 12, 3))
+    shot = filmed(rig, X, noise=0.3)
+    pixels, offsets = [], [0]
+    for cell in range(len(shot.observations.offsets) - 1):
+        a, b = shot.observations.offsets[cell : cell + 2]
+        seen = shot.observations.pixels[a:b][rng.random(b - a) < 0.6]
+        false = rng.uniform((300, 200), (1600, 900), (6, 2))
+        pixels.append(np.concatenate([seen, false]))
+        offsets.append(offsets[-1] + len(pixels[-1]))
+    o = dataclasses.replace(
+        shot.observations, pixels=np.concatenate(pixels), offsets=np.array(offsets), markers=None
+    )
+    truth = am.Tracks.from_dense(o.times, X)
+
+    def scores(prior=None):
+        return am.point_scores(am.reconstruct(o, rig, MODEL, prior=prior).detections, truth)
+
+    plain = scores()
+    helped = scores(expected_at(o.times, X + rng.normal(0, 0.005, X.shape)))
+    assert helped.recall > plain.recall + 0.05
+    assert helped.ghosts < plain.ghosts
+    # Expected where nothing is: next to nothing changes.
+    misled = scores(expected_at(o.times, X + 0.4))
+    assert misled.recall == pytest.approx(plain.recall, abs=0.01)
+    assert misled.ghosts < plain.ghosts + 0.02
+
+
+def test_the_score_of_a_point_is_that_of_its_density():
+    # One point, seen well: what the prior adds is the log of the density there over the usual one.
+    rig = am.Rig.ring(4, radius=4, height=2)
+    X = np.array([[[0.1, 0.2, 1.0]]])
+    o = filmed(rig, X, noise=0.0).observations
+    plain = am.reconstruct(o, rig, MODEL)
+    off, sigma = np.array([0.004, -0.003, 0.002]), 0.005
+    helped = am.reconstruct(o, rig, MODEL, prior=expected_at(o.times, X + off, sigma))
+    S = sigma**2 * np.eye(3) + plain.detections.covariances[0]
+    density = np.exp(-0.5 * off @ np.linalg.solve(S, off)) / np.sqrt(np.linalg.det(2 * np.pi * S))
+    gained = np.log1p(0.9 * density / MODEL.density)
+    assert helped.scores[0] - plain.scores[0] == pytest.approx(gained, rel=0.02)
+    assert gained > 5
+
+
+def test_what_is_expected_must_be_of_these_frames():
     rng = np.random.default_rng(12)
     rig = am.Rig.ring(4, radius=4, height=2)
     X = rng.uniform((-0.5, -0.5, 0.5), (0.5, 0.5, 1.5), (5, 10, 3))
-    shot = filmed(rig, X, noise=0.3)
-    o = shot.observations
-    plain = am.reconstruct(o, rig, MODEL)
-    expected = am.Detections.from_frames(
-        o.times,
-        [
-            *(X + 0.003),
-        ][:5],
-    )
-    helped = am.reconstruct(o, rig, MODEL, prior=expected)
-    np.testing.assert_allclose(helped.detections.points, plain.detections.points, atol=1e-9)
-    nowhere = am.Detections.from_frames(o.times, [X[t] + 0.4 for t in range(5)])
-    np.testing.assert_allclose(
-        am.reconstruct(o, rig, MODEL, prior=nowhere).detections.points,
-        plain.detections.points,
-        atol=1e-9,
-    )
+    o = filmed(rig, X, noise=0.3).observations
+    with pytest.raises(am.ParameterError, match="covariances"):
+        am.reconstruct(o, rig, prior=am.Detections.from_frames(o.times, list(X)))
     with pytest.raises(am.ParameterError, match="prior: expected the times"):
         am.reconstruct(o, rig, prior=am.Detections.from_frames([0.0], [X[0]]))
     with pytest.raises(am.ParameterError, match="prior: expected places in 3-D"):

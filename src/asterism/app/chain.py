@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.app.reconstruct import Prior
 
 _Scene = Annotated[str, typer.Argument(metavar="SCENE", help="One of `asterism scenes`.")]
 _Rig = Annotated[
@@ -53,6 +54,7 @@ def chain(
     seed: _Seed = 0,
     option: _Options = None,
     seeing: _Seeing = None,
+    prior: Prior = False,
     overwrite: _Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -67,10 +69,12 @@ def chain(
 
         asterism chain person --rig ring8 --method gnn --method mcmcda
 
+        asterism chain person --rig ring4 --prior
+
         asterism chain two_people --rig ring8 --seeing false=0.5 --seeing noise_px=0.3 -o chain
     """
     import asterism as am
-    from asterism.app.reconstruct import about, figures, true_tracks
+    from asterism.app.reconstruct import about, expected_from, figures, true_tracks
     from asterism.app.recording import made_scene, rig_from, seeing_from
     from asterism.app.run_folder import check_folder
     from asterism.app.track import resolved_method
@@ -86,6 +90,9 @@ def chain(
     start = time.perf_counter()
     with progress("reconstructing", o.n_frames) as advance:
         made = am.reconstruct(o, cameras, advance=advance)
+    if prior:
+        with progress("reconstructing again", o.n_frames) as advance:
+            made = am.reconstruct(o, cameras, prior=expected_from(made), advance=advance)
     seconds = time.perf_counter() - start
     seen = (shot.blob_of >= 0).sum(axis=0)
     scores = am.point_scores(made.detections, truth, counted=seen >= 2)

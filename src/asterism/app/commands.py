@@ -22,6 +22,7 @@ from asterism.app.plot import plot
 from asterism.app.recognize import recognize
 from asterism.app.reconstruct import reconstruct
 from asterism.app.report import report
+from asterism.app.reproduce.command import reproduce
 from asterism.app.simulate import simulate
 from asterism.app.stitch import stitch
 from asterism.app.track import track
@@ -76,6 +77,7 @@ for _command in (
     plot,
     view,
     demo,
+    reproduce,
 ):
     app.command()(_command)
 app.add_typer(camera)

@@ -35,6 +35,12 @@ _Gate = Annotated[
 _Merge = Annotated[
     float, typer.Option("--merge", help="Noise of images that have merged, pixels; 0 for none.")
 ]
+Prior = Annotated[
+    bool,
+    typer.Option(
+        "--prior", help="Do it twice: tracks of the first points tell where to expect points."
+    ),
+]
 _Threads = Annotated[int, typer.Option(help="Frames at a time.")]
 
 
@@ -47,6 +53,7 @@ def reconstruct(
     min_views: _MinViews = 2,
     gate: _Gate = 4.0,
     merge: _Merge = 1.0,
+    prior: Prior = False,
     threads: _Threads = 1,
     quiet: Quiet = False,
     json: Json = False,
@@ -61,6 +68,8 @@ def reconstruct(
         asterism reconstruct film/observations.csv --rig film/rig.toml -o points.c3d
 
         asterism reconstruct blobs.csv --rig calibration.toml -o points.csv --min-views 3
+
+        asterism reconstruct blobs.csv --rig four_cameras.toml -o points.csv --prior
     """
     import numpy as np
 
@@ -82,11 +91,17 @@ def reconstruct(
     }
     with progress("estimating noise, misses and clutter"):
         model = am.estimate_images(observations, cameras, sigma_px=sigma, gate=gate)
-    with progress("reconstructing", observations.n_frames) as advance:
-        made = am.reconstruct(
-            observations, cameras, model, min_views=min_views, gate=gate, merge_px=merge,
-            n_threads=threads, advance=advance,
-        )  # fmt: skip
+
+    def points(expected: am.Detections | None = None) -> am.Reconstruction:
+        with progress("reconstructing", observations.n_frames) as advance:
+            return am.reconstruct(
+                observations, cameras, model, min_views=min_views, gate=gate, merge_px=merge,
+                prior=expected, n_threads=threads, advance=advance,
+            )  # fmt: skip
+
+    made = points()
+    if prior:
+        made = points(expected_from(made))
     d = made.detections
     unnamed = am.Tracks(detections=d, labels=np.full(d.n_points, -1))
     am.write(unnamed, out, format=formats[out])
@@ -104,6 +119,15 @@ def reconstruct(
     elif not quiet:
         rows = [(source, f"{observations.n_cameras} cameras, {observations.n_frames} frames")]
         print_table([*rows, *about(made, observations), ("written", out)], title="Reconstructed")
+
+
+def expected_from(made: am.Reconstruction) -> am.Detections:
+    """Track the points and give where they were to be expected."""
+    import asterism as am
+
+    model = am.estimate_model(made.detections).model
+    tracks = am.track(made.detections, am.SMP(window=3), model=model)
+    return am.expected_places(tracks, model)
 
 
 def true_tracks(made: am.Reconstruction, observations: am.Observations) -> am.Tracks:

@@ -19,8 +19,8 @@ __all__ = ["expected_places"]
 def expected_places(tracks: Tracks, model: TrackingModel, *, coast: int = 5) -> Detections:
     """Predict where the marker of each track is in each frame, from the frames before alone.
 
-    For `asterism.reconstruct`, whose image points of a frame may be told apart by where markers were
-    heading.
+    For `asterism.reconstruct`: where markers were heading may tell the image points of a frame
+    apart.
 
     Parameters
     ----------
