@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from asterism.app.console import Json, Quiet, print_json, print_table, progress
-from asterism.app.reconstruct import Prior
+from asterism.app.reconstruct import Prior, about, expected_from, figures, true_tracks
 
 _Scene = Annotated[str, typer.Argument(metavar="SCENE", help="One of `asterism scenes`.")]
 _Rig = Annotated[
@@ -74,7 +74,6 @@ def chain(
         asterism chain two_people --rig ring8 --seeing false=0.5 --seeing noise_px=0.3 -o chain
     """
     import asterism as am
-    from asterism.app.reconstruct import about, expected_from, figures, true_tracks
     from asterism.app.recording import made_scene, rig_from, seeing_from
     from asterism.app.run_folder import check_folder
     from asterism.app.track import resolved_method
