@@ -224,7 +224,7 @@ class Detections:
         a, b = self.offsets[first], self.offsets[end]
         known: dict[str, Any] = {
             name: getattr(self, name)[a:b]
-            for name in self.PER_POINT
+            for name in Detections.PER_POINT  # those of a capture are more
             if getattr(self, name) is not None
         }
         offsets = self.offsets[first : end + 1] - a
