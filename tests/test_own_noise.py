@@ -145,19 +145,20 @@ def test_a_part_keeps_what_is_known_of_its_points():
     assert len(part.covariances) == part.n_points
 
 
-def test_a_part_of_a_capture_is_detections():
-    d = wanderers(np.random.default_rng(6)).detections
-    capture = am.Capture.from_frames(d.times, [points for _, points in d])
+def test_a_part_of_a_capture_is_detections(tmp_path):
+    am.write(wanderers(np.random.default_rng(6)), tmp_path / "a.c3d")
+    capture = am.read(tmp_path / "a.c3d")
     part = capture.part(2, 4)
     assert type(part) is am.Detections
-    assert np.array_equal(part.points, d.part(2, 4).points)
+    assert np.array_equal(part.points, capture.points[capture.offsets[2] : capture.offsets[4]])
 
 
-def test_a_capture_too_long_to_be_read_whole_is_read_in_pieces():
+def test_a_capture_too_long_to_be_read_whole_is_read_in_pieces(tmp_path):
     rng = np.random.default_rng(7)
     paths = rng.uniform(-1, 1, (1, 40, 3)) + 0.1 * np.sin(np.arange(1800)[:, None, None] / 30)
     paths = paths + rng.normal(0, 1e-3, paths.shape)
-    d = am.Tracks.from_dense(np.arange(1800) * 0.01, paths).detections
-    assert d.n_points > 60_000
-    capture = am.Capture.from_frames(d.times, [points for _, points in d])
-    assert am.estimate_model(capture).model == am.estimate_model(d).model
+    am.write(am.Tracks.from_dense(np.arange(1800) * 0.01, paths), tmp_path / "a.c3d")
+    capture = am.read(tmp_path / "a.c3d")
+    assert capture.n_points > 60_000
+    bare = am.Detections(times=capture.times, offsets=capture.offsets, points=capture.points)
+    assert am.estimate_model(capture).model == am.estimate_model(bare).model
