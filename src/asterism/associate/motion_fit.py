@@ -41,6 +41,8 @@ PIECE_POINTS = 60
 WORTH = 0.05
 """Nats a detection that a motion must win over a simpler one. The few wrong links that tracks
 contain are jolts to the fit; where there are no others they win less than this."""
+ROUGH = 0.1
+"""Step, of a logarithm, over which the likelihood of several motions is taken for smooth."""
 FARTHEST = 0.3
 """Longest step, of a logarithm, that is taken to the summit of a likelihood."""
 JOLT = 0.1
@@ -208,7 +210,9 @@ def polish(
     def cost(x: NDArray[np.float64]) -> float:
         return len(sample.labels) * _cost(sample, model, at(x))
 
-    h = 1 / math.sqrt(n)  # about a standard deviation
+    # About a standard deviation. Of several motions the likelihood is rough at that scale: a link that
+    # none of them foresees is taken by one or by another.
+    h = 1 / math.sqrt(n) if len(fit.levels) == 1 else ROUGH
     steps = h * np.eye(len(first))
     middle = cost(first)
     up, down = (np.array([cost(first + sign * e) for e in steps]) for sign in (1, -1))
