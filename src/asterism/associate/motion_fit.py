@@ -210,8 +210,8 @@ def polish(
     def cost(x: NDArray[np.float64]) -> float:
         return len(sample.labels) * _cost(sample, model, at(x))
 
-    # About a standard deviation. Of several motions the likelihood is rough at that scale: a link that
-    # none of them foresees is taken by one or by another.
+    # About a standard deviation. Of several motions the likelihood is rough at that scale: a link
+    # that none of them foresees is taken by one or by another.
     h = 1 / math.sqrt(n) if len(fit.levels) == 1 else ROUGH
     steps = h * np.eye(len(first))
     middle = cost(first)
