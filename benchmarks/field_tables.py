@@ -1,0 +1,95 @@
+"""The page of `field.py`: a table of IDF1, one of time by the number of markers, one for each kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from report import conditions, table
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
+
+__all__ = ["page"]
+
+REFERENCE = "Stone Soup GNN"
+
+
+def _mean(values: Sequence[float], form: str) -> str:
+    known = [v for v in values if not np.isnan(v)]
+    return form.format(float(np.mean(known))) if known else "–"
+
+
+def _idf1(scores: Sequence[Any]) -> str:
+    errors = [s.error for s in scores if s.error]
+    if len(errors) == len(scores):
+        return "–"
+    value = f"{np.mean([s.idf1 for s in scores]):.3f}"
+    return f"{value} ({len(errors)} failed)" if errors else value
+
+
+def _against(scores: Sequence[Any], reference: Sequence[Any]) -> str:
+    """Give the geometric mean of the times of the same clips, the reference's over these."""
+    theirs = {s.clip: s.ms for s in reference if not s.error}
+    ratios = [theirs[s.clip] / s.ms for s in scores if not s.error and s.clip in theirs and s.ms]
+    return f"{np.exp(np.mean(np.log(ratios))):,.3g}" if ratios else "–"
+
+
+def _of_kind(kind: str, found: Any, names: Sequence[str], ours: Sequence[str]) -> list[str]:
+    rows: list[list[str]] = []
+    for name in names:
+        scores = found[kind, name]
+        label = f"**{name}**" if name in ours else name
+        errors = list(dict.fromkeys(s.error for s in scores if s.error))
+        done = [s for s in scores if not s.error]
+        if not done:
+            rows.append([label, errors[0], *[""] * 7])
+            continue
+        rows.append([
+            label, _idf1(scores), _mean([s.switches for s in done], "{:.1f}"),
+            _mean([s.wrong for s in done], "{:.0f}"),
+            _mean([s.tracks_per_true for s in done], "{:.2f}"),
+            _mean([s.ms for s in done], "{:.2f}"),
+            _against(done, found.get((kind, REFERENCE), [])),
+            _mean([s.megabytes for s in done], "{:.0f}"),
+            _mean([s.prepared for s in done], "{:.1f}"),
+        ])  # fmt: skip
+    head = [
+        "", "IDF1", "switches a 1000", "wrong links", "tracks/true", "ms a frame",
+        "× as fast as Stone Soup GNN", "memory, MB", "prepared in, s",
+    ]  # fmt: skip
+    return [f"**{kind}**, {len(found[kind, names[0]])} clips:", "", *table(head, rows), ""]
+
+
+def page(
+    found: Any, names: Sequence[str], ours: Sequence[str], options: argparse.Namespace
+) -> list[str]:
+    """Give the lines of the page."""
+    every = list(dict.fromkeys(kind for kind, _ in found))
+    label = {name: f"**{name}**" if name in ours else name for name in names}
+    lines = [
+        f"Each peer tuned by {options.trials} random settings, fewer where {options.budget:g} s of "
+        f"CPU time were used up, on up to {options.tuning_frames} frames of two other clips; "
+        f"{options.seeds} seeds of each scene; at most {options.frames} frames a clip; "
+        f"{options.files} captures of at most {options.points:,} points; a run of more than "
+        f"{options.limit:g} s is ended. Ours (bold): nothing tuned. {conditions()}; one core, CPU "
+        "time.",
+        "",
+        "Mean IDF1; – where there is none, which counts as 0 where other clips of the kind have one:",
+        "",
+    ]
+    lines += table(["", *every], [[label[n], *(_idf1(found[k, n]) for k in every)] for n in names])
+    growing = [kind for kind in every if kind.startswith("dense")]
+    if growing:
+        rows = [
+            [label[n], *(_mean([s.ms for s in found[k, n]], "{:.2f}") for k in growing)]
+            for n in names
+        ]
+        lines += ["", "Milliseconds a frame, by the number of markers:", ""]
+        lines += table(["", *(kind.removeprefix("dense ") for kind in growing)], rows)
+    lines.append("")
+    for kind in every:
+        lines += _of_kind(kind, found, names, ours)
+    return lines
