@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import itertools
 import json
 import os
 import re
+import time
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +27,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: one cor
 import numpy as np
 
 import asterism as am
-from field_clips import Kind, kinds
+from field_clips import Clip, Kind, kinds
 from field_tables import page
 from measured import measured
 from peers import PEERS, Peer, Setting, in_frames
@@ -173,18 +175,23 @@ def of_peer(kind: Kind, peer: Peer, options: argparse.Namespace, cache: Cache) -
     return found
 
 
+@lru_cache(maxsize=16)
+def estimated(clip: Clip) -> tuple[am.Tracks, am.TrackingModel, float]:
+    """Give a clip, its model, and the CPU seconds of estimating it."""
+    truth = clip.make()
+    start = time.process_time()
+    model = am.estimate_model(truth.detections).model
+    return truth, model, time.process_time() - start
+
+
 def of_ours(kind: Kind, name: str, options: argparse.Namespace, cache: Cache) -> list[Score]:
     package = Path(am.__file__).parent
-    source = digest(*sorted(package.rglob("*.py")), HERE / "field_clips.py")
+    parts = [sorted((package / part).rglob("*.py")) for part in ("associate", "label", "model")]
+    source = digest(*itertools.chain(*parts), HERE / "field_clips.py")
     method, is_stitched = OURS[name]
 
     def make(clip: Any) -> dict[str, Any]:
-        import time
-
-        truth = clip.make()
-        start = time.process_time()
-        model = am.estimate_model(truth.detections).model
-        prepared = time.process_time() - start
+        truth, model, prepared = estimated(clip)
 
         def work() -> NDArray[np.int64]:
             if is_stitched:
@@ -240,9 +247,8 @@ def main() -> None:
                 scores = of_ours(kind, name, options, cache)
             found.setdefault((kind.name, name), []).extend(scores)
             values = [s.idf1 for s in scores]
-            print(
-                kind.name, name, f"{np.mean(values):.3f}", scores[-1].error, sep=" | ", flush=True
-            )
+            value = f"{np.mean(values):.3f}"
+            print(kind.name, name, value, scores[-1].error, sep=" | ", flush=True)
     publish(page(found, names, list(OURS), options), options.markdown)
 
 

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 __all__ = ["Clip", "Kind", "kinds"]
 
 TUNING_SEED = 1000
-# Scene, its options, noise in metres. `smooth` keeps its density, so that 50 markers are the place to
-# tune for more.
+# Scene, its options, noise in metres. `smooth` keeps its density, so that 50 markers are the place
+# to tune for more.
 SCENES: dict[str, tuple[str, dict[str, Any], float]] = {
     "cube": ("cube", {}, 0.005),
     "two cubes": ("crossing", {}, 0.005),
@@ -102,7 +102,7 @@ def _capture_clip(path: Path, condition: str, frames: int) -> Clip:
 
 
 def _small(data: Path, points: int, files: int) -> list[Path]:
-    """Captures with truth, from the smallest on, up to so many points."""
+    """Give the captures with truth, from the smallest on, up to so many points."""
     sizes: list[tuple[int, Path]] = []
     for path in captures(data) if data.is_dir() else []:
         capture = am.read(path)
@@ -129,7 +129,7 @@ def kinds(
                 tuned_as=f"captures, {condition}, half {half}",
                 scored=tuple(_capture_clip(p, condition, frames) for p in paths[half::2]),
                 tuning=tuple(
-                    _capture_clip(p, condition, tuning_frames) for p in paths[1 - half :: 2][-2:]
+                    _capture_clip(p, condition, tuning_frames) for p in paths[1 - half :: 2][:2]
                 ),
             )
             if kind.scored and kind.tuning:

@@ -1,4 +1,4 @@
-"""The page of `field.py`: a table of IDF1, one of time by the number of markers, one for each kind."""
+"""The page of `field.py`: IDF1, time by the number of markers, and a table for each kind."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def page(
         f"{options.limit:g} s is ended. Ours (bold): nothing tuned. {conditions()}; one core, CPU "
         "time.",
         "",
-        "Mean IDF1; – where there is none, which counts as 0 where other clips of the kind have one:",
+        "Mean IDF1. A clip that failed counts as 0; – where all of a kind failed:",
         "",
     ]
     lines += table(["", *every], [[label[n], *(_idf1(found[k, n]) for k in every)] for n in names])

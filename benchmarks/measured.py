@@ -37,7 +37,8 @@ class Run:
     seconds : float
         CPU time.
     megabytes : float
-        Most memory resident at a time, less what was when it began; nan where the system does not say.
+        Most memory resident at a time, less what was when it began; nan where the system does not
+        say.
     error : str
         Why it failed, "" where it did not.
     """

@@ -37,9 +37,11 @@ def label(d: am.Detections, setting: Setting) -> NDArray[np.int64]:
             for i, point in enumerate(points)
         ]
         tracker.update(detections=found)
-        for thing in tracker.tracked_objects:
-            if thing.last_detection.data >= first:
-                owner.append((thing.last_detection.data, thing))
+        owner += [
+            (thing.last_detection.data, thing)
+            for thing in tracker.tracked_objects
+            if thing.last_detection.data >= first
+        ]
     labels = np.full(d.n_points, -1)
     for i, thing in owner:
         # None where the track was never believed.

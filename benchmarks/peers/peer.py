@@ -1,13 +1,14 @@
 """What a peer is to the benchmark: a name, what may be searched, and a way to label detections.
 
 Every peer gets the clip in frames (one unit of time each) and in its own length: all lengths of a
-setting are shares of `length_of` the clip. So one setting can serve clips of one kind that differ in
-speed, for the sake of the peers: ours know nothing of it.
+setting are shares of `length_of` the clip. So one setting can serve clips of one kind that differ
+in speed, for the sake of the peers: ours know nothing of it.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -82,7 +83,7 @@ def in_frames(detections: am.Detections) -> am.Detections:
 def length_of(detections: am.Detections) -> float:
     """Give the median distance of a point to the nearest one of the next frame, metres."""
     frames = [points for _, points in detections if len(points)]
-    apart = [KDTree(b).query(a)[0] for a, b in zip(frames[:-1], frames[1:], strict=True)]
+    apart = [KDTree(b).query(a)[0] for a, b in itertools.pairwise(frames)]
     return max(float(np.median(np.concatenate(apart))), 1e-6) if apart else 1.0
 
 

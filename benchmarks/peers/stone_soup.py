@@ -1,7 +1,7 @@
 """Stone Soup: nearly constant velocity, global nearest neighbours on a k-d tree, or JPDA by EHM2.
 
-Put together as its tutorials do: new tracks are held until they have several detections, ended after
-some frames without one.
+Put together as its tutorials do: new tracks are held until they have several detections, and ended
+after some frames without one.
 """
 
 from __future__ import annotations
