@@ -17,7 +17,7 @@ import json
 import os
 import re
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -62,6 +62,7 @@ class Score:
     ms: float = float("nan")
     megabytes: float = float("nan")
     prepared: float = float("nan")
+    trials: int | None = None
     error: str = ""
 
 
@@ -158,9 +159,6 @@ def of_peer(kind: Kind, peer: Peer, options: argparse.Namespace, cache: Cache) -
     )
     found: list[Score] = []
     for clip in kind.scored:
-        if setting["error"]:
-            found.append(Score(clip=clip.name, error=f"in tuning {setting['error']}"))
-            continue
         if found and found[-1].error:  # a clip of the same size again
             found.append(Score(clip=clip.name, error=found[-1].error))
             continue
@@ -171,7 +169,10 @@ def of_peer(kind: Kind, peer: Peer, options: argparse.Namespace, cache: Cache) -
             return asdict(scored(clip.name, truth, work, options.limit, setting["seconds"]))
 
         key = ("scored", clip.name, options.frames, peer.name, setting["setting"], options.limit)
-        found.append(Score(**cache.get((*key, source), make)))
+        score = Score(**cache.get((*key, source), make))
+        # Where no trial came to its end, the middle is what there is.
+        trials = 0 if setting["error"] else setting["trials"]
+        found.append(replace(score, trials=trials))
     return found
 
 
@@ -211,6 +212,9 @@ def main() -> None:
     beside = HERE.parents[1] / "shared" / "data"
     parser.add_argument("--data", type=Path, default=beside)
     parser.add_argument("--only", default="", help="kinds or trackers with this in their name")
+    parser.add_argument(
+        "--without", default="\n", help="leave out trackers with this in their name"
+    )
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--trials", type=int, default=30)
     parser.add_argument("--budget", type=float, default=300, help="CPU seconds of a search")
@@ -230,7 +234,7 @@ def main() -> None:
         options.data, seeds=options.seeds, frames=options.frames,
         tuning_frames=options.tuning_frames, points=options.points, files=options.files,
     )  # fmt: skip
-    names = [*PEERS, *OURS]
+    names = [name for name in (*PEERS, *OURS) if options.without not in name]
     if any(options.only in kind.name for kind in every):
         every = [kind for kind in every if options.only in kind.name]
     else:

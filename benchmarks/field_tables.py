@@ -45,7 +45,7 @@ def _of_kind(kind: str, found: Any, names: Sequence[str], ours: Sequence[str]) -
         errors = list(dict.fromkeys(s.error for s in scores if s.error))
         done = [s for s in scores if not s.error]
         if not done:
-            rows.append([label, errors[0], *[""] * 7])
+            rows.append([label, errors[0], *[""] * 8])
             continue
         rows.append([
             label, _idf1(scores), _mean([s.switches for s in done], "{:.1f}"),
@@ -54,11 +54,12 @@ def _of_kind(kind: str, found: Any, names: Sequence[str], ours: Sequence[str]) -
             _mean([s.ms for s in done], "{:.2f}"),
             _against(done, found.get((kind, REFERENCE), [])),
             _mean([s.megabytes for s in done], "{:.0f}"),
+            "–" if done[0].trials is None else str(min(s.trials for s in done)),
             _mean([s.prepared for s in done], "{:.1f}"),
         ])  # fmt: skip
     head = [
         "", "IDF1", "switches a 1000", "wrong links", "tracks/true", "ms a frame",
-        "× as fast as Stone Soup GNN", "memory, MB", "prepared in, s",
+        "× as fast as Stone Soup GNN", "memory, MB", "trials", "prepared in, s",
     ]  # fmt: skip
     return [f"**{kind}**, {len(found[kind, names[0]])} clips:", "", *table(head, rows), ""]
 

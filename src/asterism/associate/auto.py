@@ -39,8 +39,8 @@ RIGID = 0.05
 """Two markers keep their distance if it varies by less than this share of what they move: on bodies
 0.001 to 0.03, of independent markers the steadiest of all pairs 0.1 to 0.5."""
 ON_BODIES = 0.2
-"""Share of tracks with such a partner from which on the clip is one of bodies; wrong tracks, of which
-bursts make many, have none."""
+"""Share of tracks with such a partner from which on the clip is one of bodies: wrong tracks, which
+bursts make, have none."""
 CLEAR = 0.01
 """Detections in a gate beside the right one, for each labelled, up to which nothing is in doubt."""
 
@@ -77,7 +77,7 @@ def choose_method(
     """Choose a method by the clip.
 
     - Tracks to begin with are for `MCMCDA`, which alone repairs them.
-    - Where most markers keep their distance to another, they sit on bodies: `SMP` over three frames,
+    - Where markers keep their distance to another, they sit on bodies: `SMP` over three frames,
       stitched, for a hidden marker comes back where its neighbours carry it.
     - Markers that walk at random, or that come into each other's gates: `MCMCDA`.
     - Anything else is clear: `GNN`.

@@ -54,8 +54,8 @@ def track(
         Labels for the same detections, without those that were filled; tracks are numbered in the
         order in which they were believed. ``info["log_posterior"]`` is what every method is
         measured by (`log_posterior`); stitched tracks have none, for the model knows no gap so
-        long. ``info["chosen"]`` says which method was chosen and why, where none was given; the rest
-        of ``info`` is the method's own.
+        long. ``info["chosen"]`` says which method was chosen and why, where none was given; the
+        rest of ``info`` is the method's own.
 
     Raises
     ------
