@@ -28,7 +28,7 @@ import numpy as np
 
 import asterism as am
 from field_clips import Clip, Kind, kinds
-from field_tables import page
+from field_tables import NOT_RUN, page
 from measured import measured
 from peers import PEERS, Peer, Setting, in_frames
 from report import publish
@@ -259,7 +259,7 @@ def main() -> None:
                     else:
                         scores = of_ours(kind, name, options, cache)
                 except KeyError:
-                    scores = [Score(clip=c.name, error="not run") for c in kind.scored]
+                    scores = [Score(clip=c.name, error=NOT_RUN) for c in kind.scored]
             found.setdefault((kind.name, name), []).extend(scores)
             values = [s.idf1 for s in scores]
             value = f"{np.mean(values):.3f}"

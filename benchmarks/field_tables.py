@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
 
-__all__ = ["page"]
+__all__ = ["NOT_RUN", "page"]
+
+NOT_RUN = "not run"
 
 REFERENCE = "Stone Soup GNN"
 
@@ -22,8 +24,15 @@ def _mean(values: Sequence[float], form: str) -> str:
     return form.format(float(np.mean(known))) if known else "–"
 
 
+def _that_ran(scores: Sequence[Any]) -> list[Any]:
+    return [s for s in scores if s.error != NOT_RUN]
+
+
 def _idf1(scores: Sequence[Any]) -> str:
+    scores = _that_ran(scores)
     errors = [s.error for s in scores if s.error]
+    if not scores:
+        return NOT_RUN
     if len(errors) == len(scores):
         return "–"
     value = f"{np.mean([s.idf1 for s in scores]):.3f}"
@@ -40,7 +49,9 @@ def _against(scores: Sequence[Any], reference: Sequence[Any]) -> str:
 def _of_kind(kind: str, found: Any, names: Sequence[str], ours: Sequence[str]) -> list[str]:
     rows: list[list[str]] = []
     for name in names:
-        scores = found[kind, name]
+        scores = _that_ran(found[kind, name])
+        if not scores:
+            continue
         label = f"**{name}**" if name in ours else name
         errors = list(dict.fromkeys(s.error for s in scores if s.error))
         done = [s for s in scores if not s.error]
@@ -61,20 +72,29 @@ def _of_kind(kind: str, found: Any, names: Sequence[str], ours: Sequence[str]) -
         "", "IDF1", "switches a 1000", "wrong links", "tracks/true", "ms a frame",
         "× as fast as Stone Soup GNN", "memory, MB", "trials", "prepared in, s",
     ]  # fmt: skip
-    return [f"**{kind}**, {len(found[kind, names[0]])} clips:", "", *table(head, rows), ""]
+    if not rows:
+        return []
+    n_clips = max(len(_that_ran(found[kind, name])) for name in names)
+    return [f"**{kind}**, {n_clips} clips:", "", *table(head, rows), ""]
 
 
 def page(
     found: Any, names: Sequence[str], ours: Sequence[str], options: argparse.Namespace
 ) -> list[str]:
     """Give the lines of the page."""
-    every = list(dict.fromkeys(kind for kind, _ in found))
+    every = list(
+        dict.fromkeys(
+            kind for (kind, _), scores in found.items() if any(not s.error for s in scores)
+        )
+    )
+    of = f"{options.seeds} seeds of each scene"
+    if all(kind.startswith("captures") for kind in every):
+        of = f"{options.files} captures of at most {options.points:,} points"
     label = {name: f"**{name}**" if name in ours else name for name in names}
     lines = [
         f"Each peer tuned by {options.trials} random settings, fewer where {options.budget:g} s of "
         f"CPU time were used up, on up to {options.tuning_frames} frames of two other clips; "
-        f"{options.seeds} seeds of each scene; at most {options.frames} frames a clip; "
-        f"{options.files} captures of at most {options.points:,} points; a run of more than "
+        f"{of}; at most {options.frames} frames a clip; a run of more than "
         f"{options.limit:g} s is ended. Ours (bold): nothing tuned. {conditions()}; one core, CPU "
         "time.",
         "",
