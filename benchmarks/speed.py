@@ -19,7 +19,7 @@ import numpy as np
 
 import asterism as am
 from methods import METHODS
-from peer import track_in_numpy
+from peers.numpy_loop import track_in_numpy
 from report import best_of, conditions, publish
 
 SIZES = ((8, 20_000), (50, 4_000), (200, 1_000), (1000, 200))

@@ -97,7 +97,9 @@ def test_track_gives_the_same_as_the_library(scene, capsys):
 
 
 def test_summary_as_json(scene, capsys):
-    summary = json.loads(run("track in.csv --model model.toml -o out.csv --json", capsys))
+    summary = json.loads(
+        run("track in.csv --method gnn --model model.toml -o out.csv --json", capsys)
+    )
     tracks = am.read_tracks("out.csv")
     assert summary["n_tracks"] == tracks.n_tracks
     assert summary["n_clutter"] == (tracks.labels == -1).sum()
@@ -197,11 +199,20 @@ def test_no_input_is_written_to(scene, capsys):
         ("track nowhere.csv", "nowhere.csv: opening: expected a file"),
         ("track", "IN: expected a capture"),
         ("track in.csv --method gn", "did you mean 'gnn'?"),
-        ("track in.csv --option gate_probabilty=1e-6", "did you mean 'gate_probability'?"),
-        ("track in.csv --option proposers=tracks", "method gnn"),
-        ("track in.csv --option delete_odds", "NAME=VALUE"),
-        ("track in.csv --option delete_odds=many", "delete_odds: expected a number, got 'many'"),
-        ("track in.csv --option delete_odds=0.5", "delete_odds: expected a number > 1"),
+        (
+            "track in.csv --method gnn --option gate_probabilty=1e-6",
+            "did you mean 'gate_probability'?",
+        ),
+        ("track in.csv --method gnn --option proposers=tracks", "method gnn"),
+        ("track in.csv --method gnn --option delete_odds", "NAME=VALUE"),
+        (
+            "track in.csv --method gnn --option delete_odds=many",
+            "delete_odds: expected a number, got 'many'",
+        ),
+        (
+            "track in.csv --method gnn --option delete_odds=0.5",
+            "delete_odds: expected a number > 1",
+        ),
         (
             "track in.csv --method mcmcda --option bond_weight=-2",
             "bond_weight: expected a number in [0, 100]",
@@ -215,6 +226,7 @@ def test_no_input_is_written_to(scene, capsys):
         ("track in.csv --model in.csv", "in.csv: the file: expected TOML"),
         ("track --from nowhere.toml", "nowhere.toml"),
         ("track --from in.csv", "expected TOML"),
+        ("track in.csv --option delete_odds=5", "name the method"),
         ("track in.csv --methd gnn", "No such option: --methd"),
         ("trak in.csv", "Did you mean 'track'?"),
         ("corrupt in.csv -o a.csv --truth t.csv", "has no labels"),
@@ -237,7 +249,7 @@ def test_what_the_user_can_mend(scene, capsys, line, says):
 
 
 def test_damaged_run_files(scene, capsys):
-    run("track in.csv --model model.toml --run first", capsys)
+    run("track in.csv --method gnn --model model.toml --run first", capsys)
     good = (scene / "first/run.toml").read_text()
     path = scene / "run.toml"
     for old, new, says in (
@@ -295,7 +307,7 @@ def test_info(scene, capsys):
 
 def test_methods_and_scenes_are_those_of_the_library(capsys):
     listed = json.loads(run("methods --json", capsys))
-    assert list(listed) == list(am.METHODS)
+    assert list(listed) == ["auto", *am.METHODS]
     options = listed["smp"]["options"]
     made = am.SMP()
     assert {name: option["default"] for name, option in options.items()} == {
@@ -405,8 +417,8 @@ def hidden_person(folder):
 
 def test_track_finds_hidden_markers_again(scene, capsys):
     hidden_person(scene)
-    run("track p.c3d -o alone.c3d", capsys)
-    out = run("track p.c3d -o found.c3d --stitch --run r", capsys)
+    run("track p.c3d --method gnn -o alone.c3d", capsys)
+    out = run("track p.c3d --method gnn -o found.c3d --stitch --run r", capsys)
     assert "markers found again" in out
     truth = am.read_tracks("pt.c3d")
     alone, found = (am.evaluate(am.read_tracks(f), truth) for f in ("alone.c3d", "found.c3d"))
@@ -421,7 +433,7 @@ def test_track_finds_hidden_markers_again(scene, capsys):
 
 def test_stitch_says_what_it_joined(scene, capsys):
     hidden_person(scene)
-    run("track p.c3d -o pieces.c3d", capsys)
+    run("track p.c3d --method gnn -o pieces.c3d", capsys)
     out = run("stitch pieces.c3d -o markers.c3d", capsys)
     assert "least sure" in out
     told = json.loads(run("stitch pieces.c3d -o markers.csv --json", capsys))

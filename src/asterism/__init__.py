@@ -5,7 +5,7 @@ in, tracks out; every method searches the posterior of one generative model.
 
 >>> import asterism as am
 >>> capture = am.read("trial.c3d")                        # doctest: +SKIP
->>> tracks = am.track(capture, am.GNN())                  # doctest: +SKIP
+>>> tracks = am.track(capture)                            # doctest: +SKIP
 >>> am.write(tracks, "trial.tracked.c3d")                 # doctest: +SKIP
 """
 
@@ -24,14 +24,15 @@ if TYPE_CHECKING:
     from asterism.associate import MHT as MHT
     from asterism.associate import SMP as SMP
     from asterism.associate import TOMHT as TOMHT
+    from asterism.associate import Choice as Choice
     from asterism.associate import HypothesisCluster as HypothesisCluster
     from asterism.associate import Method as Method
     from asterism.associate import ModelEstimate as ModelEstimate
     from asterism.associate import TrackSplitting as TrackSplitting
     from asterism.associate import Update as Update
+    from asterism.associate import choose_method as choose_method
     from asterism.associate import estimate_model as estimate_model
     from asterism.associate import method_by_name as method_by_name
-    from asterism.associate import track as track
     from asterism.camera import BrownConrady as BrownConrady
     from asterism.camera import Camera as Camera
     from asterism.camera import Capsule as Capsule
@@ -94,6 +95,7 @@ if TYPE_CHECKING:
     from asterism.label import learn_bonds as learn_bonds
     from asterism.label import recognize as recognize
     from asterism.label import stitch as stitch
+    from asterism.label import track as track
     from asterism.model import DWNA as DWNA
     from asterism.model import DWPA as DWPA
     from asterism.model import Capture as Capture
@@ -200,13 +202,14 @@ _PUBLIC = {
         "SMP",
         "TOMHT",
         "TrackSplitting",
+        "Choice",
         "HypothesisCluster",
         "Method",
         "ModelEstimate",
         "Update",
+        "choose_method",
         "estimate_model",
         "method_by_name",
-        "track",
     ),
     "label": (
         "Bonds",
@@ -222,6 +225,7 @@ _PUBLIC = {
         "learn_bonds",
         "recognize",
         "stitch",
+        "track",
     ),
     "reconstruct": (
         "CameraSuggestion",

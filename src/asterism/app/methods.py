@@ -31,9 +31,11 @@ def methods(json: Json = False) -> None:
     """
     import asterism as am
     from asterism.app.options import method_options
+    from asterism.associate import AUTO
 
     _show(
-        {
+        {AUTO: ("The clip chooses one of these, and whether to stitch, and says why.", {})}
+        | {
             name: (_first_line(method), method_options(method))
             for name, method in am.METHODS.items()
         },
@@ -71,7 +73,10 @@ def _show(things: Mapping[str, tuple[str, Mapping[str, Option]]], json: bool) ->
     for i, (name, (about, options)) in enumerate(things.items()):
         rows = [(f"  {o.name}", o.type_text, str(o.default), o.about) for o in options.values()]
         title = ("\n" if i else "") + f"{name}: {about}"
-        print_table(rows, ("  option", "type", "default", "meaning"), title=title)
+        if rows:
+            print_table(rows, ("  option", "type", "default", "meaning"), title=title)
+        else:
+            print_table([("  no options",)], title=title)
 
 
 def _plain(about: str, options: Mapping[str, Option]) -> dict[str, Any]:

@@ -67,6 +67,8 @@ class Job:
         Whether tracks are made into markers through gaps of any length.
     format : str
         Format of the result, a key of `asterism.io.FORMATS`.
+    chosen : str
+        Which method the capture chose and why; "" where it was named.
     """
 
     source: Path
@@ -78,6 +80,7 @@ class Job:
     start: bool
     stitch: bool
     format: str
+    chosen: str = ""
 
     def to_toml(self) -> str:
         """Give the job as the text of a ``run.toml``, with the versions of what runs it."""
@@ -92,6 +95,8 @@ class Job:
                     "seed": self.seed,
                     "start": self.start,
                     "stitch": self.stitch,
+                    # For people: a repeat does not choose again.
+                    **({"chosen": self.chosen} if self.chosen else {}),
                     # TOML has no null.
                     "options": {k: NONE if v is None else v for k, v in self.options.items()},
                 },
@@ -127,6 +132,7 @@ class Job:
                 },
                 start=_table(values, "method").get("start", False) is True,
                 stitch=_table(values, "method").get("stitch", False) is True,
+                chosen=_text(values, "method", "chosen", default=""),
                 model=am.TrackingModel.from_dict(_table(values, "model")),
                 seed=_table(values, "method").get("seed", 0),
                 format=_text(values, "output", "format"),
@@ -224,8 +230,8 @@ def _table(values: dict[str, Any], name: str) -> dict[str, Any]:
     return table
 
 
-def _text(values: dict[str, Any], table: str, name: str) -> str:
-    text = _table(values, table).get(name)
+def _text(values: dict[str, Any], table: str, name: str, default: str | None = None) -> str:
+    text = _table(values, table).get(name, default)
     if not isinstance(text, str):
         raise ParameterError(f"{table}.{name}", "a text", repr(text))
     return text

@@ -32,7 +32,11 @@ _Format = Annotated[
     str | None, typer.Option(help="Format of the result; by default told by its name.")
 ]
 _Method = Annotated[
-    str | None, typer.Option(help="Method, one of `asterism methods`.", show_default="gnn")
+    str | None,
+    typer.Option(
+        help="Method, one of `asterism methods`; auto chooses by the capture, and says why.",
+        show_default="auto",
+    ),
 ]
 _Options = Annotated[
     list[str] | None,
@@ -101,6 +105,8 @@ def track(
 
         asterism track trial.c3d
 
+        asterism track trial.c3d --method gnn
+
         asterism track trial.c3d --method smp --option proposers=detections
 
         asterism track trial.c3d -o tracks.csv --model model.toml
@@ -133,7 +139,14 @@ def track(
     else:
         if source is None:
             raise ParameterError("IN", "a capture to track", "nothing", "asterism track --help")
-        name, options = resolved_method(method or "gnn", option or [])
+        from asterism.associate import AUTO
+
+        name, options = method or AUTO, dict[str, Any]()
+        if name != AUTO:
+            name, options = resolved_method(name, option or [])
+        elif option:
+            hint = "name the method: --method smp"
+            raise ParameterError("--option", "a method to have it", f"--method {AUTO}", hint)
         check_number("--seed", seed or 0, above=0, closed=True, integer=True)
         given = None if model is None else read_model(model)
         capture = am.read(source)
@@ -144,10 +157,16 @@ def track(
             with progress("estimating the model"):
                 estimate = am.estimate_model(capture)
             given = estimate.model
+        chosen = ""
+        if name == AUTO:
+            with progress("choosing the method"):
+                choice = am.choose_method(capture, given, has_start=start)
+            name, options, chosen = choice.method.name, all_options(choice.method), choice.text
+            stitch = stitch or choice.stitch
         job = Job(
             source=source, sha256=sha256_of(source), method=name, options=options,
             model=am.fragment_model(given) if stitch else given, seed=seed or 0, start=start,
-            stitch=stitch, format=chosen_format,
+            stitch=stitch, format=chosen_format, chosen=chosen,
         )  # fmt: skip
     if out is None:
         out = default_output(job.source, job.format)
@@ -163,6 +182,8 @@ def track(
         _print_capture(capture)
         if estimate is not None:
             print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
+        if job.chosen:
+            print_table([("method", job.chosen)])
     tracks, summary = carry_out(job, capture, out, run)
     if report is not None:
         _write_report(tracks, report, job, summary, estimate)
@@ -171,8 +192,16 @@ def track(
         print_table(rows, title=f"\nTracked with {job.method}")
     if json:
         page = {} if report is None else {"report": str(report)}
-        told = {"options": job.options, "model": job.model.to_dict()}
+        told = {"options": job.options, "stitch": job.stitch, "model": job.model.to_dict()}
+        told |= {"chosen": job.chosen} if job.chosen else {}
         print_json(summary.to_dict() | told | page)
+
+
+def all_options(method: am.Method[Any]) -> dict[str, Any]:
+    """Give all options of a method."""
+    from asterism.app.options import method_options
+
+    return {option: getattr(method, option) for option in method_options(type(method))}
 
 
 def resolved_method(name: str, texts: list[str]) -> tuple[str, dict[str, Any]]:
@@ -185,7 +214,7 @@ def resolved_method(name: str, texts: list[str]) -> tuple[str, dict[str, Any]]:
     known = method_options(am.METHODS[name])
     given = parsed(f"method {name}", texts, known)
     made = am.method_by_name(name, **given)
-    return name, {option: getattr(made, option) for option in known}
+    return name, all_options(made)
 
 
 def _repeated(path: Path, source: Path | None, settings: list[str]) -> tuple[Any, am.Capture]:
@@ -221,6 +250,7 @@ def _write_report(
 
     options = ", ".join(f"{name}={value}" for name, value in job.options.items())
     told = [("method", job.method + (", then stitched" if job.stitch else ""))]
+    told += [("chosen by the capture", job.chosen)] if job.chosen else []
     told += [("options", options)] if options else []
     told += summary.rows()
     made = f"Tracked with {job.method}{', then stitched,' * job.stitch} in {summary.seconds:.2g} s "

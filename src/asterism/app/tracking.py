@@ -109,6 +109,8 @@ def _carry_out(job: Job, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
     for warning in capture.warnings:
         log.info("%s: %s", capture.path, warning)
     method = am.method_by_name(job.method, **job.options)
+    if job.chosen:
+        log.info("method chosen: %s", job.chosen)
     log.info("tracking %s (%d frames) with %r", capture.path, capture.n_frames, method)
     method.init(job.model, n_axes=capture.n_axes)  # loads the engine, which is no time of tracking
     start = time.perf_counter()

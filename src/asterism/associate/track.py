@@ -1,12 +1,10 @@
-"""Detections in, tracks out."""
+"""The loop of a method over a clip: detections in, tracks out."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from asterism.associate.gnn import GNN
 from asterism.associate.method import Method
-from asterism.associate.model_from_clip import estimate_model
 from asterism.errors import ParameterError
 from asterism.model import Detections, TrackingModel, Tracks
 from asterism.model.posterior import log_posterior
@@ -17,57 +15,46 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["track"]
+__all__ = ["checked", "track_with"]
 
 
-def track(
+def track_with(
+    method: Method[Any],
     detections: Detections,
-    method: Method[Any] | None = None,
+    model: TrackingModel,
     *,
-    model: TrackingModel | None = None,
     seed: int | None = None,
     start: Tracks | None = None,
     progress: Callable[[int], Any] | None = None,
 ) -> Tracks:
-    """Tell which detection is which marker.
+    """Run a method over a clip.
 
     Parameters
     ----------
+    method : Method
+        The way of searching.
     detections : Detections
-        Unnamed points; names that a `Capture` carries are not used.
-    method : Method, optional
-        The way of searching; `GNN` where none is given.
-    model : TrackingModel, optional
-        The model that is searched; estimated from the clip where none is given.
+        Unnamed points; those that were filled are left out.
+    model : TrackingModel
+        The model that is searched.
     seed : int, optional
         For the methods that draw.
     start : Tracks, optional
-        Tracks of the same detections to begin with, the fragments of a file say; `MCMCDA` repairs
-        them by merging, splitting and switching.
+        Tracks of the same detections to begin with.
     progress : callable, optional
         Called now and then with the number of frames done.
 
     Returns
     -------
     Tracks
-        Labels for the same detections, without those that were filled; tracks are numbered in the
-        order in which they were believed. ``info["log_posterior"]`` is what every method is
-        measured by (`log_posterior`), the rest of ``info`` is the method's own.
+        ``info["log_posterior"]`` and what the method tells.
 
     Raises
     ------
     ParameterError
-        If there is nothing from which to estimate a model, or an argument has the wrong type.
-
-    Examples
-    --------
-    >>> import asterism as am
-    >>> truth = am.simulate.cube(seed=1)
-    >>> tracks = am.track(truth.detections, am.SMP())
+        If an argument has the wrong type.
     """
-    _check_type(
-        "detections", detections, Detections, "tracks.detections, or Detections.from_frames"
-    )
+    checked("method", method, Method, "GNN()")
     if start is not None:
         labels = _labels_of(start, detections)
         if detections.filled is not None:
@@ -75,11 +62,6 @@ def track(
     else:
         labels = None
     detections = detections.measured()
-    method = GNN() if method is None else method
-    _check_type("method", method, Method, "GNN()")
-    if model is None:
-        model = estimate_model(detections).model
-    _check_type("model", model, TrackingModel, "estimate_model(detections).model")
     state = method.init(model, n_axes=detections.n_axes, seed=seed)
     state, labels, confidence = method.run(state, detections, progress=progress, start=labels)
     info = dict(state.info)
@@ -90,15 +72,16 @@ def track(
     return tracks
 
 
+def checked(name: str, value: object, kind: type, hint: str) -> None:
+    """Raise `ParameterError` unless a value is of its type."""
+    if not isinstance(value, kind):
+        raise ParameterError(name, f"{kind.__name__} (try {hint})", type(value).__name__)
+
+
 def _labels_of(start: Tracks, detections: Detections) -> NDArray[np.int64]:
-    _check_type("start", start, Tracks, "a Capture's tracks")
+    checked("start", start, Tracks, "a Capture's tracks")
     if len(start.labels) != detections.n_points:
         raise ParameterError(
             "start", f"labels of the same {detections.n_points} detections", len(start.labels)
         )
     return start.labels
-
-
-def _check_type(name: str, value: object, kind: type, hint: str) -> None:
-    if not isinstance(value, kind):
-        raise ParameterError(name, f"{kind.__name__} (try {hint})", type(value).__name__)

@@ -1,5 +1,6 @@
 """Which fragments of tracks are one marker, which one that is, and where it was in between."""
 
+from asterism.label.automatic import track
 from asterism.label.bonds import Bonds, learn_bonds
 from asterism.label.filling import Filling, Gap, fill
 from asterism.label.identify import FRAGMENT_GAP, fragment_model, identify
@@ -23,4 +24,5 @@ __all__ = [
     "learn_bonds",
     "recognize",
     "stitch",
+    "track",
 ]

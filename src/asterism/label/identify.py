@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-from asterism.associate import SMP, Method, estimate_model, track
+from asterism.associate import SMP, Method, estimate_model
+from asterism.associate.track import checked, track_with
 from asterism.label.stitching import Stitching, stitch
+from asterism.model import Detections, TrackingModel
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from asterism.model import Detections, TrackingModel
 
 __all__ = ["FRAGMENT_GAP", "fragment_model", "identify"]
 
@@ -74,11 +74,13 @@ def identify(
     >>> am.evaluate(markers.tracks, hidden).idf1 > 0.99
     True
     """
+    checked("detections", detections, Detections, "tracks.detections, or Detections.from_frames")
     method = SMP(window=3) if method is None else method
     if model is None:
         model = estimate_model(detections).model
+    checked("model", model, TrackingModel, "estimate_model(detections).model")
     model = fragment_model(model)
-    fragments = track(detections, method, model=model, seed=seed, progress=progress)
+    fragments = track_with(method, detections, model, seed=seed, progress=progress)
     return stitch(
         fragments, model, confirm=confirm, ghost_radius=ghost_radius, max_hidden=max_hidden
     )

@@ -172,7 +172,8 @@ def stitch(
     >>> truth = am.simulate.person(seed=1)
     >>> hidden = am.simulate.sense(truth, burst=am.simulate.Burst(), seed=1)
     >>> model = am.fragment_model(am.estimate_model(hidden.detections).model)
-    >>> am.stitch(am.track(hidden.detections, model=model), model)  # doctest: +ELLIPSIS
+    >>> pieces = am.track(hidden.detections, am.GNN(), model=model)
+    >>> am.stitch(pieces, model)  # doctest: +ELLIPSIS
     Stitching(... tracks, ... joins, ... cuts, ... ghosts)
     """
     if not isinstance(tracks, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]

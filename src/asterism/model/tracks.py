@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -43,8 +43,8 @@ class Tracks:
     confidence : array_like, shape (N,), optional
         Probability in [0, 1] that the label is right, from methods that know it.
     info : mapping, optional
-        Numbers about how the labels were found, from methods: what was approximated and by how
-        much, what it took.
+        How the labels were found, from methods: numbers, of what was approximated and by how much
+        and what it took; and as text which method was chosen, and why.
 
     Raises
     ------
@@ -64,7 +64,7 @@ class Tracks:
     labels: NDArray[np.int64]
     names: tuple[str | None, ...] = ()
     confidence: NDArray[np.float64] | None = None
-    info: Mapping[str, float] = field(default_factory=dict[str, float])
+    info: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __post_init__(self) -> None:
         n = self.detections.n_points

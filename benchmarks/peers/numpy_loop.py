@@ -13,10 +13,13 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import chi2
 
+import asterism as am
+from peers.peer import Peer, Setting, length_of
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    import asterism as am
+__all__ = ["PEER", "track_in_numpy"]
 
 
 def track_in_numpy(detections: am.Detections, model: am.TrackingModel) -> NDArray[np.int64]:
@@ -87,3 +90,35 @@ def track_in_numpy(detections: am.Detections, model: am.TrackingModel) -> NDArra
         ids, gap = np.append(ids, np.full(n, -1)), np.append(gap, np.zeros(n, int))
         pending += [[first + int(j)] for j in np.flatnonzero(~taken)]
     return labels
+
+
+def label(d: am.Detections, setting: Setting) -> NDArray[np.int64]:
+    scale = length_of(d)
+    volume = float(np.prod(np.ptp(d.points, axis=0) + scale))
+    clutter = setting["clutter"] / volume
+    model = am.TrackingModel(
+        motion=am.DWNA(
+            acceleration_sigma=setting["process"] * scale, velocity_sigma=setting["speed"] * scale
+        ),
+        sensor=am.Sensor(
+            noise_sigma=setting["noise"] * scale,
+            p_detection=setting["detected"],
+            clutter_density=clutter,
+        ),
+        population=am.Population(
+            birth_density=0.1 * clutter, p_disappear=1e-4,
+            max_speed=10 * setting["speed"] * scale, max_gap=int(setting["max_gap"]),
+        ),
+    )  # fmt: skip
+    return track_in_numpy(d, model)
+
+
+PEER = Peer(
+    name="Kalman + assignment",
+    package="",
+    space={
+        "process": (0.02, 3.0), "noise": (0.05, 3.0), "speed": (1.0, 30.0), "clutter": (0.01, 30.0),
+        "detected": (0.7, 0.99), "max_gap": (3, 60),
+    },
+    label=label,
+)  # fmt: skip

@@ -1,0 +1,94 @@
+"""What a peer is to the benchmark: a name, what may be searched, and a way to label detections.
+
+Every peer gets the clip in frames (one unit of time each) and in its own length: all lengths of a
+setting are shares of `length_of` the clip. So one setting can serve clips of one kind that differ
+in speed, for the sake of the peers: ours know nothing of it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial import KDTree
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    import asterism as am
+
+__all__ = ["Peer", "Setting", "drop_short", "in_frames", "length_of", "module"]
+
+Setting = dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peer:
+    """A tracker beside ours.
+
+    Parameters
+    ----------
+    name : str
+        As in the table.
+    package : str
+        What must be installed, by its name in `benchmarks`' extra; "" where nothing need be.
+    space : mapping
+        Least and greatest value of each parameter, drawn evenly in their logarithm; whole numbers
+        where both ends are.
+    label : callable
+        Gives the label of every detection, -1 for none, from the clip and a setting.
+    """
+
+    name: str
+    package: str
+    space: Mapping[str, tuple[float, float]]
+    label: Callable[[am.Detections, Setting], NDArray[np.int64]]
+
+    def draw(self, rng: np.random.Generator) -> Setting:
+        """Draw a setting."""
+        setting: Setting = {}
+        for name, (low, high) in self.space.items():
+            value = float(np.exp(rng.uniform(np.log(low), np.log(high))))
+            is_whole = isinstance(low, int) and isinstance(high, int)
+            setting[name] = round(value) if is_whole else value
+        return setting
+
+    def middle(self) -> Setting:
+        """Give the middle of the space: the first trial of every search."""
+        ends = self.space.items()
+        value = {name: float(np.sqrt(low * high)) for name, (low, high) in ends}
+        return {
+            name: round(value[name]) if isinstance(low, int) and isinstance(high, int)
+            else value[name]
+            for name, (low, high) in ends
+        }  # fmt: skip
+
+
+def module(name: str) -> Any:
+    """Give a module of a peer, which has no types and need not be there."""
+    return import_module(name)
+
+
+def in_frames(detections: am.Detections) -> am.Detections:
+    """Give the same points, a unit of time for a frame."""
+    return dataclasses.replace(detections, times=np.arange(detections.n_frames, dtype=float))
+
+
+def length_of(detections: am.Detections) -> float:
+    """Give the median distance of a point to the nearest one of the next frame, metres."""
+    frames = [points for _, points in detections if len(points)]
+    apart = [KDTree(b).query(a)[0] for a, b in itertools.pairwise(frames)]
+    return max(float(np.median(np.concatenate(apart))), 1e-6) if apart else 1.0
+
+
+def drop_short(labels: NDArray[np.int64], least: float) -> NDArray[np.int64]:
+    """Make clutter of tracks with fewer detections than `least`."""
+    counts = np.bincount(labels + 1, minlength=1)
+    counts[0] = 0
+    return np.where(counts[labels + 1] >= least, labels, -1)

@@ -1,0 +1,156 @@
+"""The method that a clip chooses: bodies, walkers, rivals, and clips without any doubt."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.app import main
+from asterism.associate.auto import partners
+from asterism.simulate import Burst
+
+
+def sensed(truth, noise=0.005, **more):
+    more = {"missing": 0.1, "clutter": 0.1} | more
+    return am.simulate.sense(truth, noise=noise, seed=1, **more)
+
+
+CLIPS = {
+    "bodies": (lambda: sensed(am.simulate.cube(seed=1)), "smp", True, "8 of 8 markers keep"),
+    "a person in bursts": (
+        lambda: am.simulate.sense(
+            am.simulate.person(seed=1), burst=Burst(), noise=3e-4, seed=1
+        ),
+        "smp",
+        True,
+        "bodies",
+    ),
+    "walkers": (lambda: sensed(am.simulate.SCENES["walk"].make(seed=1)), "mcmcda", False, "random"),
+    "independent and sparse": (
+        lambda: sensed(am.simulate.SCENES["wander"].make(seed=1)), "gnn", False, "0.0 rivals"
+    ),
+    "independent and dense": (
+        lambda: sensed(am.simulate.smooth(n_markers=200, frames=50, seed=1)),
+        "mcmcda",
+        False,
+        "rivals within the gates",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CLIPS)
+def test_the_clip_chooses_and_says_why(name):
+    make, method, stitch, why = CLIPS[name]
+    truth = make()
+    model = am.estimate_model(truth.detections).model
+    choice = am.choose_method(truth.detections, model)
+    assert (choice.method.name, choice.stitch) == (method, stitch)
+    assert why in choice.reason
+    assert "\n" not in choice.text
+    assert choice == am.choose_method(truth.detections, model)
+
+
+def test_no_method_is_the_one_that_was_chosen():
+    truth = CLIPS["bodies"][0]()
+    model = am.estimate_model(truth.detections).model
+    tracks = am.track(truth.detections, model=model, seed=1)
+    assert tracks.info["chosen"] == am.choose_method(truth.detections, model).text
+    stitched = am.identify(truth.detections, am.SMP(window=3), model=model, seed=1).tracks
+    np.testing.assert_array_equal(tracks.labels, stitched.labels)
+    assert "log_posterior" not in tracks.info  # the model knows no gap so long
+    walkers = CLIPS["walkers"][0]()
+    model = am.estimate_model(walkers.detections).model
+    tracks = am.track(walkers.detections, model=model, seed=1)
+    named = am.track(walkers.detections, am.MCMCDA(), model=model, seed=1)
+    np.testing.assert_array_equal(tracks.labels, named.labels)
+    assert tracks.info["log_posterior"] == named.info["log_posterior"]
+    assert "chosen" not in named.info
+
+
+def test_tracks_to_begin_with_are_for_mcmcda():
+    truth = CLIPS["bodies"][0]()
+    tracks = am.track(truth.detections, start=truth, seed=1)
+    assert tracks.info["chosen"].startswith("mcmcda: there are tracks to begin with")
+    assert am.evaluate(tracks, truth).idf1 > 0.99
+
+
+def test_partners_are_counted_by_distances_alone():
+    rng = np.random.default_rng(1)
+    t = np.linspace(0, 1, 60)[:, None]
+    one = np.concatenate([np.sin(5 * t), np.cos(3 * t), t], axis=1)
+    other = one + np.array([0.1, 0, 0])
+    free = np.cumsum(rng.normal(0, 0.1, (60, 3)), axis=0)
+    brief = np.where(
+        t > 0.8, one + np.array([0, 0.1, 0]), np.nan
+    )  # seen in too few frames to be compared
+    dense = np.stack([one, other, free, brief], axis=1)
+    times = np.arange(60) / 100
+    assert partners(am.Tracks.from_dense(times, dense), 1e-4) == (2, 3)
+    # Noise must not part a body: a distance can be no steadier than its ends.
+    noisy = np.stack([one, other], axis=1) * 0.01 + rng.normal(0, 0.005, (60, 2, 3))
+    assert partners(am.Tracks.from_dense(times, noisy), 0.005) == (2, 2)
+    assert partners(am.Tracks.from_dense(times, noisy), 1e-5) == (0, 2)
+
+
+def test_clips_of_nothing_and_of_one_point():
+    model = am.estimate_model(am.simulate.cube(seed=1).detections).model
+    for frames in ([np.empty((0, 3))] * 3, [np.zeros((1, 3))] * 3):
+        d = am.Detections.from_frames(np.arange(3.0), frames)
+        choice = am.choose_method(d, model)
+        assert (choice.method.name, choice.stitch) == ("gnn", False)
+    flat = np.random.default_rng(1).normal(size=(4, 2)) + np.arange(30)[:, None, None] * 0.01
+    d = am.Tracks.from_dense(np.arange(30) / 100, flat).detections
+    assert am.choose_method(d, am.estimate_model(d).model).method.name in am.METHODS
+    with pytest.raises(am.ParameterError, match="detections"):
+        am.choose_method(flat, model)
+    with pytest.raises(am.ParameterError, match="TrackingModel"):
+        am.choose_method(d, None)
+
+
+@pytest.fixture
+def person(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    truth = am.simulate.sense(
+        am.simulate.person(seed=1, frames=150), burst=Burst(), noise=3e-4, seed=1
+    )
+    am.write(am.Tracks(detections=truth.detections, labels=np.full(len(truth.labels), -1)), "p.csv")
+    return tmp_path
+
+
+def test_the_command_line_says_why_and_a_repeat_does_not_choose_again(person, capsys, monkeypatch):
+    assert main(["track", "p.csv", "--run", "first"]) == 0
+    out = capsys.readouterr().out
+    assert "smp, window=3, then stitched:" in out
+    assert "keep their distance" in out
+    job = tomllib.loads((person / "first/run.toml").read_text())
+    assert job["method"]["name"] == "smp"
+    assert job["method"]["options"]["window"] == 3
+    assert job["method"]["stitch"] is True
+    assert "bodies" in job["method"]["chosen"]
+    assert job["model"]["population"]["max_gap"] <= 4
+    assert "bodies" in (person / "first/log.txt").read_text()
+
+    def never(*_, **__):
+        raise AssertionError("a repeat chose again")
+
+    monkeypatch.setattr(am, "choose_method", never)
+    assert main(["track", "--from", "first/run.toml", "--run", "second"]) == 0
+    for name in ("run.toml", "p.tracked.csv"):
+        assert (person / "first" / name).read_bytes() == (person / "second" / name).read_bytes()
+
+
+def test_json_tells_the_choice_and_auto_may_be_named(person, capsys):
+    assert main(["track", "p.csv", "-o", "a.csv", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert "bodies" in told["chosen"]
+    assert (told["method"], told["stitch"]) == ("smp", True)
+    assert main(["track", "p.csv", "-o", "b.csv", "--method", "auto", "-q"]) == 0
+    assert (person / "a.csv").read_bytes() == (person / "b.csv").read_bytes()
+    assert main(["track", "p.csv", "-o", "c.csv", "--method", "gnn", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert "chosen" not in told
+    assert (told["method"], told["stitch"]) == ("gnn", False)

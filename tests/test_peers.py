@@ -1,0 +1,96 @@
+"""Every peer of the benchmark, where it is installed: labels that fit, and that are of some use."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import asterism as am
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+from field_clips import cut
+from measured import measured
+from peers import PEERS, in_frames
+
+MODULES = {"nrl-tracker": "pytcl"}
+
+
+def tiny():
+    truth = am.simulate.cube(seed=1, frames=25)
+    return am.simulate.sense(truth, missing=0.05, clutter=0.05, noise=0.002, seed=1)
+
+
+@pytest.mark.filterwarnings("default")  # of others' making
+@pytest.mark.parametrize("name", PEERS)
+def test_a_peer_labels_every_detection(name):
+    peer = PEERS[name]
+    if peer.package:
+        pytest.importorskip(MODULES.get(peer.package, peer.package), exc_type=ImportError)
+    truth = tiny()
+    d = in_frames(truth.detections)
+    try:
+        labels = peer.label(d, peer.middle())
+    except Exception as error:
+        if isinstance(error.__cause__, OSError):
+            pytest.skip(f"{name} does not load here: {error.__cause__}")
+        raise
+    assert labels.shape == (d.n_points,)
+    assert labels.min() >= -1
+    for t in range(d.n_frames):  # a track has one detection a frame
+        here = labels[d.offsets[t] : d.offsets[t + 1]]
+        here = here[here >= 0]
+        assert len(np.unique(here)) == len(here)
+    tracks = am.Tracks(detections=truth.detections, labels=labels)
+    # laptrack has no motion; all others follow a cube by far the most of the time.
+    assert am.evaluate(tracks, truth).idf1 > (0.2 if name == "laptrack" else 0.6)
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_settings_are_drawn_inside_their_space(name):
+    peer = PEERS[name]
+    rng = np.random.default_rng(1)
+    for setting in (peer.middle(), *(peer.draw(rng) for _ in range(50))):
+        assert setting.keys() == peer.space.keys()
+        for key, (low, high) in peer.space.items():
+            assert low <= setting[key] <= high
+            assert isinstance(setting[key], int) == isinstance(low, int)
+    again = np.random.default_rng(1)
+    assert peer.draw(again) == peer.draw(np.random.default_rng(1))
+
+
+def test_a_run_is_ended_at_its_limit_and_says_why_it_failed():
+    def forever():
+        while True:
+            pass
+
+    def fails():
+        raise ValueError("no such thing")
+
+    assert measured(forever, 1).error == "more than 1 s"
+    assert measured(fails, 5).error == "ValueError: no such thing"
+    done = measured(lambda: np.arange(3), 5)
+    np.testing.assert_array_equal(done.labels, [0, 1, 2])
+    assert done.error == ""
+
+
+def test_memory_is_that_of_the_run():
+    held = np.ones(30_000_000)  # the parent's own does not count
+    work = measured(lambda: np.full(20_000_000, 2.0)[:3].astype(int), 20)
+    if not np.isnan(work.megabytes):
+        assert 120 < work.megabytes < 220
+    assert held[0] == 1
+
+
+def test_a_cut_clip_keeps_its_truth():
+    truth = tiny()
+    first = cut(truth, 10)
+    assert first.detections.n_frames == 10
+    n = first.detections.n_points
+    a, b = truth.labels[:n], first.labels
+    np.testing.assert_array_equal(a >= 0, b >= 0)
+    pairs = set(zip(a[a >= 0].tolist(), b[b >= 0].tolist(), strict=True))
+    assert len(pairs) == len({x for x, _ in pairs}) == len({y for _, y in pairs})
