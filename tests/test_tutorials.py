@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+import asterism as am
+
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PAGES = [*sorted((DOCS / "tutorials").glob("*.md")), DOCS / "how-to.md"]
 
@@ -20,6 +22,16 @@ def load(name):
 
 
 pages = load("run_pages")
+
+
+@pytest.fixture(autouse=True)
+def lists_as_they_were():
+    """Take back what a page adds to the lists of methods and formats."""
+    before = [(entries, dict(entries)) for entries in (am.METHODS, am.FORMATS)]
+    yield
+    for entries, old in before:
+        entries.clear()
+        entries.update(old)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[p.stem for p in PAGES])
