@@ -1,9 +1,9 @@
 """Run the code of Markdown pages: ``python docs/run_pages.py PAGE.md…`` renews what they show.
 
 The blocks of a page run in order, in one folder that is empty at first: Python in one namespace,
-commands of the shell in between. A ``text`` block right after one shows what that one prints; a line
-that is only … stands for any number of lines. The pictures of a page that its own code writes are
-those in `docs/images`. The tests run the pages as they are and hold them to what they show.
+commands of the shell in between. A ``text`` block right after one shows what that one prints; a
+line that is only … stands for any lines. Pictures of a page that its own code writes are those in
+`docs/images`. The tests run the pages as they are and hold them to what they show.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def run(page: Path, folder: Path) -> list[tuple[Block, str, Block | None]]:
     namespace: dict[str, Any] = {"__name__": "__main__"}
     done: list[tuple[Block, str, Block | None]] = []
     with contextlib.chdir(folder):
-        for block, after in zip(blocks, [*blocks[1:], None], strict=True):
+        for block, after in zip(blocks, [*blocks, None][1:], strict=True):
             shown = after if after is not None and after.language == "text" else None
             if block.language in ("python", "sh"):
                 try:
@@ -117,7 +117,8 @@ def check(page: Path, folder: Path) -> None:
         if expected is not None and not is_as_shown(out, expected):
             lines = expected.splitlines(), _tidy(out).splitlines()
             difference = "\n".join(difflib.unified_diff(*lines, "shown", "printed", lineterm=""))
-            raise PageError(f"{page.name}, line {block.line}:\n{difference}")
+            hint = "if that is as it should be: python docs/run_pages.py " + page.name
+            raise PageError(f"{page.name}, line {block.line}:\n{difference}\n({hint})")
     missing = [name for name in pictures_of(source) if not (folder / name).is_file()]
     if missing:
         raise PageError(f"{page.name} shows {', '.join(missing)} and does not write it")
