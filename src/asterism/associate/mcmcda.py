@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping  # noqa: TC003 - options are read off the annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from asterism.associate.engine_method import EngineMethod
-from asterism.errors import ParameterError, check_fields, check_number
+from asterism.associate.mcmc_moves import MOVES, checked_weights
+from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,46 +23,8 @@ if TYPE_CHECKING:
     from asterism.associate.method import Update
     from asterism.model import Detections, TrackingModel
 
-__all__ = ["MCMCDA", "MOVES"]
+__all__ = ["MCMCDA"]
 
-MOVES = (
-    "birth",
-    "death",
-    "split",
-    "merge",
-    "extension",
-    "reduction",
-    "update",
-    "switch",
-    "insertion",
-    "deletion",
-    "transfer",
-    "replacement",
-    "exchange",
-    "relocation",
-)
-"""Kinds of moves; the last six are not the report's."""
-
-WEIGHTS: dict[str, dict[str, float]] = {
-    "uniform": dict.fromkeys(MOVES, 1.0),
-    # Equation 4.7 of the report, its bounds taken apart.
-    "report": {
-        "birth": 1.0,
-        "death": 1.0,
-        "split": 2.0,
-        "merge": 2.0,
-        "extension": 9.0,
-        "reduction": 5.0,
-        "switch": 5.0,
-        "update": 5.0,
-    },
-}
-PAIRS = (
-    ("birth", "death"),
-    ("split", "merge"),
-    ("extension", "reduction"),
-    ("insertion", "deletion"),
-)
 SPLITS = ("whole", "likelihood", "cells", "clusters")
 MOST = 1_000_000
 """Of moves for a marker in a frame, which are then some seconds, and of frames in a window."""
@@ -247,13 +210,13 @@ class MCMCDA(EngineMethod):
                     name, "0 with the ascent", repr(getattr(self, name)),
                     "only the metropolis chain samples",
                 )  # fmt: skip
-        _checked_weights(self.move_weights)
+        checked_weights(self.move_weights)
 
     def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> Tracker:
         from asterism import _engine
         from asterism.model.compiled import motion_model, score_model
 
-        weights = _checked_weights(self.move_weights)
+        weights = checked_weights(self.move_weights)
         chain = _engine.ChainOptions(
             weights=np.array([weights.get(move, 0.0) for move in MOVES]),
             is_informed=self.proposal == "informed",
@@ -382,24 +345,3 @@ def _checked_seed(seed: int | None) -> int:
         return 0
     check_number("seed", seed, above=0, below=2**64 - 1, closed=True, integer=True)
     return int(seed)
-
-
-def _checked_weights(weights: str | Mapping[str, float]) -> Mapping[str, float]:
-    if isinstance(weights, str):
-        if weights not in WEIGHTS:
-            raise ParameterError("move_weights", "'uniform', 'report' or a mapping", repr(weights))
-        return WEIGHTS[weights]
-    if not isinstance(weights, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("move_weights", "'uniform', 'report' or a mapping", repr(weights))
-    check_fields("move_weights", weights, MOVES)
-    for move, weight in weights.items():
-        check_number(f"move_weights[{move}]", weight, above=0, closed=True)
-    if not weights.get("birth"):
-        raise ParameterError("move_weights", "births among the moves", dict(weights))
-    for one, other in PAIRS:
-        if bool(weights.get(one)) != bool(weights.get(other)):
-            raise ParameterError(
-                "move_weights", f"{one} and {other} both or neither", dict(weights),
-                "a move that cannot be taken back is never taken",
-            )  # fmt: skip
-    return weights

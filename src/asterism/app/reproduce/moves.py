@@ -10,7 +10,7 @@ import asterism as am
 from asterism.app.reproduce.part import Claim, Outcome, Part, Picture, Table
 from asterism.app.reproduce.rules import exact, spread
 from asterism.app.reproduce.walks import REPORT, clips
-from asterism.associate.mcmcda import MOVES, WEIGHTS
+from asterism.associate.mcmc_moves import MOVES, WEIGHTS
 from asterism.view.style import CLUTTER, CYCLE, INK, new_panels
 
 if TYPE_CHECKING:

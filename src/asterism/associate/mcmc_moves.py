@@ -1,0 +1,81 @@
+"""The kinds of moves of Markov chain Monte Carlo data association, and how often each is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from asterism.errors import ParameterError, check_fields, check_number
+
+__all__ = ["MOVES", "WEIGHTS", "checked_weights"]
+
+MOVES = (
+    "birth",
+    "death",
+    "split",
+    "merge",
+    "extension",
+    "reduction",
+    "update",
+    "switch",
+    "insertion",
+    "deletion",
+    "transfer",
+    "replacement",
+    "exchange",
+    "relocation",
+)
+"""Kinds of moves; the last six are not the report's."""
+
+WEIGHTS: dict[str, dict[str, float]] = {
+    "uniform": dict.fromkeys(MOVES, 1.0),
+    # Equation 4.7 of the report, its bounds taken apart.
+    "report": {
+        "birth": 1.0,
+        "death": 1.0,
+        "split": 2.0,
+        "merge": 2.0,
+        "extension": 9.0,
+        "reduction": 5.0,
+        "switch": 5.0,
+        "update": 5.0,
+    },
+}
+PAIRS = (
+    ("birth", "death"),
+    ("split", "merge"),
+    ("extension", "reduction"),
+    ("insertion", "deletion"),
+)
+
+
+def checked_weights(weights: str | Mapping[str, float]) -> Mapping[str, float]:
+    """Give the weight of each kind of move.
+
+    Parameters
+    ----------
+    weights : str or mapping
+        "uniform", "report", or weights by kind.
+
+    Raises
+    ------
+    ParameterError
+        If a kind is unknown, a weight is no number ≥ 0, or moves could not be taken back.
+    """
+    if isinstance(weights, str):
+        if weights not in WEIGHTS:
+            raise ParameterError("move_weights", "'uniform', 'report' or a mapping", repr(weights))
+        return WEIGHTS[weights]
+    if not isinstance(weights, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ParameterError("move_weights", "'uniform', 'report' or a mapping", repr(weights))
+    check_fields("move_weights", weights, MOVES)
+    for move, weight in weights.items():
+        check_number(f"move_weights[{move}]", weight, above=0, closed=True)
+    if not weights.get("birth"):
+        raise ParameterError("move_weights", "births among the moves", dict(weights))
+    for one, other in PAIRS:
+        if bool(weights.get(one)) != bool(weights.get(other)):
+            raise ParameterError(
+                "move_weights", f"{one} and {other} both or neither", dict(weights),
+                "a move that cannot be taken back is never taken",
+            )  # fmt: skip
+    return weights
