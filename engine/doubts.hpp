@@ -14,10 +14,8 @@ class Doubts {
   };
 
   void add_frame() { frames_.emplace_back(); }
-  // A link that leads into a frame so many before the newest.
-  void add(std::int32_t from, std::int32_t to, std::int64_t age = 0) {
-    frames_[frames_.size() - 1 - static_cast<std::size_t>(age)].push_back({from, to});
-  }
+  // A link that leads into the newest frame.
+  void add(std::int32_t from, std::int32_t to) { frames_.back().push_back({from, to}); }
   // Forgets all but the newest frames.
   void keep(std::size_t n_frames) {
     while (frames_.size() > n_frames) frames_.pop_front();

@@ -69,16 +69,11 @@ class FrameStart {
     p.apply(s_.edits);
     doubt_births(p, doubts);
     for (std::int32_t r = 0; r < n_rows; ++r)
-      if (s_.match[r] >= 0)
-        doubt_leap(p, s_.rows[r], doubts);
-      else
-        doubt_last(p, s_.rows[r], doubts);
+      if (s_.match[r] < 0) doubt_last(p, s_.rows[r], doubts);
   }
 
  private:
   static constexpr std::int32_t kNone = -1, kNewTrack = -2;
-  // A detection that is by so many doubts too improbable may yet be made good by the next.
-  static constexpr double kHindsight = 3;
   struct Last {
     std::int32_t detection = -1;
     std::int64_t number = -1;
@@ -178,35 +173,6 @@ class FrameStart {
     }
   }
 
-  // Hindsight: free detections that a track has just leapt over, and might have had.
-  void doubt_leap(const Partition<Filter>& p, std::int32_t k, Doubts& doubts) {
-    const DetectionWindow& window = p.window();
-    const std::int32_t j = p.last(k), i = p.before(j), kept = p.track(k).size() - 1;
-    if (j < 0 || i < 0 || window[j].frame != window.now()) return;
-    for (std::int64_t t = std::max(window[i].frame, p.frozen()) + 1; t < window.now(); ++t) {
-      const DetectionWindow::Frame& frame = window.frame(t);
-      const auto gap = static_cast<int>(t - window[i].frame);
-      p.filter().expect(p.motion(), window, p.state(i), window[i].frame, gap, s_.expected);
-      // How much the next detection may make good is seen below.
-      if (frame.ids.empty()) continue;
-      const double radius =
-          Filter::radius(s_.expected, -p.gap_score(gap) - kHindsight * doubt_,
-                         frame.places->grid.r_most());
-      if (radius < 0) continue;
-      frame.places->grid.within(Filter::center(s_.expected), radius, [&](std::int32_t n, double) {
-        const std::int32_t y = frame.ids[n];
-        if (!p.is_free(y) || !window.is_linkable(i, y) || !window.is_linkable(y, j)) return;
-        Edit<Filter>& edit = s_.other;
-        edit.track = k;
-        edit.keep = kept;
-        edit.tail.clear();
-        p.append(edit, y);
-        p.append(edit, j);
-        if (p.score_of(edit) > p.score_of(k) - doubt_) doubts.add(i, y, window.now() - t);
-      });
-    }
-  }
-
   // Hindsight: where a track is not seen, what it would expect had its last detection not been its own.
   void doubt_last(const Partition<Filter>& p, std::int32_t k, Doubts& doubts) {
     const DetectionWindow& window = p.window();
@@ -234,7 +200,6 @@ class FrameStart {
     std::vector<char> is_given;
     std::vector<Candidate> candidates, others;
     std::vector<Edit<Filter>> edits;
-    Edit<Filter> other;
     Assignment assignment;
     typename Filter::Expected expected;
   };

@@ -312,9 +312,7 @@ class Moves {
     if (slots_.empty()) return false;
     const Slot slot = draw_one(slots_, random, q);
     q.with = x;
-    Edit<Filter>& e = q.edit(slot.track, slot.keep);
-    p_.append(e, x);
-    splices_.append(e, slot.track, slot.keep);
+    splices_.put_in(x, slot.track, slot.keep, q);
     return true;
   }
 
@@ -366,9 +364,7 @@ class Moves {
     const Slot slot = draw_one(slots_, random, q);
     q.with = x;
     splices_.take_out(x, q);
-    Edit<Filter>& e = q.edit(slot.track, slot.keep);
-    p_.append(e, x);
-    splices_.append(e, slot.track, slot.keep);
+    splices_.put_in(x, slot.track, slot.keep, q);
     return true;
   }
 

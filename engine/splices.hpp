@@ -37,6 +37,12 @@ class Splices {
     const std::int32_t k = p_.track_of(x);
     append(q.edit(k, p_.place_of(x)), k, p_.place_of(x) + 1);
   }
+  // A track with y at a place of its own, before what had it.
+  void put_in(std::int32_t y, std::int32_t track, std::int32_t place, Change<Filter>& q) const {
+    Edit<Filter>& e = q.edit(track, place);
+    p_.append(e, y);
+    append(e, track, place);
+  }
   // A free detection in the place of another; false where its neighbours forbid it.
   bool replace(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
     if (!fits_in_place_of(y, x)) return false;

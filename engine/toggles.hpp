@@ -6,6 +6,7 @@
 //   relocate  y stands after a instead of after c, or back
 //   transfer  all from y on stands after a instead of after c, one of which is a track's last; or back
 //   begin     a is the first of the track that had y as its first, or of a new one of both; or back
+//   skip      y, which stands between a and c, is taken out, or put back; without c, y is the last
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@
 namespace asterism {
 
 struct Toggle {
-  enum class Kind { trade, swap, relocate, transfer, begin };
+  enum class Kind { trade, swap, relocate, transfer, begin, skip };
   Kind kind = Kind::trade;
   std::int32_t y = 0, a = 0, c = 0;  // for the first two a stands for x
 };
@@ -45,6 +46,7 @@ class Toggles {
       case Toggle::Kind::relocate: return relocate(t.y, other(t), out);
       case Toggle::Kind::transfer: return transfer(t.y, other(t), out);
       case Toggle::Kind::begin: return begin(t.a, t.y, out);
+      case Toggle::Kind::skip: return skip(t.y, t.a, t.c, out);
     }
     return false;
   }
@@ -86,10 +88,7 @@ class Toggles {
     const std::int32_t next = p_.after(to);
     if (next >= 0 && !p_.window().is_linkable(y, next)) return false;
     splices_.take_out(y, q);
-    const std::int32_t k = p_.track_of(to);
-    Edit<Filter>& e = q.edit(k, p_.place_of(to) + 1);
-    p_.append(e, y);
-    splices_.append(e, k, p_.place_of(to) + 1);
+    splices_.put_in(y, p_.track_of(to), p_.place_of(to) + 1, q);
     return true;
   }
 
@@ -121,6 +120,21 @@ class Toggles {
     if (p_.track(k).size() > 2) splices_.append(e, k, 1);
     return true;
   }
+
+  bool skip(std::int32_t y, std::int32_t a, std::int32_t c, Change<Filter>& q) const {
+    if (is_taken(y)) {
+      if (p_.before(y) != a || p_.after(y) != c || !splices_.may_go(y)) return false;
+      splices_.take_out(y, q);
+      return true;
+    }
+    const std::int32_t k = p_.track_of(a);
+    if (!p_.is_free(y) || k < 0 || p_.after(a) != c || !p_.window().is_linkable(a, y) ||
+        (c >= 0 && !p_.window().is_linkable(y, c)))
+      return false;
+    splices_.put_in(y, k, p_.place_of(a) + 1, q);
+    return true;
+  }
+
   bool is_first(std::int32_t i) const {
     return p_.place_of(i) == 0 && p_.track(p_.track_of(i)).n_gone == 0;
   }

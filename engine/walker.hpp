@@ -130,6 +130,7 @@ class Walker {
     if (hot_share_ == 0) return;
     const Partition<Filter>& p = sampler_.partition();
     const std::int32_t n = p.window().n_ids();
+    is_listed_.assign(n, false);
     for (std::int32_t i = 0; i < n; ++i) {
       if (static_cast<std::int32_t>(local_.size()) <= p.origin(i)) local_.resize(p.origin(i) + 1, -1);
       local_[p.origin(i)] = i;
@@ -142,6 +143,7 @@ class Walker {
       if (a < 0 || y < 0) continue;
       const std::int32_t x = p.track_of(a) < 0 ? -1 : p.after(a);
       const std::int32_t c = p.track_of(y) < 0 ? -1 : p.before(y);
+      add_skips(a, y);
       if (p.track_of(a) < 0 || x == y) {
         add_hot({Toggle::Kind::begin, y, a});
         continue;
@@ -155,6 +157,24 @@ class Walker {
       add_hot({Toggle::Kind::trade, y, x});
     }
     for (std::int32_t i = 0; i < n; ++i) local_[p.origin(i)] = -1;
+  }
+  // A link that is not there is made, or one that is goes with either of its ends.
+  void add_skips(std::int32_t a, std::int32_t y) {
+    const Partition<Filter>& p = sampler_.partition();
+    if (p.track_of(a) < 0) return;
+    const std::int32_t next = p.after(a);
+    if (next == y) {
+      add_skip_of(y);
+      add_skip_of(a);
+    } else if (p.is_free(y)) {
+      add_hot({Toggle::Kind::skip, y, a, next});
+    }
+  }
+  void add_skip_of(std::int32_t y) {
+    const Partition<Filter>& p = sampler_.partition();
+    if (is_listed_[y] || p.is_frozen(y) || p.before(y) < 0) return;
+    is_listed_[y] = true;
+    add_hot({Toggle::Kind::skip, y, p.before(y), p.after(y)});
   }
   void add_hot(const Toggle& toggle) {
     const double gain = sampler_.gain_of(toggle);
@@ -178,6 +198,7 @@ class Walker {
   bool is_draw_;
   std::vector<Hot> hot_;
   std::vector<std::int32_t> local_;
+  std::vector<char> is_listed_;  // detections that may be skipped by a toggle of their own
 };
 
 }  // namespace asterism

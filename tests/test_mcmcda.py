@@ -148,6 +148,35 @@ def test_confidence_is_the_share_of_the_posterior_in_which_a_detection_follows_t
     assert np.sqrt(np.mean(np.square(off))) < 0.012
 
 
+@pytest.mark.parametrize(
+    ("until", "off"),
+    [(4, 0.02), (4, 0.035), (4, 0.04), (4, 0.045), (4, 0.05), (4, 0.06), (7, 0.04), (7, 0.045)],
+)
+def test_what_comes_later_speaks_of_what_was_linked(until, off):
+    # A marker that moves straight, but for one point, or from that on. Whether it is the marker's is
+    # told by the next: here against all partitions, as frames come.
+    x = 0.05 * np.arange(7.0)[:, None, None] * [1, 0, 0]
+    x[3:until] += off
+    d, model = am.Detections.from_frames(np.arange(7) * 0.1, list(x)), small_model()
+    kept = {}  # of each point: the one before it, and how probable that was in each frame since
+    for n in range(2, 8):
+        partitions, totals = every_partition(d.part(0, n), model)
+        p = np.exp(totals - totals.max())
+        p /= p.sum()
+        best = partitions[int(np.argmax(totals))]
+        for i in range(n):
+            right = [follows(tracks, i) == follows(best, i) for tracks in partitions]
+            if kept.get(i, (None,))[0] != follows(best, i):
+                kept[i] = (follows(best, i), [])
+            kept[i][1].append(p[right].sum())
+    method = am.MCMCDA(moves=100, confidence=20_000, end_odds=1)
+    tracks = am.track(d, method, model=model, seed=1)
+    assert predecessors(tracks.labels).tolist() == [kept[i][0] for i in range(7)]
+    for i in range(7):
+        of = i if kept[i][0] != -1 else i + 1  # of the first, that the next follows it
+        assert tracks.confidence[i] == pytest.approx(np.mean(kept[of][1]), abs=0.02), i
+
+
 def predecessors(labels):
     """Of each detection, the one before in its track; -1 for the first, -2 in no track."""
     last, before = {}, np.full(len(labels), -2)
@@ -316,7 +345,7 @@ def test_a_whole_take_is_walked_over_in_the_end():
     whole = am.track(d, method, model=model, seed=1, progress=done.append)
     assert done == sorted(done)
     assert done[-1] == d.n_frames
-    narrow = am.track(d, am.MCMCDA(window=3, moves=200), model=model, seed=1)
+    narrow = am.track(d, am.MCMCDA(window=1, moves=200), model=model, seed=1)
     assert whole.info["log_posterior"] > narrow.info["log_posterior"]
     assert whole.info["moves"] > 100 * d.n_points
     assert ((whole.confidence > 0) & (whole.confidence <= 1)).all()
