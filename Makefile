@@ -65,9 +65,16 @@ sanitize: $(VENV)/.test
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake --build build/sanitize
 	$(BIN)/python tests/run_sanitized.py build/sanitize
 
+# From the tree, where the engine is built already; and what is built from is all in the archive of
+# sources.
 wheel: $(VENV)/.python
 	$(BIN)/python -m pip install --quiet build
-	$(BIN)/python -m build --outdir dist
+	rm -rf dist
+	$(BIN)/python -m build --no-isolation --sdist --wheel --outdir dist
+	tar -tzf dist/*.tar.gz | sed 's,^[^/]*/,,' | LC_ALL=C sort > build/in_sources
+	git ls-files CMakeLists.txt LICENSE README.md pyproject.toml engine src | LC_ALL=C sort \
+	  | LC_ALL=C comm -23 - build/in_sources > build/missing
+	@test ! -s build/missing || { echo "not in the archive of sources:"; cat build/missing; exit 1; }
 
 # The player of the report page, from its sources in web/ into the package. Needs Node.js ≥ 20; who
 # only uses or builds the package needs none, because the bundle is committed.
