@@ -90,6 +90,8 @@ def test_the_whole_chain(tmp_path, capsys):
     assert main(arguments) == 2
     assert main([*arguments[:-3], "--overwrite", "-o", str(tmp_path / "chain")]) == 0
     assert "Identity" in capsys.readouterr().out
+    assert main(["chain", "person", "--rig", "ring6", "--frames", "30"]) == 0
+    assert "chosen  smp, window=3, then stitched" in capsys.readouterr().out
     assert main(["chain", "person", "--method", "nobody"]) == 2
 
 

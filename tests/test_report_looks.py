@@ -11,22 +11,9 @@ import pytest
 from PIL import Image
 
 import asterism as am
-from browser import CHROMIUM, Browser
-from report_cases import full_page
+from browser import CHROMIUM
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
-
-
-@pytest.fixture(scope="module")
-def browser():
-    made = Browser()
-    yield made
-    made.close()
-
-
-@pytest.fixture(scope="module")
-def person(tmp_path_factory):
-    return full_page(tmp_path_factory.mktemp("person") / "page.html")
 
 
 def place(page):

@@ -21,7 +21,7 @@ _Out = Annotated[
 ]
 _Methods = Annotated[
     list[str] | None,
-    typer.Option("--method", help="Method to track with; may be repeated.", show_default="gnn"),
+    typer.Option("--method", help="Method to track with; may be repeated.", show_default="auto"),
 ]
 _Frames = Annotated[int | None, typer.Option(help="Number of frames.", show_default="the scene's")]
 _Rate = Annotated[float | None, typer.Option(help="Frames a second.", show_default="the scene's")]
@@ -76,9 +76,11 @@ def chain(
     import asterism as am
     from asterism.app.recording import made_scene, rig_from, seeing_from
     from asterism.app.run_folder import check_folder
-    from asterism.app.track import resolved_method
+    from asterism.associate import AUTO
+    from asterism.errors import check_fields
 
-    methods = [resolved_method(name, []) for name in method or ["gnn"]]
+    names = method or [AUTO]
+    check_fields("method", names, {AUTO, *am.METHODS})
     if out is not None:
         check_folder(out, overwrite=overwrite)
     truth, values = made_scene(scene, {"frames": frames, "rate": rate, "seed": seed}, option or [])
@@ -99,12 +101,13 @@ def chain(
     tracks: dict[str, am.Tracks] = {}
     identity: dict[str, dict[str, Any]] = {}
     model = am.estimate_model(made.detections).model
-    for name, options in methods:
+    for name in names:
         with progress(f"tracking with {name}", o.n_frames) as advance:
-            chosen = am.method_by_name(name, **options)
             tracks[name] = am.track(
-                made.detections, chosen, model=model, seed=seed, progress=advance
-            )
+                made.detections,
+                None if name == AUTO else am.method_by_name(name),
+                model=model, seed=seed, progress=advance,
+            )  # fmt: skip
         identity[name] = am.evaluate(tracks[name], who).to_dict()
     n_there = max(int((shot.projection.reason[0] != am.Reason.ABSENT).sum()), 1)
     two_d = {
@@ -145,6 +148,8 @@ def chain(
             ("method", "IDF1", "switches", "MOTA", "tracks"),
             title="\nIdentity",
         )
+        if AUTO in tracks:
+            print_table([("chosen", tracks[AUTO].info["chosen"])])
         if out is not None:
             print_table([("written", out)])
 

@@ -37,9 +37,14 @@ class ModelEstimate:
     stds: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def __str__(self) -> str:
-        width = max(len(name) for name, _, _ in self.reasons)
-        value = max(len(text) for _, text, _ in self.reasons)
-        return "\n".join(f"{n:<{width}}  {v:<{value}}  {why}" for n, v, why in self.reasons)
+        from rich.cells import cell_len, set_cell_size  # a bar over v takes no place of its own
+
+        width = max(cell_len(name) for name, _, _ in self.reasons)
+        value = max(cell_len(text) for _, text, _ in self.reasons)
+        return "\n".join(
+            f"{set_cell_size(n, width)}  {set_cell_size(v, value)}  {why}"
+            for n, v, why in self.reasons
+        )
 
 
 def motion_levels(model: TrackingModel) -> tuple[str, str, tuple[float, ...]]:
