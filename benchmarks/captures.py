@@ -1,6 +1,7 @@
 """The table of real captures: each method with the estimated model, as captured and corrupted.
 
-Finds the captures in ``../shared/data`` beside the project (or ``--data``); prints Markdown.
+Finds the captures in ``../shared/data`` beside the project (or ``--data``); prints Markdown. Frames a
+second are of processor time.
 
     python benchmarks/captures.py [--data FOLDER] [--only NAME] [--markdown FILE]
 """
@@ -45,9 +46,9 @@ def score(
     speed: dict[str, float] = {}
     results: dict[str, am.Tracks] = {}
     for name, method in METHODS.items():
-        start = time.perf_counter()
+        start = time.process_time()
         results[name] = am.track(truth.detections, method, model=model)
-        speed[name] = truth.detections.n_frames / (time.perf_counter() - start)
+        speed[name] = truth.detections.n_frames / (time.process_time() - start)
         found[name] = am.evaluate(results[name], truth)
     return found, speed, results
 
@@ -64,12 +65,12 @@ def details(e: am.Evaluation) -> list[str]:
 
 def unlabelled_row(path: Path, capture: am.Capture) -> list[str]:
     """Track a capture without truth, and count where it parts from the recorder's pieces."""
-    start = time.perf_counter()
+    start = time.process_time()
     estimate = am.estimate_model(capture)
-    seconds = time.perf_counter() - start
-    start = time.perf_counter()
+    seconds = time.process_time() - start
+    start = time.process_time()
     tracks = am.track(capture, am.GNN(), model=estimate.model)
-    taken = time.perf_counter() - start
+    taken = time.process_time() - start
     pieces = am.Tracks(detections=capture, labels=capture.labels)
     order, _ = pieces.by_track
     inside = np.diff(capture.labels[order]) == 0
@@ -109,9 +110,9 @@ def main() -> None:
             continue
         for condition, make in conditions.items():
             truth = make(capture.tracks)
-            start = time.perf_counter()
+            start = time.process_time()
             model = am.estimate_model(truth.detections).model
-            seconds = time.perf_counter() - start
+            seconds = time.process_time() - start
             gap = model.population.max_gap
             floors = [am.evaluate(am.floor(truth, g), truth).idf1 for g in (10, gap)]
             found, speed, results = score(truth, model)
