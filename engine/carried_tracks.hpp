@@ -1,0 +1,237 @@
+// Bodies between prediction and pairing: believed tracks that are not seen are expected where their
+// neighbours carry them, and neighbours have a say in who takes which point.
+//
+//   1  tracks that were seen in the last frame list their candidates; two that like each other best
+//      tell where the marker is for now
+//   2  by these the hidden ones are placed. The carried place is fused with the track's own prediction
+//      as a measurement of it would be; its own state goes on untouched until the marker is seen, for
+//      places that are carried frame after frame err alike
+//   3  the hidden ones list their candidates, and bonds say what they think of those in doubt
+//
+// A point that comes up for a hidden marker may be a ghost beside it, as well as it: anywhere within
+// half the distance to its nearest neighbour, about. A point that is more like that than like the
+// marker is not taken.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include "body_carrier.hpp"
+#include "bond_graph.hpp"
+#include "fresh.hpp"
+#include "live_tracks.hpp"
+
+namespace asterism {
+
+struct CarryOptions {
+  bool is_on = false;
+  std::int32_t max_carried = 0;  // frames
+  double bond_weight = 0;        // all that bonds say of a pairing is within ± so many nats
+};
+
+class CarriedTracks {
+ public:
+  CarriedTracks(const MotionModel& m, const CarryOptions& options)
+      : opt_(options), carrier_(m.axis.D, m.axis.r) {}
+
+  bool is_on() const { return opt_.is_on; }
+  // A pairing may become better by so much.
+  double bond_weight() const { return opt_.bond_weight; }
+
+  // Lists the candidates of a frame. `list(asked, out)` adds those of the tracks for which asked(i)
+  // holds, by their predictions, with gains down to bond_weight() below `least_gain`.
+  template <typename List>
+  void list(LiveTracks<>& live, const MotionStep& step, std::span<const Point> points,
+            double least_gain, List&& list, std::vector<Candidate>& out, FrameStats& stats) {
+    live.predict_all(step);
+    out.clear();
+    list([&](std::size_t i) { return live[i].gap == 0; }, out);
+    place_seen(live, points, out);
+    place_hidden(live);
+    s_.alone.clear();
+    list([&](std::size_t i) { return s_.is_carried[i] != 0; }, s_.alone);
+    for (std::size_t i = 0; i < live.size(); ++i)
+      if (s_.is_carried[i]) live.expect(i, Prediction(live.m, s_.fused[i]));
+    list([&](std::size_t i) { return live[i].gap > 0; }, out);
+    std::stable_sort(out.begin(), out.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.row < b.row; });
+    weigh(live, points, least_gain, out, stats);
+    count_refused(least_gain, out, stats);
+  }
+
+  // Track i takes a detection, or none.
+  void take(LiveTrack<>& track, std::size_t i, FrameStats& stats) const {
+    if (!is_carried(i)) return;
+    track.state = s_.fused[i];
+    ++stats.n_returned;
+  }
+  void miss(LiveTrack<>& track, std::size_t i, FrameStats& stats) const {
+    if (!is_carried(i) || s_.is_doubtful[i] || track.gap > opt_.max_carried) return;
+    ++track.carried;
+    ++stats.n_carried;
+  }
+  bool is_carried(std::size_t i) const { return opt_.is_on && s_.is_carried[i]; }
+
+  // After a frame.
+  void learn(const LiveTracks<>& live, FrameStats& stats) {
+    if (!opt_.is_on) return;
+    s_.seen.clear();
+    s_.known.clear();
+    for (const LiveTrack<>& track : live.tracks) {
+      if (!track.is_confirmed()) continue;
+      s_.known.push_back(number(track));
+      if (track.gap == 0) s_.seen.push_back({number(track), track.last});
+    }
+    std::sort(s_.known.begin(), s_.known.end());
+    std::sort(s_.seen.begin(), s_.seen.end(),
+              [](const Seen& a, const Seen& b) { return a.marker < b.marker; });
+    for (const std::int32_t marker : known_)
+      if (!std::binary_search(s_.known.begin(), s_.known.end(), marker)) carrier_.forget(marker);
+    known_.assign(s_.known.begin(), s_.known.end());
+    carrier_.see(s_.seen);
+    for (const std::int32_t marker : known_) stats.n_bonds += carrier_.n_bonds(marker);
+  }
+
+ private:
+  // A place is doubtful that is not known to this share of the distance to the nearest neighbour.
+  static constexpr double kDoubtful = 0.25;
+  // Of the carried place and the track's own, squared and along an axis, against what is expected: from
+  // here on it is the carried place that is thought to be less sure than it says.
+  static constexpr double kAgreed = 4;
+
+  static std::int32_t number(const LiveTrack<>& track) { return static_cast<std::int32_t>(track.id); }
+
+  // A track and a point that like each other best.
+  void place_seen(const LiveTracks<>& live, std::span<const Point> points,
+                  std::span<const Candidate> candidates) {
+    s_.best_row.assign(points.size(), -1);
+    s_.best_column.assign(live.size(), -1);
+    const auto better = [&](std::int32_t e, std::int32_t than) {
+      return than < 0 || candidates[e].gain > candidates[than].gain;
+    };
+    for (std::int32_t e = 0; e < static_cast<std::int32_t>(candidates.size()); ++e) {
+      const Candidate& c = candidates[e];
+      if (!live[c.row].is_confirmed()) continue;
+      if (better(e, s_.best_row[c.column])) s_.best_row[c.column] = e;
+      if (better(e, s_.best_column[c.row])) s_.best_column[c.row] = e;
+    }
+    s_.places.clear();
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      const std::int32_t e = s_.best_column[i];
+      if (e < 0 || s_.best_row[candidates[e].column] != e) continue;
+      s_.places.set(number(live[i]), points[candidates[e].column]);
+    }
+  }
+
+  void place_hidden(const LiveTracks<>& live) {
+    s_.is_carried.assign(live.size(), 0);
+    s_.is_doubtful.assign(live.size(), 0);
+    s_.fused.resize(live.size());
+    s_.ghosts.assign(live.size(), 0);
+    Carriage found;
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      const LiveTrack<>& track = live[i];
+      if (track.gap == 0 || !track.is_confirmed()) continue;
+      if (!carrier_.carry(number(track), s_.places, found)) continue;
+      const int D = live.m.axis.D;
+      const Prediction& own = live.prediction(i);
+      double S = 0;
+      for (int b = 0; b < own.M; ++b) S += own.w[b] * own.S[b];
+      const double apart = squared_distance(found.place.at, own.center, D) / (D * kAgreed);
+      const double V = std::max(found.place.variance, apart - S);
+      const double doubtful = kDoubtful * found.nearest;
+      s_.is_doubtful[i] = !(V < doubtful * doubtful);
+      Point carried = found.place.at;
+      carried.r = std::max(V - live.m.axis.r, 0.0);
+      s_.fused[i] = track.state;
+      update(live.m, own, carried, s_.fused[i]);
+      s_.is_carried[i] = 1;
+      // As likely as the marker itself, and clutter all the same.
+      const double radius = 0.5 * found.nearest;
+      s_.ghosts[i] =
+          softplus(-0.5 * D * std::log(2 * std::numbers::pi * radius * radius) - live.sm.log_clutter);
+    }
+  }
+
+  // What ghosts and bonds make of the candidates.
+  void weigh(const LiveTracks<>& live, std::span<const Point> points, double least_gain,
+             std::vector<Candidate>& out, FrameStats& stats) {
+    s_.n_rows.assign(points.size(), 0);
+    s_.n_columns.assign(live.size(), 0);
+    for (const Candidate& c : out) {
+      ++s_.n_rows[c.column];
+      ++s_.n_columns[c.row];
+    }
+    const auto is_in_doubt = [&](const Candidate& c) {
+      return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 ||
+             c.gain - opt_.bond_weight <= least_gain;
+    };
+    std::int32_t row = -1;
+    for (Candidate& c : out) {
+      if (!live[c.row].is_confirmed()) continue;
+      const bool was_listed = c.gain > least_gain;
+      c.gain -= s_.ghosts[c.row];
+      if (opt_.bond_weight > 0 && is_in_doubt(c)) {
+        if (row != c.row) list_bonds(live[row = c.row]);
+        c.gain += says(points, c);
+      }
+      // A hidden one's are counted against what it would take by itself.
+      stats.n_refused += was_listed && !is_carried(c.row) && !(c.gain > least_gain);
+    }
+    std::erase_if(out, [&](const Candidate& c) { return !(c.gain > least_gain); });
+  }
+
+  void list_bonds(const LiveTrack<>& track) {
+    s_.bonds.clear();
+    const double r = carrier_.noise();
+    for (const Bond& bond : carrier_.bonds(number(track))) {
+      if (s_.places.find(bond.other) == nullptr) continue;
+      s_.bonds.push_back({bond.other, bond.mean, spread(bond, r), 0});
+      if (s_.bonds.size() == kSteadiest) break;
+    }
+    const auto n = std::max(BondGraph::kFew, static_cast<std::int32_t>(s_.bonds.size()));
+    for (BondGraph::Bond& bond : s_.bonds) bond.weight = opt_.bond_weight / n;
+  }
+  double says(std::span<const Point> points, const Candidate& c) const {
+    double sum = 0;
+    for (const BondGraph::Bond& bond : s_.bonds) {
+      const Point& other = *s_.places.find(bond.other);
+      const double distance2 = squared_distance(points[c.column], other, carrier_.n_axes());
+      if (distance2 > 0) sum += bond.says(std::sqrt(distance2));  // no marker is where another is
+    }
+    return sum;
+  }
+
+  // Points that a hidden track would have taken by itself.
+  void count_refused(double least_gain, std::span<const Candidate> out, FrameStats& stats) const {
+    for (const Candidate& own : s_.alone)
+      if (own.gain > least_gain)
+        stats.n_refused += std::ranges::none_of(out, [&](const Candidate& c) {
+          return c.row == own.row && c.column == own.column;
+        });
+  }
+
+  struct Memory {
+    std::vector<char> is_carried, is_doubtful;
+    std::vector<MotionState> fused;
+    std::vector<double> ghosts;  // log (1 + their density / clutter's), by track
+    std::vector<std::int32_t> best_row, best_column, n_rows, n_columns;
+    std::vector<Candidate> alone;
+    std::vector<BondGraph::Bond> bonds;
+    std::vector<Seen> seen;
+    std::vector<std::int32_t> known;
+    Places places;
+  };
+
+  CarryOptions opt_;
+  BodyCarrier carrier_;
+  std::vector<std::int32_t> known_;
+  Fresh<Memory> s_;
+};
+
+}  // namespace asterism
