@@ -44,7 +44,7 @@ class BodyCarrier {
     frames_.emplace_back(seen.begin(), seen.end());
     if (frames_.size() > kKept) frames_.pop_front();
     ++n_frames_;
-    for (const Seen& one : seen) hidden_.erase(one.marker);
+    for (const Seen& one : seen) welcome(one.marker);
     neighbours_.add(seen);
     if (frames_.size() > 1)
       for (const Seen& one : frames_[frames_.size() - 2])
@@ -66,7 +66,7 @@ class BodyCarrier {
     if (hidden == hidden_.end() || trust == trust_.end() || trust->second.shifted.n < kLeastJudged)
       return false;
     s_.ways.clear();
-    for (const Remembered& anchor : hidden->second) {
+    for (const Remembered& anchor : hidden->second.anchors) {
       s_.pairs.clear();
       for (std::size_t k = 0; k < anchor.around.size() && s_.pairs.size() < kSteadiest; ++k)
         if (const Point* at = now.find(anchor.around[k].marker); at != nullptr)
@@ -106,7 +106,8 @@ class BodyCarrier {
   static constexpr std::array<std::size_t, 3> kAnchors{0, 4, 10};
   static constexpr std::size_t kLag = 12, kKept = kLag + 1;  // frames
   static constexpr std::int64_t kJudgeEvery = 4, kMemory = 50, kLeastJudged = 3;
-  static constexpr double kLeastOff = 0.05;
+  static constexpr double kLeastOff = 0.02;
+  static constexpr double kUsual = 2, kUnknown = 0.05;
 
   // Of the last kMemory.
   struct RecentMean {
@@ -116,14 +117,18 @@ class BodyCarrier {
   };
   // Of a marker that was carried kLag frames to where it was seen: how far off that was along an axis,
   // squared; the part of this that bonds and geometry expected; and how far off its offset from the
-  // steadiest neighbour was, had that been kept.
+  // steadiest neighbour was, had that been kept; and how far it had moved, which is what all this is known for.
   struct Trust {
-    RecentMean error, expected, shifted;
+    RecentMean error, expected, shifted, moved;
   };
 
   // From the frame with that number, counted from 1.
   struct Remembered : Anchor {
     std::int64_t frame = 0;
+  };
+  struct Hidden {
+    std::vector<Remembered> anchors;
+    std::size_t n_back = 0;  // frames in which it was seen again
   };
 
   static const Point* find(const Sighting& frame, std::int32_t marker) {
@@ -134,12 +139,23 @@ class BodyCarrier {
   // Of a neighbour about where the body takes it: both were measured then and now, and bodies bend by
   // what the distance varied, and by what was not seen yet.
   double variance(const Bond& bond) const {
-    const double unseen = 0.1 * bond.mean / static_cast<double>(bond.n);
+    const double unseen = bond.mean * (0.01 + 1 / static_cast<double>(bond.n));
     return std::max(bond.variance, 2 * r_) + unseen * unseen;
   }
 
+  // Whoever is back for a while is not hidden any more. Until then it may have been a ghost that came, so
+  // that what was remembered of the marker is kept.
+  void welcome(std::int32_t marker) {
+    const auto hidden = hidden_.find(marker);
+    if (hidden == hidden_.end()) return;
+    if (++hidden->second.n_back > kAnchors.back()) hidden_.erase(hidden);
+  }
   void hide(std::int32_t marker) {
-    std::vector<Remembered>& anchors = hidden_[marker];
+    if (const auto hidden = hidden_.find(marker); hidden != hidden_.end()) {
+      hidden->second.n_back = 0;
+      return;
+    }
+    std::vector<Remembered>& anchors = hidden_[marker].anchors;
     const std::span<const Bond> steady = bonds(marker);
     const std::size_t last = frames_.size() - 2;
     for (const std::size_t back : kAnchors) {
@@ -168,6 +184,10 @@ class BodyCarrier {
         trust.expected.n == 0 ? 1 : (trust.error.value - 2 * r_) / trust.expected.value;
     out.place = carried_place(s_.pairs, then, D_, r_, std::max(off * bent, kLeastOff),
                               4 * r_ + bent * trust.shifted.value);
+    // Whoever moves as never before may bend as never before.
+    const double moved = std::sqrt(squared_distance(out.place.at, then, D_)) -
+                         kUsual * bent * std::sqrt(trust.moved.value);
+    if (moved > 0) out.place.variance += kUnknown * kUnknown * moved * moved;
     out.n_neighbours = static_cast<std::int32_t>(s_.pairs.size());
     double nearest2 = std::numeric_limits<double>::infinity();
     for (const RigidPair& p : s_.pairs)
@@ -217,6 +237,7 @@ class BodyCarrier {
         shift2 += off * off;
       }
       trust.shifted.add(std::min(shift2, most) / D_);
+      trust.moved.add(squared_distance(one.at, *before, D_));
       const CarriedPlace place = carried_place(s_.pairs, *before, D_, 0, 1,
                                                std::numeric_limits<double>::infinity());
       if (!std::isfinite(place.variance)) continue;
@@ -236,7 +257,7 @@ class BodyCarrier {
   std::int64_t n_frames_ = 0;
   Neighbours neighbours_;
   std::deque<Sighting> frames_;
-  std::map<std::int32_t, std::vector<Remembered>> hidden_;
+  std::map<std::int32_t, Hidden> hidden_;
   std::map<std::int32_t, Trust> trust_;
   Fresh<Memory> s_;
 };

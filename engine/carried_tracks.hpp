@@ -36,8 +36,8 @@ struct CarryOptions {
 
 class CarriedTracks {
  public:
-  CarriedTracks(const MotionModel& m, const CarryOptions& options)
-      : opt_(options), carrier_(m.axis.D, m.axis.r) {}
+  CarriedTracks(const MotionModel& m, const ScoreModel& score, const CarryOptions& options)
+      : opt_(options), max_gap_(score.max_gap), carrier_(m.axis.D, m.axis.r) {}
 
   bool is_on() const { return opt_.is_on; }
   // A pairing may become better by so much.
@@ -71,6 +71,7 @@ class CarriedTracks {
     ++stats.n_returned;
   }
   void miss(LiveTrack<>& track, std::size_t i, FrameStats& stats) const {
+    if (opt_.is_on && s_.heir[i] >= 0) track.gap = max_gap_ + track.carried;
     if (!is_carried(i) || s_.is_doubtful[i] || track.gap > opt_.max_carried) return;
     ++track.carried;
     ++stats.n_carried;
@@ -98,10 +99,11 @@ class CarriedTracks {
   }
 
  private:
+  static constexpr double kNever = -std::numeric_limits<double>::infinity();
   // A place is doubtful that is not known to this share of the distance to the nearest neighbour.
   static constexpr double kDoubtful = 0.25;
-  // Of the carried place and the track's own, squared and along an axis, against what is expected: from
-  // here on it is the carried place that is thought to be less sure than it says.
+  // What the carried place and the track's own may differ by, squared and along an axis, against what is
+  // expected. Where they differ more, the one that is less sure is less sure than it says.
   static constexpr double kAgreed = 4;
 
   static std::int32_t number(const LiveTrack<>& track) { return static_cast<std::int32_t>(track.id); }
@@ -121,10 +123,12 @@ class CarriedTracks {
       if (better(e, s_.best_column[c.row])) s_.best_column[c.row] = e;
     }
     s_.places.clear();
+    s_.owner.assign(points.size(), -1);
     for (std::size_t i = 0; i < live.size(); ++i) {
       const std::int32_t e = s_.best_column[i];
       if (e < 0 || s_.best_row[candidates[e].column] != e) continue;
       s_.places.set(number(live[i]), points[candidates[e].column]);
+      s_.owner[candidates[e].column] = static_cast<std::int32_t>(i);
     }
   }
 
@@ -139,17 +143,22 @@ class CarriedTracks {
       if (track.gap == 0 || !track.is_confirmed()) continue;
       if (!carrier_.carry(number(track), s_.places, found)) continue;
       const int D = live.m.axis.D;
-      const Prediction& own = live.prediction(i);
       double S = 0;
-      for (int b = 0; b < own.M; ++b) S += own.w[b] * own.S[b];
-      const double apart = squared_distance(found.place.at, own.center, D) / (D * kAgreed);
-      const double V = std::max(found.place.variance, apart - S);
+      for (int b = 0; b < live.m.M; ++b) S += live.prediction(i).w[b] * live.prediction(i).S[b];
+      double V = found.place.variance;
+      const double apart =
+          squared_distance(found.place.at, live.prediction(i).center, D) / (D * kAgreed);
+      MotionState& state = s_.fused[i];
+      state = track.state;
+      if (apart > S + V && S < V) V = apart - S;
+      if (apart > S + V)
+        for (int b = 0; b < live.m.M; ++b)
+          for (double& P : state.mode[b].P) P *= apart / S;
       const double doubtful = kDoubtful * found.nearest;
       s_.is_doubtful[i] = !(V < doubtful * doubtful);
       Point carried = found.place.at;
       carried.r = std::max(V - live.m.axis.r, 0.0);
-      s_.fused[i] = track.state;
-      update(live.m, own, carried, s_.fused[i]);
+      update(live.m, Prediction(live.m, state), carried, state);
       s_.is_carried[i] = 1;
       // As likely as the marker itself, and clutter all the same.
       const double radius = 0.5 * found.nearest;
@@ -175,15 +184,33 @@ class CarriedTracks {
     for (Candidate& c : out) {
       if (!live[c.row].is_confirmed()) continue;
       const bool was_listed = c.gain > least_gain;
-      c.gain -= s_.ghosts[c.row];
       if (opt_.bond_weight > 0 && is_in_doubt(c)) {
         if (row != c.row) list_bonds(live[row = c.row]);
         c.gain += says(points, c);
       }
+      const bool is_ghost = !(c.gain > least_gain + s_.ghosts[c.row]);
+      if (is_ghost || (is_carried(c.row) && !may_take(live, c))) c.gain = kNever;
       // A hidden one's are counted against what it would take by itself.
       stats.n_refused += was_listed && !is_carried(c.row) && !(c.gain > least_gain);
     }
+    succeed(live, out);
     std::erase_if(out, [&](const Candidate& c) { return !(c.gain > least_gain); });
+  }
+  bool may_take(const LiveTracks<>& live, const Candidate& c) const {
+    const std::int32_t owner = s_.owner[c.column];
+    return owner < 0 || live[owner].first_time > live[c.row].last_time;
+  }
+  // Tracks that are hidden ones come back give way to them.
+  void succeed(const LiveTracks<>& live, std::vector<Candidate>& out) {
+    s_.heir.assign(live.size(), -1);
+    for (std::int32_t e = 0; e < static_cast<std::int32_t>(out.size()); ++e) {
+      const Candidate& c = out[e];
+      if (!is_carried(c.row) || c.gain == kNever || s_.owner[c.column] < 0) continue;
+      std::int32_t& heir = s_.heir[s_.owner[c.column]];
+      if (heir < 0 || c.gain > out[heir].gain) heir = e;
+    }
+    for (Candidate& c : out)
+      if (s_.heir[c.row] >= 0) c.gain = kNever;
   }
 
   void list_bonds(const LiveTrack<>& track) {
@@ -220,7 +247,7 @@ class CarriedTracks {
     std::vector<char> is_carried, is_doubtful;
     std::vector<MotionState> fused;
     std::vector<double> ghosts;  // log (1 + their density / clutter's), by track
-    std::vector<std::int32_t> best_row, best_column, n_rows, n_columns;
+    std::vector<std::int32_t> best_row, best_column, owner, heir, n_rows, n_columns;
     std::vector<Candidate> alone;
     std::vector<BondGraph::Bond> bonds;
     std::vector<Seen> seen;
@@ -229,6 +256,7 @@ class CarriedTracks {
   };
 
   CarryOptions opt_;
+  std::int32_t max_gap_;
   BodyCarrier carrier_;
   std::vector<std::int32_t> known_;
   Fresh<Memory> s_;

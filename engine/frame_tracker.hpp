@@ -38,7 +38,7 @@ class FrameTracker {
  public:
   FrameTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
                const FrameOptions& options)
-      : live_(model, score, life), opt_(options), carried_(model, options.carry) {}
+      : live_(model, score, life), opt_(options), carried_(model, score, options.carry) {}
 
   // Take the points of the next frame. Calls label(detection, track id, confidence) for every
   // detection whose label is decided now: those of this frame in confirmed tracks and, when a track

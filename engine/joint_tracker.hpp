@@ -38,7 +38,7 @@ class JointTracker {
  public:
   JointTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
                const JointOptions& options)
-      : live_(model, score, life), opt_(options), carried_(model, options.carry) {}
+      : live_(model, score, life), opt_(options), carried_(model, score, options.carry) {}
 
   // As FrameTracker::step. Every point of the frame gets a label, -1 with the probability that it is
   // of no track that is believed.

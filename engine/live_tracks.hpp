@@ -47,7 +47,7 @@ struct LiveTrack {
   std::int32_t gap = 0;  // frames since the last detection
   std::int32_t carried = 0;  // of these, in which its neighbours told where it is
   double score = 0, best_score = 0;
-  double last_time = 0;
+  double first_time = 0, last_time = 0;
   Point last{};
   MotionState state;
   std::vector<Pending> pending;
@@ -255,7 +255,7 @@ class LiveTracks {
   Track& begin(std::size_t j, const Point& y, double time, double score) {
     Track& track = tracks.emplace_back();
     track.score = track.best_score = score;
-    track.last_time = time;
+    track.first_time = track.last_time = time;
     track.last = y;
     track.state = begin_state(m, y);
     track.pending.push_back({n_seen + static_cast<std::int64_t>(j), 1.0});
