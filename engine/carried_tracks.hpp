@@ -103,7 +103,7 @@ class CarriedTracks {
   // A place is doubtful that is not known to this share of the distance to the nearest neighbour.
   static constexpr double kDoubtful = 0.25;
   // What the carried place and the track's own may differ by, squared and along an axis, against what is
-  // expected. Where they differ more, the one that is less sure is less sure than it says.
+  // expected. Where they differ more, the track is less sure of its own than it says.
   static constexpr double kAgreed = 4;
 
   static std::int32_t number(const LiveTrack<>& track) { return static_cast<std::int32_t>(track.id); }
@@ -145,12 +145,12 @@ class CarriedTracks {
       const int D = live.m.axis.D;
       double S = 0;
       for (int b = 0; b < live.m.M; ++b) S += live.prediction(i).w[b] * live.prediction(i).S[b];
-      double V = found.place.variance;
+      const double V = found.place.variance;
       const double apart =
           squared_distance(found.place.at, live.prediction(i).center, D) / (D * kAgreed);
+      if (!(V < S)) continue;  // it knows better itself
       MotionState& state = s_.fused[i];
       state = track.state;
-      if (apart > S + V && S < V) V = apart - S;
       if (apart > S + V)
         for (int b = 0; b < live.m.M; ++b)
           for (double& P : state.mode[b].P) P *= apart / S;
