@@ -99,7 +99,7 @@ class BodyByHand:
         return mean
 
     def carry(self, marker: int, markers, points):
-        """Place and variance of a marker that is not seen, or None."""
+        """Place and variance of a hidden marker, and how many carry it; or None."""
         now = dict(zip(map(int, markers), np.asarray(points), strict=True))
         (error, expected, shifted, moved), counts = self.trust(marker)
         last = max(t for t, frame in enumerate(self.frames) if marker in frame)
@@ -125,8 +125,8 @@ class BodyByHand:
                 if (own_v := self.r + max(off * bent, 0.02) * raw) < variance:
                     at, variance = turned, own_v
             beyond = np.linalg.norm(at - frame[marker]) - 2 * bent * np.sqrt(moved)
-            ways.append((at, variance + (0.05 * max(beyond, 0)) ** 2))
+            ways.append((at, variance + (0.05 * max(beyond, 0)) ** 2, len(own)))
         if not ways:
             return None
-        apart = [sum(np.linalg.norm(p - q) for q, _ in ways) for p, _ in ways]
+        apart = [sum(np.linalg.norm(p - q) for q, *_ in ways) for p, *_ in ways]
         return ways[int(np.argmin(apart))]
