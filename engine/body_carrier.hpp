@@ -3,7 +3,8 @@
 //
 // The variance of a carried place (carried_place.hpp) is what bonds and geometry say, times how far off
 // it was in the past: while a marker is seen, its neighbours are asked now and then to carry it here
-// from kLag frames ago.
+// from kLag frames ago. It grows with the frames since the marker was seen. What bodies do that were
+// never seen to move so far is not known: then it is wider by a share of how far they have moved.
 #pragma once
 
 #include <algorithm>
@@ -102,22 +103,24 @@ class BodyCarrier {
   using Sighting = std::vector<Seen>;
 
   static constexpr std::size_t kRemembered = 16;  // neighbours of a hidden marker
-  // Frames before a marker was seen last: that one may be a ghost beside it.
+  // Frames before the one in which a marker was seen last, which may show a ghost beside it.
   static constexpr std::array<std::size_t, 3> kAnchors{0, 4, 10};
   static constexpr std::size_t kLag = 12, kKept = kLag + 1;  // frames
+  // A marker is asked about every so many frames; so many answers are remembered, and so many needed.
   static constexpr std::int64_t kJudgeEvery = 4, kMemory = 50, kLeastJudged = 3;
-  static constexpr double kLeastOff = 0.02;
+  static constexpr double kLeastOff = 0.02;  // κ is no less
+  // Bodies that move more than so many times what they used to bend by a share of what is beyond that.
   static constexpr double kUsual = 2, kUnknown = 0.05;
 
-  // Of the last kMemory.
+  // Of the last kMemory values.
   struct RecentMean {
     std::int64_t n = 0;
     double value = 0;
     void add(double x) { value += (x - value) / static_cast<double>(std::min(++n, kMemory)); }
   };
   // Of a marker that was carried kLag frames to where it was seen: how far off that was along an axis,
-  // squared; the part of this that bonds and geometry expected; and how far off its offset from the
-  // steadiest neighbour was, had that been kept; and how far it had moved, which is what all this is known for.
+  // squared; the part of this that bonds and geometry expected; how far off it would have been at its
+  // offset from the steadiest neighbour; and how far it had moved, squared.
   struct Trust {
     RecentMean error, expected, shifted, moved;
   };

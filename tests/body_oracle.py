@@ -55,7 +55,9 @@ class BodyByHand:
         if self.D == 2:
             turn = arm @ arm / (w @ (arms**2).sum(axis=1))
         else:
-            J = sum(wk * (x @ x * np.eye(3) - np.outer(x, x)) for wk, x in zip(w, arms, strict=True))
+            J = sum(
+                wk * (x @ x * np.eye(3) - np.outer(x, x)) for wk, x in zip(w, arms, strict=True)
+            )
             across = np.cross(arm, np.eye(3))
             turn = np.trace(across @ np.linalg.inv(J) @ across.T)
         return at, max(chi2, 1.0) * (1 / w.sum() + turn / self.D)

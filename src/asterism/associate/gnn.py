@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-
 from asterism.associate.with_bodies import WithBodies
 
 if TYPE_CHECKING:
@@ -50,6 +49,12 @@ class GNN(WithBodies):
         from asterism import _engine
 
         return _engine.FrameTracker(
-            motion, score, life, matcher=0, is_strict=False, capacity=1, merged_within=0.0,
+            motion,
+            score,
+            life,
+            matcher=0,
+            is_strict=False,
+            capacity=1,
+            merged_within=0.0,
             carry=self._carry(),
         )

@@ -1,8 +1,8 @@
 """What the methods share whose tracks carry each other through gaps: bodies, learnt as they go.
 
-Which tracks keep their distances is learnt while they are seen. One that is hidden is expected where
-its neighbours carry it, and neighbours have a say in who takes which point. The loop is in the engine
-(carried_tracks.hpp); nothing of it is there where `bodies` is off.
+Which tracks keep their distances is learnt while they are seen. One that is hidden is expected
+where its neighbours carry it, and neighbours have a say in who takes which point. The loop is in
+the engine (carried_tracks.hpp); nothing of it is there where `bodies` is off.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class WithBodies(FrameByFrame):
         its neighbours carry it, for as long as they do, beyond d̄ too; and its points are doubted
         that disagree with them.
     max_carried : int
-        With `bodies`, frames after which a hidden marker is carried no longer, 1 to 100000.
+        With `bodies`, so many frames of hiding may be carried, 1 to 100000; then d̄ is left.
     bond_weight : float
         With `bodies`, what bonds say of a pairing that is in doubt lies within ± so many nats, 0 to
         100. 0: they only carry.
