@@ -6,7 +6,8 @@
 //   2  by these the hidden ones are placed. The carried place is fused with the track's own prediction
 //      as a measurement of it would be; its own state goes on untouched until the marker is seen, for
 //      places that are carried frame after frame err alike
-//   3  the hidden ones list their candidates, and bonds say what they think of those in doubt
+//   3  the hidden ones list their candidates, by the fused place or by their own where that is
+//      likelier, and bonds say what they think of those in doubt
 //
 // A point that comes up for a hidden marker may be a ghost beside it, as well as it: anywhere within
 // half the distance to its nearest neighbour, about. A point that is more like that than like the
@@ -14,6 +15,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -55,20 +57,29 @@ class CarriedTracks {
     place_hidden(live);
     s_.alone.clear();
     list([&](std::size_t i) { return s_.is_carried[i] != 0; }, s_.alone);
+    s_.own.resize(live.size());
     for (std::size_t i = 0; i < live.size(); ++i)
-      if (s_.is_carried[i]) live.expect(i, Prediction(live.m, s_.fused[i]));
+      if (s_.is_carried[i]) {
+        s_.own[i] = live.prediction(i);
+        live.expect(i, Prediction(live.m, s_.fused[i]));
+      }
     list([&](std::size_t i) { return live[i].gap > 0; }, out);
+    add_alone(out);
     std::stable_sort(out.begin(), out.end(),
                      [](const Candidate& a, const Candidate& b) { return a.row < b.row; });
     weigh(live, points, least_gain, out, stats);
     count_refused(least_gain, out, stats);
   }
 
-  // Track i takes a detection, or none.
-  void take(LiveTrack<>& track, std::size_t i, FrameStats& stats) const {
+  // Track i takes a detection at y, or none.
+  void take(LiveTracks<>& live, std::size_t i, const Point& y, FrameStats& stats) const {
     if (!is_carried(i)) return;
-    track.state = s_.fused[i];
     ++stats.n_returned;
+    std::array<double, kMaxModes> each{};
+    if (s_.own[i].log_likelihood(y, each) > live.prediction(i).log_likelihood(y, each))
+      live.expect(i, s_.own[i]);
+    else
+      live[i].state = s_.fused[i];
   }
   void miss(LiveTrack<>& track, std::size_t i, FrameStats& stats) const {
     if (opt_.is_on && s_.heir[i] >= 0) track.gap = max_gap_ + track.carried;
@@ -162,8 +173,21 @@ class CarriedTracks {
       s_.is_carried[i] = 1;
       // As likely as the marker itself, and clutter all the same.
       const double radius = 0.5 * found.nearest;
-      s_.ghosts[i] =
-          softplus(-0.5 * D * std::log(2 * std::numbers::pi * radius * radius) - live.sm.log_clutter);
+      s_.ghosts[i] = softplus(-0.5 * D * std::log(2 * std::numbers::pi * radius * radius) -
+                              live.sm.log_clutter);
+    }
+  }
+
+  // A hidden track may be right by itself where its neighbours are not.
+  void add_alone(std::vector<Candidate>& out) const {
+    for (const Candidate& own : s_.alone) {
+      const auto same = std::ranges::find_if(out, [&](const Candidate& c) {
+        return c.row == own.row && c.column == own.column;
+      });
+      if (same == out.end())
+        out.push_back(own);
+      else if (own.gain > same->gain)
+        *same = own;
     }
   }
 
@@ -246,6 +270,7 @@ class CarriedTracks {
   struct Memory {
     std::vector<char> is_carried, is_doubtful;
     std::vector<MotionState> fused;
+    std::vector<Prediction> own;
     std::vector<double> ghosts;  // log (1 + their density / clutter's), by track
     std::vector<std::int32_t> best_row, best_column, owner, heir, n_rows, n_columns;
     std::vector<Candidate> alone;

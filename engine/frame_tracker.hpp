@@ -196,7 +196,7 @@ class FrameTracker {
         carried_.miss(track, i, stats);
         continue;
       }
-      carried_.take(track, i, stats);
+      carried_.take(live_, i, points[j], stats);
       const Point y = measured(i, points);
       track.score += live_.hit_gain() + update(live_.m, live_.prediction(i), y, track.state);
       live_.take(i, j, y, time, 1.0, label);

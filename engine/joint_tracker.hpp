@@ -243,7 +243,7 @@ class JointTracker {
       if (s_.mixture.empty()) continue;
       // What carries a hidden marker is not its own until it is seen.
       if (carried_.is_carried(i) && s_.match[i] < 0) continue;
-      carried_.take(live_[i], i, stats);
+      if (s_.match[i] >= 0) carried_.take(live_, i, points[s_.match[i]], stats);
       // Given that the track exists, a miss is less likely than it is in itself.
       const double seldom = probability(existence(i)) * p_miss() / not_seen(existence(i));
       const double missed = std::max(1 - taken, 0.0) * seldom;
