@@ -64,9 +64,8 @@ class CarriedTracks {
         live.expect(i, Prediction(live.m, s_.fused[i]));
       }
     list([&](std::size_t i) { return live[i].gap > 0; }, out);
-    add_alone(out);
-    std::stable_sort(out.begin(), out.end(),
-                     [](const Candidate& a, const Candidate& b) { return a.row < b.row; });
+    std::ranges::stable_sort(out, {}, &Candidate::row);
+    add_alone(least_gain, out);
     weigh(live, points, least_gain, out, stats);
     count_refused(least_gain, out, stats);
   }
@@ -178,19 +177,26 @@ class CarriedTracks {
     }
   }
 
-  // A hidden track may be right by itself where its neighbours are not.
-  void add_alone(std::vector<Candidate>& out) const {
-    for (const Candidate& own : s_.alone) {
-      const auto same = std::ranges::find_if(out, [&](const Candidate& c) {
-        return c.row == own.row && c.column == own.column;
-      });
-      if (same == out.end())
-        out.push_back(own);
-      else if (own.gain > same->gain)
-        *same = own;
-    }
+  // The place of the same pairing among candidates in order of their rows, or how many there are.
+  static std::size_t find_same(std::span<const Candidate> all, const Candidate& one) {
+    const auto row = std::ranges::equal_range(all, one.row, {}, &Candidate::row);
+    const auto at = std::ranges::find(row, one.column, &Candidate::column);
+    return at == row.end() ? all.size() : static_cast<std::size_t>(&*at - all.data());
   }
-
+  // A hidden track may be right by itself where its neighbours are not.
+  void add_alone(double least_gain, std::vector<Candidate>& out) {
+    s_.added.clear();
+    for (const Candidate& own : s_.alone) {
+      if (!(own.gain + opt_.bond_weight > least_gain + s_.ghosts[own.row])) continue;
+      const std::size_t same = find_same(out, own);
+      if (same == out.size())
+        s_.added.push_back(own);
+      else if (own.gain > out[same].gain)
+        out[same] = own;
+    }
+    out.insert(out.end(), s_.added.begin(), s_.added.end());
+    std::ranges::stable_sort(out, {}, &Candidate::row);
+  }
   // What ghosts and bonds make of the candidates.
   void weigh(const LiveTracks<>& live, std::span<const Point> points, double least_gain,
              std::vector<Candidate>& out, FrameStats& stats) {
@@ -261,10 +267,7 @@ class CarriedTracks {
   // Points that a hidden track would have taken by itself.
   void count_refused(double least_gain, std::span<const Candidate> out, FrameStats& stats) const {
     for (const Candidate& own : s_.alone)
-      if (own.gain > least_gain)
-        stats.n_refused += std::ranges::none_of(out, [&](const Candidate& c) {
-          return c.row == own.row && c.column == own.column;
-        });
+      if (own.gain > least_gain) stats.n_refused += find_same(out, own) == out.size();
   }
 
   struct Memory {
@@ -273,7 +276,7 @@ class CarriedTracks {
     std::vector<Prediction> own;
     std::vector<double> ghosts;  // log (1 + their density / clutter's), by track
     std::vector<std::int32_t> best_row, best_column, owner, heir, n_rows, n_columns;
-    std::vector<Candidate> alone;
+    std::vector<Candidate> alone, added;
     std::vector<BondGraph::Bond> bonds;
     std::vector<Seen> seen;
     std::vector<std::int32_t> known;
