@@ -65,7 +65,7 @@ class CarriedTracks {
       }
     list([&](std::size_t i) { return live[i].gap > 0; }, out);
     std::ranges::stable_sort(out, {}, &Candidate::row);
-    add_alone(least_gain, out);
+    add_alone(out);
     weigh(live, points, least_gain, out, stats);
     count_refused(least_gain, out, stats);
   }
@@ -184,10 +184,10 @@ class CarriedTracks {
     return at == row.end() ? all.size() : static_cast<std::size_t>(&*at - all.data());
   }
   // A hidden track may be right by itself where its neighbours are not.
-  void add_alone(double least_gain, std::vector<Candidate>& out) {
+  void add_alone(std::vector<Candidate>& out) {
     s_.added.clear();
     for (const Candidate& own : s_.alone) {
-      if (!(own.gain + opt_.bond_weight > least_gain + s_.ghosts[own.row])) continue;
+      if (!(own.gain + opt_.bond_weight > s_.ghosts[own.row])) continue;
       const std::size_t same = find_same(out, own);
       if (same == out.size())
         s_.added.push_back(own);
@@ -218,8 +218,7 @@ class CarriedTracks {
         if (row != c.row) list_bonds(live[row = c.row]);
         c.gain += says(points, c);
       }
-      const bool is_ghost = !(c.gain > least_gain + s_.ghosts[c.row]);
-      if (is_ghost || (is_carried(c.row) && !may_take(live, c))) c.gain = kNever;
+      if (is_carried(c.row) && (!(c.gain > s_.ghosts[c.row]) || !may_take(live, c))) c.gain = kNever;
       // A hidden one's are counted against what it would take by itself.
       stats.n_refused += was_listed && !is_carried(c.row) && !(c.gain > least_gain);
     }

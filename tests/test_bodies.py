@@ -134,6 +134,50 @@ def test_who_is_forgotten_is_nobodys_neighbour():
     assert sum(engine.n_bonds(k) for k in range(7)) == 15
 
 
+def walk_model(**changes):
+    values = {"birth_density": 1e-3, "p_disappear": 1e-4, "max_speed": 5, "max_gap": 5} | changes
+    return am.TrackingModel(
+        motion=am.RandomWalk(walk_sigma=0.08),  # 8 mm in a frame
+        sensor=am.Sensor(noise_sigma=SIGMA, p_detection=0.98, clutter_density=1e-2),
+        population=am.Population(**values),
+    )
+
+
+@pytest.mark.parametrize("make", METHODS)
+def test_neighbours_tell_a_marker_from_a_ghost_that_moves_likelier(make):
+    # All move on by 15 mm; where one of them was there is a ghost.
+    rng = np.random.default_rng(8)
+    shape = rng.uniform(-0.15, 0.15, (7, 3))
+    frames = [shape + rng.normal(0, SIGMA, shape.shape) for _ in range(90)]
+    frames.append(np.vstack([frames[0][:1], shape + [0.015, 0, 0]]))
+    d = am.Detections.from_frames(0.01 * np.arange(91), frames)
+    found = {}
+    for weight in (0.0, 5.0):
+        tracks = am.track(d, make(bodies=True, bond_weight=weight), model=walk_model())
+        found[weight] = int(np.flatnonzero(tracks.labels[d.offsets[90] :] == tracks.labels[0])[0])
+    assert found == {0.0: 0, 5.0: 1}
+
+
+@pytest.mark.parametrize("make", METHODS)
+def test_a_hidden_marker_is_known_when_it_comes_back(make):
+    # Hidden for 40 frames, of which the model bridges 5, while the body goes on and turns; a ghost is
+    # beside its place meanwhile.
+    rng = np.random.default_rng(9)
+    truth, seen = turning(rng, 160, 3, speed=0.3)
+    frames = []
+    for t, points in enumerate(seen):
+        hidden = 100 <= t < 140
+        ghost = truth[t, :1] + [0.05, 0.0, 0.0]
+        frames.append(np.vstack([ghost, points[1:]]) if hidden else points)
+    d = am.Detections.from_frames(0.01 * np.arange(160), frames)
+    model = walk_model()
+    off, on = (am.track(d, make(bodies=b), model=model).labels for b in (False, True))
+    first, back, ghosts = 0, d.offsets[140], d.offsets[100:140]
+    assert (off[ghosts] == off[first]).any()
+    assert on[first] == on[back] == on[-7]
+    assert (on[ghosts] != on[first]).all()
+
+
 @functools.cache
 def hidden_person(seed):
     truth = am.simulate.person(seed=seed)
