@@ -149,7 +149,7 @@ def test_neighbours_tell_a_marker_from_a_ghost_that_moves_likelier(make):
     rng = np.random.default_rng(8)
     shape = rng.uniform(-0.15, 0.15, (7, 3))
     frames = [shape + rng.normal(0, SIGMA, shape.shape) for _ in range(90)]
-    frames.append(np.vstack([frames[0][:1], shape + [0.015, 0, 0]]))
+    frames.append(np.vstack([frames[0][:1], shape + np.array([0.015, 0, 0])]))
     d = am.Detections.from_frames(0.01 * np.arange(91), frames)
     found = {}
     for weight in (0.0, 5.0):
@@ -160,14 +160,14 @@ def test_neighbours_tell_a_marker_from_a_ghost_that_moves_likelier(make):
 
 @pytest.mark.parametrize("make", METHODS)
 def test_a_hidden_marker_is_known_when_it_comes_back(make):
-    # Hidden for 40 frames, of which the model bridges 5, while the body goes on and turns; a ghost is
-    # beside its place meanwhile.
+    # Hidden for 40 frames, of which the model bridges 5, while the body goes on and turns; a ghost
+    # is beside its place meanwhile.
     rng = np.random.default_rng(9)
     truth, seen = turning(rng, 160, 3, speed=0.3)
     frames = []
     for t, points in enumerate(seen):
         hidden = 100 <= t < 140
-        ghost = truth[t, :1] + [0.05, 0.0, 0.0]
+        ghost = truth[t, :1] + np.array([0.05, 0, 0])
         frames.append(np.vstack([ghost, points[1:]]) if hidden else points)
     d = am.Detections.from_frames(0.01 * np.arange(160), frames)
     model = walk_model()
