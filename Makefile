@@ -51,6 +51,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/fills.py --markdown docs/tables/fills.md
 	$(BIN)/python benchmarks/recognition.py --markdown docs/tables/recognition.md
 	$(BIN)/python benchmarks/bond_term.py --markdown docs/tables/bond_term.md
+	$(BIN)/python benchmarks/bodies.py --markdown docs/tables/bodies.md
 	$(BIN)/python benchmarks/reconstruction.py --markdown docs/tables/reconstruction.md
 	$(BIN)/python benchmarks/prior.py --markdown docs/tables/prior.md
 	$(BIN)/python benchmarks/estimation.py --markdown docs/tables/estimation.md

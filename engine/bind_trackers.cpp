@@ -6,10 +6,8 @@
 
 #include "bindings.hpp"
 #include "forest.hpp"
-#include "frame_tracker.hpp"
 #include "hypothesis_forest.hpp"
 #include "hypothesis_matrix.hpp"
-#include "joint_tracker.hpp"
 #include "mcmc_tracker.hpp"
 #include "motion_arrays.hpp"
 #include "python_packer.hpp"
@@ -167,7 +165,10 @@ void bind_trackers(nb::module_& module) {
       .def_ro("n_merged", &FrameStats::n_merged)
       .def_ro("chain", &FrameStats::chain)
       .def_ro("n_bonds", &FrameStats::n_bonds)
-      .def_ro("bond_score", &FrameStats::bond_score);
+      .def_ro("bond_score", &FrameStats::bond_score)
+      .def_ro("n_carried", &FrameStats::n_carried)
+      .def_ro("n_returned", &FrameStats::n_returned)
+      .def_ro("n_refused", &FrameStats::n_refused);
 
   nb::class_<ChainStats>(module, "ChainStats")
       .def_ro("n_search", &ChainStats::n_search)
@@ -234,34 +235,6 @@ void bind_trackers(nb::module_& module) {
           },
           nb::kw_only(), "weights"_a, "is_informed"_a, "stop"_a, "floor"_a, "has_first_rules"_a,
           "is_ascent"_a, "share_at_doubts"_a = 0.0, "is_draw"_a = false);
-
-  bind_tracker<FrameTracker>(module, "FrameTracker")
-      .def(
-          "__init__",
-          [](FrameTracker* self, const MotionModel& model, const ScoreModel& score,
-             const LifeOptions& life, std::int32_t matcher, bool is_strict, std::int32_t capacity,
-             double merged_within) {
-            require(capacity >= 1 && capacity <= 64, "capacity: 1 to 64");
-            require(matcher >= 0 && matcher <= 2, "matcher: 0, 1 or 2");
-            new (self) FrameTracker(
-                model, score, life,
-                {static_cast<Matcher>(matcher), is_strict, capacity, merged_within});
-          },
-          "model"_a, "score"_a, "life"_a, nb::kw_only(), "matcher"_a, "is_strict"_a, "capacity"_a,
-          "merged_within"_a);
-
-  bind_tracker<JointTracker>(module, "JointTracker")
-      .def(
-          "__init__",
-          [](JointTracker* self, const MotionModel& model, const ScoreModel& score,
-             const LifeOptions& life, std::int64_t max_states, bool is_guarded,
-             bool is_sure_until_gap) {
-            require(max_states >= 1 && max_states <= std::int64_t{1} << 30,
-                    "max_states: 1 to 2^30");
-            new (self) JointTracker(model, score, life, {max_states, is_guarded, is_sure_until_gap});
-          },
-          "model"_a, "score"_a, "life"_a, nb::kw_only(), "max_states"_a, "is_guarded"_a,
-          "is_sure_until_gap"_a);
 
   nb::class_<BranchOptions>(module, "BranchOptions")
       .def(

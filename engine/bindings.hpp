@@ -5,6 +5,7 @@
 
 void bind_tracking(nanobind::module_& module);
 void bind_trackers(nanobind::module_& module);
+void bind_frame(nanobind::module_& module);
 void bind_camera(nanobind::module_& module);
 void bind_solvers(nanobind::module_& module);
 void bind_chain(nanobind::module_& module);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "assignment.hpp"
+#include "carried_tracks.hpp"
 #include "live_tracks.hpp"
 #include "marriage_market.hpp"
 
@@ -30,13 +31,14 @@ struct FrameOptions {
   // within a distance of it; they are merged by their likelihood.
   std::int32_t capacity = 1;
   double merged_within = 0;
+  CarryOptions carry;  // not where is_strict
 };
 
 class FrameTracker {
  public:
   FrameTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
                const FrameOptions& options)
-      : live_(model, score, life), opt_(options) {}
+      : live_(model, score, life), opt_(options), carried_(model, score, options.carry) {}
 
   // Take the points of the next frame. Calls label(detection, track id, confidence) for every
   // detection whose label is decided now: those of this frame in confirmed tracks and, when a track
@@ -44,7 +46,7 @@ class FrameTracker {
   template <typename Label>
   FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
     FrameStats stats;
-    find_candidates(time, step, points);
+    find_candidates(time, step, points, stats);
     stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());
     s_.match.assign(live_.size(), -1);
     s_.is_taken.assign(points.size(), 0);
@@ -53,11 +55,12 @@ class FrameTracker {
     // single frame cannot see that the marker which it takes over would have to vanish for good.
     match_all(true, points, stats);
     match_all(false, points, stats);
-    update_tracks(time, points, label);
+    update_tracks(time, points, stats, label);
     if (!opt_.is_strict)
       begin_tracks(time, points);
     else if (live_.n_frames == 0)
       begin_strictly(time, points, label);
+    carried_.learn(live_, stats);
     live_.end_frame(time, points.size(), stats);
     total_.add(stats);
     return stats;
@@ -87,23 +90,30 @@ class FrameTracker {
     return live_[i].is_confirmed() ? gain : softplus(live_[i].score + gain);
   }
 
-  void find_candidates(double time, const MotionStep& step, std::span<const Point> points) {
+  void find_candidates(double time, const MotionStep& step, std::span<const Point> points,
+                       FrameStats& stats) {
     if (opt_.is_strict) {
       live_.predict_all(step);
       return pair_all(points);
     }
     const double hit = live_.hit_gain(), miss = live_.miss_gain(), over = live_.leftover_gain();
+    const double spare = carried_.is_on() ? carried_.bond_weight() : 0;
     // A believed track takes a point only if that beats missing it and leaving the point over.
-    const double least = miss + over - hit;
-    live_.candidates(
-        time, step, points, 0.0,
-        [&](std::size_t i) {
-          return live_[i].is_confirmed() ? least : -std::numeric_limits<double>::infinity();
+    const double least = miss + over - hit - spare;
+    const auto least_of = [&](std::size_t i) {
+      return live_[i].is_confirmed() ? least : -std::numeric_limits<double>::infinity();
+    };
+    const auto gain_of = [&](std::size_t i, double log_likelihood) {
+      return odds(i, hit + log_likelihood) - odds(i, miss) - over;
+    };
+    if (!carried_.is_on())
+      return live_.candidates(time, step, points, 0.0, least_of, gain_of, s_.candidates);
+    carried_.list(
+        live_, step, points, 0.0,
+        [&](auto&& is_asked, std::vector<Candidate>& out) {
+          live_.list(time, points, -spare, is_asked, least_of, gain_of, out);
         },
-        [&](std::size_t i, double log_likelihood) {
-          return odds(i, hit + log_likelihood) - odds(i, miss) - over;
-        },
-        s_.candidates);
+        s_.candidates, stats);
   }
 
   void pair_all(std::span<const Point> points) {
@@ -175,15 +185,18 @@ class FrameTracker {
   }
 
   template <typename Label>
-  void update_tracks(double time, std::span<const Point> points, Label&& label) {
+  void update_tracks(double time, std::span<const Point> points, FrameStats& stats,
+                     Label&& label) {
     for (std::size_t i = 0; i < live_.size(); ++i) {
       LiveTrack<NoMore>& track = live_[i];
       const std::int32_t j = s_.match[i];
       if (j < 0) {
         track.score += live_.miss_gain();
         ++track.gap;
+        carried_.miss(track, i, stats);
         continue;
       }
+      carried_.take(live_, i, points[j], stats);
       const Point y = measured(i, points);
       track.score += live_.hit_gain() + update(live_.m, live_.prediction(i), y, track.state);
       live_.take(i, j, y, time, 1.0, label);
@@ -198,6 +211,7 @@ class FrameTracker {
 
   LiveTracks<> live_;
   FrameOptions opt_;
+  CarriedTracks carried_;
   FrameStats total_;
   Fresh<Memory> s_;
 };

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "best_permutations.hpp"
+#include "carried_tracks.hpp"
 #include "joint_events.hpp"
 #include "live_tracks.hpp"
 #include "pda_update.hpp"
@@ -30,13 +31,14 @@ struct JointOptions {
   // A believed track counts as one that exists until its gap is too long: markers hide in bursts,
   // of which P_d knows nothing. Otherwise its r falls with every miss, and ends it.
   bool is_sure_until_gap = true;
+  CarryOptions carry;
 };
 
 class JointTracker {
  public:
   JointTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
                const JointOptions& options)
-      : live_(model, score, life), opt_(options) {}
+      : live_(model, score, life), opt_(options), carried_(model, score, options.carry) {}
 
   // As FrameTracker::step. Every point of the frame gets a label, -1 with the probability that it is
   // of no track that is believed.
@@ -44,7 +46,7 @@ class JointTracker {
   FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
     FrameStats stats;
     survive();
-    find_candidates(time, step, points);
+    find_candidates(time, step, points, stats);
     stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());
     s_.match.assign(live_.size(), -1);
     s_.match_probability.assign(live_.size(), 0);
@@ -55,8 +57,9 @@ class JointTracker {
     share_among_tentative(points, stats);
     for (std::size_t j = 0; j < points.size(); ++j)
       label(live_.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * (1 - newborn(1)));
-    update_tracks(time, points, label);
+    update_tracks(time, points, stats, label);
     begin_tracks(time, points);
+    carried_.learn(live_, stats);
     live_.end_frame(time, points.size(), stats);
     total_.add(stats);
     return stats;
@@ -119,17 +122,26 @@ class JointTracker {
     }
   }
 
-  void find_candidates(double time, const MotionStep& step, std::span<const Point> points) {
+  void find_candidates(double time, const MotionStep& step, std::span<const Point> points,
+                       FrameStats& stats) {
     const double common =
         live_.sm.log_detect - live_.sm.log_clutter - live_.leftover_gain();
+    const double least = kNegligible - (carried_.is_on() ? carried_.bond_weight() : 0);
     const auto offset = [&](std::size_t i) {
       return common - softplus(-existence(i)) - std::log(not_seen(existence(i)));
     };
-    live_.candidates(
-        time, step, points, kNegligible,
-        [&](std::size_t i) { return kNegligible - offset(i); },
-        [&](std::size_t i, double log_likelihood) { return offset(i) + log_likelihood; },
-        s_.candidates);
+    const auto least_of = [&](std::size_t i) { return least - offset(i); };
+    const auto gain_of = [&](std::size_t i, double log_likelihood) {
+      return offset(i) + log_likelihood;
+    };
+    if (!carried_.is_on())
+      return live_.candidates(time, step, points, least, least_of, gain_of, s_.candidates);
+    carried_.list(
+        live_, step, points, kNegligible,
+        [&](auto&& is_asked, std::vector<Candidate>& out) {
+          live_.list(time, points, least, is_asked, least_of, gain_of, out);
+        },
+        s_.candidates, stats);
   }
 
   // Pairings of the believed tracks, or of the tentative ones with what is left.
@@ -229,6 +241,9 @@ class JointTracker {
         taken += s_.weights[last];
       }
       if (s_.mixture.empty()) continue;
+      // What carries a hidden marker is not its own until it is seen.
+      if (carried_.is_carried(i) && s_.match[i] < 0) continue;
+      if (s_.match[i] >= 0) carried_.take(live_, i, points[s_.match[i]], stats);
       // Given that the track exists, a miss is less likely than it is in itself.
       const double seldom = probability(existence(i)) * p_miss() / not_seen(existence(i));
       const double missed = std::max(1 - taken, 0.0) * seldom;
@@ -251,15 +266,17 @@ class JointTracker {
   }
 
   template <typename Label>
-  void update_tracks(double time, std::span<const Point> points, Label&& label) {
+  void update_tracks(double time, std::span<const Point> points, FrameStats& stats,
+                     Label&& label) {
     for (std::size_t i = 0; i < live_.size(); ++i) {
       LiveTrack<NoMore>& track = live_[i];
       update_existence(i);
       const std::int32_t j = s_.match[i];
       if (j < 0) {
         ++track.gap;
+        carried_.miss(track, i, stats);
         const bool is_gone = existence(i) < -live_.opt.confirm_score;
-        if (track.is_confirmed() && is_gone) track.gap = live_.sm.max_gap;
+        if (track.is_confirmed() && is_gone) track.gap = live_.sm.max_gap + track.carried;
         continue;
       }
       // Of a tentative track: given that it is a marker at all.
@@ -290,6 +307,7 @@ class JointTracker {
 
   LiveTracks<> live_;
   JointOptions opt_;
+  CarriedTracks carried_;
   FrameStats total_;
   Fresh<Memory> s_;
 };

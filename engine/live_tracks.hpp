@@ -41,12 +41,13 @@ struct Pending {
 // What a tracker keeps beside a track, where it keeps nothing.
 struct NoMore {};
 
-template <typename More>
+template <typename More = NoMore>
 struct LiveTrack {
   std::int64_t id = -1;  // -1 while tentative
   std::int32_t gap = 0;  // frames since the last detection
+  std::int32_t carried = 0;  // of these, in which its neighbours told where it is
   double score = 0, best_score = 0;
-  double last_time = 0;
+  double first_time = 0, last_time = 0;
   Point last{};
   MotionState state;
   std::vector<Pending> pending;
@@ -75,6 +76,8 @@ struct FrameStats {
   ChainStats chain;
   std::int64_t n_bonds = 0;  // of markers, at the end
   double bond_score = 0;     // nats that they said of what was settled
+  // Hidden tracks that were carried, by frames; those that came back; points that neighbours refused.
+  std::int64_t n_carried = 0, n_returned = 0, n_refused = 0;
 
   void add(const FrameStats& next) {
     add_work(next);
@@ -103,6 +106,9 @@ struct FrameStats {
     n_nodes += next.n_nodes;
     gap = std::max(gap, next.gap);
     n_merged += next.n_merged;
+    n_carried += next.n_carried;
+    n_returned += next.n_returned;
+    n_refused += next.n_refused;
     chain.add(next.chain);
   }
 };
@@ -115,7 +121,8 @@ inline double softplus(double x) { return x > 30 ? x : std::log1p(std::exp(x)); 
 // Working memory of one step.
 struct GateMemory {
   std::vector<Prediction> predictions;
-  std::vector<double> radii;
+  std::vector<std::size_t> asked;
+  std::vector<double> radii;  // of these
   PointGrid grid;
 };
 
@@ -153,30 +160,42 @@ class LiveTracks {
   void candidates(double time, const MotionStep& step, std::span<const Point> points,
                   double least_gain, Least&& least, Gain&& gain, std::vector<Candidate>& out) {
     out.clear();
-    s_.radii.resize(tracks.size());
-    double sum_radii = 0;
     predict_all(step);
+    list(time, points, least_gain, [](std::size_t) { return true; }, least, gain, out);
+  }
+  // Adds those of the tracks for which is_asked(i) holds, by their predictions as they are.
+  template <typename Asked, typename Least, typename Gain>
+  void list(double time, std::span<const Point> points, double least_gain, Asked&& is_asked,
+            Least&& least, Gain&& gain, std::vector<Candidate>& out) {
+    s_.asked.clear();
+    s_.radii.clear();
+    double sum_radii = 0;
     double r_most = 0;
     for (const Point& y : points) r_most = std::max(r_most, y.r);
     for (std::size_t i = 0; i < tracks.size(); ++i) {
-      s_.radii[i] = s_.predictions[i].radius(opt.gate, least(i), r_most);
-      sum_radii += std::max(s_.radii[i], 0.0);
+      if (!is_asked(i)) continue;
+      s_.asked.push_back(i);
+      s_.radii.push_back(s_.predictions[i].radius(opt.gate, least(i), r_most));
+      sum_radii += std::max(s_.radii.back(), 0.0);
     }
-    if (tracks.empty() || points.empty()) return;
-    s_.grid.build(points, m.axis.D, 2 * sum_radii / static_cast<double>(tracks.size()));
+    if (s_.asked.empty() || points.empty()) return;
+    s_.grid.build(points, m.axis.D, 2 * sum_radii / static_cast<double>(s_.asked.size()));
     std::array<double, kMaxModes> each{};
-    for (std::size_t i = 0; i < tracks.size(); ++i) {
+    for (std::size_t a = 0; a < s_.asked.size(); ++a) {
+      const std::size_t i = s_.asked[a];
       const Prediction& prediction = s_.predictions[i];
-      const auto list = [&](std::int32_t j, double distance2) {
+      const auto add = [&](std::int32_t j, double distance2) {
         const double won = gain(i, prediction.log_likelihood(points[j], each));
         if (won > least_gain && std::isfinite(won))
           out.push_back({static_cast<std::int32_t>(i), j, won, distance2});
       };
-      within_gate(s_.grid, points, prediction, s_.radii[i], tracks[i].last,
-                  time - tracks[i].last_time, list);
+      within_gate(s_.grid, points, prediction, s_.radii[a], tracks[i].last,
+                  time - tracks[i].last_time, add);
       if (static_cast<std::int64_t>(out.size()) > opt.max_candidates) throw CandidateLimit{};
     }
   }
+  // Track i is expected elsewhere than by its own state.
+  void expect(std::size_t i, const Prediction& prediction) { s_.predictions[i] = prediction; }
 
   // Calls visit(point, squared distance from the prediction) for every point within `radius` that is
   // in the gate and that the marker, `dt` ago at `last`, can have come to.
@@ -209,7 +228,7 @@ class LiveTracks {
     Track& track = tracks[i];
     track.last = y;
     track.last_time = time;
-    track.gap = 0;
+    track.gap = track.carried = 0;
     if (track.is_confirmed()) {
       label(n_seen + j, track.id, confidence);
       return;
@@ -221,14 +240,14 @@ class LiveTracks {
     track.pending = {};
   }
 
-  // After every track was updated or missed: a link spans at most max_gap frames, and a tentative
-  // track also ends by its score.
+  // After every track was updated or missed: a link spans at most max_gap frames in which nobody told
+  // where the marker is, and a tentative track also ends by its score.
   void end_tracks() {
     std::erase_if(tracks, [&](Track& track) {
       track.best_score = std::max(track.best_score, track.score);
       const bool is_doubted =
           !track.is_confirmed() && track.best_score - track.score > opt.delete_drop;
-      return track.gap >= sm.max_gap || is_doubted;
+      return track.gap - track.carried >= sm.max_gap || is_doubted;
     });
   }
 
@@ -236,7 +255,7 @@ class LiveTracks {
   Track& begin(std::size_t j, const Point& y, double time, double score) {
     Track& track = tracks.emplace_back();
     track.score = track.best_score = score;
-    track.last_time = time;
+    track.first_time = track.last_time = time;
     track.last = y;
     track.state = begin_state(m, y);
     track.pending.push_back({n_seen + static_cast<std::int64_t>(j), 1.0});

@@ -70,6 +70,12 @@ class Neighbours {
 
   // A marker that will not be asked for again.
   void forget(std::int32_t marker) { bonds_.erase(marker); }
+  // And that the others are not asked about either.
+  void forget_everywhere(std::int32_t marker) {
+    forget(marker);
+    for (auto& [own, bonds] : bonds_)
+      std::erase_if(bonds, [&](const Bond& bond) { return bond.other == marker; });
+  }
 
   std::span<const Bond> of(std::int32_t marker) const {
     const auto at = bonds_.find(marker);

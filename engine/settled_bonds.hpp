@@ -13,6 +13,7 @@
 #include "bond_term.hpp"
 #include "neighbours.hpp"
 #include "partition.hpp"
+#include "steady_bonds.hpp"
 
 namespace asterism {
 
@@ -60,22 +61,10 @@ class SettledBonds {
   }
 
  private:
-  static constexpr std::size_t kSteadiest = 6;  // bonds of a marker
-  static constexpr std::int64_t kLeast = 30;    // frames until a bond is one
-  // A distance that is known no better than by this share of itself is none that is kept.
-  static constexpr double kLoose = 0.3;
-
   struct Found {
     BondGraph::Pair pair;
     std::int64_t n = 0;
   };
-
-  // s of a bond: three times what its distance varied by, and what bodies bend by that was not seen
-  // yet. Where it is ranked its unsteadiness asks whom to trust; here it is how far off is too far.
-  double spread(const Bond& bond) const {
-    const double unseen = bond.mean * (0.02 + 1 / static_cast<double>(bond.n));
-    return std::sqrt(9 * (bond.variance + r_) + unseen * unseen);
-  }
 
   // The steadiest bonds of each of these tracks with others of them.
   std::vector<BondGraph::Pair> pairs_of(
@@ -84,12 +73,12 @@ class SettledBonds {
     for (std::int32_t a = 0; a < static_cast<std::int32_t>(tracks.size()); ++a) {
       own.clear();
       for (const Bond& bond : neighbours_.of(tracks[a].first)) {
-        const double scale = spread(bond);
-        if (bond.n < kLeast || scale > kLoose * bond.mean) continue;
+        if (!is_steady(bond, r_)) continue;
         const auto at = std::lower_bound(tracks.begin(), tracks.end(), std::pair(bond.other, -1));
         if (at == tracks.end() || at->first != bond.other) continue;
         const auto b = static_cast<std::int32_t>(at - tracks.begin());
-        own.push_back({{std::min(a, b), std::max(a, b), bond.mean, scale}, bond.n});
+        own.push_back({{std::min(a, b), std::max(a, b), bond.mean, spread(bond, r_)},
+                       bond.n});
       }
       std::sort(own.begin(), own.end(), [](const Found& x, const Found& y) {
         return std::tuple(x.pair.scale, x.pair.a, x.pair.b) <

@@ -98,6 +98,14 @@ def test_the_last_of_one_name_counts_and_dashes_will_do():
     assert parsed("gnn", ["delete-odds=5", "delete_odds=7"], options) == {"delete_odds": 7.0}
 
 
+def test_bodies_are_options_of_the_methods_that_have_them():
+    having = {name for name in am.METHODS if "bodies" in method_options(am.METHODS[name])}
+    assert having == {"gnn", "smp", "jpda"}
+    options = method_options(am.METHODS["gnn"])
+    given = parsed("gnn", ["bodies=yes", "max-carried=30", "bond-weight=0"], options)
+    assert am.GNN(**given) == am.GNN(bodies=True, max_carried=30, bond_weight=0.0)
+
+
 @pytest.mark.parametrize("name", am.METHODS)
 def test_every_method_explains_every_option(name):
     for option in method_options(am.METHODS[name]).values():

@@ -77,6 +77,12 @@ class FrameStats:
     def n_bonds(self) -> int: ...
     @property
     def bond_score(self) -> float: ...
+    @property
+    def n_carried(self) -> int: ...
+    @property
+    def n_returned(self) -> int: ...
+    @property
+    def n_refused(self) -> int: ...
 
 class ChainStats:
     @property
@@ -178,6 +184,20 @@ class _Tracker:
     @property
     def total(self) -> FrameStats: ...
 
+class CarryOptions:
+    def __init__(
+        self, *, is_on: bool = False, max_carried: int = 0, bond_weight: float = 0.0
+    ) -> None: ...
+
+class BodyCarrier:
+    def __init__(self, *, n_axes: int, noise_sigma: float) -> None: ...
+    def see(self, markers: NDArray[np.int64], points: NDArray[np.float64]) -> None: ...
+    def carry(
+        self, marker: int, markers: NDArray[np.int64], points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], float, int] | None: ...
+    def n_bonds(self, marker: int) -> int: ...
+    def forget(self, marker: int) -> None: ...
+
 class FrameTracker(_Tracker):
     def __init__(
         self,
@@ -189,6 +209,7 @@ class FrameTracker(_Tracker):
         is_strict: bool,
         capacity: int,
         merged_within: float,
+        carry: CarryOptions,
     ) -> None: ...
 
 class JointTracker(_Tracker):
@@ -201,6 +222,7 @@ class JointTracker(_Tracker):
         max_states: int,
         is_guarded: bool,
         is_sure_until_gap: bool,
+        carry: CarryOptions,
     ) -> None: ...
 
 class BranchOptions:

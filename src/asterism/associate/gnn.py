@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from asterism.associate.frame_by_frame import FrameByFrame
+from asterism.associate.with_bodies import WithBodies
 
 if TYPE_CHECKING:
     from asterism import _engine
@@ -17,7 +17,7 @@ __all__ = ["GNN"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class GNN(FrameByFrame):
+class GNN(WithBodies):
     """Global nearest neighbour: each frame by one exact linear assignment.
 
     A pairing of track and detection wins ``log P_d N(y; ŷ, S) / (λ_f + P_d λ_b) - log(1 - P_d)``
@@ -30,6 +30,8 @@ class GNN(FrameByFrame):
     ----------
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
 
     Examples
     --------
@@ -47,5 +49,12 @@ class GNN(FrameByFrame):
         from asterism import _engine
 
         return _engine.FrameTracker(
-            motion, score, life, matcher=0, is_strict=False, capacity=1, merged_within=0.0
+            motion,
+            score,
+            life,
+            matcher=0,
+            is_strict=False,
+            capacity=1,
+            merged_within=0.0,
+            carry=self._carry(),
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from asterism.associate.frame_by_frame import FrameByFrame
+from asterism.associate.with_bodies import WithBodies
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ __all__ = ["JPDA"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class JPDA(FrameByFrame):
+class JPDA(WithBodies):
     """Joint probabilistic data association: each frame averaged over all that it may mean.
 
     Every way of sharing the detections out among the believed tracks has a probability, and so has
@@ -49,6 +49,8 @@ class JPDA(FrameByFrame):
         ``1 - confirm_probability``.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
 
     Examples
     --------
@@ -84,6 +86,7 @@ class JPDA(FrameByFrame):
             max_states=int(self.max_states),
             is_guarded=self.guard,
             is_sure_until_gap=self.sure_until_gap,
+            carry=self._carry(),
         )
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:

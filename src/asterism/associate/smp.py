@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from asterism.associate.frame_by_frame import FrameByFrame
 from asterism.associate.over_window import branch_options, check_window
+from asterism.associate.with_bodies import WithBodies
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ PRUNE_ODDS = 1e6
 
 
 @dataclass(frozen=True, kw_only=True)
-class SMP(FrameByFrame):
+class SMP(WithBodies):
     """Stable marriage: no track and detection would both rather have each other.
 
     Tracks (the report's men) rank the detections by their predictive density N(ŷ, S); detections
@@ -57,6 +57,8 @@ class SMP(FrameByFrame):
         distance along it. Until then labels are what would be decided now, and may change.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
     """
 
     proposers: Literal["tracks", "detections"] = "tracks"
@@ -82,6 +84,9 @@ class SMP(FrameByFrame):
         if self.window > 1 and (self.strict or self.capacity > 1):
             given = "strict=True" if self.strict else f"capacity={self.capacity}"
             raise ParameterError("window", f"1, as {given} is given", self.window)
+        if self.bodies and (self.strict or self.window > 1):
+            given = "strict=True" if self.strict else f"window={self.window}"
+            raise ParameterError("bodies", f"False, as {given} is given", self.bodies)
 
     def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
@@ -98,6 +103,7 @@ class SMP(FrameByFrame):
                 is_strict=self.strict,
                 capacity=int(self.capacity),
                 merged_within=self.merged_within,
+                carry=self._carry(),
             )
         ways = branch_options(window=self.window, max_branches=MAX_WAYS, prune_odds=PRUNE_ODDS)
         return _engine.TreeTracker(
