@@ -30,6 +30,7 @@ TESTS = (
     "test_mcmcda.py",
     "test_mcmcda_bonds.py",
     "test_own_noise.py",
+    "test_bodies.py",
     "test_stitch_parts.py",
     "test_stitched.py",
 )
