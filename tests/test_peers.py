@@ -80,6 +80,8 @@ def test_lengths_are_those_of_the_markers_that_move():
     frames = [np.array([[0, 0, 0], [9, 0, 0], [0.03 * t, 5, 0]]) for t in range(20)]
     d = am.Detections.from_frames(np.arange(20.0), frames)
     assert length_of(d) == pytest.approx(0.03)
+    at_rest = am.Detections.from_frames(np.arange(20.0), [frames[0]] * 20)
+    assert length_of(at_rest) == pytest.approx(0.001)
 
 
 def test_a_run_is_ended_at_its_limit_and_says_why_it_failed():

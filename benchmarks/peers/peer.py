@@ -99,11 +99,12 @@ def length_of(detections: am.Detections) -> float:
 
     Over the captures and what was done to them, the longest steps are 1.2 to 6 of these (99 of 100,
     one capture at rest left out). Of the median they are 1.7 to 9.5, for half the markers may rest;
-    the ninetieth percentile is that of clutter where there is any.
+    the ninetieth percentile is that of clutter where there is any. A millimetre at least: nobody
+    would let a tracker look no farther for markers that rest.
     """
     frames = [points for _, points in detections if len(points)]
     apart = [KDTree(b).query(a)[0] for a, b in itertools.pairwise(frames)]
-    return max(float(np.quantile(np.concatenate(apart), 0.75)), 1e-6) if apart else 1.0
+    return max(float(np.quantile(np.concatenate(apart), 0.75)), 1e-3) if apart else 1.0
 
 
 def drop_short(labels: NDArray[np.int64], least: float) -> NDArray[np.int64]:
