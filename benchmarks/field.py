@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from dataclasses import replace
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: one core for all
@@ -47,6 +48,9 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=600, help="at most, of a clip")
     parser.add_argument("--tuning-frames", type=int, default=200, help="at most, of one to tune on")
     parser.add_argument("--files", type=int, default=9, help="captures at most, to be scored on")
+    parser.add_argument(
+        "--own", action="store_true", help="tune on the clips that are scored: more than is fair"
+    )
     parser.add_argument("--known", action="store_true", help="run nothing, show what there is")
     parser.add_argument("--quick", action="store_true", help="one seed, 2 trials, 60 frames")
     parser.add_argument("--markdown", type=Path, help="folder of the tables")
@@ -60,6 +64,8 @@ def main() -> None:
         options.data, seeds=options.seeds, frames=options.frames,
         tuning_frames=options.tuning_frames, files=options.files,
     )  # fmt: skip
+    if options.own:
+        every = [replace(k, tuned_as=f"{k.name}, its own", tuning=k.scored) for k in every]
     names = [n for n in (*FLOORS, *PEERS, *OURS) if not any(part in n for part in options.without)]
     if any(options.only in kind.name for kind in every):
         every = [kind for kind in every if options.only in kind.name]

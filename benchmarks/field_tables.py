@@ -39,14 +39,17 @@ def ran(scores: Sequence[Score]) -> list[Score]:
 
 
 def idf1(scores: Sequence[Score]) -> str:
-    scores = ran(scores)
-    errors = [s.error for s in scores if s.error]
-    if not scores:
+    done = ran(scores)
+    errors = [s.error for s in done if s.error]
+    if not done:
         return NOT_RUN
-    if len(errors) == len(scores):
+    if len(errors) == len(done):
         return "–"
-    value = f"{np.mean([s.idf1 for s in scores]):.3f}"
-    return f"{value} ({len(errors)} failed)" if errors else value
+    value = f"{np.mean([s.idf1 for s in done]):.3f}"
+    notes = [f"{len(errors)} failed"] if errors else []
+    if len(done) < len(scores):  # no mean to hold against the others
+        notes.append(f"{len(done)} of {len(scores)}")
+    return f"{value} ({', '.join(notes)})" if notes else value
 
 
 def against(scores: Sequence[Score], reference: Sequence[Score], *, is_whole: bool) -> str:
