@@ -67,7 +67,7 @@ def growth(found: Found) -> Any:
         if not points:
             continue
         x, y = zip(*points, strict=True)
-        color = "#1f5fa8" if name in OURS else "#9a9a9a"
+        color = "#1f5fa8" if name in OURS else "#6e6e6e"
         style = "-" if name in OURS else "--"
         axes.plot(x, y, style, color=color, marker="o", markersize=4, linewidth=1.4)
         ends.append((float(x[-1]), float(y[-1]), name, color))
@@ -77,6 +77,8 @@ def growth(found: Found) -> Any:
     axes.set_xticks(ticks, [f"{n:,}" for n in ticks])
     axes.set_xticks([], minor=True)
     axes.set_xlim(right=4500)
+    heights = [0.1, 1, 10, 100, 1000]
+    axes.set_yticks(heights, [f"{h:,g}" for h in heights])
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="#e6e6e6", linewidth=0.6)
     return figure

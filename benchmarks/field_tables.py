@@ -57,10 +57,13 @@ def against(scores: Sequence[Score], reference: Sequence[Score], *, is_whole: bo
     theirs = {s.clip: s.ms for s in reference if not s.error}
     ratios: list[float] = []
     for s in scores:
-        if not s.error and s.clip in theirs and s.ms:
+        if not s.error and s.clip in theirs and s.ms > 0:
             before = 1e3 * s.prepared / s.frames if is_whole and s.trials is None else 0.0
             ratios.append(theirs[s.clip] / (s.ms + before))
-    return f"{np.exp(np.mean(np.log(ratios))):,.3g}" if ratios else "–"
+    if not ratios:
+        return "–"
+    value = float(np.exp(np.mean(np.log(ratios))))
+    return f"{value:,.0f}" if value >= 10 else f"{value:.1f}"
 
 
 def of_kind(kind: str, found: Found) -> list[str]:
