@@ -86,6 +86,7 @@ def growth(found: Found) -> Any:
 
 def _name(axes: Any, ends: list[tuple[float, float, str, str]]) -> None:
     """Write each name beside the end of its line, moved up where it would hit the one below."""
+    ground = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}  # no line through a name
     for last in sorted({x for x, *_ in ends}):
         lowest = -np.inf
         for _, y, name, color in sorted(e for e in ends if e[0] == last):
@@ -93,5 +94,5 @@ def _name(axes: Any, ends: list[tuple[float, float, str, str]]) -> None:
             lowest = place
             axes.annotate(
                 name, (last, 10**place), xytext=(7, 0), textcoords="offset points", fontsize=8,
-                color=color, va="center",
+                color=color, va="center", bbox=ground,
             )  # fmt: skip
