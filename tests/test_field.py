@@ -43,9 +43,9 @@ FAST = Peer(name="fast", package="", space={"at": (0.1, 100.0)}, label=broken_by
 
 def test_the_search_finds_what_trying_all_in_full_finds():
     truths = [clip(1), clip(2)]
-    found = tuned(FAST, None, truths, 6, 60.0)
+    found = tuned(FAST, None, truths, 30, 60.0)
     rng = np.random.default_rng(0)
-    settings = [FAST.middle(), *(FAST.draw(rng) for _ in range(5))]
+    settings = [FAST.middle(), *(FAST.draw(rng) for _ in range(29))]
 
     def value(setting):
         labels = [broken_by(t.detections, setting) for t in truths]
@@ -58,7 +58,7 @@ def test_the_search_finds_what_trying_all_in_full_finds():
     best = max(settings, key=value)
     assert found["setting"] == best != FAST.middle()
     assert found["idf1"] == pytest.approx(value(best))
-    assert (found["trials"], found["error"]) == (6, "")
+    assert (found["trials"], found["error"]) == (30, "")
 
 
 def test_the_search_begins_with_what_was_found_for_another():
