@@ -52,10 +52,10 @@ def verdict(kinds: Sequence[str], found: Found) -> list[str]:
     floor_name = list(FLOORS)[-1]
     rows: list[list[str]] = []
     for kind in kinds:
-        peers = [n for n in PEERS if not np.isnan(value(found[kind, n]))]
-        ours = [n for n in OURS if not np.isnan(value(found[kind, n]))]
-        if not peers or not ours:
-            continue
+        peers = [n for n in PEERS if not np.isnan(value(found.get((kind, n), ())))]
+        ours = [n for n in OURS if not np.isnan(value(found.get((kind, n), ())))]
+        if not peers or "auto" not in ours or (kind, floor_name) not in found:
+            continue  # a part was asked for, or is missing
         peer, own = best(peers, kind, found), best(ours, kind, found)
         theirs, auto = value(found[kind, peer]), value(found[kind, "auto"])
         top = max(theirs, value(found[kind, own]))

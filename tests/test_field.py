@@ -174,6 +174,13 @@ def test_the_verdict_tells_who_is_ahead(peer, ours, word, saved, fastest):
     assert (line[4], line[8], line[9].removesuffix(" |")) == (word, saved, fastest)
 
 
+@pytest.mark.parametrize("gone", ["motpy", "auto", list(FLOORS)[-1]])
+def test_a_part_of_the_trackers_has_no_verdict_and_no_error(gone):
+    found = table_of({"motpy": row(0.9, 1.0, 1)}, {})
+    found = {key: rows for key, rows in found.items() if key[1] != gone}
+    assert len(verdict(["dense 50"], found)) == 2  # the head
+
+
 def test_switches_that_the_floor_forces_do_not_count():
     assert fewer(3.0, 2.1, 2.0) == "10.0 ×"
     assert fewer(2.0, 2.1, 2.0) == "none to save"
