@@ -46,8 +46,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md
 	$(BIN)/python benchmarks/identity.py --markdown docs/tables/identity.md \
 	  --methods gnn "smp, window=3" mcmcda
-	$(BIN)/python benchmarks/field.py --data none --markdown docs/tables/field.md
-	$(BIN)/python benchmarks/field.py --only captures --markdown docs/tables/field_captures.md
+	$(BIN)/python benchmarks/field.py --markdown docs/tables --figure docs/images/field_growth.svg
 	$(BIN)/python benchmarks/fills.py --markdown docs/tables/fills.md
 	$(BIN)/python benchmarks/recognition.py --markdown docs/tables/recognition.md
 	$(BIN)/python benchmarks/bond_term.py --markdown docs/tables/bond_term.md

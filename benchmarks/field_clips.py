@@ -1,7 +1,7 @@
 """The clips of `field.py`: scenes and captures, those that are scored and those to tune on.
 
-Who tunes sees other seeds of the same kind of scene, and of captures the other half of the files,
-corrupted in the same way.
+Who tunes sees other seeds of the same kind of scene, and other captures corrupted in the same way:
+every third one by name, which none is scored on.
 """
 
 from __future__ import annotations
@@ -65,20 +65,24 @@ class Kind:
     tuning: tuple[Clip, ...]
 
 
-def cut(truth: am.Tracks, n_frames: int) -> am.Tracks:
-    """Give the first frames."""
+def cut(truth: am.Tracks, n_frames: int, *, is_middle: bool = False) -> am.Tracks:
+    """Give the first frames, or those in the middle, where a recording is busiest."""
     d = truth.detections
     n_frames = min(n_frames, d.n_frames)
-    n = int(d.offsets[n_frames])
-    first = am.Detections(
-        times=d.times[:n_frames], offsets=d.offsets[: n_frames + 1], points=d.points[:n]
+    first = (d.n_frames - n_frames) // 2 if is_middle else 0
+    offsets = d.offsets[first : first + n_frames + 1]
+    inside = slice(int(offsets[0]), int(offsets[-1]))
+    part = am.Detections(
+        times=d.times[first : first + n_frames],
+        offsets=offsets - offsets[0],
+        points=d.points[inside],
     )
-    labels = truth.labels[:n]
+    labels = truth.labels[inside]
     kept, numbered = np.unique(labels[labels >= 0], return_inverse=True)
     labels = labels.copy()
     labels[labels >= 0] = numbered
     names = tuple(truth.names[int(i)] for i in kept) if truth.names else ()
-    return am.Tracks(detections=first, labels=labels, names=names)
+    return am.Tracks(detections=part, labels=labels, names=names)
 
 
 def _scene(name: str, seed: int, frames: int) -> am.Tracks:
@@ -96,42 +100,36 @@ def _scene_clips(name: str, seeds: range, frames: int) -> tuple[Clip, ...]:
 
 def _capture_clip(path: Path, condition: str, frames: int) -> Clip:
     def make() -> am.Tracks:
-        return cut(CONDITIONS[condition](am.read(path).tracks), frames)
+        return cut(CONDITIONS[condition](am.read(path).tracks), frames, is_middle=True)
 
     return Clip(name=f"{path.name}, {condition}", make=make)
 
 
-def _small(data: Path, points: int, files: int) -> list[Path]:
-    """Give the captures with truth, from the smallest on, up to so many points."""
-    sizes: list[tuple[int, Path]] = []
-    for path in captures(data) if data.is_dir() else []:
-        capture = am.read(path)
-        if any(capture.names) and capture.n_points <= points:
-            sizes.append((capture.n_points, path))
-    return [path for _, path in sorted(sizes)[-files:]]
+def with_truth(data: Path) -> list[Path]:
+    """Give the captures whose points are named."""
+    paths = captures(data) if data.is_dir() else []
+    return [path for path in paths if any(am.read(path).names)]
 
 
-def kinds(
-    data: Path, *, seeds: int, frames: int, tuning_frames: int, points: int, files: int
-) -> list[Kind]:
-    """Give all kinds; those of captures in two halves, each tuned on the other."""
+def kinds(data: Path, *, seeds: int, frames: int, tuning_frames: int, files: int) -> list[Kind]:
+    """Give all kinds: the scenes, and the captures once for each way to corrupt them."""
     found: list[Kind] = []
     for name in SCENES:
         tuned_as = TUNED_AS.get(name, name)
         tuning = _scene_clips(tuned_as, range(TUNING_SEED, TUNING_SEED + 2), tuning_frames)
         scored = _scene_clips(name, range(seeds), frames)
         found.append(Kind(name=name, tuned_as=tuned_as, scored=scored, tuning=tuning))
-    paths = _small(data, points, files)
-    for condition in CONDITIONS:
-        for half in (0, 1):
-            kind = Kind(
-                name=f"captures, {condition}",
-                tuned_as=f"captures, {condition}, half {half}",
-                scored=tuple(_capture_clip(p, condition, frames) for p in paths[half::2]),
-                tuning=tuple(
-                    _capture_clip(p, condition, tuning_frames) for p in paths[1 - half :: 2][:2]
-                ),
+    paths = with_truth(data)
+    to_tune = paths[2::3]
+    to_score = [path for path in paths if path not in to_tune][:files]
+    for condition in CONDITIONS if to_tune else ():
+        name = f"captures, {condition}"
+        found.append(
+            Kind(
+                name=name,
+                tuned_as=name,
+                scored=tuple(_capture_clip(path, condition, frames) for path in to_score),
+                tuning=tuple(_capture_clip(path, condition, tuning_frames) for path in to_tune),
             )
-            if kind.scored and kind.tuning:
-                found.append(kind)
+        )
     return found

@@ -1,4 +1,4 @@
-"""The page of `field.py`: IDF1, time by the number of markers, and a table for each kind."""
+"""The pages of `field.py`: who wins where, growth, a table for each kind, and every clip."""
 
 from __future__ import annotations
 
@@ -6,111 +6,150 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from field_growth import growth_table
+from field_rows import FLOORS, NOT_RUN, OURS
+from field_verdict import verdict
+from peers import PEERS
 from report import conditions, table
 
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
 
-__all__ = ["NOT_RUN", "page"]
+    from field_rows import Found, Score
 
-NOT_RUN = "not run"
+__all__ = ["pages"]
 
 REFERENCE = "Stone Soup GNN"
+LABEL = {**dict.fromkeys(PEERS, "{}"), **dict.fromkeys(OURS, "**{}**")}
 
 
-def _mean(values: Sequence[float], form: str) -> str:
+def label(name: str) -> str:
+    """Give a tracker's name, ours in bold and the floors in italics."""
+    return LABEL.get(name, "*{}*").format(name)
+
+
+def mean(values: Sequence[float], form: str) -> str:
     known = [v for v in values if not np.isnan(v)]
     return form.format(float(np.mean(known))) if known else "–"
 
 
-def _that_ran(scores: Sequence[Any]) -> list[Any]:
+def ran(scores: Sequence[Score]) -> list[Score]:
     return [s for s in scores if s.error != NOT_RUN]
 
 
-def _idf1(scores: Sequence[Any]) -> str:
-    scores = _that_ran(scores)
-    errors = [s.error for s in scores if s.error]
-    if not scores:
+def idf1(scores: Sequence[Score]) -> str:
+    done = ran(scores)
+    errors = [s.error for s in done if s.error]
+    if not done:
         return NOT_RUN
-    if len(errors) == len(scores):
+    if len(errors) == len(done):
         return "–"
-    value = f"{np.mean([s.idf1 for s in scores]):.3f}"
-    return f"{value} ({len(errors)} failed)" if errors else value
+    value = f"{np.mean([s.idf1 for s in done]):.3f}"
+    notes = [f"{len(errors)} failed"] if errors else []
+    if len(done) < len(scores):  # no mean to hold against the others
+        notes.append(f"{len(done)} of {len(scores)}")
+    return f"{value} ({', '.join(notes)})" if notes else value
 
 
-def _against(scores: Sequence[Any], reference: Sequence[Any]) -> str:
+def against(scores: Sequence[Score], reference: Sequence[Score], *, is_whole: bool) -> str:
     """Give the geometric mean of the times of the same clips, the reference's over these."""
     theirs = {s.clip: s.ms for s in reference if not s.error}
-    ratios = [theirs[s.clip] / s.ms for s in scores if not s.error and s.clip in theirs and s.ms]
-    return f"{np.exp(np.mean(np.log(ratios))):,.3g}" if ratios else "–"
+    ratios: list[float] = []
+    for s in scores:
+        if not s.error and s.clip in theirs and s.ms > 0:
+            before = 1e3 * s.prepared / s.frames if is_whole and s.trials is None else 0.0
+            ratios.append(theirs[s.clip] / (s.ms + before))
+    if not ratios:
+        return "–"
+    value = float(np.exp(np.mean(np.log(ratios))))
+    return f"{value:,.0f}" if value >= 10 else f"{value:.1f}"
 
 
-def _of_kind(kind: str, found: Any, names: Sequence[str], ours: Sequence[str]) -> list[str]:
+def of_kind(kind: str, found: Found) -> list[str]:
+    names = [name for k, name in found if k == kind]
+    most = max((len(ran(found[kind, name])) for name in names), default=0)
     rows: list[list[str]] = []
     for name in names:
-        scores = _that_ran(found[kind, name])
+        scores = ran(found[kind, name])
         if not scores:
             continue
-        label = f"**{name}**" if name in ours else name
-        errors = list(dict.fromkeys(s.error for s in scores if s.error))
+        some = f" ({len(scores)} clips)" if len(scores) < most else ""
         done = [s for s in scores if not s.error]
         if not done:
-            rows.append([label, errors[0], *[""] * 8])
+            rows.append([label(name) + some, scores[0].error, *[""] * 8])
             continue
+        reference = found.get((kind, REFERENCE), [])
+        is_floor = name in FLOORS
+        ratio = against(done, reference, is_whole=False)
+        whole = against(done, reference, is_whole=True)
         rows.append([
-            label, _idf1(scores), _mean([s.switches for s in done], "{:.1f}"),
-            _mean([s.wrong for s in done], "{:.0f}"),
-            _mean([s.tracks_per_true for s in done], "{:.2f}"),
-            _mean([s.ms for s in done], "{:.2f}"),
-            _against(done, found.get((kind, REFERENCE), [])),
-            _mean([s.megabytes for s in done], "{:.0f}"),
-            "–" if done[0].trials is None else str(min(s.trials for s in done)),
-            _mean([s.prepared for s in done], "{:.1f}"),
+            label(name) + some, idf1(scores), mean([s.switches for s in done], "{:.1f}"),
+            f"{np.mean([s.wrong for s in done]):.0f}, {np.mean([s.broken for s in done]):.0f}",
+            mean([s.tracks_per_true for s in done], "{:.2f}"),
+            mean([s.ms for s in done], "{:.2f}"),
+            ratio if ratio == whole else f"{ratio} ({whole})",
+            mean([s.megabytes for s in done], "{:.0f}"),
+            "–" if done[0].trials is None else str(min(s.trials or 0 for s in done)),
+            "–" if is_floor else mean([s.prepared for s in done], "{:.1f}"),
         ])  # fmt: skip
     head = [
-        "", "IDF1", "switches a 1000", "wrong links", "tracks/true", "ms a frame",
+        "", "IDF1", "switches a 1000", "links wrong, broken", "tracks/true", "ms a frame",
         "× as fast as Stone Soup GNN", "memory, MB", "trials", "prepared in, s",
     ]  # fmt: skip
-    if not rows:
-        return []
-    n_clips = max(len(_that_ran(found[kind, name])) for name in names)
-    return [f"**{kind}**, {n_clips} clips:", "", *table(head, rows), ""]
+    return [f"**{kind}**, {most} clips:", "", *table(head, rows), ""] if rows else []
 
 
-def page(
-    found: Any, names: Sequence[str], ours: Sequence[str], options: argparse.Namespace
-) -> list[str]:
-    """Give the lines of the page."""
-    every = list(
-        dict.fromkeys(
-            kind for (kind, _), scores in found.items() if any(not s.error for s in scores)
-        )
+def of_clips(kinds: Sequence[str], found: Found) -> list[str]:
+    """Give the IDF1 of every tracker on every clip."""
+    names = list(dict.fromkeys(name for _, name in found))
+    rows: list[list[str]] = []
+    for kind in kinds:
+        for i, first in enumerate(found[kind, names[0]]):
+            scores = [found[kind, name][i] for name in names]
+            row = [f"{first.clip}, {max(s.points for s in scores):,} points"]
+            best = max((s.idf1 for s, n in zip(scores, names, strict=True) if n not in FLOORS))
+            for name, s in zip(names, scores, strict=True):
+                value = "–" if s.error else f"{s.idf1:.3f}"
+                is_best = name not in FLOORS and not s.error and s.idf1 >= best - 5e-4
+                row.append(f"**{value}**" if is_best else NOT_RUN if s.error == NOT_RUN else value)
+            rows.append(row)
+    return table(["", *names], rows)
+
+
+def how(found: Found, options: argparse.Namespace) -> str:
+    """Say what was run, so that no figure stands alone."""
+    clips = {s.clip for scores in found.values() for s in ran(scores)}
+    return (
+        f"Each peer tuned by {options.trials} settings, fewer where {options.budget:g} s of CPU "
+        f"time were used up, on up to {options.tuning_frames} frames a clip; {len(clips)} clips, "
+        f"at most {options.frames} frames each; a run of more than {options.limit:g} s is ended. "
+        f"Ours (bold): nothing tuned. {conditions()}; one core of a machine that did other work, "
+        "CPU time."
     )
-    of = f"{options.seeds} seeds of each scene"
-    if all(kind.startswith("captures") for kind in every):
-        of = f"{options.files} captures of at most {options.points:,} points"
-    label = {name: f"**{name}**" if name in ours else name for name in names}
-    lines = [
-        f"Each peer tuned by {options.trials} random settings, fewer where {options.budget:g} s of "
-        f"CPU time were used up, on up to {options.tuning_frames} frames of two other clips; "
-        f"{of}; at most {options.frames} frames a clip; a run of more than "
-        f"{options.limit:g} s is ended. Ours (bold): nothing tuned. {conditions()}; one core, CPU "
-        "time.",
-        "",
-        "Mean IDF1. A clip that failed counts as 0; – where all of a kind failed:",
-        "",
-    ]
-    lines += table(["", *every], [[label[n], *(_idf1(found[k, n]) for k in every)] for n in names])
-    growing = [kind for kind in every if kind.startswith("dense")]
+
+
+def pages(found: Found, options: argparse.Namespace) -> dict[str, list[str]]:
+    """Give the lines of each page by its name."""
+    kinds = list(
+        dict.fromkeys(k for (k, n), rows in found.items() if n not in FLOORS and ran(rows))
+    )
+    names = list(dict.fromkeys(name for _, name in found))
+    made = how(found, options)
+    scenes = [kind for kind in kinds if not kind.startswith("captures")]
+    files = [kind for kind in kinds if kind.startswith("captures")]
+    given: dict[str, list[str]] = {"field": [made, "", *verdict(kinds, found)]}
+    for page, some in (("field_scenes", scenes), ("field_captures", files)):
+        head = ["", *(kind.removeprefix("captures, ") for kind in some)]
+        rows = [[label(n), *(idf1(found[k, n]) for k in some)] for n in names]
+        lines = ["Mean IDF1. A clip that failed counts as 0; – where all of a kind failed:", ""]
+        lines += [*table(head, rows), ""]
+        for kind in some:
+            lines += of_kind(kind, found)
+        if some:
+            given[page] = lines
+    growing: list[Any] = [kind for kind in kinds if kind.startswith("dense")]
     if growing:
-        rows = [
-            [label[n], *(_mean([s.ms for s in found[k, n]], "{:.2f}") for k in growing)]
-            for n in names
-        ]
-        lines += ["", "Milliseconds a frame, by the number of markers:", ""]
-        lines += table(["", *(kind.removeprefix("dense ") for kind in growing)], rows)
-    lines.append("")
-    for kind in every:
-        lines += _of_kind(kind, found, names, ours)
-    return lines
+        given["field_growth"] = growth_table(growing, found)
+    given["field_clips"] = of_clips(kinds, found)
+    return given

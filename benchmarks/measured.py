@@ -66,7 +66,10 @@ def _child(work: Callable[[], NDArray[np.int64]], limit: int, pipe: Any) -> None
     try:
         labels, error = work(), ""
     except Exception as failed:  # whatever a peer raises is its row
-        labels, error = None, f"{type(failed).__name__}: {failed}"
+        reason: BaseException = failed
+        while reason.__cause__ is not None:
+            reason = reason.__cause__
+        labels, error = None, f"{type(reason).__name__}: {reason}"
     taken = time.process_time() - start
     pipe.send((labels, taken, _memory("VmHWM") - before, error[:200]))
 

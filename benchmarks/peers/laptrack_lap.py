@@ -22,6 +22,8 @@ def label(d: am.Detections, setting: Setting) -> NDArray[np.int64]:
         cutoff=reach**2,
         gap_closing_cutoff=(reach * setting["gap_reach"]) ** 2,
         gap_closing_max_frame_count=int(setting["max_gap"]),
+        # What a link may cost beside others; 90 by itself, with which one link in ten is refused.
+        alternative_cost_percentile=setting["percentile"],
     )
     graph = tracker.predict([points for _, points in d])
     labels = np.full(d.n_points, -1)
@@ -35,7 +37,8 @@ PEER = Peer(
     name="laptrack",
     package="laptrack",
     space={
-        "reach": (1.0, 30.0), "gap_reach": (0.5, 5.0), "max_gap": (1, 60), "least": (2, 10)
+        "reach": (1.0, 30.0), "gap_reach": (0.5, 5.0), "max_gap": (1, 60), "least": (2, 10),
+        "percentile": (80.0, 100.0),
     },
     label=label,
 )  # fmt: skip

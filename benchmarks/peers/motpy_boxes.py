@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from peers import numpy_loop
 from peers.peer import Peer, Setting, drop_short, length_of, module
 
 if TYPE_CHECKING:
@@ -62,8 +63,9 @@ PEER = Peer(
     name="motpy",
     package="motpy",
     space={
-        "box": (2.0, 40.0), "overlap": (0.01, 0.3), "process": (0.05, 5.0), "noise": (0.05, 3.0),
-        "speed": (1.0, 30.0), "max_gap": (3, 60), "least": (2, 10),
+        "box": (1.0, 30.0), "overlap": (0.01, 0.3), "process": (0.02, 3.0), "noise": (0.01, 2.0),
+        "speed": (0.5, 10.0), "max_gap": (3, 60), "least": (2, 10),
     },
     label=label,
+    like=numpy_loop.PEER,
 )  # fmt: skip

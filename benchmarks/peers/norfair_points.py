@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from peers import numpy_loop
 from peers.peer import Peer, Setting, length_of, module
 
 if TYPE_CHECKING:
@@ -26,7 +27,10 @@ def label(d: am.Detections, setting: Setting) -> NDArray[np.int64]:
         hit_counter_max=most,
         initialization_delay=min(int(setting["delay"]), most - 1),
         filter_factory=module("norfair.filter").OptimizedKalmanFilterFactory(
-            R=setting["noise"] ** 2, Q=setting["process"] ** 2
+            R=setting["noise"] ** 2,
+            Q=setting["process"] ** 2,
+            pos_variance=setting["noise"] ** 2,
+            vel_variance=setting["speed"] ** 2,
         ),
     )
     owner: list[tuple[int, Any]] = []
@@ -53,8 +57,9 @@ PEER = Peer(
     name="norfair",
     package="norfair",
     space={
-        "reach": (1.5, 30.0), "max_gap": (3, 60), "delay": (1, 8),
-        "noise": (0.1, 10.0), "process": (0.05, 5.0),
+        "reach": (1.0, 20.0), "max_gap": (3, 60), "delay": (1, 8),
+        "noise": (0.01, 2.0), "process": (0.02, 3.0), "speed": (0.5, 10.0),
     },
     label=label,
+    like=numpy_loop.PEER,
 )  # fmt: skip

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import chi2
 
+from peers import numpy_loop
 from peers.peer import Peer, Setting, drop_short, length_of, module
 
 if TYPE_CHECKING:
@@ -58,8 +59,9 @@ PEER = Peer(
     name="nrl-tracker",
     package="nrl-tracker",
     space={
-        "process": (0.02, 3.0), "noise": (0.05, 3.0), "speed": (1.0, 30.0), "gate": (3.0, 8.0),
+        "process": (0.02, 3.0), "noise": (0.01, 2.0), "speed": (0.5, 10.0), "gate": (3.0, 8.0),
         "max_gap": (3, 60), "least": (2, 8),
     },
     label=label,
+    like=numpy_loop.PEER,
 )  # fmt: skip

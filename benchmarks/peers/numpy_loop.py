@@ -117,7 +117,7 @@ PEER = Peer(
     name="Kalman + assignment",
     package="",
     space={
-        "process": (0.02, 3.0), "noise": (0.05, 3.0), "speed": (1.0, 30.0), "clutter": (0.01, 30.0),
+        "process": (0.02, 3.0), "noise": (0.01, 2.0), "speed": (0.5, 10.0), "clutter": (0.01, 30.0),
         "detected": (0.7, 0.99), "max_gap": (3, 60),
     },
     label=label,

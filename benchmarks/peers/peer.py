@@ -43,12 +43,26 @@ class Peer:
         where both ends are.
     label : callable
         Gives the label of every detection, -1 for none, from the clip and a setting.
+    like : Peer, optional
+        Another with the same kind of motion: the search begins with what was found for it, which
+        is the best chance of those that are too slow for many trials.
     """
 
     name: str
     package: str
     space: Mapping[str, tuple[float, float]]
     label: Callable[[am.Detections, Setting], NDArray[np.int64]]
+    like: Peer | None = None
+
+    def near(self, setting: Setting) -> Setting:
+        """Give the middle, with what another peer's setting says of the same parameters."""
+        found = self.middle()
+        for name, (low, high) in self.space.items():
+            if name in setting:
+                value = min(max(setting[name], low), high)
+                is_whole = isinstance(low, int) and isinstance(high, int)
+                found[name] = round(value) if is_whole else float(value)
+        return found
 
     def draw(self, rng: np.random.Generator) -> Setting:
         """Draw a setting."""
@@ -81,10 +95,16 @@ def in_frames(detections: am.Detections) -> am.Detections:
 
 
 def length_of(detections: am.Detections) -> float:
-    """Give the median distance of a point to the nearest one of the next frame, metres."""
+    """Give the upper quartile of the distance of a point to the nearest one of the next, metres.
+
+    Over the captures and what was done to them, the longest steps are 1.2 to 6 of these (99 of 100,
+    one capture at rest left out). Of the median they are 1.7 to 9.5, for half the markers may rest;
+    the ninetieth percentile is that of clutter where there is any. A millimetre at least: nobody
+    would let a tracker look no farther for markers that rest.
+    """
     frames = [points for _, points in detections if len(points)]
     apart = [KDTree(b).query(a)[0] for a, b in itertools.pairwise(frames)]
-    return max(float(np.median(np.concatenate(apart))), 1e-6) if apart else 1.0
+    return max(float(np.quantile(np.concatenate(apart), 0.75)), 1e-3) if apart else 1.0
 
 
 def drop_short(labels: NDArray[np.int64], least: float) -> NDArray[np.int64]:

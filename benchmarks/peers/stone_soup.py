@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.stats import chi2
 
+from peers import numpy_loop
 from peers.peer import Peer, Setting, drop_short, length_of, module
 
 if TYPE_CHECKING:
@@ -101,7 +103,9 @@ def _jpda(d: am.Detections, setting: Setting) -> NDArray[np.int64]:
     parts = _parts(d.n_axes, setting)
     probable = module("stonesoup.hypothesiser.probability").PDAHypothesiser(
         parts.predictor, parts.updater, clutter_spatial_density=setting["clutter"],
-        prob_detect=setting["detected"], prob_gate=1 - 1e-6,
+        prob_detect=setting["detected"],
+        # The library turns it back into a distance, which 1 would make infinite.
+        prob_gate=min(float(chi2.cdf(setting["gate"] ** 2, d.n_axes)), 1 - 1e-12),
     )  # fmt: skip
     joint = module("stonesoup.dataassociator.probability").JPDAwithEHM2(probable)
     reduced = module("stonesoup.functions").gm_reduce_single
@@ -112,15 +116,16 @@ def _jpda(d: am.Detections, setting: Setting) -> NDArray[np.int64]:
     numbers: dict[str, int] = {}
     for now, found in _frames(d, parts.sensor):
         taken: set[Any] = set()
-        # Without a detection it hands back nothing, and no track would move on.
-        for track, several in joint.associate(tracks, found, now).items():
+        # Two tracks may hold the same detection for their best: it goes to the surer one.
+        joined = joint.associate(tracks, found, now).items()
+        for track, several in sorted(joined, key=lambda pair: -_greatest(pair[1])):
             states = [parts.updater.update(h) if h else h.prediction for h in several]
             mean, covariance = reduced(
                 StateVectors([s.state_vector for s in states]),
                 np.stack([s.covar for s in states], axis=2),
                 np.array([h.probability for h in several]),
             )
-            best = max(several, key=lambda h: h.probability)
+            best = max(several, key=lambda h: float(h.probability))
             if best:
                 state = update.GaussianStateUpdate(mean, covariance, several, now)
                 track.append(state)
@@ -137,6 +142,11 @@ def _jpda(d: am.Detections, setting: Setting) -> NDArray[np.int64]:
     return drop_short(labels, 2)
 
 
+def _greatest(several: Any) -> float:
+    """Give the probability of the most probable hypothesis."""
+    return max(float(h.probability) for h in several)
+
+
 def _begin(track: Any, numbers: dict[str, int], labels: NDArray[np.int64], update: Any) -> None:
     """Label the detections by which a track has come to be."""
     numbers[track.id] = len(numbers)
@@ -146,14 +156,17 @@ def _begin(track: Any, numbers: dict[str, int], labels: NDArray[np.int64], updat
 
 
 _SPACE: dict[str, tuple[float, float]] = {
-    "process": (0.02, 3.0), "noise": (0.05, 3.0), "speed": (1.0, 30.0), "gate": (3.0, 12.0),
+    "process": (0.02, 3.0), "noise": (0.01, 2.0), "speed": (0.5, 10.0), "gate": (3.0, 8.0),
     "max_gap": (3, 60), "least": (2, 8),
 }  # fmt: skip
 
-GNN = Peer(name="Stone Soup GNN", package="stonesoup", space=_SPACE, label=_gnn)
+GNN = Peer(
+    name="Stone Soup GNN", package="stonesoup", space=_SPACE, label=_gnn, like=numpy_loop.PEER
+)
 JPDA = Peer(
     name="Stone Soup JPDA",
     package="stonesoup",
     space=_SPACE | {"clutter": (1e-7, 1e-2), "detected": (0.7, 0.99)},
     label=_jpda,
+    like=GNN,
 )
