@@ -1,7 +1,7 @@
 """The table of real captures: each method with the estimated model, as captured and corrupted.
 
-Finds the captures in ``../shared/data`` beside the project (or ``--data``); prints Markdown. Frames a
-second are of processor time.
+Finds the captures in ``../shared/data`` beside the project (or ``--data``); prints Markdown.
+Frames a second are of processor time.
 
     python benchmarks/captures.py [--data FOLDER] [--only NAME] [--markdown FILE]
 """

@@ -96,6 +96,14 @@ def test_partners_are_counted_by_distances_alone():
     assert partners(am.Tracks.from_dense(times, noisy), 1e-5) == (0, 2)
 
 
+def test_many_markers_in_a_short_clip_are_no_bodies():
+    # Of some ten thousand pairs, over a second, many keep their distance by chance.
+    moving = am.simulate.smooth(n_markers=200, frames=24, seed=1)
+    truth = am.simulate.sense(moving, missing=0.1, clutter=0.1, noise=0.005, seed=1)
+    d = truth.detections
+    assert not am.choose_method(d, am.estimate_model(d).model).stitch
+
+
 def test_clips_of_nothing_and_of_one_point():
     model = am.estimate_model(am.simulate.cube(seed=1).detections).model
     for frames in ([np.empty((0, 3))] * 3, [np.zeros((1, 3))] * 3):

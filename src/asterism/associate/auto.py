@@ -38,6 +38,9 @@ COMMON = 20
 RIGID = 0.05
 """Two markers keep their distance if it varies by less than this share of what they move: on bodies
 0.001 to 0.03, of independent markers the steadiest of all pairs 0.1 to 0.5."""
+NEAREST = 6
+"""Partners are looked for among so many that were nearest: of a thousand independent markers over a
+few frames some pair always keeps its distance."""
 ON_BODIES = 0.2
 """Share of tracks with such a partner from which on the clip is one of bodies: wrong tracks, which
 bursts make, have none."""
@@ -135,7 +138,7 @@ def choose_method(
 
 
 def partners(tracks: Tracks, noise_sigma: float) -> tuple[int, int]:
-    """Count the tracks that keep their distance to another one, and those that can be compared.
+    """Count the tracks that keep their distance to a neighbour, and those that can be compared.
 
     Parameters
     ----------
@@ -160,8 +163,9 @@ def partners(tracks: Tracks, noise_sigma: float) -> tuple[int, int]:
         if not len(others):
             continue
         n_compared += 1
+        nearest = np.argsort(np.nanmean(distance[:, others], axis=0), kind="stable")[:NEAREST]
         moved = np.sqrt(np.nanvar(positions[:, i], axis=0).sum())
-        varies = np.nanstd(distance[:, others], axis=0)
+        varies = np.nanstd(distance[:, others[nearest]], axis=0)
         n_rigid += bool(varies.min() < max(RIGID * moved, 3 * noise_sigma))
     return n_rigid, n_compared
 
