@@ -134,9 +134,9 @@ def test_what_ends_its_process_does_not_load_and_harms_nobody():
         import os
         import signal
 
-        os.kill(os.getpid(), signal.SIGKILL)
+        os.kill(os.getpid(), signal.SIGTERM)
 
-    assert unloadable(replace(FAST, label=ends)) == "does not load: ended by -9"
+    assert unloadable(replace(FAST, label=ends)) == "does not load: ended by -15"
     assert unloadable(PEERS["Kalman + assignment"]) == ""
 
 
