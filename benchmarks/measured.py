@@ -6,6 +6,7 @@ alike; a limit of CPU time ends it.
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import resource
@@ -59,6 +60,7 @@ def _memory(name: str) -> float:
 
 def _child(work: Callable[[], NDArray[np.int64]], limit: int, pipe: Any) -> None:
     os.environ["OMP_NUM_THREADS"] = "1"
+    gc.freeze()  # the parent's garbage, if it were freed here, would hide what the work takes
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
     if STATUS.exists():
         Path("/proc/self/clear_refs").write_text("5")  # the peak so far is the parent's

@@ -5,8 +5,8 @@ detection, clutter, births, deaths, greatest speed and greatest gap, each mostly
 ten either way. They are chosen by the IDF1 of the first half of a capture and measured, as the
 estimated ones are, on the second, whose truth neither has seen. Prints Markdown.
 
-    python benchmarks/tuned.py [--trials N] [--data FOLDER] [--only NAME] [--most POINTS]
-                               [--markdown FILE]
+    python benchmarks/tuned.py [--trials N] [--methods NAME …] [--data FOLDER] [--only NAME]
+                               [--most POINTS] [--markdown FILE]
 """
 
 from __future__ import annotations
@@ -14,11 +14,13 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import asterism as am
 from captures import captures, corrupted, named_only
+from methods import METHODS
 from report import publish, table
 
 LONGEST_GAP = 120
@@ -68,7 +70,7 @@ def drawn(model: am.TrackingModel, rng: np.random.Generator) -> am.TrackingModel
     )
 
 
-def idf1(truth: am.Tracks, model: am.TrackingModel, method: am.GNN | am.MCMCDA) -> float:
+def idf1(truth: am.Tracks, model: am.TrackingModel, method: am.Method[Any]) -> float:
     return am.evaluate(am.track(truth.detections, method, model=model, seed=1), truth).idf1
 
 
@@ -79,9 +81,10 @@ def main() -> None:
     parser.add_argument("--only", default="")
     parser.add_argument("--trials", type=int, default=40)
     parser.add_argument("--most", type=int, default=130_000, help="points of a capture")
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=["gnn", "smp, window=3"])
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
-    methods: dict[str, am.GNN | am.MCMCDA] = {"gnn": am.GNN(), "mcmcda": am.MCMCDA(confidence=0.0)}
+    methods = {name: METHODS[name] for name in options.methods}
     rows: list[list[str]] = []
     gaps: dict[tuple[str, str], list[float]] = {}
     for path in captures(options.data):

@@ -43,7 +43,8 @@ LEFT_OUT = (
     "no_worse or whole_take or more_chains or way_of_running or more_moves or window_s_best or "
     "identities_where_markers_hide or value_that_is_told or guessed_soon or too_long_to_be_read or "
     "blurred_helps or endless_run or chains_disagree or model_from_the_clip or wrong_links or "
-    "deadline or keep_their_distances"
+    "deadline or keep_their_distances or no_harm_where or of_a_person_come_back or "
+    "loop_over_step or carrying_ends"
 )
 """Too slow (a blackboard is Python, a posterior is sampled for millions of moves, numbers below the
 normal range take a hundred cycles each), or measuring memory or time, which the sanitizers
