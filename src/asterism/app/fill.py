@@ -133,7 +133,7 @@ def _least_sure(found: am.Filling, capture: am.Capture) -> list[tuple[str, str]]
             "" if n else "least sure",
             f"{names[gap.track] or f'track {gap.track}'}, frames {capture.first_frame + gap.first} "
             f"to {capture.first_frame + gap.last}: ±{1e3 * gap.std:.3g} mm, {gap.estimator}"
-            + ("" if gap.n_windows else " (the take is too short to try it)"),
+            + ("" if gap.n_windows else " (nowhere in the take could it be tried)"),
         )
         for n, gap in enumerate(sorted(filled, key=lambda gap: -gap.std)[:_MOST])
     ]
