@@ -6,6 +6,7 @@ alike; a limit of CPU time ends it.
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import multiprocessing
 import os
@@ -60,7 +61,10 @@ def _memory(name: str) -> float:
 
 def _child(work: Callable[[], NDArray[np.int64]], limit: int, pipe: Any) -> None:
     os.environ["OMP_NUM_THREADS"] = "1"
-    gc.freeze()  # the parent's garbage, if it were freed here, would hide what the work takes
+    gc.freeze()  # the parent's garbage, if it were freed here, would hide what the work takes,
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)  # and so would what it freed and kept: the work would be given that
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
     if STATUS.exists():
         Path("/proc/self/clear_refs").write_text("5")  # the peak so far is the parent's
