@@ -3,7 +3,8 @@
 Of markers that are seen around them, stretches of 10, 30, 60 and 120 frames are hidden, up to three
 at a time, at random places (seeded), and filled by `am.fill`, by a cubic spline through ten frames
 on each side, and by Kinetics Toolkit's `fill_missing_samples` (linear, its default, and cubic). The
-gaps that the captures have themselves stay. A marker is *bonded* if the distance to three others or
+gaps that the captures have themselves stay. Then 10 % of the points of an excerpt are hidden at
+random, wherever they are. A marker is *bonded* if the distance to three others or
 more varies by less than 10 mm (half of the middle 68 %).
 
     python benchmarks/fills.py [--data FOLDER] [--only NAME] [--rounds N] [--markdown FILE]
@@ -33,6 +34,7 @@ LENGTHS = (10, 30, 60, 120)
 ENDS = 10
 AT_A_TIME = 3
 MOST = 40  # stretches a round
+SCATTERED, EXCERPT = 0.1, 300  # share of the points, frames
 BONDED = 0.010
 WAYS = ("fill", "spline", "ktk linear", "ktk cubic")
 
@@ -137,6 +139,36 @@ def measure(name: str, truth: am.Tracks, length: int, seed: int) -> tuple[list[S
     return found, ms
 
 
+def scattered(truth: am.Tracks) -> list[str]:
+    """Hide points at random and fill: how many could be tried, how far off beside the spline."""
+    d = truth.detections
+    whole = truth.positions()[:EXCERPT]
+    is_hidden = np.random.default_rng(0).random(whole.shape[:2]) < SCATTERED
+    hidden = np.where(is_hidden[..., None], np.nan, whole)
+    tracks = am.Tracks.from_dense(d.times[:EXCERPT], hidden, truth.names)
+    filling = am.fill(tracks)
+    e = filling.tracks.detections
+    assert e.stds is not None
+    frames, labels = e.frame_of[e.filled], filling.tracks.labels[e.filled]
+    kept = is_hidden[frames, labels] & np.isfinite(whole[frames, labels, 0])
+    frames, labels = frames[kept], labels[kept]
+    true = whole[frames, labels]
+    off = e.points[e.filled][kept] - true
+    z = off / e.stds[e.filled][kept, None]
+    spline = np.empty_like(off)
+    for k in np.unique(labels):
+        seen, mine = np.flatnonzero(np.isfinite(hidden[:, k, 0])), labels == k
+        spline[mine] = CubicSpline(d.times[seen], hidden[seen, k])(d.times[frames[mine]])
+    of_fill, of_spline = (1e3 * np.linalg.norm(one, axis=1) for one in (off, spline - true))
+    tried = [gap.n_windows > 0 for gap in filling.gaps if gap.is_filled]
+    return [
+        str(len(tried)), f"{100 * np.mean(tried):.1f}",
+        *(f"{np.sqrt((mm**2).mean()):.2f} ({np.median(mm):.2f})" for mm in (of_fill, of_spline)),
+        f"{100 * (np.abs(z) < 1.96).mean():.1f}", f"{(z**2).mean():.2f}",
+        f"{1e3 * e.stds[e.filled][kept].max():.1f}",
+    ]  # fmt: skip
+
+
 def accuracy(found: list[Stretch]) -> list[str]:
     """RMS and median of each way, mm, and by what `fill` divides the spline's."""
     cells = [str(len(found))]
@@ -168,6 +200,7 @@ def main() -> None:
     found: list[Stretch] = []
     taken: list[float] = []
     names: list[str] = []
+    at_random: list[list[str]] = []
     for path in captures(options.data):
         capture = am.read(path) if options.only in path.name else None
         if capture is None or not any(capture.names):
@@ -179,6 +212,7 @@ def main() -> None:
                 stretches, ms = measure(path.name, truth, length, seed)
                 found += stretches
                 taken += [ms] * bool(stretches)
+        at_random.append([path.name, *scattered(truth)])
         print(path.name, len(found), flush=True)
     head = ["frames hidden", "stretches", *WAYS, "spline / fill"]
     lines = ["RMS distance over all stretches, mm (median of the stretches):", ""]
@@ -207,6 +241,12 @@ def main() -> None:
         rows += [[name, *ratios, *calibration(some)[1:]]] if some else []
     head = ["capture", *(f"spline / fill, {n}" for n in LENGTHS), *head[2:]]
     lines += [*table(head, rows), ""]
+    lines += [
+        f"{100 * SCATTERED:.0f} % of the points of {EXCERPT} frames missing at random, mm:",
+        "",
+    ]
+    head = ["capture", "gaps", "tried, %", "fill", "spline", "within 1.96 σ, %", "mean square"]
+    lines += [*table([*head, "largest σ"], at_random), ""]
     lines += [f"{np.median(taken):.0f} ms a gap. {conditions()}."]
     publish(lines, options.markdown)
 

@@ -19,6 +19,7 @@ from asterism import _engine
 from asterism.app import main
 from asterism.io.c3d_layout import read_c3d
 from asterism.label.distances import distances_from
+from asterism.label.gap import estimates
 from asterism.label.gap.bodies import fit_body
 from asterism.label.gap.ends import CAREFUL, NOISES, OFFSETS, SPANS, bridges, is_steady
 from asterism.label.gap.patterns import RIDGES, learn_pattern
@@ -87,14 +88,24 @@ def test_gaps_are_those_between_detections(rows):
 @given(st.integers(0, 10_000))
 def test_windows_have_all_that_they_need_and_no_other_has(seed):
     rng = np.random.default_rng(seed)
-    known = rng.random(60) < 0.9
-    frames = np.array([20, 21, 23, 24, 25, 26, 28])
-    shifts = frames - 20
-    expected = [a for a in range(60 - 8) if known[a + shifts].all()]
-    found = held_out(known, frames, 1000)
+    own, bridged, helped = rng.random((3, 60)) < 0.85
+    bridged |= own
+    frames = np.array([16, 18, 20, 21, 23, 24, 25, 26, 28])
+    near, far = np.array([18, 20, 21, 26, 28]), np.array([16])
+    span = Span(track=0, first=23, last=25)
+    expected = [
+        a
+        for a in range(60 - 12)
+        if helped[a + frames - 16].all()
+        and own[a + near - 16].all()
+        and bridged[a + far - 16].all()
+        and own[a + span.hidden - 16].sum() >= 2
+    ]
+    found = held_out(own, bridged, helped, frames, span, 1000)
     np.testing.assert_array_equal(found[:, 0], expected)
-    np.testing.assert_array_equal(found - found[:, :1], np.broadcast_to(shifts, found.shape))
-    assert len(held_out(known, frames, 5)) == min(5, len(expected))
+    shifts = np.broadcast_to(frames - 16, found.shape)
+    np.testing.assert_array_equal(found - found[:, :1], shifts)
+    assert len(held_out(own, bridged, helped, frames, span, 5)) == min(5, len(expected))
 
 
 def test_ends_are_the_nearest_frames_that_were_seen():
@@ -370,6 +381,38 @@ def test_fills_are_as_sure_as_they_say():
     assert 0.6 < (z**2).mean() < 1.5
     assert 0.66 < (z < 1).mean() < 0.82
     assert (z < 1.96).mean() == pytest.approx(0.95, abs=0.025)
+
+
+@pytest.mark.parametrize(("missing", "tried"), [(0.1, 0.99), (0.2, 0.9)])
+def test_points_missing_at_random_are_tried_too(missing, tried):
+    person = am.simulate.person(activity="walk", seed=3, frames=200)
+    some = am.Tracks.from_dense(person.detections.times, person.positions()[:, :8])
+    noisy = am.simulate.sense(some, noise=3e-4, seed=3)
+    filling = am.fill(am.simulate.sense(noisy, missing=missing, seed=4), model=MODEL)
+    assert np.mean([gap.n_windows > 0 for gap in filling.gaps]) > tried
+    e, std = errors(filling, noisy)
+    assert np.median(np.linalg.norm(e, axis=1)) < 1e-3  # of noise alone 0.46 mm
+    z = np.abs(e / std[:, None])
+    assert std.max() < 5e-3
+    assert (z < 1.96).mean() == pytest.approx(0.95, abs=0.03)
+
+
+def test_what_is_bridged_knows_nothing_of_what_is_hidden(monkeypatch):
+    """A hole beside the hidden frame is bridged with its help: no window may begin there."""
+    monkeypatch.setattr(estimates, "MOST_WINDOWS", 1000)
+    truth = rigid(frames=120, noise=1e-4)
+    take = estimates.Take(
+        times=truth.detections.times,
+        positions=hidden_at(truth, (0, 60, 60), (0, 40, 40), (3, 80, 84)).positions(),
+        model=MODEL,
+    )
+    assert np.isfinite(take.bridged[60, 0]).all()
+    assert np.isnan(take.bridged[80:85, 3]).all()  # too long
+    found = estimates.estimate(take, Span(track=0, first=60, last=60))
+    middle = found.windows[:, found.windows.shape[1] // 2]
+    assert not set(middle) & {37, 38, 39, 40, 41, 42, 43}
+    assert {36, 44} <= set(middle)
+    assert np.isfinite(found.truth).all()
 
 
 def test_points_filled_before_are_no_measurements():

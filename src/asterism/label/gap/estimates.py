@@ -19,7 +19,7 @@ from asterism.label.distances import distances_from
 from asterism.label.gap.bodies import Body, fit_body
 from asterism.label.gap.ends import CAREFUL, Bridges, bridges, is_steady
 from asterism.label.gap.patterns import learn_pattern
-from asterism.label.gap.spans import held_out, usable_ends
+from asterism.label.gap.spans import NEAREST_ENDS, find_gaps, held_out, usable_ends
 from asterism.model import Detections, Tracks
 
 if TYPE_CHECKING:
@@ -43,12 +43,14 @@ LEAST_PATTERN = 40
 """Frames from which a pattern may be learnt."""
 MOST_LEARNT = 500
 """Frames spread over the take, from which body and pattern are learnt beside the windows'."""
-NEAREST_ENDS = 3
-"""Frames on each side in which every helper must have been seen."""
 MOST_COMPARED = 400
 """Frames in which distances are compared."""
 STEADIEST = 1e-4
 """Metres; a neighbour is not believed to be steadier."""
+BRIDGED = 3
+"""A marker that is missing for so many frames is taken to be where its own motion leads, but where
+that is the question: points that go missing at random leave hardly a frame in which all were
+seen."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -73,6 +75,26 @@ class Take:
     def seen(self) -> NDArray[np.bool_]:
         """Where each track was measured, shape (T, K)."""
         return np.isfinite(self.positions[..., 0])
+
+    @cached_property
+    def bridged(self) -> NDArray[np.float64]:
+        """Positions, and those of gaps of up to `BRIDGED` frames by the smoother."""
+        short = [span for span in find_gaps(self.seen) if span.length <= BRIDGED]
+        if not short:
+            return self.positions
+        found = self.positions.copy()
+        tracks = Tracks.from_dense(self.times, self.positions)
+        states = smooth(tracks, self.model)
+        at = states.offsets[:-1] - states.first_frames
+        H = self.model.motion.modes[0].observation
+        for span in short:
+            found[span.hidden, span.track] = states.means[at[span.track] + span.hidden] @ H
+        return found
+
+    @cached_property
+    def known(self) -> NDArray[np.bool_]:
+        """Where each track was measured or bridged, shape (T, K)."""
+        return np.isfinite(self.bridged[..., 0])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -103,7 +125,7 @@ class Estimates:
     each : tuple of Estimate
         One to three.
     truth : ndarray, shape (H, L, D)
-        What was hidden in the windows, metres.
+        What was hidden in the windows, metres; NaN where the marker was not seen in truth.
     windows : ndarray of int, shape (H, W)
         Their frames.
     n_neighbours : int
@@ -118,16 +140,17 @@ class Estimates:
 
 def estimate(take: Take, span: Span) -> Estimates:
     """Estimate a marker through a gap and through windows like it."""
-    X, k = take.positions, span.track
-    ends = usable_ends(take.seen[:, k], span)
+    k = span.track
+    X, own = take.bridged, take.seen[:, k]
+    ends = usable_ends(own, span)
     helpers, spreads = _helpers(take, span, ends)
-    # The marker seen, and all its helpers.
-    known = take.seen[:, k] & take.seen[:, helpers].all(axis=1)
-    ends = ends[known[ends]]
+    helped = take.known[:, helpers].all(axis=1)
+    known = own & helped
+    ends = ends[helped[ends]]
     frames = np.sort(np.concatenate([ends, span.hidden]))
     is_end = (frames < span.first) | (frames > span.last)
     most = max(LEAST_WINDOWS, min(MOST_WINDOWS, MOST_HIDDEN // span.length))
-    windows = held_out(known, frames, most)
+    windows = held_out(own, take.known[:, k], helped, frames, span, most)
     spread = np.flatnonzero(known)
     spread = spread[:: -(-len(spread) // MOST_LEARNT)]
     rows = np.unique(np.concatenate([windows.ravel(), frames, spread]))
@@ -152,8 +175,8 @@ def estimate(take: Take, span: Span) -> Estimates:
         rigid = np.full(span.length, (places[is_known] ** 2).mean())
         rigid *= _caution(is_known.sum() / span.length)
         found.append(
-            _carried("body", np.zeros((*every.shape, X.shape[2])), places[at], is_end, ways, room,
-                     rigid)
+            _carried("body", np.zeros((*every.shape, X.shape[2])), places[at], is_end, ways,
+                     room, rigid)
         )  # fmt: skip
         if is_known.sum() >= LEAST_PATTERN:
             Z = body.to_body(X[rows][:, helpers]).reshape(len(rows), -1)
@@ -176,7 +199,7 @@ def estimate(take: Take, span: Span) -> Estimates:
             )
     return Estimates(
         each=tuple(found),
-        truth=X[windows[:, ~is_end], k],
+        truth=take.positions[windows[:, ~is_end], k],
         windows=windows,
         n_neighbours=len(neighbours),
     )
@@ -185,25 +208,26 @@ def estimate(take: Take, span: Span) -> Estimates:
 def _helpers(
     take: Take, span: Span, ends: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Markers that were seen throughout, at both ends and often beside this one; steadiest first.
+    """Markers that are known throughout, at both ends and often beside this one; steadiest first.
 
     Also by how much their distance from it varies, metres.
     """
-    X, seen, k = take.positions, take.seen, span.track
+    k, known = span.track, take.known
     before, after = ends[ends < span.first], ends[ends > span.last]
     needed = np.concatenate([before[-NEAREST_ENDS:], span.hidden, after[:NEAREST_ENDS]])
-    mine = np.flatnonzero(seen[:, k])
-    n_together = seen[mine].sum(axis=0)
-    is_there = seen[needed].all(axis=0)
+    mine = np.flatnonzero(take.seen[:, k])
+    n_together = known[mine].sum(axis=0)
+    is_there = known[needed].all(axis=0)
     is_there &= n_together >= max(LEAST_SHARE * len(mine), LEAST_TOGETHER)
     is_there[k] = False
     others = np.flatnonzero(is_there)
     compared = mine[:: -(-len(mine) // MOST_COMPARED)]
-    spreads = distances_from(X[compared, k], X[compared][:, others]).spread
+    theirs = take.bridged[compared][:, others]
+    spreads = distances_from(take.positions[compared, k], theirs).spread
     steadiest = np.argsort(spreads, kind="stable")[:MOST_HELPERS]
     others, spreads = others[steadiest], spreads[steadiest]
-    # As many as leave most of the frames in which they were all seen.
-    n_all = np.logical_and.accumulate(seen[mine][:, others], axis=1).sum(axis=0)
+    # As many as leave most of the frames in which they are all known.
+    n_all = np.logical_and.accumulate(known[mine][:, others], axis=1).sum(axis=0)
     n = int((n_all >= LEAST_SHARE * n_all.max(initial=0)).sum())
     return others[:n], spreads[:n]
 
@@ -238,7 +262,7 @@ def _smoother(
     pieces = Detections(
         times=take.times,
         offsets=np.concatenate([[0], np.cumsum(counts)]),
-        points=take.positions[frames[order], track],
+        points=take.bridged[frames[order], track],
     )
     states = smooth(Tracks(detections=pieces, labels=labels[order]), take.model)
     at = states.offsets[:-1, None] + every[:, ~is_end] - states.first_frames[:, None]
@@ -277,7 +301,7 @@ def _carried(
     way = CAREFUL
     if len(base) > 1:
         off = carried[:, :-1] - missed[:-1, ~is_end]
-        way = int(np.argmin((off**2).mean(axis=(1, 2, 3))))
+        way = int(np.argmin(np.nanmean(off**2, axis=(1, 2, 3))))
     return Estimate(
         name=name,
         values=room(base[:, ~is_end] + carried[way]),

@@ -67,13 +67,13 @@ def settle(found: Estimates) -> Fill:
     weights = _weights(errors)
     mixed = np.einsum("j,jhld->hld", weights, values)
     off = np.einsum("j,jhld->hld", weights, errors)
-    held_out = _smoothed((off**2).mean(axis=(0, 2)))
+    held_out = _smoothed(_profile(off))
     variances = (n * held_out + OWN_WINDOWS * (weights @ own)) / (n + OWN_WINDOWS)
     return Fill(
         points=mixed[-1],
         stds=np.sqrt(variances) * _doubt(values - mixed, off / np.sqrt(held_out + TINY)[:, None]),
         weights=weights,
-        rms=np.sqrt((errors**2).sum(axis=3).mean(axis=(1, 2))),
+        rms=np.sqrt(np.nanmean((errors**2).sum(axis=3), axis=(1, 2))),
         n_windows=n,
     )
 
@@ -104,6 +104,7 @@ def _weights(errors: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     J = len(errors)
     flat = errors.reshape(J, -1)
+    flat = flat[:, np.isfinite(flat[0])]
     C = flat @ flat.T / flat.shape[1]
     C += 1e-3 * np.diag(np.diag(C)) + TINY * np.eye(J)
     best, least = np.eye(J)[int(np.argmin(np.diag(C)))], np.inf
@@ -117,6 +118,18 @@ def _weights(errors: NDArray[np.float64]) -> NDArray[np.float64]:
                 best = np.zeros(J)
                 best[chosen] = w / w.sum()
     return best
+
+
+def _profile(off: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean square error of a coordinate in each hidden frame, shape (L,).
+
+    Where no window knows the truth, by the frames around it.
+    """
+    every = np.arange(off.shape[1])
+    is_known = np.isfinite(off[..., 0])
+    n = is_known.sum(axis=0)
+    total = np.nansum((off**2).mean(axis=2), axis=0)
+    return np.interp(every, every[n > 0], total[n > 0] / n[n > 0])
 
 
 def _smoothed(profile: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -137,10 +150,10 @@ def _doubt(apart: NDArray[np.float64], z: NDArray[np.float64]) -> float:
     apart : ndarray, shape (J, H + 1, L, D)
         Estimates from their mean, in the windows and, last, in the gap.
     z : ndarray, shape (H, L, D)
-        Errors in the windows, relative to their usual size.
+        Errors in the windows, relative to their usual size; NaN where the truth is not known.
     """
     spread = np.log((apart**2).mean(axis=(0, 2, 3)) + TINY) / 2
-    square = (z**2).mean(axis=(1, 2))
+    square = np.nanmean(z**2, axis=(1, 2))
     if len(apart) < 2 or not (square > 0).all() or np.ptp(spread[:-1]) < 1e-9:
         return 1.0
     x = (spread - spread[:-1].mean()) / spread[:-1].std()

@@ -13,12 +13,14 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["N_ENDS", "Span", "find_gaps", "held_out", "n_apart", "usable_ends"]
+__all__ = ["NEAREST_ENDS", "N_ENDS", "Span", "find_gaps", "held_out", "n_apart", "usable_ends"]
 
 N_ENDS = 10
 """Frames at each end of a gap that are looked at: enough for a slope, too few for the past."""
 REACH = 2
 """They lie within so many times `N_ENDS` frames of the gap, for there may be others beside it."""
+NEAREST_ENDS = 3
+"""Frames on each side in which all must have been seen, or the helpers known."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,15 +84,29 @@ def usable_ends(seen: NDArray[np.bool_], span: Span) -> NDArray[np.int64]:
     return np.concatenate([before, after])
 
 
-def held_out(known: NDArray[np.bool_], frames: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+def held_out(
+    own: NDArray[np.bool_],
+    bridged: NDArray[np.bool_],
+    helped: NDArray[np.bool_],
+    frames: NDArray[np.int64],
+    span: Span,
+    most: int,
+) -> NDArray[np.int64]:
     """Move the frames of a gap and its ends to where all that they need is known.
 
     Parameters
     ----------
-    known : ndarray of bool, shape (T,)
-        Where the marker and all its helpers were seen.
+    own : ndarray of bool, shape (T,)
+        Where the marker was seen: needed in the `NEAREST_ENDS` frames on each side, for what is
+        bridged there would know of what is hidden, and in half of what is hidden.
+    bridged : ndarray of bool, shape (T,)
+        Where it was seen or bridged: needed in the other frames at the ends.
+    helped : ndarray of bool, shape (T,)
+        Where all its helpers are known: needed throughout.
     frames : ndarray of int, shape (W,)
-        Frames of the gap and of its ends.
+        Frames of the gap and of its ends, in order of time.
+    span : Span
+        The gap.
     most : int
         Windows that are wanted at most; they are spread evenly over those there are.
 
@@ -98,23 +114,35 @@ def held_out(known: NDArray[np.bool_], frames: NDArray[np.int64], most: int) -> 
     -------
     ndarray of int, shape (H, W)
     """
-    shifts = frames - frames.min()
-    n_starts = len(known) - int(shifts.max())
-    fits = np.ones(max(n_starts, 0), dtype=bool)
-    if not len(fits):
+    first = frames.min()
+    n_starts = len(own) - int(frames.max() - first)
+    if n_starts <= 0:
         return np.empty((0, len(frames)), dtype=np.int64)
-    total = np.concatenate([[0], np.cumsum(known)])
-    for shift, length in _runs(shifts):
-        here = total[shift + length : shift + length + n_starts] - total[shift : shift + n_starts]
-        fits &= here == length
+
+    def count(mask: NDArray[np.bool_], frames: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Count from each start those of the frames that the mask has, a run at a time."""
+        total = np.concatenate([[0], np.cumsum(mask)])
+        found = np.zeros(n_starts, dtype=np.int64)
+        for shift, length in _runs(frames - first):
+            found += total[shift + length :][:n_starts] - total[shift:][:n_starts]
+        return found
+
+    before, after = frames[frames < span.first], frames[frames > span.last]
+    nearest = np.concatenate([before[-NEAREST_ENDS:], after[:NEAREST_ENDS]])
+    ends = np.concatenate([before, after])
+    fits = count(helped, frames) == len(frames)
+    fits &= (count(own, nearest) == len(nearest)) & (count(bridged, ends) == len(ends))
+    fits &= 2 * count(own, span.hidden) >= span.length
     starts = np.flatnonzero(fits)
     if len(starts) > most:
         starts = starts[np.linspace(0, len(starts) - 1, most).round().astype(int)]
-    return starts[:, None] + shifts
+    return starts[:, None] + (frames - first)
 
 
 def _runs(shifts: NDArray[np.int64]) -> list[tuple[int, int]]:
     """Give begin and length of each unbroken run of some numbers."""
+    if not len(shifts):
+        return []
     ordered = np.sort(shifts)
     pieces = np.split(ordered, np.flatnonzero(np.diff(ordered) > 1) + 1)
     return [(int(piece[0]), len(piece)) for piece in pieces]
