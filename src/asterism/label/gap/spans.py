@@ -100,7 +100,8 @@ def held_out(
         Where the marker was seen: needed in the `NEAREST_ENDS` frames on each side, for what is
         bridged there would know of what is hidden, and in half of what is hidden.
     bridged : ndarray of bool, shape (T,)
-        Where it was seen or bridged: needed in the other frames at the ends.
+        Where it was seen or bridged: needed in all other frames, for a stretch of which a long part
+        is not known tells little.
     helped : ndarray of bool, shape (T,)
         Where all its helpers are known: needed throughout.
     frames : ndarray of int, shape (W,)
@@ -129,9 +130,8 @@ def held_out(
 
     before, after = frames[frames < span.first], frames[frames > span.last]
     nearest = np.concatenate([before[-NEAREST_ENDS:], after[:NEAREST_ENDS]])
-    ends = np.concatenate([before, after])
-    fits = count(helped, frames) == len(frames)
-    fits &= (count(own, nearest) == len(nearest)) & (count(bridged, ends) == len(ends))
+    fits = count(helped & bridged, frames) == len(frames)
+    fits &= count(own, nearest) == len(nearest)
     fits &= 2 * count(own, span.hidden) >= span.length
     starts = np.flatnonzero(fits)
     if len(starts) > most:
