@@ -377,6 +377,38 @@ def test_help_and_version(capsys):
         assert f"asterism {command}" in run(f"{command} --help", capsys)
 
 
+def test_the_common_options_are_everywhere():
+    # A command without --quiet or --json stops the script that passes them to all commands alike.
+    from typer.main import get_command
+
+    from asterism.app.commands import app
+
+    commands = dict(get_command(app).commands)
+    commands |= {f"camera {name}": c for name, c in commands.pop("camera").commands.items()}
+    lists = {"methods", "scenes"}
+    assert lists < commands.keys()
+    assert "camera map" in commands
+    for name, command in commands.items():
+        options = {o for parameter in command.params for o in parameter.opts}
+        wanted = {"--json"} if name in lists else {"--json", "--quiet", "-q"}
+        assert wanted <= options, name
+
+
+@pytest.mark.parametrize("line", [
+    "info in.csv",
+    "evaluate truth.csv truth.csv",
+    "evaluate truth.csv truth.csv --by-frame frames.csv",
+    "camera info rig.toml",
+    "camera check rig.toml",
+    "camera map rig.toml --spacing 1",
+])  # fmt: skip
+def test_quiet_prints_nothing_and_json_an_object(scene, capsys, line):
+    am.write_rig(am.Rig.ring(4, radius=4, height=2.5), "rig.toml")
+    assert run(line, capsys)
+    assert run(f"{line} --quiet", capsys) == ""
+    assert isinstance(json.loads(run(f"{line} --json", capsys)), dict)
+
+
 def test_demo(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = run("demo -o one", capsys)

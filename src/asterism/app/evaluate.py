@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asterism.app.console import Json, console, print_json
+from asterism.app.console import Json, Quiet, console, print_json
 
 if TYPE_CHECKING:
     import asterism as am
@@ -21,7 +21,13 @@ _ByFrame = Annotated[
 ]
 
 
-def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Json = False) -> None:
+def evaluate(
+    labels: _Labels,
+    truth: _Truth,
+    by_frame: _ByFrame = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
     """Score labels against the truth, detection by detection.
 
     Both files must hold the same detections, whatever their formats: those at the same time and
@@ -43,7 +49,7 @@ def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Js
         _write_by_frame(scores, by_frame)
     if json:
         print_json(scores.to_dict())
-    else:
+    elif not quiet:
         console().print(str(scores), markup=False, soft_wrap=True)
 
 
