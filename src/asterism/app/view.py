@@ -27,9 +27,9 @@ def view(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Look at tracks in space and time: turn, zoom, play, choose what is shown.
+    r"""Look at tracks in space and time: turn, zoom, play, choose what is shown.
 
-    Needs Rerun: pip install 'asterism[view]'. The viewer listens to this machine alone, and its
+    Needs Rerun: pip install 'asterism\[view]'. The viewer listens to this machine alone, and its
     usage statistics are switched off.
 
     For example:
