@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asterism.app.calibration_options import (  # noqa: TC001 - typer reads the annotations
+from asterism.app.calibration_options import (
     CalibrationFile,
     FromFormat,
     LengthUnits,
+    read_calibration,
 )
 from asterism.app.camera_map import map_
 from asterism.app.console import Json, Quiet, print_json, print_table
@@ -80,9 +81,8 @@ def info(
         asterism camera info calibration.toml --units mm --json
     """
     from asterism.app.camera_info import describe_rig
-    from asterism.io.calibration import read_rig
 
-    rig = read_rig(calibration, format=from_format, units=units)
+    rig = read_calibration(calibration, from_format, units)
     cameras, whole = describe_rig(rig)
     if json:
         print_json({"calibration": str(calibration), **whole,
@@ -143,16 +143,19 @@ def convert(
         asterism camera convert walk.qca.txt folder --format flydra
     """
     from asterism.app.files import check_outputs
+    from asterism.app.options import as_options
     from asterism.camera import Rig
-    from asterism.io.calibration import read_rig, write_rig
+    from asterism.io.calibration import write_rig
     from asterism.io.calibration.files import format_to_write
 
     check_outputs({"OUT": out}, [calibration])
-    chosen = format_to_write(out, to_format)
-    rig = read_rig(calibration, format=from_format, units=units)
+    with as_options({"path": "OUT", "format": "--format"}):
+        chosen = format_to_write(out, to_format)
+    rig = read_calibration(calibration, from_format, units)
     fits = [_fitted(camera, lens, chosen) for camera in rig]
     cameras = [c if fit is None else fit.camera for c, fit in zip(rig, fits, strict=True)]
-    write_rig(Rig(tuple(cameras)), out, format=chosen.name)
+    with as_options({"path": "OUT"}):
+        write_rig(Rig(tuple(cameras)), out, format=chosen.name)
     changes = [
         {
             "name": name,
@@ -219,10 +222,9 @@ def check(
     """
     from asterism.app.camera_check import check_points, check_rig
     from asterism.errors import check_number
-    from asterism.io.calibration import read_rig
 
     check_number("--max-px", max_px, above=0)
-    rig = read_rig(calibration, format=from_format, units=units)
+    rig = read_calibration(calibration, from_format, units)
     checks = check_rig(rig)
     errors: list[dict[str, Any]] = []
     if points:

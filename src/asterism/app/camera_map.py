@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asterism.app.calibration_options import (  # noqa: TC001 - typer reads the annotations
+from asterism.app.calibration_options import (
     CalibrationFile,
     FromFormat,
     LengthUnits,
+    read_calibration,
 )
 from asterism.app.console import Json, Quiet, print_json, print_table
 from asterism.errors import ParameterError
@@ -70,7 +71,7 @@ def map_(
     import numpy as np
 
     from asterism.app.files import check_outputs
-    from asterism.io.calibration import read_rig
+    from asterism.app.options import as_options
     from asterism.reconstruct import triangulation_map
 
     check_outputs({"-o": out}, [calibration])
@@ -78,12 +79,17 @@ def map_(
         raise ParameterError("-o", "a name ending in .png", str(out))
     if (low is None) != (high is None):
         raise ParameterError("--low", "both --low and --high, or neither", "one of them")
-    rig = read_rig(calibration, format=from_format, units=units)
+    rig = read_calibration(calibration, from_format, units)
     if low is None or high is None:
         corners = _default_box(rig)
     else:
         corners = _corner("--low", low), _corner("--high", high)
-    found = triangulation_map(rig, *corners, spacing=spacing, sigma_px=sigma, n_suggestions=suggest)
+    options = {"low": "--low", "high": "--high", "spacing": "--spacing", "sigma_px": "--sigma",
+               "n_suggestions": "--suggest"}  # fmt: skip
+    with as_options(options):
+        found = triangulation_map(
+            rig, *corners, spacing=spacing, sigma_px=sigma, n_suggestions=suggest
+        )
     if out is not None:
         from asterism.app.film_pictures import save
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from asterism.app.console import Json, Quiet, console, print_json
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     import asterism as am
@@ -44,7 +45,12 @@ def evaluate(
     from asterism.app.files import check_outputs, read_labels
 
     check_outputs({"--by-frame": by_frame}, [labels, truth])
-    scores = am.evaluate(read_labels(labels), am.read_tracks(truth))
+    found, true = read_labels(labels), am.read_tracks(truth)
+    if not true.n_tracks:
+        expected = "a capture whose markers are labelled"
+        got = f"{truth}, which has no labels"
+        raise ParameterError("TRUTH", expected, got, "the truth is the second of the two files")
+    scores = am.evaluate(found, true)
     if by_frame is not None:
         _write_by_frame(scores, by_frame)
     if json:
