@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_kind
+from asterism.model import Tracks
 from asterism.view.coverage import draw_bar
 from asterism.view.rows import axes_for, frame_rows, legend_above, rows_of, strip_above
 from asterism.view.style import CLUTTER, CYCLE, GRADIENT, GRID, INK, new_axes, tidy
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism.evaluate import Calibration
-    from asterism.model import Tracks
 
 __all__ = ["plot_confidence", "plot_reliability"]
 
@@ -45,6 +45,7 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
     ParameterError
         If the tracks have no confidence.
     """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
     if tracks.confidence is None:
         hint = "jpda, mht and mcmcda say how sure they are; of the files a CSV keeps it"
         raise ParameterError("tracks", "tracks with a confidence", "none", hint)

@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_kind
+from asterism.model import Tracks
 from asterism.view.rows import axes_for, frame_rows, legend_above, rows_of, strip_above
 from asterism.view.style import CLUTTER, CYCLE, INK, MISSED, RIGHT, WRONG
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-    from asterism.model import Tracks
 
 __all__ = ["plot_errors", "plot_presence"]
 
@@ -71,6 +70,8 @@ def plot_errors(tracks: Tracks, truth: Tracks, ax: Axes | None = None) -> Axes:
     ParameterError
         If the detections of the two are not the same.
     """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    check_kind("truth", truth, Tracks)
     a, b = tracks.detections, truth.detections
     if a is not b and not (
         np.array_equal(a.offsets, b.offsets) and np.array_equal(a.points, b.points)

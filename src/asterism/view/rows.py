@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asterism.errors import check_kind
+from asterism.model import Tracks
 from asterism.view.style import GRID, INK, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-    from asterism.model import Tracks
 
 __all__ = ["axes_for", "frame_rows", "legend_above", "rows_of", "strip_above"]
 
@@ -21,6 +21,7 @@ _MOST_NAMES = 60  # rows that can be named legibly
 
 def rows_of(tracks: Tracks) -> NDArray[np.int64]:
     """Row of each track, shape (K,), by first frame and then by number; -1 where it is empty."""
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
     order, offsets = tracks.by_track
     there = np.flatnonzero(tracks.lengths)
     first = tracks.detections.frame_of[order[offsets[there]]]
