@@ -143,6 +143,7 @@ def test_the_title_is_the_callers_own_and_nothing_lies_on_it(kind, part):
     inches = np.array([strip.y0 - main.y1, strip.height]) / figure.dpi
     np.testing.assert_allclose(inches, [0.1, 0.55], atol=0.02)
     np.testing.assert_allclose([strip.x0, strip.x1], [main.x0, main.x1], atol=1)
+    assert am.figure_bytes(axes, "png")[1:4] == b"PNG"  # of the whole figure
 
 
 @pytest.mark.parametrize("n_axes", [2, 3])
