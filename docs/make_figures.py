@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from PIL import Image
 
 import asterism as am
-from asterism.evaluate import right_links
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,7 +63,7 @@ def main() -> None:
     reliability: dict[str, Any] = {}
     for name in ("jpda", "mht", "mcmcda"):
         tracks = found[name]
-        links, is_right = right_links(tracks.labels, truth.labels)
+        links, is_right = am.right_links(tracks.labels, truth.labels)
         assert tracks.confidence is not None
         reliability[name] = am.calibration(tracks.confidence[links], is_right)
     gnn, best = found["gnn"], found["mcmcda"]

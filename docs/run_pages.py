@@ -158,8 +158,10 @@ def _tidy(text: str) -> str:
 
 
 def _python(block: Block, page: Path, namespace: dict[str, Any]) -> str:
-    # Lines are numbered as in the page, for tracebacks.
-    code = compile("\n" * (block.line - 1) + block.text, str(page), "exec")
+    # Lines are numbered as in the page, for tracebacks. The `annotations` of this file are not the
+    # page's: with them a dataclass there would take a ClassVar for a field.
+    text = "\n" * (block.line - 1) + block.text
+    code = compile(text, str(page), "exec", dont_inherit=True)
     out = io.StringIO()
     with contextlib.redirect_stdout(out):
         exec(code, namespace)

@@ -375,6 +375,77 @@ def test_help_and_version(capsys):
     commands = "track corrupt evaluate info methods estimate simulate film camera scenes demo"
     for command in commands.split():
         assert f"asterism {command}" in run(f"{command} --help", capsys)
+    # What stands in brackets is no markup of the help's.
+    assert "pip install 'asterism[view]'" in run("view --help", capsys)
+    assert "[[" not in run("scenes --help", capsys)
+
+
+def test_the_common_options_are_everywhere():
+    # A command without --quiet or --json stops the script that passes them to all commands alike.
+    from typer.main import get_command
+
+    from asterism.app.commands import app
+
+    commands = dict(get_command(app).commands)
+    commands |= {f"camera {name}": c for name, c in commands.pop("camera").commands.items()}
+    lists = {"methods", "scenes"}
+    assert lists < commands.keys()
+    assert "camera map" in commands
+    for name, command in commands.items():
+        options = {o for parameter in command.params for o in parameter.opts}
+        wanted = {"--json"} if name in lists else {"--json", "--quiet", "-q"}
+        assert wanted <= options, name
+
+
+@pytest.mark.parametrize(("line", "says"), [
+    ("simulate person -o a.c3d --markers 3", "--markers: expected a whole number in [40, 90]"),
+    ("simulate cube -o a.c3d --frames 0", "--frames: expected"),
+    ("simulate cube -o a.c3d --option frames=0", "frames: expected"),
+    ("corrupt scene.csv -o a.csv --truth t.csv --missing 10", "--missing: expected"),
+    ("corrupt scene.csv -o a.csv --truth t.csv --sense missing=10", "missing: expected"),
+    ("camera map rig.toml --low 1,1,1 --high 0,0,0", "--high: expected"),
+    ("camera map rig.toml --suggest -1", "--suggest: expected"),
+    ("camera info rig.toml --from opncv", "--from: expected"),
+    ("camera convert rig.toml rig.abc", "OUT: expected a name ending in"),
+    ("camera convert rig.toml a.yml --format opncv", "--format: expected one of"),
+    ("track in.csv --method gn", "--method: expected one of"),
+    ("track in.csv --run .", "--run: expected a new or an empty folder"),
+    ("track in.csv --report page.pdf", "--report: expected a name ending in .html"),
+    ("report truth.csv -o page.pdf", "-o: expected a name ending in .html"),
+    ("film cube --rig ring4 -o .", "-o: expected a new or an empty folder"),
+    ("evaluate truth.csv in.csv", "(the truth is the second of the two files)"),
+    ("info empty.csv", "got an empty file"),
+    ("reconstruct in.csv --rig rig.toml -o a.csv", "line 1: expected the columns"),
+])  # fmt: skip
+def test_mistakes_are_told_by_the_names_of_the_command_line(scene, capsys, line, says):
+    am.write_rig(am.Rig.ring(4, radius=4, height=2.5), "rig.toml")
+    Path("empty.csv").touch()
+    before = sorted(scene.iterdir())
+    told = refused(line, capsys)
+    assert f" {says}" in told  # an option has its dashes, an argument of the library has none
+    assert told.count("\n") == 1
+    assert sorted(scene.iterdir()) == before
+
+
+def test_noise_in_millimetres_is_doubted(scene, capsys):
+    for noise, doubts in (("0.0003", False), ("3", True)):
+        assert main(f"corrupt scene.csv -o a.csv --truth t.csv --noise {noise} -q".split()) == 0
+        assert ("the markers are within" in capsys.readouterr().err) == doubts
+
+
+@pytest.mark.parametrize("line", [
+    "info in.csv",
+    "evaluate truth.csv truth.csv",
+    "evaluate truth.csv truth.csv --by-frame frames.csv",
+    "camera info rig.toml",
+    "camera check rig.toml",
+    "camera map rig.toml --spacing 1",
+])  # fmt: skip
+def test_quiet_prints_nothing_and_json_an_object(scene, capsys, line):
+    am.write_rig(am.Rig.ring(4, radius=4, height=2.5), "rig.toml")
+    assert run(line, capsys)
+    assert run(f"{line} --quiet", capsys) == ""
+    assert isinstance(json.loads(run(f"{line} --json", capsys)), dict)
 
 
 def test_demo(tmp_path, monkeypatch, capsys):

@@ -125,7 +125,7 @@ def test_errors_are_those_of_the_file(work, capsys, monkeypatch):
     monkeypatch.setattr(am, "plot_errors", lambda *a: seen.append(before(*a)) or seen[-1])
     run("errors truth.csv --truth truth.csv -o a.png", capsys)
     (above,) = seen[0].child_axes
-    assert above.get_title(loc="left") == "0 % of the labels wrong"
+    assert above.get_xlabel() == "0 % of the labels wrong"
 
 
 def test_observations_of_a_film_are_drawn_as_they_are(work, capsys, monkeypatch):

@@ -328,6 +328,21 @@ def test_fragments_are_repaired(window):
     assert am.evaluate(kept, am.floor(truth, model.population.max_gap)).idf1 > 0.99
 
 
+@pytest.mark.parametrize("window", [10, None])
+def test_without_a_move_and_a_start_nothing_could_begin(window):
+    # Every detection would be clutter, and nobody would be told.
+    truth = wanderers(np.random.default_rng(6), n_frames=10)
+    method = am.MCMCDA(window=window, moves=0)
+    with pytest.raises(am.ParameterError, match=r"moves: expected a number > 0, or labels"):
+        am.track(truth.detections, method, model=small_model())
+
+
+def test_a_stream_without_a_move_is_refused_at_its_first_frame():
+    method = am.MCMCDA(moves=0)
+    with pytest.raises(am.ParameterError, match="moves"):
+        method.step(method.init(small_model()), 0.0, np.zeros((1, 3)))
+
+
 def test_a_start_is_for_those_who_can():
     truth = wanderers(np.random.default_rng(6), n_frames=10)
     with pytest.raises(am.ParameterError, match="mcmcda"):

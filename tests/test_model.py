@@ -59,6 +59,18 @@ def test_bad_detections_say_what_and_where(times, frames, message):
         am.Detections.from_frames(times, frames)
 
 
+def test_a_capture_is_made_as_detections_are():
+    frames = [[[0.0, 0, 0], [1, 0, 0]], [], [[1, 0, 0]]]
+    dense = np.zeros((2, 2, 3))
+    for d in (am.Capture.from_frames([0, 1, 3], frames), am.Capture.from_dense([0, 1], dense)):
+        assert isinstance(d, am.Capture)
+        assert d.channels.tolist() == d.labels.tolist() == [-1] * d.n_points
+        assert d.tracks.n_tracks == 0
+    # None are nobody's, but a number of them that does not fit is still a mistake.
+    with pytest.raises(am.ParameterError, match="labels"):
+        am.Capture(times=d.times, offsets=d.offsets, points=d.points, labels=[])
+
+
 def test_detections_cannot_be_changed_from_outside():
     points, labels = np.zeros((2, 3)), np.array([0, 1])
     d = am.Detections(times=[0], offsets=[0, 2], points=points)

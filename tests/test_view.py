@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import sys
 
@@ -73,7 +74,7 @@ def test_errors_are_coloured_by_the_marker_that_a_track_has_most_often():
         (1, -0.05, 0.15, right), (1, 0.15, 0.35, wrong),
     ]  # fmt: skip
     (above,) = axes.child_axes
-    assert "38 % of the labels wrong" in above.get_title(loc="left")
+    assert above.get_xlabel() == "38 % of the labels wrong"
     labels = [text.get_text() for text in above.get_legend().get_texts()]
     assert labels == ["no label", "wrong marker", "right marker"]
     tops = [c.get_paths()[0].vertices[:, 1].max() for c in above.collections]
@@ -115,6 +116,34 @@ def test_all_axes_have_one_scale():
     spans = np.array([np.ptp(limits()) for limits in (axes.get_xlim, axes.get_ylim, axes.get_zlim)])
     box = axes._box_aspect
     np.testing.assert_allclose(spans / box, np.full(3, spans[0] / box[0]))
+
+
+@pytest.mark.parametrize("part", ["figure", "half", "subfigure"])
+@pytest.mark.parametrize("kind", ["presence", "errors", "confidence"])
+def test_the_title_is_the_callers_own_and_nothing_lies_on_it(kind, part):
+    tracks = tracks_of(["01", "01*", "0", "01"])
+    tracks = dataclasses.replace(tracks, confidence=np.ones(len(tracks.labels)))
+    figure = Figure(figsize=(8, 7), layout=None if part == "figure" else "constrained")
+    if part == "subfigure":  # which has neither a height in inches nor a canvas
+        ax = figure.subfigures(1, 2, wspace=0.1)[0].add_subplot()
+    else:
+        ax = figure.add_subplot(*((2, 1, 2) if part == "half" else ()))
+    draw = {"presence": plot_presence, "confidence": am.plot_confidence,
+            "errors": lambda t, ax: plot_errors(t, t, ax=ax)}[kind]  # fmt: skip
+    axes = draw(tracks, ax=ax)
+    axes.set_title("A title of the caller, as long as titles are in papers")
+    figure.draw_without_rendering()
+    (above,) = axes.child_axes
+    title = axes.title.get_window_extent()
+    below = [above.get_window_extent(), above.xaxis.label.get_window_extent()]
+    below += [legend.get_window_extent() for legend in [above.get_legend()] if legend]
+    assert above.get_xlabel()
+    assert all(title.y0 >= box.y1 for box in below)
+    strip, main = above.get_window_extent(), axes.get_window_extent()
+    inches = np.array([strip.y0 - main.y1, strip.height]) / figure.dpi
+    np.testing.assert_allclose(inches, [0.1, 0.55], atol=0.02)
+    np.testing.assert_allclose([strip.x0, strip.x1], [main.x0, main.x1], atol=1)
+    assert am.figure_bytes(axes, "png")[1:4] == b"PNG"  # of the whole figure
 
 
 @pytest.mark.parametrize("n_axes", [2, 3])

@@ -59,12 +59,26 @@ if TYPE_CHECKING:
     from asterism.errors import FormatError as FormatError
     from asterism.errors import ParameterError as ParameterError
     from asterism.errors import SolverLimit as SolverLimit
+    from asterism.evaluate import Alignment as Alignment
+    from asterism.evaluate import AssociationScores as AssociationScores
+    from asterism.evaluate import Calibration as Calibration
+    from asterism.evaluate import ClearScores as ClearScores
     from asterism.evaluate import Evaluation as Evaluation
+    from asterism.evaluate import GospaScores as GospaScores
+    from asterism.evaluate import HotaScores as HotaScores
+    from asterism.evaluate import IdentityScores as IdentityScores
     from asterism.evaluate import PointScores as PointScores
+    from asterism.evaluate import align as align
+    from asterism.evaluate import association_scores as association_scores
     from asterism.evaluate import calibration as calibration
+    from asterism.evaluate import clear_scores as clear_scores
     from asterism.evaluate import evaluate as evaluate
     from asterism.evaluate import floor as floor
+    from asterism.evaluate import gospa_scores as gospa_scores
+    from asterism.evaluate import hota_scores as hota_scores
+    from asterism.evaluate import identity_scores as identity_scores
     from asterism.evaluate import point_scores as point_scores
+    from asterism.evaluate import right_links as right_links
     from asterism.filter import GateGroups as GateGroups
     from asterism.filter import States as States
     from asterism.filter import expected_places as expected_places
@@ -73,6 +87,7 @@ if TYPE_CHECKING:
     from asterism.filter import smooth as smooth
     from asterism.io import FORMATS as FORMATS
     from asterism.io import CaptureInfo as CaptureInfo
+    from asterism.io import Format as Format
     from asterism.io import describe as describe
     from asterism.io import read as read
     from asterism.io import read_tracks as read_tracks
@@ -248,8 +263,29 @@ _PUBLIC = {
         "joint_marginals",
         "k_best_assignments",
     ),
-    "evaluate": ("Evaluation", "PointScores", "calibration", "evaluate", "floor", "point_scores"),
-    "io": ("FORMATS", "CaptureInfo", "describe", "read", "read_tracks", "write"),
+    "evaluate": (
+        "Alignment",
+        "AssociationScores",
+        "Calibration",
+        "ClearScores",
+        "Evaluation",
+        "GospaScores",
+        "HotaScores",
+        "IdentityScores",
+        "PointScores",
+        "align",
+        "association_scores",
+        "calibration",
+        "clear_scores",
+        "evaluate",
+        "floor",
+        "gospa_scores",
+        "hota_scores",
+        "identity_scores",
+        "point_scores",
+        "right_links",
+    ),
+    "io": ("FORMATS", "CaptureInfo", "Format", "describe", "read", "read_tracks", "write"),
     "io.calibration": ("CALIBRATIONS", "read_rig", "write_rig"),
     "io.observations": ("read_observations", "write_observations"),
     "reporting": ("report",),

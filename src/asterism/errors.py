@@ -24,6 +24,7 @@ __all__ = [
     "SolverLimit",
     "check_array",
     "check_fields",
+    "check_kind",
     "check_number",
     "keep_array",
 ]
@@ -160,6 +161,49 @@ def check_number(
         raise ParameterError(name, expected, f"{number:g}", hint)
 
 
+def check_kind(name: str, value: object, kind: type, hint: str = "") -> None:
+    """Raise unless `value` is of a class.
+
+    Parameters
+    ----------
+    name : str
+        How the caller knows the value.
+    value : object
+        The value.
+    kind : type
+        The class.
+    hint : str
+        What to try instead. Where the value has what is wanted under one of the usual names, as the
+        `Stitching` of `identify` has tracks, that name is the hint.
+
+    Raises
+    ------
+    ParameterError
+        If it is not.
+
+    Examples
+    --------
+    >>> check_kind("radius", "3", float)
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: radius: expected a float, got '3'
+    """
+    if isinstance(value, kind):
+        return
+    word = kind.__name__
+    expected = word if word.endswith("s") else f"a {word}"
+    got = f"{type(value).__name__}"
+    if isinstance(value, str):
+        got = repr(value)
+    elif isinstance(value, type):
+        got = f"the class {value.__name__}"
+    for part in ("tracks", "detections", "model", "bonds", "observations"):
+        if isinstance(getattr(value, part, None), kind):
+            hint = f"its .{part}"
+            break
+    raise ParameterError(name, expected, got, f"try {hint}" if hint else "")
+
+
 def check_array(
     name: str,
     value: ArrayLike,
@@ -256,6 +300,6 @@ def check_fields(name: str, given: Iterable[str], known: Iterable[str]) -> None:
     known = list(known)
     for field in given:
         if field not in known:
-            near = difflib.get_close_matches(field, known, n=1)
+            near = difflib.get_close_matches(str(field), known, n=1)
             hint = f"did you mean {near[0]!r}?" if near else ""
             raise ParameterError(name, f"one of {', '.join(known)}", repr(field), hint)

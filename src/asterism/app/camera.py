@@ -8,6 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from asterism.app.calibration_options import (
+    CalibrationFile,
+    FromFormat,
+    LengthUnits,
+    read_calibration,
+)
 from asterism.app.camera_map import map_
 from asterism.app.console import Json, Quiet, print_json, print_table
 from asterism.errors import ParameterError
@@ -26,13 +32,6 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 
-_Calib = Annotated[Path, typer.Argument(metavar="CALIB", help="Calibration: a file or a folder.")]
-_From = Annotated[
-    str | None, typer.Option("--from", metavar="FORMAT", help="Format, if it cannot be told.")
-]
-_Units = Annotated[
-    str | None, typer.Option(metavar="mm|cm|m", help="Unit of length, if the files do not say it.")
-]
 _Out = Annotated[Path, typer.Argument(metavar="OUT", help="File, or new folder, to write.")]
 _Format = Annotated[
     str | None,
@@ -64,7 +63,11 @@ _Most = Annotated[
 
 @app.command()
 def info(
-    calibration: _Calib, from_format: _From = None, units: _Units = None, json: Json = False
+    calibration: CalibrationFile,
+    from_format: FromFormat = None,
+    units: LengthUnits = None,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Say what each camera of a calibration is, where it stands, and what the rig sees.
 
@@ -78,18 +81,18 @@ def info(
         asterism camera info calibration.toml --units mm --json
     """
     from asterism.app.camera_info import describe_rig
-    from asterism.io.calibration import read_rig
 
-    rig = read_rig(calibration, format=from_format, units=units)
+    rig = read_calibration(calibration, from_format, units)
     cameras, whole = describe_rig(rig)
     if json:
         print_json({"calibration": str(calibration), **whole,
                     "cameras": [dataclasses.asdict(c) for c in cameras],
                     "warnings": list(rig.warnings)})  # fmt: skip
-        return
-    print_table((_row(c) for c in cameras), _COLUMNS, title=f"{calibration}: {len(rig)} cameras")
-    rows = [(key.replace("_", " "), _text(value)) for key, value in whole.items()]
-    print_table([*rows, *_warnings(rig.warnings)])
+    elif not quiet:
+        title = f"{calibration}: {len(rig)} cameras"
+        print_table((_row(c) for c in cameras), _COLUMNS, title=title)
+        rows = [(key.replace("_", " "), _text(value)) for key, value in whole.items()]
+        print_table([*rows, *_warnings(rig.warnings)])
 
 
 _COLUMNS = ("camera", "size", "focal px", "field °", "position", "looks at", "lens", "shift px",
@@ -117,12 +120,12 @@ def _warnings(warnings: tuple[str, ...]) -> list[tuple[str, str]]:
 
 @app.command()
 def convert(
-    calibration: _Calib,
+    calibration: CalibrationFile,
     out: _Out,
     to_format: _Format = None,
     lens: _LensOption = "auto",
-    from_format: _From = None,
-    units: _Units = None,
+    from_format: FromFormat = None,
+    units: LengthUnits = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -140,16 +143,19 @@ def convert(
         asterism camera convert walk.qca.txt folder --format flydra
     """
     from asterism.app.files import check_outputs
+    from asterism.app.options import as_options
     from asterism.camera import Rig
-    from asterism.io.calibration import read_rig, write_rig
+    from asterism.io.calibration import write_rig
     from asterism.io.calibration.files import format_to_write
 
     check_outputs({"OUT": out}, [calibration])
-    chosen = format_to_write(out, to_format)
-    rig = read_rig(calibration, format=from_format, units=units)
+    with as_options({"path": "OUT", "format": "--format"}):
+        chosen = format_to_write(out, to_format)
+    rig = read_calibration(calibration, from_format, units)
     fits = [_fitted(camera, lens, chosen) for camera in rig]
     cameras = [c if fit is None else fit.camera for c, fit in zip(rig, fits, strict=True)]
-    write_rig(Rig(tuple(cameras)), out, format=chosen.name)
+    with as_options({"path": "OUT"}):
+        write_rig(Rig(tuple(cameras)), out, format=chosen.name)
     changes = [
         {
             "name": name,
@@ -191,12 +197,13 @@ def _fitted(camera: Any, lens: str, chosen: Calibration) -> LensFit | None:
 
 @app.command()
 def check(
-    calibration: _Calib,
+    calibration: CalibrationFile,
     points: _Points = None,
     point_units: _PointUnits = None,
     max_px: _Most = 2.0,
-    from_format: _From = None,
-    units: _Units = None,
+    from_format: FromFormat = None,
+    units: LengthUnits = None,
+    quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Say whether a calibration can be right; exit with 1 if it cannot.
@@ -215,10 +222,9 @@ def check(
     """
     from asterism.app.camera_check import check_points, check_rig
     from asterism.errors import check_number
-    from asterism.io.calibration import read_rig
 
     check_number("--max-px", max_px, above=0)
-    rig = read_rig(calibration, format=from_format, units=units)
+    rig = read_calibration(calibration, from_format, units)
     checks = check_rig(rig)
     errors: list[dict[str, Any]] = []
     if points:
@@ -229,7 +235,7 @@ def check(
         print_json({"calibration": str(calibration), "passed": not failed,
                     "checks": [dataclasses.asdict(c) for c in checks], "reprojection": errors,
                     "warnings": list(rig.warnings)})  # fmt: skip
-    else:
+    elif not quiet:
         _print_checks(checks, errors, rig.warnings)
     if failed:
         raise typer.Exit(1)

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asterism.app.console import Json, print_json, print_table
+from asterism.app.calibration_options import (
+    CalibrationFile,
+    FromFormat,
+    LengthUnits,
+    read_calibration,
+)
+from asterism.app.console import Json, Quiet, print_json, print_table
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -20,13 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["map_"]
 
-_Calib = Annotated[Path, typer.Argument(metavar="CALIB", help="Calibration: a file or a folder.")]
-_From = Annotated[
-    str | None, typer.Option("--from", metavar="FORMAT", help="Format, if it cannot be told.")
-]
-_Units = Annotated[
-    str | None, typer.Option(metavar="mm|cm|m", help="Unit of length, if the files do not say it.")
-]
 _Picture = Annotated[
     Path | None, typer.Option("--out", "-o", metavar="FILE.png", help="Picture to write.")
 ]
@@ -47,15 +46,16 @@ _Suggest = Annotated[int, typer.Option(help="How many places for one more camera
 
 
 def map_(
-    calibration: _Calib,
+    calibration: CalibrationFile,
     out: _Picture = None,
     low: _Low = None,
     high: _High = None,
     spacing: _Spacing = None,
     sigma: _Sigma = 0.3,
     suggest: _Suggest = 3,
-    from_format: _From = None,
-    units: _Units = None,
+    from_format: FromFormat = None,
+    units: LengthUnits = None,
+    quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Say how exactly a rig can place a point in its volume, and where one more camera helps most.
@@ -71,7 +71,7 @@ def map_(
     import numpy as np
 
     from asterism.app.files import check_outputs
-    from asterism.io.calibration import read_rig
+    from asterism.app.options import as_options
     from asterism.reconstruct import triangulation_map
 
     check_outputs({"-o": out}, [calibration])
@@ -79,12 +79,17 @@ def map_(
         raise ParameterError("-o", "a name ending in .png", str(out))
     if (low is None) != (high is None):
         raise ParameterError("--low", "both --low and --high, or neither", "one of them")
-    rig = read_rig(calibration, format=from_format, units=units)
+    rig = read_calibration(calibration, from_format, units)
     if low is None or high is None:
         corners = _default_box(rig)
     else:
         corners = _corner("--low", low), _corner("--high", high)
-    found = triangulation_map(rig, *corners, spacing=spacing, sigma_px=sigma, n_suggestions=suggest)
+    options = {"low": "--low", "high": "--high", "spacing": "--spacing", "sigma_px": "--sigma",
+               "n_suggestions": "--suggest"}  # fmt: skip
+    with as_options(options):
+        found = triangulation_map(
+            rig, *corners, spacing=spacing, sigma_px=sigma, n_suggestions=suggest
+        )
     if out is not None:
         from asterism.app.film_pictures import save
 
@@ -111,7 +116,14 @@ def map_(
     }
     if json:
         print_json(values | {"output": None if out is None else str(out)})
-        return
+    elif not quiet:
+        title = f"{calibration}: {len(rig)} cameras, {sigma:g} px"
+        _print_map(values, title)
+        if out is not None:
+            print_table([("written", out)])
+
+
+def _print_map(values: dict[str, Any], title: str) -> None:
     print_table(
         [
             ("volume", f"{_listed(values['low'])} to {_listed(values['high'])}"),
@@ -120,7 +132,7 @@ def map_(
                 f"{values['percentile_95_error_mm']:.3g} mm in 95 %"),
             ("over the volume", f"{values['rms_error_mm']:.3g} mm root mean square"),
         ],
-        title=f"{calibration}: {len(rig)} cameras, {sigma:g} px",
+        title=title,
     )  # fmt: skip
     if values["suggestions"]:
         rows = [
@@ -129,8 +141,6 @@ def map_(
         ]
         columns = ("position", "root mean square, mm", "seen by two, %")
         print_table(rows, columns, title="\nOne more camera")
-    if out is not None:
-        print_table([("written", out)])
 
 
 def _listed(values: Sequence[float]) -> str:

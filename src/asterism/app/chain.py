@@ -80,7 +80,7 @@ def chain(
     from asterism.errors import check_fields
 
     names = method or [AUTO]
-    check_fields("method", names, (AUTO, *am.METHODS))
+    check_fields("--method", names, (AUTO, *am.METHODS))
     if out is not None:
         check_folder(out, overwrite=overwrite)
     truth, values = made_scene(scene, {"frames": frames, "rate": rate, "seed": seed}, option or [])

@@ -57,27 +57,13 @@ def _root(  # pyright: ignore[reportUnusedFunction]
     del version
 
 
-for _command in (
-    track,
-    stitch,
-    fill,
-    bonds,
-    recognize,
-    report,
-    evaluate,
-    info,
-    estimate,
-    methods,
-    corrupt,
-    simulate,
-    scenes,
-    film,
-    reconstruct,
-    chain,
-    plot,
-    view,
-    demo,
-    reproduce,
-):
-    app.command()(_command)
-app.add_typer(camera)
+_TITLES = {
+    "From points to markers": (track, stitch, fill, bonds, recognize, estimate, methods),
+    "What there is, and what came of it": (info, evaluate, report, plot, view),
+    "Experiments with a known truth": (corrupt, simulate, scenes, demo, reproduce),
+    "Cameras": (film, reconstruct, chain),
+}
+for _title, _commands in _TITLES.items():
+    for _command in _commands:
+        app.command(rich_help_panel=_title)(_command)
+app.add_typer(camera, rich_help_panel="Cameras")

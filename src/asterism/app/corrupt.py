@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,6 +10,8 @@ import typer
 
 from asterism.app.console import Json, Quiet, print_json, print_table
 from asterism.errors import ParameterError
+
+log = logging.getLogger(__name__)
 
 _In = Annotated[Path, typer.Argument(metavar="IN", help="Labelled capture.")]
 _Out = Annotated[Path, typer.Option("--out", "-o", help="File for the points without names.")]
@@ -76,6 +79,7 @@ def corrupt(
 
     import asterism as am
     from asterism.app.files import check_outputs
+    from asterism.app.options import as_options
     from asterism.app.recording import episode, switches_from
     from asterism.simulate import Burst, Ghosts
 
@@ -94,8 +98,12 @@ def corrupt(
         "ghosts": haunting,
         "stride": stride,
     }
-    switches |= switches_from(sense or [])
-    spoilt = am.simulate.sense(known, **switches, seed=seed)
+    extent = float(np.ptp(known.detections.points, axis=0).max(initial=0.0))
+    if noise > extent / 10:
+        log.warning("--noise %g: metres; the markers are within %.3g m", noise, extent)
+    more = switches_from(sense or [])
+    with as_options({name: f"--{name}" for name in ("seed", *switches) if name not in more}):
+        spoilt = am.simulate.sense(known, **switches | more, seed=seed)
     unnamed = am.Tracks(
         detections=spoilt.detections, labels=np.full(spoilt.detections.n_points, -1)
     )

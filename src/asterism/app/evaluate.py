@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asterism.app.console import Json, console, print_json
+from asterism.app.console import Json, Quiet, console, print_json
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     import asterism as am
@@ -21,7 +22,13 @@ _ByFrame = Annotated[
 ]
 
 
-def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Json = False) -> None:
+def evaluate(
+    labels: _Labels,
+    truth: _Truth,
+    by_frame: _ByFrame = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
     """Score labels against the truth, detection by detection.
 
     Both files must hold the same detections, whatever their formats: those at the same time and
@@ -38,12 +45,17 @@ def evaluate(labels: _Labels, truth: _Truth, by_frame: _ByFrame = None, json: Js
     from asterism.app.files import check_outputs, read_labels
 
     check_outputs({"--by-frame": by_frame}, [labels, truth])
-    scores = am.evaluate(read_labels(labels), am.read_tracks(truth))
+    found, true = read_labels(labels), am.read_tracks(truth)
+    if not true.n_tracks:
+        expected = "a capture whose markers are labelled"
+        got = f"{truth}, which has no labels"
+        raise ParameterError("TRUTH", expected, got, "the truth is the second of the two files")
+    scores = am.evaluate(found, true)
     if by_frame is not None:
         _write_by_frame(scores, by_frame)
     if json:
         print_json(scores.to_dict())
-    else:
+    elif not quiet:
         console().print(str(scores), markup=False, soft_wrap=True)
 
 

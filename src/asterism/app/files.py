@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     import asterism as am
 
-__all__ = ["check_outputs", "read_labels", "read_model", "truth_of_each"]
+__all__ = ["check_outputs", "check_page", "read_labels", "read_model", "truth_of_each"]
 
 _MARKS_CLUTTER = ("c3d", "csv")  # as Asterism writes them
 
@@ -42,6 +42,12 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | No
         seen[identity] = f"which {option} names too"
         if not path.resolve().parent.is_dir():
             raise ParameterError(option, "a file in a folder that exists", path)
+
+
+def check_page(option: str, path: Path | None) -> None:
+    """Raise before any work if a report would be written under the name of something else."""
+    if path is not None and path.suffix.lower() not in (".html", ".htm"):
+        raise ParameterError(option, "a name ending in .html", str(path))
 
 
 def _identity(path: Path) -> object:

@@ -49,11 +49,11 @@ def fill(
 
     For example:
 
-        asterism fill trial.c3d -o filled.c3d
+        asterism fill trial.tracked.c3d -o filled.c3d
 
         asterism fill tracks.csv -o filled.csv --longest 0.5 --json
 
-        asterism fill trial.c3d -o filled.trc --unflagged
+        asterism fill trial.tracked.c3d -o filled.trc --unflagged
     """
     import asterism as am
     from asterism.app.files import check_outputs, read_model

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asterism.app.console import Json, print_json, print_table
+from asterism.app.console import Json, Quiet, print_json, print_table
 
 if TYPE_CHECKING:
     import asterism as am
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _File = Annotated[Path, typer.Argument(metavar="FILE", help="Capture to look at.")]
 
 
-def info(file: _File, json: Json = False) -> None:
+def info(file: _File, quiet: Quiet = False, json: Json = False) -> None:
     """Say what a capture holds, what is odd about it, and how hard its markers are to tell apart.
 
     For example:
@@ -30,7 +30,7 @@ def info(file: _File, json: Json = False) -> None:
     found = am.describe(am.read(file))
     if json:
         print_json(dataclasses.asdict(found))
-    else:
+    elif not quiet:
         print_table(_rows(found))
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 _Scene = Annotated[
-    str | None, typer.Argument(metavar="[SCENE]", help="Show the options of this one.")
+    str | None, typer.Argument(metavar="SCENE", help="Show the options of this one.")
 ]
 
 

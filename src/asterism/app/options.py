@@ -7,17 +7,18 @@ import inspect
 import re
 import types
 import typing
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Union
 
 from asterism.errors import ParameterError, check_fields
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Generator, Mapping, Sequence
 
     from asterism.associate import Method
 
-__all__ = ["Option", "method_options", "parsed", "scene_options"]
+__all__ = ["Option", "as_options", "method_options", "parsed", "scene_options"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +124,24 @@ def parsed(owner: str, texts: Sequence[str], known: dict[str, Option]) -> dict[s
         check_fields(f"option of {owner}", [name], known)
         values[name] = known[name].parse(value.strip())
     return values
+
+
+@contextmanager
+def as_options(names: Mapping[str, str]) -> Generator[None, None, None]:
+    """Let errors about arguments of the library name the options that these came from.
+
+    Parameters
+    ----------
+    names : mapping of str to str
+        The option by the argument; errors about others stay as they are.
+    """
+    try:
+        yield
+    except ParameterError as error:
+        if error.name not in names:
+            raise
+        told = error.expected, error.got, error.hint
+        raise ParameterError(names[error.name], *told) from error
 
 
 def _type_text(kind: Any) -> str:

@@ -46,13 +46,14 @@ def made_scene(
         If the scene or an option is unknown, or it has no number of markers to choose.
     """
     import asterism as am
-    from asterism.app.options import parsed, scene_options
+    from asterism.app.options import as_options, parsed, scene_options
 
     scenes = am.simulate.SCENES
     check_fields("scene", [name], scenes)
     known = scene_options(scenes[name].make)
     values = parsed(f"scene {name}", texts, known)
     given = {key: value for key, value in given.items() if value is not None}
+    options = {key: f"--{key}" for key in given}
     if "markers" in given:
         number = next((n for n in ("n_markers", "n_drones") if n in known), None)
         if number is None:
@@ -60,11 +61,13 @@ def made_scene(
                 "--markers", f"nothing: {name} has its own number", given["markers"]
             )
         given[number] = given.pop("markers")
+        options[number] = "--markers"
     for twice in values.keys() & given.keys():
         raise ParameterError(twice, "one value", f"{values[twice]} by --option and {given[twice]}")
     values |= given
     values.setdefault("seed", 0)
-    return scenes[name].make(**values), values
+    with as_options(options):
+        return scenes[name].make(**values), values
 
 
 def rig_from(text: str, points: Any) -> tuple[am.Rig, str]:

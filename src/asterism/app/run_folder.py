@@ -178,8 +178,8 @@ def sha256_of(path: Path) -> str:
         raise FormatError(path, "opening", "a readable file", error.strerror) from error
 
 
-def check_folder(path: Path, *, overwrite: bool) -> None:
-    """Raise unless a folder for results may be made or used.
+def check_folder(path: Path, *, overwrite: bool, option: str = "-o") -> None:
+    """Raise unless a folder for results, which an option names, may be made or used.
 
     Raises
     ------
@@ -187,10 +187,10 @@ def check_folder(path: Path, *, overwrite: bool) -> None:
         If it is there, holds anything and `overwrite` is false, or is not a folder.
     """
     if path.exists() and not path.is_dir():
-        raise ParameterError("folder", "a folder or a new name", f"the file {path}")
+        raise ParameterError(option, "a folder or a new name", f"the file {path}")
     if path.is_dir() and any(path.iterdir()) and not overwrite:
         raise ParameterError(
-            "folder", "a new or an empty folder", f"{path}, which holds files",
+            option, "a new or an empty folder", f"{path}, which holds files",
             "--overwrite replaces those of the same names",
         )  # fmt: skip
 

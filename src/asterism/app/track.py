@@ -122,13 +122,14 @@ def track(
         asterism track --from runs/first/run.toml -o again.c3d
     """
     import asterism as am
-    from asterism.app.files import check_outputs, read_model
+    from asterism.app.files import check_outputs, check_page, read_model
     from asterism.app.run_folder import FILES, Job, check_folder, sha256_of
     from asterism.app.tracking import carry_out, default_output, output_format
 
     check_outputs({"-o": out, "--report": report}, [source, model, repeat])
+    check_page("--report", report)
     if run is not None:
-        check_folder(run, overwrite=overwrite)
+        check_folder(run, overwrite=overwrite, option="--run")
     estimate: am.ModelEstimate | None = None
     if repeat is not None:
         settings = {"--method": method, "--option": option, "--model": model, "--seed": seed,
@@ -210,7 +211,7 @@ def resolved_method(name: str, texts: list[str]) -> tuple[str, dict[str, Any]]:
     from asterism.app.options import method_options, parsed
     from asterism.errors import check_fields
 
-    check_fields("method", [name], am.METHODS)
+    check_fields("--method", [name], am.METHODS)
     known = method_options(am.METHODS[name])
     given = parsed(f"method {name}", texts, known)
     made = am.method_by_name(name, **given)

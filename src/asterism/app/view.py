@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from asterism.app.console import Quiet, print_table
+from asterism.app.console import Json, Quiet, print_json, print_table
 
 _Tracked = Annotated[Path, typer.Argument(metavar="TRACKED", help="File with tracks.")]
 _Rig = Annotated[
@@ -20,10 +20,16 @@ _Save = Annotated[
 ]
 
 
-def view(tracked: _Tracked, rig: _Rig = None, save: _Save = None, quiet: Quiet = False) -> None:
-    """Look at tracks in space and time: turn, zoom, play, choose what is shown.
+def view(
+    tracked: _Tracked,
+    rig: _Rig = None,
+    save: _Save = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    r"""Look at tracks in space and time: turn, zoom, play, choose what is shown.
 
-    Needs Rerun: pip install 'asterism[view]'. The viewer listens to this machine alone, and its
+    Needs Rerun: pip install 'asterism\[view]'. The viewer listens to this machine alone, and its
     usage statistics are switched off.
 
     For example:
@@ -47,5 +53,7 @@ def view(tracked: _Tracked, rig: _Rig = None, save: _Save = None, quiet: Quiet =
             raise ParameterError("--rig", "tracks in 3-D", f"{tracked}, in 2-D")
         cameras, _ = rig_from(rig, tracks.detections.points)
     am.view(tracks, rig=cameras, path=save)
-    if save is not None and not quiet:
+    if json:
+        print_json({"input": str(tracked), "output": None if save is None else str(save)})
+    elif save is not None and not quiet:
         print_table([("written", save)])

@@ -16,7 +16,7 @@ import numpy as np
 from asterism.associate.gnn import GNN
 from asterism.associate.mcmcda import MCMCDA
 from asterism.associate.smp import SMP
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_kind
 from asterism.model import Detections, RandomWalk, TrackingModel, Tracks
 
 if TYPE_CHECKING:
@@ -112,8 +112,7 @@ def choose_method(
     >>> choice.method.name, choice.stitch
     ('smp', True)
     """
-    if not isinstance(detections, Detections):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("detections", "Detections", type(detections).__name__)
+    check_kind("detections", detections, Detections)
     if not isinstance(model, TrackingModel):  # pyright: ignore[reportUnnecessaryIsInstance]
         hint = "try estimate_model(detections).model"
         raise ParameterError("model", "a TrackingModel", type(model).__name__, hint)

@@ -15,7 +15,8 @@ from asterism.associate.method import (
     checked_frame,
     refuse_start,
 )
-from asterism.errors import ParameterError, SolverLimit
+from asterism.errors import ParameterError, SolverLimit, check_kind
+from asterism.model import TrackingModel
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from asterism import _engine
-    from asterism.model import Detections, TrackingModel
+    from asterism.model import Detections
 
     Tracker = (
         _engine.FrameTracker
@@ -117,6 +118,7 @@ class EngineMethod(Method[EngineState]):
         """Make the state before the first frame; see `Method.init`."""
         if n_axes not in (2, 3):
             raise ParameterError("n_axes", "2 or 3", repr(n_axes))
+        check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
         tracker = self._tracker(model, n_axes, seed)
         return EngineState(model=model, n_axes=n_axes, tracker=tracker, about=self._about)
 

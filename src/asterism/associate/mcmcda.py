@@ -54,7 +54,8 @@ class MCMCDA(EngineMethod):
         detection.
     moves : float or None
         Moves in a frame, for each of its detections (or each track, if these are more) that is in
-        doubt; None with a `deadline` alone.
+        doubt; None with a `deadline` alone. Tracks begin by moves alone, so 0 is only for labels to
+        start from: it leaves them as they are, and says how sure they are.
     deadline : float or None
         Seconds after the arrival of a frame at which the walk stops; then results depend on the
         machine, and ``info["moves"]`` says how far it came.
@@ -261,6 +262,7 @@ class MCMCDA(EngineMethod):
         """Take the next frame; see `Method.step`."""
         if self.window is None:
             raise ParameterError("window", "a number of frames", "None", "a stream has no end")
+        self._refuse_to_stand(state, None)
         return super().step(state, time, points, covariances=covariances)
 
     def run(
@@ -272,6 +274,7 @@ class MCMCDA(EngineMethod):
         start: NDArray[np.int64] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; see `Method.run`."""
+        self._refuse_to_stand(state, start)
         tracker = _own_copy(state)
         if start is not None:
             tracker.start_from(np.ascontiguousarray(start, dtype=np.int64))
@@ -298,6 +301,12 @@ class MCMCDA(EngineMethod):
         tell(1.0)
         state = replace(state, tracker=tracker)
         return state, labels[n_before:], None if sure is None else confidence[n_before:]
+
+    def _refuse_to_stand(self, state: EngineState, start: object) -> None:
+        """Raise where no track could ever begin, neither by a move nor with a label."""
+        if self.moves == 0 and start is None and state.n_seen == 0:
+            hint = "tracks begin by moves alone; gnn pairs frame by frame without any"
+            raise ParameterError("moves", "a number > 0, or labels to start from", "0", hint)
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
         chain = stats.chain

@@ -10,6 +10,7 @@ What this file is not: a fit to truth. Names in the capture are never looked at.
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
@@ -29,7 +30,7 @@ from asterism.associate.motion_fit import (
     polish,
 )
 from asterism.associate.open_population import draw_rates
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_kind
 from asterism.model import (
     DWNA,
     Detections,
@@ -48,6 +49,10 @@ if TYPE_CHECKING:
 
 __all__ = ["ModelEstimate", "estimate_model"]
 
+log = logging.getLogger(__name__)
+
+LARGEST = 100.0
+"""Metres from the middle of a capture to its points, beyond which these are hardly metres."""
 SAMPLE_POINTS = 60_000
 """Longer captures are read in pieces, spread evenly, of so many detections in all."""
 N_PIECES = 8
@@ -87,6 +92,10 @@ def estimate_model(
     -------
     ModelEstimate
 
+    Warns
+    -----
+    In the log, where the points lie so far apart that they are hardly metres.
+
     Raises
     ------
     ParameterError
@@ -94,6 +103,7 @@ def estimate_model(
     """
     if population not in ("closed", "open"):
         raise ParameterError("population", "'closed' or 'open'", repr(population))
+    check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     detections = detections.measured()
     if detections.n_frames < 3 or detections.n_points < 3:
         raise ParameterError(
@@ -102,6 +112,7 @@ def estimate_model(
             f"{detections.n_frames} frames with {detections.n_points} points",
             "give a model",
         )
+    _doubt_units(detections)
     pieces = list(_pieces(detections))
     scales = first_scales(pieces)
     region = Region.of(detections)
@@ -170,6 +181,18 @@ def estimate_model(
         events=(mean.births, mean.deaths) if population == "open" else None,
     )  # fmt: skip
     return ModelEstimate(model=model, reasons=reasons, stds=stds)
+
+
+def _doubt_units(detections: Detections) -> None:
+    """Say so where a tenth of the points is too far from the middle for a volume in metres."""
+    points = detections.points[:: 1 + detections.n_points // SAMPLE_POINTS]
+    spread = np.abs(points - np.median(points, axis=0)).max(axis=1)
+    far = float(np.quantile(spread, 0.9))
+    if far > LARGEST:
+        log.warning(
+            "a tenth of the points is more than %.3g m from their middle: "
+            "if these are millimetres, divide them by 1000", far,
+        )  # fmt: skip
 
 
 def _pieces(detections: Detections) -> Iterator[Detections]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from asterism.associate.method import Method
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_kind
 from asterism.model import Detections, TrackingModel, Tracks
 from asterism.model.posterior import log_posterior
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["checked", "track_with"]
+__all__ = ["check_method", "track_with"]
 
 
 def track_with(
@@ -54,7 +54,7 @@ def track_with(
     ParameterError
         If an argument has the wrong type.
     """
-    checked("method", method, Method, "GNN()")
+    check_method(method)
     if start is not None:
         labels = _labels_of(start, detections)
         if detections.filled is not None:
@@ -72,14 +72,13 @@ def track_with(
     return tracks
 
 
-def checked(name: str, value: object, kind: type, hint: str) -> None:
-    """Raise `ParameterError` unless a value is of its type."""
-    if not isinstance(value, kind):
-        raise ParameterError(name, f"{kind.__name__} (try {hint})", type(value).__name__)
+def check_method(method: object) -> None:
+    """Raise `ParameterError` unless it is a method; a name and a class are the usual mistakes."""
+    check_kind("method", method, Method, 'am.GNN(), or am.method_by_name("gnn")')
 
 
 def _labels_of(start: Tracks, detections: Detections) -> NDArray[np.int64]:
-    checked("start", start, Tracks, "a Capture's tracks")
+    check_kind("start", start, Tracks, "am.Tracks(detections=…, labels=…)")
     if len(start.labels) != detections.n_points:
         raise ParameterError(
             "start", f"labels of the same {detections.n_points} detections", len(start.labels)

@@ -50,6 +50,11 @@ class WithBodies(FrameByFrame):
             "max_carried", self.max_carried, above=1, below=100_000, closed=True, integer=True
         )
         check_number("bond_weight", self.bond_weight, above=0, below=100, closed=True)
+        for name in ("max_carried", "bond_weight"):
+            usual, given = getattr(WithBodies, name), getattr(self, name)
+            if not self.bodies and given != usual:
+                hint = "it has no effect without bodies"
+                raise ParameterError(name, "bodies=True beside it", f"{given} alone", hint)
 
     def _carry(self) -> _engine.CarryOptions:
         """Make the engine's options."""

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_number
+from asterism.errors import ParameterError, check_kind, check_number
 from asterism.evaluate.matching import same_detections, same_frames
+from asterism.model import Tracks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from asterism.model import Tracks
 
 __all__ = ["Alignment", "align", "marker_labels"]
 
@@ -71,6 +70,8 @@ def align(tracks: Tracks, truth: Tracks, *, tolerance: float = 1e-6) -> Alignmen
         If fewer than half of the detections of either side are found on the other.
     """
     check_number("tolerance", tolerance, above=0, closed=True)
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    check_kind("truth", truth, Tracks, "am.read_tracks(path)")
     a, b = tracks.detections, truth.detections
     i_a, i_b = same_detections(a, b, tolerance)
     for n in (a.n_points, b.n_points):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from asterism.errors import check_number
+from asterism.errors import check_kind, check_number
 from asterism.evaluate.alignment import marker_labels
 from asterism.evaluate.counts import successions
 from asterism.model import Tracks
@@ -44,6 +44,7 @@ def floor(truth: Tracks, max_gap: int) -> Tracks:
     (array([0, 0, 1, 1]), array([0, 0, 0, 0]))
     """
     check_number("max_gap", max_gap, above=1, closed=True, integer=True)
+    check_kind("truth", truth, Tracks)
     frame_of = truth.detections.frame_of
     before, after = successions(marker_labels(truth))
     is_short = frame_of[after] - frame_of[before] <= max_gap

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from asterism.errors import ParameterError, check_array, check_number
+from asterism.errors import ParameterError, check_array, check_kind, check_number
+from asterism.model import Detections, Tracks
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-    from asterism.model import Detections, Tracks
 
 __all__ = ["PointScores", "point_scores"]
 
@@ -100,6 +99,8 @@ def point_scores(
     Video Processing (2008).
     """
     check_number("radius", radius, above=0)
+    check_kind("points", points, Detections)
+    check_kind("truth", truth, Tracks)
     if points.n_frames != truth.detections.n_frames or points.n_axes != truth.detections.n_axes:
         expected = f"{points.n_frames} frames, {points.n_axes}-D, as the points have"
         got = f"{truth.detections.n_frames} frames, {truth.detections.n_axes}-D"

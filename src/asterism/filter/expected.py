@@ -37,8 +37,8 @@ def expected_places(tracks: Tracks, model: TrackingModel, *, coast: int = 5) -> 
         Of the same frames: in each the places of the tracks that began before it, by track, with
         covariances (m², the same on every axis). Of several motions the middle one leads.
     """
-    d = tracks.detections
     states = filter_states(tracks, model)
+    d = tracks.detections
     kind, F, Q = steps_of(model.motion, d.times)
     H = model.motion.modes[0].observation
     middle = len(model.motion.modes) // 2

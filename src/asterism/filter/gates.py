@@ -82,8 +82,8 @@ def gate_groups(
     from scipy.special import chdtri
 
     check_number("gate_probability", gate_probability, above=0, below=1)
-    d = tracks.detections
     states = filter_states(tracks, model)
+    d = tracks.detections
     gate = float(chdtri(d.n_axes, gate_probability))
     h = model.motion.modes[0].observation
     noise = model.sensor.noise_sigma**2

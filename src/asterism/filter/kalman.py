@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism import _engine
+from asterism.errors import check_kind
+from asterism.model import TrackingModel, Tracks
 from asterism.model.compiled import motion_model, steps_of, with_noise
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from asterism.model import TrackingModel, Tracks
 
 __all__ = ["States", "filter_states", "smooth"]
 
@@ -57,6 +57,8 @@ class States:
 
 
 def _states(tracks: Tracks, model: TrackingModel, *, smoothed: bool) -> States:
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     d = tracks.detections
     order, offsets = tracks.by_track
     frames = d.frame_of[order]

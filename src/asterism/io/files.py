@@ -6,15 +6,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from asterism.errors import FormatError, ParameterError
+from asterism.errors import FormatError, ParameterError, check_kind
 from asterism.io.atomic import replacing
 from asterism.io.formats import FORMATS, Format
-from asterism.model import Capture
+from asterism.model import Capture, Tracks
 
 if TYPE_CHECKING:
     from collections.abc import Generator
-
-    from asterism.model import Tracks
 
 __all__ = ["read", "read_tracks", "write"]
 
@@ -113,6 +111,7 @@ def write(
     FormatError
         If the file cannot be written, or its source cannot be read again.
     """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
     path = Path(path)
     known = [f for f in FORMATS.values() if f.write is not None]
     if format is None:
@@ -174,7 +173,8 @@ def _find(path: Path, asked: Format | None) -> Format:
         if candidate.sniff(head):
             return candidate
     names = ", ".join(f"{f.name} ({f.description})" for f in candidates)
-    raise FormatError(path, "its first bytes", f"one of: {names}", repr(head[:40]))
+    got = repr(head[:40]) if head else "an empty file"
+    raise FormatError(path, "its first bytes", f"one of: {names}", got)
 
 
 @contextmanager

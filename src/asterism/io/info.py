@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.errors import check_kind
+from asterism.model import Capture
+
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
-
-    from asterism.model import Capture
 
 __all__ = ["CaptureInfo", "describe"]
 
@@ -111,6 +112,7 @@ def describe(capture: Capture) -> CaptureInfo:
     pieces of trajectory, which end where following them was hard: they look easier than they are.
     In captures of more than 10 000 frames the neighbours are those of an even sample of frames.
     """
+    check_kind("capture", capture, Capture, "am.read(path)")
     named = np.array([name is not None for name in capture.names], dtype=bool)
     is_named = np.zeros(capture.n_points, dtype=bool)
     has_label = capture.labels >= 0

@@ -97,7 +97,7 @@ def read_observations(path: str | Path) -> Observations:
     header = cells_of(lines[0])
     missing = [name for name in _COLUMNS[:-1] if name not in header]
     if missing or len(set(header)) < len(header) or not set(header) <= set(_COLUMNS):
-        got = ", ".join(header)[:200]
+        got = repr(", ".join(header)[:60])
         raise FormatError(path, "line 1", f"the columns {', '.join(_COLUMNS)}", got)
     numbers, texts = columns_of(path, lines, header, _TEXTS)
     try:

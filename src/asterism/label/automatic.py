@@ -9,7 +9,8 @@ import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from asterism.associate import Method, choose_method, estimate_model
-from asterism.associate.track import checked, track_with
+from asterism.associate.track import check_method, track_with
+from asterism.errors import check_kind
 from asterism.label.identify import fragment_model
 from asterism.label.stitching import stitch
 from asterism.model import Detections, TrackingModel, Tracks
@@ -70,10 +71,12 @@ def track(
     >>> tracks.info["chosen"]
     'smp, window=3, then stitched: 8 of 8 markers keep their distance to another: bodies'
     """
-    checked("detections", detections, Detections, "tracks.detections, or Detections.from_frames")
+    check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
+    if method is not None:
+        check_method(method)  # before the model is estimated, which takes its time
     if model is None:
         model = estimate_model(detections).model
-    checked("model", model, TrackingModel, "estimate_model(detections).model")
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     more: dict[str, Any] = {"seed": seed, "start": start, "progress": progress}
     if method is not None:
         return track_with(method, detections, model, **more)

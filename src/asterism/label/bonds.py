@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError, check_number, keep_array
+from asterism.errors import FormatError, ParameterError, check_kind, check_number, keep_array
 from asterism.label.distances import distances_between
 from asterism.model import Tracks
 from asterism.model.toml_file import read_toml, write_toml
@@ -198,8 +198,7 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = 20) -> Bon
     >>> am.learn_bonds(am.simulate.person(seed=1))  # doctest: +ELLIPSIS
     Bonds(53 markers, ... pairs, ... rigid, ... clusters)
     """
-    if not isinstance(tracks, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("tracks", "Tracks", type(tracks).__name__, "try am.track(detections)")
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_number("neighbours", neighbours, above=1, below=1000, closed=True, integer=True)
     check_number("least", least, above=2, below=1e6, closed=True, integer=True)
     tracks = tracks.measured()

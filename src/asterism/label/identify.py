@@ -6,7 +6,8 @@ import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from asterism.associate import SMP, Method, estimate_model
-from asterism.associate.track import checked, track_with
+from asterism.associate.track import check_method, track_with
+from asterism.errors import check_kind
 from asterism.label.stitching import Stitching, stitch
 from asterism.model import Detections, TrackingModel
 
@@ -74,11 +75,12 @@ def identify(
     >>> am.evaluate(markers.tracks, hidden).idf1 > 0.99
     True
     """
-    checked("detections", detections, Detections, "tracks.detections, or Detections.from_frames")
+    check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     method = SMP(window=3) if method is None else method
+    check_method(method)  # before the model is estimated, which takes its time
     if model is None:
         model = estimate_model(detections).model
-    checked("model", model, TrackingModel, "estimate_model(detections).model")
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     model = fragment_model(model)
     fragments = track_with(method, detections, model, seed=seed, progress=progress)
     return stitch(

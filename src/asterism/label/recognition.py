@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_kind
 from asterism.label.bonds import BEND, MOST_FRAMES, Bonds
 from asterism.label.distances import distances_between
 from asterism.model import Tracks
@@ -98,10 +98,8 @@ def recognize(tracks: Tracks, bonds: Bonds) -> Recognition:
     units of s: what it varied by in both takes and what a marker moves when it is stuck on anew.
     It is bounded, so that one wrong distance is outvoted.
     """
-    if not isinstance(tracks, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("tracks", "Tracks", type(tracks).__name__, "try am.identify(points)")
-    if not isinstance(bonds, Bonds):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("bonds", "Bonds", type(bonds).__name__, "try am.learn_bonds(tracks)")
+    check_kind("tracks", tracks, Tracks, "am.identify(detections).tracks")
+    check_kind("bonds", bonds, Bonds, "am.learn_bonds(tracks)")
     if tracks.detections.n_axes != bonds.places.shape[1]:
         expected = f"{bonds.places.shape[1]} axes, as the bonds have"
         raise ParameterError("tracks", expected, tracks.detections.n_axes)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from asterism import _engine
 from asterism.associate import SMP, Method, Update
 from asterism.associate.method import MethodState, checked_frame
-from asterism.errors import ParameterError, check_number
+from asterism.errors import check_kind, check_number
 from asterism.label.identify import fragment_model
 from asterism.label.stitching import check_options, stitch_options
 from asterism.model.compiled import motion_model, no_transition, transition
@@ -113,8 +113,7 @@ class Stitched(Method[StitchedState]):
     lag: int | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.method, Method):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise ParameterError("method", "a Method (try SMP(window=3))", self.method)
+        check_kind("method", self.method, Method, "am.SMP(window=3)")
         check_options(self.confirm, self.ghost_radius, self.max_hidden)
         if self.lag is not None:
             check_number("lag", self.lag, above=0, below=10_000, closed=True, integer=True)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism import _engine
-from asterism.errors import ParameterError, check_number
+from asterism.errors import ParameterError, check_kind, check_number
 from asterism.label.bonds import Bonds, learn_bonds
 from asterism.label.passes import go_through
 from asterism.model import TrackingModel, Tracks
@@ -176,8 +176,7 @@ def stitch(
     >>> am.stitch(pieces, model)  # doctest: +ELLIPSIS
     Stitching(... tracks, ... joins, ... cuts, ... ghosts)
     """
-    if not isinstance(tracks, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("tracks", "Tracks", type(tracks).__name__, "try am.track(detections)")
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
     if not isinstance(model, TrackingModel):  # pyright: ignore[reportUnnecessaryIsInstance]
         hint = "try am.estimate_model(detections).model"
         raise ParameterError("model", "a TrackingModel", type(model).__name__, hint)

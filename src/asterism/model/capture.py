@@ -18,8 +18,13 @@ if TYPE_CHECKING:
 __all__ = ["Capture"]
 
 
-def _no_channels() -> NDArray[np.int64]:
-    return np.empty(0, dtype=np.int64)
+_UNKNOWN = np.empty(0, dtype=np.int64)
+_UNKNOWN.flags.writeable = False
+
+
+def _unknown() -> NDArray[np.int64]:
+    """Stand for -1 throughout, until the number of points is known."""
+    return _UNKNOWN
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -37,12 +42,14 @@ class Capture(Detections):
     first_frame : int
         The file's number of its first frame.
     units : str
-        The unit of length in the file, "mm" or "m"; `points` are metres whatever it is.
+        The unit of length in the file, "mm" say; `points` are metres whatever it is.
     channels : array_like of int, shape (N,)
-        The file's own channel (column, trajectory) of each detection, -1 where there is none.
+        The file's own channel (column, trajectory) of each detection, -1 where there is none; -1
+        throughout unless given.
     labels : array_like of int, shape (N,)
         The file's own identities: one for each named channel and one for each unbroken piece of
-        an unnamed channel, because recorders reuse those for other markers; -1 where none.
+        an unnamed channel, because recorders reuse those for other markers; -1 where none, and
+        throughout unless given.
     names : tuple of str or None
         Name of each identity, None where it has none.
     modelled : tuple of str
@@ -53,6 +60,13 @@ class Capture(Detections):
     See Also
     --------
     asterism.read : makes one.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> capture = Capture.from_frames([0.0, 0.01], [[[0, 0, 0], [1, 0, 0]], [[0, 0, 0]]])
+    >>> replace(capture, path=Path("arena.dots"), format="dots", units="cm")
+    Capture('arena.dots', 2 frames, 3 points, 3-D, 0 to 0.01 s, 0 named)
     """
 
     path: Path = field(default_factory=Path)
@@ -60,8 +74,8 @@ class Capture(Detections):
     rate: float = 0.0
     first_frame: int = 1
     units: str = "m"
-    channels: NDArray[np.int64] = field(default_factory=_no_channels)
-    labels: NDArray[np.int64] = field(default_factory=_no_channels)
+    channels: NDArray[np.int64] = field(default_factory=_unknown)
+    labels: NDArray[np.int64] = field(default_factory=_unknown)
     names: tuple[str | None, ...] = ()
     modelled: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -71,7 +85,10 @@ class Capture(Detections):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("channels", "labels"):
-            array = keep_array(name, getattr(self, name), (self.n_points,), dtype=np.int64)
+            given = getattr(self, name)
+            if given is _UNKNOWN:
+                given = np.full(self.n_points, -1)
+            array = keep_array(name, given, (self.n_points,), dtype=np.int64)
             object.__setattr__(self, name, array)
 
     @property

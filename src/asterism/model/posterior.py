@@ -15,14 +15,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from asterism import _engine
+from asterism.errors import check_kind
 from asterism.model.compiled import motion_model, score_model, steps_of, with_noise
+from asterism.model.tracking_model import TrackingModel
+from asterism.model.tracks import Tracks
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-    from asterism.model.tracking_model import TrackingModel
-    from asterism.model.tracks import Tracks
 
 __all__ = ["log_posterior", "track_scores"]
 
@@ -42,6 +42,8 @@ def track_scores(tracks: Tracks, model: TrackingModel) -> NDArray[np.float64]:
     ndarray, shape (K,)
         -inf for a track that the model forbids; 0 for one without any detection.
     """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     d = tracks.detections
     order, offsets = tracks.by_track
     kind, F, Q = steps_of(model.motion, d.times)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from asterism.errors import ParameterError, keep_array
+from asterism.errors import ParameterError, check_kind, keep_array
 from asterism.model.detections import Detections
 
 if TYPE_CHECKING:
@@ -67,6 +67,9 @@ class Tracks:
     info: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __post_init__(self) -> None:
+        check_kind(
+            "detections", self.detections, Detections, "am.Detections.from_frames, or am.read"
+        )
         n = self.detections.n_points
         labels = keep_array("labels", self.labels, (n,), dtype=np.int64)
         if labels.size and not -1 <= labels.min() <= labels.max() < MOST_TRACKS:

@@ -8,7 +8,7 @@ import numpy as np
 
 from asterism import _engine
 from asterism.camera import Observations, Rig
-from asterism.errors import ParameterError, check_number
+from asterism.errors import ParameterError, check_kind, check_number
 from asterism.model import Detections
 from asterism.model.compiled import with_noise
 from asterism.model.detections import FARTHEST
@@ -163,10 +163,8 @@ def matched_rig(observations: Observations, rig: Rig) -> tuple[Rig, NDArray[np.i
     ParameterError
         If one is not in the rig, or there are under two.
     """
-    if not isinstance(observations, Observations):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("observations", "Observations", type(observations).__name__)
-    if not isinstance(rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("rig", "a Rig", type(rig).__name__)
+    check_kind("observations", observations, Observations, "am.read_observations(path)")
+    check_kind("rig", rig, Rig, "am.read_rig(path)")
     names = observations.cameras
     unknown = [name for name in names if name not in rig.names]
     if unknown:
@@ -212,8 +210,7 @@ def _expected(prior: Detections | None, observations: Observations) -> Detection
             points=np.empty((0, 3)),
             covariances=np.empty((0, 3, 3)),
         )
-    if not isinstance(prior, Detections):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("prior", "Detections", type(prior).__name__)
+    check_kind("prior", prior, Detections, "am.expected_places(tracks, model)")
     if prior.n_axes != 3:
         raise ParameterError("prior", "places in 3-D", f"{prior.n_axes}-D ones")
     if not np.array_equal(prior.times, observations.times):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import ParameterError, check_array
+from asterism.errors import ParameterError, check_array, check_kind
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -136,8 +136,7 @@ def per_camera(
 
 
 def _checked(rig: Rig) -> Rig:
-    if not isinstance(rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("rig", "a Rig", type(rig).__name__)
+    check_kind("rig", rig, Rig, "am.read_rig(path)")
     return rig
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_kind
 from asterism.io.atomic import replacing
 from asterism.model import Capture, Tracks
 from asterism.reporting.connections import connections_of
@@ -81,15 +81,16 @@ def report(
     >>> truth = am.simulate.cube(seed=1)
     >>> am.report(am.track(truth.detections), "cube.html", truth=truth)  # doctest: +SKIP
     """
-    if not isinstance(tracks, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("tracks", "Tracks", type(tracks).__name__, "try am.track(detections)")
-    if truth is not None and not isinstance(truth, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("truth", "Tracks or None", type(truth).__name__)
-    if rig is not None and not isinstance(rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("rig", "a Rig or None", type(rig).__name__)
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    if truth is not None:
+        check_kind("truth", truth, Tracks)
+    if rig is not None:
+        check_kind("rig", rig, Rig, "am.read_rig(path)")
     if up not in ("x", "y", "z", None):
         raise ParameterError("up", "x, y, z or None", repr(up))
     d, path = tracks.detections, Path(path)
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise ParameterError("path", "a name ending in .html", repr(path.name))
     if rig is not None and d.n_axes != 3:
         raise ParameterError("rig", "tracks in space to look at", f"{d.n_axes}-D tracks")
     if isinstance(d, Capture) and not overwrite_input and path.resolve() == d.path.resolve():

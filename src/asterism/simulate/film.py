@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Observations, Rig
-from asterism.errors import ParameterError, check_number
+from asterism.errors import ParameterError, check_kind, check_number
 from asterism.model import Tracks
-from asterism.simulate.seeing import Blobs, see
+from asterism.simulate.seeing import Blobs, Seeing, see
 from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism.camera import Projection, Surface
-    from asterism.simulate.seeing import Seeing
 
 __all__ = ["Film", "film"]
 
@@ -89,14 +88,14 @@ def film(
     >>> film(scene, rig, seeing=am.simulate.Seeing(missing=0.1), seed=1).observations
     Observations(4 cameras, 10 frames, 293 points)
     """
-    if not isinstance(truth, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("truth", "Tracks", type(truth).__name__)
-    if not isinstance(rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("rig", "a Rig", type(rig).__name__)
+    check_kind("truth", truth, Tracks)
+    check_kind("rig", rig, Rig, "am.read_rig(path)")
     detections = truth.detections
     if detections.n_axes != 3:
         raise ParameterError("truth", "3-D detections", f"{detections.n_axes}-D ones")
     check_number("seed", seed, above=0, closed=True, integer=True)
+    if seeing is not None:
+        check_kind("seeing", seeing, Seeing)
     if surfaces is None:
         surfaces = truth.surfaces if isinstance(truth, Truth) else ()
     positions = truth.positions()

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import ParameterError, check_number
+from asterism.errors import ParameterError, check_kind, check_number
 from asterism.model import Capture, Detections, Tracks
 from asterism.simulate.episodes import Burst, Ghosts, Visits
 from asterism.simulate.false import anywhere, beside, haunting
@@ -25,7 +25,6 @@ from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
 
 __all__ = ["sense"]
 
@@ -206,8 +205,7 @@ def sense(
 
 
 def _check(truth: Tracks, switches: dict[str, Any]) -> None:
-    if not isinstance(truth, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("truth", "Tracks", type(truth).__name__)
+    check_kind("truth", truth, Tracks)
     for name, kind in (("burst", Burst), ("visits", Visits), ("ghosts", Ghosts), ("rig", Rig)):
         if not isinstance(switches[name], (kind, type(None))):
             got = type(switches[name]).__name__

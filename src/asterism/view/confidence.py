@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_kind
+from asterism.model import Tracks
 from asterism.view.coverage import draw_bar
-from asterism.view.rows import axes_for, frame_rows, rows_of, strip_above
+from asterism.view.rows import axes_for, frame_rows, legend_above, rows_of, strip_above
 from asterism.view.style import CLUTTER, CYCLE, GRADIENT, GRID, INK, new_axes, tidy
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism.evaluate import Calibration
-    from asterism.model import Tracks
 
 __all__ = ["plot_confidence", "plot_reliability"]
 
@@ -45,6 +45,7 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
     ParameterError
         If the tracks have no confidence.
     """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
     if tracks.confidence is None:
         hint = "jpda, mht and mcmcda say how sure they are; of the files a CSV keeps it"
         raise ParameterError("tracks", "tracks with a confidence", "none", hint)
@@ -67,7 +68,8 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
             axes.axhline(edge, color="white", linewidth=2.0)
     frame_rows(axes, tracks, rows)
     axes.grid(visible=False)
-    above = strip_above(axes)
+    told = f"mean confidence {sure.mean():.3f}" if len(sure) else "no labels"
+    above = strip_above(axes, told)
     n = np.bincount(frame, minlength=d.n_frames)
     total = np.bincount(frame, weights=sure, minlength=d.n_frames)
     mean = np.divide(total, n, out=np.full(d.n_frames, np.nan), where=n > 0)
@@ -77,12 +79,7 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
     above.plot(d.times, least, color=CYCLE[1], linewidth=0.8, label="least")
     above.plot(d.times, mean, color=CYCLE[0], linewidth=1.2, label="mean")
     above.set_ylim(-0.03, 1.05)
-    above.legend(
-        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8,
-        labelcolor=INK, handlelength=1.2,
-    )  # fmt: skip
-    told = f"mean confidence {sure.mean():.3f}" if len(sure) else "no labels"
-    above.set_title(told, fontsize=11, color=INK, loc="left")
+    legend_above(above)
     return axes
 
 

@@ -59,6 +59,7 @@ def figure_bytes(picture: Figure | Axes | Sequence[Axes], ending: str) -> bytes:
     check_fields("ending", [ending], ENDINGS)
     first: Any = picture[0] if isinstance(picture, (list, tuple)) else picture
     figure = getattr(first, "figure", first)
+    figure = getattr(figure, "figure", figure)  # of a part of a figure the whole
     file = io.BytesIO()
     with matplotlib.rc_context(_OPTIONS):
         figure.savefig(file, format=ending, metadata=_METADATA[ending])

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asterism.errors import check_kind
+from asterism.model import Tracks
 from asterism.view.style import CLUTTER, CYCLE, GRID, INK, given_axes, new_panels, tidy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
-
-    from asterism.model import Tracks
 
 __all__ = ["plot_axes"]
 
@@ -41,6 +41,7 @@ def plot_axes(tracks: Tracks, ax: Sequence[Axes] | None = None) -> list[Axes]:
     ParameterError
         If there are not as many axes as coordinates.
     """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
     d = tracks.detections
     D = d.n_axes
     if ax is None:

@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError
-from asterism.view.rows import axes_for, frame_rows, rows_of, strip_above
+from asterism.errors import ParameterError, check_kind
+from asterism.model import Tracks
+from asterism.view.rows import axes_for, frame_rows, legend_above, rows_of, strip_above
 from asterism.view.style import CLUTTER, CYCLE, INK, MISSED, RIGHT, WRONG
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-    from asterism.model import Tracks
 
 __all__ = ["plot_errors", "plot_presence"]
 
@@ -40,11 +39,9 @@ def plot_presence(tracks: Tracks, ax: Axes | None = None) -> Axes:
     order, _ = tracks.by_track
     colours = np.array(CYCLE, dtype=object)[tracks.labels[order] % len(CYCLE)]
     _draw_bars(axes, tracks, rows, colours)
-    above = strip_above(axes)
+    above = strip_above(axes, f"{len(np.unique(tracks.labels[order]))} tracks over time")
     _draw_counts(above, tracks, tracks.labels < 0, CLUTTER)
     above.set_ylabel("clutter", fontsize=8, color=INK)
-    n_seen = len(np.unique(tracks.labels[order]))
-    above.set_title(f"{n_seen} tracks over time", fontsize=11, color=INK, loc="left")
     return axes
 
 
@@ -73,13 +70,15 @@ def plot_errors(tracks: Tracks, truth: Tracks, ax: Axes | None = None) -> Axes:
     ParameterError
         If the detections of the two are not the same.
     """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    check_kind("truth", truth, Tracks)
     a, b = tracks.detections, truth.detections
     if a is not b and not (
         np.array_equal(a.offsets, b.offsets) and np.array_equal(a.points, b.points)
     ):
         raise ParameterError(
             "truth", f"labels of the same {a.n_points} detections", f"{b.n_points} others",
-            "asterism.evaluate.align finds the same detections in two captures",
+            "am.align finds the same detections in two captures",
         )  # fmt: skip
     marker_of = _commonest_marker(tracks, truth)
     is_labelled = tracks.labels >= 0
@@ -91,19 +90,15 @@ def plot_errors(tracks: Tracks, truth: Tracks, ax: Axes | None = None) -> Axes:
     axes = ax if ax is not None else axes_for(rows)
     order, _ = tracks.by_track
     _draw_bars(axes, tracks, rows, np.where(is_right[order], RIGHT, WRONG).astype(object))
-    above = strip_above(axes)
     is_wrong = is_labelled & ~is_right
+    share = 100 * is_wrong.sum() / max(int(is_labelled.sum()), 1)
+    above = strip_above(axes, f"{share:.2g} % of the labels wrong")
     is_missed = ~is_labelled & (truth.labels >= 0)
     _draw_counts(above, tracks, is_wrong | is_missed, MISSED, "no label")
     _draw_counts(above, tracks, is_wrong, WRONG, "wrong marker")
     above.plot([], [], color=RIGHT, linewidth=4, label="right marker")
-    above.legend(
-        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, fontsize=8,
-        labelcolor=INK, handlelength=1.2,
-    )  # fmt: skip
+    legend_above(above)
     above.set_ylabel("errors", fontsize=8, color=INK)
-    share = 100 * is_wrong.sum() / max(int(is_labelled.sum()), 1)
-    above.set_title(f"{share:.2g} % of the labels wrong", fontsize=11, color=INK, loc="left")
     return axes
 
 

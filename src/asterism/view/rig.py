@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_number
+from asterism.camera import Rig
+from asterism.errors import ParameterError, check_kind, check_number
 from asterism.view.coverage import counts_map, draw_bar, whole_ticks
 from asterism.view.outlines import outlines
 from asterism.view.space import to_scale
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
-    from asterism.camera import Camera, Coverage, Rig, Surface
+    from asterism.camera import Camera, Coverage, Surface
 
 __all__ = ["plot_rig"]
 
@@ -62,6 +63,7 @@ def plot_rig(
     Axes
         Metres on all axes, to one scale.
     """
+    check_kind("rig", rig, Rig, "am.Rig((camera,))")
     axes: Any = ax if ax is not None else new_axes(solid=True, height=6.0)
     dots = np.empty((0, 3)) if points is None else _finite(points)
     lines = [line for surface in surfaces for line in outlines(surface, moment)]

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asterism.errors import check_kind
+from asterism.model import Tracks
 from asterism.view.space import to_scale
 from asterism.view.style import CLUTTER, CYCLE, INK, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-    from asterism.model import Tracks
 
 __all__ = ["plot_trajectories"]
 
@@ -35,6 +35,7 @@ def plot_trajectories(tracks: Tracks, ax: Axes | None = None) -> Axes:
     Axes
         Metres on all axes, to one scale.
     """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
     d = tracks.detections
     is_solid = d.n_axes == 3
     axes: Any = ax if ax is not None else new_axes(solid=is_solid, height=7.0)

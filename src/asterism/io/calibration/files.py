@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError
+from asterism.camera import Rig
+from asterism.errors import FormatError, ParameterError, check_kind
 from asterism.io.atomic import replacing
 from asterism.io.calibration.formats import CALIBRATIONS, Calibration
 from asterism.io.units import PER_METRE, parse_unit
-
-if TYPE_CHECKING:
-    from asterism.camera import Rig
 
 __all__ = ["format_of", "format_to_write", "read_rig", "write_rig"]
 
@@ -88,6 +85,7 @@ def write_rig(rig: Rig, path: str | Path, *, format: str | None = None) -> None:
     FormatError
         If the file cannot be written.
     """
+    check_kind("rig", rig, Rig)
     path = Path(path)
     chosen = format_to_write(path, format)
     for i, camera in enumerate(rig):
