@@ -23,7 +23,7 @@ from asterism.label.gap import estimates
 from asterism.label.gap.bodies import fit_body
 from asterism.label.gap.ends import CAREFUL, NOISES, OFFSETS, SPANS, bridges, is_steady
 from asterism.label.gap.patterns import RIDGES, learn_pattern
-from asterism.label.gap.scores import _weights
+from asterism.label.gap.scores import _doubt, _weights
 from asterism.label.gap.spans import Span, find_gaps, held_out, n_apart, usable_ends
 from asterism.simulate import Burst
 
@@ -412,6 +412,29 @@ def test_what_is_bridged_knows_nothing_of_what_is_hidden(monkeypatch):
     assert not set(middle) & {37, 38, 39, 40, 41, 42, 43}
     assert {36, 44} <= set(middle)
     assert np.isfinite(found.truth).all()
+
+
+def test_doubt_grows_as_estimators_disagree():
+    rng = np.random.default_rng(0)
+    z = rng.normal(size=(200, 5, 3))
+    apart = rng.normal(size=(2, 201, 5, 3))
+    alike = apart / np.sqrt((apart**2).mean(axis=(0, 2, 3)))[:, None, None]
+
+    def doubt(apart, z, factor):
+        last = np.append(np.ones(200), factor)[:, None, None]
+        return _doubt(apart * last, z)
+
+    # Windows that disagree alike tell nothing: errors are taken to grow with disagreement.
+    assert doubt(alike, z, 10) == pytest.approx(10)
+    assert doubt(alike, z, 0.1) == pytest.approx(0.1)
+    # Windows that tell of it are believed: errors as the root of it, or none the larger.
+    spread = np.exp(rng.normal(size=200))
+    varied = alike * np.append(spread, 1.0)[:, None, None]
+    even = z / np.sqrt((z**2).mean(axis=(1, 2)))[:, None, None]
+    assert doubt(varied, even * np.sqrt(spread)[:, None, None], 10) == pytest.approx(
+        np.sqrt(10 / spread.mean()), rel=0.1
+    )
+    assert doubt(varied, even, 10) == pytest.approx(1, rel=0.1)
 
 
 def test_points_filled_before_are_no_measurements():

@@ -24,8 +24,11 @@ LEAST_WINDOWS, LEAST_APART = 8, 2
 """Windows that are needed, and so many of them may hide nothing that another hides."""
 OWN_WINDOWS = 0.25
 """What estimators say of themselves counts for this part of a window that is apart."""
-CAUTION = 10.0
-"""Windows that it takes to believe in half of what disagreement tells."""
+CAUTION = 4.0
+"""Squared logarithms that it takes to believe half of what the windows tell of disagreement: as
+long as they all disagree alike, errors are taken to grow as it does."""
+FARTHEST = 4.0
+"""Logarithm of how much more or less than the windows a gap can disagree and be believed."""
 TINY = 1e-300
 
 
@@ -143,7 +146,8 @@ def _smoothed(profile: NDArray[np.float64]) -> NDArray[np.float64]:
 def _doubt(apart: NDArray[np.float64], z: NDArray[np.float64]) -> float:
     """How much farther off this fill may be than the windows: as the estimators disagree more.
 
-    The log of a window's error is regressed on the log of how far the estimators are apart.
+    The log of a window's error is regressed on the log of how far the estimators are apart; before
+    any window is seen the slope is 1.
 
     Parameters
     ----------
@@ -154,11 +158,10 @@ def _doubt(apart: NDArray[np.float64], z: NDArray[np.float64]) -> float:
     """
     spread = np.log((apart**2).mean(axis=(0, 2, 3)) + TINY) / 2
     square = np.nanmean(z**2, axis=(1, 2))
-    if len(apart) < 2 or not (square > 0).all() or np.ptp(spread[:-1]) < 1e-9:
+    if len(apart) < 2 or not (square > 0).all():
         return 1.0
-    x = (spread - spread[:-1].mean()) / spread[:-1].std()
-    y = np.log(square) / 2
-    slope = x[:-1] @ (y - y.mean()) / (len(y) + CAUTION)
-    factors = np.exp(slope * x.clip(-3, 3))
+    x, y = spread - spread[:-1].mean(), np.log(square) / 2
+    slope = (x[:-1] @ (y - y.mean()) + CAUTION) / (x[:-1] @ x[:-1] + CAUTION)
+    factors = np.exp(slope * x.clip(-FARTHEST, FARTHEST))
     # The windows as a whole must come out with their own mean square.
     return float(factors[-1] * np.sqrt((square / factors[:-1] ** 2).mean() / square.mean()))
