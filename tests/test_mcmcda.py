@@ -128,7 +128,7 @@ def test_confidence_is_the_share_of_the_posterior_in_which_a_detection_follows_t
         p /= p.sum()
         groups = ("whole", "likelihood")[seed // 2 % 2]
         method = am.MCMCDA(
-            window=5, moves=1000, confidence=250_000, groups=groups, doubt=20, end_odds=1
+            window=5, moves=1000, confidence=50_000, groups=groups, doubt=20, end_odds=1
         )
         tracks = am.track(d, method, model=model, seed=seed)
         before = predecessors(tracks.labels)
