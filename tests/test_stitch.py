@@ -80,7 +80,7 @@ def test_too_few_pairs_are_moved_and_not_turned(n):
     ("method", "seed"),
     [
         *((am.SMP(window=3), seed) for seed in range(4)),
-        *((am.GNN(), seed) for seed in range(4)),
+        *((am.GNN(), seed) for seed in range(2)),
         *((am.MCMCDA(confidence=0), seed) for seed in range(2)),
     ],
 )
