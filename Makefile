@@ -3,13 +3,15 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo install test lint types contracts docs bench tables sanitize wheel web web-check clean
+.PHONY: demo install test lint types contracts docs bench tables sanitize sanitized wheel web web-check clean
 
 demo: $(VENV)/.demo
 	$(BIN)/asterism demo --out demo --overwrite
 
+# Each core takes files that follow each other, which share what they simulate, and in the end what
+# others still have.
 test: $(VENV)/.test
-	$(BIN)/python -m pytest -n auto --doctest-modules --doctest-continue-on-failure
+	$(BIN)/python -m pytest -n auto --dist worksteal --doctest-modules --doctest-continue-on-failure
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff check .
@@ -57,12 +59,14 @@ tables: $(VENV)/.bench
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
 # beside the package, never installed.
-sanitize: $(VENV)/.test
+sanitize: sanitized $(VENV)/.test
+	$(BIN)/python tests/run_sanitized.py build/sanitize
+
+sanitized: $(VENV)/.python
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake -S . -B build/sanitize -G Ninja \
 	  -DASTERISM_SANITIZE=ON -DASTERISM_WERROR=ON -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
 	  -Dnanobind_DIR="$$($(BIN)/python -m nanobind --cmake_dir)"
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake --build build/sanitize
-	$(BIN)/python tests/run_sanitized.py build/sanitize
 
 # From the tree, where the engine is built already; and what is built from is all in the archive of
 # sources.

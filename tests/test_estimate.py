@@ -102,7 +102,7 @@ def test_points_that_never_move_and_are_never_missed():
 
 
 @pytest.mark.parametrize(
-    ("n_frames", "n_markers", "n_empty"), [(20, 5000, 0), (5, 20_000, 0), (900, 100, 300)]
+    ("n_frames", "n_markers", "n_empty"), [(20, 1500, 0), (5, 6000, 0), (400, 60, 150)]
 )
 def test_dense_short_and_late_captures(n_frames, n_markers, n_empty):
     rng = np.random.default_rng(6)

@@ -128,7 +128,7 @@ def test_confidence_is_the_share_of_the_posterior_in_which_a_detection_follows_t
         p /= p.sum()
         groups = ("whole", "likelihood")[seed // 2 % 2]
         method = am.MCMCDA(
-            window=5, moves=1000, confidence=250_000, groups=groups, doubt=20, end_odds=1
+            window=5, moves=1000, confidence=50_000, groups=groups, doubt=20, end_odds=1
         )
         tracks = am.track(d, method, model=model, seed=seed)
         before = predecessors(tracks.labels)
@@ -376,7 +376,7 @@ def test_a_signal_ends_a_run_between_two_frames():
         raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGALRM, stop)
-    start = time.perf_counter()
+    start = time.process_time()  # others may have the core meanwhile
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.2)
         with pytest.raises(KeyboardInterrupt):
@@ -384,7 +384,7 @@ def test_a_signal_ends_a_run_between_two_frames():
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
-    assert time.perf_counter() - start < 5  # to the end it would be a minute
+    assert time.process_time() - start < 5  # to the end it would be a minute
 
 
 def test_a_walk_over_a_whole_take_can_be_interrupted():

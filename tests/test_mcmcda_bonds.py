@@ -213,7 +213,7 @@ def test_the_value_that_is_told_is_the_common_one():
 
 @pytest.mark.parametrize("options", [{}, {"groups": "whole"}, {"window": None, "moves": 10}])
 def test_neither_threads_nor_the_way_of_running_change_a_byte(options):
-    truth = body_in_bursts(frames=80)
+    truth = body_in_bursts(frames=60)
     d, model = truth.detections, am.fragment_model(am.estimate_model(truth.detections).model)
     runs = [
         am.track(d, am.MCMCDA(bond_weight=5, threads=n, **options), model=model, seed=2)

@@ -62,7 +62,7 @@ def tracks_of(cluster, origins) -> list[tuple[int, ...]]:
 def test_all_hypotheses_are_all_partitions_with_their_probabilities(seed):
     rng = np.random.default_rng(seed)
     n_tracks = 0
-    for _ in range(30):
+    for _ in range(15):
         n_frames, most = ((5, 2), (4, 3), (3, 4))[rng.integers(3)]
         d, model = tiny_problem(rng, n_frames, most, int(rng.integers(2, 4))), tiny_model(rng)
         partitions, totals = every_partition(d, model)
@@ -86,7 +86,7 @@ def test_all_hypotheses_are_all_partitions_with_their_probabilities(seed):
                 continue  # of a target that is tentative still
             says = [owner.get(i) == first for owner in owners]
             assert tracks.confidence[i] == pytest.approx(wanted[says].sum(), abs=1e-9)
-    assert n_tracks > 10
+    assert n_tracks > 5
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -101,7 +101,7 @@ def test_scores_are_those_of_the_definition():
 def test_finds_the_best_of_all_choices():
     rng = np.random.default_rng(5)
     n_contested = 0
-    for _ in range(25):
+    for _ in range(12):
         rig = random_rig(rng, 3)
         # Close together, so that rays of different markers meet.
         X = rng.uniform(-0.03, 0.03, (1, 4, 3))
@@ -115,7 +115,7 @@ def test_finds_the_best_of_all_choices():
         n_contested += len(tuples) > len(best.chosen)
         assert made.scores.sum() == pytest.approx(best.value, abs=0.05 * max(len(tuples), 1) ** 0.5)
         assert made.info["n_cut"] == 0
-    assert n_contested > 15
+    assert n_contested > 7
 
 
 def test_the_choice_is_that_of_the_exact_solver():

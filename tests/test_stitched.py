@@ -10,11 +10,17 @@ import pytest
 import asterism as am
 from asterism.simulate import Burst, Ghosts
 
+MODEL = am.TrackingModel(
+    motion=am.RandomWalk(walk_sigma=0.05),
+    sensor=am.Sensor(noise_sigma=1e-3, p_detection=0.99, clutter_density=1e-3),
+    population=am.Population(birth_density=1e-2, p_disappear=1e-3, max_speed=2, max_gap=4),
+)
+
 
 @functools.cache
-def disturbed(seed):
+def disturbed(seed, frames=300):
     """A person and its model."""
-    truth = am.simulate.person(seed=seed)
+    truth = am.simulate.person(seed=seed, frames=frames)
     truth = am.simulate.sense(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
     return truth, am.estimate_model(truth.detections).model
 
@@ -98,7 +104,7 @@ def test_run_is_the_loop_over_step():
 
 
 def test_a_state_is_a_value():
-    truth, model = disturbed(1)
+    truth, model = disturbed(1, frames=100)
     frames = list(truth.detections)
     method = am.Stitched()
     state = method.init(model)
@@ -120,13 +126,8 @@ def test_a_state_is_a_value():
 def test_empty_frames_and_two_axes():
     rng = np.random.default_rng(0)
     corner = rng.uniform(0, 1, (8, 2))
-    model = am.TrackingModel(
-        motion=am.RandomWalk(walk_sigma=0.05),
-        sensor=am.Sensor(noise_sigma=1e-3, p_detection=0.99, clutter_density=1e-3),
-        population=am.Population(birth_density=1e-2, p_disappear=1e-3, max_speed=2, max_gap=4),
-    )
     method = am.Stitched(confirm=5)
-    state = method.init(model, n_axes=2)
+    state = method.init(MODEL, n_axes=2)
     for t in range(60):
         points = corner + 0.002 * t
         if 30 <= t < 40:
@@ -168,7 +169,7 @@ def test_options_out_of_range_are_refused(wrong, name):
 @pytest.mark.parametrize(("time", "points"), [(0.0, []), (-1, []), (1, [[np.nan] * 3])])
 def test_frames_that_are_wrong_are_refused(time, points):
     method = am.Stitched()
-    state = method.init(disturbed(0)[1])
+    state = method.init(MODEL)
     state, _ = method.step(state, 0.0, [[0, 0, 0]])
     with pytest.raises(am.ParameterError):
         method.step(state, time, points)

@@ -37,7 +37,7 @@ def crowd_model(motion: am.Motion | None = None) -> am.TrackingModel:
     ids=["one frame", "default", "report's test", "independent", "pruned", "smp", "smp by points"],
 )
 @pytest.mark.parametrize("motion", ["dwna", "interacting"])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_labels_and_confidence_are_those_of_the_blackboard(method, motion, seed):
     truth = crowd(seed, n_axes=2 + seed % 2, spread=0.12)
     model = crowd_model(interacting() if motion == "interacting" else None)
