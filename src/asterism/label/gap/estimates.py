@@ -144,7 +144,7 @@ def estimate(take: Take, span: Span) -> Estimates:
     X, own = take.bridged, take.seen[:, k]
     ends = usable_ends(own, span)
     helpers, spreads = _helpers(take, span, ends)
-    helped = take.known[:, helpers].all(axis=1)
+    helped = np.logical_and.reduce(take.known[:, helpers], axis=1)
     known = own & helped
     ends = ends[helped[ends]]
     frames = np.sort(np.concatenate([ends, span.hidden]))
