@@ -56,6 +56,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/prior.py --markdown docs/tables/prior.md
 	$(BIN)/python benchmarks/estimation.py --markdown docs/tables/estimation.md
 	$(BIN)/python benchmarks/tuned.py --markdown docs/tables/tuned.md
+	$(BIN)/python benchmarks/regions.py --markdown docs/tables/regions.md
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
 # beside the package, never installed.
