@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import FormatError, ParameterError, check_kind
+from asterism.errors import FormatError, ParameterError, check_kind, check_path
 from asterism.io.atomic import replacing
 from asterism.io.calibration.formats import CALIBRATIONS, CalibrationFormat
 from asterism.io.units import PER_METRE, parse_unit
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 __all__ = ["format_of", "format_to_write", "read_rig", "write_rig"]
 
@@ -48,7 +51,7 @@ def read_rig(path: str | Path, *, format: str | None = None, units: str | None =
     ...
     asterism.errors.FormatError: none.toml: opening: expected a calibration, got nothing ...
     """
-    path = Path(path)
+    path = check_path("path", path)
     chosen = None if format is None else _named(format)
     unit = _unit(units)
     try:
@@ -86,7 +89,7 @@ def write_rig(rig: Rig, path: str | Path, *, format: str | None = None) -> None:
         If the file cannot be written.
     """
     check_kind("rig", rig, Rig)
-    path = Path(path)
+    path = check_path("path", path)
     chosen = format_to_write(path, format)
     for i, camera in enumerate(rig):
         if not camera.name.isprintable():
