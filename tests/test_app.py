@@ -408,7 +408,7 @@ def test_only_mcmcda_starts_from_tracks(scene, capsys, monkeypatch):
         raise AssertionError
 
     monkeypatch.setattr("asterism.estimate_model", never)  # told before the work
-    assert main("track truth.csv -o out.csv --method gnn --start".split()) == 2
+    assert main(["track", "truth.csv", "-o", "out.csv", "--method", "gnn", "--start"]) == 2
     told = capsys.readouterr().err
     assert "--start: expected --method mcmcda beside it, or none, got --method gnn" in told
 
