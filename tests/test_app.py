@@ -386,7 +386,7 @@ def test_examples_in_the_help_are_indented(capsys):
 
     from asterism.app.commands import app
 
-    for command in get_command(app).commands:  # pyright: ignore
+    for command in get_command(app).commands:
         lines = run(f"{command} --help", capsys).splitlines()
         examples = [line for line in lines if line.strip().startswith(f"asterism {command} ")]
         indented = [line for line in examples if line.startswith("     asterism")]
