@@ -380,6 +380,39 @@ def test_help_and_version(capsys):
     assert "[[" not in run("scenes --help", capsys)
 
 
+def test_examples_in_the_help_are_indented(capsys):
+    # The help's margin is that of its second paragraph on: with nothing but examples there, theirs.
+    from typer.main import get_command
+
+    from asterism.app.commands import app
+
+    for command in get_command(app).commands:
+        lines = run(f"{command} --help", capsys).splitlines()
+        examples = [line for line in lines if line.strip().startswith(f"asterism {command} ")]
+        indented = [line for line in examples if line.startswith("     asterism")]
+        assert indented == examples, command
+        assert examples or command in ("methods", "scenes", "camera"), command
+
+
+def test_a_model_is_written_under_the_name_of_one(scene, capsys):
+    for line in ("estimate in.csv", "bonds truth.csv"):
+        assert main(f"{line} -o model.json".split()) == 2
+        assert "-o: expected a name ending in .toml, got model.json" in capsys.readouterr().err
+        assert not Path("model.json").exists()
+        run(f"{line} -o model.TOML", capsys)
+        Path("model.TOML").unlink()
+
+
+def test_only_mcmcda_starts_from_tracks(scene, capsys, monkeypatch):
+    def never(*_, **__):
+        raise AssertionError
+
+    monkeypatch.setattr("asterism.estimate_model", never)  # told before the work
+    assert main(["track", "truth.csv", "-o", "out.csv", "--method", "gnn", "--start"]) == 2
+    told = capsys.readouterr().err
+    assert "--start: expected --method mcmcda beside it, or none, got --method gnn" in told
+
+
 def test_the_common_options_are_everywhere():
     # A command without --quiet or --json stops the script that passes them to all commands alike.
     from typer.main import get_command

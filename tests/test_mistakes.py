@@ -56,6 +56,53 @@ MISTAKES = {
     "points to a picture over time": (lambda: am.plot_axes(D), "tracks: expected Tracks"),
     "points to a picture of errors": (lambda: am.plot_errors(TRUTH, D), "truth: expected Tracks"),
     "a camera for a rig": (lambda: am.plot_rig(RIG[0]), "rig: expected a Rig, got Camera"),
+    "a rig for a picture": (lambda: am.plot_image(RIG, 3), "camera: expected a Camera, got Rig"),
+    "a number for what a camera sees": (
+        lambda: am.plot_image(RIG[0], 3),
+        "projection: expected a Projection, got int (try camera.project(points))",
+    ),
+    "a rig for a lens": (lambda: am.plot_lens(RIG), "camera: expected a Camera, got Rig"),
+    "a rig for what it covers": (lambda: am.plot_coverage(RIG), "expected a Coverage, got Rig"),
+    "points for groups": (lambda: am.plot_groups(D), "groups: expected GateGroups, got Detec"),
+    "a film for what was seen": (
+        lambda: am.plot_projections(am.simulate.film(TRUTH, RIG), RIG),
+        "observations: expected Observations, got Film (try its .observations)",
+    ),
+    "a score without a name": (
+        lambda: am.plot_compare(am.evaluate(TRUTH, TRUTH)),
+        'scores: expected a Mapping, got Evaluation (try {"a name": am.evaluate(tracks, truth)})',
+    ),
+    "tracks for their score": (
+        lambda: am.plot_compare({"gnn": TRUTH}),
+        "scores: expected an Evaluation by each name, got Truth of gnn",
+    ),
+    "confidences for a calibration": (
+        lambda: am.plot_reliability({"gnn": TRUTH}), "expected a Calibration, got Truth",
+    ),
+    "a number for a file": (lambda: am.read(3), "path: expected the name of a file, got int"),
+    "points for a file": (lambda: am.read_tracks(D), "path: expected the name of a file, got Dete"),
+    "nothing to write to": (lambda: am.write(TRUTH, None), "the name of a file, got NoneType"),
+    "a number for a calibration": (lambda: am.read_rig(3), "path: expected the name of a file"),
+    "a number for image points": (lambda: am.read_observations(3), "path: expected the name of"),
+    "a number for a model": (lambda: am.TrackingModel.from_toml(3), "path: expected the name of"),
+    "a number for bonds": (lambda: am.Bonds.from_toml(3), "path: expected the name of a file"),
+    "a number for a page": (lambda: am.report(TRUTH, 3), "path: expected the name of a file"),
+    "no state to go on from": (
+        lambda: am.GNN().step(None, 0.0, D.frame(0)),
+        "state: expected an EngineState, got NoneType (try method.init(model))",
+    ),
+    "no state for mcmcda": (lambda: am.MCMCDA().step(None, 0.0, []), "state: expected an Engine"),
+    "a model for a state": (lambda: am.SMP().run(MODEL, D), "state: expected an EngineState"),
+    "another method's state": (
+        lambda: am.Stitched().step(am.GNN().init(MODEL), 0.0, []),
+        "state: expected a StitchedState, got EngineState (try method.init(model))",
+    ),
+    "no state to stitch from": (lambda: am.Stitched().run(None, D), "state: expected a MethodS"),
+    "no model to stitch with": (lambda: am.Stitched().init(None), "model: expected a TrackingM"),
+    "points to fill": (lambda: am.fill(D), "expected Tracks, got Detections (try am.track(det"),
+    "an estimate to fill with": (
+        lambda: am.fill(TRUTH, model=am.estimate_model(D)), "got ModelEstimate (try its .model)",
+    ),
     "points to write as a rig": (lambda: am.write_rig(D, "x.toml"), "rig: expected a Rig"),
     "labels of labels": (
         lambda: am.Tracks(detections=TRUTH, labels=TRUTH.labels), "got Truth (try its .detections)",

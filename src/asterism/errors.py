@@ -7,13 +7,14 @@ Nothing here knows about tracking.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -26,6 +27,7 @@ __all__ = [
     "check_fields",
     "check_kind",
     "check_number",
+    "check_path",
     "keep_array",
 ]
 
@@ -191,7 +193,8 @@ def check_kind(name: str, value: object, kind: type, hint: str = "") -> None:
     if isinstance(value, kind):
         return
     word = kind.__name__
-    expected = word if word.endswith("s") else f"a {word}"
+    article = "an" if word[0] in "AEIOU" else "a"
+    expected = word if word.endswith("s") else f"{article} {word}"
     got = f"{type(value).__name__}"
     if isinstance(value, str):
         got = repr(value)
@@ -202,6 +205,37 @@ def check_kind(name: str, value: object, kind: type, hint: str = "") -> None:
             hint = f"its .{part}"
             break
     raise ParameterError(name, expected, got, f"try {hint}" if hint else "")
+
+
+def check_path(name: str, value: object) -> Path:
+    """Give `value` as a path, or raise.
+
+    Parameters
+    ----------
+    name : str
+        How the caller knows the value.
+    value : object
+        The value.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ParameterError
+        If it is neither text nor a path.
+
+    Examples
+    --------
+    >>> check_path("path", 3)
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: path: expected the name of a file, got int
+    """
+    if isinstance(value, (str, os.PathLike)):
+        return Path(cast("str | os.PathLike[str]", value))
+    raise ParameterError(name, "the name of a file", type(value).__name__)
 
 
 def check_array(

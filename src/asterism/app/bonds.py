@@ -40,9 +40,10 @@ def bonds(
         asterism bonds labelled.c3d -o subject.toml
     """
     import asterism as am
-    from asterism.app.files import check_outputs
+    from asterism.app.files import check_ending, check_outputs
 
     check_outputs({"-o": out}, [source])
+    check_ending("-o", out, ".toml")
     capture = am.read(source)
     if not (capture.labels >= 0).any():
         hint = "asterism track makes them first"

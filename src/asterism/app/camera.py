@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from asterism.app.camera_check import Check
     from asterism.app.camera_info import CameraInfo
     from asterism.camera.lens_fit import LensFit
-    from asterism.io.calibration import Calibration
+    from asterism.io.calibration import CalibrationFormat
 
 __all__ = ["app"]
 
@@ -179,7 +179,7 @@ def convert(
             print_table(_warnings(rig.warnings))
 
 
-def _fitted(camera: Any, lens: str, chosen: Calibration) -> LensFit | None:
+def _fitted(camera: Any, lens: str, chosen: CalibrationFormat) -> LensFit | None:
     from asterism.camera import BrownConrady, ReportRadial, ViconRadial
     from asterism.io.calibration.fitting import fit_kind, fit_to_format
 

@@ -35,6 +35,8 @@ def demo(
 ) -> None:
     """Simulate a capture, spoil it, track it with each method, score the results and draw them.
 
+    Everything goes into one folder, each method's run into one of its own.
+
     For example:
 
         asterism demo

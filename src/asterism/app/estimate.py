@@ -29,6 +29,8 @@ def estimate(
 ) -> None:
     """Estimate noise, motion, misses and clutter from the points themselves.
 
+    Each figure is told with what it was read off; `asterism track --model` takes the file.
+
     For example:
 
         asterism estimate trial.c3d
@@ -38,10 +40,11 @@ def estimate(
         asterism estimate arena.csv --open -o model.toml
     """
     import asterism as am
-    from asterism.app.files import check_outputs
+    from asterism.app.files import check_ending, check_outputs
     from asterism.app.run_folder import write_text
 
-    check_outputs({"--out": out}, [source])
+    check_outputs({"-o": out}, [source])
+    check_ending("-o", out, ".toml")
     capture = am.read(source)
     with progress("estimating the model"):
         found = am.estimate_model(capture, population="open" if open_population else "closed")

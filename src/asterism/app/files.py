@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     import asterism as am
 
-__all__ = ["check_outputs", "check_page", "read_labels", "read_model", "truth_of_each"]
+__all__ = ["check_ending", "check_outputs", "read_labels", "read_model", "truth_of_each"]
 
 _MARKS_CLUTTER = ("c3d", "csv")  # as Asterism writes them
 
@@ -44,10 +44,25 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | No
             raise ParameterError(option, "a file in a folder that exists", path)
 
 
-def check_page(option: str, path: Path | None) -> None:
-    """Raise before any work if a report would be written under the name of something else."""
-    if path is not None and path.suffix.lower() not in (".html", ".htm"):
-        raise ParameterError(option, "a name ending in .html", str(path))
+def check_ending(option: str, path: Path | None, *endings: str) -> None:
+    """Raise before any work if a file would be written under the name of something else.
+
+    Parameters
+    ----------
+    option : str
+        The option that names it.
+    path : Path or None
+        The file, if one is asked for.
+    *endings : str
+        What its name may end in, in small letters; the first is what the message says.
+
+    Raises
+    ------
+    ParameterError
+        If it ends in something else.
+    """
+    if path is not None and path.suffix.lower() not in endings:
+        raise ParameterError(option, f"a name ending in {endings[0]}", str(path))
 
 
 def _identity(path: Path) -> object:

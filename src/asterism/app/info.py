@@ -19,6 +19,8 @@ _File = Annotated[Path, typer.Argument(metavar="FILE", help="Capture to look at.
 def info(file: _File, quiet: Quiet = False, json: Json = False) -> None:
     """Say what a capture holds, what is odd about it, and how hard its markers are to tell apart.
 
+    Nothing is tracked and nothing written.
+
     For example:
 
         asterism info trial.c3d

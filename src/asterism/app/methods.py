@@ -23,6 +23,8 @@ _Scene = Annotated[
 def methods(json: Json = False) -> None:
     """List the methods and their options.
 
+    `asterism track --method NAME --option NAME=VALUE` takes them.
+
     For example:
 
         asterism methods
@@ -45,6 +47,8 @@ def methods(json: Json = False) -> None:
 
 def scenes(scene: _Scene = None, json: Json = False) -> None:
     """List the scenes that can be simulated, or the options of one.
+
+    `asterism simulate SCENE --option NAME=VALUE` takes them.
 
     For example:
 

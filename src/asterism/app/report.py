@@ -48,11 +48,11 @@ def report(
         asterism report tracked.c3d --truth truth.c3d --rig trial.xcp -o page.html
     """
     import asterism as am
-    from asterism.app.files import check_outputs, check_page, read_labels
+    from asterism.app.files import check_ending, check_outputs, read_labels
 
     page = out or source.with_suffix(".html")
     check_outputs({"-o": page}, [source, truth, rig])
-    check_page("-o", page)
+    check_ending("-o", page, ".html", ".htm")
     tracks = read_labels(source)
     true = None if truth is None else am.read_tracks(truth)
     cameras = None if rig is None else am.read_rig(rig)

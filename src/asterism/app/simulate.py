@@ -70,6 +70,8 @@ def simulate(
 ) -> None:
     r"""Simulate markers in motion and write them; spoilt, if asked, with the truth beside.
 
+    `asterism scenes` lists the scenes and their options. The same seed gives the same bytes.
+
     For example:
 
         asterism simulate person -o walk.c3d --option activity=walk --markers 60

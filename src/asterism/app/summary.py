@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-__all__ = ["Gap", "Summary", "stitching_rows", "summarize"]
+__all__ = ["BridgedGap", "Summary", "stitching_rows", "summarize"]
 
 DOUBTFUL = 0.9
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gap:
+class BridgedGap:
     """Frames in which a track was not seen, between two detections of it.
 
     Parameters
@@ -56,7 +56,7 @@ class Summary:
         Tracks, detections in them and detections in none.
     n_gaps : int
         Gaps within tracks.
-    longest_gaps : tuple of Gap
+    longest_gaps : tuple of BridgedGap
         The longest of them, up to three.
     seconds, frames_per_second : float
         Time that the method took, and its pace.
@@ -78,7 +78,7 @@ class Summary:
     n_labelled: int
     n_clutter: int
     n_gaps: int
-    longest_gaps: tuple[Gap, ...]
+    longest_gaps: tuple[BridgedGap, ...]
     seconds: float
     frames_per_second: float
     log_posterior: float | None
@@ -178,7 +178,7 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
         n_clutter=d.n_points - n_labelled,
         n_gaps=len(before),
         longest_gaps=tuple(
-            Gap(
+            BridgedGap(
                 track=int(track[i]),
                 first=d.first_frame + int(frame[i]) + 1,
                 last=d.first_frame + int(frame[i + 1]) - 1,

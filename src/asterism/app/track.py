@@ -122,12 +122,12 @@ def track(
         asterism track --from runs/first/run.toml -o again.c3d
     """
     import asterism as am
-    from asterism.app.files import check_outputs, check_page, read_model
+    from asterism.app.files import check_ending, check_outputs, read_model
     from asterism.app.run_folder import FILES, Job, check_folder, sha256_of
     from asterism.app.tracking import carry_out, default_output, output_format
 
     check_outputs({"-o": out, "--report": report}, [source, model, repeat])
-    check_page("--report", report)
+    check_ending("--report", report, ".html", ".htm")
     if run is not None:
         check_folder(run, overwrite=overwrite, option="--run")
     estimate: am.ModelEstimate | None = None
@@ -152,6 +152,9 @@ def track(
         given = None if model is None else read_model(model)
         capture = am.read(source)
         chosen_format = output_format(capture, out, format)
+        if start and name not in (AUTO, am.MCMCDA.name):
+            expected = f"--method {am.MCMCDA.name} beside it, or none"
+            raise ParameterError("--start", expected, f"--method {name}")
         if start and not (capture.labels >= 0).any():
             raise ParameterError("--start", "a capture with tracks", f"none in {source}")
         if given is None:

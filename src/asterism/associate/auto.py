@@ -16,7 +16,7 @@ import numpy as np
 from asterism.associate.gnn import GNN
 from asterism.associate.mcmcda import MCMCDA
 from asterism.associate.smp import SMP
-from asterism.errors import ParameterError, check_kind
+from asterism.errors import check_kind
 from asterism.model import Detections, RandomWalk, TrackingModel, Tracks
 
 if TYPE_CHECKING:
@@ -113,9 +113,7 @@ def choose_method(
     ('smp', True)
     """
     check_kind("detections", detections, Detections)
-    if not isinstance(model, TrackingModel):  # pyright: ignore[reportUnnecessaryIsInstance]
-        hint = "try estimate_model(detections).model"
-        raise ParameterError("model", "a TrackingModel", type(model).__name__, hint)
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     if has_start:
         return Choice(method=MCMCDA(), stitch=False, reason="there are tracks to begin with")
     detections = detections.measured()

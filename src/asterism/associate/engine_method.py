@@ -133,6 +133,7 @@ class EngineMethod(Method[EngineState]):
         """Take the next frame; see `Method.step`."""
         from asterism.model.compiled import no_transition, transition, with_noise
 
+        check_kind("state", state, EngineState, "method.init(model)")
         before = state.tracker
         frame = checked_frame(time, before.last_time, points, state.n_axes)
         if covariances is not None:
@@ -168,6 +169,7 @@ class EngineMethod(Method[EngineState]):
         """Take all frames in the engine; the same labels as the loop over `step`."""
         from asterism.model.compiled import steps_of, with_noise
 
+        check_kind("state", state, EngineState, "method.init(model)")
         refuse_start(start)
         points = with_noise(detections.points, detections.covariances)
         tracker = state.tracker.copy()

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from asterism.associate.engine_method import EngineMethod
+from asterism.associate.engine_method import EngineMethod, EngineState
 from asterism.associate.mcmc_moves import MOVES, checked_weights
-from asterism.errors import ParameterError, check_number
+from asterism.errors import ParameterError, check_kind, check_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from asterism import _engine
-    from asterism.associate.engine_method import EngineState, Tracker
+    from asterism.associate.engine_method import Tracker
     from asterism.associate.method import Update
     from asterism.model import Detections, TrackingModel
 
@@ -304,6 +304,7 @@ class MCMCDA(EngineMethod):
 
     def _refuse_to_stand(self, state: EngineState, start: object) -> None:
         """Raise where no track could ever begin, neither by a move nor with a label."""
+        check_kind("state", state, EngineState, "method.init(model)")
         if self.moves == 0 and start is None and state.n_seen == 0:
             hint = "tracks begin by moves alone; gnn pairs frame by frame without any"
             raise ParameterError("moves", "a number > 0, or labels to start from", "0", hint)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_array, check_number
+from asterism.errors import ParameterError, check_array, check_kind, check_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Method", "MethodState", "Update", "checked_frame", "refuse_start"]
 
 
+@runtime_checkable
 class MethodState(Protocol):
     """What every method's state tells."""
 
@@ -124,7 +125,8 @@ class Method(ABC, Generic[State]):
         Raises
         ------
         ParameterError
-            If the time does not advance or the points are not finite numbers.
+            If the state is none of this method's, the time does not advance, or the points are
+            not finite numbers.
         """
 
     def run(
@@ -155,6 +157,7 @@ class Method(ABC, Generic[State]):
             has any.
         """
         refuse_start(start)
+        check_kind("state", state, MethodState, "method.init(model)")
         first = state.n_seen
         labels = np.full(first + detections.n_points, -1, dtype=np.int64)
         confidence: NDArray[np.float64] | None = None

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from asterism.errors import FormatError, ParameterError, check_kind
+from asterism.errors import FormatError, ParameterError, check_kind, check_path
 from asterism.io.atomic import replacing
 from asterism.io.formats import FORMATS, Format
 from asterism.model import Capture, Tracks
 
 if TYPE_CHECKING:
     from collections.abc import Generator
+    from pathlib import Path
 
 __all__ = ["read", "read_tracks", "write"]
 
@@ -39,7 +39,7 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     FormatError
         If the file is not there, or is of no known format, or not what its format says.
     ParameterError
-        If `format` is unknown.
+        If `path` is no path, or `format` is unknown.
 
     Examples
     --------
@@ -48,7 +48,7 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     ...
     asterism.errors.FormatError: nowhere.c3d: opening: expected a file, got nothing of that name
     """
-    path = Path(path)
+    path = check_path("path", path)
     asked = None if format is None else _named(format)
     with _about(path):
         return _find(path, asked).read(path)
@@ -73,7 +73,7 @@ def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
     FormatError, ParameterError
         As in `read`.
     """
-    path = Path(path)
+    path = check_path("path", path)
     asked = None if format is None else _named(format)
     with _about(path):
         chosen = _find(path, asked)
@@ -112,7 +112,7 @@ def write(
         If the file cannot be written, or its source cannot be read again.
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
-    path = Path(path)
+    path = check_path("path", path)
     known = [f for f in FORMATS.values() if f.write is not None]
     if format is None:
         endings = [f for f in known if path.suffix.lower() in f.extensions and path.suffix]

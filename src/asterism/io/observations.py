@@ -10,19 +10,19 @@ bits.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.camera import Observations
-from asterism.errors import FormatError, ParameterError, check_number
+from asterism.errors import FormatError, ParameterError, check_number, check_path
 from asterism.io.atomic import replacing
 from asterism.io.csv_columns import columns_of, quoted, whole
 from asterism.io.text_table import cells_of, check_times, read_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -61,7 +61,7 @@ def write_observations(
     _check_names("cameras", observations.cameras)
     if observations.markers is not None:
         _check_names("marker_names", observations.marker_names)
-    with replacing(Path(path)) as file:
+    with replacing(check_path("path", path)) as file:
         for text in _texts(observations, int(first_frame)):
             file.write(text.encode())
 
@@ -87,7 +87,7 @@ def read_observations(path: str | Path) -> Observations:
     FormatError
         If there is no such file, or with the line that is not as it should be.
     """
-    path = Path(path)
+    path = check_path("path", path)
     try:
         lines = read_lines(path)
     except OSError as error:

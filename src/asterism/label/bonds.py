@@ -148,8 +148,8 @@ class Bonds:
         FormatError
             If the file cannot be read, is not TOML, or holds no bonds.
         """
-        path = Path(path)
         content = read_toml(path, "bonds in TOML")
+        path = Path(path)
         if content.get("format") != FORMAT:
             got = content.get("format", "none")
             raise FormatError(

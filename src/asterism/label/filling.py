@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.associate import estimate_model
-from asterism.errors import ParameterError, check_number
+from asterism.errors import check_kind, check_number
 from asterism.label.gap.estimates import Take, estimate
 from asterism.label.gap.scores import Fill, settle
 from asterism.label.gap.spans import Span, find_gaps
@@ -168,11 +168,9 @@ def fill(
     >>> filling  # doctest: +ELLIPSIS
     Filling(... of ... gaps, ... points)
     """
-    if not isinstance(tracks, Tracks):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("tracks", "Tracks", type(tracks).__name__, "try am.track(detections)")
-    if model is not None and not isinstance(model, TrackingModel):  # pyright: ignore[reportUnnecessaryIsInstance]
-        hint = "try am.estimate_model(detections).model"
-        raise ParameterError("model", "a TrackingModel", type(model).__name__, hint)
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    if model is not None:
+        check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     check_number("longest", longest, above=0, below=1e9)
     tracks = tracks.measured()
     d = tracks.detections

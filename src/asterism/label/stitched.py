@@ -11,12 +11,11 @@ from asterism.associate.method import MethodState, checked_frame
 from asterism.errors import check_kind, check_number
 from asterism.label.identify import fragment_model
 from asterism.label.stitching import check_options, stitch_options
+from asterism.model import TrackingModel
 from asterism.model.compiled import motion_model, no_transition, transition
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-    from asterism.model import TrackingModel
 
 __all__ = ["Stitched", "StitchedState"]
 
@@ -122,6 +121,7 @@ class Stitched(Method[StitchedState]):
         self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None
     ) -> StitchedState:
         """Make the state before the first frame; see `Method.init`."""
+        check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
         model = fragment_model(model)
         fragments = self.method.init(model, n_axes=n_axes, seed=seed)
         options = stitch_options(model, self.confirm, self.ghost_radius, self.max_hidden)
@@ -138,6 +138,7 @@ class Stitched(Method[StitchedState]):
         covariances: ArrayLike | None = None,
     ) -> tuple[StitchedState, Update]:
         """Take the next frame; see `Method.step`."""
+        check_kind("state", state, StitchedState, "method.init(model)")
         frame = checked_frame(time, state.last_time, points, state.n_axes)
         fragments, found = self.method.step(state.fragments, time, frame, covariances=covariances)
         motion, dt = state.model.motion, time - state.last_time

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import tomllib
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asterism.errors import FormatError
+from asterism.errors import FormatError, check_path
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
 __all__ = ["read_toml", "write_toml"]
 
@@ -20,7 +20,7 @@ def write_toml(content: Mapping[str, Any], path: str | Path | None) -> str:
 
     text = tomli_w.dumps(content)
     if path is not None:
-        path = Path(path)
+        path = check_path("path", path)
         unfinished = path.with_name(f".{path.name}.part")
         unfinished.write_text(text, encoding="utf-8")
         unfinished.replace(path)
@@ -32,10 +32,12 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
 
     Raises
     ------
+    ParameterError
+        If `path` is no path.
     FormatError
         If the file cannot be read, or is not TOML.
     """
-    path = Path(path)
+    path = check_path("path", path)
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import ParameterError, check_kind
+from asterism.errors import ParameterError, check_kind, check_path
 from asterism.io.atomic import replacing
 from asterism.model import Capture, Tracks
 from asterism.reporting.connections import connections_of
@@ -17,6 +16,7 @@ from asterism.view.report import Contents, page
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from pathlib import Path
 
     from asterism.view.report.contents import Axis
 
@@ -88,7 +88,7 @@ def report(
         check_kind("rig", rig, Rig, "am.read_rig(path)")
     if up not in ("x", "y", "z", None):
         raise ParameterError("up", "x, y, z or None", repr(up))
-    d, path = tracks.detections, Path(path)
+    d, path = tracks.detections, check_path("path", path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise ParameterError("path", "a name ending in .html", repr(path.name))
     if rig is not None and d.n_axes != 3:

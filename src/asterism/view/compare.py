@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_fields
+from asterism.errors import ParameterError, check_fields, check_kind
 from asterism.view.style import CYCLE, GRID, INK, given_axes, new_panels, tidy
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from matplotlib.axes import Axes
 
@@ -44,11 +45,17 @@ def plot_compare(
     Raises
     ------
     ParameterError
-        If there is nothing to compare, a time is of nobody or not above zero, or there are not as
-        many axes as figures.
+        If there is nothing to compare, something else than scores, a time is of nobody or not
+        above zero, or there are not as many axes as figures.
     """
+    hint = '{"a name": am.evaluate(tracks, truth)}'
+    check_kind("scores", scores, Mapping, hint)
     if not scores:
         raise ParameterError("scores", "at least one", "none")
+    for name, score in scores.items():
+        if not hasattr(score, "idf1"):  # its class is of a house that this one does not enter
+            got = f"{type(score).__name__} of {name}"
+            raise ParameterError("scores", "an Evaluation by each name", got, f"try {hint}")
     times = dict(milliseconds or {})
     check_fields("milliseconds", times, scores)
     names = list(scores)

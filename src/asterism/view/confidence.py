@@ -111,6 +111,10 @@ def plot_reliability(
     parts = calibration if isinstance(calibration, Mapping) else {"": calibration}
     if not parts:
         raise ParameterError("calibration", "at least one", "none")
+    for part in parts.values():
+        if not hasattr(part, "ece"):  # its class is of a house that this one does not enter
+            hint = "try am.calibration(confidence, is_right)"
+            raise ParameterError("calibration", "a Calibration", type(part).__name__, hint)
     axes: Any = ax if ax is not None else new_axes(height=6.0)
     axes.plot([0, 1], [0, 1], color=CLUTTER, linewidth=1, linestyle="--", label="as sure as right")
     axes.set_aspect("equal", adjustable="box")

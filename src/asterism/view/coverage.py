@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_fields, check_number
+from asterism.camera import Coverage
+from asterism.errors import ParameterError, check_fields, check_kind, check_number
 from asterism.view.style import CLUTTER, GRADIENT, GRID, INK, new_axes, tidy
 
 if TYPE_CHECKING:
@@ -14,8 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from numpy.typing import NDArray
-
-    from asterism.camera import Coverage
 
 __all__ = ["counts_map", "draw_bar", "plot_coverage", "whole_ticks"]
 
@@ -54,10 +53,11 @@ def plot_coverage(
     Raises
     ------
     ParameterError
-        If the places are no grid, or it has no level near that height.
+        If it is no coverage, the places are no grid, or it has no level near that height.
     """
     from matplotlib.colors import LogNorm
 
+    check_kind("coverage", coverage, Coverage, "rig.coverage(am.volume_grid(…))")
     check_fields("what", [what], ("cameras", "error"))
     x, y, z, spacing = _grid(coverage.points)
     if height is not None:

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asterism.errors import check_kind
+from asterism.filter import GateGroups
 from asterism.view.style import GRADIENT, GRID, INK, new_axes, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from asterism.filter import GateGroups
 
 __all__ = ["plot_groups"]
 
@@ -36,9 +36,15 @@ def plot_groups(groups: GateGroups, ax: Axes | None = None) -> Axes:
     Axes
         Seconds across; tracks, stacked by the size of their group, the largest groups at the
         bottom and darkest, those alone grey.
+
+    Raises
+    ------
+    ParameterError
+        If it is no `GateGroups`.
     """
     import matplotlib
 
+    check_kind("groups", groups, GateGroups, "am.gate_groups(tracks, model)")
     axes: Any = ax if ax is not None else new_axes(height=4.0)
     T = len(groups.times)
     least = np.array(list(_SIZES))

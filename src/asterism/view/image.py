@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.camera import DepthImage, Polygon, Reason
-from asterism.errors import ParameterError, check_array
+from asterism.camera import Camera, DepthImage, Polygon, Projection, Reason
+from asterism.errors import ParameterError, check_array, check_kind
 from asterism.view.coverage import draw_bar
 from asterism.view.outlines import outlines
 from asterism.view.style import CLUTTER, CYCLE, GRADIENT, GRID, INK, new_axes
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
-    from asterism.camera import Camera, Projection, Surface
+    from asterism.camera import Surface
 
 __all__ = ["frame_image", "image_axes", "plot_depth", "plot_image"]
 
@@ -81,12 +81,15 @@ def plot_image(
     Raises
     ------
     ParameterError
-        If the projection is not of one frame and one camera, or something has not its K entries.
+        If an argument is of another kind, the projection is not of one frame and one camera, or
+        something has not its K entries.
 
     References
     ----------
     The 2010 report, §3.3 and 3.4.
     """
+    check_kind("camera", camera, Camera, "rig[0]")
+    check_kind("projection", projection, Projection, "camera.project(points)")
     if projection.reason.ndim != 1:
         expected = "points of one frame in one camera, arrays of shape (K,)"
         got = f"reasons of shape {projection.reason.shape}"

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asterism.camera import Camera
+from asterism.errors import check_kind
 from asterism.view.image import frame_image, image_axes
 from asterism.view.style import CYCLE, GRID, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-    from asterism.camera import Camera
 
 __all__ = ["plot_lens"]
 
@@ -43,6 +43,11 @@ def plot_lens(camera: Camera, ax: Axes | None = None) -> Axes:
         Pixels, u to the right and v down. The title says how far the lens shifts points within
         the image.
 
+    Raises
+    ------
+    ParameterError
+        If it is no camera.
+
     References
     ----------
     The 2010 report, figure 3.6.
@@ -50,6 +55,7 @@ def plot_lens(camera: Camera, ax: Axes | None = None) -> Axes:
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Rectangle
 
+    check_kind("camera", camera, Camera, "rig[0]")
     axes: Any = ax if ax is not None else image_axes(camera.size_px)
     w, h = camera.size_px
     lines = _grid(camera)

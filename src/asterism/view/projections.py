@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError
+from asterism.camera import Observations, Rig
+from asterism.errors import ParameterError, check_kind
 from asterism.view.image import frame_image
 from asterism.view.style import CLUTTER, CYCLE, INK, given_axes, new_panels
 
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
-
-    from asterism.camera import Observations, Rig
 
 __all__ = ["plot_projections"]
 
@@ -53,12 +52,15 @@ def plot_projections(
     Raises
     ------
     ParameterError
-        If a camera is not in the rig, or there are not as many axes as cameras.
+        If an argument is of another kind, a camera is not in the rig, or there are not as many
+        axes as cameras.
 
     References
     ----------
     The 2010 report, §3.3.
     """
+    check_kind("observations", observations, Observations, "am.read_observations(path)")
+    check_kind("rig", rig, Rig, "am.read_rig(path)")
     seen = observations
     sizes = dict(zip(rig.names, (camera.size_px for camera in rig), strict=True))
     for name in seen.cameras:

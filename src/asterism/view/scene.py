@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError
+from asterism.errors import FormatError, ParameterError, check_path
 from asterism.view.style import CLUTTER, CYCLE
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def view(tracks: Tracks, *, rig: Rig | None = None, path: str | Path | None = No
     if not tracks.detections.n_points:
         raise ParameterError("tracks", "at least one detection", "none")
     if path is not None:
-        _save(rerun, tracks, rig, Path(path))
+        _save(rerun, tracks, rig, check_path("path", path))
         return
     from asterism.view.viewer import open_viewer
 

@@ -6,6 +6,6 @@
 """
 
 from asterism.io.calibration.files import read_rig, write_rig
-from asterism.io.calibration.formats import CALIBRATIONS, Calibration
+from asterism.io.calibration.formats import CALIBRATIONS, CalibrationFormat
 
-__all__ = ["CALIBRATIONS", "Calibration", "read_rig", "write_rig"]
+__all__ = ["CALIBRATIONS", "CalibrationFormat", "read_rig", "write_rig"]

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import FormatError, ParameterError, check_kind
+from asterism.errors import FormatError, ParameterError, check_kind, check_path
 from asterism.io.atomic import replacing
-from asterism.io.calibration.formats import CALIBRATIONS, Calibration
+from asterism.io.calibration.formats import CALIBRATIONS, CalibrationFormat
 from asterism.io.units import PER_METRE, parse_unit
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 __all__ = ["format_of", "format_to_write", "read_rig", "write_rig"]
 
@@ -48,7 +51,7 @@ def read_rig(path: str | Path, *, format: str | None = None, units: str | None =
     ...
     asterism.errors.FormatError: none.toml: opening: expected a calibration, got nothing ...
     """
-    path = Path(path)
+    path = check_path("path", path)
     chosen = None if format is None else _named(format)
     unit = _unit(units)
     try:
@@ -86,7 +89,7 @@ def write_rig(rig: Rig, path: str | Path, *, format: str | None = None) -> None:
         If the file cannot be written.
     """
     check_kind("rig", rig, Rig)
-    path = Path(path)
+    path = check_path("path", path)
     chosen = format_to_write(path, format)
     for i, camera in enumerate(rig):
         if not camera.name.isprintable():
@@ -113,7 +116,7 @@ def _write_folder(path: Path, content: dict[str, bytes]) -> None:
         raise FormatError(path, "writing", "a folder that can be written", what) from error
 
 
-def format_to_write(path: Path, format: str | None) -> Calibration:
+def format_to_write(path: Path, format: str | None) -> CalibrationFormat:
     """Give the format to write, as asked or by the ending of the name.
 
     Parameters
@@ -125,7 +128,7 @@ def format_to_write(path: Path, format: str | None) -> Calibration:
 
     Returns
     -------
-    Calibration
+    CalibrationFormat
 
     Raises
     ------
@@ -143,7 +146,7 @@ def format_to_write(path: Path, format: str | None) -> Calibration:
     raise ParameterError("path", f"a name ending in {every}", repr(path.name), hint)
 
 
-def _named(name: str) -> Calibration:
+def _named(name: str) -> CalibrationFormat:
     if name not in CALIBRATIONS:
         raise ParameterError("format", f"one of {', '.join(CALIBRATIONS)}", repr(name))
     return CALIBRATIONS[name]
@@ -158,7 +161,7 @@ def _unit(units: str | None) -> str | None:
     return unit
 
 
-def _openable(path: Path, chosen: Calibration) -> Calibration:
+def _openable(path: Path, chosen: CalibrationFormat) -> CalibrationFormat:
     """Check that there is a file, or a folder, where the format is one."""
     is_folder = path.is_dir()
     fits = chosen.sniff_folder is not None if is_folder else chosen.sniff is not None
@@ -177,7 +180,7 @@ def _what_it_is(path: Path) -> str:
     return "a device or pipe" if path.exists() else "nothing of that name"
 
 
-def format_of(path: Path) -> Calibration:
+def format_of(path: Path) -> CalibrationFormat:
     """Tell the format of a calibration that exists, by its name and its first bytes.
 
     Parameters
@@ -187,7 +190,7 @@ def format_of(path: Path) -> Calibration:
 
     Returns
     -------
-    Calibration
+    CalibrationFormat
 
     Raises
     ------

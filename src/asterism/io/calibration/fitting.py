@@ -9,7 +9,7 @@ from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     from asterism.camera import Camera, Lens, LensFit
-    from asterism.io.calibration.formats import Calibration
+    from asterism.io.calibration.formats import CalibrationFormat
 
 __all__ = ["fit_kind", "fit_to_format"]
 
@@ -20,14 +20,14 @@ _KINDS: dict[str, type[Lens]] = {
 }
 
 
-def fit_to_format(camera: Camera, format: Calibration) -> LensFit | None:
+def fit_to_format(camera: Camera, format: CalibrationFormat) -> LensFit | None:
     """Give a camera the lens, and if need be the K, that a format can hold.
 
     Parameters
     ----------
     camera : Camera
         The camera.
-    format : Calibration
+    format : CalibrationFormat
         Where it is to go.
 
     Returns
@@ -42,7 +42,7 @@ def fit_to_format(camera: Camera, format: Calibration) -> LensFit | None:
     return None
 
 
-def fit_kind(camera: Camera, kind: type[Lens] | None, format: Calibration) -> LensFit:
+def fit_kind(camera: Camera, kind: type[Lens] | None, format: CalibrationFormat) -> LensFit:
     """Give a camera another kind of lens, and no coefficient for which a format has no place.
 
     Where the lens has coordinates of its own (``K_lens``), or K a skew that must go, K and the
@@ -54,7 +54,7 @@ def fit_kind(camera: Camera, kind: type[Lens] | None, format: Calibration) -> Le
         The camera.
     kind : type of Lens or None
         The lens it shall have.
-    format : Calibration
+    format : CalibrationFormat
         Where it is to go.
 
     Returns

@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
     from asterism.camera import Rig
 
-__all__ = ["CALIBRATIONS", "Calibration"]
+__all__ = ["CALIBRATIONS", "CalibrationFormat"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Calibration:
+class CalibrationFormat:
     """A calibration format.
 
     Parameters
@@ -57,10 +57,10 @@ class Calibration:
     has_k3: bool = True
 
 
-CALIBRATIONS: dict[str, Calibration] = {
+CALIBRATIONS: dict[str, CalibrationFormat] = {
     c.name: c
     for c in (
-        Calibration(
+        CalibrationFormat(
             name="rig",
             extensions=(".toml",),
             description="TOML of Asterism; keeps everything",
@@ -70,7 +70,7 @@ CALIBRATIONS: dict[str, Calibration] = {
             sniff=rig_toml.sniff,
             unit="m",
         ),
-        Calibration(
+        CalibrationFormat(
             name="anipose",
             extensions=(".toml",),
             description="TOML of anipose, freemocap and caliscope",
@@ -80,7 +80,7 @@ CALIBRATIONS: dict[str, Calibration] = {
             sniff=anipose.sniff,
             has_skew=False,
         ),
-        Calibration(
+        CalibrationFormat(
             name="opencv",
             extensions=(".yml", ".yaml"),
             description="YAML of OpenCV's FileStorage",
@@ -90,7 +90,7 @@ CALIBRATIONS: dict[str, Calibration] = {
             sniff=opencv.sniff,
             has_skew=False,
         ),
-        Calibration(
+        CalibrationFormat(
             name="qca",
             extensions=(".qca.txt", ".qca"),
             description="XML as Qualisys Track Manager exports it",
@@ -101,7 +101,7 @@ CALIBRATIONS: dict[str, Calibration] = {
             unit="mm",
             has_skew=False,
         ),
-        Calibration(
+        CalibrationFormat(
             name="xcp",
             extensions=(".xcp",),
             description="XML of Vicon",
@@ -112,7 +112,7 @@ CALIBRATIONS: dict[str, Calibration] = {
             unit="mm",
             has_skew=False,
         ),
-        Calibration(
+        CalibrationFormat(
             name="flydra",
             extensions=(),
             description="folder of flydra and the Multi-Camera Self-Calibration toolbox",
@@ -123,7 +123,7 @@ CALIBRATIONS: dict[str, Calibration] = {
             has_skew=False,  # beside a lens
             has_k3=False,
         ),
-        Calibration(
+        CalibrationFormat(
             name="myptv",
             extensions=(),
             description="folder of MyPTV's Tsai camera files, or one of them",
