@@ -130,7 +130,8 @@ def _print_map(values: dict[str, Any], title: str) -> None:
             ("seen by two cameras or more", f"{values['seen_by_two_percent']:.1f} %"),
             ("error where seen", f"{values['median_error_mm']:.3g} mm median, "
                 f"{values['percentile_95_error_mm']:.3g} mm in 95 %"),
-            ("over the volume", f"{values['rms_error_mm']:.3g} mm root mean square"),
+            ("over the volume", f"{values['rms_error_mm']:.3g} mm root mean square, where a place "
+                "that is not seen is as unsure as the volume is wide"),
         ],
         title=title,
     )  # fmt: skip
