@@ -50,16 +50,19 @@ class Figures:
         """Count one capture, stitched in so many milliseconds a frame."""
         self.rows.append((e.idf1, e.switches_per_1000, e.clutter_labelled_percent, ms))
 
-    def text(self) -> list[str]:
-        """Give the means, and the median of the times."""
-        rows = np.array(self.rows)
-        ghosts = rows[:, 2][~np.isnan(rows[:, 2])]
-        return [
-            f"{rows[:, 0].mean():.4f}",
-            f"{rows[:, 1].mean():.2f}",
-            f"{ghosts.mean():.1f}" if len(ghosts) else "–",
-            f"{np.median(rows[:, 3]):.3f}",
-        ]
+    def identity(self) -> str:
+        """Give mean IDF1 and switches for 1000 detections."""
+        idf1, switches = np.array(self.rows).mean(axis=0)[:2]
+        return f"{idf1:.4f} ({switches:.2f})"
+
+    def clutter(self) -> str:
+        """Give the mean share of clutter that has a label, %."""
+        share = np.array(self.rows)[:, 2]
+        return "–" if np.isnan(share).all() else f"{np.nanmean(share):.1f}"
+
+    def ms(self) -> str:
+        """Give the median time of a frame, milliseconds."""
+        return f"{np.median(np.array(self.rows)[:, 3]):.2f}"
 
 
 class Joins:
@@ -105,7 +108,7 @@ def main() -> None:
     options = parser.parse_args()
     found: dict[tuple[str, str, str], Figures] = {}
     floors: dict[tuple[str, int], list[float]] = {}
-    joins = {name: Joins() for name in options.methods}
+    joins = Joins()
     each: list[list[str]] = []
     for path in captures(options.data):
         capture = am.read(path) if options.only in path.name else None
@@ -129,36 +132,33 @@ def main() -> None:
                 ms = 1e3 * (time.process_time() - start) / d.n_frames
                 e = am.evaluate(stitching.tracks, truth)
                 if condition == "bursts":
-                    joins[name].add(stitching, truth)
+                    joins.add(stitching, truth)
                 found.setdefault((condition, name, "alone"), Figures()).add(alone, np.nan)
                 found.setdefault((condition, name, "stitched"), Figures()).add(e, ms)
                 row.append(f"{alone.idf1:.3f} → {e.idf1:.3f}")
             each.append(row)
             print(*row, sep=" | ", flush=True)
-    means: list[list[str]] = []
-    for condition in CONDITIONS:
-        at = [f"{np.mean(floors[condition, gap]):.4f}" for gap in (10, 60)]
-        means.append([condition, "floor at 10 frames", at[0], "", "", ""])
-        means.append([condition, "floor at 60 frames", at[1], "", "", ""])
-        for name in options.methods:
-            for way in ("alone", "stitched"):
-                figures = found[condition, name, way].text()
-                means.append(
-                    [condition, f"{name}, {way}", *figures[:3], figures[3].replace("nan", "–")]
-                )
-    lines = ["Means over the captures:", ""]
-    head = [
-        "",
-        "",
-        "IDF1",
-        "switches a 1000",
-        "ghosts and clutter labelled, %",
-        "stitching, ms of processor time a frame",
+    means = [
+        [f"floor at {gap} frames", *(f"{np.mean(floors[c, gap]):.4f}" for c in CONDITIONS)]
+        for gap in (10, 60)
     ]
-    lines += [*table(head, means), ""]
+    rest: list[list[str]] = []
     for name in options.methods:
-        lines += [f"Joins of {name} in bursts, by how probable they were held:", ""]
-        lines += [*table(["held for", "joins", "mean, %", "right, %"], joins[name].rows()), ""]
+        pairs = [(found[c, name, "alone"], found[c, name, "stitched"]) for c in CONDITIONS]
+        means.append([name, *(f"{a.identity()} → {b.identity()}" for a, b in pairs)])
+        rest.append(
+            [name, *(f"{a.clutter()} → {b.clutter()}" for a, b in pairs[1:]),
+             *(b.ms() for _, b in pairs)]
+        )  # fmt: skip
+    lines = ["Means over the captures, IDF1 (switches for 1000 detections), alone → stitched:", ""]
+    lines += [*table(["", *CONDITIONS], means), ""]
+    lines += [
+        "Ghosts and clutter that are labelled, %, and processor time of stitching a frame, ms:"
+    ]
+    head = [*list(CONDITIONS)[1:], *(f"ms, {c}" for c in CONDITIONS)]
+    lines += ["", *table(["", *head], rest), ""]
+    lines += ["Joins of all methods in bursts, by how probable they were held:", ""]
+    lines += [*table(["held for", "joins", "mean, %", "right, %"], joins.rows()), ""]
     lines += ["IDF1, alone → stitched:", ""]
     lines += table(["capture", "condition", "floor 10", "floor 60", *options.methods], each)
     lines += ["", f"{conditions()}."]
