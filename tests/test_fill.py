@@ -414,6 +414,32 @@ def test_what_is_bridged_knows_nothing_of_what_is_hidden(monkeypatch):
     assert np.isfinite(found.truth).all()
 
 
+def test_what_is_bridged_is_no_truth(monkeypatch):
+    """Neither an error nor the way through the gap is measured where a marker was bridged."""
+    truth = rigid(frames=90, noise=1e-4)
+    holes = [(0, t, t) for t in (20, 40)]
+    positions = hidden_at(truth, (0, 60, 66), *holes).positions()
+    take = estimates.Take(times=truth.detections.times, positions=positions, model=MODEL)
+    seen_by_carried = []
+    carried = estimates._carried
+    monkeypatch.setattr(
+        estimates,
+        "_carried",
+        lambda name, base, there, is_end, *rest: (
+            seen_by_carried.append((there, is_end)) or carried(name, base, there, is_end, *rest)
+        ),
+    )
+    found = estimates.estimate(take, Span(track=0, first=60, last=66))
+    own = take.seen[found.windows, 0]
+    assert not own.all()  # some windows have a hole
+    for there, is_end in seen_by_carried:
+        hidden = np.isfinite(there[:-1, ~is_end]).all(axis=2)
+        np.testing.assert_array_equal(hidden, own[:, ~is_end])
+        assert np.isfinite(there[:, is_end]).all()
+    np.testing.assert_array_equal(np.isfinite(found.truth).all(axis=2), own[:, ~is_end])
+    assert all(np.isfinite(one.values).all() for one in found.each)
+
+
 def test_doubt_grows_as_estimators_disagree():
     rng = np.random.default_rng(0)
     z = rng.normal(size=(200, 5, 3))

@@ -174,8 +174,10 @@ def estimate(take: Take, span: Span) -> Estimates:
         places = places - mean
         rigid = np.full(span.length, (places[is_known] ** 2).mean())
         rigid *= _caution(is_known.sum() / span.length)
+        there = places[at]
+        there[~own[every] & ~is_end] = np.nan  # what is bridged is no truth to choose a way by
         found.append(
-            _carried("body", np.zeros((*every.shape, X.shape[2])), places[at], is_end, ways,
+            _carried("body", np.zeros((*every.shape, X.shape[2])), there, is_end, ways,
                      room, rigid)
         )  # fmt: skip
         if is_known.sum() >= LEAST_PATTERN:
@@ -190,7 +192,7 @@ def estimate(take: Take, span: Span) -> Estimates:
                 _carried(
                     "pattern",
                     base,
-                    places[at],
+                    there,
                     is_end,
                     ways,
                     room,
