@@ -23,7 +23,7 @@ from asterism.label.gap import estimates
 from asterism.label.gap.bodies import fit_body
 from asterism.label.gap.ends import CAREFUL, NOISES, OFFSETS, SPANS, bridges, is_steady
 from asterism.label.gap.patterns import RIDGES, learn_pattern
-from asterism.label.gap.scores import _doubt, _weights
+from asterism.label.gap.scores import _doubt, _profile, _weights
 from asterism.label.gap.spans import Span, find_gaps, held_out, n_apart, usable_ends
 from asterism.simulate import Burst
 
@@ -438,6 +438,16 @@ def test_what_is_bridged_is_no_truth(monkeypatch):
         assert np.isfinite(there[:, is_end]).all()
     np.testing.assert_array_equal(np.isfinite(found.truth).all(axis=2), own[:, ~is_end])
     assert all(np.isfinite(one.values).all() for one in found.each)
+
+
+def test_the_profile_is_the_mean_over_what_is_known():
+    rng = np.random.default_rng(0)
+    off = rng.normal(size=(6, 5, 3))
+    off[:4, 1] = np.nan
+    off[:, 3] = np.nan  # nobody knows: by the frames around it
+    expected = [np.mean([x @ x / 3 for x in off[:, t] if np.isfinite(x[0])]) for t in (0, 1, 2, 4)]
+    between = (expected[2] + expected[3]) / 2
+    np.testing.assert_allclose(_profile(off), [*expected[:3], between, expected[3]])
 
 
 def test_doubt_grows_as_estimators_disagree():
