@@ -70,13 +70,12 @@ def map_(
     """
     import numpy as np
 
-    from asterism.app.files import check_outputs
+    from asterism.app.files import check_ending, check_outputs
     from asterism.app.options import as_options
     from asterism.reconstruct import triangulation_map
 
     check_outputs({"-o": out}, [calibration])
-    if out is not None and out.suffix.lower() != ".png":
-        raise ParameterError("-o", "a name ending in .png", str(out))
+    check_ending("-o", out, ".png")
     if (low is None) != (high is None):
         raise ParameterError("--low", "both --low and --high, or neither", "one of them")
     rig = read_calibration(calibration, from_format, units)

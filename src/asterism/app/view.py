@@ -39,13 +39,12 @@ def view(
         asterism view trial.tracked.csv --rig walk.xcp --save scene.rrd
     """
     import asterism as am
-    from asterism.app.files import check_outputs, read_labels
+    from asterism.app.files import check_ending, check_outputs, read_labels
     from asterism.app.recording import rig_from
     from asterism.errors import ParameterError
 
     check_outputs({"--save": save}, [tracked, None if rig is None else Path(rig)])
-    if save is not None and save.suffix.lower() != ".rrd":
-        raise ParameterError("--save", "a name ending in .rrd", str(save))
+    check_ending("--save", save, ".rrd")
     tracks = read_labels(tracked)
     cameras: am.Rig | None = None
     if rig is not None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism import _engine
-from asterism.errors import ParameterError, check_kind, check_number
+from asterism.errors import check_kind, check_number
 from asterism.label.bonds import Bonds, learn_bonds
 from asterism.label.passes import go_through
 from asterism.model import TrackingModel, Tracks
@@ -177,9 +177,7 @@ def stitch(
     Stitching(... tracks, ... joins, ... cuts, ... ghosts)
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
-    if not isinstance(model, TrackingModel):  # pyright: ignore[reportUnnecessaryIsInstance]
-        hint = "try am.estimate_model(detections).model"
-        raise ParameterError("model", "a TrackingModel", type(model).__name__, hint)
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     check_options(confirm, ghost_radius, max_hidden)
     tracks = tracks.measured()
     d = tracks.detections
