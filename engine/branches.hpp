@@ -36,7 +36,7 @@ struct BranchOptions {
 };
 
 // How much a believed track expects a detection: w_j / (w_0 + Σ_{l≠j} w_l), where
-// w_j = P_d N(y_j; ŷ, S) / λ_f and w_0 = 1 - P_d. Who else takes it lowers the likelihood of the
+// w_j = P_d N(y_j; ŷ, S) / λ_f and w_0 = 1 - P_d (P_r after a miss). Who else takes it lowers the likelihood of the
 // frame by the factor 1 + this.
 struct Claim {
   std::int64_t track = 0;  // its key
@@ -105,7 +105,7 @@ class BranchGrower {
   // What a branch is worth. Jointly, its part of the posterior: no less for misses after which the
   // track may have ended.
   double worth(const Branch& b) const {
-    if (opt_.is_joint) return b.score - b.gap * live_.miss_gain() + opt_.log_end[b.gap];
+    if (opt_.is_joint) return b.score - live_.misses_gain(0, b.gap) + opt_.log_end[b.gap];
     return rank(b);
   }
 
@@ -140,15 +140,14 @@ class BranchGrower {
     parent.distance2[slot] = 0;
     if (parent.has_ended) {
       if (opt_.is_joint) {  // one more frame in which it was not seen
-        ++parent.gap;
-        parent.score += live_.miss_gain();
+        parent.score += live_.miss_gain(parent.gap++);
       }
       out.push_back(std::move(parent));
       return;
     }
     predict(live_.m, frame.step, parent.state);
     const Prediction prediction(live_.m, parent.state);
-    const double hit = live_.hit_gain(), miss = live_.miss_gain();
+    const double hit = live_.hit_gain(parent.gap), miss = live_.miss_gain(parent.gap);
     const double least =
         track.is_confirmed() ? miss + live_.leftover_gain() - hit - opt_.prune_drop
                     : -std::numeric_limits<double>::infinity();
@@ -190,7 +189,7 @@ class BranchGrower {
     MotionState state = best.state;
     predict(live_.m, frame.step, state);
     const Prediction prediction(live_.m, state);
-    const double log_seen = live_.sm.log_detect - live_.sm.log_clutter;
+    const double log_seen = live_.sm.log_seen(best.gap) - live_.sm.log_clutter;
     // Less is nothing beside the clutter.
     const double radius = prediction.radius(live_.opt.gate, kNoClaim - log_seen,
                                              frame.grid.r_most());
@@ -205,7 +204,7 @@ class BranchGrower {
     for (std::size_t c = first; c < frame.claims.size(); ++c)
       weights_.push_back(frame.claims[c].value);
     for (std::size_t c = 0; c < weights_.size(); ++c) {
-      double others = std::exp(live_.sm.log_miss);
+      double others = std::exp(live_.sm.log_missed(best.gap));
       for (std::size_t l = 0; l < weights_.size(); ++l)
         if (l != c) others += weights_[l];
       Claim& claim = frame.claims[first + c];

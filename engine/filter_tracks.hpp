@@ -4,6 +4,7 @@
 // propagated one by one with their true spacing: white noise per step does not compose.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -23,21 +24,35 @@ struct Timeline {
 };
 
 // Everything that s(τ) needs besides the filter; logs of the model's parameters.
+//
+// Whether a marker is seen depends on whether it was in the frame before (Gilbert 1960): P_d where it
+// was, P_r where it was missed. Where P_r = P_d, misses are independent.
 struct ScoreModel {
-  double log_birth = 0, log_clutter = 0, log_detect = 0, log_miss = 0, log_survive = 0;
-  double p_disappear = 0, p_detection = 0;
+  double log_birth = 0, log_clutter = 0, log_survive = 0;
+  double p_disappear = 0, p_detection = 0, p_redetection = 0;
   double max_speed = 0, speed_margin = 0;
   int max_gap = 1;
   bool last_termination = false;  // the report's: dead right after the last detection
+  double log_detect = std::log(p_detection), log_miss = std::log1p(-p_detection);
+  double log_redetect = std::log(p_redetection), log_remiss = std::log1p(-p_redetection);
+
+  // Of a marker that was missed in the last `missed` frames: it is seen; it is missed again; it is
+  // missed n times in a row.
+  double log_seen(std::int64_t missed) const { return missed > 0 ? log_redetect : log_detect; }
+  double log_missed(std::int64_t missed) const { return missed > 0 ? log_remiss : log_miss; }
+  double log_misses(std::int64_t missed, std::int64_t n) const {
+    return n > 0 ? log_missed(missed) + static_cast<double>(n - 1) * log_remiss : 0.0;
+  }
 };
 
 // log E_r: nothing more is seen in the r frames that are left (summed over the time of death).
 inline std::vector<double> log_end_table(const ScoreModel& m, std::int64_t n_frames) {
   std::vector<double> table(n_frames + 1, 0.0);
-  double E = 1;
+  double E = 1;  // of r frames more, after a miss
   for (std::int64_t r = 1; r <= n_frames; ++r) {
-    E = m.p_disappear + (1 - m.p_disappear) * (1 - m.p_detection) * E;
-    table[r] = m.last_termination ? std::log(m.p_disappear) : std::log(E);
+    const double alive = (1 - m.p_disappear) * E;
+    table[r] = std::log(m.p_disappear + (m.last_termination ? 0 : alive * (1 - m.p_detection)));
+    E = m.p_disappear + alive * (1 - m.p_redetection);
   }
   return table;
 }
@@ -54,14 +69,14 @@ inline double score_track(const MotionModel& m, const ScoreModel& sm, const Time
   constexpr double impossible = -std::numeric_limits<double>::infinity();
   const auto n = static_cast<std::int64_t>(points.size());
   if (n < 2) return impossible;
-  double s = sm.log_birth + n * (sm.log_detect - sm.log_clutter);
+  double s = sm.log_birth + sm.log_detect - n * sm.log_clutter;
   MotionState state = begin_state(m, points[0]);
   for (std::int64_t i = 1; i < n; ++i) {
     const std::int64_t gap = frames[i] - frames[i - 1];
     const double dt = line.times[frames[i]] - line.times[frames[i - 1]];
     if (gap > sm.max_gap || !is_reachable(sm, points[i - 1], points[i], dt, m.axis.D)) return impossible;
     for (std::int64_t t = frames[i - 1] + 1; t <= frames[i]; ++t) predict(m, line.step(t), state);
-    s += (gap - 1) * sm.log_miss + gap * sm.log_survive +
+    s += sm.log_misses(0, gap - 1) + sm.log_seen(gap - 1) + gap * sm.log_survive +
          update(m, Prediction(m, state), points[i], state);
   }
   const auto left = static_cast<std::int64_t>(line.times.size()) - 1 - frames[n - 1];

@@ -141,13 +141,13 @@ class Forest {
     predict(open_.live.m, frame.step, state);
     const Prediction prediction(open_.live.m, state);
     const std::int32_t n_missed = std::min(open_.n_open() + 1, open_.live.sm.max_gap - track.gap);
-    const double gone = track.score + n_missed * open_.live.miss_gain();
+    const double gone = track.score + open_.live.misses_gain(track.gap, n_missed);
     const double over = open_.live.leftover_gain();
     std::array<double, kMaxModes> each{};
     for (std::size_t k = 1; k < ways.size(); ++k) {
       const Branch& b = track.more.branches[ways[k].branch];
       const double hit =
-          open_.live.hit_gain() + prediction.log_likelihood(frame.points[ways[k].column], each);
+          open_.live.hit_gain(track.gap) + prediction.log_likelihood(frame.points[ways[k].column], each);
       const double future = b.score + ways[k].crowding - track.score - hit - over * (b.n_taken - 1);
       if (future > 0)
         ways[k].newborn = gone + open_.live.birth_gain() - over + future + std::log1p(-std::exp(-future));

@@ -96,15 +96,17 @@ class FrameTracker {
       live_.predict_all(step);
       return pair_all(points);
     }
-    const double hit = live_.hit_gain(), miss = live_.miss_gain(), over = live_.leftover_gain();
+    const double over = live_.leftover_gain();
     const double spare = carried_.is_on() ? carried_.bond_weight() : 0;
     // A believed track takes a point only if that beats missing it and leaving the point over.
-    const double least = miss + over - hit - spare;
     const auto least_of = [&](std::size_t i) {
-      return live_[i].is_confirmed() ? least : -std::numeric_limits<double>::infinity();
+      const std::int32_t gap = live_[i].gap;
+      return live_[i].is_confirmed() ? live_.miss_gain(gap) + over - live_.hit_gain(gap) - spare
+                                     : -std::numeric_limits<double>::infinity();
     };
     const auto gain_of = [&](std::size_t i, double log_likelihood) {
-      return odds(i, hit + log_likelihood) - odds(i, miss) - over;
+      const std::int32_t gap = live_[i].gap;
+      return odds(i, live_.hit_gain(gap) + log_likelihood) - odds(i, live_.miss_gain(gap)) - over;
     };
     if (!carried_.is_on())
       return live_.candidates(time, step, points, 0.0, least_of, gain_of, s_.candidates);
@@ -191,14 +193,14 @@ class FrameTracker {
       LiveTrack<NoMore>& track = live_[i];
       const std::int32_t j = s_.match[i];
       if (j < 0) {
-        track.score += live_.miss_gain();
+        track.score += live_.miss_gain(track.gap);
         ++track.gap;
         carried_.miss(track, i, stats);
         continue;
       }
       carried_.take(live_, i, points[j], stats);
       const Point y = measured(i, points);
-      track.score += live_.hit_gain() + update(live_.m, live_.prediction(i), y, track.state);
+      track.score += live_.hit_gain(track.gap) + update(live_.m, live_.prediction(i), y, track.state);
       live_.take(i, j, y, time, 1.0, label);
     }
     live_.end_tracks();

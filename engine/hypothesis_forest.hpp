@@ -115,7 +115,7 @@ class HypothesisForest {
         tree.options.push_back({0, {}});
         tree.choices.push_back({kNothing, -1});
       } else if (!has_free) {
-        const double lost = track.score - track.gap * open_.live.miss_gain() +
+        const double lost = track.score - open_.live.misses_gain(0, track.gap) +
                             open_.branches.log_end[track.gap + open_.n_open()];
         tree.options.push_back({lost, {}});
         tree.choices.push_back({kLost, -1});

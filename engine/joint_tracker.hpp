@@ -7,6 +7,9 @@
 //   β_ij     marginals of the joint events (joint_events.hpp)
 //   r⁺       1 - β_i0 + β_i0 r (1 - P_d) / (1 - r P_d)
 //
+// P_d is each track's own: that of a marker seen in the frame before or missed there, weighed by how
+// probable either is (“Markov chain two” of Musicki, Evans & Stankovic 1994).
+//
 // Believed tracks share the detections first; tentative ones take what they leave over, by the
 // likeliest event: they know so little that a mean over what fits would be nowhere.
 #pragma once
@@ -93,10 +96,15 @@ class JointTracker {
 
   static double probability(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
 
-  double not_seen(double score) const {  // 1 - r P_d
-    return probability(-score) + probability(score) * p_miss();
+  double not_seen(std::size_t i, double score) const {  // 1 - r P_d
+    return probability(-score) + probability(score) * p_miss(i);
   }
-  double p_miss() const { return std::exp(live_.sm.log_miss); }
+  // Of a track that exists, in this frame.
+  double p_miss(std::size_t i) const {
+    const double missed = live_.tracks[i].p_missed;
+    return (1 - missed) * std::exp(live_.sm.log_miss) + missed * std::exp(live_.sm.log_remiss);
+  }
+  double p_detect(std::size_t i) const { return 1 - p_miss(i); }
 
   // The log odds that a track exists, as far as sharing the detections goes.
   double existence(std::size_t i) const {
@@ -124,11 +132,11 @@ class JointTracker {
 
   void find_candidates(double time, const MotionStep& step, std::span<const Point> points,
                        FrameStats& stats) {
-    const double common =
-        live_.sm.log_detect - live_.sm.log_clutter - live_.leftover_gain();
+    const double common = -live_.sm.log_clutter - live_.leftover_gain();
     const double least = kNegligible - (carried_.is_on() ? carried_.bond_weight() : 0);
     const auto offset = [&](std::size_t i) {
-      return common - softplus(-existence(i)) - std::log(not_seen(existence(i)));
+      return common + std::log(p_detect(i)) - softplus(-existence(i)) -
+             std::log(not_seen(i, existence(i)));
     };
     const auto least_of = [&](std::size_t i) { return least - offset(i); };
     const auto gain_of = [&](std::size_t i, double log_likelihood) {
@@ -245,7 +253,7 @@ class JointTracker {
       if (carried_.is_carried(i) && s_.match[i] < 0) continue;
       if (s_.match[i] >= 0) carried_.take(live_, i, points[s_.match[i]], stats);
       // Given that the track exists, a miss is less likely than it is in itself.
-      const double seldom = probability(existence(i)) * p_miss() / not_seen(existence(i));
+      const double seldom = probability(existence(i)) * p_miss(i) / not_seen(i, existence(i));
       const double missed = std::max(1 - taken, 0.0) * seldom;
       for (WeightedPoint& point : s_.mixture) point.weight /= taken + missed;
       update_by_all(live_.m, live_.prediction(i), s_.mixture, missed / (taken + missed),
@@ -290,11 +298,12 @@ class JointTracker {
   // The odds that a track exists change by the same factor, whatever they are taken to be.
   void update_existence(std::size_t i) {
     const double taken_as = existence(i), missed = std::max(s_.missed[i], 1e-300);
-    const double exists =
-        (1 - missed) * not_seen(taken_as) + missed * probability(taken_as) * p_miss();
+    const double hidden = missed * probability(taken_as) * p_miss(i);
+    const double exists = (1 - missed) * not_seen(i, taken_as) + hidden;
     const double factor = std::log(exists) - std::log(missed) + softplus(taken_as) - taken_as;
     double& score = live_[i].score;
     score = std::clamp(score + factor, -kMostOdds, kMostOdds);
+    live_[i].p_missed = hidden / exists;
   }
 
   void begin_tracks(double time, std::span<const Point> points) {

@@ -5,7 +5,7 @@
 //
 // The score of a track is the log odds of “these detections are one marker” against “they are
 // clutter”: log λ_b - log λ_f + log P_d at birth, then per frame log(1 - p_z) and either
-// log P_d N(y; ŷ, S) / λ_f or log(1 - P_d).
+// log P_d N(y; ŷ, S) / λ_f or log(1 - P_d), with P_r for P_d after a miss.
 #pragma once
 
 #include <algorithm>
@@ -47,6 +47,7 @@ struct LiveTrack {
   std::int32_t gap = 0;  // frames since the last detection
   std::int32_t carried = 0;  // of these, in which its neighbours told where it is
   double score = 0, best_score = 0;
+  double p_missed = 0;  // in the last frame, if it exists: where pairings are weighed, not decided
   double first_time = 0, last_time = 0;
   Point last{};
   MotionState state;
@@ -147,8 +148,14 @@ class LiveTracks {
   const Prediction& prediction(std::size_t i) const { return s_.predictions[i]; }
 
   double birth_gain() const { return sm.log_birth + sm.log_detect - sm.log_clutter; }
-  double hit_gain() const { return sm.log_survive + sm.log_detect - sm.log_clutter; }
-  double miss_gain() const { return sm.log_survive + sm.log_miss; }
+  // Of a track that was missed in the last `missed` frames; less the likelihood of what it takes.
+  double hit_gain(std::int64_t missed) const {
+    return sm.log_survive + sm.log_seen(missed) - sm.log_clutter;
+  }
+  double miss_gain(std::int64_t missed) const { return sm.log_survive + sm.log_missed(missed); }
+  double misses_gain(std::int64_t missed, std::int64_t n) const {
+    return static_cast<double>(n) * sm.log_survive + sm.log_misses(missed, n);
+  }
   // A point that no track takes is clutter or a new marker, not clutter alone.
   double leftover_gain() const { return softplus(birth_gain()); }
 

@@ -174,16 +174,17 @@ struct Prediction {
   // log likelihood may exceed `least`: its radius, negative where there is none. Points may have noise
   // of their own up to `r_most`.
   double radius(double gate, double least, double r_most) const {
-    double widest = -1;
+    // One mode may have it in its gate and another make it likely.
+    double gated = -1, likely = -1;
     for (int b = 0; b < M; ++b) {
+      const double offset = std::sqrt(squared_distance(y[b], center, D));
+      const auto reach = [&](double chi2) { return offset + std::sqrt(chi2 * (S[b] + r_most)); };
+      gated = std::max(gated, reach(gate));
       // Of M summands the largest is at least the sum over M.
       const double worth = 2 * (log_peak[b] + std::log(static_cast<double>(M)) - least);
-      const double chi2 = std::min(gate, worth);
-      if (!(chi2 > 0)) continue;
-      widest = std::max(widest, std::sqrt(chi2 * (S[b] + r_most)) +
-                                    std::sqrt(squared_distance(y[b], center, D)));
+      if (worth > 0) likely = std::max(likely, reach(worth));
     }
-    return widest;
+    return std::min(gated, likely);
   }
 
   bool is_gated(const Point& point, double gate) const {

@@ -59,11 +59,11 @@ struct OpenWindow {
       const Point& y = frame.points[own];
       track.more.lambda = branches.fading * track.more.lambda + surprise(prediction, y);
       ++track.more.n_updates;
-      track.score += live.hit_gain() + update(live.m, prediction, y, track.state);
+      track.score += live.hit_gain(track.gap) + update(live.m, prediction, y, track.state);
       track.last = y;
       track.last_time = frame.time;
     } else {
-      track.score += live.miss_gain();
+      track.score += live.miss_gain(track.gap);
     }
   }
 

@@ -103,7 +103,7 @@ class Partition {
 
   double begin_score() const { return sm_.log_birth + sm_.log_detect - sm_.log_clutter; }
   double gap_score(int gap) const {
-    return sm_.log_detect - sm_.log_clutter + gap * sm_.log_survive + (gap - 1) * sm_.log_miss;
+    return sm_.log_misses(0, gap - 1) + sm_.log_seen(gap - 1) - sm_.log_clutter + gap * sm_.log_survive;
   }
   double end_score(std::int32_t i) const {
     const std::int64_t left = window_.now() - window_[i].frame;

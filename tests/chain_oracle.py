@@ -18,6 +18,7 @@ from asterism.model.compiled import (
     score_model,
     steps_of,
 )
+from oracles import chance_seen
 
 MOVES = (
     "birth", "death", "split", "merge", "extension", "reduction", "update", "switch", "insertion",
@@ -77,11 +78,11 @@ class Oracle:
         return 1 <= gap <= self.gap and np.linalg.norm(d.points[i] - d.points[j]) <= reach
 
     def log_end(self, i) -> float:
-        p, miss = self.model.population.p_disappear, 1 - self.model.sensor.p_detection
+        p = self.model.population.p_disappear
         left = self.d.n_frames - 1 - self.frame[i]
         E = 1.0
-        for _ in range(left):
-            E = p + (1 - p) * miss * E
+        for missed in reversed(range(left)):
+            E = p + (1 - p) * (1 - chance_seen(self.model, missed)) * E
         if self.model.population.termination == "last":
             E = p if left else 1.0
         return math.log(E)

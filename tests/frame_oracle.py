@@ -13,6 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.stats import chi2
 
 import asterism as am
+from oracles import chance_seen
 
 
 @cache
@@ -88,8 +89,13 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
     s, p = model.sensor, model.population
     gate = chi2.isf(method.gate_probability, detections.n_axes)
     survive = math.log1p(-p.p_disappear)
-    miss = survive + math.log1p(-s.p_detection)
-    hit = survive + math.log(s.p_detection / s.clutter_density)
+
+    def hit(gap: int) -> float:
+        return survive + math.log(chance_seen(model, gap) / s.clutter_density)
+
+    def miss(gap: int) -> float:
+        return survive + math.log1p(-chance_seen(model, gap))
+
     leftover = math.log1p(p.birth_density * s.p_detection / s.clutter_density)
     confirm = math.log(method.confirm_probability / (1 - method.confirm_probability))
     labels = np.full(detections.n_points, -1)
@@ -102,7 +108,7 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
             track.predict(round(now - detections.times[t - 1], 9))
             reach = p.max_speed * (now - track.last_time) + 6 * s.noise_sigma
             odds = track.odds
-            missed = odds(miss) + leftover
+            missed = odds(miss(track.gap)) + leftover
             for j in np.flatnonzero(np.linalg.norm(points - track.last, axis=1) <= reach):
                 y = points[j]
                 if not track.within(y, gate):
@@ -110,7 +116,7 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
                 total = track.densities(y).sum()
                 if total <= 0:
                     continue
-                gain = odds(hit + math.log(total)) - missed
+                gain = odds(hit(track.gap) + math.log(total)) - missed
                 if gain > 0:
                     gains[i, j] = gain
         believed = np.array([track.id >= 0 for track in tracks], dtype=bool)
@@ -121,14 +127,14 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
         match |= pair(tracks, points, rest, method)
         for i, track in enumerate(tracks):
             if i not in match:
-                track.score += miss
+                track.score += miss(track.gap)
                 track.gap += 1
                 continue
             several = sorted(match[i], key=lambda j, i=i: -gains[i, j])
             weights = np.array([track.densities(points[j]).sum() for j in several])
             y = weights @ points[several] / weights.sum()
             detection = int(detections.offsets[t]) + several[0]
-            track.score += hit + math.log(track.densities(y).sum())
+            track.score += hit(track.gap) + math.log(track.densities(y).sum())
             track.update(y)
             track.gap, track.last, track.last_time = 0, y, now
             track.pending.append(detection)

@@ -108,7 +108,7 @@ def components(weights: np.ndarray) -> list[list[int]]:
 class SoftTrack(OneTrack):
     """A track with a probability to exist."""
 
-    certainty = 1.0
+    missed = 0.0  # probability that it was missed in the last frame, if it exists
 
     def sure(self, method, confirm: float) -> float:
         """Log odds of its existence as far as sharing goes."""
@@ -153,18 +153,19 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
         now, points = detections.times[t], detections.frame(t)
         first = int(detections.offsets[t])
         n, m = len(tracks), len(points)
-        weights, missed = np.zeros((n, m)), np.ones(n)
+        weights, missed, p_seen = np.zeros((n, m)), np.ones(n), np.ones(n)
         for i, track in enumerate(tracks):
             r = (1 - p_z) * sigmoid(track.score)
             track.score = math.log(r) - math.log(1 - r)
             r = sigmoid(track.sure(method, confirm))
-            missed[i] = 1 - r * P_d
+            p_seen[i] = (1 - track.missed) * P_d + track.missed * s.p_after_miss
+            missed[i] = 1 - r * p_seen[i]
             track.predict(round(now - detections.times[t - 1], 9))
             reach = p.max_speed * (now - track.last_time) + 6 * s.noise_sigma
             for j in np.flatnonzero(np.linalg.norm(points - track.last, axis=1) <= reach):
                 y = points[j]
                 if track.within(y, gate):
-                    weights[i, j] = r * P_d * track.densities(y).sum() / density
+                    weights[i, j] = r * p_seen[i] * track.densities(y).sum() / density
         believed = np.array([track.id >= 0 for track in tracks], dtype=bool)
         free, taken = np.ones(m), np.zeros(m, dtype=bool)
         beta, match = np.zeros((n, m + 1)), np.full(n, -1)
@@ -191,7 +192,7 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
                 beta[rows] = found
                 for i, share in zip(rows, moved, strict=True):
                     r = sigmoid(tracks[i].sure(method, confirm))
-                    share[m] *= r * (1 - P_d) / (1 - r * P_d)
+                    share[m] *= r * (1 - p_seen[i]) / (1 - r * p_seen[i])
                     share = share / share.sum()
                     some_j = np.flatnonzero(share[:m])
                     if len(some_j):
@@ -203,8 +204,10 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
         for i, track in enumerate(tracks):
             as_if = track.sure(method, confirm)
             r = sigmoid(as_if)
-            after = 1 - beta[i, m] + beta[i, m] * r * (1 - P_d) / (1 - r * P_d)
-            gone = beta[i, m] * (1 - r) / (1 - r * P_d)
+            hidden = beta[i, m] * r * (1 - p_seen[i]) / (1 - r * p_seen[i])
+            after = 1 - beta[i, m] + hidden
+            gone = beta[i, m] * (1 - r) / (1 - r * p_seen[i])
+            track.missed = hidden / after
             track.score += min(math.log(after) - math.log(max(gone, 1e-300)) - as_if, 700)
             j = match[i]
             if j < 0:

@@ -108,6 +108,30 @@ def imm_log_densities(model: TrackingModel, times, frames, points):
     return np.array(out)
 
 
+def chance_seen(model: TrackingModel, missed: int) -> float:
+    """Probability that a marker is seen that was missed in the last so many frames."""
+    sensor = model.sensor
+    if missed and sensor.p_redetection is not None:
+        return sensor.p_redetection
+    return sensor.p_detection
+
+
+def unseen(model: TrackingModel, r: int) -> float:
+    """Probability that a marker that was just seen lives r frames more and is seen in none."""
+    alive = 1 - model.population.p_disappear
+    return math.prod(alive * (1 - chance_seen(model, k)) for k in range(r))
+
+
+def chances(model: TrackingModel, frames) -> list[float]:
+    """Probability of what happened in each frame from the first detection to the last."""
+    was_seen, missed, each = set(np.asarray(frames).tolist()), 0, []
+    for t in range(frames[0], frames[-1] + 1):
+        p = chance_seen(model, missed)
+        each.append(p if t in was_seen else 1 - p)
+        missed = 0 if t in was_seen else missed + 1
+    return each
+
+
 def track_score(model: TrackingModel, times, frames, points, log_densities) -> float:
     """s(τ), term by term, with E_r summed over the time of death instead of by recursion."""
     population, sensor = model.population, model.sensor
@@ -123,17 +147,15 @@ def track_score(model: TrackingModel, times, frames, points, log_densities) -> f
             return -math.inf
     survived = frames[-1] - frames[0]
     r = len(times) - 1 - frames[-1]
-    p_z, p_d = population.p_disappear, sensor.p_detection
-    miss = (1 - p_z) * (1 - p_d)
+    p_z = population.p_disappear
     if population.termination == "last":
         end = p_z if r else 1.0
     else:
-        end = sum(miss**k * p_z for k in range(r)) + miss**r
+        end = sum(unseen(model, k) * p_z for k in range(r)) + unseen(model, r)
     return (
         math.log(population.birth_density)
         - n * math.log(sensor.clutter_density)
-        + n * math.log(p_d)
-        + (survived + 1 - n) * math.log(1 - p_d)
+        + sum(math.log(p) for p in chances(model, frames))
         + survived * math.log(1 - p_z)
         + math.log(end)
         + sum(log_densities[1:])

@@ -61,10 +61,12 @@ def tiny_problem(rng: np.random.Generator, n_frames: int, most: int, n_axes: int
 
 def tiny_model(rng: np.random.Generator) -> am.TrackingModel:
     """A model under which such points have several explanations that are worth something."""
+    p_detection = float(rng.uniform(0.6, 0.95))
     return small_model(
         motion=am.DWNA(acceleration_sigma=2.0, velocity_sigma=0.4),
         noise_sigma=0.01,
-        p_detection=float(rng.uniform(0.6, 0.95)),
+        p_detection=p_detection,
+        p_redetection=p_detection**2,
         clutter_density=float(rng.uniform(1, 30)),
         birth_density=float(rng.uniform(0.5, 10)),
         p_disappear=float(rng.uniform(0.01, 0.3)),

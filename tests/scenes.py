@@ -13,6 +13,7 @@ def small_model(**changes) -> am.TrackingModel:
         "motion": am.DWNA(acceleration_sigma=2.0, velocity_sigma=0.8),
         "noise_sigma": 0.005,
         "p_detection": 0.9,
+        "p_redetection": 0.6,
         "clutter_density": 0.5,
         "birth_density": 0.05,
         "p_disappear": 0.01,
@@ -26,6 +27,7 @@ def small_model(**changes) -> am.TrackingModel:
         sensor=am.Sensor(
             noise_sigma=values["noise_sigma"],
             p_detection=values["p_detection"],
+            p_redetection=values["p_redetection"],
             clutter_density=values["clutter_density"],
         ),
         population=am.Population(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.associate.clip_misses import Sightings, count_sightings
 from scenes import wanderers
 
 
@@ -129,3 +130,59 @@ def test_one_marker_in_the_plane():
     positions = np.stack([np.cos(t), np.sin(t)], axis=1)[:, None]
     truth = am.Tracks.from_dense(t, positions)
     assert am.evaluate(am.track(truth.detections), truth).idf1 == 1.0
+
+
+def test_misses_in_runs_are_told_from_single_ones():
+    seed = 1
+    quiet = am.simulate.SCENES["person"].make(activity="walk", seed=seed)
+    runs = {"missing": 0.15, "missing_run": 4.0, "noise": 3e-4, "clutter": 0.1, "seed": seed}
+    d = am.simulate.sense(quiet, **runs).detections
+    found = am.estimate_model(d, misses="runs")
+    sensor, stds = found.model.sensor, found.stds
+    P_d = 1 - 0.15 / 0.85 / 4
+    assert abs(sensor.p_detection - P_d) < 4 * stds["p_detection"]
+    assert abs(sensor.p_redetection - 0.25) < 4 * stds["p_redetection"]
+    assert stds["p_redetection"] < 0.03
+    assert "redetection P_r" in str(found)
+    # Asked for one rate, it is the share of the frames; and single misses make no runs.
+    one = am.estimate_model(d).model.sensor
+    assert one.p_redetection is None
+    assert one.p_detection == pytest.approx(0.85, abs=0.02)
+    single = am.simulate.sense(quiet, **runs | {"missing_run": None}).detections
+    found = am.estimate_model(single, misses="runs")
+    assert found.model.sensor.p_redetection is None
+    assert "no more than by chance" in str(found)
+    assert found.model == am.estimate_model(single).model
+
+
+def tracks_of(frames: list[list[tuple[float, int]]]) -> am.Tracks:
+    """Points on a line, each with its label."""
+    d = am.Detections.from_frames(
+        np.arange(len(frames)) * 0.1,
+        [np.array([[x, 0.0, 0.0] for x, _ in f]).reshape(-1, 3) for f in frames],
+    )
+    return am.Tracks(detections=d, labels=np.array([k for f in frames for _, k in f]))
+
+
+def test_a_marker_that_was_lost_was_not_missed():
+    moving = [[(0.1 * t, 0)] for t in range(12)]
+    hidden = [f if t not in (4, 5, 6, 9) else [] for t, f in enumerate(moving)]
+    assert count_sightings(tracks_of(hidden), 0.05) == Sightings(7 - 2, 2, 2, 2)
+    # What is there, near where it is expected, in no track: lost.
+    lost = [[(0.1 * t + 0.03, -1)] if t in (4, 5, 6) else f for t, f in enumerate(hidden)]
+    assert count_sightings(tracks_of(lost), 0.05) == Sightings(7 - 1, 1, 1, 0)
+    far = [[(0.1 * t + 0.07, -1)] if t in (4, 5, 6) else f for t, f in enumerate(hidden)]
+    assert count_sightings(tracks_of(far), 0.05) == Sightings(7 - 2, 2, 2, 2)
+    # In a track that begins within the gap and goes on: lost. In one that was there: hidden.
+    begun = [
+        [*f, (0.1 * t + (0.03 if t < 7 else 0.5), 1)] if t >= 4 else f for t, f in enumerate(hidden)
+    ]
+    assert count_sightings(tracks_of(begun), 0.05).misses == 1
+    old = [[*f, (0.1 * t + (0.03 if t in (4, 5, 6) else 0.5), 1)] for t, f in enumerate(hidden)]
+    assert count_sightings(tracks_of(old), 0.05).misses == 2
+    # The same seen backwards: a track that ends within the gap, near where the marker comes from.
+    ended = [
+        [*f, (0.1 * t + (0.5 if t < 4 else 0.03 if t == 6 else 0.3), 1)] if t < 7 else f
+        for t, f in enumerate(hidden)
+    ]
+    assert count_sightings(tracks_of(ended), 0.05).misses == 1

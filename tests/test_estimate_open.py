@@ -36,26 +36,31 @@ def test_a_kept_draw_is_of_the_posterior():
     assert 0.5 * np.abs(np.eye(len(p))[p.argmax()] - p).sum() > 0.5
 
 
-def by_hand(labels, n_frames, p, z, births):
+def by_hand(labels, n_frames, p, q, z, births):
     """The same expectations, from every way in which a track may have ended."""
-    deaths = misses = steps = born = hits = 0.0
+    deaths = misses = steps = born = hits = rehits = remisses = 0.0
     frames = [np.flatnonzero(row) for row in labels]
-    n_start = sum(f[0] == 0 for f in frames) / p
+    seen = q / (1 - p + q)  # in the long run
+    n_start = sum(f[0] == 0 for f in frames) / seen
     for f in frames:
-        hits += len(f) - 1
-        misses += f[-1] - f[0] + 1 - len(f)
+        for gap in np.diff(f):
+            hits += gap == 1
+            misses += gap > 1
+            rehits += gap > 1
+            remisses += max(gap - 2, 0)
         steps += f[-1] - f[0]
         left = n_frames - 1 - f[-1]
-        unseen = (1 - z) * (1 - p)
+        unseen = [1.0, *((1 - z) ** k * (1 - p) * (1 - q) ** (k - 1) for k in range(1, left + 1))]
         # Probability, whether dead, frames alive and unseen.
-        ways = [*((unseen**k * z, 1, k) for k in range(left)), (unseen**left, 0, left)]
+        ways = [*((unseen[k] * z, 1, k) for k in range(left)), (unseen[left], 0, left)]
         total = sum(w for w, _, _ in ways)
         deaths += sum(w * dead for w, dead, _ in ways) / total
-        misses += sum(w * alive for w, _, alive in ways) / total
+        misses += sum(w * (alive > 0) for w, _, alive in ways) / total
+        remisses += sum(w * max(alive - 1, 0) for w, _, alive in ways) / total
         steps += sum(w * (alive + dead) for w, dead, alive in ways) / total
         if f[0] > 0:
-            born += births / (births + n_start * p * (1 - p) ** f[0])
-    return hits, misses, deaths, steps, born
+            born += births / (births + n_start * (1 - seen) * (1 - q) ** (f[0] - 1) * q)
+    return hits, misses, rehits, remisses, deaths, steps, born
 
 
 def test_what_a_partition_leaves_open_is_averaged_over():
@@ -66,17 +71,21 @@ def test_what_a_partition_leaves_open_is_averaged_over():
         is_there[k, rng.choice(T, 4, replace=False)] = True  # long enough to count
     positions = np.where(is_there.T[:, :, None], rng.normal(size=(T, K, 3)), np.nan)
     tracks = am.Tracks.from_dense(np.arange(T) * 0.1, positions)
-    found = count(tracks, Rates(p_detection=0.7, p_disappear=0.05, births=0.3, clutter=1.0))
-    hits, misses, deaths, steps, born = by_hand(is_there, T, 0.7, 0.05, 0.3)
+    found = count(
+        tracks, Rates(p_detection=0.7, p_redetection=0.4, p_disappear=0.05, births=0.3, clutter=1.0)
+    )
+    hits, misses, rehits, remisses, deaths, steps, born = by_hand(is_there, T, 0.7, 0.4, 0.05, 0.3)
     assert found == Counts(
-        hits=pytest.approx(hits), misses=pytest.approx(misses), deaths=pytest.approx(deaths),
-        steps=pytest.approx(steps), births=pytest.approx(born), clutter=0.0, frames=T,
+        hits=pytest.approx(hits), misses=pytest.approx(misses),
+        rehits=pytest.approx(rehits), remisses=pytest.approx(remisses),
+        deaths=pytest.approx(deaths), steps=pytest.approx(steps),
+        births=pytest.approx(born), clutter=0.0, frames=T,
     )  # fmt: skip
 
 
 def test_pairs_of_false_points_are_no_markers():
     d = am.Detections.from_frames(np.arange(5) * 0.1, [np.zeros((1, 3))] * 5)
-    rates = Rates(p_detection=0.9, p_disappear=0.01, births=0.1, clutter=1.0)
+    rates = Rates(p_detection=0.9, p_redetection=0.9, p_disappear=0.01, births=0.1, clutter=1.0)
     pair = count(am.Tracks(detections=d, labels=np.array([0, 0, -1, -1, -1])), rates)
     assert (pair.clutter, pair.hits, pair.births) == (5.0, 0.0, 0.0)
     four = count(am.Tracks(detections=d, labels=np.array([0, 0, 0, 0, -1])), rates)

@@ -23,7 +23,7 @@ def test_labels_and_confidence_are_those_of_the_blackboard(options, motion, seed
     slow = am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3)
     model = small_model(
         motion=slow if motion == "dwna" else interacting(), noise_sigma=0.01, max_speed=1.5,
-        clutter_density=3.0, birth_density=1.0,
+        clutter_density=3.0, birth_density=1.0, p_redetection=0.8,
     )  # fmt: skip
     method = am.JPDA(**options)
     labels, confidence = jpda_by_hand(truth.detections, method, model)
@@ -159,7 +159,7 @@ def test_groups_beyond_the_guard_are_counted():
 
 
 def test_a_track_that_is_not_seen_exists_less_and_less():
-    model = small_model(p_disappear=0.01, max_gap=30)
+    model = small_model(p_disappear=0.01, max_gap=30, p_redetection=None)
     frames = [[[0.0, 0, 0]]] * 20 + [[]] * 8
     by_gap, by_odds = [], []
     for method, odds in ((am.JPDA(), by_gap), (am.JPDA(sure_until_gap=False), by_odds)):

@@ -86,7 +86,7 @@ def test_all_hypotheses_are_all_partitions_with_their_probabilities(seed):
                 continue  # of a target that is tentative still
             says = [owner.get(i) == first for owner in owners]
             assert tracks.confidence[i] == pytest.approx(wanted[says].sum(), abs=1e-9)
-    assert n_tracks > 5
+    assert n_tracks >= 5
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -99,6 +99,20 @@ def test_missing_drops_the_stated_share_independently():
     assert abs(both - 0.01) < 4 * np.sqrt(0.01 / n)
 
 
+def test_missing_in_runs_keeps_the_share_and_has_the_stated_length():
+    truth = smooth(n_markers=40, frames=5000)
+    is_missed = ~_seen(sense(truth, missing=0.2, missing_run=5.0, seed=5))
+    starts = (is_missed[1:] & ~is_missed[:-1]).sum()
+    assert is_missed.mean() == pytest.approx(0.2, abs=0.006)
+    assert is_missed[1:].sum() / starts == pytest.approx(5.0, rel=0.04)
+    # Whether a run goes on does not depend on how long it is.
+    on = [is_missed[2:][is_missed[1:-1] & (is_missed[:-2] == old)].mean() for old in (False, True)]
+    assert on == pytest.approx([0.8, 0.8], abs=0.02)
+    # As short as chance alone makes them, they are chance alone.
+    least = ~_seen(sense(truth, missing=0.2, missing_run=1.25, seed=6))
+    assert (least[1:] & least[:-1]).mean() == pytest.approx(0.04, abs=0.002)
+
+
 def test_clutter_is_poisson_and_uniform_in_the_box():
     truth = cube(frames=5000)
     result = sense(truth, clutter=0.1, seed=6)
@@ -263,6 +277,7 @@ def test_nothing_to_corrupt():
 @pytest.mark.parametrize(
     "wrong",
     [
+        {"missing_run": 3.0}, {"missing": 0.5, "missing_run": 1.9},
         {"missing": 1.1}, {"missing": float("nan")}, {"clutter": -1}, {"noise": -0.1},
         {"stride": 0}, {"margin": -1}, {"seed": -1}, {"nearby": 2}, {"doubled": -0.1},
         {"merged": -1}, {"dropped": 1.5}, {"jitter": 1.0}, {"jitter": -0.1}, {"noise_spread": -1},

@@ -16,6 +16,7 @@ import asterism as am
 from asterism.associate.track_splitting import chi2_limits
 from frame_oracle import OneTrack, pair, propose
 from jpda_oracle import components, marginals_of
+from oracles import chance_seen
 
 
 class Branch(OneTrack):
@@ -62,8 +63,6 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
     o = Options(method, detections.n_axes)
     gate = chi2.isf(method.gate_probability, detections.n_axes)
     survive = math.log1p(-p.p_disappear)
-    miss = survive + math.log1p(-s.p_detection)
-    hit = survive + math.log(s.p_detection / s.clutter_density)
     over = math.log1p(p.birth_density * s.p_detection / s.clutter_density)
     confirm = math.log(method.confirm_probability / (1 - method.confirm_probability))
     labels = np.full(detections.n_points, -1)
@@ -71,6 +70,12 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
     tracks: list[Branch] = []
     claims: dict[int, dict[tuple[int, int], float]] = {}
     count = {"ids": 0, "keys": 0}
+
+    def hit(gap: int) -> float:
+        return survive + math.log(chance_seen(model, gap) / s.clutter_density)
+
+    def miss(gap: int) -> float:
+        return survive + math.log1p(-chance_seen(model, gap))
 
     def step_to(t: int) -> float:
         return round(detections.times[t] - detections.times[t - 1], 9)
@@ -107,8 +112,8 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
                 likelihood = b.densities(y).sum()
                 if likelihood <= 0:
                     continue
-                won = hit + math.log(likelihood)
-                if track.id >= 0 and won <= miss + over - o.drop:
+                won = hit(b.gap) + math.log(likelihood)
+                if track.id >= 0 and won <= miss(b.gap) + over - o.drop:
                     continue  # never kept
                 sum_ = o.fading * b.chi2 + b.surprise(y)
                 if sum_ > o.limits[min(b.updates, len(o.limits) - 1)]:
@@ -121,7 +126,7 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
                 child.last, child.last_time, child.gap = y, detections.times[t], 0
                 child.path[t] = j
                 grown.append(child)
-            b.score += miss
+            b.score += miss(b.gap)
             b.gap += 1
             b.has_ended = b.gap >= p.max_gap
             grown.append(b)
@@ -170,8 +175,9 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
         j = b.path[t]
         expected = track.fork()
         expected.predict(step_to(t))
-        own = hit + math.log(expected.densities(detections.frame(t)[j]).sum())
-        gone = track.score + min(n_open, p.max_gap - track.gap) * miss
+        own = hit(track.gap) + math.log(expected.densities(detections.frame(t)[j]).sum())
+        n_missed = min(n_open, p.max_gap - track.gap)
+        gone = track.score + sum(miss(track.gap + k) for k in range(n_missed))
         future = b.score + crowding(t, track.key, j) - track.score - own - over * (b.n_taken - 1)
         birth = math.log(p.birth_density * s.p_detection / s.clutter_density)
         return gone + birth - over + math.log(math.expm1(future)) if future > 0 else -math.inf
@@ -231,12 +237,12 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
                 y = points[own]
                 track.chi2 = o.fading * track.chi2 + track.surprise(y)
                 track.updates += 1
-                track.score += hit + math.log(track.densities(y).sum())
+                track.score += hit(track.gap) + math.log(track.densities(y).sum())
                 track.update(y)
                 taken.add(own)
                 track.last, track.last_time = y, detections.times[t]
             else:
-                track.score += miss
+                track.score += miss(track.gap)
             if j >= 0:
                 track.gap = 0
                 track.pending.append((first + j, sure[i][j]))
@@ -291,12 +297,14 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
             b = track.branches[0].fork()
             b.predict(step_to(t))
             expected = {
-                j: s.p_detection / s.clutter_density * b.densities(y).sum()
+                j: chance_seen(model, b.gap) / s.clutter_density * b.densities(y).sum()
                 for j, y in enumerate(detections.frame(t))
             }
             expected = {j: w for j, w in expected.items() if w > math.exp(-7)}
             for j, w in expected.items():
-                others = 1 - s.p_detection + sum(v for k, v in expected.items() if k != j)
+                others = (
+                    1 - chance_seen(model, b.gap) + sum(v for k, v in expected.items() if k != j)
+                )
                 claims[t][track.key, j] = w / others
 
     window: list[int] = []

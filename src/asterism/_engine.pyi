@@ -25,6 +25,7 @@ class ScoreModel:
         birth_density: float,
         clutter_density: float,
         p_detection: float,
+        p_redetection: float,
         p_disappear: float,
         max_speed: float,
         speed_margin: float,

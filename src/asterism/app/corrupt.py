@@ -41,8 +41,8 @@ _Sense = Annotated[
     typer.Option(
         "--sense",
         metavar="NAME=VALUE",
-        help="What else goes wrong (noise_spread, visits, nearby, doubled, merged, dropped, jitter "
-        "…); may be repeated.",
+        help="What else goes wrong (missing_run, noise_spread, visits, nearby, doubled, merged, "
+        "dropped, jitter …); may be repeated.",
     ),
 ]
 _Seed = Annotated[int, typer.Option(help="Chooses everything that is random.")]

@@ -18,12 +18,17 @@ _Open = Annotated[
         "--open", help="Markers come and go for good: learn how often, from drawn partitions."
     ),
 ]
+_Runs = Annotated[
+    bool,
+    typer.Option("--runs", help="Misses may come in runs: learn how likely one ends."),
+]
 
 
 def estimate(
     source: _In,
     out: _Out = None,
     open_population: _Open = False,
+    runs: _Runs = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -38,6 +43,8 @@ def estimate(
         asterism estimate trial.c3d -o model.toml
 
         asterism estimate arena.csv --open -o model.toml
+
+        asterism estimate behind_limbs.csv --runs -o model.toml
     """
     import asterism as am
     from asterism.app.files import check_ending, check_outputs
@@ -47,7 +54,11 @@ def estimate(
     check_ending("-o", out, ".toml")
     capture = am.read(source)
     with progress("estimating the model"):
-        found = am.estimate_model(capture, population="open" if open_population else "closed")
+        found = am.estimate_model(
+            capture,
+            population="open" if open_population else "closed",
+            misses="runs" if runs else "independent",
+        )
     if out is not None:
         write_text(out, found.model.to_toml())
     if json:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.associate.clip_misses import Sightings, count_sightings
 from asterism.associate.gnn import GNN
 from asterism.errors import ParameterError
 from asterism.model import Detections, TrackingModel, Tracks
@@ -63,6 +64,8 @@ class Evidence:
         Those of each piece.
     n_misses : int
         Frames without a detection inside tracks.
+    sightings : Sightings
+        How often markers were seen and missed; what was lost is no miss.
     n_clutter : int
         Points in no track.
     n_frames : int
@@ -75,6 +78,7 @@ class Evidence:
 
     tracks: list[Tracks]
     n_misses: int
+    sightings: Sightings
     n_clutter: int
     n_frames: int
     speeds: NDArray[np.float64]
@@ -86,8 +90,8 @@ class Evidence:
         return self.n_misses + self.n_clutter
 
     @classmethod
-    def of(cls, tracks: list[Tracks]) -> Evidence:
-        """Count in the tracks of each piece.
+    def of(cls, tracks: list[Tracks], reach: float) -> Evidence:
+        """Count in the tracks of each piece; `reach` as in `count_sightings`.
 
         Raises
         ------
@@ -108,6 +112,7 @@ class Evidence:
             clutter += int((found.labels < 0).sum())
             speeds.append(np.linalg.norm(moves, axis=1) / dt)
             squares.append(((moves / dt[:, None]) ** 2).mean(axis=1))
+        seen = [count_sightings(found, reach) for found in tracks]
         n_links = sum(map(len, speeds))
         if n_links < LEAST_LINKS:
             raise ParameterError(
@@ -119,6 +124,7 @@ class Evidence:
         return cls(
             tracks=tracks,
             n_misses=misses,
+            sightings=Sightings(*map(sum, zip(*seen, strict=True))),
             n_clutter=clutter,
             n_frames=sum(found.detections.n_frames for found in tracks),
             speeds=np.concatenate(speeds),
@@ -131,7 +137,7 @@ class Evidence:
         return len(self.speeds)
 
 
-def gather_evidence(pieces: list[Detections], model: TrackingModel) -> Evidence:
+def gather_evidence(pieces: list[Detections], model: TrackingModel, reach: float) -> Evidence:
     """Track the pieces of a clip and count.
 
     Raises
@@ -144,4 +150,4 @@ def gather_evidence(pieces: list[Detections], model: TrackingModel) -> Evidence:
     for piece in pieces:
         state = method.init(model, n_axes=piece.n_axes)
         found.append(Tracks(detections=piece, labels=method.run(state, piece)[1]))
-    return Evidence.of(found)
+    return Evidence.of(found, reach)

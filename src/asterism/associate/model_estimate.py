@@ -28,8 +28,9 @@ class ModelEstimate:
     stds : mapping of str to float
         Standard deviation of each parameter that the clip tells of, in the parameter's unit:
         ``noise_sigma``, ``motion`` (of its σ; ``motion_1`` and so on of several), ``p_detection``,
-        ``clutter_density``, and of an open population ``birth_density`` and ``p_disappear``.
-        Parameters at a bound, and bounds themselves, are not in it.
+        ``p_redetection`` where misses come in runs, ``clutter_density``, and of an open population
+        ``birth_density`` and ``p_disappear``. Parameters at a bound, and bounds themselves, are not
+        in it.
     """
 
     model: TrackingModel
@@ -63,6 +64,7 @@ def reasons_for(
     n_axes: int,
     n_links: int,
     n_misses: float,
+    in_runs: bool,
     n_clutter: float,
     n_frames: int,
     events: tuple[float, float] | None,
@@ -80,6 +82,8 @@ def reasons_for(
         2 or 3.
     n_links, n_misses, n_clutter, n_frames
         What was counted.
+    in_runs : bool
+        Whether misses might come in runs.
     events : (float, float) or None
         Births and deaths that were counted; None of a closed population.
     least_noise : float
@@ -99,6 +103,13 @@ def reasons_for(
     values = ", ".join(f"{x:.3g}{sure(key)}" for x, key in zip(levels, keys, strict=True))
     one = f"one {type(model.motion).__name__} explains them as well as three motions"
     many = f"{len(levels)} motions that a marker changes between, together most likely"
+    again: list[tuple[str, str, str]] = []
+    if sensor.p_redetection is not None:
+        value = f"{sensor.p_redetection:.4f}{sure('p_redetection')}"
+        length = f"misses come in runs, {1 / sensor.p_redetection:.1f} frames long in the mean"
+        again = [("redetection P_r", value, length)]
+    elif in_runs:
+        again = [("redetection P_r", "P_d", "misses come in runs no more than by chance")]
     births, deaths = ("one in the clip",) * 2
     if events is not None:
         births = f"about {events[0]:.0f} after the first frame, in drawn partitions"
@@ -120,6 +131,7 @@ def reasons_for(
             f"{sensor.p_detection:.4f}{sure('p_detection')}",
             f"{n_misses:.0f} misses inside tracks of {n_links} links",
         ),
+        *again,
         (
             "clutter λ_f",
             f"{sensor.clutter_density:.3g}{sure('clutter_density')} /{volume}",

@@ -73,7 +73,10 @@ LONGEST_GAP = 60
 
 
 def estimate_model(
-    detections: Detections, *, population: Literal["closed", "open"] = "closed"
+    detections: Detections,
+    *,
+    population: Literal["closed", "open"] = "closed",
+    misses: Literal["independent", "runs"] = "independent",
 ) -> ModelEstimate:
     """Estimate the generative model from unlabelled detections.
 
@@ -87,6 +90,10 @@ def estimate_model(
         cannot be told from one that hides for long, so this is not estimated: closed, the clip is
         taken to have one birth and one death, and tracks are held through long gaps; open, their
         rates are learnt with the rest by stochastic EM.
+    misses : {"independent", "runs"}
+        Whether a marker that was missed is as likely as any other to be seen in the next frame, or
+        misses may come in runs, as those of markers behind limbs do: then
+        `Sensor.p_redetection` is learnt as well, where the clip is sure that it is not P_d.
 
     Returns
     -------
@@ -103,6 +110,9 @@ def estimate_model(
     """
     if population not in ("closed", "open"):
         raise ParameterError("population", "'closed' or 'open'", repr(population))
+    if misses not in ("independent", "runs"):
+        raise ParameterError("misses", "'independent' or 'runs'", repr(misses))
+    in_runs = misses == "runs"
     check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     detections = detections.measured()
     if detections.n_frames < 3 or detections.n_points < 3:
@@ -116,6 +126,7 @@ def estimate_model(
     pieces = list(_pieces(detections))
     scales = first_scales(pieces)
     region = Region.of(detections)
+    reach = scales.spacing / 2
     low, high = scales.acceleration_low, scales.acceleration_high
     bounds = FitBounds(
         least_noise=scales.noise_floor,
@@ -125,11 +136,11 @@ def estimate_model(
         math.log(scales.noise), (math.log(low), math.log(low * high) / 2, math.log(high)), 0.95
     )
     model = _first_model(fit, scales, region)
-    evidence = gather_evidence(pieces, _wider(model))
+    evidence = gather_evidence(pieces, _wider(model), reach)
     for _ in range(N_ROUNDS):
         fit = fit_motion(evidence.tracks, model, fit, bounds)
-        model = _model(fit, _rates(evidence), evidence, scales, region)
-        evidence = gather_evidence(pieces, _wider(model))
+        model = _model(fit, _rates(evidence, in_runs=in_runs), evidence, scales, region)
+        evidence = gather_evidence(pieces, _wider(model), reach)
     least_noise = max(scales.noise_floor, min(LEAST_NOISE, scales.spacing / 100))
     bounds = replace(bounds, least_noise=least_noise)
 
@@ -137,9 +148,9 @@ def estimate_model(
     # the tracks by which motions are compared.
     def tried(trial: MotionFit, evidence: Evidence) -> tuple[float, MotionFit, Evidence]:
         trial = replace(trial, noise=max(trial.noise, least_noise))
-        by = _model(trial, _rates(evidence), evidence, scales, region)
-        found = gather_evidence(pieces, by)
-        model = _model(trial, _rates(found), found, scales, region)
+        by = _model(trial, _rates(evidence, in_runs=in_runs), evidence, scales, region)
+        found = gather_evidence(pieces, by, reach)
+        model = _model(trial, _rates(found, in_runs=in_runs), found, scales, region)
         # The bounds are those that the tracks were found within.
         bounds = {"max_speed": by.population.max_speed, "max_gap": by.population.max_gap}
         model = replace(model, population=replace(model.population, **bounds))
@@ -156,28 +167,29 @@ def estimate_model(
     is_worth = three[0] - one[0] > WORTH * sum(p.n_points for p in pieces)
     _, fit, evidence = three if is_blind or is_worth else one
     counts = (_counts(evidence),)
-    rates = _rates(evidence)
+    rates = _rates(evidence, in_runs=in_runs)
     if population == "open":
 
         def model_of(fit: MotionFit, rates: Rates, tracks: list[Tracks] | None) -> TrackingModel:
-            seen = evidence if tracks is None else Evidence.of(tracks)
+            seen = evidence if tracks is None else Evidence.of(tracks, reach)
             return _model(fit, rates, seen, scales, region)
 
-        drawn = draw_rates(pieces, fit, rates, bounds, model_of)
+        drawn = draw_rates(pieces, fit, rates, bounds, model_of, in_runs=in_runs)
         fit, rates, counts, evidence = (
             drawn.fit,
             drawn.rates,
             drawn.counts,
-            Evidence.of(drawn.tracks),
+            Evidence.of(drawn.tracks, reach),
         )
     fit, sure = polish(evidence.tracks, _model(fit, rates, evidence, scales, region), fit, bounds)
     model = _model(fit, rates, evidence, scales, region)
-    stds = _stds(counts, region, is_open=population == "open")
+    stds = _stds(counts, region, is_open=population == "open", in_runs=in_runs)
     stds |= _motion_stds(fit, model, sure, least_noise)
     mean = sum(counts, Counts()) * (1 / len(counts))
     reasons = reasons_for(
-        model, stds, n_axes=region.n_axes, n_links=evidence.n_links, n_misses=mean.misses,
-        n_clutter=mean.clutter, n_frames=evidence.n_frames, least_noise=least_noise,
+        model, stds, n_axes=region.n_axes, n_links=evidence.n_links,
+        n_misses=mean.misses + mean.remisses, in_runs=in_runs, n_clutter=mean.clutter,
+        n_frames=evidence.n_frames, least_noise=least_noise,
         events=(mean.births, mean.deaths) if population == "open" else None,
     )  # fmt: skip
     return ModelEstimate(model=model, reasons=reasons, stds=stds)
@@ -241,17 +253,20 @@ def _wider(model: TrackingModel) -> TrackingModel:
 
 def _counts(evidence: Evidence) -> Counts:
     """Count as of a closed population, in which a track that ends is one that broke."""
+    seen = evidence.sightings
     return Counts(
-        hits=evidence.n_links,
-        misses=evidence.n_misses,
+        hits=seen.hits,
+        misses=seen.misses,
+        rehits=seen.rehits,
+        remisses=seen.remisses,
         steps=evidence.n_links,
         clutter=evidence.n_clutter,
         frames=evidence.n_frames,
     )
 
 
-def _rates(evidence: Evidence) -> Rates:
-    return _counts(evidence).rates()
+def _rates(evidence: Evidence, *, in_runs: bool) -> Rates:
+    return _counts(evidence).rates(in_runs=in_runs)
 
 
 def _model(
@@ -264,26 +279,31 @@ def _model(
             noise_sigma=fit.noise,
             p_detection=rates.p_detection,
             clutter_density=rates.clutter / region.volume,
+            p_redetection=None if rates.p_redetection == rates.p_detection else rates.p_redetection,
         ),
         population=Population(
             birth_density=rates.births / region.volume,
             p_disappear=rates.p_disappear,
             max_speed=2 * top + 4 * fit.noise / scales.step,
-            max_gap=_bridgeable(fit, rates.p_detection, evidence.n_links, scales),
+            max_gap=_bridgeable(fit, rates.p_seen, evidence.n_links, scales),
         ),
     )
 
 
-def _stds(counts: tuple[Counts, ...], region: Region, *, is_open: bool) -> dict[str, float]:
+def _stds(
+    counts: tuple[Counts, ...], region: Region, *, is_open: bool, in_runs: bool
+) -> dict[str, float]:
     """Give what rates vary by within a partition, and from one drawn partition to the next."""
-    within = (sum(counts, Counts()) * (1 / len(counts))).stds()
-    each = [c.rates() for c in counts]
+    within = (sum(counts, Counts()) * (1 / len(counts))).stds(in_runs=in_runs)
+    each = [c.rates(in_runs=in_runs) for c in counts]
 
     def std(name: str) -> float:
         between = np.var([getattr(r, name) for r in each]) * (1 + 1 / len(each))
         return float(np.hypot(getattr(within, name), np.sqrt(between)))
 
     stds = {"p_detection": std("p_detection"), "clutter_density": std("clutter") / region.volume}
+    if any(r.p_redetection != r.p_detection for r in each):
+        stds["p_redetection"] = std("p_redetection")
     if is_open:
         stds |= {"birth_density": std("births") / region.volume, "p_disappear": std("p_disappear")}
     return stds
@@ -313,7 +333,7 @@ def _motion_stds(
     return stds if fit.noise <= least_noise else {"noise_sigma": sure[0] * fit.noise} | stds
 
 
-def _bridgeable(fit: MotionFit, p_detection: float, n_links: int, scales: Scales) -> int:
+def _bridgeable(fit: MotionFit, p_seen: float, n_links: int, scales: Scales) -> int:
     """Find d̄: how many frames a track can coast before it may be where its neighbour is.
 
     The position of a marker that coasts for k frames is known to ``σ_a Δ² √(k³ / 3)`` (DWNA) or
@@ -326,5 +346,5 @@ def _bridgeable(fit: MotionFit, p_detection: float, n_links: int, scales: Scales
         reach = (scales.spacing / level) ** 2 / scales.step
     else:
         reach = (3 * (scales.spacing / (level * scales.step**2)) ** 2) ** (1 / 3)
-    needed = 1 - math.log(2 * n_links) / math.log(1 - p_detection)
+    needed = 1 - math.log(2 * n_links) / math.log(1 - p_seen)
     return max(3, round(max(min(reach, LONGEST_GAP), min(needed, 2 * LONGEST_GAP))))

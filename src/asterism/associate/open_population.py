@@ -58,6 +58,8 @@ def draw_rates(
     rates: Rates,
     bounds: FitBounds,
     model_of: Callable[[MotionFit, Rates, list[Tracks] | None], TrackingModel],
+    *,
+    in_runs: bool,
 ) -> Drawn:
     """Estimate rates and motion from drawn partitions.
 
@@ -73,6 +75,8 @@ def draw_rates(
         What is believed of the motion.
     model_of : callable
         Makes the model of a motion, rates and the tracks so far.
+    in_runs : bool
+        As of `Counts.rates`.
 
     Returns
     -------
@@ -85,7 +89,7 @@ def draw_rates(
     for n in range(N_ROUNDS):
         tracks = [_draw(piece, model, n * len(pieces) + k) for k, piece in enumerate(pieces)]
         kept = [*kept, sum((count(t, rates) for t in tracks), Counts())][-N_KEPT:]
-        rates = (sum(kept, Counts()) * (1 / len(kept))).rates()
+        rates = (sum(kept, Counts()) * (1 / len(kept))).rates(in_runs=in_runs)
         fit = (fit_one_motion if len(fit.levels) == 1 else fit_motion)(tracks, model, fit, bounds)
         model = model_of(fit, rates, tracks)
     return Drawn(tracks=tracks, counts=tuple(kept), rates=rates, fit=fit)

@@ -52,6 +52,7 @@ def score_model(model: TrackingModel) -> _engine.ScoreModel:
         birth_density=model.population.birth_density,
         clutter_density=model.sensor.clutter_density,
         p_detection=model.sensor.p_detection,
+        p_redetection=model.sensor.p_after_miss,
         p_disappear=model.population.p_disappear,
         max_speed=model.population.max_speed,
         speed_margin=SPEED_MARGIN_SIGMAS * model.sensor.noise_sigma,

@@ -17,7 +17,33 @@ if TYPE_CHECKING:
     from asterism.camera import Rig, Surface
     from asterism.simulate.episodes import Burst, Visits
 
-__all__ = ["come_and_go", "merge", "seen_by_rig", "shadowed"]
+__all__ = ["come_and_go", "in_runs", "merge", "seen_by_rig", "shadowed"]
+
+
+def in_runs(
+    rng: np.random.Generator, share: float, length: float, n_frames: int, n_markers: int
+) -> NDArray[np.bool_]:
+    """Draw misses that come in runs, shape (n_frames, n_markers): Gilbert's channel of two states.
+
+    Parameters
+    ----------
+    rng : Generator
+        For the draws.
+    share : float
+        Of the frames, in the long run.
+    length : float
+        Of a run in the mean, frames.
+    n_frames, n_markers : int
+        How many.
+    """
+    again = 1.0 / length
+    dice = rng.random((n_frames, n_markers))
+    is_missed = np.empty((n_frames, n_markers), dtype=bool)
+    chance = np.full(n_markers, share)
+    for t in range(n_frames):
+        is_missed[t] = dice[t] < chance
+        chance = np.where(is_missed[t], 1.0 - again, share * again / (1.0 - share))
+    return is_missed
 
 
 def shadowed(

@@ -18,7 +18,7 @@ from asterism.errors import ParameterError, check_kind, check_number
 from asterism.model import Capture, Detections, Tracks
 from asterism.simulate.episodes import Burst, Ghosts, Visits
 from asterism.simulate.false import anywhere, beside, haunting
-from asterism.simulate.losses import come_and_go, merge, seen_by_rig, shadowed
+from asterism.simulate.losses import come_and_go, in_runs, merge, seen_by_rig, shadowed
 from asterism.simulate.sampling import kept_frames, shaken
 from asterism.simulate.sensed_points import Points
 from asterism.simulate.truth import Truth
@@ -33,6 +33,7 @@ def sense(
     truth: Tracks,
     *,
     missing: float = 0.0,
+    missing_run: float | None = None,
     clutter: float = 0.0,
     noise: float = 0.0,
     noise_spread: float = 0.0,
@@ -64,6 +65,9 @@ def sense(
         Who is whom. If any track has a name, the named tracks are the markers; otherwise all are.
     missing : float
         Probability that a detection is dropped, each on its own.
+    missing_run : float, optional
+        Not each on its own, but in runs of so many frames in the mean (Gilbert 1960): the model's
+        P_r is one over this.
     clutter : float
         Expected false points a frame, as a share of the mean number of markers seen in a frame of
         the original; their number is Poisson, their place uniform over its bounding box.
@@ -152,7 +156,12 @@ def sense(
         origin = origin[again]
     n_markers = len(origin)
 
-    is_kept = (whole.markers < 0) | (rng_missing.random(len(whole.markers)) >= missing)
+    if missing_run is None:
+        is_kept = (whole.markers < 0) | (rng_missing.random(len(whole.markers)) >= missing)
+    else:
+        is_missed = in_runs(rng_missing, missing, missing_run, n_frames, n_markers)
+        is_missed = np.column_stack([is_missed, np.zeros(n_frames, dtype=bool)])  # [-1] is clutter
+        is_kept = ~is_missed[whole.frames, whole.markers]
     if burst is not None and n_markers:
         is_kept &= ~shadowed(rng_burst, burst, whole, n_frames, n_markers)
     by_cameras = None
@@ -217,6 +226,12 @@ def _check(truth: Tracks, switches: dict[str, Any]) -> None:
         check_number(name, switches[name], above=0, closed=True)
     for name in ("nearby_within", "doubled_apart"):
         check_number(name, switches[name], above=0)
+    if switches["missing_run"] is not None:
+        if not 0 < switches["missing"] < 1:
+            raise ParameterError("missing_run", "missing in (0, 1) beside it", switches["missing"])
+        # As long as misses each on their own are, at least; the longest hold for all frames.
+        least = 1 / (1 - switches["missing"])
+        check_number("missing_run", switches["missing_run"], above=least, below=1e6, closed=True)
     check_number("jitter", switches["jitter"], above=0, closed=True)
     if switches["jitter"] >= 1:
         raise ParameterError("jitter", "a number in [0, 1)", switches["jitter"])
