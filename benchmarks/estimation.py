@@ -33,10 +33,17 @@ class World:
     noise: float = 1e-3
     acceleration: float = 1.0
     p_detection: float = 0.9
+    p_redetection: float | None = None  # after a miss; misses are independent without it
     clutter: float = 2.0  # a frame
     births: float = 0.0  # a frame
     p_disappear: float = 0.0
     walk: float = 0.0  # σ_w, m/√s; then there is no velocity
+
+    @property
+    def p_in_the_long_run(self) -> float:
+        """Share of the frames in which a marker is seen."""
+        again = self.p_redetection or self.p_detection
+        return again / (1 - self.p_detection + again)
 
     def draw(self, seed: int) -> am.Tracks:
         """Draw a clip and who is whom."""
@@ -49,6 +56,7 @@ class World:
         labels: list[list[int]] = [[] for _ in range(T)]
         for k, first in enumerate(starts):
             x, v = rng.uniform(0, EDGE, 3), rng.normal(0, 0.3, 3)
+            p_seen = self.p_in_the_long_run
             for t in range(first, T):
                 if t > first:
                     if rng.random() < self.p_disappear:
@@ -58,7 +66,9 @@ class World:
                     else:
                         a = rng.normal(0, self.acceleration, 3)
                         x, v = x + v * STEP + a * STEP**2 / 2, v + a * STEP
-                if rng.random() < self.p_detection or 0 < first == t:
+                is_seen = rng.random() < p_seen or 0 < first == t
+                p_seen = self.p_detection if is_seen else self.p_redetection or self.p_detection
+                if is_seen:
                     frames[t].append(x + rng.normal(0, self.noise, 3))
                     labels[t].append(k)
         for t in range(T):
@@ -76,6 +86,7 @@ class World:
             "noise_sigma": self.noise,
             "motion": self.walk or self.acceleration,
             "p_detection": self.p_detection,
+            "p_redetection": self.p_redetection or np.nan,
             "clutter_density": self.clutter / volume,
             "birth_density": self.births / volume,
             "p_disappear": self.p_disappear,
@@ -87,10 +98,18 @@ WORLDS: dict[str, tuple[World, Literal["closed", "open"]]] = {
     "P_d 0.7, 10 false points a frame": (World(p_detection=0.7, clutter=10.0), "closed"),
     "60 markers, lively": (World(n_markers=60, acceleration=10.0, clutter=6.0), "closed"),
     "random walk": (World(walk=0.05), "closed"),
+    "misses in runs": (World(p_detection=0.95, p_redetection=0.3), "closed"),
     "come and go": (World(births=0.2, p_disappear=0.01), "open"),
     "come and go, P_d 0.8": (World(births=0.4, p_disappear=0.02, p_detection=0.8), "open"),
+    "come and go, in runs": (
+        World(births=0.2, p_disappear=0.01, p_detection=0.95, p_redetection=0.3),
+        "open",
+    ),
 }
-SHOWN = ("noise_sigma", "motion", "p_detection", "clutter_density", "birth_density", "p_disappear")
+SHOWN = (
+    "noise_sigma", "motion", "p_detection", "p_redetection", "clutter_density", "birth_density",
+    "p_disappear",
+)  # fmt: skip
 
 
 def values(model: am.TrackingModel) -> dict[str, float]:
@@ -104,6 +123,7 @@ def values(model: am.TrackingModel) -> dict[str, float]:
         "noise_sigma": model.sensor.noise_sigma,
         "motion": level,
         "p_detection": model.sensor.p_detection,
+        "p_redetection": model.sensor.p_redetection or np.nan,
         "clutter_density": model.sensor.clutter_density,
         "birth_density": model.population.birth_density,
         "p_disappear": model.population.p_disappear,
@@ -124,7 +144,8 @@ def main() -> None:
         for seed in range(options.seeds):
             drawn = world.draw(seed)
             start = time.perf_counter()
-            found = am.estimate_model(drawn.detections, population=population)
+            misses = "runs" if world.p_redetection else "independent"
+            found = am.estimate_model(drawn.detections, population=population, misses=misses)
             seconds.append(time.perf_counter() - start)
             kinds.append(type(found.model.motion).__name__)
             got = values(found.model)
@@ -141,8 +162,8 @@ def main() -> None:
             row.append(f"{rms:.2f} ({100 * np.median(off[key]):.1g} %)" if z[key] else "–")
         rows.append([*row, f"{np.median(seconds):.1f}"])
         print(*rows[-1], flush=True)
-    head = ["scene", "population", "motion chosen", "σ", "σ_a or σ_w", "P_d", "λ_f", "λ_b", "p_z",
-            "s"]  # fmt: skip
+    head = ["scene", "population", "motion chosen", "σ", "σ_a or σ_w", "P_d", "P_r", "λ_f", "λ_b",
+            "p_z", "s"]  # fmt: skip
     lines = [f"{options.seeds} seeds; root mean square of z, and median relative error:", ""]
     publish([*lines, *table(head, rows)], options.markdown)
 

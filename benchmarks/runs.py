@@ -1,4 +1,4 @@
-"""Misses in runs: every method with a model in which misses are independent, and with one that has P_r.
+"""Misses in runs: every method with a model of independent misses, and with one that has P_r.
 
 People and a juggler before four cameras, seen past their limbs by two or more of them (10 % of the
 detections missing besides, 10 % clutter, 0.3 mm of noise), and the real captures as captured. IDF1
@@ -10,8 +10,8 @@ with independent misses → with runs. Finds the captures in ``../shared/data`` 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from captures import captures, named_only
 from methods import METHODS
 from report import conditions, publish, table
 from scenes import CASES, sensed
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 CAMERAS = "before four cameras"
 CAPTURED = "as captured"

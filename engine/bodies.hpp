@@ -115,6 +115,19 @@ class Bodies {
 
   static double square(double x) { return x * x; }
 
+  // Sorts the least kFitted to the front, and says how many these are: insertion is quicker than a heap
+  // for so few.
+  static std::size_t least_first(std::vector<std::pair<double, std::int32_t>>& all) {
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const std::pair<double, std::int32_t> one = all[i];
+      if (n == kFitted && !(one < all[n - 1])) continue;
+      std::size_t at = n < kFitted ? n++ : n - 1;
+      for (; at > 0 && one < all[at - 1]; --at) all[at] = all[at - 1];
+      all[at] = one;
+    }
+    return n;
+  }
   // Fragments that are seen both then and now.
   void list_common(const Sightings& s, std::int64_t then) {
     if (w_.common_from == then) return;
@@ -134,9 +147,7 @@ class Bodies {
     for (std::int32_t k = 0; k < static_cast<std::int32_t>(w_.common.size()); ++k)
       if (w_.common[k].first != own)
         w_.nearest.emplace_back(squared_distance(w_.common[k].second.a, then, D_), k);
-    const std::size_t n = std::min(kFitted, w_.nearest.size());
-    std::partial_sort(w_.nearest.begin(), w_.nearest.begin() + static_cast<std::ptrdiff_t>(n),
-                      w_.nearest.end());
+    const std::size_t n = least_first(w_.nearest);
     w_.pairs.clear();
     for (std::size_t k = 0; k < n; ++k) {
       w_.pairs.push_back(w_.common[w_.nearest[k].second].second);
@@ -150,9 +161,7 @@ class Bodies {
     for (const Bond& bond : neighbours_.of(marker))
       if (w_.places.find(bond.other) != nullptr && w_.places_now.find(bond.other) != nullptr)
         w_.steady.emplace_back(neighbours_.unsteadiness(bond), bond.other);
-    const std::size_t n = std::min(kFitted, w_.steady.size());
-    std::partial_sort(w_.steady.begin(), w_.steady.begin() + static_cast<std::ptrdiff_t>(n),
-                      w_.steady.end());
+    const std::size_t n = least_first(w_.steady);
     for (std::size_t r = 0; r < n; ++r)
       w_.pairs.push_back({*w_.places.find(w_.steady[r].second), *w_.places_now.find(w_.steady[r].second),
                         1 / square(w_.steady[r].first)});

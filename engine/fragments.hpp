@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -82,27 +83,28 @@ struct Frame {
   }
 };
 
+// Copies share their frames: only the newest is worked on, by the copy that has added it.
 class RecentFrames {
  public:
   std::int64_t now() const { return now_; }
-  Frame& newest() { return frames_.back(); }
-  const Frame& newest() const { return frames_.back(); }
+  Frame& newest() { return *frames_.back(); }
+  const Frame& newest() const { return *frames_.back(); }
   // None where it is too long ago.
   const Frame* find(std::int64_t t) const {
     const std::int64_t back = now_ - t;
     return back >= 0 && back < static_cast<std::int64_t>(frames_.size())
-               ? &frames_[frames_.size() - 1 - static_cast<std::size_t>(back)]
+               ? frames_[frames_.size() - 1 - static_cast<std::size_t>(back)].get()
                : nullptr;
   }
   void add(std::size_t n_kept) {
     ++now_;
-    frames_.emplace_back();
+    frames_.push_back(std::make_shared<Frame>());
     while (frames_.size() > n_kept) frames_.pop_front();
   }
 
  private:
   std::int64_t now_ = -1;
-  std::deque<Frame> frames_;
+  std::deque<std::shared_ptr<Frame>> frames_;
 };
 
 }  // namespace asterism

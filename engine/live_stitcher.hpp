@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <span>
 #include <utility>
 #include <vector>
@@ -37,26 +38,27 @@ class LiveStitcher {
             std::span<const std::int64_t> labels,
             std::span<const std::pair<std::int64_t, std::int64_t>> revised, Tell&& tell) {
     for (const auto& [detection, label] : revised) revise(detection, label);
-    Recent& now = recent_.emplace_back();
+    Recent& now = *recent_.emplace_back(std::make_shared<Recent>());
     now.step = step;
     now.first = n_seen_;
     now.points.assign(points.begin(), points.end());
     now.labels.assign(labels.begin(), labels.end());
     now.known.resize(points.size());
     n_seen_ += static_cast<std::int64_t>(points.size());
-    if (recent_.size() > n_waiting_) take(recent_[recent_.size() - 1 - n_waiting_]);
+    if (recent_.size() > n_waiting_) take(own(recent_[recent_.size() - 1 - n_waiting_]));
     stitcher_.guess();
-    for (Recent& frame : recent_)
-      if (frame.is_taken)
-        tell_of_taken(frame, tell);
-      else
-        tell_of_waiting(frame, tell);
+    for (std::shared_ptr<Recent>& frame : recent_)
+      if (!frame->is_taken)
+        tell_of_waiting(own(frame), tell);
+      else if (!frame->is_settled)
+        tell_of_taken(own(frame), tell);
     if (recent_.size() > n_waiting_ + n_kept_) recent_.pop_front();
   }
 
  private:
   struct Known {
     std::int32_t fragment = -1, told = -2;
+    bool is_settled = false;
   };
   struct Recent {
     std::int64_t first = 0;  // of its detections
@@ -68,11 +70,16 @@ class LiveStitcher {
     std::vector<std::int64_t> labels;
   };
 
+  // Copies of the whole share their frames until one of them changes a frame.
+  static Recent& own(std::shared_ptr<Recent>& frame) {
+    if (frame.use_count() > 1) frame = std::make_shared<Recent>(*frame);
+    return *frame;
+  }
   // What has been taken is settled.
   void revise(std::int64_t detection, std::int64_t label) {
-    for (auto frame = recent_.rbegin(); frame != recent_.rend() && !frame->is_taken; ++frame) {
-      if (detection < frame->first) continue;
-      frame->labels[static_cast<std::size_t>(detection - frame->first)] = label;
+    for (auto frame = recent_.rbegin(); frame != recent_.rend() && !(*frame)->is_taken; ++frame) {
+      if (detection < (*frame)->first) continue;
+      own(*frame).labels[static_cast<std::size_t>(detection - (*frame)->first)] = label;
       return;
     }
   }
@@ -89,13 +96,14 @@ class LiveStitcher {
   }
   template <typename Tell>
   void tell_of_taken(Recent& frame, Tell&& tell) {
-    if (frame.is_settled) return;
     frame.is_settled = true;
     for (std::size_t i = 0; i < frame.known.size(); ++i) {
-      const Known& own = frame.known[i];
-      const bool is_free = own.fragment < 0;
-      frame.is_settled &= is_free || !stitcher_.is_open(own.fragment);
-      tell_of(frame, i, is_free ? -1 : stitcher_.marker_of(own.fragment), tell);
+      Known& known = frame.known[i];
+      if (known.is_settled) continue;
+      const bool is_free = known.fragment < 0;
+      known.is_settled = is_free || !stitcher_.is_open(known.fragment);
+      frame.is_settled &= known.is_settled;
+      tell_of(frame, i, is_free ? -1 : stitcher_.marker_of(known.fragment), tell);
     }
   }
   // A guess gives way to what is known.
@@ -124,7 +132,7 @@ class LiveStitcher {
   Stitcher stitcher_;
   std::size_t n_waiting_, n_kept_;
   std::int64_t n_seen_ = 0, n_joins_ = 0, n_ghosts_ = 0;
-  std::deque<Recent> recent_;
+  std::deque<std::shared_ptr<Recent>> recent_;
   std::vector<std::int32_t> fragments_, markers_;  // while a frame is worked on
 };
 
