@@ -16,6 +16,7 @@ from scenes import calibration_in_crowds, crowd, small_model, wanderers
 
 def crowd_model():
     return small_model(
+        p_redetection=None,
         motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
         max_speed=1.5, clutter_density=5.0, birth_density=0.5, p_disappear=1e-3, max_gap=6,
     )  # fmt: skip

@@ -98,7 +98,7 @@ def test_knowing_which_detections_are_blurred_helps(method):
     points = d.points + np.where(is_blurred, 0.05, 0.0)[:, None] * rng.normal(size=d.points.shape)
     blurred = dataclasses.replace(truth, detections=dataclasses.replace(d, points=points))
     known = with_variances(blurred, np.where(is_blurred, 0.05**2, 0.0))
-    model = small_model(max_speed=20.0)
+    model = small_model(max_speed=20.0, p_redetection=None)
     usual = dataclasses.replace(
         model, sensor=dataclasses.replace(model.sensor, noise_sigma=np.hypot(SIGMA, 0.05 / 2**0.5))
     )
