@@ -95,11 +95,12 @@ class Counts:
         in_runs : bool
             Whether P_r may differ from P_d; it does where the counts are sure of it.
         """
-        p, q, seen = _share(self.hits, self.misses), _share(self.rehits, self.remisses), self._seen
-        in_runs = in_runs and self._sure_of_runs > SURE_OF_RUNS
+        p = q = _share(*self._seen)
+        if in_runs and self._sure_of_runs > SURE_OF_RUNS:
+            p, q = _share(self.hits, self.misses), _share(self.rehits, self.remisses)
         return Rates(
-            p_detection=min(p if in_runs else _share(*seen), MOST_SURE),
-            p_redetection=min(q if in_runs else _share(*seen), MOST_SURE),
+            p_detection=min(p, MOST_SURE),
+            p_redetection=min(q, MOST_SURE),
             p_disappear=(self.deaths + 1) / (self.steps + 2),
             births=(self.births + 1) / self.frames,
             clutter=(self.clutter + 1) / self.frames,
@@ -120,8 +121,8 @@ class Counts:
         rates = self.rates(in_runs=in_runs)
         p, q, z = rates.p_detection, rates.p_redetection, rates.p_disappear
         chances, again = self.hits + self.misses, self.rehits + self.remisses
-        if p == q:
-            chances = again = chances + again
+        if p == q:  # one rate, from all
+            chances = again = sum(self._seen)
         return Rates(
             p_detection=float(np.sqrt(p * (1 - p) / (chances + 3))),
             p_redetection=float(np.sqrt(q * (1 - q) / (again + 3))),
