@@ -68,8 +68,8 @@ def main() -> None:
         runs = am.estimate_model(d, misses="runs").model
         P_d, P_r = true_rates(truth, runs.population.max_gap)
         said = runs.sensor.p_redetection
-        row = [name, f"{P_d:.4f}, {P_r:.2f}", f"{runs.sensor.p_detection:.4f}, "]
-        row[-1] += "P_d" if said is None else f"{said:.2f}"
+        row = [name, f"{P_d:.4f}, {P_r:.2f}".replace("nan", "–")]
+        row.append(f"{runs.sensor.p_detection:.4f}, " + ("P_d" if said is None else f"{said:.2f}"))
         for method, maker in METHODS.items():
             before = am.evaluate(am.track(d, maker, model=single), truth).idf1
             after = before
@@ -87,7 +87,7 @@ def main() -> None:
     lines = ["Mean IDF1, misses independent → in runs:", ""]
     lines += [*table(["", *METHODS], head), "", "Each:", ""]
     lines += table(["clip", "true P_d, P_r", "learnt", *METHODS], rows)
-    lines += ["", f"{options.seeds} seeds of each scene. {conditions()}."]
+    lines += ["", f"Seeds of each scene: {options.seeds}. {conditions()}."]
     publish(lines, options.markdown)
 
 
