@@ -125,8 +125,8 @@ void bind_tracking(nb::module_& module) {
       .def(
           "__init__",
           [](ScoreModel* self, double birth_density, double clutter_density, double p_detection,
-             double p_redetection, double p_disappear, double max_speed, double speed_margin, int max_gap,
-             bool last_termination) {
+             double p_redetection, double p_disappear, double max_speed, double speed_margin,
+             int max_gap, bool last_termination) {
             new (self) ScoreModel{std::log(birth_density),
                                   std::log(clutter_density),
                                   std::log1p(-p_disappear),
@@ -139,8 +139,7 @@ void bind_tracking(nb::module_& module) {
                                   last_termination};
           },
           nb::kw_only(), "birth_density"_a, "clutter_density"_a, "p_detection"_a, "p_redetection"_a,
-          "p_disappear"_a,
-          "max_speed"_a, "speed_margin"_a, "max_gap"_a, "last_termination"_a);
+          "p_disappear"_a, "max_speed"_a, "speed_margin"_a, "max_gap"_a, "last_termination"_a);
 
   module.def("score_tracks", &score_tracks, "model"_a, "score"_a, "points"_a, "frames"_a,
              "offsets"_a, "times"_a, "kind"_a, "F"_a, "Q"_a);

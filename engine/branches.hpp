@@ -36,8 +36,8 @@ struct BranchOptions {
 };
 
 // How much a believed track expects a detection: w_j / (w_0 + Σ_{l≠j} w_l), where
-// w_j = P_d N(y_j; ŷ, S) / λ_f and w_0 = 1 - P_d (P_r after a miss). Who else takes it lowers the likelihood of the
-// frame by the factor 1 + this.
+// w_j = P_d N(y_j; ŷ, S) / λ_f and w_0 = 1 - P_d, with P_r for P_d after a miss. Who else takes it
+// lowers the likelihood of the frame by the factor 1 + this.
 struct Claim {
   std::int64_t track = 0;  // its key
   std::int32_t column = 0;

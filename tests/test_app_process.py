@@ -135,6 +135,28 @@ def test_a_signal_where_exceptions_are_lost(where):
     assert (done.returncode, done.stderr) == (143, "asterism: stopped by SIGTERM\n")
 
 
+@pytest.mark.parametrize("nth", [1, 2])
+def test_a_signal_while_handlers_are_set(nth):
+    # In the very call that sets the first, or the last, of the handlers.
+    script = (
+        "import signal, sys, os\n"
+        "from asterism.app.endings import exit_code\n"
+        "set_handler, n = signal.signal, 0\n"
+        "def at_once(number, handler):\n"
+        "    global n\n"
+        "    n += 1\n"
+        "    before = set_handler(number, handler)\n"
+        f"    if n == {nth}: os.kill(os.getpid(), number)\n"
+        "    return before\n"
+        "signal.signal = at_once\n"
+        "sys.exit(exit_code(lambda: None))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) in (
+        (130, "asterism: stopped by SIGINT\n"), (143, "asterism: stopped by SIGTERM\n"),
+    )  # fmt: skip
+
+
 def test_an_ignored_signal_stays_ignored(tmp_path):
     script = (
         "import signal, sys, os\n"

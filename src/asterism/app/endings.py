@@ -118,10 +118,13 @@ def _stopping() -> Generator[None, None, None]:
         threading.Timer(0.01, _thread.interrupt_main, [lost.exc_value.signum]).start()
 
     # Who started us with a signal ignored (nohup, a shell's background job) wants it ignored.
-    asked = [s for s in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(s) != signal.SIG_IGN]
-    before = {number: signal.signal(number, stop) for number in asked}
-    hook, sys.unraisablehook = sys.unraisablehook, again
+    known = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: handler for number, handler in known.items() if handler != signal.SIG_IGN}
+    hook = sys.unraisablehook
     try:
+        sys.unraisablehook = again
+        for number in before:  # from the first on a signal may come
+            signal.signal(number, stop)
         yield
     finally:
         sys.unraisablehook = hook
