@@ -134,7 +134,7 @@ def test_one_marker_in_the_plane():
 
 def test_misses_in_runs_are_told_from_single_ones():
     seed = 1
-    quiet = am.simulate.SCENES["person"].make(activity="walk", seed=seed)
+    quiet = am.simulate.SCENES["person"].make(activity="walk", frames=160, seed=seed)
     runs = {"missing": 0.15, "missing_run": 4.0, "noise": 3e-4, "clutter": 0.1, "seed": seed}
     d = am.simulate.sense(quiet, **runs).detections
     found = am.estimate_model(d, misses="runs")
