@@ -56,6 +56,18 @@ def refused(line, capsys):
     return err
 
 
+def test_misses_in_runs_are_made_and_learnt(scene, capsys):
+    run("simulate person -o p.csv --frames 160 --seed 1", capsys)
+    line = "corrupt p.csv -o a.csv --truth t.csv --missing 0.15 --sense missing_run=4"
+    made = json.loads(run(f"{line} --noise 0.0003 --json", capsys))
+    assert made["sense"]["missing_run"] == 4.0
+    found = json.loads(run("estimate a.csv --runs --json", capsys))
+    assert found["model"]["sensor"]["p_redetection"] == pytest.approx(0.25, abs=0.05)
+    run("estimate a.csv --runs -o runs.toml", capsys)
+    run("track a.csv --method gnn --model runs.toml -o b.csv", capsys)
+    assert "missing in (0, 1)" in refused(line.replace("0.15", "0"), capsys)
+
+
 def test_corrupt_forgets_every_name_and_keeps_every_point(scene):
     unnamed, truth = am.read("in.csv"), am.read_tracks("truth.csv")
     assert (unnamed.labels == -1).all()

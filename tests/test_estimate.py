@@ -148,7 +148,7 @@ def test_misses_in_runs_are_told_from_single_ones():
     one = am.estimate_model(d).model.sensor
     assert one.p_redetection is None
     assert one.p_detection == pytest.approx(0.85, abs=0.02)
-    single = am.simulate.sense(quiet, **runs | {"missing_run": None}).detections
+    single = am.simulate.sense(quiet, **runs | {"missing_run": 0.0}).detections
     found = am.estimate_model(single, misses="runs")
     assert found.model.sensor.p_redetection is None
     assert "no more than by chance" in str(found)

@@ -33,7 +33,7 @@ def sense(
     truth: Tracks,
     *,
     missing: float = 0.0,
-    missing_run: float | None = None,
+    missing_run: float = 0.0,
     clutter: float = 0.0,
     noise: float = 0.0,
     noise_spread: float = 0.0,
@@ -65,9 +65,9 @@ def sense(
         Who is whom. If any track has a name, the named tracks are the markers; otherwise all are.
     missing : float
         Probability that a detection is dropped, each on its own.
-    missing_run : float, optional
+    missing_run : float
         Not each on its own, but in runs of so many frames in the mean (Gilbert 1960): the model's
-        P_r is one over this.
+        P_r is one over this. 0 for each on its own.
     clutter : float
         Expected false points a frame, as a share of the mean number of markers seen in a frame of
         the original; their number is Poisson, their place uniform over its bounding box.
@@ -156,7 +156,7 @@ def sense(
         origin = origin[again]
     n_markers = len(origin)
 
-    if missing_run is None:
+    if not missing_run:
         is_kept = (whole.markers < 0) | (rng_missing.random(len(whole.markers)) >= missing)
     else:
         is_missed = in_runs(rng_missing, missing, missing_run, n_frames, n_markers)
@@ -226,7 +226,7 @@ def _check(truth: Tracks, switches: dict[str, Any]) -> None:
         check_number(name, switches[name], above=0, closed=True)
     for name in ("nearby_within", "doubled_apart"):
         check_number(name, switches[name], above=0)
-    if switches["missing_run"] is not None:
+    if switches["missing_run"]:
         if not 0 < switches["missing"] < 1:
             raise ParameterError("missing_run", "missing in (0, 1) beside it", switches["missing"])
         # As long as misses each on their own are, at least; the longest hold for all frames.
