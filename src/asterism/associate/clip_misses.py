@@ -105,8 +105,9 @@ def _is_left_over(
     )
     places = d.points[now] + (d.points[now] - d.points[before]) * step[:, None]
     # Frames far apart along an axis of their own, so that one tree does for all.
-    tree: Any = KDTree(np.column_stack([d.points, d.frame_of * (4.0 * reach)]))
-    near = tree.query_ball_point(np.column_stack([places, (t + way) * (4.0 * reach)]), reach)
+    apart = 1.0 + 4.0 * reach
+    tree: Any = KDTree(np.column_stack([d.points, d.frame_of * apart]))
+    near = tree.query_ball_point(np.column_stack([places, (t + way) * apart]), reach)
     for n, points in enumerate(near):
         result[n] = any(way * limits[j] > way * t[n] for j in points)
     return result

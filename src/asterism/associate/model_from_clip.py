@@ -135,11 +135,15 @@ def estimate_model(
     fit = bounds.fit(
         math.log(scales.noise), (math.log(low), math.log(low * high) / 2, math.log(high)), 0.95
     )
+
+    def rates_of(evidence: Evidence) -> Rates:
+        return _counts(evidence).rates(in_runs=in_runs)
+
     model = _first_model(fit, scales, region)
     evidence = gather_evidence(pieces, _wider(model), reach)
     for _ in range(N_ROUNDS):
         fit = fit_motion(evidence.tracks, model, fit, bounds)
-        model = _model(fit, _rates(evidence, in_runs=in_runs), evidence, scales, region)
+        model = _model(fit, rates_of(evidence), evidence, scales, region)
         evidence = gather_evidence(pieces, _wider(model), reach)
     least_noise = max(scales.noise_floor, min(LEAST_NOISE, scales.spacing / 100))
     bounds = replace(bounds, least_noise=least_noise)
@@ -148,9 +152,9 @@ def estimate_model(
     # the tracks by which motions are compared.
     def tried(trial: MotionFit, evidence: Evidence) -> tuple[float, MotionFit, Evidence]:
         trial = replace(trial, noise=max(trial.noise, least_noise))
-        by = _model(trial, _rates(evidence, in_runs=in_runs), evidence, scales, region)
+        by = _model(trial, rates_of(evidence), evidence, scales, region)
         found = gather_evidence(pieces, by, reach)
-        model = _model(trial, _rates(found, in_runs=in_runs), found, scales, region)
+        model = _model(trial, rates_of(found), found, scales, region)
         # The bounds are those that the tracks were found within.
         bounds = {"max_speed": by.population.max_speed, "max_gap": by.population.max_gap}
         model = replace(model, population=replace(model.population, **bounds))
@@ -167,7 +171,7 @@ def estimate_model(
     is_worth = three[0] - one[0] > WORTH * sum(p.n_points for p in pieces)
     _, fit, evidence = three if is_blind or is_worth else one
     counts = (_counts(evidence),)
-    rates = _rates(evidence, in_runs=in_runs)
+    rates = rates_of(evidence)
     if population == "open":
 
         def model_of(fit: MotionFit, rates: Rates, tracks: list[Tracks] | None) -> TrackingModel:
@@ -253,20 +257,12 @@ def _wider(model: TrackingModel) -> TrackingModel:
 
 def _counts(evidence: Evidence) -> Counts:
     """Count as of a closed population, in which a track that ends is one that broke."""
-    seen = evidence.sightings
     return Counts(
-        hits=seen.hits,
-        misses=seen.misses,
-        rehits=seen.rehits,
-        remisses=seen.remisses,
+        **evidence.sightings._asdict(),
         steps=evidence.n_links,
         clutter=evidence.n_clutter,
         frames=evidence.n_frames,
     )
-
-
-def _rates(evidence: Evidence, *, in_runs: bool) -> Rates:
-    return _counts(evidence).rates(in_runs=in_runs)
 
 
 def _model(
