@@ -13,7 +13,7 @@ from asterism.app.reproduce.parts import PARTS
 from asterism.errors import check_fields, check_number
 
 if TYPE_CHECKING:
-    from asterism.app.reproduce.pages import Made
+    from asterism.app.reproduce.part import Made
 
 __all__ = ["reproduce"]
 
@@ -61,8 +61,8 @@ def reproduce(
 
         asterism reproduce --only mcmcda --only smp --seeds 20 -o tables
     """
-    from asterism.app.reproduce.pages import Made, write_pages, write_part
-    from asterism.app.reproduce.part import Effort
+    from asterism.app.reproduce.pages import write_pages, write_part
+    from asterism.app.reproduce.part import Effort, Made
     from asterism.app.reproduce.parts import load
     from asterism.app.run_folder import check_folder
 

@@ -23,8 +23,7 @@ from asterism.app.reproduce.words import (
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from asterism.app.reproduce.pages import Made
-    from asterism.app.reproduce.part import Claim, Effort, Table
+    from asterism.app.reproduce.part import Claim, Effort, Made, Table
 
 __all__ = ["page_text"]
 

@@ -17,8 +17,7 @@ from asterism.app.reproduce.words import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from asterism.app.reproduce.pages import Made
-    from asterism.app.reproduce.part import Effort
+    from asterism.app.reproduce.part import Effort, Made
 
 __all__ = ["contents_text", "page_text", "part_text", "rules_text", "times_text"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from asterism.app.reproduce import html, markdown
 from asterism.app.run_folder import write_text
@@ -13,26 +13,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from asterism.app.reproduce.part import Effort, Outcome, Part
+    from asterism.app.reproduce.part import Effort, Made
 
-__all__ = ["HTML", "MARKDOWN", "TIMES", "Made", "write_pages", "write_part"]
+__all__ = ["HTML", "MARKDOWN", "TIMES", "write_pages", "write_part"]
 
 HTML, MARKDOWN, TIMES = "reproduction.html", "reproduction.md", "times.md"
 PARTS, IMAGES = "parts", "images"
-
-
-class Made(NamedTuple):
-    """A part that is finished."""
-
-    name: str
-    part: Part
-    outcome: Outcome
-
-    @property
-    def counts(self) -> tuple[int, int]:
-        """How many claims were reproduced, and how many there are."""
-        claims = self.outcome.claims
-        return sum(c.verdict.holds for c in claims), len(claims)
 
 
 def write_part(made: Made, out: Path) -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from asterism.app.reproduce.rules import Verdict
 
-__all__ = ["Claim", "Effort", "Outcome", "Part", "Picture", "Table", "Tell", "Timing"]
+__all__ = ["Claim", "Effort", "Made", "Outcome", "Part", "Picture", "Table", "Tell", "Timing"]
 
 Tell = Callable[[float], object]
 """To be told which share of a part is done."""
@@ -124,3 +124,17 @@ class Part:
     run: Callable[[Effort, Tell], Outcome]
     slips: tuple[str, ...] = ()
     chosen: tuple[str, ...] = ()
+
+
+class Made(NamedTuple):
+    """A part that is finished."""
+
+    name: str
+    part: Part
+    outcome: Outcome
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """How many claims were reproduced, and how many there are."""
+        claims = self.outcome.claims
+        return sum(c.verdict.holds for c in claims), len(claims)
