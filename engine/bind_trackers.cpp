@@ -245,7 +245,7 @@ void bind_trackers(nb::module_& module) {
             require(window >= 1 && window <= kMaxWindow, "window: 1 to 16");
             require(max_branches >= 1 && merge_last >= 1, "max_branches, merge_last: at least 1");
             new (self) BranchOptions{window, max_branches, merge_last, prune_drop, fading,
-                                     {delta.data(), delta.data() + delta.size()}, z, false, {}};
+                                     {delta.data(), delta.data() + delta.size()}, z, false, {}, 0};
           },
           nb::kw_only(), "window"_a, "max_branches"_a, "merge_last"_a, "prune_drop"_a, "fading"_a,
           "delta"_a, "z"_a);
@@ -255,25 +255,30 @@ void bind_trackers(nb::module_& module) {
       .def(
           "__init__",
           [](TreeTracker<Forest>* self, const MotionModel& model, const ScoreModel& score,
-             const LifeOptions& life, const BranchOptions& branches, std::int32_t resolver,
-             bool is_independent) {
+             const LifeOptions& life, BranchOptions branches, std::int32_t resolver,
+             bool is_independent, const CarryOptions& carry) {
             require(resolver >= 0 && resolver <= 2, "resolver: 0, 1 or 2");
-            new (self) TreeTracker<Forest>(Forest(
-                model, score, life, branches, {static_cast<Resolver>(resolver), is_independent}));
+            require(!(is_independent && carry.is_on), "carry: not where is_independent");
+            branches.max_carried = carry.max_carried;
+            new (self) TreeTracker<Forest>(
+                Forest(model, score, life, branches, carry,
+                       {static_cast<Resolver>(resolver), is_independent}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "resolver"_a,
-          "is_independent"_a);
+          "is_independent"_a, "carry"_a);
 
   bind_tracker<TreeTracker<HypothesisForest>>(module, "HypothesisTracker")
       .def(
           "__init__",
           [](TreeTracker<HypothesisForest>* self, const MotionModel& model, const ScoreModel& score,
              const LifeOptions& life, BranchOptions branches, std::int64_t max_hypotheses,
-             std::int64_t max_nodes, double new_track_claim, nb::object choose) {
+             std::int64_t max_nodes, double new_track_claim, const CarryOptions& carry,
+             nb::object choose) {
             require(max_hypotheses >= 1 && max_nodes >= 1, "limits: at least 1");
             const double least_new_worth = -branches.prune_drop;
             const double drop = std::max(branches.prune_drop, 25.0);
             make_joint(branches, score);
+            branches.max_carried = carry.max_carried;
             Packer packer;
             if (!choose.is_none())
               packer = [shared = std::make_shared<const PythonPacker>(std::move(choose))](
@@ -281,12 +286,12 @@ void bind_trackers(nb::module_& module) {
                            std::span<const std::int32_t> first_resource,
                            FrameStats& stats) { return (*shared)(trees, first_resource, stats); };
             new (self) TreeTracker<HypothesisForest>(
-                HypothesisForest(model, score, life, branches, new_track_claim,
+                HypothesisForest(model, score, life, branches, carry, new_track_claim,
                                  {max_hypotheses, max_nodes, least_new_worth, drop,
                                   std::move(packer)}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
-          "max_nodes"_a, "new_track_claim"_a, "choose"_a = nb::none());
+          "max_nodes"_a, "new_track_claim"_a, "carry"_a, "choose"_a = nb::none());
 
   bind_tracker<TreeTracker<HypothesisMatrix>>(module, "MatrixTracker")
       .def("clusters", &clusters)
@@ -294,16 +299,17 @@ void bind_trackers(nb::module_& module) {
           "__init__",
           [](TreeTracker<HypothesisMatrix>* self, const MotionModel& model, const ScoreModel& score,
              const LifeOptions& life, BranchOptions branches, std::int64_t max_hypotheses,
-             double merged_within, double new_track_claim) {
+             double merged_within, double new_track_claim, const CarryOptions& carry) {
             require(max_hypotheses >= 1, "max_hypotheses: at least 1");
             const double drop = branches.prune_drop;
             make_joint(branches, score);
+            branches.max_carried = carry.max_carried;
             new (self) TreeTracker<HypothesisMatrix>(
-                HypothesisMatrix(model, score, life, branches, new_track_claim,
+                HypothesisMatrix(model, score, life, branches, carry, new_track_claim,
                                  {max_hypotheses, drop, merged_within}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
-          "merged_within"_a, "new_track_claim"_a);
+          "merged_within"_a, "new_track_claim"_a, "carry"_a);
 
   bind_mcmc<OneMotion>(module, "OneMotionTracker");
   bind_mcmc<SeveralMotions>(module, "SeveralMotionsTracker");

@@ -76,6 +76,23 @@ Out<double> score_tracks(const MotionModel& m, const ScoreModel& sm, const In<do
   return scores.give({tracks.n_tracks()});
 }
 
+Out<double> foresee_tracks(const MotionModel& m, const In<double>& points,
+                           const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
+                           const In<double>& times, const In<std::int32_t>& kind,
+                           const In<double>& F, const In<double>& Q) {
+  const Timeline line = timeline(m, times, kind, F, Q);
+  const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
+  Owned<double> log_densities(tracks.points.size());
+  {
+    nb::gil_scoped_release release;
+    for (std::size_t k = 0; k < tracks.n_tracks(); ++k)
+      if (const auto f = tracks.frames_of(k); !f.empty())
+        foresee_track(m, line, tracks.points_of(k), f,
+                      {log_densities.data.get() + tracks.offsets[k], f.size()});
+  }
+  return log_densities.give({tracks.points.size()});
+}
+
 nb::tuple filter_tracks(const MotionModel& m, const In<double>& points,
                         const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
                         const In<double>& times, const In<std::int32_t>& kind, const In<double>& F,
@@ -143,6 +160,8 @@ void bind_tracking(nb::module_& module) {
 
   module.def("score_tracks", &score_tracks, "model"_a, "score"_a, "points"_a, "frames"_a,
              "offsets"_a, "times"_a, "kind"_a, "F"_a, "Q"_a);
+  module.def("foresee_tracks", &foresee_tracks, "model"_a, "points"_a, "frames"_a, "offsets"_a,
+             "times"_a, "kind"_a, "F"_a, "Q"_a);
   module.def("filter_tracks", &filter_tracks, "model"_a, "points"_a, "frames"_a, "offsets"_a,
              "times"_a, "kind"_a, "F"_a, "Q"_a, "smooth"_a);
 }

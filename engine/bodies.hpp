@@ -35,17 +35,22 @@ class Bodies {
     list_markers(s, s.frames.newest(), w_.places_now);
   }
   // How well the neighbours know the link of a fragment from then to now: log density against
-  // elsewhere. False where there are too few to say.
-  bool link(const Sightings& s, const Frame::One& own, std::int64_t when, double& gain) {
-    list_common(s, when);
+  // elsewhere, of the steadiest and, where these say less than `enough`, of the nearest too. False
+  // where there are too few to say.
+  bool link(const Sightings& s, const Frame::One& own, const Fragment& f, double enough,
+            double& gain) {
+    list_common(s, f.last);
     if (w_.common.size() < least_for_rotation(D_) + 2) return false;
-    const Point then = *s.frames.find(when)->find(own.fragment);
-    const std::int32_t marker = s.fragments.at(own.fragment).marker;
+    const Point then = *s.frames.find(f.last)->find(own.fragment);
+    const double elsewhere = s.elsewhere.log_density(own.at, s.frames.newest(), own.fragment);
+    const auto say = [&] {
+      return carry(w_.pairs, then, D_, 3 * noise_).log_density(own.at) - elsewhere;
+    };
+    gain = -std::numeric_limits<double>::infinity();
+    if (f.marker >= 0 && pair_steadiest(f.marker) && w_.pairs.size() == kFitted) gain = say();
+    if (gain >= enough) return true;
     pair_nearest(own.fragment, then);
-    gain = carry(w_.pairs, then, D_, 3 * noise_).log_density(own.at);
-    if (marker >= 0 && pair_steadiest(marker) && w_.pairs.size() == kFitted)
-      gain = std::max(gain, carry(w_.pairs, then, D_, 3 * noise_).log_density(own.at));
-    gain -= s.elsewhere.log_density(own.at, s.frames.newest(), own.fragment);
+    gain = std::max(gain, say());
     return true;
   }
 

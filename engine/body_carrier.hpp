@@ -60,21 +60,25 @@ class BodyCarrier {
   }
 
   // Where a marker is that was not seen in the frames before, by where others are. False where none of
-  // its neighbours is among them, or too little is known of it.
-  bool carry(std::int32_t marker, const Places& now, Carriage& out) {
+  // its neighbours is among them, or too little is known of it. Of the frames before this one, `n_open`
+  // were not told to `see`: a marker that was there in the last that was may have gone since.
+  bool carry(std::int32_t marker, const Places& now, Carriage& out, std::int64_t n_open = 0) {
     const auto hidden = hidden_.find(marker);
     const auto trust = trust_.find(marker);
-    if (hidden == hidden_.end() || trust == trust_.end() || trust->second.shifted.n < kLeastJudged)
-      return false;
+    if (trust == trust_.end() || trust->second.shifted.n < kLeastJudged) return false;
+    if (hidden == hidden_.end()) {
+      s_.anchors.clear();
+      if (n_open > 0 && !frames_.empty()) remember(marker, frames_.size() - 1, s_.anchors);
+    }
     s_.ways.clear();
-    for (const Remembered& anchor : hidden->second.anchors) {
+    for (const Remembered& anchor : hidden == hidden_.end() ? s_.anchors : hidden->second.anchors) {
       s_.pairs.clear();
       for (std::size_t k = 0; k < anchor.around.size() && s_.pairs.size() < kSteadiest; ++k)
         if (const Point* at = now.find(anchor.around[k].marker); at != nullptr)
           s_.pairs.push_back({anchor.around[k].at, *at, anchor.weight[k]});
       if (s_.pairs.empty()) continue;
       // Bodies bend on, as if at random.
-      const double frames = static_cast<double>(n_frames_ + 1 - anchor.frame);
+      const double frames = static_cast<double>(n_frames_ + n_open + 1 - anchor.frame);
       s_.ways.push_back(way(anchor.at, trust->second, frames / kLag));
     }
     if (s_.ways.empty()) return false;
@@ -159,15 +163,20 @@ class BodyCarrier {
       return;
     }
     std::vector<Remembered>& anchors = hidden_[marker].anchors;
+    remember(marker, frames_.size() - 2, anchors);
+    if (anchors.empty()) hidden_.erase(marker);
+  }
+  // Where a marker was among others in frames_[last], in which it was seen last, and before.
+  void remember(std::int32_t marker, std::size_t last, std::vector<Remembered>& anchors) {
     const std::span<const Bond> steady = bonds(marker);
-    const std::size_t last = frames_.size() - 2;
+    const auto since = static_cast<std::int64_t>(frames_.size() - 1 - last);
     for (const std::size_t back : kAnchors) {
       if (back > last) continue;
       const Point* own = find(frames_[last - back], marker);
       if (own == nullptr) continue;
       Remembered& anchor = anchors.emplace_back();
       anchor.at = *own;
-      anchor.frame = n_frames_ - 1 - static_cast<std::int64_t>(back);
+      anchor.frame = n_frames_ - since - static_cast<std::int64_t>(back);
       for (const Bond& bond : steady)
         if (const Point* at = find(frames_[last - back], bond.other);
             at != nullptr && anchor.around.size() < kRemembered) {
@@ -176,7 +185,6 @@ class BodyCarrier {
         }
       if (anchor.around.empty()) anchors.pop_back();
     }
-    if (anchors.empty()) hidden_.erase(marker);
   }
 
   // Carries a marker from where it was by `s_.pairs`.
@@ -253,6 +261,7 @@ class BodyCarrier {
     std::vector<Bond> steady;
     std::vector<RigidPair> pairs;
     std::vector<Carriage> ways;
+    std::vector<Remembered> anchors;
   };
 
   int D_;

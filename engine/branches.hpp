@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "carried_state.hpp"
 #include "live_tracks.hpp"
 #include "surprise.hpp"
 
@@ -33,6 +34,7 @@ struct BranchOptions {
   // expect is for the joint choice to settle.
   bool is_joint = false;
   std::vector<double> log_end;  // then: log of the probability of nothing more in so many frames
+  std::int32_t max_carried = 0;  // frames that neighbours may carry a hidden track
 };
 
 // How much a believed track expects a detection: w_j / (w_0 + Σ_{l≠j} w_l), where
@@ -53,6 +55,7 @@ struct WindowFrame {
   PointGrid grid;
   std::vector<Claim> claims;    // by track
   std::vector<double> claimed;  // by all tracks, of each detection
+  std::vector<Advice> advice;   // by track, to those who get any
 
   // What a detection loses for a track by what the others expect, until the frame is decided and
   // shared out: exact for two tracks, for more each is as if it were the only other one (linear
@@ -65,6 +68,15 @@ struct WindowFrame {
       if (at->column == column) others -= at->value;
     return std::log1p(std::max(others, 0.0));
   }
+
+  const Advice* advice_to(std::int64_t track) const {
+    const auto at = std::ranges::lower_bound(advice, track, {}, &Advice::track);
+    return at != advice.end() && at->track == track ? &*at : nullptr;
+  }
+  double says(std::int64_t track, std::int32_t column) const {
+    const Advice* own = advice_to(track);
+    return own == nullptr ? 0 : own->of(column);
+  }
 };
 
 struct Branch {
@@ -74,14 +86,17 @@ struct Branch {
   std::int64_t n_updates = 0;
   double last_time = 0;
   Point last{};
-  std::int32_t gap = 0, n_taken = 0;  // n_taken: detections within the window
+  std::int32_t gap = 0, carried = 0;  // as a track's
+  std::int32_t n_taken = 0;           // detections within the window
   bool has_ended = false;
+  bool is_chosen = false;  // by the last joint choice
   // Detection in each frame of the window, -1 for a miss, and its squared distance from what was
   // expected: by frame number, modulo the longest window.
   std::array<std::int32_t, kMaxWindow> path{};
   std::array<double, kMaxWindow> distance2{};
 
   std::int32_t taken(std::int64_t frame) const { return path[frame % kMaxWindow]; }
+  std::int32_t untold() const { return gap - carried; }
 };
 
 // What a track keeps beside what is decided of it: λ up to there, and the branches from there on.
@@ -91,6 +106,12 @@ struct Tree {
   double lambda = 0;
   std::int64_t n_updates = 0;
   std::vector<Branch> branches;
+
+  // By what all trees do together where that was asked, else by itself.
+  const Branch& best() const {
+    const auto chosen = std::ranges::find(branches, true, &Branch::is_chosen);
+    return chosen == branches.end() ? branches.front() : *chosen;
+  }
 };
 
 class BranchGrower {
@@ -105,7 +126,7 @@ class BranchGrower {
   // What a branch is worth. Jointly, its part of the posterior: no less for misses after which the
   // track may have ended.
   double worth(const Branch& b) const {
-    if (opt_.is_joint) return b.score - live_.misses_gain(0, b.gap) + opt_.log_end[b.gap];
+    if (opt_.is_joint) return b.score - live_.misses_gain(0, b.untold()) + opt_.log_end[b.untold()];
     return rank(b);
   }
 
@@ -119,6 +140,7 @@ class BranchGrower {
     b.last_time = track.last_time;
     b.last = track.last;
     b.gap = track.gap;
+    b.carried = track.carried;
     return b;
   }
 
@@ -132,6 +154,18 @@ class BranchGrower {
     track.more.branches.assign(grown_.begin(), grown_.end());
   }
 
+  // What a track that was hidden for `gap` frames expects of a frame, its state predicted to it.
+  Expected expected(const MotionState& state, std::int32_t gap, const Advice* advice) const {
+    const bool is_told = advice != nullptr && advice->is_carried && gap > 0;
+    return Expected(live_.m, state, is_told ? &advice->place : nullptr);
+  }
+  // Whether a track that was hidden for `gap` frames and is not seen in this one either lives by what
+  // its neighbours tell. Who is carried is hidden from view: such a frame says nothing of whether the
+  // marker is still there.
+  bool lives_on(const Expected& expected, std::int32_t gap, const Advice* advice) const {
+    return expected.is_carried() && !advice->is_doubtful && gap < opt_.max_carried;
+  }
+
   // Adds a branch's ways over a further frame: one for each detection in its gate, then the miss.
   void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch parent,
              std::vector<Branch>& out, FrameStats& stats) const {
@@ -140,13 +174,15 @@ class BranchGrower {
     parent.distance2[slot] = 0;
     if (parent.has_ended) {
       if (opt_.is_joint) {  // one more frame in which it was not seen
-        parent.score += live_.miss_gain(parent.gap++);
+        parent.score += live_.miss_gain(parent.untold());
+        ++parent.gap;
       }
       out.push_back(std::move(parent));
       return;
     }
     predict(live_.m, frame.step, parent.state);
-    const Prediction prediction(live_.m, parent.state);
+    const Advice* advice = frame.advice_to(track.more.key);
+    const Expected all = expected(parent.state, parent.gap, advice);
     const double hit = live_.hit_gain(parent.gap), miss = live_.miss_gain(parent.gap);
     const double least =
         track.is_confirmed() ? miss + live_.leftover_gain() - hit - opt_.prune_drop
@@ -154,31 +190,46 @@ class BranchGrower {
     const auto child_with = [&](std::int32_t j, double d2) {
       const Point& y = frame.points[j];
       ++stats.n_candidates;
+      const Prediction& prediction = all.of(y);
       const double lambda = opt_.fading * parent.lambda + surprise(prediction, y);
       if (!passes(lambda, parent.n_updates + 1)) {
         ++stats.n_cut;
         return;
       }
       Branch child = parent;
+      all.choose(y, child.state);
       const double won = hit + update(live_.m, prediction, y, child.state);
       if (!std::isfinite(won)) return;
       child.score += opt_.is_joint ? won : won - frame.crowding(track.more.key, j);
+      if (advice != nullptr) child.score += advice->of(j);
       child.lambda = lambda;
       ++child.n_updates;
       ++child.n_taken;
       child.last = y;
       child.last_time = frame.time;
-      child.gap = 0;
+      child.gap = child.carried = 0;
       child.path[slot] = j;
       child.distance2[slot] = d2;
       out.push_back(std::move(child));
     };
-    live_.within_gate(frame.grid, frame.points, prediction,
-                      prediction.radius(live_.opt.gate, least, frame.grid.r_most()), parent.last,
-                      frame.time - parent.last_time, child_with);
+    const bool gives_way = advice != nullptr && advice->gives_way;
+    if (all.is_carried()) {
+      for (const std::int32_t j : advice->may_take)
+        child_with(j, squared_distance(frame.points[j], all.of(frame.points[j]).center,
+                                       live_.m.axis.D));
+    } else if (!gives_way) {
+      const Prediction& own = all.prediction();
+      live_.within_gate(frame.grid, frame.points, own,
+                        own.radius(live_.opt.gate, least, frame.grid.r_most()), parent.last,
+                        frame.time - parent.last_time, child_with);
+    }
     if (static_cast<std::int64_t>(out.size()) > live_.opt.max_candidates) throw CandidateLimit{};
-    parent.score += miss;
-    parent.has_ended = ++parent.gap >= live_.sm.max_gap;
+    if (lives_on(all, parent.gap, advice))
+      ++parent.carried;
+    else
+      parent.score += miss;
+    ++parent.gap;
+    parent.has_ended = gives_way || parent.untold() >= live_.sm.max_gap;
     out.push_back(std::move(parent));
   }
 
@@ -186,20 +237,28 @@ class BranchGrower {
   void claim(const LiveTrack<Tree>& track, WindowFrame& frame) {
     const Branch& best = track.more.branches.front();
     if (best.has_ended) return;
+    const Advice* advice = frame.advice_to(track.more.key);
+    if (advice != nullptr && advice->gives_way) return;
     MotionState state = best.state;
     predict(live_.m, frame.step, state);
-    const Prediction prediction(live_.m, state);
+    const Expected all = expected(state, best.gap, advice);
+    const Prediction& prediction = all.prediction();
     const double log_seen = live_.sm.log_seen(best.gap) - live_.sm.log_clutter;
     // Less is nothing beside the clutter.
     const double radius = prediction.radius(live_.opt.gate, kNoClaim - log_seen,
                                              frame.grid.r_most());
-    if (radius < 0) return;
+    if (radius < 0 && !all.is_carried()) return;
     std::array<double, kMaxModes> each{};
     const std::size_t first = frame.claims.size();
-    frame.grid.within(prediction.center, radius, [&](std::int32_t j, double) {
-      const double log_w = log_seen + prediction.log_likelihood(frame.points[j], each);
+    const auto weigh = [&](std::int32_t j, double) {
+      const Point& y = frame.points[j];
+      const double log_w = log_seen + all.of(y).log_likelihood(y, each);
       if (log_w > kNoClaim && log_w < 700) frame.claims.push_back({track.more.key, j, std::exp(log_w)});
-    });
+    };
+    if (all.is_carried())
+      for (const std::int32_t j : advice->may_take) weigh(j, 0);
+    else
+      frame.grid.within(prediction.center, radius, weigh);
     weights_.clear();
     for (std::size_t c = first; c < frame.claims.size(); ++c)
       weights_.push_back(frame.claims[c].value);

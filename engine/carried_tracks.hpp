@@ -20,11 +20,13 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "body_carrier.hpp"
 #include "bond_graph.hpp"
+#include "carried_state.hpp"
 #include "fresh.hpp"
 #include "live_tracks.hpp"
 
@@ -46,15 +48,17 @@ class CarriedTracks {
   double bond_weight() const { return opt_.bond_weight; }
 
   // Lists the candidates of a frame. `list(asked, out)` adds those of the tracks for which asked(i)
-  // holds, by their predictions, with gains down to bond_weight() below `least_gain`.
+  // holds, by their predictions, with gains down to bond_weight() below `least_gain`. `n_open`: frames
+  // before this one of which nothing was learnt yet.
   template <typename List>
   void list(LiveTracks<>& live, const MotionStep& step, std::span<const Point> points,
-            double least_gain, List&& list, std::vector<Candidate>& out, FrameStats& stats) {
+            double least_gain, List&& list, std::vector<Candidate>& out, FrameStats& stats,
+            std::int64_t n_open = 0) {
     live.predict_all(step);
     out.clear();
     list([&](std::size_t i) { return live[i].gap == 0; }, out);
     place_seen(live, points, out);
-    place_hidden(live);
+    place_hidden(live, n_open);
     s_.alone.clear();
     list([&](std::size_t i) { return s_.is_carried[i] != 0; }, s_.alone);
     s_.own.resize(live.size());
@@ -88,12 +92,24 @@ class CarriedTracks {
   }
   bool is_carried(std::size_t i) const { return opt_.is_on && s_.is_carried[i]; }
 
+  // What was found by `list`, of track i: where it is carried, and whether that is known well enough to
+  // live by; the hidden one that it is and gives way to, or -1; what bonds say of its pairings in doubt.
+  struct Told {
+    std::int32_t row = 0, column = 0;
+    double nats = 0;
+  };
+  const CarriedPlace& place(std::size_t i) const { return s_.place[i]; }
+  bool is_doubtful(std::size_t i) const { return s_.is_doubtful[i] != 0; }
+  std::int32_t heir(std::size_t i) const { return s_.heir[i]; }
+  std::span<const Told> told() const { return s_.told; }
+
   // After a frame.
-  void learn(const LiveTracks<>& live, FrameStats& stats) {
+  template <typename More>
+  void learn(const LiveTracks<More>& live, FrameStats& stats) {
     if (!opt_.is_on) return;
     s_.seen.clear();
     s_.known.clear();
-    for (const LiveTrack<>& track : live.tracks) {
+    for (const LiveTrack<More>& track : live.tracks) {
       if (!track.is_confirmed()) continue;
       s_.known.push_back(number(track));
       if (track.gap == 0) s_.seen.push_back({number(track), track.last});
@@ -112,11 +128,11 @@ class CarriedTracks {
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
   // A place is doubtful that is not known to this share of the distance to the nearest neighbour.
   static constexpr double kDoubtful = 0.25;
-  // What the carried place and the track's own may differ by, squared and along an axis, against what is
-  // expected. Where they differ more, the track is less sure of its own than it says.
-  static constexpr double kAgreed = 4;
 
-  static std::int32_t number(const LiveTrack<>& track) { return static_cast<std::int32_t>(track.id); }
+  template <typename More>
+  static std::int32_t number(const LiveTrack<More>& track) {
+    return static_cast<std::int32_t>(track.id);
+  }
 
   // A track and a point that like each other best.
   void place_seen(const LiveTracks<>& live, std::span<const Point> points,
@@ -142,35 +158,27 @@ class CarriedTracks {
     }
   }
 
-  void place_hidden(const LiveTracks<>& live) {
+  void place_hidden(const LiveTracks<>& live, std::int64_t n_open) {
     s_.is_carried.assign(live.size(), 0);
     s_.is_doubtful.assign(live.size(), 0);
+    s_.place.resize(live.size());
     s_.fused.resize(live.size());
     s_.ghosts.assign(live.size(), 0);
     Carriage found;
     for (std::size_t i = 0; i < live.size(); ++i) {
       const LiveTrack<>& track = live[i];
       if (track.gap == 0 || !track.is_confirmed()) continue;
-      if (!carrier_.carry(number(track), s_.places, found)) continue;
-      const int D = live.m.axis.D;
-      double S = 0;
-      for (int b = 0; b < live.m.M; ++b) S += live.prediction(i).w[b] * live.prediction(i).S[b];
-      const double V = found.place.variance;
-      const double apart =
-          squared_distance(found.place.at, live.prediction(i).center, D) / (D * kAgreed);
-      if (!(V < S)) continue;  // it knows better itself
-      MotionState& state = s_.fused[i];
-      state = track.state;
-      if (apart > S + V)
-        for (int b = 0; b < live.m.M; ++b)
-          for (double& P : state.mode[b].P) P *= apart / S;
+      if (!carrier_.carry(number(track), s_.places, found, n_open)) continue;
+      const std::optional<MotionState> fused =
+          fuse(live.m, track.state, live.prediction(i), found.place);
+      if (!fused) continue;
+      s_.fused[i] = *fused;
+      s_.place[i] = found.place;
       const double doubtful = kDoubtful * found.nearest;
-      s_.is_doubtful[i] = !(V < doubtful * doubtful);
-      Point carried = found.place.at;
-      carried.r = std::max(V - live.m.axis.r, 0.0);
-      update(live.m, Prediction(live.m, state), carried, state);
+      s_.is_doubtful[i] = !(found.place.variance < doubtful * doubtful);
       s_.is_carried[i] = 1;
       // As likely as the marker itself, and clutter all the same.
+      const int D = live.m.axis.D;
       const double radius = 0.5 * found.nearest;
       s_.ghosts[i] = softplus(-0.5 * D * std::log(2 * std::numbers::pi * radius * radius) -
                               live.sm.log_clutter);
@@ -210,13 +218,15 @@ class CarriedTracks {
       return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 ||
              c.gain - opt_.bond_weight <= least_gain;
     };
+    s_.told.clear();
     std::int32_t row = -1;
     for (Candidate& c : out) {
       if (!live[c.row].is_confirmed()) continue;
       const bool was_listed = c.gain > least_gain;
       if (opt_.bond_weight > 0 && is_in_doubt(c)) {
         if (row != c.row) list_bonds(live[row = c.row]);
-        c.gain += says(points, c);
+        s_.told.push_back({c.row, c.column, says(points, c)});
+        c.gain += s_.told.back().nats;
       }
       if (is_carried(c.row) && (!(c.gain > s_.ghosts[c.row]) || !may_take(live, c))) c.gain = kNever;
       // A hidden one's are counted against what it would take by itself.
@@ -238,6 +248,8 @@ class CarriedTracks {
       std::int32_t& heir = s_.heir[s_.owner[c.column]];
       if (heir < 0 || c.gain > out[heir].gain) heir = e;
     }
+    for (std::int32_t& heir : s_.heir)
+      if (heir >= 0) heir = out[heir].row;
     for (Candidate& c : out)
       if (s_.heir[c.row] >= 0) c.gain = kNever;
   }
@@ -271,6 +283,8 @@ class CarriedTracks {
 
   struct Memory {
     std::vector<char> is_carried, is_doubtful;
+    std::vector<CarriedPlace> place;
+    std::vector<Told> told;
     std::vector<MotionState> fused;
     std::vector<Prediction> own;
     std::vector<double> ghosts;  // log (1 + their density / clutter's), by track

@@ -20,14 +20,24 @@ struct Carried {
   int D = 3;
 
   double log_density(const Point& y) const {
-    constexpr double nu = 3;
-    return log_peak() - 0.5 * (nu + D) *
-                            std::log1p(squared_distance(y, at, D) / (nu * scale * scale));
+    return log_peak() - 0.5 * (kFreedom + D) *
+                            std::log1p(squared_distance(y, at, D) / (kFreedom * scale * scale));
   }
-  double log_peak() const {
-    constexpr double nu = 3;
-    return std::lgamma(0.5 * (nu + D)) - std::lgamma(0.5 * nu) -
-           D * (0.5 * std::log(nu * std::numbers::pi) + std::log(scale));
+  double log_peak() const { return log_unit_peaks()[D] - D * std::log(scale); }
+
+ private:
+  static constexpr double kFreedom = 3;
+
+  // Of a scale of 1, by the number of axes.
+  static const std::array<double, 4>& log_unit_peaks() {
+    static const std::array<double, 4> peaks = [] {
+      std::array<double, 4> all{};
+      for (int d = 1; d < 4; ++d)
+        all[d] = std::lgamma(0.5 * (kFreedom + d)) - std::lgamma(0.5 * kFreedom) -
+                 d * 0.5 * std::log(kFreedom * std::numbers::pi);
+      return all;
+    }();
+    return peaks;
   }
 };
 

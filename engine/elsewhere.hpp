@@ -13,7 +13,10 @@ namespace asterism {
 class Elsewhere {
  public:
   Elsewhere(int D, double noise, double ghost_radius)
-      : D_(D), noise_(noise), radius2_(ghost_radius * ghost_radius) {}
+      : D_(D),
+        noise_(noise),
+        radius2_(ghost_radius * ghost_radius),
+        peak_(std::pow(2 * std::numbers::pi * radius2_, -0.5 * D)) {}
 
   // Anywhere is where anything was seen so far.
   void add(const Point& y) {
@@ -33,8 +36,7 @@ class Elsewhere {
       if (one.fragment != own && far < 40) beside += std::exp(-0.5 * far);
     }
     const double n = std::max<double>(static_cast<double>(at.seen.size()), 1);
-    return std::log(1 / volume_ +
-                    beside / n / std::pow(2 * std::numbers::pi * radius2_, 0.5 * D_));
+    return std::log(1 / volume_ + beside / n * peak_);
   }
   // Whether a ghost of another may be there.
   bool is_beside(const Point& y, const Frame& at, std::int32_t own) const {
@@ -45,7 +47,7 @@ class Elsewhere {
 
  private:
   int D_;
-  double noise_, radius2_;
+  double noise_, radius2_, peak_;
   bool has_box_ = false;
   Point low_{}, high_{};
   double volume_ = 1;

@@ -32,16 +32,19 @@ struct ForestOptions {
 class Forest {
  public:
   Forest(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
-         const BranchOptions& branches, const ForestOptions& options)
-      : open_{{model, score, life}, branches, {}}, opt_(options) {}
+         const BranchOptions& branches, const CarryOptions& carry, const ForestOptions& options)
+      : open_{{model, score, life}, branches, {}, {model, score, life, carry}}, opt_(options) {}
 
   // Takes a frame; decides the oldest one if the window is full with it.
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
     frame->claimed.assign(frame->points.size(), 0);
+    open_.advise(*frame, stats);
     if (!opt_.is_independent) open_.claim(*frame);
     open_.push(std::move(frame), stats);
-    if (open_.is_full()) decide(stats, label);
+    if (!open_.is_full()) return;
+    decide(stats, label);
+    open_.learn(stats);
   }
 
   // Decides all frames that are left, with what is known of them.
@@ -139,15 +142,18 @@ class Forest {
                      std::vector<Way>& ways) const {
     MotionState state = track.state;
     predict(open_.live.m, frame.step, state);
-    const Prediction prediction(open_.live.m, state);
-    const std::int32_t n_missed = std::min(open_.n_open() + 1, open_.live.sm.max_gap - track.gap);
+    const BranchGrower grower(open_.live, open_.branches);
+    const Advice* advice = frame.advice_to(track.more.key);
+    const Expected expected = grower.expected(state, track.gap, advice);
+    const std::int32_t n_missed = std::min(open_.n_open() + 1, open_.live.sm.max_gap - track.untold());
     const double gone = track.score + open_.live.misses_gain(track.gap, n_missed);
     const double over = open_.live.leftover_gain();
     std::array<double, kMaxModes> each{};
     for (std::size_t k = 1; k < ways.size(); ++k) {
       const Branch& b = track.more.branches[ways[k].branch];
-      const double hit =
-          open_.live.hit_gain(track.gap) + prediction.log_likelihood(frame.points[ways[k].column], each);
+      const Point& y = frame.points[ways[k].column];
+      double hit = open_.live.hit_gain(track.gap) + expected.of(y).log_likelihood(y, each);
+      if (advice != nullptr) hit += advice->of(ways[k].column);
       const double future = b.score + ways[k].crowding - track.score - hit - over * (b.n_taken - 1);
       if (future > 0)
         ways[k].newborn = gone + open_.live.birth_gain() - over + future + std::log1p(-std::exp(-future));
@@ -263,13 +269,13 @@ class Forest {
     LiveTrack<Tree>& track = open_.live[i];
     const std::int32_t j = s_.match[i];
     const std::int32_t own = opt_.is_independent ? track.more.branches.front().taken(frame.number) : j;
-    open_.carry(frame, i, own);
+    open_.carry(frame, i, own, stats);
     if (own >= 0) s_.is_taken[own] = 1;
     if (j >= 0) {
       const Point last = track.last;
       open_.live.take(i, j, last, frame.time, way_to(i, j)->probability, label);
     } else {
-      ++track.gap;
+      open_.miss(frame, i);
     }
     open_.keep(frame, i, own, stats);
   }

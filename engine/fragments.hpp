@@ -39,7 +39,7 @@ struct Fragment {
   std::int64_t first = 0, last = 0;
   std::int32_t n = 0;
   std::vector<Sight> sights;  // until it is decided upon
-  MotionState state;
+  MotionState state;         // while its motion is compared
   double alone = 0;  // log likelihood of its second detection and those after
   std::vector<Continuation> continuations;
   double known = 0;  // how well its neighbours knew its links, on average
@@ -56,8 +56,8 @@ struct Marker {
   std::int32_t fragment = -1;
   std::int64_t label = -1;  // of that
   std::int64_t last = 0;
-  MotionState state;            // now
-  std::vector<Anchor> anchors;  // while it is hidden
+  MotionState state;            // now, while it is hidden
+  std::vector<Anchor> anchors;  // as well
   bool is_hidden = false;
   double trust = 3;  // how well its neighbours carried it lately, while it was seen
 };
@@ -70,6 +70,7 @@ struct Frame {
     Point at{};
     std::int32_t point = 0;  // its number in the frame
   };
+  MotionStep step;        // to it
   std::vector<One> seen;  // in order of fragments
 
   const Point* find(std::int32_t fragment) const {
@@ -96,9 +97,26 @@ class RecentFrames {
                ? frames_[frames_.size() - 1 - static_cast<std::size_t>(back)].get()
                : nullptr;
   }
-  void add(std::size_t n_kept) {
+  // How a fragment moves now, by all that is remembered of it.
+  MotionState motion(const MotionModel& m, std::int32_t fragment) const {
+    MotionState state;
+    bool has_begun = false;
+    for (const std::shared_ptr<Frame>& frame : frames_) {
+      if (has_begun) predict(m, frame->step, state);
+      const Point* y = frame->find(fragment);
+      if (y == nullptr) continue;
+      if (has_begun)
+        update(m, Prediction(m, state), *y, state);
+      else
+        state = begin_state(m, *y);
+      has_begun = true;
+    }
+    return state;
+  }
+  void add(const MotionStep& step, std::size_t n_kept) {
     ++now_;
     frames_.push_back(std::make_shared<Frame>());
+    frames_.back()->step = step;
     while (frames_.size() > n_kept) frames_.pop_front();
   }
 

@@ -33,19 +33,23 @@ struct HypothesisOptions {
 class HypothesisForest {
  public:
   HypothesisForest(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
-                   const BranchOptions& branches, double new_track_claim,
+                   const BranchOptions& branches, const CarryOptions& carry, double new_track_claim,
                    const HypothesisOptions& options)
-      : open_{{{model, score, life}, branches, {}}, new_track_claim, {}}, opt_(options) {}
+      : open_{{{model, score, life}, branches, {}, {model, score, life, carry}}, new_track_claim, {}},
+        opt_(options) {}
 
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
     frame->claimed.assign(frame->points.size(), 0);
+    open_.advise(*frame, stats);
     open_.claim(*frame);
     open_.push(frame, stats);
     BranchGrower grower(open_.live, open_.branches);
     for (LiveTrack<Tree>& seed : open_.seeds) grower.grow(*frame, seed, open_.n_open(), stats);
     open_.sow();
-    if (open_.is_full()) decide(stats, label);
+    if (!open_.is_full()) return;
+    decide(stats, label);
+    open_.learn(stats);
   }
 
   template <typename Label>
@@ -115,8 +119,8 @@ class HypothesisForest {
         tree.options.push_back({0, {}});
         tree.choices.push_back({kNothing, -1});
       } else if (!has_free) {
-        const double lost = track.score - open_.live.misses_gain(0, track.gap) +
-                            open_.branches.log_end[track.gap + open_.n_open()];
+        const double lost = track.score - open_.live.misses_gain(0, track.untold()) +
+                            open_.branches.log_end[track.untold() + open_.n_open()];
         tree.options.push_back({lost, {}});
         tree.choices.push_back({kLost, -1});
       }
@@ -149,6 +153,12 @@ class HypothesisForest {
     if (!entangled.empty()) choose_by_packer(entangled, stats);
   }
 
+  void mark(std::int32_t i, const Choice& best) {
+    std::vector<Branch>& branches = open_.tree(i).more.branches;
+    for (Branch& b : branches) b.is_chosen = false;
+    if (best.branch >= 0) branches[best.branch].is_chosen = true;
+  }
+
   void choose_by_packer(const std::vector<std::int32_t>& entangled, FrameStats& stats) {
     std::vector<std::vector<PackingOption>> options;
     for (const std::int32_t i : entangled) options.push_back(std::move(s_.trees[i].options));
@@ -157,6 +167,7 @@ class HypothesisForest {
     stats.largest_group = std::max<std::int64_t>(stats.largest_group, entangled.size());
     for (std::size_t c = 0; c < entangled.size(); ++c) {
       const Choice& best = s_.trees[entangled[c]].choices[own[c]];
+      mark(entangled[c], best);
       s_.fates[entangled[c]] = {best.branch != kNothing, best.column, 0};
     }
   }
@@ -185,6 +196,7 @@ class HypothesisForest {
     for (std::size_t c = 0; c < cluster.size(); ++c) {
       const TreeOptions& tree = s_.trees[cluster[c]];
       const Choice& best = tree.choices[chosen[c]];
+      mark(cluster[c], best);
       double own = 0;
       for (std::size_t h = 0; h < totals.size(); ++h) {
         const double p = std::exp(totals[h] - totals.front()) / sum;

@@ -31,13 +31,15 @@ namespace asterism {
 class HypothesisMatrix {
  public:
   HypothesisMatrix(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
-                   const BranchOptions& branches, double new_track_claim,
+                   const BranchOptions& branches, const CarryOptions& carry, double new_track_claim,
                    const MatrixOptions& options)
-      : open_{{{model, score, life}, branches, {}}, new_track_claim, {}}, opt_(options) {}
+      : open_{{{model, score, life}, branches, {}, {model, score, life, carry}}, new_track_claim, {}},
+        opt_(options) {}
 
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
     frame->claimed.assign(frame->points.size(), 0);
+    open_.advise(*frame, stats);
     open_.claim(*frame);
     open_.frames.push_back(frame);
     s_.ways.grow(open_, stats);
@@ -61,6 +63,7 @@ class HypothesisMatrix {
       weigh(1);
       prune_by_oldest();
       mash(stats, label);
+      open_.learn(stats);
     }
     split();
   }

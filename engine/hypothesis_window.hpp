@@ -78,12 +78,14 @@ struct HypothesisWindow : OpenWindow {
     for (std::size_t i = 0; i < n_live; ++i) {
       const Fate& fate = fates[i];
       const std::int32_t own = fate.exists ? fate.column : -1;
-      carry(*frame, i, own);
+      carry(*frame, i, own, stats);
       if (own >= 0) {
         const Point last = live[i].last;
         live.take(i, own, last, frame->time, fate.probability, label);
+      } else if (fate.exists) {
+        miss(*frame, i);
       } else {
-        live[i].gap = fate.exists ? live[i].gap + 1 : live.sm.max_gap;
+        end(i);
       }
       keep(*frame, i, fate.column, stats);
     }

@@ -1,5 +1,8 @@
 // One Kalman filter for a point whose axes share their covariance.
 //
+// Loops over axes run over all that there may be, where those beyond D are zeros: the compiler then
+// knows how many there are.
+//
 // With isotropic noise the D axes of a point do not mix and have the same covariance, which depends
 // on the pattern of detections alone. So a track needs one n × n matrix and D means of n states.
 //
@@ -79,7 +82,7 @@ inline void predict_mean(const AxisModel& m, const AxisStep& step, const AxisSta
                          AxisState& out) {
   with_states(m.n, [&](auto n_states) {
     constexpr int n = n_states;
-    for (int d = 0; d < m.D; ++d) {
+    for (int d = 0; d < kMaxAxes; ++d) {
       AxisVector x{};
       for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) x[i] += step.F[i * n + j] * s.x[d][j];
@@ -109,7 +112,7 @@ inline Point observed(const AxisModel& m, const AxisState& s) {
   return with_states(m.n, [&](auto n_states) {
     constexpr int n = n_states;
     Point y{};
-    for (int d = 0; d < m.D; ++d)
+    for (int d = 0; d < kMaxAxes; ++d)
       for (int i = 0; i < n; ++i) y[d] += m.H[i] * s.x[d][i];
     return y;
   });

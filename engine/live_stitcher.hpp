@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <cstdint>
 #include <deque>
-#include <memory>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "shared_copy.hpp"
 #include "stitcher.hpp"
 
 namespace asterism {
@@ -38,48 +38,43 @@ class LiveStitcher {
             std::span<const std::int64_t> labels,
             std::span<const std::pair<std::int64_t, std::int64_t>> revised, Tell&& tell) {
     for (const auto& [detection, label] : revised) revise(detection, label);
-    Recent& now = *recent_.emplace_back(std::make_shared<Recent>());
+    Recent& now = recent_.emplace_back(Recent{}).own();
     now.step = step;
     now.first = n_seen_;
     now.points.assign(points.begin(), points.end());
     now.labels.assign(labels.begin(), labels.end());
     now.known.resize(points.size());
     n_seen_ += static_cast<std::int64_t>(points.size());
-    if (recent_.size() > n_waiting_) take(own(recent_[recent_.size() - 1 - n_waiting_]));
+    if (recent_.size() > n_waiting_) take(recent_[recent_.size() - 1 - n_waiting_].own());
     stitcher_.guess();
-    for (std::shared_ptr<Recent>& frame : recent_)
+    for (SharedCopy<Recent>& frame : recent_)
       if (!frame->is_taken)
-        tell_of_waiting(own(frame), tell);
-      else if (!frame->is_settled)
-        tell_of_taken(own(frame), tell);
+        tell_of_waiting(frame.own(), tell);
+      else if (!frame->open.empty())
+        tell_of_taken(frame.own(), tell);
     if (recent_.size() > n_waiting_ + n_kept_) recent_.pop_front();
   }
 
  private:
   struct Known {
     std::int32_t fragment = -1, told = -2;
-    bool is_settled = false;
   };
   struct Recent {
     std::int64_t first = 0;  // of its detections
-    bool is_taken = false, is_settled = false;
+    bool is_taken = false;
     std::vector<Known> known;
+    std::vector<std::int32_t> open;  // detections whose marker may change, once it is taken
     // While it waits.
     MotionStep step;
     std::vector<Point> points;
     std::vector<std::int64_t> labels;
   };
 
-  // Copies of the whole share their frames until one of them changes a frame.
-  static Recent& own(std::shared_ptr<Recent>& frame) {
-    if (frame.use_count() > 1) frame = std::make_shared<Recent>(*frame);
-    return *frame;
-  }
   // What has been taken is settled.
   void revise(std::int64_t detection, std::int64_t label) {
     for (auto frame = recent_.rbegin(); frame != recent_.rend() && !(*frame)->is_taken; ++frame) {
       if (detection < (*frame)->first) continue;
-      own(*frame).labels[static_cast<std::size_t>(detection - (*frame)->first)] = label;
+      frame->own().labels[static_cast<std::size_t>(detection - (*frame)->first)] = label;
       return;
     }
   }
@@ -89,22 +84,21 @@ class LiveStitcher {
       n_joins_ += d.marker >= 0 && d.after >= 0;
       n_ghosts_ += d.marker == Decision::kGhost;
     });
-    for (std::size_t i = 0; i < frame.known.size(); ++i) frame.known[i].fragment = fragments_[i];
+    for (std::size_t i = 0; i < frame.known.size(); ++i) {
+      frame.known[i].fragment = fragments_[i];
+      frame.open.push_back(static_cast<std::int32_t>(i));
+    }
     frame.is_taken = true;
     std::vector<Point>().swap(frame.points);
     std::vector<std::int64_t>().swap(frame.labels);
   }
   template <typename Tell>
   void tell_of_taken(Recent& frame, Tell&& tell) {
-    frame.is_settled = true;
-    for (std::size_t i = 0; i < frame.known.size(); ++i) {
-      Known& known = frame.known[i];
-      if (known.is_settled) continue;
-      const bool is_free = known.fragment < 0;
-      known.is_settled = is_free || !stitcher_.is_open(known.fragment);
-      frame.is_settled &= known.is_settled;
-      tell_of(frame, i, is_free ? -1 : stitcher_.marker_of(known.fragment), tell);
-    }
+    std::erase_if(frame.open, [&](std::int32_t i) {
+      const std::int32_t f = frame.known[i].fragment;
+      tell_of(frame, i, f < 0 ? -1 : stitcher_.marker_of(f), tell);
+      return f < 0 || !stitcher_.is_open(f);
+    });
   }
   // A guess gives way to what is known.
   template <typename Tell>
@@ -132,7 +126,7 @@ class LiveStitcher {
   Stitcher stitcher_;
   std::size_t n_waiting_, n_kept_;
   std::int64_t n_seen_ = 0, n_joins_ = 0, n_ghosts_ = 0;
-  std::deque<std::shared_ptr<Recent>> recent_;
+  std::deque<SharedCopy<Recent>> recent_;
   std::vector<std::int32_t> fragments_, markers_;  // while a frame is worked on
 };
 

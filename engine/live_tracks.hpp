@@ -55,6 +55,7 @@ struct LiveTrack {
   [[no_unique_address]] More more;
 
   bool is_confirmed() const { return id >= 0; }
+  std::int32_t untold() const { return gap - carried; }  // frames in which nobody told where it is
 };
 
 // Of one frame, or of many: sums of what is counted, the worst of what is a size or a bound.
@@ -254,7 +255,7 @@ class LiveTracks {
       track.best_score = std::max(track.best_score, track.score);
       const bool is_doubted =
           !track.is_confirmed() && track.best_score - track.score > opt.delete_drop;
-      return track.gap - track.carried >= sm.max_gap || is_doubted;
+      return track.untold() >= sm.max_gap || is_doubted;
     });
   }
 

@@ -69,6 +69,20 @@ inline MotionState begin_state(const MotionModel& m, const Point& y) {
 //   e_a  mean of mode a less that of mode 0       E_a  e_a e_aᵀ, averaged over the axes
 //
 // The axes share one covariance, so what their means differ by is shared out evenly.
+
+// Mean over the axes of e eᵀ.
+template <int n>
+AxisMatrix mean_square(const std::array<AxisVector, kMaxAxes>& e, int D) {
+  AxisMatrix E{};
+  for (int i = 0; i < n; ++i)
+    for (int j = i; j < n; ++j) {
+      double sum = 0;
+      for (int d = 0; d < kMaxAxes; ++d) sum += e[d][i] * e[d][j];
+      E[i * n + j] = E[j * n + i] = sum / D;
+    }
+  return E;
+}
+
 struct ModeSpread {
   std::array<std::array<AxisVector, kMaxAxes>, kMaxModes> e{};
   std::array<AxisMatrix, kMaxModes> E{};
@@ -77,11 +91,9 @@ struct ModeSpread {
     with_states(m.axis.n, [&](auto n_states) {
       constexpr int n = n_states;
       for (int a = 1; a < m.M; ++a) {
-        for (int d = 0; d < m.axis.D; ++d)
+        for (int d = 0; d < kMaxAxes; ++d)
           for (int i = 0; i < n; ++i) e[a][d][i] = s.mode[a].x[d][i] - s.mode[0].x[d][i];
-        for (int d = 0; d < m.axis.D; ++d)
-          for (int i = 0; i < n; ++i)
-            for (int j = 0; j < n; ++j) E[a][i * n + j] += e[a][d][i] * e[a][d][j] / m.axis.D;
+        E[a] = mean_square<n>(e[a], m.axis.D);
       }
     });
   }
@@ -96,16 +108,15 @@ inline AxisState mix(const MotionModel& m, const MotionState& s, const ModeSprea
     std::array<AxisVector, kMaxAxes> shift{};
     for (int k = 0; k < n * n; ++k) mixed.P[k] *= weights[0];
     for (int a = 1; a < m.M; ++a) {
-      for (int d = 0; d < m.axis.D; ++d)
+      for (int d = 0; d < kMaxAxes; ++d)
         for (int i = 0; i < n; ++i) shift[d][i] += weights[a] * spread.e[a][d][i];
       for (int k = 0; k < n * n; ++k)
         mixed.P[k] += weights[a] * (s.mode[a].P[k] + spread.E[a][k]);
     }
-    for (int d = 0; d < m.axis.D; ++d)
-      for (int i = 0; i < n; ++i) {
-        mixed.x[d][i] += shift[d][i];
-        for (int j = 0; j < n; ++j) mixed.P[i * n + j] -= shift[d][i] * shift[d][j] / m.axis.D;
-      }
+    for (int d = 0; d < kMaxAxes; ++d)
+      for (int i = 0; i < n; ++i) mixed.x[d][i] += shift[d][i];
+    const AxisMatrix moved = mean_square<n>(shift, m.axis.D);
+    for (int k = 0; k < n * n; ++k) mixed.P[k] -= moved[k];
     return mixed;
   });
 }

@@ -10,6 +10,7 @@
 
 #include "branches.hpp"
 #include "live_tracks.hpp"
+#include "window_bodies.hpp"
 
 namespace asterism {
 
@@ -17,6 +18,7 @@ struct OpenWindow {
   LiveTracks<Tree> live;
   BranchOptions branches;
   std::vector<std::shared_ptr<const WindowFrame>> frames;
+  WindowBodies bodies;
   std::int64_t n_trees = 0;
 
   std::int32_t n_open() const { return static_cast<std::int32_t>(frames.size()); }
@@ -30,7 +32,11 @@ struct OpenWindow {
     }
   }
 
-  // What the believed tracks expect of a frame that comes.
+  // What neighbours say of a frame that comes.
+  void advise(WindowFrame& frame, FrameStats& stats) {
+    if (bodies.is_on()) bodies.advise(live, n_open(), frame, stats);
+  }
+  // What the believed tracks expect of it.
   void claim(WindowFrame& frame) const {
     BranchGrower grower(live, branches);
     for (const LiveTrack<Tree>& track : live.tracks)
@@ -49,23 +55,46 @@ struct OpenWindow {
     return oldest;
   }
 
+  // After a decision.
+  void learn(FrameStats& stats) {
+    if (bodies.is_on()) bodies.learn(live, stats);
+  }
+
   // Carries what is decided of track i over the frame just popped, with detection `own` or, at -1,
-  // none.
-  void carry(const WindowFrame& frame, std::size_t i, std::int32_t own) {
+  // none; its gap is the caller's.
+  void carry(const WindowFrame& frame, std::size_t i, std::int32_t own, FrameStats& stats) {
     LiveTrack<Tree>& track = live[i];
+    const BranchGrower grower(live, branches);
     predict(live.m, frame.step, track.state);
+    const Advice* advice = frame.advice_to(track.more.key);
+    const Expected expected = grower.expected(track.state, track.gap, advice);
     if (own >= 0) {
-      const Prediction prediction(live.m, track.state);
       const Point& y = frame.points[own];
+      const Prediction& prediction = expected.of(y);
+      expected.choose(y, track.state);
+      stats.n_returned += expected.is_carried();
       track.more.lambda = branches.fading * track.more.lambda + surprise(prediction, y);
       ++track.more.n_updates;
       track.score += live.hit_gain(track.gap) + update(live.m, prediction, y, track.state);
       track.last = y;
       track.last_time = frame.time;
+    } else if (grower.lives_on(expected, track.gap, advice)) {
+      ++track.carried;
+      ++stats.n_carried;
     } else {
       track.score += live.miss_gain(track.gap);
     }
   }
+
+  // Track i was not seen in that frame.
+  void miss(const WindowFrame& frame, std::size_t i) {
+    const Advice* advice = frame.advice_to(live[i].more.key);
+    if (advice != nullptr && advice->gives_way)
+      end(i);
+    else
+      ++live[i].gap;
+  }
+  void end(std::size_t i) { live[i].gap = live.sm.max_gap + live[i].carried; }
 
   // Keeps the branches that agree with what was carried; grows new ones where none do.
   void keep(const WindowFrame& frame, std::size_t i, std::int32_t own, FrameStats& stats) {
@@ -84,6 +113,7 @@ struct OpenWindow {
       --b.n_taken;
       b.distance2[frame.number % kMaxWindow] = 0;
       if (!branches.is_joint) b.score += frame.crowding(track.more.key, own);
+      b.score -= frame.says(track.more.key, own);
     }
   }
 

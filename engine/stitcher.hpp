@@ -66,13 +66,14 @@ class Stitcher {
   void step(const MotionStep& step, std::span<const Point> points,
             std::span<const std::int64_t> labels, std::span<std::int32_t> fragment_of,
             Decide&& decide) {
-    so_far_.frames.add(static_cast<std::size_t>(opt_.confirm + opt_.max_gap + 2));
+    so_far_.frames.add(step, static_cast<std::size_t>(opt_.confirm + opt_.max_gap + 2));
     move_on(step);
     take_in(points, labels, fragment_of);
     cut_links(labels, fragment_of);
     for (std::size_t i = 0; i < points.size(); ++i)
       if (fragment_of[i] >= 0) see(fragment_of[i], points[i]);
     hide();
+    go_on();
     learn();
     decide_due(false, decide);
     forget();
@@ -109,19 +110,17 @@ class Stitcher {
 
   std::int64_t now() const { return so_far_.frames.now(); }
   bool is_over(const Fragment& f) const { return now() - f.last > opt_.max_gap; }
-  bool is_short(const Fragment& f) const {
-    return is_over(f) && f.last - f.first + 1 < opt_.confirm;
-  }
+  bool is_brief(const Fragment& f) const { return f.last - f.first + 1 < opt_.confirm; }
+  bool is_short(const Fragment& f) const { return is_over(f) && is_brief(f); }
 
   void move_on(const MotionStep& step) {
     for (auto& [id, f] : so_far_.fragments) {
-      if (f.marker >= 0) continue;  // the marker has its state
+      if (f.marker != Decision::kOpen || f.n >= kMotionSights) continue;
       predict(m_, step, f.state);
-      if (f.n < kMotionSights)
-        for (Continuation& c : f.continuations) predict(m_, step, c.state);
+      for (Continuation& c : f.continuations) predict(m_, step, c.state);
     }
     for (auto& [id, marker] : markers_)
-      if (now() - marker.last <= kMotionFrames) predict(m_, step, marker.state);
+      if (marker.is_hidden && now() - marker.last <= kMotionFrames) predict(m_, step, marker.state);
   }
 
   void take_in(std::span<const Point> points, std::span<const std::int64_t> labels,
@@ -183,9 +182,10 @@ class Stitcher {
     for (Frame::One& one : now.seen) {
       Fragment& f = so_far_.fragments.at(one.fragment);
       if (f.n == 0 || so_far_.frames.find(f.last) == nullptr) continue;
+      const double least = std::min(kContradicted, f.known - kFall);
       double gain = 0;
-      if (!bodies_.link(so_far_, one, f.last, gain)) continue;
-      if (opt_.may_cut && gain < std::min(kContradicted, f.known - kFall)) {
+      if (!bodies_.link(so_far_, one, f, f.known, gain)) continue;
+      if (opt_.may_cut && gain < least) {
         w_.cut.push_back(&one);
       } else {
         f.known += 0.2 * (gain - f.known);
@@ -211,31 +211,40 @@ class Stitcher {
         marker.anchors.clear();
       }
       marker.last = f.last = now();
-      update(m_, Prediction(m_, marker.state), y, marker.state);
       ++f.n;
       return;
     }
     if (f.n == 0) {
       f.state = begin_state(m_, y);
-      for (const auto& [k, marker] : markers_)
-        if (marker.last < now() && now() - marker.last <= kMotionFrames)
-          f.continuations.push_back({k, marker.state, 0});
     } else if (f.n < kMotionSights) {
       f.alone += update(m_, Prediction(m_, f.state), y, f.state);
-    } else {
-      update(m_, Prediction(m_, f.state), y, f.state);
-    }
-    if (f.n < kMotionSights)
       for (Continuation& c : f.continuations)
         c.log_likelihood += update(m_, Prediction(m_, c.state), y, c.state);
+    }
     ++f.n;
     f.last = now();
     if (static_cast<std::int64_t>(f.sights.size()) < opt_.confirm) f.sights.push_back({now(), y});
   }
-  // Markers that are not seen any more remember who was around them.
+  // Markers that are not seen any more remember who was around them, and how they moved.
   void hide() {
     for (auto& [k, marker] : markers_)
-      if (!marker.is_hidden && marker.last < now()) bodies_.remember_around(so_far_, k, marker);
+      if (!marker.is_hidden && marker.last < now()) hide(k, marker);
+  }
+  void hide(std::int32_t k, Marker& marker) {
+    bodies_.remember_around(so_far_, k, marker);
+    marker.state = so_far_.frames.motion(m_, marker.fragment);
+  }
+  // What begins in this frame may go on with the motion of any of them.
+  void go_on() {
+    for (const auto& one : so_far_.frames.newest().seen) {
+      Fragment& f = so_far_.fragments.at(one.fragment);
+      if (f.n != 1 || f.marker != Decision::kOpen) continue;
+      for (const auto& [k, marker] : markers_) {
+        if (!marker.is_hidden || now() - marker.last > kMotionFrames) continue;
+        Continuation& c = f.continuations.emplace_back(Continuation{k, marker.state, 0});
+        c.log_likelihood = update(m_, Prediction(m_, c.state), one.at, c.state);
+      }
+    }
   }
   void learn() {
     w_.seen.clear();
@@ -262,8 +271,12 @@ class Stitcher {
     Decision out{id};
     std::tie(out.marker, out.probability) = claims_.best(
         so_far_, markers_, bodies_, id, [this](const Fragment& g) { return is_short(g); });
-    if (out.marker == Decision::kOpen)
-      out.marker = is_short(f) && (has_bodies() || is_beside(f, id)) ? Decision::kGhost : n_markers_++;
+    if (out.marker == Decision::kOpen) {
+      // What comes up just before the take ends is no likelier to be a marker than at other times.
+      const bool is_late = is_brief(f) && f.first >= opt_.confirm;
+      const bool may_be_ghost = (is_short(f) || is_late) && (has_bodies() || is_beside(f, id));
+      out.marker = may_be_ghost ? Decision::kGhost : n_markers_++;
+    }
     f.marker = out.marker;
     if (out.marker < 0) return out;
     Marker& marker = markers_[out.marker];
@@ -271,9 +284,8 @@ class Stitcher {
     marker.fragment = id;
     marker.label = f.label;
     marker.last = f.last;
-    marker.state = f.state;
     marker.is_hidden = false;
-    if (f.last < now()) bodies_.remember_around(so_far_, out.marker, marker);
+    if (f.last < now()) hide(out.marker, marker);
     f.sights.clear();
     f.continuations.clear();
     return out;

@@ -13,7 +13,18 @@ from asterism.simulate import Burst, Ghosts
 from body_oracle import BodyByHand
 
 SIGMA = 1e-3
-METHODS = (am.GNN, am.SMP, am.JPDA)
+METHODS = {
+    "gnn": am.GNN,
+    "smp": am.SMP,
+    "jpda": am.JPDA,
+    "smp of the past": functools.partial(am.SMP, window=3),
+    "splitting": am.TrackSplitting,
+    "tomht": am.TOMHT,
+    "mda": am.MDA,
+    "mht": am.MHT,
+}
+BY_BRANCHES = [METHODS[n] for n in ("smp of the past", "splitting", "tomht", "mda")]
+each_method = pytest.mark.parametrize("make", METHODS.values(), ids=METHODS)
 
 
 def turning(rng, n_frames, n_axes, n_markers=7, bend=0.0, speed=1.0):
@@ -143,7 +154,7 @@ def walk_model(**changes):
     )
 
 
-@pytest.mark.parametrize("make", METHODS)
+@each_method
 def test_neighbours_tell_a_marker_from_a_ghost_that_moves_likelier(make):
     # All move on by 15 mm; where one of them was there is a ghost.
     rng = np.random.default_rng(8)
@@ -158,21 +169,24 @@ def test_neighbours_tell_a_marker_from_a_ghost_that_moves_likelier(make):
     assert found == {0.0: 0, 5.0: 1}
 
 
-@pytest.mark.parametrize("make", METHODS)
+@each_method
 def test_a_hidden_marker_is_known_when_it_comes_back(make):
     # Hidden for 40 frames, of which the model bridges 5, while the body goes on and turns; a ghost
-    # is beside its place meanwhile.
+    # is beside its place: from the first on, or from the fourth for those that keep frames open and
+    # decide by the best branches, to which a marker is not hidden yet in the first.
+    begins = 103 if make in BY_BRANCHES else 100
     rng = np.random.default_rng(9)
     truth, seen = turning(rng, 160, 3, speed=0.3)
     frames = []
     for t, points in enumerate(seen):
         hidden = 100 <= t < 140
         ghost = truth[t, :1] + np.array([0.05, 0, 0])
-        frames.append(np.vstack([ghost, points[1:]]) if hidden else points)
+        others = points[1:] if t < begins else np.vstack([ghost, points[1:]])
+        frames.append(others if hidden else points)
     d = am.Detections.from_frames(0.01 * np.arange(160), frames)
     model = walk_model()
     off, on = (am.track(d, make(bodies=b), model=model).labels for b in (False, True))
-    first, back, ghosts = 0, d.offsets[140], d.offsets[100:140]
+    first, back, ghosts = 0, d.offsets[140], d.offsets[begins:140]
     assert (off[ghosts] == off[first]).any()
     assert on[first] == on[back] == on[-7]
     assert (on[ghosts] != on[first]).all()
@@ -185,14 +199,18 @@ def hidden_person(seed):
     return truth, am.estimate_model(truth.detections).model
 
 
-@pytest.mark.parametrize("make", METHODS)
+@each_method
 @pytest.mark.parametrize("seed", [1, 2])
 def test_hidden_markers_of_a_person_come_back_as_themselves(make, seed):
+    if make is am.MDA:
+        pytest.skip("slow, and the same forest as TOMHT's")
     truth, model = hidden_person(seed)
     off, on = (am.track(truth.detections, make(bodies=b), model=model) for b in (False, True))
     before, after = am.evaluate(off, truth), am.evaluate(on, truth)
     assert after.idf1 > before.idf1 + 0.03
-    assert after.switches_per_1000 < before.switches_per_1000
+    # Nearly all switches of splitting are between frames in a row: of markers that are seen.
+    if make is not am.TrackSplitting:
+        assert after.switches_per_1000 < before.switches_per_1000
     assert on.info["carried"] > 200
     assert on.info["returned"] > 5
     assert on.info["refused"] > 100
@@ -200,7 +218,7 @@ def test_hidden_markers_of_a_person_come_back_as_themselves(make, seed):
     assert not {"carried", "returned", "refused", "bonds"} & set(off.info)
 
 
-@pytest.mark.parametrize("make", METHODS)
+@each_method
 @pytest.mark.parametrize("scene", ["walk", "wander", "swarm", "juggler", "attracted"])
 def test_no_harm_where_there_are_no_bodies(make, scene):
     truth = am.simulate.sense(
@@ -208,6 +226,8 @@ def test_no_harm_where_there_are_no_bodies(make, scene):
     )
     if scene == "swarm" and make is am.JPDA:
         pytest.skip("slow, and the same tracks as GNN's")
+    if make is am.MDA:
+        pytest.skip("slow, and the same forest as TOMHT's")
     model = am.estimate_model(truth.detections).model
     off, on = (
         am.evaluate(am.track(truth.detections, make(bodies=b), model=model), truth).idf1
@@ -216,7 +236,7 @@ def test_no_harm_where_there_are_no_bodies(make, scene):
     assert on > off - 1e-3
 
 
-@pytest.mark.parametrize("make", METHODS)
+@each_method
 def test_a_stream_is_the_whole_take_and_a_state_is_a_value(make):
     truth, model = hidden_person(1)
     d = truth.detections.part(0, 140)
@@ -231,15 +251,36 @@ def test_a_stream_is_the_whole_take_and_a_state_is_a_value(make):
         labels[update.revised] = update.revised_labels
     np.testing.assert_array_equal(labels, whole.labels)
     assert all(whole.info[name] == value for name, value in state.info.items())
-    again = [method.step(kept, *list(d)[100])[1].labels for _ in range(2)]
-    np.testing.assert_array_equal(*again)
+    # Another future, in which bodies stretch, leaves nothing behind.
+    other = kept
+    for t in range(100, 130):
+        other, _ = method.step(other, d.times[t], 1.5 * d.frame(t)[::2])
+    again, state = np.full(d.n_points, -1), kept
+    for t in range(100, 140):
+        state, update = method.step(state, d.times[t], d.frame(t))
+        again[d.offsets[t] : d.offsets[t + 1]] = update.labels
+        again[update.revised] = update.revised_labels
+    np.testing.assert_array_equal(again[d.offsets[100] :], labels[d.offsets[100] :])
 
 
-def test_carrying_ends_in_time():
+@pytest.mark.parametrize("make", [am.SMP, am.TrackSplitting, am.TOMHT, am.MHT])
+def test_a_window_beyond_the_longest_gap_carries_too(make):
+    # What is learnt of decided frames alone ends before the gap begins: were a marker carried only
+    # once it is known there as hidden, its track would be over by then.
+    rng = np.random.default_rng(12)
+    _, seen = turning(rng, 150, 3, speed=0.3)
+    frames = [points[1:] if 100 <= t < 130 else points for t, points in enumerate(seen)]
+    d = am.Detections.from_frames(0.01 * np.arange(150), frames)
+    labels = am.track(d, make(window=8, bodies=True), model=walk_model(max_gap=4)).labels
+    assert labels[0] == labels[d.offsets[130]] == labels[-7] >= 0
+
+
+@pytest.mark.parametrize("make", [METHODS[n] for n in ("gnn", "smp of the past", "tomht", "mht")])
+def test_carrying_ends_in_time(make):
     truth, model = hidden_person(1)
     longest = {}
     for limit in (1, 30, 60):
-        method = am.GNN(bodies=True, max_carried=limit)
+        method = make(bodies=True, max_carried=limit)
         state, gaps = method.init(model), [0]
         for time, points in truth.detections:
             state, _ = method.step(state, time, points)
@@ -257,7 +298,10 @@ def test_carrying_ends_in_time():
         (am.GNN, {"bodies": "yes"}, "bodies"),
         (am.JPDA, {"max_carried": 0}, "max_carried"),
         (am.SMP, {"bond_weight": -1}, "bond_weight"),
-        (am.SMP, {"bodies": True, "window": 3}, "bodies"),
+        (am.TOMHT, {"bodies": "yes"}, "bodies"),
+        (am.MHT, {"max_carried": 30}, "max_carried"),
+        (am.TrackSplitting, {"bodies": True, "bond_weight": 101}, "bond_weight"),
+        (am.TrackSplitting, {"bodies": True, "independent": True}, "bodies"),
         (am.SMP, {"bodies": True, "strict": True}, "bodies"),
     ],
 )

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.filter import predictive_log_densities
 from oracles import imm_log_densities, kalman, rts
 from scenes import interacting, small_model, wanderers
 
@@ -43,13 +44,23 @@ def test_filter_and_smoother_are_the_textbook_ones(motion, n_axes):
         assert np.allclose(smoothed.covariances[rows], [P[:n, :n] for P in Ps], rtol=1e-6)
 
 
-def test_interacting_motions_are_weighed_as_by_the_plain_formulas():
-    truth = wanderers(np.random.default_rng(2), missing=0.2, irregular=True)
+@pytest.mark.parametrize("n_axes", [2, 3])
+def test_interacting_motions_are_weighed_as_by_the_plain_formulas(n_axes):
+    truth = wanderers(np.random.default_rng(2), n_axes=n_axes, missing=0.2, irregular=True)
     model = small_model(motion=interacting())
     states = am.filter_states(truth, model)
     for _, frames, points, members in tracks_of(truth):
         expected = imm_log_densities(model, truth.detections.times, frames, points)
         assert np.allclose(states.log_densities[members], expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("motion", [am.RandomWalk(walk_sigma=0.3), interacting()])
+def test_densities_alone_are_those_of_the_filter(motion):
+    truth = wanderers(np.random.default_rng(5), missing=0.2, clutter=1, irregular=True)
+    model = small_model(motion=motion)
+    alone = predictive_log_densities(truth, model)
+    np.testing.assert_array_equal(alone, am.filter_states(truth, model).log_densities)
+    assert (alone != 0).sum() == (truth.lengths - 1).sum()
 
 
 def test_alike_modes_are_one_mode():

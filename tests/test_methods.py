@@ -27,6 +27,8 @@ METHODS = {
     "mht": am.MHT(),
     "mcmcda": am.MCMCDA(),
     "mda": am.MDA(),
+    "tomht with bodies": am.TOMHT(bodies=True),
+    "mht with bodies": am.MHT(bodies=True),
 }
 each_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 # The others are held to every partition of small problems instead.

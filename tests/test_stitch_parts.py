@@ -325,6 +325,16 @@ def test_what_is_short_among_bodies_is_a_ghost(place):
     assert found.marker[8] == 8
 
 
+@pytest.mark.parametrize(("first", "marker"), [(285, 8), (286, -2), (299, -2)])
+def test_what_comes_up_too_late_to_be_decided_upon_is_a_ghost(first, marker):
+    assert one_pass(scene((first, 299, PLACE))).marker[8] == marker
+
+
+@pytest.mark.parametrize("frames", [1, 14, 15])
+def test_what_is_there_from_the_start_of_a_short_take_is_no_ghost(frames):
+    assert one_pass(scene(frames=frames)).marker == list(range(8))
+
+
 @pytest.mark.parametrize(("off", "is_ghost"), [(0.05, True), (0.5, False)])
 def test_where_there_are_no_bodies_ghosts_are_short_and_beside_a_marker(off, is_ghost):
     dense = scene((100, 105, np.zeros(3)), body=BODY[:4])

@@ -249,6 +249,7 @@ class TreeTracker(_Tracker):
         *,
         resolver: int,
         is_independent: bool,
+        carry: CarryOptions,
     ) -> None: ...
     def chi2(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]: ...
 
@@ -274,6 +275,7 @@ class HypothesisTracker(_Tracker):
         max_hypotheses: int,
         max_nodes: int,
         new_track_claim: float,
+        carry: CarryOptions,
         choose: _Choose | None = None,
     ) -> None: ...
 
@@ -288,6 +290,7 @@ class MatrixTracker(_Tracker):
         max_hypotheses: int,
         merged_within: float,
         new_track_claim: float,
+        carry: CarryOptions,
     ) -> None: ...
     def clusters(
         self,
@@ -298,6 +301,16 @@ class MatrixTracker(_Tracker):
 def score_tracks(
     model: MotionModel,
     score: ScoreModel,
+    points: NDArray[np.float64],
+    frames: NDArray[np.int64],
+    offsets: NDArray[np.int64],
+    times: NDArray[np.float64],
+    kind: NDArray[np.int32],
+    F: NDArray[np.float64],
+    Q: NDArray[np.float64],
+) -> NDArray[np.float64]: ...
+def foresee_tracks(
+    model: MotionModel,
     points: NDArray[np.float64],
     frames: NDArray[np.int64],
     offsets: NDArray[np.int64],

@@ -93,9 +93,9 @@ def _is_left_over(
     from scipy.spatial import KDTree
 
     d = tracks.detections
-    result = np.zeros(len(at), dtype=bool)
-    if not len(at):
-        return result
+    free = np.flatnonzero(way * limits > way * (d.frame_of - way))  # where their frame is the next
+    if not len(at) or not len(free):
+        return np.zeros(len(at), dtype=bool)
     now = order[at]
     before = order[np.clip(at - way, 0, len(order) - 1)]
     t = d.frame_of[now]
@@ -106,8 +106,6 @@ def _is_left_over(
     places = d.points[now] + (d.points[now] - d.points[before]) * step[:, None]
     # Frames far apart along an axis of their own, so that one tree does for all.
     apart = 1.0 + 4.0 * reach
-    tree: Any = KDTree(np.column_stack([d.points, d.frame_of * apart]))
-    near = tree.query_ball_point(np.column_stack([places, (t + way) * apart]), reach)
-    for n, points in enumerate(near):
-        result[n] = any(way * limits[j] > way * t[n] for j in points)
-    return result
+    tree: Any = KDTree(np.column_stack([d.points[free], d.frame_of[free] * apart]))
+    distance = tree.query(np.column_stack([places, (t + way) * apart]))[0]
+    return np.asarray(distance <= reach)

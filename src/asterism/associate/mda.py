@@ -44,6 +44,8 @@ class MDA(Hypotheses):
         A detection that a believed track expects by more than these odds begins no track.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
 
     Examples
     --------
@@ -81,6 +83,7 @@ class MDA(Hypotheses):
             max_hypotheses=1,
             max_nodes=1000,  # of tracks that share nothing: one suffices
             new_track_claim=self.new_track_odds,
+            carry=self._carry(),
             choose=self._choose,
         )
 

@@ -76,6 +76,8 @@ class MHT(Hypotheses):
         A detection that a believed track expects by more than these odds begins no track.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
 
     Examples
     --------
@@ -147,6 +149,7 @@ class MHT(Hypotheses):
             max_hypotheses=int(self.max_hypotheses),
             merged_within=self.merged_within,
             new_track_claim=self.new_track_odds,
+            carry=self._carry(),
         )
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:

@@ -141,8 +141,10 @@ def estimate_model(
 
     model = _first_model(fit, scales, region)
     evidence = gather_evidence(pieces, _wider(model), reach)
+    fits: list[MotionFit] = []
     for _ in range(N_ROUNDS):
         fit = fit_motion(evidence.tracks, model, fit, bounds)
+        fits.append(fit)
         model = _model(fit, rates_of(evidence), evidence, scales, region)
         evidence = gather_evidence(pieces, _wider(model), reach)
     least_noise = max(scales.noise_floor, min(LEAST_NOISE, scales.spacing / 100))
@@ -160,7 +162,8 @@ def estimate_model(
         model = replace(model, population=replace(model.population, **bounds))
         return _log_evidence(found, model, region), trial, found
 
-    three = tried(fit, evidence)
+    # A fit sees a sample of the tracks, and may miss the few that move most: then it loses them.
+    three = min((tried(fit, evidence) for fit in reversed(fits)), key=lambda trial: trial[2].n_lost)
     # One motion is learnt from tracks of its own, from the quietest on: those of three have jolts,
     # true or wrong, that it would have to explain.
     one = tried(replace(fit, levels=fit.levels[:1], stay=1.0), evidence)

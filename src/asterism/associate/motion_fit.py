@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from asterism.filter import filter_states
+from asterism.filter import predictive_log_densities
 from asterism.model import (
     DWNA,
     Detections,
@@ -275,7 +275,7 @@ def _cost(sample: Tracks, model: TrackingModel, fit: MotionFit) -> float:
         motion=fit.motion(model.velocity_sigma(sample.detections.n_axes)),
         sensor=replace(model.sensor, noise_sigma=fit.noise),
     )
-    return -float(filter_states(sample, trial).log_densities.mean())
+    return -float(predictive_log_densities(sample, trial).mean())
 
 
 def _sample(tracks: list[Tracks]) -> Tracks:

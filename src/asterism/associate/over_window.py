@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.associate.frame_by_frame import FrameByFrame
+from asterism.associate.with_bodies import WithBodies
 from asterism.errors import check_number
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def branch_options(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hypotheses(FrameByFrame):
+class Hypotheses(WithBodies):
     """Options of every method that explains all detections of a window at once.
 
     Parameters
@@ -62,6 +62,8 @@ class Hypotheses(FrameByFrame):
         A detection that a believed track expects by more than these odds begins no track.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
     """
 
     window: int = 3

@@ -84,9 +84,8 @@ class SMP(WithBodies):
         if self.window > 1 and (self.strict or self.capacity > 1):
             given = "strict=True" if self.strict else f"capacity={self.capacity}"
             raise ParameterError("window", f"1, as {given} is given", self.window)
-        if self.bodies and (self.strict or self.window > 1):
-            given = "strict=True" if self.strict else f"window={self.window}"
-            raise ParameterError("bodies", f"False, as {given} is given", self.bodies)
+        if self.bodies and self.strict:
+            raise ParameterError("bodies", "False, as strict=True is given", self.bodies)
 
     def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
@@ -107,7 +106,13 @@ class SMP(WithBodies):
             )
         ways = branch_options(window=self.window, max_branches=MAX_WAYS, prune_odds=PRUNE_ODDS)
         return _engine.TreeTracker(
-            motion, score, life, ways, resolver=matcher, is_independent=False
+            motion,
+            score,
+            life,
+            ways,
+            resolver=matcher,
+            is_independent=False,
+            carry=self._carry(),
         )
 
     def step(

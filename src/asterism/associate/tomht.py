@@ -45,6 +45,8 @@ class TOMHT(Hypotheses):
         A detection that a believed track expects by more than these odds begins no track.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
 
     Examples
     --------
@@ -82,6 +84,7 @@ class TOMHT(Hypotheses):
             max_hypotheses=int(self.max_hypotheses),
             max_nodes=int(self.max_nodes),
             new_track_claim=self.new_track_odds,
+            carry=self._carry(),
         )
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from asterism.associate.frame_by_frame import FrameByFrame
 from asterism.associate.over_window import branch_options, check_window
+from asterism.associate.with_bodies import WithBodies
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _EXACT_LIMITS = 4096
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrackSplitting(FrameByFrame):
+class TrackSplitting(WithBodies):
     """Track splitting: a branch for every detection in the gate and one for a miss.
 
     Each track is a tree. Along a branch ``λ(k) = ρ λ(k-1) + νᵀ S⁻¹ ν`` sums how far the detections
@@ -67,9 +67,11 @@ class TrackSplitting(FrameByFrame):
     independent : bool
         Whether each tree goes on with what it likes best though another has it, as in the report:
         then only the labels are resolved, trees know nothing of each other, and two may follow one
-        marker.
+        marker. Not with `bodies`.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
 
     Examples
     --------
@@ -101,6 +103,8 @@ class TrackSplitting(FrameByFrame):
         check_number("prune_odds", self.prune_odds, above=1)
         if not isinstance(self.independent, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise ParameterError("independent", "True or False", repr(self.independent))
+        if self.bodies and self.independent:
+            raise ParameterError("bodies", "False, as independent=True is given", self.bodies)
 
     def _make(
         self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
@@ -119,7 +123,13 @@ class TrackSplitting(FrameByFrame):
             z=float(-ndtri(self.alpha)),
         )
         return _engine.TreeTracker(
-            motion, score, life, branches, resolver=0, is_independent=self.independent
+            motion,
+            score,
+            life,
+            branches,
+            resolver=0,
+            is_independent=self.independent,
+            carry=self._carry(),
         )
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:

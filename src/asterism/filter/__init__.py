@@ -2,6 +2,14 @@
 
 from asterism.filter.expected import expected_places
 from asterism.filter.gates import GateGroups, gate_groups
-from asterism.filter.kalman import States, filter_states, smooth
+from asterism.filter.kalman import States, filter_states, predictive_log_densities, smooth
 
-__all__ = ["GateGroups", "States", "expected_places", "filter_states", "gate_groups", "smooth"]
+__all__ = [
+    "GateGroups",
+    "States",
+    "expected_places",
+    "filter_states",
+    "gate_groups",
+    "predictive_log_densities",
+    "smooth",
+]

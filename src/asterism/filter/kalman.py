@@ -6,7 +6,7 @@ Symbols: n states an axis, D axes, K tracks. The axes of a track share one covar
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from asterism.model.compiled import motion_model, steps_of, with_noise
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["States", "filter_states", "smooth"]
+__all__ = ["States", "filter_states", "predictive_log_densities", "smooth"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -56,29 +56,56 @@ class States:
         return dense
 
 
-def _states(tracks: Tracks, model: TrackingModel, *, smoothed: bool) -> States:
+def _for_engine(tracks: Tracks, model: TrackingModel) -> tuple[Any, ...]:
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     d = tracks.detections
     order, offsets = tracks.by_track
-    frames = d.frame_of[order]
-    kind, F, Q = steps_of(model.motion, d.times)
     points = with_noise(d.points, d.covariances)[order]
+    motion, steps = motion_model(model, d.n_axes), steps_of(model.motion, d.times)
+    return motion, points, d.frame_of[order], offsets, d.times, *steps
+
+
+def _of_detections(tracks: Tracks, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bring values of detections in tracks, by track, into the order of all; 0 of clutter."""
+    out = np.zeros(tracks.detections.n_points)
+    out[tracks.by_track[0]] = values
+    return out
+
+
+def _states(tracks: Tracks, model: TrackingModel, *, smoothed: bool) -> States:
     means, covariances, rows, densities = _engine.filter_tracks(
-        motion_model(model, d.n_axes), points, frames, offsets, d.times, kind, F, Q, smoothed
-    )  # fmt: skip
+        *_for_engine(tracks, model), smooth=smoothed
+    )
+    order, offsets = tracks.by_track
     first = np.zeros(tracks.n_tracks, dtype=np.int64)
     has_any = tracks.lengths > 0
-    first[has_any] = frames[offsets[:-1][has_any]]
-    log_densities = np.zeros(d.n_points)
-    log_densities[order] = densities
+    first[has_any] = tracks.detections.frame_of[order[offsets[:-1][has_any]]]
     return States(
         means=means,
         covariances=covariances,
         offsets=rows,
         first_frames=first,
-        log_densities=log_densities,
+        log_densities=_of_detections(tracks, densities),
     )
+
+
+def predictive_log_densities(tracks: Tracks, model: TrackingModel) -> NDArray[np.float64]:
+    """Log density of each detection given its track's earlier ones, as in `filter_states`.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        The tracks.
+    model : TrackingModel
+        Its motion and its noise are used.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        ``log N(y; ŷ, S)``; 0 at a track's first detection and for clutter.
+    """
+    return _of_detections(tracks, _engine.foresee_tracks(*_for_engine(tracks, model)))
 
 
 def filter_states(tracks: Tracks, model: TrackingModel) -> States:
