@@ -14,6 +14,7 @@ import argparse
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from captures import captures
 from report import conditions, publish, table
 
 Found = dict[tuple[str, ...], list[tuple[float, ...]]]
-Make = Callable[[bool], am.GNN | am.SMP | am.JPDA]
+Make = Callable[[bool], am.Method[Any]]
 
 CAPTURES = ("JA1Gait35", "tennis", "mocap36", "runway_13", "testdata")
 SCENES = ("walk", "wander", "swarm", "attracted", "juggler")
@@ -31,6 +32,10 @@ METHODS: dict[str, Make] = {
     "gnn": lambda bodies: am.GNN(bodies=bodies),
     "smp": lambda bodies: am.SMP(bodies=bodies),
     "jpda": lambda bodies: am.JPDA(bodies=bodies),
+    "smp3": lambda bodies: am.SMP(window=3, bodies=bodies),
+    "splitting": lambda bodies: am.TrackSplitting(bodies=bodies),
+    "tomht": lambda bodies: am.TOMHT(bodies=bodies),
+    "mht": lambda bodies: am.MHT(bodies=bodies),
 }
 WAYS = ("off", "on", "stitched", "on, stitched")
 HEAD = ("IDF1", "switches a 1000", "ghosts and clutter labelled, %", "ms a frame")
