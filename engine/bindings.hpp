@@ -4,7 +4,9 @@
 #include <nanobind/nanobind.h>
 
 void bind_tracking(nanobind::module_& module);
-void bind_trackers(nanobind::module_& module);
+void bind_options(nanobind::module_& module);
+void bind_trees(nanobind::module_& module);
+void bind_mcmc(nanobind::module_& module);
 void bind_frame(nanobind::module_& module);
 void bind_camera(nanobind::module_& module);
 void bind_solvers(nanobind::module_& module);

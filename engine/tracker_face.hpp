@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -19,6 +20,9 @@ using namespace nb::literals;
 
 using Labels = nb::ndarray<std::int64_t, nb::numpy, nb::c_contig, nb::device::cpu>;
 using Confidence = nb::ndarray<double, nb::numpy, nb::c_contig, nb::device::cpu>;
+// Takes a detection, its track's id or -1, and how sure that is. One type for all callers, so that a
+// tracker is compiled once.
+using Labeller = std::function<void(std::int64_t, std::int64_t, double)>;
 
 // One frame on a copy of the state: (new state, labels, their confidence, earlier detections whose
 // label changes, their labels, their confidence, stats). Without confidence its arrays are empty.
@@ -41,17 +45,18 @@ nb::tuple step(const Tracker& before, double time, const In<double>& F, const In
   };
   std::vector<Revision> revised;
   const std::int64_t first = before.n_seen();
+  const Labeller label = [&](std::int64_t detection, std::int64_t id, double p) {
+    if (detection < first) {
+      revised.push_back({detection, id, p});
+      return;
+    }
+    labels.data[detection - first] = id;
+    if (n_sure > 0) confidence.data[detection - first] = p;
+  };
   FrameStats stats;
   {
     nb::gil_scoped_release release;
-    stats = after.step(time, motion, frame, [&](std::int64_t detection, std::int64_t id, double p) {
-      if (detection < first) {
-        revised.push_back({detection, id, p});
-        return;
-      }
-      labels.data[detection - first] = id;
-      if (n_sure > 0) confidence.data[detection - first] = p;
-    });
+    stats = after.step(time, motion, frame, label);
   }
   const std::size_t r = revised.size(), r_sure = before.has_confidence() ? r : 0;
   Owned<std::int64_t> which(r), ids(r);
@@ -91,7 +96,7 @@ void run(Tracker& tracker, const In<double>& times, const In<std::int32_t>& kind
   require(!tracker.has_confidence() || static_cast<std::int64_t>(confidence.size()) >= n_seen,
           "confidence: one for every detection so far");
   nb::gil_scoped_release release;
-  const auto label = [&](std::int64_t detection, std::int64_t id, double p) {
+  const Labeller label = [&](std::int64_t detection, std::int64_t id, double p) {
     labels.data()[detection] = id;
     if (tracker.has_confidence()) confidence.data()[detection] = p;
   };
