@@ -45,7 +45,7 @@ ON_BODIES = 0.2
 """Share of tracks with such a partner from which on the clip is one of bodies: wrong tracks, which
 bursts make, have none."""
 CLEAR = 0.01
-"""Detections in a gate beside the right one, for each labelled, up to which nothing is in doubt."""
+"""Detections in a gate beside the right one, for each link, up to which nothing is in doubt."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,9 +126,11 @@ def choose_method(
         return Choice(method=SMP(window=3), stitch=True, reason=reason)
     if any(isinstance(mode, RandomWalk) for mode in model.motion.modes):
         return Choice(method=MCMCDA(), stitch=False, reason="markers walk at random, no bodies")
-    n_labelled = int((labels >= 0).sum())
-    rivals = max(state.info["candidates"] / max(n_labelled, 1) - 1, 0.0)
-    doubt = f"{100 * rivals:.1f} rivals within the gates for 100 detections, no bodies"
+    # Of links, not of detections: the first of a track is in no gate, and short clips are full of
+    # first ones.
+    n_links = int(tracks.lengths.sum()) - tracks.n_tracks
+    rivals = max(state.info["candidates"] / max(n_links, 1) - 1, 0.0)
+    doubt = f"{100 * rivals:.1f} rivals within the gates for 100 links, no bodies"
     if rivals > CLEAR:
         return Choice(method=MCMCDA(), stitch=False, reason=doubt)
     return Choice(method=method, stitch=False, reason=doubt)
