@@ -56,7 +56,7 @@ void update(const AxisModel& m, const Point& y, AxisState& s) {
 }
 
 AxisState smooth_back(const AxisModel& m, const AxisMatrix& F, const AxisState& filtered,
-                             const AxisState& predicted, const AxisState& next) {
+                      const AxisState& predicted, const AxisState& next) {
   const int n = m.n;
   AxisMatrix L{}, C{};
   for (int i = 0; i < n; ++i)

@@ -8,7 +8,7 @@
 namespace asterism {
 
 std::array<double, kMaxModes> stationary(std::array<double, kMaxModes * kMaxModes> T,
-                                                int M) {
+                                         int M) {
   std::array<double, kMaxModes> w{};
   for (int i = 0; i < 40; ++i) {
     std::array<double, kMaxModes * kMaxModes> next{};
@@ -72,7 +72,7 @@ struct ModeSpread {
 
 // Mean and covariance of a mixture of the modes of a state, with weights that sum to 1.
 AxisState mix(const MotionModel& m, const MotionState& s, const ModeSpread& spread,
-                     const std::array<double, kMaxModes>& weights) {
+              const std::array<double, kMaxModes>& weights) {
   return with_states(m.axis.n, [&](auto n_states) {
     constexpr int n = n_states;
     AxisState mixed = s.mode[0];
