@@ -65,14 +65,18 @@ def first_scales(pieces: list[Detections]) -> Scales:
     spacings: list[NDArray[np.float64]] = []
     for piece in pieces:
         filled = np.flatnonzero(piece.counts)
+        frames = [piece.frame(int(t)) for t in filled]
+        linked: dict[int, tuple[NDArray[np.int64], NDArray[np.float64]]] = {}
         stride = max(1, piece.n_points * len(pieces) // LINKED_POINTS)
         for i in range(0, len(filled) - 2, stride):
-            three = filled[i : i + 3]
-            a, b, c = (piece.frame(int(t)) for t in three)
-            dt1, dt2 = np.diff(piece.times[three])
-            forward, spacing = _sure_links(a, b)
+            a, b, c = frames[i : i + 3]
+            dt1, dt2 = np.diff(piece.times[filled[i : i + 3]])
+            for k in (i, i + 1):  # where the stride is 1, all but the last are known
+                if k not in linked:
+                    linked[k] = _sure_links(frames[k], frames[k + 1])
+            forward, spacing = linked[i]
             spacings.append(spacing)
-            onward, _ = _sure_links(b, c)
+            onward, _ = linked[i + 1]
             k = np.flatnonzero(forward >= 0)
             steps.append((b[forward[k]] - a[k]) / dt1)
             k = k[onward[forward[k]] >= 0]
