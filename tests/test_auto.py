@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import tomllib
 
@@ -42,11 +43,16 @@ CLIPS = {
 }  # fmt: skip
 
 
+@functools.cache
+def clip(name):
+    truth = CLIPS[name][0]()
+    return truth, am.estimate_model(truth.detections).model
+
+
 @pytest.mark.parametrize("name", CLIPS)
 def test_the_clip_chooses_and_says_why(name):
-    make, method, stitch, why = CLIPS[name]
-    truth = make()
-    model = am.estimate_model(truth.detections).model
+    _, method, stitch, why = CLIPS[name]
+    truth, model = clip(name)
     choice = am.choose_method(truth.detections, model)
     assert (choice.method.name, choice.stitch) == (method, stitch)
     assert why in choice.reason
@@ -55,15 +61,13 @@ def test_the_clip_chooses_and_says_why(name):
 
 
 def test_no_method_is_the_one_that_was_chosen():
-    truth = CLIPS["bodies"][0]()
-    model = am.estimate_model(truth.detections).model
+    truth, model = clip("bodies")
     tracks = am.track(truth.detections, model=model, seed=1)
     assert tracks.info["chosen"] == am.choose_method(truth.detections, model).text
     stitched = am.identify(truth.detections, am.SMP(window=3), model=model, seed=1).tracks
     np.testing.assert_array_equal(tracks.labels, stitched.labels)
     assert "log_posterior" not in tracks.info  # the model knows no gap so long
-    walkers = CLIPS["walkers"][0]()
-    model = am.estimate_model(walkers.detections).model
+    walkers, model = clip("walkers")
     tracks = am.track(walkers.detections, model=model, seed=1)
     named = am.track(walkers.detections, am.MCMCDA(), model=model, seed=1)
     np.testing.assert_array_equal(tracks.labels, named.labels)

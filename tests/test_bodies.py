@@ -218,17 +218,21 @@ def test_hidden_markers_of_a_person_come_back_as_themselves(make, seed):
     assert not {"carried", "returned", "refused", "bonds"} & set(off.info)
 
 
+@functools.cache
+def spoilt(scene):
+    made = getattr(am.simulate, scene)(seed=1)
+    truth = am.simulate.sense(made, missing=0.1, clutter=0.1, noise=1e-3, seed=1)
+    return truth, am.estimate_model(truth.detections).model
+
+
 @each_method
 @pytest.mark.parametrize("scene", ["walk", "wander", "swarm", "juggler", "attracted"])
 def test_no_harm_where_there_are_no_bodies(make, scene):
-    truth = am.simulate.sense(
-        getattr(am.simulate, scene)(seed=1), missing=0.1, clutter=0.1, noise=1e-3, seed=1
-    )
     if scene == "swarm" and make is am.JPDA:
         pytest.skip("slow, and the same tracks as GNN's")
     if make is am.MDA:
         pytest.skip("slow, and the same forest as TOMHT's")
-    model = am.estimate_model(truth.detections).model
+    truth, model = spoilt(scene)
     off, on = (
         am.evaluate(am.track(truth.detections, make(bodies=b), model=model), truth).idf1
         for b in (False, True)
