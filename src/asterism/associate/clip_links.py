@@ -71,9 +71,9 @@ def first_scales(pieces: list[Detections]) -> Scales:
         for i in range(0, len(filled) - 2, stride):
             a, b, c = frames[i : i + 3]
             dt1, dt2 = np.diff(piece.times[filled[i : i + 3]])
-            for k in (i, i + 1):  # where the stride is 1, all but the last are known
-                if k not in linked:
-                    linked[k] = _sure_links(frames[k], frames[k + 1])
+            for pair in (i, i + 1):  # where the stride is 1, all but the last are known
+                if pair not in linked:
+                    linked[pair] = _sure_links(frames[pair], frames[pair + 1])
             forward, spacing = linked[i]
             spacings.append(spacing)
             onward, _ = linked[i + 1]
