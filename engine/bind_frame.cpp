@@ -50,15 +50,6 @@ std::optional<std::tuple<Out<double>, double, std::int32_t>> carry(BodyCarrier& 
 }  // namespace
 
 void bind_frame(nb::module_& module) {
-  nb::class_<CarryOptions>(module, "CarryOptions")
-      .def(
-          "__init__",
-          [](CarryOptions* self, bool is_on, std::int32_t max_carried, double bond_weight) {
-            require(max_carried >= 0 && bond_weight >= 0, "options of bodies: at least 0");
-            new (self) CarryOptions{is_on, max_carried, bond_weight};
-          },
-          nb::kw_only(), "is_on"_a = false, "max_carried"_a = 0, "bond_weight"_a = 0.0);
-
   nb::class_<BodyCarrier>(module, "BodyCarrier")
       .def(
           "__init__",

@@ -3,6 +3,7 @@
 
 #include "bindings.hpp"
 #include "branches.hpp"
+#include "carried_tracks.hpp"
 #include "live_tracks.hpp"
 #include "motion_arrays.hpp"
 
@@ -59,6 +60,15 @@ void bind_options(nb::module_& module) {
           },
           nb::kw_only(), "window"_a, "max_branches"_a, "merge_last"_a, "prune_drop"_a, "fading"_a,
           "delta"_a, "z"_a);
+
+  nb::class_<CarryOptions>(module, "CarryOptions")
+      .def(
+          "__init__",
+          [](CarryOptions* self, bool is_on, std::int32_t max_carried, double bond_weight) {
+            require(max_carried >= 0 && bond_weight >= 0, "options of bodies: at least 0");
+            new (self) CarryOptions{is_on, max_carried, bond_weight};
+          },
+          nb::kw_only(), "is_on"_a = false, "max_carried"_a = 0, "bond_weight"_a = 0.0);
 
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {
     try {
