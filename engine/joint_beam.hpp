@@ -12,6 +12,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -124,7 +125,9 @@ class JointBeam {
     return log_scale;
   }
 
-  // A slot for as long as a vertex is in the frontier; and when that is.
+  // A slot for as long as a vertex is in the frontier, and the steps in which it enters and leaves.
+  // The vertex of a step gives its slot back before those that enter take theirs, so that no more
+  // slots are in use than the largest frontier has vertices, which is what W is chosen by.
   void choose_slots() {
     slot_.assign(graph_.size(), -1);
     enters_.assign(graph_.size(), -1);
@@ -132,16 +135,17 @@ class JointBeam {
     std::vector<std::int32_t> spare;
     std::int32_t n_slots = 0;
     for (std::size_t t = 0; t < steps_.size(); ++t) {
+      const std::int32_t v = steps_[t].vertex;
+      leaves_[v] = static_cast<std::int32_t>(t);
+      if (slot_[v] >= 0) spare.push_back(slot_[v]);
       for (const std::int32_t u : steps_[t].entering) {
         if (spare.empty()) spare.push_back(n_slots++);
         slot_[u] = spare.back();
         spare.pop_back();
         enters_[u] = static_cast<std::int32_t>(t);
       }
-      const std::int32_t v = steps_[t].vertex;
-      leaves_[v] = static_cast<std::int32_t>(t);
-      if (slot_[v] >= 0) spare.push_back(slot_[v]);
     }
+    assert(n_slots <= static_cast<std::int32_t>(64 * W));
   }
 
   // The vertices that are most fought for are followed, while there is room.
