@@ -19,6 +19,19 @@ namespace asterism {
 
 using Clock = std::chrono::steady_clock;
 
+// A moment so many seconds after another, never for what no clock can hold.
+inline Clock::time_point after(Clock::time_point start, double seconds) {
+  constexpr double kMost = 1e9;
+  if (!(seconds < kMost)) return Clock::time_point::max();
+  return start + std::chrono::duration_cast<Clock::duration>(
+                     std::chrono::duration<double>(std::max(seconds, 0.0)));
+}
+inline Clock::time_point halfway_to(Clock::time_point end) {
+  if (end == Clock::time_point::max()) return end;
+  const Clock::time_point now = Clock::now();
+  return now < end ? now + (end - now) / 2 : end;
+}
+
 // Asks now and then, on the thread that made it, whether to go on; tells how much of it is done.
 class Watch {
  public:
@@ -30,7 +43,8 @@ class Watch {
     n_done_ += n_more;
     if (std::this_thread::get_id() == owner_ && Clock::now() > next_) {
       next_ = Clock::now() + std::chrono::milliseconds(100);
-      if (!goes_on_(std::min(static_cast<double>(n_done_) / all_, 1.0))) is_stopped_ = true;
+      const auto done = static_cast<double>(n_done_);
+      if (!goes_on_(done < all_ ? done / all_ : 1.0)) is_stopped_ = true;
     }
     return is_stopped_;
   }
@@ -65,8 +79,10 @@ class Budgets {
  public:
   // `moves` for each unit of weight.
   Budgets(std::span<const double> weights, double moves, Watch* watch = nullptr) : watch_(watch) {
-    for (const double weight : weights)
-      moves_.push_back(static_cast<std::int64_t>(std::min(std::ceil(moves * weight), kEndless)));
+    for (const double weight : weights) {
+      const double own = weight > 0 ? std::ceil(moves * weight) : 0;  // moves may be without limit
+      moves_.push_back(own < static_cast<double>(kEndless) ? static_cast<std::int64_t>(own) : kEndless);
+    }
   }
   // What time there is until then is shared out as well, among so many chains of each group.
   void end_at(Clock::time_point end, std::span<const double> weights, std::int32_t n_chains,
@@ -76,21 +92,19 @@ class Budgets {
     for (const double weight : weights) all += weight * n_chains;
     const double left = std::chrono::duration<double>(end - Clock::now()).count();
     const double workers = std::min<double>(n_threads, static_cast<double>(weights.size()) * n_chains);
-    for (const double weight : weights) seconds_.push_back(left * workers * weight / all);
+    for (const double weight : weights)
+      seconds_.push_back(weight > 0 ? left * workers * weight / all : 0);
   }
 
   // Its time begins now.
   Budget of(std::size_t group) const {
     Budget out{moves_[group], end_, watch_};
-    if (!seconds_.empty()) {
-      const std::chrono::duration<double> own(std::max(seconds_[group], 0.0));
-      out.until = std::min(end_, Clock::now() + std::chrono::duration_cast<Clock::duration>(own));
-    }
+    if (!seconds_.empty()) out.until = std::min(end_, after(Clock::now(), seconds_[group]));
     return out;
   }
 
  private:
-  static constexpr double kEndless = 1e15;
+  static constexpr std::int64_t kEndless = std::int64_t{1} << 50;
 
   std::vector<std::int64_t> moves_;
   std::vector<double> seconds_;

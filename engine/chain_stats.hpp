@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -18,8 +19,11 @@ struct ChainStats {
   std::int64_t n_cut = 0;       // plausible links between different groups, which none could take
   std::int64_t n_given = 0, n_refused = 0;  // links to start from; that the model or others forbade
   std::int64_t n_doubtful = 0;  // detections of whose label halves or chains differ by over 0.1
-  double rhat = 1;              // of the log posterior, the worst
-  double ess = std::numeric_limits<double>::infinity();  // effective samples of it, the least
+  std::int64_t n_unmoved = 0;   // groups whose chains never moved, so that their mixing is not known
+  // Of the log posterior: the largest R̂ and the smallest effective sample size of the groups for which
+  // they are known. NaN where they are known for none.
+  double rhat = std::numeric_limits<double>::quiet_NaN();
+  double ess = std::numeric_limits<double>::quiet_NaN();
 
   void add(const ChainStats& next) {
     for (int k = 0; k < kMoves; ++k) {
@@ -35,8 +39,12 @@ struct ChainStats {
     n_given += next.n_given;
     n_refused += next.n_refused;
     n_doubtful += next.n_doubtful;
-    rhat = std::max(rhat, next.rhat);
-    ess = std::min(ess, next.ess);
+    n_unmoved += next.n_unmoved;
+    add_mixing(next.rhat, next.ess);
+  }
+  void add_mixing(double next_rhat, double next_ess) {
+    rhat = std::fmax(rhat, next_rhat);  // the other where one is NaN
+    ess = std::fmin(ess, next_ess);
   }
 };
 

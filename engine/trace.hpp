@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace asterism {
@@ -29,13 +30,14 @@ class Trace {
   double variance() const {
     return std::max(sum2_ / static_cast<double>(n_) - mean() * mean(), 0.0);
   }
+  // NaN where the chain never moved.
   double ess_of_halves(std::int64_t n) const {
     double mean = 0, between = 0;
     for (const double x : means_) mean += x / static_cast<double>(means_.size());
     for (const double x : means_) between += (x - mean) * (x - mean);
     between /= std::max<double>(static_cast<double>(means_.size()) - 1, 1);
     const double all = variance();
-    if (!(between > 0) || !(all > 0)) return static_cast<double>(n);
+    if (!(between > 0) || !(all > 0)) return std::numeric_limits<double>::quiet_NaN();
     return std::min(static_cast<double>(n),
                     static_cast<double>(n) * all / (static_cast<double>(batch_) * between));
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -25,8 +26,10 @@ struct Halves {
   std::vector<std::int32_t> detections;      // in the whole
   std::array<std::vector<double>, kN> shares;  // in which they follow what they follow
   std::array<double, kN> mean{}, variance{};   // of the log posterior
-  double ess = 0;
-  std::int64_t n_moves = 0;
+  std::array<std::int64_t, kN> n_moves{};
+  double ess = 0;  // NaN of a chain that never moved
+
+  std::int64_t all_moves() const { return std::accumulate(n_moves.begin(), n_moves.end(), std::int64_t{0}); }
 };
 
 template <typename Filter>
@@ -73,32 +76,31 @@ class Walker {
     out.detections.clear();
     for (std::int32_t i = 0; i < p.window().n_ids(); ++i)
       if (!p.is_frozen(i)) out.detections.push_back(p.origin(i));
-    // Halves of equal length, unless time runs out.
+    // Halves of equal length; where time is short, each has half of it.
     const auto weigh = [&](const Change<Filter>& change, bool is_taken) {
       marginals_.weigh(change, is_taken);
     };
     Trace trace;
     const std::int64_t half = std::max<std::int64_t>(budget.moves / Halves::kN, 1);
-    out.n_moves = 0;
     for (int h = 0; h < Halves::kN; ++h) {
       marginals_.forget();
       trace.begin(half);
-      const Budget own{half, budget.until, budget.watch};
+      const Budget own{half, h + 1 < Halves::kN ? halfway_to(budget.until) : budget.until, budget.watch};
       std::int64_t n = 0;
       for (; n == 0 || !own.is_over(n); ++n) {
         step(weigh);
         marginals_.count();
         trace.add(sampler_.gain());
       }
-      out.n_moves += n;
+      out.n_moves[h] = n;
       out.mean[h] = trace.mean();
       out.variance[h] = trace.variance();
       out.shares[h].clear();
       for (std::int32_t i = 0; i < p.window().n_ids(); ++i)
         if (!p.is_frozen(i)) out.shares[h].push_back(marginals_.share(i));
     }
-    out.ess = trace.ess_of_halves(out.n_moves);
-    stats.n_sampled += out.n_moves;
+    out.ess = trace.ess_of_halves(out.all_moves());
+    stats.n_sampled += out.all_moves();
     add_counts(stats);
   }
 
@@ -140,7 +142,7 @@ class Walker {
     };
     for (const auto& [from, to] : group.doubts) {
       const std::int32_t a = local(from), y = local(to);
-      if (a < 0 || y < 0) continue;
+      if (a < 0 || y < 0 || p.is_frozen(y)) continue;  // a settled link is in doubt no more
       const std::int32_t x = p.track_of(a) < 0 ? -1 : p.after(a);
       const std::int32_t c = p.track_of(y) < 0 ? -1 : p.before(y);
       add_skips(a, y);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -91,12 +92,15 @@ class Walks {
   }
 
   // Split R̂ (Gelman et al. 2013) of the log posterior over the halves of all chains, which are long;
-  // and the mean of their shares.
+  // and the mean of their shares, each weighed by its moves. Chains that never moved have no variance
+  // to compare: of these neither R̂ nor the effective sample size is known.
   static void judge(std::span<const Halves> chains, std::vector<double>& shares, ChainStats& stats) {
     const auto n_halves = static_cast<double>(chains.size() * Halves::kN);
-    double mean = 0, within = 0, between = 0, ess = 0;
+    double mean = 0, within = 0, between = 0, moves = 0;
+    double ess = std::numeric_limits<double>::quiet_NaN();  // of those chains for which it is known
     for (const Halves& chain : chains) {
-      ess += chain.ess;
+      if (!std::isnan(chain.ess)) ess = std::isnan(ess) ? chain.ess : ess + chain.ess;
+      moves += static_cast<double>(chain.all_moves());
       for (int h = 0; h < Halves::kN; ++h) {
         mean += chain.mean[h] / n_halves;
         within += chain.variance[h] / n_halves;
@@ -105,15 +109,18 @@ class Walks {
     for (const Halves& chain : chains)
       for (int h = 0; h < Halves::kN; ++h)
         between += (chain.mean[h] - mean) * (chain.mean[h] - mean) / (n_halves - 1);
-    if (within > 0) stats.rhat = std::max(stats.rhat, std::sqrt(1 + between / within));
-    stats.ess = std::min(stats.ess, ess);
+    if (within > 0)
+      stats.add_mixing(std::sqrt(1 + between / within), ess);
+    else
+      ++stats.n_unmoved;
     for (std::size_t n = 0; n < chains[0].detections.size(); ++n) {
       double sum = 0, least = 1, most = 0;
       for (const Halves& chain : chains)
-        for (const std::vector<double>& half : chain.shares) {
-          sum += half[n] / n_halves;
-          least = std::min(least, half[n]);
-          most = std::max(most, half[n]);
+        for (int h = 0; h < Halves::kN; ++h) {
+          const double share = chain.shares[h][n];
+          sum += share * (n_halves * static_cast<double>(chain.n_moves[h]) / moves) / n_halves;
+          least = std::min(least, share);
+          most = std::max(most, share);
         }
       shares[chains[0].detections[n]] = std::clamp(sum, 0.0, 1.0);
       stats.n_doubtful += most - least > kDoubtful;
