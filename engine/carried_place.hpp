@@ -23,7 +23,6 @@
 #include <span>
 
 #include "rigid_fit.hpp"
-#include "symmetric3.hpp"
 
 namespace asterism {
 
@@ -31,25 +30,6 @@ struct CarriedPlace {
   Point at{};
   double variance = std::numeric_limits<double>::infinity();  // of a coordinate of the marker's place
 };
-
-// tr([d]× J⁻¹ [d]×ᵀ), infinite where the points lie in a line with each other.
-inline double turning_variance(std::span<const RigidPair> pairs, const Point& mean, const Point& d,
-                               int D) {
-  constexpr double never = std::numeric_limits<double>::infinity();
-  Symmetric3 S;  // Σ b' b'ᵀ / v
-  for (const RigidPair& p : pairs)
-    S.add({p.b[0] - mean[0], p.b[1] - mean[1], D > 2 ? p.b[2] - mean[2] : 0.0}, p.weight);
-  const double all = S.trace();
-  const Vec3 arm{d[0], d[1], D > 2 ? d[2] : 0.0};
-  const double arm2 = arm.x * arm.x + arm.y * arm.y + arm.z * arm.z;
-  if (!(all > 0)) return never;
-  if (D == 2) return arm2 / all;
-  const Symmetric3 J{all - S.xx, -S.xy, -S.xz, all - S.yy, -S.yz, all - S.zz};
-  if (!(J.determinant() > 1e-9 * all * all * all)) return never;
-  const Symmetric3 turn = J.inverse();
-  const Vec3 turned = turn * arm;
-  return turn.trace() * arm2 - (turned.x * arm.x + turned.y * arm.y + turned.z * arm.z);
-}
 
 // `pairs` have the weights 1/v_k, the steadiest first. `r`: of a measured coordinate. `shifted`: what
 // the offset from that first one changes by, squared, along an axis.

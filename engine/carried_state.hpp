@@ -77,7 +77,7 @@ class Expected {
 };
 
 // What its neighbours say of a believed track in a frame, by what all expected when it came.
-struct Advice {
+struct NeighbourAdvice {
   std::int64_t track = 0;    // its key
   bool is_carried = false;   // where it is hidden it is at `place`, and takes none but one of `may_take`
   bool is_doubtful = false;  // that place is not known well enough to live by

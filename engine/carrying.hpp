@@ -42,13 +42,28 @@ struct Carried {
 };
 
 // From where the neighbours were and are, to where the marker is that was at `then`. What they leave
-// when one rigid motion is fitted to them is how far it may be off.
+// when one rigid motion is fitted to them is how far it may be off. Neighbours near one line do not
+// determine how far they turned about it: where their noise alone moves the marker by more than kMoved
+// of its distance from them, they move it along without turning it, as too few neighbours do.
 inline Carried carry(std::span<const RigidPair> neighbours, const Point& then, int D, double noise) {
-  const RigidFit fit = fit_rigid(neighbours, D);
-  Carried out{fit(then), noise + 0.8 * fit.rms, D};
+  constexpr double kMoved = 0.3;
   const std::size_t least = least_for_rotation(D);
-  if (neighbours.size() < least)  // moved along, not turned: the farther off, the worse
-    out.scale += 0.3 * std::sqrt(squared_distance(then, fit.from, D));
+  RigidFit fit = fit_rigid(neighbours, D);
+  Point arm{};
+  double all = 0;
+  for (int d = 0; d < D; ++d) arm[d] = fit(then)[d] - fit.to[d];
+  for (const RigidPair& p : neighbours) all += p.weight;
+  const double far = std::sqrt(squared_distance(then, fit.from, D));
+  bool is_turned = neighbours.size() >= least;
+  if (D > 1 && is_turned) {
+    const double weight = all / static_cast<double>(neighbours.size());
+    const double spread2 = weight * turning_variance(neighbours, fit.to, arm, D) / D;
+    is_turned = noise * noise * spread2 <= kMoved * kMoved * far * far;
+    if (!is_turned) fit = fit_rigid(neighbours, D, false);
+  }
+  Carried out{fit(then), noise + 0.8 * fit.rms, D};
+  if (!is_turned)
+    out.scale += kMoved * far;
   else if (neighbours.size() == least)
     out.scale = 1.5 * out.scale + 2 * noise;
   return out;

@@ -20,7 +20,7 @@ namespace asterism {
 
 // The label of the marker that a fragment is thought to go on with, and how much that is worth: log
 // odds for that marker, half of it against all others.
-struct Advice {
+struct JoinAdvice {
   std::int64_t goes_on_with = 0;
   double weight = 0;
 };
@@ -30,7 +30,7 @@ class Claims {
   static constexpr double kWorth = 0.25;  // of the log odds, in a probability
 
   // What is thought already of fragments that begin with a label.
-  void advise(std::int64_t label, const Advice& advice) { advice_[label] = advice; }
+  void advise(std::int64_t label, const JoinAdvice& advice) { advice_[label] = advice; }
 
   // The marker that a fragment is, kOpen if it is none of those that are hidden; and how probably.
   // `is_short` tells of fragments that were over before they were decided upon.
@@ -149,7 +149,7 @@ class Claims {
     Assignment assignment;
   };
 
-  std::unordered_map<std::int64_t, Advice> advice_;
+  std::unordered_map<std::int64_t, JoinAdvice> advice_;
   Fresh<Memory> w_;  // while a fragment is compared
 };
 

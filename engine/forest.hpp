@@ -143,7 +143,7 @@ class Forest {
     MotionState state = track.state;
     predict(open_.live.m, frame.step, state);
     const BranchGrower grower(open_.live, open_.branches);
-    const Advice* advice = frame.advice_to(track.more.key);
+    const NeighbourAdvice* advice = frame.advice_to(track.more.key);
     const Expected expected = grower.expected(state, track.gap, advice);
     const std::int32_t n_missed = std::min(open_.n_open() + 1, open_.live.sm.max_gap - track.untold());
     const double gone = track.score + open_.live.misses_gain(track.gap, n_missed);

@@ -23,7 +23,7 @@ struct Decision {
   double probability = 1;       // that it does
 };
 
-struct Sight {
+struct FragmentPoint {
   std::int64_t frame = 0;
   Point at{};
 };
@@ -38,7 +38,7 @@ struct Fragment {
   std::int32_t marker = Decision::kOpen;
   std::int64_t first = 0, last = 0;
   std::int32_t n = 0;
-  std::vector<Sight> sights;  // until it is decided upon
+  std::vector<FragmentPoint> sights;  // until it is decided upon
   MotionState state;         // while its motion is compared
   double alone = 0;  // log likelihood of its second detection and those after
   std::vector<Continuation> continuations;

@@ -40,7 +40,7 @@ struct ImagePoint {
 };
 
 // A place as a camera has it.
-struct Sight {
+struct ProjectedPlace {
   Plane n;
   Vec3 jx, jy;  // rows of J
   double depth;
@@ -115,7 +115,7 @@ class ImagePoints {
 
   Vec3 ray(std::size_t i) const { return {dx[i], dy[i], dz[i]}; }
 
-  Sight sight(Vec3 X) const {
+  ProjectedPlace sight(Vec3 X) const {
     const Vec3 c = camera->to_camera(X);
     const Plane n{c.x / c.z, c.y / c.z};
     const double s = 1 / c.z;

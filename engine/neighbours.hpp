@@ -23,23 +23,45 @@ struct Seen {
   Point at{};
 };
 
-// Where the markers of a frame are.
+// Where the markers of a frame are, by number: an open hash table, so that time and memory depend on
+// how many there are and not on how large their numbers have become.
 class Places {
  public:
-  void clear() { ++stamp_; }
+  void clear() {
+    std::fill(slots_.begin(), slots_.end(), Seen{kNobody, {}});
+    n_ = 0;
+  }
   void set(std::int32_t marker, const Point& at) {
-    if (static_cast<std::int32_t>(at_.size()) <= marker) at_.resize(marker + 1);
-    at_[marker] = {stamp_, at};
+    if (2 * (n_ + 1) > slots_.size()) grow();
+    Seen& slot = slots_[place(marker)];
+    n_ += slot.marker == kNobody;
+    slot = {marker, at};
   }
   const Point* find(std::int32_t marker) const {
-    return marker < static_cast<std::int32_t>(at_.size()) && at_[marker].first == stamp_
-               ? &at_[marker].second
-               : nullptr;
+    if (slots_.empty()) return nullptr;
+    const Seen& slot = slots_[place(marker)];
+    return slot.marker == marker ? &slot.at : nullptr;
   }
 
  private:
-  std::int64_t stamp_ = 0;
-  std::vector<std::pair<std::int64_t, Point>> at_;
+  static constexpr std::int32_t kNobody = -1;
+
+  // Of a marker, or where it would stand.
+  std::size_t place(std::int32_t marker) const {
+    const std::size_t last = slots_.size() - 1;  // a power of two, less one
+    std::size_t at = static_cast<std::uint32_t>(marker) * 0x9e3779b1u & last;
+    while (slots_[at].marker != kNobody && slots_[at].marker != marker) at = (at + 1) & last;
+    return at;
+  }
+  void grow() {
+    const std::vector<Seen> old = std::move(slots_);
+    slots_.assign(std::max<std::size_t>(2 * old.size(), 32), Seen{kNobody, {}});
+    for (const Seen& one : old)
+      if (one.marker != kNobody) slots_[place(one.marker)] = one;
+  }
+
+  std::vector<Seen> slots_;
+  std::size_t n_ = 0;
 };
 
 struct Bond {

@@ -151,7 +151,7 @@ class PointCandidates {
     PointCandidate c;
     c.X = X;
     for (std::size_t k = 0; k < cameras_.size(); ++k) {
-      const Sight s = cameras_[k].sight(X);
+      const ProjectedPlace s = cameras_[k].sight(X);
       if (!(s.depth > 0)) continue;
       const std::vector<ImagePoint>& points = cameras_[k].points;
       std::int32_t best = -1;
@@ -178,7 +178,7 @@ class PointCandidates {
                                        [](View v, std::int32_t camera) { return v.camera < camera; });
       if (at != c.views.end() && at->camera == k) continue;
       const ImagePoints& camera = cameras_[k];
-      const Sight s = camera.sight(c.X);
+      const ProjectedPlace s = camera.sight(c.X);
       if (!(s.depth > 0)) continue;
       const Vec3 px = P * s.jx, py = P * s.jy;
       const double sxx = dot(s.jx, px), sxy = dot(s.jx, py), syy = dot(s.jy, py);

@@ -53,7 +53,7 @@ class PointFit {
       for (const View v : c.views) {
         const ImagePoints& camera = cameras_[v.camera];
         const ImagePoint& p = camera.points[v.point];
-        const Sight s = camera.sight(c.X);
+        const ProjectedPlace s = camera.sight(c.X);
         if (!(s.depth > 0)) return false;
         add(p, s, A, g);
         c.squared += p.squared({p.n.x - s.n.x, p.n.y - s.n.y});
@@ -75,7 +75,7 @@ class PointFit {
   bool inform(PointCandidate& c) const {
     Vec3 g{0, 0, 0};
     for (const View v : c.views) {
-      const Sight s = cameras_[v.camera].sight(c.X);
+      const ProjectedPlace s = cameras_[v.camera].sight(c.X);
       if (!(s.depth > 0)) return false;
       add(cameras_[v.camera].points[v.point], s, c.information, g);
     }
@@ -84,7 +84,7 @@ class PointFit {
     return true;
   }
   // One step with a new view alone, seen as `s` says: the others are at their minimum.
-  static void step(PointCandidate& c, const ImagePoint& p, const Sight& s) {
+  static void step(PointCandidate& c, const ImagePoint& p, const ProjectedPlace& s) {
     Vec3 g{0, 0, 0};
     add(p, s, c.information, g);
     c.X = c.X + c.information.inverse() * g;
@@ -92,7 +92,7 @@ class PointFit {
 
   double squared_of(const PointCandidate& c, View v) const {
     const ImagePoints& camera = cameras_[v.camera];
-    const Sight s = camera.sight(c.X);
+    const ProjectedPlace s = camera.sight(c.X);
     const ImagePoint& p = camera.points[v.point];
     return p.squared({p.n.x - s.n.x, p.n.y - s.n.y});
   }
@@ -131,7 +131,7 @@ class PointFit {
     }
     return std::log(sum);
   }
-  static void add(const ImagePoint& p, const Sight& s, Symmetric3& A, Vec3& g) {
+  static void add(const ImagePoint& p, const ProjectedPlace& s, Symmetric3& A, Vec3& g) {
     const double ex = p.n.x - s.n.x, ey = p.n.y - s.n.y;
     A.add(s.jx, p.wxx), A.add(s.jy, p.wyy), A.add(s.jx, s.jy, p.wxy);
     g = g + (p.wxx * ex + p.wxy * ey) * s.jx + (p.wxy * ex + p.wyy * ey) * s.jy;

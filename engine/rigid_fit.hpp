@@ -5,9 +5,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <span>
 
 #include "kalman.hpp"
+#include "symmetric3.hpp"
 
 namespace asterism {
 
@@ -140,7 +142,8 @@ inline std::array<double, 9> rotation(const std::array<double, 4>& q) {
 
 }  // namespace rigid
 
-inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D) {
+// Without `may_turn` the points are moved alone.
+inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D, bool may_turn = true) {
   RigidFit fit;
   double all = 0;
   for (const RigidPair& p : pairs) {
@@ -154,7 +157,7 @@ inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D) {
     fit.from[d] /= all;
     fit.to[d] /= all;
   }
-  const bool can_turn = D > 1 && pairs.size() >= least_for_rotation(D);
+  const bool can_turn = may_turn && D > 1 && pairs.size() >= least_for_rotation(D);
   if (can_turn) {
     double S[3][3] = {}, size = 0;
     for (const RigidPair& p : pairs)
@@ -185,6 +188,25 @@ inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D) {
   const double free = n - (can_turn ? 0.5 * D * (D + 1) : D);
   fit.rms = std::sqrt(left / all / D * n / std::max(free, 1.0));
   return fit;
+}
+
+// tr([d]× J⁻¹ [d]×ᵀ), infinite where the points lie in a line with each other.
+inline double turning_variance(std::span<const RigidPair> pairs, const Point& mean, const Point& d,
+                               int D) {
+  constexpr double never = std::numeric_limits<double>::infinity();
+  Symmetric3 S;  // Σ b' b'ᵀ / v
+  for (const RigidPair& p : pairs)
+    S.add({p.b[0] - mean[0], p.b[1] - mean[1], D > 2 ? p.b[2] - mean[2] : 0.0}, p.weight);
+  const double all = S.trace();
+  const Vec3 arm{d[0], d[1], D > 2 ? d[2] : 0.0};
+  const double arm2 = arm.x * arm.x + arm.y * arm.y + arm.z * arm.z;
+  if (!(all > 0)) return never;
+  if (D == 2) return arm2 / all;
+  const Symmetric3 J{all - S.xx, -S.xy, -S.xz, all - S.yy, -S.yz, all - S.zz};
+  if (!(J.determinant() > 1e-9 * all * all * all)) return never;
+  const Symmetric3 turn = J.inverse();
+  const Vec3 turned = turn * arm;
+  return turn.trace() * arm2 - (turned.x * arm.x + turned.y * arm.y + turned.z * arm.z);
 }
 
 }  // namespace asterism

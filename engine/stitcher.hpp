@@ -58,7 +58,7 @@ class Stitcher {
   std::int64_t n_cuts() const { return n_cuts_; }
 
   // What is thought already of fragments that begin with a label.
-  void advise(std::int64_t label, const Advice& advice) { claims_.advise(label, advice); }
+  void advise(std::int64_t label, const JoinAdvice& advice) { claims_.advise(label, advice); }
 
   // One frame: its points, and of each the label that the tracker gave it, -1 for none. Writes the
   // fragment of each, and tells `decide(decision)`.
@@ -154,7 +154,7 @@ class Stitcher {
 
   bool is_beside(const Fragment& f, std::int32_t own) const {
     std::size_t n = 0, n_beside = 0;
-    for (const Sight& sight : f.sights)
+    for (const FragmentPoint& sight : f.sights)
       if (const Frame* at = so_far_.frames.find(sight.frame); at != nullptr) {
         ++n;
         n_beside += so_far_.elsewhere.is_beside(sight.at, *at, own);

@@ -41,7 +41,7 @@ class WindowBodies {
         },
         s_.candidates, stats, n_open);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      Advice& own = s_.advice[s_.place[i]];
+      NeighbourAdvice& own = s_.advice[s_.place[i]];
       const std::int32_t heir = carried.heir(i);
       own.gives_way = own.gives_way || (heir >= 0 && is_best(heir));
       if (!carried.is_carried(i)) continue;
@@ -53,7 +53,7 @@ class WindowBodies {
       if (carried.is_carried(c.row)) s_.advice[s_.place[c.row]].may_take.push_back(c.column);
     for (const CarriedTracks::Told& told : carried.told())
       s_.advice[s_.place[told.row]].says.emplace_back(told.column, told.nats);
-    for (Advice& own : s_.advice)
+    for (NeighbourAdvice& own : s_.advice)
       if (own.is_carried || own.gives_way || !own.says.empty())
         frame.advice.push_back(std::move(own));
   }
@@ -68,7 +68,7 @@ class WindowBodies {
   };
   struct Memory {
     std::vector<std::size_t> place;  // of each row's track among the advised
-    std::vector<Advice> advice;
+    std::vector<NeighbourAdvice> advice;
     std::vector<Candidate> candidates;
   };
 
