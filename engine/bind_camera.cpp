@@ -134,6 +134,8 @@ nb::tuple give_image(const RayGrid& grid, const auto& draw) {
 
 nb::tuple depth_image(const RayGrid& grid, const Camera& camera,
                       const std::vector<const Surfaces*>& surfaces, std::size_t moment) {
+  for (const Surfaces* s : surfaces)
+    require(s->n_moments == 1 || moment < s->n_moments, "moment: one that the surfaces have");
   return give_image(grid, [&](DepthImage image) {
     for (const Surfaces* s : surfaces) {
       const Scene scene = s->at(s->n_moments > 1 ? moment : 0, [&](Vec3 p) { return camera.to_camera(p); });

@@ -14,7 +14,7 @@ namespace {
 
 // Cameras, what is known of their images, and what a candidate must be.
 struct ViewSolver {
-  std::vector<const Camera*> cameras;
+  std::vector<Camera> cameras;  // copies: the list that they came in may let go of them
   std::vector<ImageSense> senses;
   CandidateOptions options;
 
@@ -22,7 +22,8 @@ struct ViewSolver {
              const In<double>& p_detection, const In<double>& clutter, double log_density,
              double gate, std::int32_t min_views, std::array<double, 3> low,
              std::array<double, 3> high)
-      : cameras(cameras_), options{log_density, gate, min_views, low, high} {
+      : options{log_density, gate, min_views, low, high} {
+    for (const Camera* camera : cameras_) cameras.push_back(*camera);
     const std::size_t C = cameras.size();
     require(sigma.size() == C && p_detection.size() == C && clutter.size() == C,
             "sigma, p_detection, clutter: one for each camera");
@@ -167,7 +168,7 @@ void bind_reconstruct(nb::module_& module) {
                     const In<double>&, double, double, std::int32_t, std::array<double, 3>,
                     std::array<double, 3>>(),
            nb::kw_only(), "cameras"_a, "sigma"_a, "p_detection"_a, "clutter"_a, "log_density"_a,
-           "gate"_a, "min_views"_a, "low"_a, "high"_a, nb::keep_alive<1, 2>())
+           "gate"_a, "min_views"_a, "low"_a, "high"_a)
       .def("reconstruct", &reconstruct, "pixels"_a, "offsets"_a, "priors"_a, "prior_offsets"_a,
            "merge"_a, "max_nodes"_a, "n_threads"_a)
       .def("candidates", &candidates, "pixels"_a, "offsets"_a);

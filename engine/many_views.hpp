@@ -18,10 +18,10 @@ struct FrameSummary {
 
 class ManyViews {
  public:
-  ManyViews(std::span<const Camera* const> cameras, std::span<const ImageSense> senses,
+  ManyViews(std::span<const Camera> cameras, std::span<const ImageSense> senses,
             const CandidateOptions& options)
       : options_(options) {
-    for (std::size_t c = 0; c < cameras.size(); ++c) images_.emplace_back(*cameras[c], senses[c]);
+    for (std::size_t c = 0; c < cameras.size(); ++c) images_.emplace_back(cameras[c], senses[c]);
   }
 
   // `pixels` of all cameras, those of camera c from offsets[c] to offsets[c + 1] (from any start).

@@ -41,9 +41,10 @@ inline Timeline timeline(const MotionModel& m, const In<double>& times,
   require(times.ndim() == 1 && kind.ndim() == 1 && times.shape(0) == kind.shape(0),
           "times and kind: shape (T,)");
   Timeline line{{times.data(), times.shape(0)}, {kind.data(), kind.shape(0)}, motion_steps(m, F, Q)};
-  for (std::size_t t = 1; t < line.kind.size(); ++t)
-    require(line.kind[t] >= 0 && static_cast<std::size_t>(line.kind[t]) < line.steps.size(),
-            "kind: an index into F");
+  // The first frame has no step to it where it is the first of all, which is said by -1.
+  const auto n_kinds = static_cast<std::int64_t>(line.steps.size());
+  for (std::size_t t = 0; t < line.kind.size(); ++t)
+    require(line.kind[t] >= (t == 0 ? -1 : 0) && line.kind[t] < n_kinds, "kind: an index into F");
   return line;
 }
 
