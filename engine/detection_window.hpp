@@ -8,6 +8,7 @@
 #include <cassert>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <span>
 #include <utility>
@@ -51,19 +52,24 @@ class DetectionWindow {
   // Number of the newest frame; that of the first is 0.
   std::int64_t now() const { return first_ + static_cast<std::int64_t>(frames_.size()) - 1; }
   int max_gap() const { return sm_.max_gap; }
+  // Detections of later frames stand for what a track does after a block of frames: nothing follows
+  // them here (see Partition::continue_with).
+  std::int64_t last_open() const { return last_open_; }
+  void close_after(std::int64_t frame) { last_open_ = frame; }
 
   bool is_linkable(std::int32_t i, std::int32_t j) const {
     const Detection &a = detections_[i], &b = detections_[j];
     const std::int64_t gap = b.frame - a.frame;
-    if (gap < 1 || gap > sm_.max_gap) return false;
+    if (gap < 1 || gap > sm_.max_gap || a.frame > last_open_) return false;
     return is_reachable(sm_, a.y, b.y, b.time - a.time, m_.axis.D);
   }
 
   // Calls visit(j) for every detection of a frame that may follow i.
   template <typename Visit>
   void each_after(std::int32_t i, std::int64_t frame_number, Visit&& visit) const {
-    const Frame& later = frame(frame_number);
     const Detection& a = detections_[i];
+    if (a.frame > last_open_) return;
+    const Frame& later = frame(frame_number);
     const double reach = sm_.max_speed * (later.time - a.time) + sm_.speed_margin;
     if (later.places) {
       later.places->grid.within(a.y, reach, [&](std::int32_t k, double) { visit(later.ids[k]); });
@@ -109,6 +115,7 @@ class DetectionWindow {
   // Becomes the part of a window that holds some of its detections, numbered here as they are given.
   void take_part(const DetectionWindow& whole, std::span<const std::int32_t> ids) {
     first_ = whole.first_;
+    last_open_ = whole.last_open_;
     frames_.resize(whole.frames_.size());
     for (std::size_t t = 0; t < frames_.size(); ++t) {
       frames_[t].time = whole.frames_[t].time;
@@ -161,6 +168,7 @@ class DetectionWindow {
   std::vector<std::int32_t> unused_;
   std::deque<Frame> frames_;
   std::int64_t first_ = 0;
+  std::int64_t last_open_ = std::numeric_limits<std::int64_t>::max();
 };
 
 }  // namespace asterism

@@ -21,6 +21,11 @@ class Doubts {
     while (frames_.size() > n_frames) frames_.pop_front();
   }
 
+  // Those of the newest frame.
+  template <typename Visit>
+  void each_new(Visit&& visit) const {
+    for (const Link& link : frames_.back()) visit(link.from, link.to);
+  }
   template <typename Visit>
   void each(Visit&& visit) const {
     for (const std::vector<Link>& links : frames_)

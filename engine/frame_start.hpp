@@ -66,10 +66,12 @@ class FrameStart {
       edit.keep = p.track(edit.track).size();
       p.append(edit, ids[j]);
     }
-    p.apply(s_.edits);
-    doubt_births(p, doubts);
+    s_.unseen.clear();
     for (std::int32_t r = 0; r < n_rows; ++r)
-      if (s_.match[r] < 0) doubt_last(p, s_.rows[r], doubts);
+      if (s_.match[r] < 0) s_.unseen.push_back(p.last(s_.rows[r]));
+    p.apply(s_.edits);  // from here on the numbers of tracks may be others'
+    doubt_births(p, doubts);
+    for (const std::int32_t last : s_.unseen) doubt_last(p, last, doubts);
   }
 
  private:
@@ -174,9 +176,9 @@ class FrameStart {
   }
 
   // Hindsight: where a track is not seen, what it would expect had its last detection not been its own.
-  void doubt_last(const Partition<Filter>& p, std::int32_t k, Doubts& doubts) {
+  void doubt_last(const Partition<Filter>& p, std::int32_t last, Doubts& doubts) {
     const DetectionWindow& window = p.window();
-    const std::int32_t last = p.last(k), i = p.before(last);
+    const std::int32_t k = p.track_of(last), i = p.before(last);
     if (i < 0 || p.is_frozen(last) || window.now() - window[i].frame > window.max_gap()) return;
     const DetectionWindow::Frame& frame = window.frame(window.now());
     if (frame.ids.empty()) return;
@@ -195,7 +197,7 @@ class FrameStart {
   }
 
   struct Memory {
-    std::vector<std::int32_t> rows, row_given, match;
+    std::vector<std::int32_t> rows, row_given, match, unseen;
     std::unordered_map<std::int32_t, std::int32_t> row_of;
     std::vector<char> is_given;
     std::vector<Candidate> candidates, others;

@@ -82,19 +82,24 @@ class Growth {
     auto operator<=>(const Follower&) const = default;
   };
 
-  // What is free to follow i, in order of gaps.
+  // What is free to follow i, in order of gaps and numbers.
   void list_free(std::int32_t i) {
+    const DetectionWindow& window = p_.window();
     free_.clear();
-    for (const std::int32_t j : p_.free().items()) add_free(i, j);
-    if (own_ >= 0) {
-      const auto& nodes = p_.track(own_).nodes;
-      for (std::size_t n = keep_; n < nodes.size(); ++n) add_free(i, nodes[n]);
+    const std::int64_t frame = window[i].frame;
+    const std::int64_t last = std::min(frame + window.max_gap(), window.now());
+    for (std::int64_t t = frame + 1; t <= last; ++t) {
+      const std::size_t n = free_.size();
+      for (const std::int32_t j : window.frame(t).ids)
+        if (is_free(j) && window.is_linkable(i, j))
+          free_.push_back({static_cast<std::int32_t>(t - frame), j});
+      std::sort(free_.begin() + static_cast<std::ptrdiff_t>(n), free_.end());
     }
-    std::sort(free_.begin(), free_.end());
   }
-  void add_free(std::int32_t i, std::int32_t j) {
-    if (p_.window().is_linkable(i, j))
-      free_.push_back({static_cast<std::int32_t>(p_.window()[j].frame - p_.window()[i].frame), j});
+  // In no track, or in what the edited track does not keep.
+  bool is_free(std::int32_t j) const {
+    return p_.is_free(j) ? !p_.is_continuation(j)
+                         : own_ >= 0 && p_.track_of(j) == own_ && p_.place_of(j) >= keep_;
   }
   double log_stop() const {
     const int max_gap = p_.window().max_gap();

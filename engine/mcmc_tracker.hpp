@@ -18,6 +18,7 @@
 
 #include "bonds.hpp"
 #include "budgets.hpp"
+#include "capture_sweep.hpp"
 #include "doubts.hpp"
 #include "frame_start.hpp"
 #include "live_tracks.hpp"
@@ -29,7 +30,8 @@ namespace asterism {
 
 struct McmcOptions {
   std::int32_t window = 1;     // frames until one is settled
-  bool is_whole = false;       // in the end everything is opened again, and walked over
+  bool is_whole = false;       // in the end the chains go over all frames again, block by block
+  std::int32_t block = 1;      // frames of a block
   double moves = 0;            // in each frame, for each of its detections or for each track
   double deadline = 0;         // seconds from the frame's arrival; 0: none
   bool has_assignment = true;  // start from the exact assignment; else from no change
@@ -50,7 +52,8 @@ class McmcTracker {
         seed_(seed),
         start_(options.has_assignment, options.split.doubt),
         walks_(chain, options.n_chains, options.n_threads),
-        settled_bonds_(m, options.bond_weight) {}
+        settled_bonds_(m, options.bond_weight),
+        sweep_(options.block, sm.max_gap) {}
 
   template <typename Label>
   FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
@@ -76,30 +79,55 @@ class McmcTracker {
     tell(label);
   }
 
-  // Walks over the whole take at once, with all that was settled opened again. `goes_on(share of the
-  // moves that are done)` is asked now and then.
+  // Goes over all frames so far again, block by block: first for the best partition, then for how
+  // probable it is. `goes_on(share of the work that is done)` is asked now and then.
   template <typename Label>
-  void finish(Label&& label, std::function<bool(double)> goes_on) {
-    Partition<Filter>& p = partition_;
-    p.thaw();
-    shares_.clear();
-    double all = 0;
-    for (const Group& group : Splitter<Filter>(p, opt_.split).split(doubts_, {}).groups)
-      all += static_cast<double>(group.n_open);
-    Watch watch(all * (opt_.moves + opt_.confidence) * opt_.n_chains, std::move(goes_on));
-    const auto allowed = [&](std::span<const Group> groups, double moves, double) {
-      return Budgets(weights_of(groups, [](const Group& g) { return g.n_open; }), moves, &watch);
-    };
+  void finish(Label&& label, const std::function<bool(double)>& goes_on) {
+    if (n_seen_ == 0) return;
     FrameStats stats;
-    BondTerm<Filter> bonds = settled_bonds_.term(p);
-    walk({}, bonds, allowed, 2, stats, [&] { return has_confidence() && !watch.is_stopped(); });
     total_.bond_score = 0;
-    tell_bonds(bonds, p.window().now(), stats);
-    stats.n_confirmed = p.tracks().size();
+    sweep_.link_labels();
+    std::vector<double> sure(has_confidence() ? n_seen_ : 0, 1.0);
+    const auto blocks = sweep_.blocks();
+    const double overlap = sweep_.overlap();
+    const std::size_t n_sweeps = has_confidence() ? 2 : 1;
+    bool is_stopped = false;
+    for (std::size_t s = 0; s < n_sweeps && !is_stopped; ++s)
+      for (std::size_t b = 0; b < blocks.size() && !is_stopped; ++b) {
+        const double n_done = static_cast<double>(s * blocks.size() + b);
+        const double n_all = static_cast<double>(n_sweeps * blocks.size());
+        const auto go_on = [&](double share) { return goes_on((n_done + share) / n_all); };
+        auto part = sweep_.take(partition_, blocks[b]);
+        const double moves = (s == 0 ? opt_.moves : opt_.confidence) / overlap;
+        const Split split = split_up(part.partition, part.doubts, {}, stats);
+        const auto weights = weights_of(split.groups, [](const Group& g) { return g.n_open; });
+        double all = 0;
+        for (const double weight : weights) all += weight;
+        Watch watch(all * moves * opt_.n_chains, go_on);
+        const Budgets budgets(weights, moves, &watch);
+        BondTerm<Filter> bonds = settled_bonds_.term(part.partition);
+        const std::uint64_t seed = seed_of(2 + n_sweeps * b + s);
+        if (s == 0) {
+          walks_.search(part.partition, bonds, split.groups, budgets, seed, stats.chain);
+          bonds.read(part.partition);
+          const std::int64_t first = part.partition.frozen() + 1;
+          tell_bonds(bonds, first, first + blocks[b].next - blocks[b].first, stats);
+          sweep_.put_back(blocks[b], part);
+        } else {
+          const auto shares =
+              walks_.sample(part.partition, bonds, split.groups, budgets, seed, stats.chain);
+          sweep_.keep_states(blocks[b], part);
+          take_shares(blocks[b], part, shares, sure);
+        }
+        is_stopped = watch.is_stopped();
+      }
+    stats.n_confirmed = sweep_.read_labels();
     total_.add(stats);
-    next_id_ = 0;
-    name_new();
-    tell(label);
+    for (std::int64_t i = 0; i < n_seen_; ++i) {
+      // Of the first of a track, that the next follows it.
+      const bool is_first = sweep_.before(i) < 0 && sweep_.after(i) >= 0;
+      label(i, sweep_.labels()[i], has_confidence() ? sure[is_first ? sweep_.after(i) : i] : 0);
+    }
   }
 
   // Links to begin the frames to come with, where the model allows them.
@@ -113,7 +141,7 @@ class McmcTracker {
   const Partition<Filter>& partition() const { return partition_; }
 
   const MotionModel& motion() const { return partition().motion(); }
-  std::int64_t n_ids() const { return next_id_ + n_named_; }
+  std::int64_t n_ids() const { return is_finished() ? total_.n_confirmed : next_id_ + n_named_; }
   // The tracks as they would be settled now.
   LiveTracks<> live() const {
     const Partition<Filter>& p = partition();
@@ -121,8 +149,10 @@ class McmcTracker {
     live.next_id = n_ids();
     for (const std::int32_t k : p.tracks().items()) {
       const std::int32_t i = p.last(k);
+      const std::int64_t number = p.window()[i].number;
+      if (is_finished() && sweep_.after(number) >= 0) continue;  // it goes on as another
       LiveTrack<NoMore>& track = live.tracks.emplace_back();
-      track.id = id_of(k);
+      track.id = is_finished() ? sweep_.labels()[number] : id_of(k);
       track.gap = static_cast<std::int32_t>(p.window().now() - p.window()[i].frame);
       track.score = p.score(i);
       track.state = state_now(i);
@@ -133,6 +163,11 @@ class McmcTracker {
   }
 
  private:
+  // Whether the labels are those of the chains over all frames so far.
+  bool is_finished() const {
+    return opt_.is_whole && static_cast<std::int64_t>(sweep_.labels().size()) == n_seen_;
+  }
+
   FrameStats add(double time, const MotionStep& step, std::span<const Point> points) {
     const auto arrival = Clock::now();
     Partition<Filter>& p = partition_;
@@ -142,6 +177,12 @@ class McmcTracker {
     ++n_frames_;
     FrameStats stats;
     start_.begin(p, doubts_, stats.chain, stats.n_candidates);
+    if (opt_.is_whole) {
+      sweep_.add_frame(time, step, points);
+      doubts_.each_new([&](std::int32_t from, std::int32_t to) {
+        sweep_.add_doubt(p.window()[from].number, p.window()[to].number);
+      });
+    }
     const Bonds sure = BondFinder<Filter>(p, opt_.bonds).find();
     stats.chain.n_sure = sure.n_sure;
     BondTerm<Filter> bonds = settled_bonds_.term(p);
@@ -150,7 +191,7 @@ class McmcTracker {
     };
     walk(sure.is_sure, bonds, allowed, 0, stats,
          [&] { return has_confidence() && !opt_.is_whole; });
-    tell_bonds(bonds, p.window().now() - opt_.window, stats);
+    tell_bonds(bonds, oldest_open(), p.window().now() + 1 - opt_.window, stats);
     stats.n_confirmed = p.tracks().size();
     stats.n_pending = p.free().size() + p.taken().size();
     total_.add(stats);
@@ -162,7 +203,7 @@ class McmcTracker {
   template <typename Allowed, typename IsAsked>
   void walk(const std::vector<char>& is_sure, BondTerm<Filter>& bonds, Allowed&& allowed,
             std::uint64_t phase, FrameStats& stats, IsAsked&& is_asked) {
-    const Split split = split_up(is_sure, stats);
+    const Split split = split_up(partition_, doubts_, is_sure, stats);
     walks_.search(partition_, bonds, split.groups,
                   allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1), seed_of(phase),
                   stats.chain);
@@ -174,21 +215,36 @@ class McmcTracker {
                               seed_of(phase + 1), stats.chain));
   }
 
-  // What bonds say of the open frames up to this one.
-  void tell_bonds(const BondTerm<Filter>& bonds, std::int64_t last, FrameStats& stats) const {
+  // What bonds say of the open frames from one on, before another.
+  static void tell_bonds(const BondTerm<Filter>& bonds, std::int64_t first, std::int64_t end,
+                         FrameStats& stats) {
     if (!bonds.is_on()) return;
     stats.n_bonds = bonds.graph().n_pairs();
-    for (std::int64_t t = oldest_open(); t <= last; ++t) stats.bond_score += bonds.total(t);
+    for (std::int64_t t = first; t < end; ++t) stats.bond_score += bonds.total(t);
   }
 
-  Split split_up(const std::vector<char>& is_sure, FrameStats& stats) {
-    Split split = Splitter<Filter>(partition_, opt_.split).split(doubts_, is_sure);
-    stats.n_groups = split.n_all;
+  // Shares of a block for those frames that are as far inside it as in any other.
+  void take_shares(const typename CaptureSweep<Filter>::Block& block,
+                   const typename CaptureSweep<Filter>::Part& part, const std::vector<double>& shares,
+                   std::vector<double>& sure) const {
+    const std::int64_t margin = (block.last + 1 - block.next) / 2;
+    const Partition<Filter>& p = part.partition;
+    for (std::int32_t i = 0; i < p.window().n_ids(); ++i) {
+      const std::int64_t t = sweep_.frame_of(part.numbers[i]);
+      if (t >= (block.is_first ? 0 : block.first + margin) && (block.is_last || t < block.next + margin))
+        sure[part.numbers[i]] = shares[i];
+    }
+  }
+
+  Split split_up(const Partition<Filter>& p, const Doubts& doubts, const std::vector<char>& is_sure,
+                 FrameStats& stats) const {
+    Split split = Splitter<Filter>(p, opt_.split).split(doubts, is_sure);
+    stats.n_groups += split.n_all;
     for (const Group& group : split.groups)
       stats.largest_group = std::max<std::int64_t>(
           stats.largest_group, static_cast<std::int64_t>(group.tracks.size() + group.free.size()));
-    stats.chain.n_walked = static_cast<std::int64_t>(split.groups.size());
-    stats.chain.n_cut = split.n_cut;
+    stats.chain.n_walked += static_cast<std::int64_t>(split.groups.size());
+    stats.chain.n_cut += split.n_cut;
     return split;
   }
 
@@ -206,9 +262,7 @@ class McmcTracker {
     });
     Budgets out(weights, moves);
     if (opt_.deadline > 0) {
-      const std::chrono::duration<double> allowed(opt_.deadline * share);
-      out.end_at(arrival + std::chrono::duration_cast<Clock::duration>(allowed), weights,
-                 opt_.n_chains, opt_.n_threads);
+      out.end_at(after(arrival, opt_.deadline * share), weights, opt_.n_chains, opt_.n_threads);
     }
     return out;
   }
@@ -259,6 +313,7 @@ class McmcTracker {
         const Said now{k < 0 ? -1 : id_of(k), confidence_of(i)};
         if (now == said_[i]) continue;
         said_[i] = now;
+        if (opt_.is_whole) sweep_.set_label(window[i].number, now.id);
         label(window[i].number, now.id, now.confidence);
       }
   }
@@ -284,13 +339,12 @@ class McmcTracker {
     for (const std::int32_t k : p.tracks().items())
       if (p.track(k).n_frozen > 0) next_id_ = std::max(next_id_, id_of(k) + 1);
     for (std::int64_t t = first; t <= settled; ++t) settled_bonds_.learn(p, t);
-    if (opt_.is_whole) return;
     doubts_.keep(static_cast<std::size_t>(window.now() - settled));
     while (window.first() + window.max_gap() <= settled) {
       for (const std::int32_t i : window.frame(window.first()).ids) {
         if (i < static_cast<std::int32_t>(said_.size())) said_[i] = {};
         if (i < static_cast<std::int32_t>(shares_.size())) shares_[i] = {};
-        if (const std::int32_t k = p.track_of(i); k >= 0 && p.track(k).size() == 1)
+        if (const std::int32_t k = p.track_of(i); k >= 0 && p.track(k).size() == 1 && !opt_.is_whole)
           settled_bonds_.forget(id_of(k));
       }
       p.drop_frame();
@@ -331,6 +385,7 @@ class McmcTracker {
     bool operator==(const Said&) const = default;
   };
   std::vector<Said> said_;
+  CaptureSweep<Filter> sweep_;
   std::int64_t next_id_ = 0, n_named_ = 0;
   FrameStats total_;
   std::int64_t n_frames_ = 0, n_seen_ = 0;

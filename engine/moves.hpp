@@ -37,7 +37,7 @@ class Moves {
     out.n_edits = 0;
     out.log_forward = 0;
     out.with = -1;
-    if (!draw(random, out)) return false;
+    if (!draw(random, out) || !p_.keeps_continuations(out.all())) return false;
     splices_.weigh(out);
     return out.log_forward > Growth<Filter>::kNever;
   }

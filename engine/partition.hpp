@@ -5,9 +5,14 @@
 // track earlier costs nothing, to lengthen it only what is new.
 //
 // Frames up to `frozen` are settled: their detections stay where they are.
+//
+// A partition may be of a block of frames in a longer capture. The tracks that go on after the block
+// then end in a *continuation*: the next detection of the track, with those after it, by which the
+// track is weighed as a whole. It may follow other tracks, and has to stay in one.
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -45,6 +50,13 @@ struct Edit {
   Tail<Filter> tail;
 };
 
+// What a track does after its continuation: detections that follow it whatever is before it.
+struct LaterPoint {
+  std::int64_t frame = 0;
+  Point y{};
+};
+using LaterPoints = std::shared_ptr<const std::vector<LaterPoint>>;
+
 template <typename Filter>
 class Partition {
  public:
@@ -72,12 +84,20 @@ class Partition {
   const MotionModel& motion() const { return m_; }
   const ScoreModel& model() const { return sm_; }
 
-  const Track& track(std::int32_t k) const { return tracks_[k]; }
-  void set_id(std::int32_t k, std::int64_t id) { tracks_[k].id = id; }
+  // The number of a track is its own until a change removes it; then it is another's.
+  const Track& track(std::int32_t k) const {
+    assert(all_.has(k));
+    return tracks_[k];
+  }
+  void set_id(std::int32_t k, std::int64_t id) {
+    assert(all_.has(k));
+    tracks_[k].id = id;
+  }
   std::int32_t track_of(std::int32_t i) const { return track_of_[i]; }
   std::int32_t place_of(std::int32_t i) const { return place_[i]; }
   bool is_free(std::int32_t i) const { return track_of_[i] == kFree; }
   bool is_frozen(std::int32_t i) const { return window_[i].frame <= frozen_; }
+  bool is_continuation(std::int32_t i) const { return window_[i].frame > window_.last_open(); }
   const State& state(std::int32_t i) const { return state_[i]; }
   double score(std::int32_t i) const { return score_[i]; }
 
@@ -91,13 +111,13 @@ class Partition {
   const IndexSet& tracks() const { return all_; }
   const IndexSet& young() const { return young_; }
 
-  std::int32_t last(std::int32_t k) const { return tracks_[k].nodes.back(); }
+  std::int32_t last(std::int32_t k) const { return track(k).nodes.back(); }
   // The detection before or after in the track, -1 where there is none.
   std::int32_t before(std::int32_t i) const {
-    return place_[i] > 0 ? tracks_[track_of_[i]].nodes[place_[i] - 1] : -1;
+    return place_[i] > 0 ? track(track_of_[i]).nodes[place_[i] - 1] : -1;
   }
   std::int32_t after(std::int32_t i) const {
-    const Track& t = tracks_[track_of_[i]];
+    const Track& t = track(track_of_[i]);
     return place_[i] + 1 < t.size() ? t.nodes[place_[i] + 1] : -1;
   }
 
@@ -106,7 +126,8 @@ class Partition {
     return sm_.log_misses(0, gap - 1) + sm_.log_seen(gap - 1) - sm_.log_clutter + gap * sm_.log_survive;
   }
   double end_score(std::int32_t i) const {
-    const std::int64_t left = window_.now() - window_[i].frame;
+    if (is_continuation(i)) return 0;  // how the track ends is as it is
+    const std::int64_t left = window_.now() + n_after_ - window_[i].frame;
     return (*log_end_)[std::min(left, kEndTable)];
   }
   double score_of(std::int32_t k) const {
@@ -143,6 +164,19 @@ class Partition {
       tail.scores.push_back((is_first ? score_[i] : tail.scores.back()) + gain);
     }
     tail.nodes.push_back(j);
+    if (is_continuation(j)) tail.scores.back() += go_on(j, state);
+  }
+  // Whether edits leave every continuation in a track.
+  bool keeps_continuations(std::span<const Edit<Filter>> edits) const {
+    for (const Edit<Filter>& edit : edits) {
+      if (edit.track < 0 || edit.keep == track(edit.track).size()) continue;
+      const std::int32_t end = last(edit.track);
+      if (is_continuation(end) && std::ranges::none_of(edits, [&](const Edit<Filter>& other) {
+            return !other.tail.nodes.empty() && other.tail.nodes.back() == end;
+          }))
+        return false;
+    }
+    return true;
   }
 
   // The same for the detection that follows in the track now, where the edit changes nothing before.
@@ -159,7 +193,9 @@ class Partition {
         edit.track = new_track();
         continue;
       }
+      assert(all_.has(edit.track));
       Track& t = tracks_[edit.track];
+      assert(edit.keep >= t.n_frozen && edit.keep <= t.size());
       for (std::int32_t p = edit.keep; p < t.size(); ++p) release(t.nodes[p]);
       t.nodes.resize(edit.keep);
     }
@@ -167,6 +203,7 @@ class Partition {
       Track& t = tracks_[edit.track];
       for (std::size_t n = 0; n < edit.tail.nodes.size(); ++n) {
         const std::int32_t i = edit.tail.nodes[n];
+        assert(is_free(i));
         free_.remove(i);
         put(edit.track, i, edit.tail.states[n], edit.tail.scores[n]);
       }
@@ -197,6 +234,8 @@ class Partition {
   void take_part(const Partition& whole, std::span<const std::int32_t> tracks,
                  std::span<const std::int32_t> free) {
     frozen_ = whole.frozen_;
+    n_after_ = whole.n_after_;
+    later_.clear();
     origin_.clear();
     for (const std::int32_t k : tracks) {
       const Track& t = whole.tracks_[k];
@@ -215,6 +254,7 @@ class Partition {
       if (t.n_frozen > 0) young_.remove(own);
       for (std::int32_t p = t.first_open(); p < t.size(); ++p, ++i)
         adopt(own, i, whole.state_[t.nodes[p]], whole.score_[t.nodes[p]]);
+      if (is_continuation(i - 1)) later_[i - 1] = whole.later_.at(t.nodes.back());
     }
     for (; i < static_cast<std::int32_t>(origin_.size()); ++i) free_.add(i);
   }
@@ -255,21 +295,25 @@ class Partition {
     apply(edits);
   }
 
-  // Opens again all that is settled.
-  void thaw() {
-    frozen_ = window_.first() - 1;
-    for (const std::int32_t k : all_.items()) {
-      Track& t = tracks_[k];
-      t.n_frozen = 0;
-      if (t.n_gone == 0) young_.add(k);
-      for (const std::int32_t i : t.nodes) list(i);
-    }
-    for (std::int64_t t = window_.first(); t <= window_.now(); ++t)
-      for (const std::int32_t i : window_.frame(t).ids)
-        if (track_of_[i] < 0) {
-          track_of_[i] = kFree;
-          free_.add(i);
-        }
+  // A block of a longer capture ends with this frame; so many frames of the capture come after the
+  // last of the window.
+  void close_after(std::int64_t frame, std::int64_t n_after) {
+    window_.close_after(frame);
+    n_after_ = n_after;
+  }
+  // A detection after the block, before it is put into a track, goes on with these.
+  void continue_with(std::int32_t i, LaterPoints later) {
+    free_.remove(i);
+    later_[i] = std::move(later);
+  }
+  // A track that begins with a settled detection, in a state that is known; or goes on with it, where
+  // others were before.
+  std::int32_t add_settled(std::int32_t i, const State& state, bool has_others_before) {
+    const std::int32_t k = new_track();
+    free_.remove(i);
+    adopt(k, i, state, 0);
+    tracks_[k].n_gone = has_others_before;
+    return k;
   }
 
   // Forgets the oldest frame, which is settled.
@@ -304,6 +348,20 @@ class Partition {
   Partition(const MotionModel& m, const ScoreModel& sm,
             std::shared_ptr<const std::vector<double>> log_end)
       : m_(m), sm_(sm), window_(m, sm), log_end_(std::move(log_end)) {}
+
+  // The state of a track beyond its continuation, and what that adds to its score but for gaps, which
+  // stay as they are.
+  double go_on(std::int32_t i, State& state) const {
+    double gain = 0;
+    std::int64_t frame = window_[i].frame;
+    for (const LaterPoint& next : *later_.at(i)) {
+      const State from = state;
+      filter_.expect(m_, window_, from, frame, static_cast<int>(next.frame - frame), expected_);
+      gain += filter_.take(m_, expected_, next.y, state);
+      frame = next.frame;
+    }
+    return gain;
+  }
 
   void reserve_up_to(std::int32_t n) {
     if (static_cast<std::int32_t>(track_of_.size()) >= n) return;
@@ -379,6 +437,8 @@ class Partition {
   DetectionWindow window_;
   std::shared_ptr<const std::vector<double>> log_end_;
   std::int64_t frozen_ = -1;
+  std::int64_t n_after_ = 0;  // frames of the capture after the window
+  std::unordered_map<std::int32_t, LaterPoints> later_;  // of continuations
   std::vector<Track> tracks_;
   std::vector<std::int32_t> unused_;
   IndexSet free_, taken_, linked_, leapt_, all_, young_;

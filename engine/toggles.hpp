@@ -33,7 +33,7 @@ class Toggles {
   bool propose(const Toggle& t, Change<Filter>& out) const {
     out.n_edits = 0;
     out.log_forward = out.log_reverse = 0;
-    if (!draw(t, out)) return false;
+    if (!draw(t, out) || !p_.keeps_continuations(out.all())) return false;
     splices_.weigh(out);
     return true;
   }
@@ -55,8 +55,10 @@ class Toggles {
   bool trade(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
     if (is_taken(x) && is_taken(y))
       return p_.track_of(x) != p_.track_of(y) && splices_.exchange(x, y, q);
-    if (!is_taken(x) && !is_taken(y)) return false;
-    return is_taken(x) ? splices_.replace(x, y, q) : splices_.replace(y, x, q);
+    // One that is settled is neither taken nor free, and stays where it is.
+    if (is_taken(x) && p_.is_free(y)) return splices_.replace(x, y, q);
+    if (is_taken(y) && p_.is_free(x)) return splices_.replace(y, x, q);
+    return false;
   }
 
   bool swap(std::int32_t x, std::int32_t y, Change<Filter>& q) const {

@@ -105,6 +105,8 @@ class ChainStats:
     @property
     def n_doubtful(self) -> int: ...
     @property
+    def n_unmoved(self) -> int: ...
+    @property
     def rhat(self) -> float: ...
     @property
     def ess(self) -> float: ...
@@ -115,6 +117,7 @@ class McmcOptions:
         *,
         window: int,
         is_whole: bool,
+        block: int,
         moves: float,
         deadline: float,
         has_assignment: bool,

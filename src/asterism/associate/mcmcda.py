@@ -29,7 +29,9 @@ SPLITS = ("whole", "likelihood", "cells", "clusters")
 MOST = 1_000_000
 """Of moves for a marker in a frame, which are then some seconds, and of frames in a window."""
 FIRST_PASS = 10
-"""Window of the pass over a whole take from which the walk over all of it begins."""
+"""Window of the pass over a whole capture from which the chains over all of it begin."""
+BLOCK = 100
+"""Frames of a whole capture that are open at a time; blocks overlap by half."""
 FLOOR = 1e-4
 """Least weight of a step of informed growth; to end in the last frame weighs 1."""
 
@@ -231,6 +233,7 @@ class MCMCDA(EngineMethod):
         options = _engine.McmcOptions(
             window=FIRST_PASS if self.window is None else int(self.window),
             is_whole=self.window is None,
+            block=BLOCK,
             moves=math.inf if self.moves is None else self.moves,
             deadline=self.deadline or 0.0,
             has_assignment=self.assignment,
