@@ -55,7 +55,7 @@ struct WindowFrame {
   PointGrid grid;
   std::vector<Claim> claims;    // by track
   std::vector<double> claimed;  // by all tracks, of each detection
-  std::vector<Advice> advice;   // by track, to those who get any
+  std::vector<NeighbourAdvice> advice;   // by track, to those who get any
 
   // What a detection loses for a track by what the others expect, until the frame is decided and
   // shared out: exact for two tracks, for more each is as if it were the only other one (linear
@@ -69,12 +69,12 @@ struct WindowFrame {
     return std::log1p(std::max(others, 0.0));
   }
 
-  const Advice* advice_to(std::int64_t track) const {
-    const auto at = std::ranges::lower_bound(advice, track, {}, &Advice::track);
+  const NeighbourAdvice* advice_to(std::int64_t track) const {
+    const auto at = std::ranges::lower_bound(advice, track, {}, &NeighbourAdvice::track);
     return at != advice.end() && at->track == track ? &*at : nullptr;
   }
   double says(std::int64_t track, std::int32_t column) const {
-    const Advice* own = advice_to(track);
+    const NeighbourAdvice* own = advice_to(track);
     return own == nullptr ? 0 : own->of(column);
   }
 };
@@ -144,25 +144,27 @@ class BranchGrower {
     return b;
   }
 
-  // Splits every branch over a further frame, the n_open-th that is not decided, and prunes them.
+  // Splits every branch over a further frame, the n_open-th that is not decided, and prunes them to
+  // at most `max_branches`, or not at all with kAll.
+  static constexpr std::int32_t kAll = std::numeric_limits<std::int32_t>::max();
   void grow(const WindowFrame& frame, LiveTrack<Tree>& track, std::int32_t n_open,
-            FrameStats& stats) {
+            std::int32_t max_branches, FrameStats& stats) {
     grown_.clear();
     for (Branch& parent : track.more.branches)
       split(frame, track, std::move(parent), grown_, stats);
-    prune(frame.number, n_open, stats);
+    prune(frame.number, n_open, max_branches, stats);
     track.more.branches.assign(grown_.begin(), grown_.end());
   }
 
   // What a track that was hidden for `gap` frames expects of a frame, its state predicted to it.
-  Expected expected(const MotionState& state, std::int32_t gap, const Advice* advice) const {
+  Expected expected(const MotionState& state, std::int32_t gap, const NeighbourAdvice* advice) const {
     const bool is_told = advice != nullptr && advice->is_carried && gap > 0;
     return Expected(live_.m, state, is_told ? &advice->place : nullptr);
   }
   // Whether a track that was hidden for `gap` frames and is not seen in this one either lives by what
   // its neighbours tell. Who is carried is hidden from view: such a frame says nothing of whether the
   // marker is still there.
-  bool lives_on(const Expected& expected, std::int32_t gap, const Advice* advice) const {
+  bool lives_on(const Expected& expected, std::int32_t gap, const NeighbourAdvice* advice) const {
     return expected.is_carried() && !advice->is_doubtful && gap < opt_.max_carried;
   }
 
@@ -181,7 +183,7 @@ class BranchGrower {
       return;
     }
     predict(live_.m, frame.step, parent.state);
-    const Advice* advice = frame.advice_to(track.more.key);
+    const NeighbourAdvice* advice = frame.advice_to(track.more.key);
     const Expected all = expected(parent.state, parent.gap, advice);
     const double hit = live_.hit_gain(parent.gap), miss = live_.miss_gain(parent.gap);
     const double least =
@@ -237,7 +239,7 @@ class BranchGrower {
   void claim(const LiveTrack<Tree>& track, WindowFrame& frame) {
     const Branch& best = track.more.branches.front();
     if (best.has_ended) return;
-    const Advice* advice = frame.advice_to(track.more.key);
+    const NeighbourAdvice* advice = frame.advice_to(track.more.key);
     if (advice != nullptr && advice->gives_way) return;
     MotionState state = best.state;
     predict(live_.m, frame.step, state);
@@ -286,15 +288,16 @@ class BranchGrower {
  private:
   static constexpr double kNoClaim = -7;  // log of w
 
-  void prune(std::int64_t frame, std::int32_t n_open, FrameStats& stats) {
+  void prune(std::int64_t frame, std::int32_t n_open, std::int32_t max_branches, FrameStats& stats) {
     std::stable_sort(grown_.begin(), grown_.end(),
                      [&](const Branch& a, const Branch& b) { return rank(a) > rank(b); });
-    const double least = rank(grown_.front()) - opt_.prune_drop;
+    const double least = max_branches == kAll ? -std::numeric_limits<double>::infinity()
+                                              : rank(grown_.front()) - opt_.prune_drop;
     std::size_t kept = 0;
     for (std::size_t b = 0; b < grown_.size(); ++b) {
       if (rank(grown_[b]) < least) break;
       if (n_open > opt_.merge_last && is_merged(grown_[b], frame, kept)) continue;
-      if (kept == static_cast<std::size_t>(opt_.max_branches)) {
+      if (kept == static_cast<std::size_t>(max_branches)) {
         ++stats.n_limited;
         continue;
       }

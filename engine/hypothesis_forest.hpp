@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "hypothesis_window.hpp"
@@ -45,8 +46,9 @@ class HypothesisForest {
     open_.claim(*frame);
     open_.push(frame, stats);
     BranchGrower grower(open_.live, open_.branches);
-    for (LiveTrack<Tree>& seed : open_.seeds) grower.grow(*frame, seed, open_.n_open(), stats);
+    for (LiveTrack<Tree>& seed : open_.seeds) grower.grow(*frame, seed, open_.n_open(), open_.max_grown, stats);
     open_.sow();
+    limit(stats);
     if (!open_.is_full()) return;
     decide(stats, label);
     open_.learn(stats);
@@ -70,6 +72,11 @@ class HypothesisForest {
   static constexpr std::int32_t kNothing = -1;  // there is no such marker
   static constexpr std::int32_t kLost = -2;     // missed in all open frames, and no branch says so
 
+  // A branch, and what the best hypothesis of its cluster loses with it.
+  struct Ranked {
+    double loss = 0;
+    std::int32_t tree = 0, branch = 0;
+  };
   struct TreeOptions {
     std::vector<PackingOption> options;
     std::vector<Choice> choices;
@@ -127,9 +134,8 @@ class HypothesisForest {
     }
   }
 
-  // The best hypothesis of every cluster of trees, and the probabilities over its best ones.
-  void choose(FrameStats& stats) {
-    s_.free.assign(open_.frames.front()->points.size(), 1);
+  // Trees that share detections.
+  std::vector<std::vector<std::int32_t>> clusters() const {
     std::vector<std::int32_t> owner(s_.n_resources, -1);
     UnionFind sets(s_.trees.size());
     for (std::size_t i = 0; i < s_.trees.size(); ++i)
@@ -142,9 +148,66 @@ class HypothesisForest {
     std::vector<std::vector<std::int32_t>> clusters(s_.trees.size());
     for (std::size_t i = 0; i < s_.trees.size(); ++i)
       clusters[sets.find(static_cast<std::int32_t>(i))].push_back(static_cast<std::int32_t>(i));
+    std::erase_if(clusters, [](const auto& cluster) { return cluster.empty(); });
+    return clusters;
+  }
+
+  // Drops the branches that no probable hypothesis needs. What a tree would like best may be another's,
+  // the more so the longer the window: so a branch is judged by what the best hypothesis of the whole
+  // cluster loses with it, and the branches of a cluster compete for its room together.
+  void limit(FrameStats& stats) {
+    list_options();
+    for (const std::vector<std::int32_t>& cluster : clusters()) limit(cluster, stats);
+    for (std::size_t i = 0; i < open_.n_all(); ++i)
+      stats.most_branches = std::max<std::int64_t>(stats.most_branches, branches(i).size());
+  }
+  void limit(const std::vector<std::int32_t>& cluster, FrameStats& stats) {
+    s_.ranked.clear();
+    rank(cluster);
+    std::ranges::stable_sort(s_.ranked, {}, &Ranked::loss);
+    const auto probable = std::ranges::upper_bound(s_.ranked, open_.branches.prune_drop, {}, &Ranked::loss);
+    const std::ptrdiff_t n_probable = probable - s_.ranked.begin();
+    const auto n_most = static_cast<std::ptrdiff_t>(open_.branches.max_branches * cluster.size());
+    stats.n_limited += std::max<std::ptrdiff_t>(n_probable - n_most, 0);
+    s_.ranked.resize(std::min(n_probable, n_most));
+    std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::pair(r.tree, r.branch); });
+    auto next = s_.ranked.begin();
+    for (const std::int32_t i : cluster) {
+      std::vector<Branch> kept;
+      for (; next != s_.ranked.end() && next->tree == i; ++next)
+        kept.push_back(std::move(branches(i)[next->branch]));
+      branches(i) = std::move(kept);
+    }
+  }
+  void rank(const std::vector<std::int32_t>& cluster) {
+    const BranchGrower grower(open_.live, open_.branches);
+    std::vector<std::vector<PackingOption>> options;
+    for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
+    const std::vector<std::vector<double>> losses = SetPacking(options).losses();
+    for (std::size_t c = 0; c < cluster.size(); ++c) {
+      const std::size_t first = s_.ranked.size();
+      // What is no option yet, such as the beginning of a track, is compared with no track.
+      for (std::size_t b = 0; b < branches(cluster[c]).size(); ++b) {
+        const Branch& branch = branches(cluster[c])[b];
+        const double loss = branch.n_taken < 2 ? 0 : std::max(-grower.worth(branch), 0.0);
+        s_.ranked.push_back({loss, cluster[c], static_cast<std::int32_t>(b)});
+      }
+      const TreeOptions& tree = s_.trees[cluster[c]];
+      for (std::size_t o = 0; o < tree.choices.size(); ++o)
+        if (tree.choices[o].branch >= 0) s_.ranked[first + tree.choices[o].branch].loss = losses[c][o];
+      // A tree keeps one branch at least.
+      std::min_element(s_.ranked.begin() + static_cast<std::ptrdiff_t>(first), s_.ranked.end(),
+                       [](const Ranked& x, const Ranked& y) { return x.loss < y.loss; })
+          ->loss = 0;
+    }
+  }
+  std::vector<Branch>& branches(std::size_t tree) { return open_.tree(tree).more.branches; }
+
+  // The best hypothesis of every cluster of trees, and the probabilities over its best ones.
+  void choose(FrameStats& stats) {
+    s_.free.assign(open_.frames.front()->points.size(), 1);
     std::vector<std::int32_t> entangled;
-    for (const std::vector<std::int32_t>& cluster : clusters) {
-      if (cluster.empty()) continue;
+    for (const std::vector<std::int32_t>& cluster : clusters()) {
       if (opt_.packer && cluster.size() > 1)
         entangled.insert(entangled.end(), cluster.begin(), cluster.end());
       else
@@ -212,6 +275,7 @@ class HypothesisForest {
   // Of one decision: live tracks first, then seeds.
   struct Memory {
     std::vector<TreeOptions> trees;
+    std::vector<Ranked> ranked;
     std::vector<Fate> fates;
     std::vector<std::int32_t> first_resource;
     std::int32_t n_resources = 0;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -20,6 +21,9 @@ struct OpenWindow {
   std::vector<std::shared_ptr<const WindowFrame>> frames;
   WindowBodies bodies;
   std::int64_t n_trees = 0;
+  // Branches that a track may have right after a further frame: all, where they are limited jointly.
+  std::int32_t max_grown = branches.is_joint ? BranchGrower::kAll
+                                             : branches.max_branches;
 
   std::int32_t n_open() const { return static_cast<std::int32_t>(frames.size()); }
   bool is_full() const { return n_open() == branches.window; }
@@ -46,7 +50,8 @@ struct OpenWindow {
   void push(std::shared_ptr<const WindowFrame> frame, FrameStats& stats) {
     frames.push_back(std::move(frame));
     BranchGrower grower(live, branches);
-    for (LiveTrack<Tree>& track : live.tracks) grower.grow(*frames.back(), track, n_open(), stats);
+    for (LiveTrack<Tree>& track : live.tracks)
+      grower.grow(*frames.back(), track, n_open(), max_grown, stats);
   }
 
   std::shared_ptr<const WindowFrame> pop() {
@@ -66,7 +71,7 @@ struct OpenWindow {
     LiveTrack<Tree>& track = live[i];
     const BranchGrower grower(live, branches);
     predict(live.m, frame.step, track.state);
-    const Advice* advice = frame.advice_to(track.more.key);
+    const NeighbourAdvice* advice = frame.advice_to(track.more.key);
     const Expected expected = grower.expected(track.state, track.gap, advice);
     if (own >= 0) {
       const Point& y = frame.points[own];
@@ -88,7 +93,7 @@ struct OpenWindow {
 
   // Track i was not seen in that frame.
   void miss(const WindowFrame& frame, std::size_t i) {
-    const Advice* advice = frame.advice_to(live[i].more.key);
+    const NeighbourAdvice* advice = frame.advice_to(live[i].more.key);
     if (advice != nullptr && advice->gives_way)
       end(i);
     else
@@ -121,7 +126,7 @@ struct OpenWindow {
     BranchGrower grower(live, branches);
     track.more.branches.assign(1, grower.root(track));
     std::int32_t n = 0;
-    for (const auto& frame : frames) grower.grow(*frame, track, ++n, stats);
+    for (const auto& frame : frames) grower.grow(*frame, track, ++n, branches.max_branches, stats);
   }
 };
 

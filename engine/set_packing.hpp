@@ -50,6 +50,22 @@ class SetPacking {
     sort();
   }
 
+  // By how much the best packing with an option may be below the best of all, by tree and option, at
+  // the prices that bring the bound down: a packing is worth no more than the bound less the loss of
+  // each of its options. The options of a packing that is known lose nothing.
+  std::vector<std::vector<double>> losses() {
+    if (!search(1, 0, kUnpriced).is_exact) set_prices();
+    const Packing best = known_;
+    std::vector<std::vector<double>> out(n_trees());
+    for (std::int32_t i = 0; i < n_trees(); ++i) {
+      const double most = *std::max_element(priced_.begin() + first_[i], priced_.begin() + first_[i + 1]);
+      out[i].resize(first_[i + 1] - first_[i]);
+      for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) out[i][number_[o]] = most - priced_[o];
+      out[i][best.own[i]] = 0;
+    }
+    return out;
+  }
+
   // Calls found(option of each tree, worth) for up to k packings, the best first, none of them more
   // than `drop` below it. With more than `max_nodes` nodes the best that can be repaired is given.
   template <typename Found>
@@ -69,7 +85,8 @@ class SetPacking {
 
  private:
   static constexpr std::int64_t kUnpriced = 32;  // nodes before prices are worth their while
-  static constexpr int kPriceRounds = 100;
+  static constexpr int kPriceRounds = 300;
+  static constexpr double kBetter = 1e-9;
 
   struct Packing {
     std::vector<std::int32_t> own;  // option of each tree, as the caller numbers them
@@ -80,7 +97,7 @@ class SetPacking {
     double bound = 0;
     std::int64_t number = 0;
     bool is_packing = false;            // `chosen` is one, and all there is in the node
-    std::vector<char> is_banned;        // by option
+    std::vector<bool> is_banned;        // by option
     std::vector<std::int32_t> chosen;  // best allowed option of each tree
 
     bool operator<(const Node& other) const {
@@ -125,6 +142,7 @@ class SetPacking {
     PackingSummary summary;
     packings_.clear();
     heap_.clear();
+    drop_ = drop;
     n_pushed_ = 0;
     Node root;
     root.is_banned.assign(options_.size(), 0);
@@ -139,11 +157,15 @@ class SetPacking {
       if (packings_.empty()) summary.bound = node.bound;
       if (node.is_packing) {
         packings_.push_back(packing(node.chosen));
+        if (packings_.size() == 1) keep_if_better(node.chosen);
         continue;
       }
       if (++summary.n_nodes > max_nodes) {
         summary.is_exact = false;
-        if (packings_.empty()) packings_.push_back(packing(repaired(node)));
+        if (packings_.empty()) {
+          keep_if_better(repaired(node.chosen));
+          packings_.push_back(known_);
+        }
         break;
       }
       const std::int32_t contested = conflict(node);
@@ -159,41 +181,59 @@ class SetPacking {
     return summary;
   }
 
-  // Prices that bring the bound down: who is wanted by several becomes dear, who by none cheap.
+  // Prices that bring the bound down: who is wanted by several becomes dear, who by none cheap. They
+  // follow a subgradient that remembers the steps before (Camerini, Fratta & Maffioli 1975), as far as
+  // the best packing that is known says (Polyak 1969); each step is a packing too, once it is repaired.
   void set_prices() {
-    double best = packings_.empty() ? 0 : packings_.front().worth, least = 0, step = 1;
-    std::vector<double> price(price_.size(), 0), used(price_.size());
+    double least = std::numeric_limits<double>::infinity(), step = 1;
+    std::vector<double> price(price_.size(), 0), used(price_.size()), way(price_.size(), 0);
     std::vector<std::int32_t> chosen(n_trees());
     int n_idle = 0;
     for (int round = 0; round < kPriceRounds && step > 1e-3; ++round) {
       double dual = 0, length = 0;
       for (const double x : price) dual += x;
       std::fill(used.begin(), used.end(), 0);
+      for (std::int32_t o = 0; o < first_.back(); ++o) {
+        priced_[o] = options_[o]->worth;
+        for (const std::int32_t r : options_[o]->uses) priced_[o] -= price[r];
+      }
       for (std::int32_t i = 0; i < n_trees(); ++i) {
-        double most = -std::numeric_limits<double>::infinity();
-        for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
-          double worth = options_[o]->worth;
-          for (const std::int32_t r : options_[o]->uses) worth -= price[r];
-          if (worth <= most) continue;
-          most = worth;
-          chosen[i] = o;
-        }
-        dual += most;
+        chosen[i] = static_cast<std::int32_t>(
+            std::max_element(priced_.begin() + first_[i], priced_.begin() + first_[i + 1]) -
+            priced_.begin());
+        dual += priced_[chosen[i]];
         for (const std::int32_t r : options_[chosen[i]]->uses) used[r] += 1;
       }
-      if (round == 0 || dual < least) {
+      if (dual < least - kBetter) {
         least = dual;
         price_ = price;
         n_idle = 0;
-      } else if (++n_idle >= 5) {
+      } else if (++n_idle >= 10) {
         step /= 2;
         n_idle = 0;
+        price = price_;
+        std::fill(way.begin(), way.end(), 0);
+        continue;
       }
+      keep_if_better(repaired(chosen));
+      if (!(least > known_.worth + kBetter)) break;
+      double along = 0, own = 0;
+      for (std::size_t r = 0; r < price.size(); ++r) {
+        if (used[r] < 1 && price[r] <= 0) used[r] = 1;  // what nobody wants is free already
+        along += (1 - used[r]) * way[r];
+        own += way[r] * way[r];
+        length += (1 - used[r]) * (1 - used[r]);
+      }
+      if (length == 0) break;  // no conflict is left, so that the bound is met
+      const double memory = along < 0 && own > 0 ? -1.5 * along / own : 0;
+      double size = 0;
+      for (std::size_t r = 0; r < price.size(); ++r) {
+        way[r] = (1 - used[r]) + memory * way[r];
+        size += way[r] * way[r];
+      }
+      if (size == 0) break;
       for (std::size_t r = 0; r < price.size(); ++r)
-        if (used[r] > 1 || (used[r] < 1 && price[r] > 0)) length += (1 - used[r]) * (1 - used[r]);
-      if (length == 0 || !(dual > best)) break;
-      for (std::size_t r = 0; r < price.size(); ++r)
-        price[r] = std::max(price[r] - step * (dual - best) / length * (1 - used[r]), 0.0);
+        price[r] = std::max(price[r] - step * (dual - known_.worth) / size * way[r], 0.0);
     }
     for (std::size_t o = 0; o < options_.size(); ++o) {
       priced_[o] = options_[o]->worth;
@@ -218,6 +258,7 @@ class SetPacking {
       for (const double x : price_) node.bound += x;
       for (const std::int32_t o : node.chosen) node.bound += priced_[o];
     }
+    if (!known_.own.empty() && node.bound < known_.worth - drop_ - kBetter) return;  // none would count
     node.number = n_pushed_++;
     heap_.push_back(std::move(node));
     std::push_heap(heap_.begin(), heap_.end());
@@ -284,22 +325,50 @@ class SetPacking {
     return std::find(list.begin(), list.end(), resource) != list.end();
   }
 
-  // A packing from a node that was not solved: trees by worth, each by its best option that fits.
-  std::vector<std::int32_t> repaired(const Node& node) {
-    std::vector<std::int32_t> order(n_trees()), out(n_trees());
+  // A packing from the options chosen, of which several may want one resource: trees by what these are
+  // worth at the prices, each by its best option that fits; then each by a better one, while there is any.
+  std::vector<std::int32_t> repaired(const std::vector<std::int32_t>& chosen) {
+    std::vector<std::int32_t> order(n_trees()), out(chosen);
     for (std::int32_t i = 0; i < n_trees(); ++i) order[i] = i;
     std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-      return priced_[node.chosen[a]] > priced_[node.chosen[b]];
+      return priced_[chosen[a]] > priced_[chosen[b]];
     });
     is_used_.assign(users_.size(), 0);
     for (const std::int32_t i : order) {
-      out[i] = first_[i];
-      while (std::any_of(options_[out[i]]->uses.begin(), options_[out[i]]->uses.end(),
-                         [&](std::int32_t r) { return is_used_[r]; }))
-        ++out[i];
-      for (const std::int32_t r : options_[out[i]]->uses) is_used_[r] = 1;
+      if (!fits(out[i])) out[i] = best_fitting(i, priced_);
+      mark(out[i], 1);
+    }
+    std::vector<double> worth;
+    for (const PackingOption* o : options_) worth.push_back(o->worth);
+    for (bool is_better = true; is_better;) {
+      is_better = false;
+      for (std::int32_t i = 0; i < n_trees(); ++i) {
+        mark(out[i], 0);
+        const std::int32_t best = best_fitting(i, worth);
+        if (worth[best] > worth[out[i]] + kBetter) {
+          out[i] = best;
+          is_better = true;
+        }
+        mark(out[i], 1);
+      }
     }
     return out;
+  }
+  bool fits(std::int32_t option) const {
+    return std::ranges::none_of(options_[option]->uses, [&](std::int32_t r) { return is_used_[r]; });
+  }
+  void mark(std::int32_t option, char is_used) {
+    for (const std::int32_t r : options_[option]->uses) is_used_[r] = is_used;
+  }
+  std::int32_t best_fitting(std::int32_t tree, const std::vector<double>& value) const {
+    std::int32_t best = -1;
+    for (std::int32_t o = first_[tree]; o < first_[tree + 1]; ++o)
+      if ((best < 0 || value[o] > value[best]) && fits(o)) best = o;
+    return best;
+  }
+  void keep_if_better(const std::vector<std::int32_t>& chosen) {
+    Packing one = packing(chosen);
+    if (known_.own.empty() || one.worth > known_.worth) known_ = std::move(one);
   }
 
   std::vector<const PackingOption*> options_;  // by tree, the best first
@@ -308,8 +377,10 @@ class SetPacking {
   std::vector<std::vector<std::int32_t>> users_;
   std::vector<std::int32_t> first_, tree_of_;
   std::vector<Packing> packings_;
+  Packing known_;  // the best that was met
   std::vector<Node> heap_;
   std::vector<char> is_used_;
+  double drop_ = 0;  // of the search
   std::int64_t n_pushed_ = 0;
 };
 
