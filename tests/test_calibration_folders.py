@@ -75,7 +75,7 @@ cam1
     ("change", "place", "expected"),
     [
         (("0.0 0.0 0.0 0.0 0.0", "0.0 0.1 0.0 0.0 0.0"), "line 10", "zeros"),
-        (("\n0.0 0.0 0.0 0.0 0.0", ""), "line 10", "got nothing"),
+        (("\n0.0 0.0 0.0 0.0 0.0", ""), "line 10", "found nothing"),
         (("6000.0", "0"), "camera cam1, K", "focal lengths > 0"),
         (("6000.0", "nan"), "line 6, focal length", "finite"),
         (("1280 1024", "1280 0"), "line 3", "whole pixels"),
@@ -133,7 +133,7 @@ def test_flydra_folders_with_less_in_them(tmp_path):
         ("camera2.Pmat.cal", lambda s: s.replace("e", "x", 1), "camera2.Pmat.cal", "3 × 4"),
         ("camera2.Pmat.cal", lambda s: "0 0 0 1\n" * 3, "camera2.Pmat.cal", "rank 3"),
         ("camera2.Pmat.cal", lambda s: s.replace(s.split()[0], "nan"), "camera2.Pmat", "finite"),
-        ("basename2.rad", lambda s: s.replace("kc1", "kd1"), "basename2.rad", "got nothing"),
+        ("basename2.rad", lambda s: s.replace("kc1", "kd1"), "basename2.rad", "found nothing"),
         ("basename2.rad", lambda s: s.replace("K11 = ", "K11 = -"), "basename2.rad", "> 0"),
         ("basename2.rad", lambda s: s.replace("K12 = 0.0", "K12 = 3"), "basename2.rad", "0 beside"),
         ("basename2.rad", lambda s: "hello\n", "basename2.rad", "a name = a number"),

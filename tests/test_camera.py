@@ -269,7 +269,7 @@ BAD = [
     (lambda: am.Rig(()), "at least one"),
     (lambda: am.Rig((1,)), "Camera"),
     (lambda: am.Rig((good(name="a"), good(name="a"))), "more than once"),
-    (lambda: am.Rig((good(name="a"),))["b"], "one of a"),
+    (lambda: am.Rig((good(name="a"),))["b"], "expected a, found"),
     (lambda: am.Rig.ring(0, radius=1, height=1), "n:"),
     (lambda: am.Rig.ring(3, radius=0, height=1), "radius"),
     (lambda: am.volume_grid((0, 0, 0), (1, 1, -1), 0.1), "high"),

@@ -160,10 +160,10 @@ def test_who_walks_has_no_velocity():
 def test_draws_need_the_chain_that_samples():
     with pytest.raises(am.ParameterError, match="keep"):
         am.MCMCDA(keep="draw", chain="ascent", confidence=0.0, at_doubts=0.0)
-    with pytest.raises(am.ParameterError, match="'best' or 'draw'"):
+    with pytest.raises(am.ParameterError, match="one of best, draw"):
         am.MCMCDA(keep="last")
 
 
 def test_the_population_is_closed_or_open():
-    with pytest.raises(am.ParameterError, match="'closed' or 'open'"):
+    with pytest.raises(am.ParameterError, match="one of closed, open"):
         am.estimate_model(wanderers(np.random.default_rng(0)).detections, population="half")

@@ -664,8 +664,8 @@ def test_the_command_refuses_in_one_line(made, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(made[0])
     before = sorted(path.name for path in made[0].iterdir())
     for line, says in (
-        ("fill nowhere.c3d -o a.c3d", "opening"),
-        ("fill in.c3d -o in.c3d", "a file of its own"),
+        ("fill nowhere.c3d -o a.c3d", "nowhere.c3d: no such file"),
+        ("fill in.c3d -o in.c3d", "a place of its own"),
         ("fill in.c3d -o a.trc", "--unflagged"),
         ("fill in.c3d -o a.xyz", "a name ending in"),
         ("fill in.c3d -o a.c3d --longest 0", "--longest"),

@@ -426,7 +426,7 @@ def test_names_do_not_collide(tmp_path):
 def test_times_must_be_regular_and_points_3d(tmp_path):
     dense = np.ones((3, 1, 3))
     write(Tracks.from_dense([0, 0.01, 0.02005], dense), tmp_path / "a.c3d")
-    with pytest.raises(ParameterError, match="write CSV"):
+    with pytest.raises(ParameterError, match="Write CSV"):
         write(Tracks.from_dense([0, 0.01, 0.03], dense), tmp_path / "b.c3d")
     with pytest.raises(ParameterError, match="3-D points"):
         write(Tracks.from_dense([0, 0.01, 0.02], dense[..., :2]), tmp_path / "b.c3d")

@@ -334,9 +334,9 @@ def test_unknown_content(load, name):
 
 
 def test_files_that_are_none(tmp_path):
-    with pytest.raises(FormatError, match="got nothing of that name"):
+    with pytest.raises(FormatError, match="no such file"):
         read(tmp_path / "no.c3d")
-    with pytest.raises(FormatError, match="got a folder"):
+    with pytest.raises(FormatError, match="found a folder"):
         read(tmp_path)
     with pytest.raises(FormatError, match="device or pipe"):
         read("/dev/zero", format="c3d")
@@ -354,3 +354,13 @@ def test_content_tells_where_the_ending_does_not(load):
 @pytest.mark.parametrize("encoding", ["latin-1", "utf-8", "utf-16"])
 def test_encodings(load, encoding):
     assert load(TRC.replace("LASI", "Hüfte").encode(encoding)).names[0] == "Hüfte"
+
+
+def test_a_trc_header_names_its_own_file(tmp_path):
+    tracks = Tracks.from_dense([0, 0.01], np.ones((2, 1, 3)), ["LASI"])
+    write(tracks, tmp_path / "walk 1.trc")
+    first = (tmp_path / "walk 1.trc").read_text().splitlines()[0]
+    assert first == "PathFileType\t4\t(X/Y/Z)\twalk 1.trc"
+    (tmp_path / "link.trc").symlink_to(tmp_path / "walk 1.trc")
+    write(tracks, tmp_path / "link.trc")  # a link stays one, and its target is the file
+    assert (tmp_path / "walk 1.trc").read_text().splitlines()[0] == first

@@ -273,7 +273,7 @@ def test_memory_of_an_endless_stream_is_bounded(method):
         (1.0, [[0.0, 0, 0]], "time: expected later than the frame before"),
         (0.5, [[0.0, 0, 0]], "time: expected later than the frame before"),
         (float("nan"), [[0.0, 0, 0]], "time: expected a finite number"),
-        (2.0, [[0.0, np.nan, 0]], "points: expected finite numbers, got nan"),
+        (2.0, [[0.0, np.nan, 0]], "points: expected finite numbers, found nan"),
         (2.0, [[0.0, 0]], r"points: expected an array of shape \(n, 3\)"),
         (2.0, [["a", "b", "c"]], "points: .* of numbers"),
     ],
@@ -291,9 +291,9 @@ def test_options_are_checked():
             am.GNN(**wrong)
     with pytest.raises(am.ParameterError, match="proposers"):
         am.SMP(proposers="nobody")
-    with pytest.raises(am.ParameterError, match="did you mean 'gate_probability'"):
+    with pytest.raises(am.ParameterError, match="Did you mean 'gate_probability'"):
         am.method_by_name("gnn", gate_probabilty=0.1)
-    with pytest.raises(am.ParameterError, match="did you mean 'gnn'"):
+    with pytest.raises(am.ParameterError, match="Did you mean 'gnn'"):
         am.method_by_name("gn")
     assert am.method_by_name("smp", proposers="detections") == am.SMP(proposers="detections")
 
@@ -310,7 +310,7 @@ def test_points_too_dense_for_the_model_are_a_clear_limit(monkeypatch):
     monkeypatch.setattr("asterism.associate.engine_method.MAX_CANDIDATES", 1000)
     rng = np.random.default_rng(1)
     d = am.Detections.from_frames([0.0, 0.1], [rng.normal(0, 0.01, (200, 3)) for _ in range(2)])
-    with pytest.raises(am.SolverLimit, match="limit of 1000"):
+    with pytest.raises(am.SolverLimit, match="at most 1000"):
         am.track(d, am.GNN(), model=small_model())
 
 

@@ -45,10 +45,10 @@ def test_frames_come_back():
     [
         ([0, 0], [ONE, ONE], "times: expected strictly increasing .* at frames 0 and 1"),
         ([0, 2, 1], [ONE] * 3, "2 then 1 at frames 1 and 2"),
-        ([0, np.nan], [ONE, ONE], r"times: expected finite numbers, got nan at index \(1,\)"),
+        ([0, np.nan], [ONE, ONE], r"times: expected finite numbers, found nan at index \(1,\)"),
         ([0], [ONE, ONE], "frames: expected 1 arrays"),
         ([0, 1], [ONE, [[0.0, 0]]], r"frames\[1\]: expected an array of shape \(n, 3\)"),
-        ([0, 1], [ONE, [[0.0, 0, np.inf]]], r"frames\[1\]: expected finite numbers, got inf"),
+        ([0, 1], [ONE, [[0.0, 0, np.inf]]], r"frames\[1\]: expected finite numbers, found inf"),
         ([0], [[[1.0]]], "points: expected 2 or 3 coordinates"),
         ([0], [[["x", "y", "z"]]], "of numbers"),
         ([0], [[[1e200, 0, 0]]], "points: expected metres, within"),
@@ -89,11 +89,11 @@ def test_detections_cannot_be_changed_from_outside():
     [
         ({"labels": [0]}, r"labels: expected an array of shape \(2,\)"),
         ({"labels": [0, -2]}, "labels: expected track numbers from 0 to"),
-        ({"labels": [0, 0]}, "at most one detection of a track in a frame, got two of track 0"),
+        ({"labels": [0, 0]}, "at most one detection of a track in a frame, found two of track 0"),
         ({"labels": [0, 2**40]}, "labels: expected track numbers from 0 to"),
         ({"labels": [0.5, 1.0]}, "labels"),
         ({"names": ("a",)}, "names: expected a name or None for each of 2"),
-        ({"confidence": [0.5, 1.5]}, r"confidence: expected probabilities in \[0, 1\], got 1.5"),
+        ({"confidence": [0.5, 1.5]}, r"confidence: expected probabilities in \[0, 1\], found 1.5"),
     ],
 )
 def test_bad_tracks_say_what(changes, message):
@@ -139,17 +139,21 @@ def test_toml_both_ways(model, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("noise_sigma", "noise_sgima", "did you mean 'noise_sigma'"),
-        ("[sensor]", "[sensro]", "did you mean 'sensor'"),
+        ("noise_sigma", "noise_sgima", "Did you mean 'noise_sigma'"),
+        ("[sensor]", "[sensro]", "Did you mean 'sensor'"),
         ('kind = "dwna"', 'kind = "magic"', "model.motion.kind: expected one of dwna"),
         ("p_detection = 0.9", "p_detection = 1.5", r"p_detection: expected a number in \(0, 1\)"),
         ('kind = "dwna"', 'kind = ["dwna"]', "model.motion.kind: expected one of dwna"),
         ("max_gap = 4", "max_gap = 99999999999", "max_gap: expected a whole number"),
         ("noise_sigma = 0.005", "noise_sigma = 1e-300", "noise_sigma: expected a number"),
         ("max_gap = 4", "max_gap = 2.5", "max_gap: expected a whole number"),
-        ("max_speed = 4.0", "", "model.population.max_speed: expected a value, got nothing"),
+        ("max_speed = 4.0", "", "model.population.max_speed: expected a value, found nothing"),
         ("[motion]", "[motion", "expected TOML"),
-        ('termination = "marginal"', 'termination = "soon"', "termination: expected 'marginal'"),
+        (
+            'termination = "marginal"',
+            'termination = "soon"',
+            "expected one of marginal, last",
+        ),
     ],
 )
 def test_a_bad_model_file_is_named_with_the_place(old, new, message, tmp_path):

@@ -151,7 +151,7 @@ def test_markers_without_declaration(tmp_path, texts, markers, names):
         ("frame,time,camera,u,v,v\n", "line 1: expected the columns"),
         ("frame,time,camera,u,v,w\n", "line 1: expected the columns"),
         (HEADER, "cameras: expected different names, at least one"),
-        (HEADER + "1,0,a,1,2,\n1,0,a,1\n", "line 3: expected 6 columns, got 4"),
+        (HEADER + "1,0,a,1,2,\n1,0,a,1\n", "line 3: expected 6 columns, found 4"),
         (HEADER + "1,0,a,1,2,\n1,0,a,1,x,\n", "line 3, column v: expected a finite number"),
         (HEADER + "1,0,a,1,inf,\n", "line 2, column v: expected a finite number"),
         (HEADER + "1,0,a,1,,\n", "line 2: expected frame, time, camera, u and v"),
@@ -160,11 +160,11 @@ def test_markers_without_declaration(tmp_path, texts, markers, names):
         (HEADER + ",,a,1,2,\n", "line 2: expected frame, time, camera, u and v"),
         (HEADER + ",,a,,,M\n", "line 2: expected frame, time, camera, u and v"),
         (HEADER + "1,0,a,,,M\n", "line 2: expected frame, time, camera, u and v"),
-        (HEADER + "1.5,0,a,1,2,\n", "line 2, column frame: expected a whole number, got 1.5"),
+        (HEADER + "1.5,0,a,1,2,\n", "line 2, column frame: expected a whole number, found 1.5"),
         (HEADER + "1,0,a,1,2,\n1,1,a,1,2,\n", "line 3: expected the time of the other rows"),
-        (HEADER + "2,0,a,1,2,\n1,1,a,1,2,\n", "line 2: expected a time after 1 s, got 0 s"),
-        (HEADER + ",,a,,,\n1,0,b,1,2,\n", "line 3: expected a declared camera, got 'b'"),
-        (HEADER + ",,,,,A\n1,0,b,1,2,B\n", "line 3: expected a declared marker, got 'B'"),
+        (HEADER + "2,0,a,1,2,\n1,1,a,1,2,\n", "line 2: expected a time after 1 s, found 0 s"),
+        (HEADER + ",,a,,,\n1,0,b,1,2,\n", "line 3: expected a declared camera, found 'b'"),
+        (HEADER + ",,,,,A\n1,0,b,1,2,B\n", "line 3: expected a declared marker, found 'B'"),
         (HEADER + ",,a,,,\n,,b,,,\n,,b,,,\n", "line 4: expected each camera declared once"),
         (HEADER + ',,"a,,,\n', "line 2: expected CSV"),
     ],
@@ -178,7 +178,7 @@ def test_damage_is_told_by_its_line(tmp_path, text, message):
 
 @pytest.mark.parametrize("where", ["none.csv", "."])
 def test_a_file_that_cannot_be_read(tmp_path, where):
-    with pytest.raises(am.FormatError, match="a readable file"):
+    with pytest.raises(am.FormatError, match=r"no such file|found a folder"):
         read_observations(tmp_path / where)
 
 

@@ -137,7 +137,7 @@ def test_verdicts_as_json(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--only", "marriages"], "did you mean 'marriage'?"),
+        (["--only", "marriages"], "Did you mean 'marriage'?"),
         (["--only", ""], "--only"),
         (["--seeds", "1"], "--seeds"),
         (["--seeds", "1001"], "--seeds"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import subprocess
 import sys
@@ -308,3 +309,13 @@ def test_no_global_state():
         "assert matplotlib.rcParams['svg.hashsalt'] is None\n"
     )
     subprocess.run([sys.executable, "-c", script], check=True, timeout=60)
+
+
+def test_confidence_says_of_what_it_is():
+    truth = am.simulate.cube(seed=1, frames=20)
+    sure = np.full(truth.detections.n_points, 0.875)
+    axes = am.plot_confidence(dataclasses.replace(truth, confidence=sure))
+    (above,) = axes.child_axes
+    assert above.get_xlabel() == "confidence of links, mean 0.875"
+    bars = [a.get_ylabel() for a in axes.figure.axes if a is not axes]
+    assert "confidence of a link" in bars

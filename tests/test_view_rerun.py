@@ -238,7 +238,7 @@ def test_a_viewer_that_does_not_open_says_so(tmp_path, monkeypatch):
     settings = tmp_path / "analytics.json"
     settings.write_text('{"analytics_enabled": false}')
     monkeypatch.setattr(viewer, "_settings_file", lambda: settings)
-    with pytest.raises(am.FormatError, match=r"Error: no DISPLAY \(without a screen, save"):
+    with pytest.raises(am.FormatError, match=r"Error: no DISPLAY. Without a screen, save"):
         viewer.open_viewer(tmp_path / "scene.rrd")
 
 
@@ -262,7 +262,7 @@ def test_the_command_saves_with_a_rig(rr, tmp_path, monkeypatch, capsys):
     ("options", "message"),
     [
         ("--save scene.txt", "a name ending in .rrd"),
-        ("--save in.csv", "a file of its own"),
+        ("--save in.csv", "a place of its own"),
         ("--rig no.xcp --save s.rrd", "ring8"),
     ],
 )

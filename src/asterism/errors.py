@@ -25,15 +25,61 @@ __all__ = [
     "SolverLimit",
     "check_array",
     "check_fields",
+    "check_file",
     "check_kind",
     "check_number",
     "check_path",
+    "clipped",
     "keep_array",
+    "not_read",
+    "not_written",
 ]
+
+_MAX_VALUE = 160  # characters of what was found, in a message
+_MAX_REPR = 200  # characters of the repr of an error
+
+
+def clipped(text: str, limit: int) -> str:
+    r"""Give a text as one line of at most `limit` characters.
+
+    Parameters
+    ----------
+    text : str
+        The text; each run of spaces and line breaks becomes one space.
+    limit : int
+        Its greatest length. A closing bracket or quotation mark is kept when it is cut.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> clipped("Rig(a, b,\n c)", 11)
+    'Rig(a, b,…)'
+    """
+    text = " ".join(text.split())
+    if len(text) <= limit:
+        return text
+    end = text[-1] if text[-1] in ")]}'\">" else ""
+    return text[: limit - 1 - len(end)].rstrip() + "…" + end
+
+
+def _message(place: str, expected: str, got: str, hint: str) -> str:
+    """Give the one line that all messages are: where, what was expected, what was found, advice."""
+    text = f"{place}: expected {expected}, found {got}" if expected else f"{place}: {got}"
+    if hint:
+        first, end = hint.split(" ", 1)[0], "" if hint[-1] in ".?!" else "."
+        # A word of prose gets its capital, code (am.GNN(), bodies=True) stays as it is.
+        text += f". {hint[0].upper() if first.strip(',:').isalpha() else hint[0]}{hint[1:]}{end}"
+    return " ".join(text.split())
 
 
 class AsterismError(Exception):
     """Base of every error that the library raises on purpose."""
+
+    def __repr__(self) -> str:
+        return clipped(f"{type(self).__name__}({str(self)!r})", _MAX_REPR)
 
 
 class ParameterError(AsterismError, ValueError):
@@ -50,8 +96,9 @@ class ParameterError(AsterismError, ValueError):
     """
 
     def __init__(self, name: str, expected: str, got: object, hint: str = "") -> None:
-        self.name, self.expected, self.got, self.hint = name, expected, str(got), hint
-        super().__init__(f"{name}: expected {expected}, got {got}" + (f" ({hint})" if hint else ""))
+        self.name, self.expected, self.hint = name, expected, hint
+        self.got = clipped(str(got), _MAX_VALUE)
+        super().__init__(_message(name, expected, self.got, hint))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.name, self.expected, self.got, self.hint)
@@ -76,10 +123,9 @@ class FormatError(AsterismError, ValueError):
         self, path: str | Path, place: str, expected: str, got: object, hint: str = ""
     ) -> None:
         self.path, self.place, self.expected = str(path), place, expected
-        self.got, self.hint = str(got), hint
-        super().__init__(
-            f"{path}: {place}: expected {expected}, got {got}" + (f" ({hint})" if hint else "")
-        )
+        self.got, self.hint = clipped(str(got), _MAX_VALUE), hint
+        where = f"{path}: {place}" if place else str(path)
+        super().__init__(_message(where, expected, self.got, hint))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.path, self.place, self.expected, self.got, self.hint)
@@ -100,7 +146,7 @@ class SolverLimit(AsterismError, RuntimeError):
 
     def __init__(self, what: str, size: int, limit: int, hint: str) -> None:
         self.what, self.size, self.limit, self.hint = what, size, limit, hint
-        super().__init__(f"{what}: {size} exceeds the limit of {limit} ({hint})")
+        super().__init__(_message(what, f"at most {limit}", f"{size}", hint))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.what, self.size, self.limit, self.hint)
@@ -141,7 +187,7 @@ def check_number(
     >>> check_number("p_detection", 1.5, above=0, below=1)
     Traceback (most recent call last):
     ...
-    asterism.errors.ParameterError: p_detection: expected a number in (0, 1), got 1.5
+    asterism.errors.ParameterError: p_detection: expected a number in (0, 1), found 1.5
     """
     kind = "a whole number" if integer else "a number"
     left, right = ("[", "]") if closed else ("(", ")")
@@ -188,7 +234,7 @@ def check_kind(name: str, value: object, kind: type, hint: str = "") -> None:
     >>> check_kind("radius", "3", float)
     Traceback (most recent call last):
     ...
-    asterism.errors.ParameterError: radius: expected a float, got '3'
+    asterism.errors.ParameterError: radius: expected a float, found '3'
     """
     if isinstance(value, kind):
         return
@@ -231,11 +277,63 @@ def check_path(name: str, value: object) -> Path:
     >>> check_path("path", 3)
     Traceback (most recent call last):
     ...
-    asterism.errors.ParameterError: path: expected the name of a file, got int
+    asterism.errors.ParameterError: path: expected the name of a file, found int
     """
     if isinstance(value, (str, os.PathLike)):
         return Path(cast("str | os.PathLike[str]", value))
     raise ParameterError(name, "the name of a file", type(value).__name__)
+
+
+def check_file(path: Path, expected: str = "a file") -> None:
+    """Raise unless a path is that of a file.
+
+    Parameters
+    ----------
+    path : Path
+        The path.
+    expected : str
+        What it should be, for the message.
+
+    Raises
+    ------
+    FormatError
+        If there is nothing, a folder, or a device or pipe.
+
+    Examples
+    --------
+    >>> check_file(Path("trial.c3d"))
+    Traceback (most recent call last):
+    ...
+    asterism.errors.FormatError: trial.c3d: no such file
+    """
+    if path.is_file():
+        return
+    if not path.exists():
+        raise FormatError(path, "", "", "no such file")
+    raise FormatError(path, "", expected, "a folder" if path.is_dir() else "a device or pipe")
+
+
+def not_read(path: str | Path, error: OSError) -> FormatError:
+    """Give the error for a file that the system does not let be read."""
+    if isinstance(error, FileNotFoundError):
+        return FormatError(path, "", "", "no such file")
+    if isinstance(error, IsADirectoryError):
+        return FormatError(path, "", "a file", "a folder")
+    return FormatError(path, "", "", f"cannot be read: {_reason(error)}")
+
+
+def not_written(path: str | Path, error: OSError) -> FormatError:
+    """Give the error for a file or folder that the system does not let be written."""
+    hint = "choose a folder that exists, may be written to and has room"
+    return FormatError(path, "", "", f"cannot be written: {_reason(error)}", hint)
+
+
+def _reason(error: OSError) -> str:
+    """Say why, without the name of a temporary file."""
+    if isinstance(error, FileNotFoundError):
+        return "no such folder"
+    text = error.strerror or "the system refuses"
+    return text[0].lower() + text[1:]
 
 
 def check_array(
@@ -329,11 +427,26 @@ def check_fields(name: str, given: Iterable[str], known: Iterable[str]) -> None:
     ParameterError
         At the first unknown name.
     """
-    import difflib
-
     known = list(known)
     for field in given:
         if field not in known:
-            near = difflib.get_close_matches(str(field), known, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else ""
-            raise ParameterError(name, f"one of {', '.join(known)}", repr(field), hint)
+            near = _nearest(str(field), list(map(str, known)))
+            hint = f"did you mean {near!r}?" if near else ""
+            expected = f"one of {', '.join(known)}" if len(known) > 1 else "".join(known)
+            raise ParameterError(name, expected, repr(field), hint)
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    """Give the known name that was probably meant; "" if none comes near.
+
+    A whole name that is near goes before one of whose words one is: gatee means gate_probability.
+    """
+    import difflib
+
+    folded = {k.lower(): k for k in known}
+    words = {word: k for k in reversed(known) for word in k.lower().split("_") if len(word) > 2}
+    for names in (folded, words):
+        near = difflib.get_close_matches(name.lower(), names, n=1)
+        if near:
+            return names[near[0]]
+    return ""

@@ -8,7 +8,6 @@ rules are few and their thresholds wide apart; what each is worth is measured in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from asterism.associate.mcmcda import MCMCDA
 from asterism.associate.smp import SMP
 from asterism.errors import check_kind
 from asterism.model import Detections, RandomWalk, TrackingModel, Tracks
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,7 +48,7 @@ CLEAR = 0.01
 """Detections in a gate beside the right one, for each link, up to which nothing is in doubt."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Choice:
     """The method for a clip, and why.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ from asterism.associate.clip_misses import Sightings, count_sightings
 from asterism.associate.gnn import GNN
 from asterism.errors import ParameterError
 from asterism.model import Detections, TrackingModel, Tracks
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +21,7 @@ __all__ = ["Evidence", "Region", "gather_evidence"]
 LEAST_LINKS = 10
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Region:
     """Where the points are, for the densities per volume.
 
@@ -54,7 +54,7 @@ class Region:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Evidence:
     """What tracking found, over all pieces of a clip.
 

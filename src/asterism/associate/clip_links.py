@@ -6,12 +6,12 @@ one marker. They favour slow markers; that is good enough to begin with.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asterism.errors import ParameterError
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +24,7 @@ LINKED_POINTS = 15_000
 """Points that are linked to the next frames, in frames spread over the clip."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Scales:
     """Rough sizes of things, SI units.
 

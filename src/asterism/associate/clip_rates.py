@@ -6,11 +6,12 @@ are averaged over under the rates so far.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import xlogy
+
+from asterism.records import record
 
 if TYPE_CHECKING:
     from asterism.model import Tracks
@@ -26,7 +27,7 @@ SURE_OF_RUNS = 10.0
 """Misses come in runs where twice the log likelihood ratio is more: by chance once in 600 clips."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Rates:
     """How often things happen.
 
@@ -52,7 +53,7 @@ class Rates:
         return self.p_redetection / (1 - self.p_detection + self.p_redetection)
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Counts:
     """What a partition shows: events, and chances of them.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from asterism.associate.method import (
 )
 from asterism.errors import ParameterError, SolverLimit, check_kind
 from asterism.model import TrackingModel
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,7 +46,7 @@ FRAMES_A_CALL = 1000
 """The engine takes so many frames at a time: few enough to show progress and to be stopped."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class EngineState:
     """The state of a method in the engine.
 
@@ -65,6 +66,12 @@ class EngineState:
     n_axes: int
     tracker: Tracker
     about: Callable[[_engine.FrameStats], dict[str, float]]
+
+    def __repr__(self) -> str:
+        return (
+            f"EngineState({self.n_axes}-D, {self.tracker.n_frames} frames and {self.n_seen} "
+            f"detections taken, {self.n_ids} tracks so far)"
+        )
 
     @property
     def n_ids(self) -> int:
@@ -100,7 +107,7 @@ class EngineState:
         return live
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class EngineMethod(Method[EngineState]):
     """A method whose frames are taken by one of the engine's trackers."""
 

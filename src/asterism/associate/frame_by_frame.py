@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from asterism.associate import engine_method
 from asterism.associate.engine_method import EngineMethod
 from asterism.errors import check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from asterism import _engine
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["FrameByFrame"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class FrameByFrame(EngineMethod):
     """Options of every frame-by-frame method.
 

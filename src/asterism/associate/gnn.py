@@ -5,10 +5,10 @@ Blackman & Popoli 1999, ch. 6; §2.4 of the report (linear assignment).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from asterism.associate.with_bodies import WithBodies
+from asterism.records import record
 
 if TYPE_CHECKING:
     from asterism import _engine
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["GNN"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class GNN(WithBodies):
     """Global nearest neighbour: each frame by one exact linear assignment.
 

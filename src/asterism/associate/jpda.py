@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from asterism.associate.with_bodies import WithBodies
 from asterism.errors import ParameterError, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from asterism import _engine
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["JPDA"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class JPDA(WithBodies):
     """Joint probabilistic data association: each frame averaged over all that it may mean.
 

@@ -62,8 +62,7 @@ def checked_weights(weights: str | Mapping[str, float]) -> Mapping[str, float]:
         If a kind is unknown, a weight is no number ≥ 0, or moves could not be taken back.
     """
     if isinstance(weights, str):
-        if weights not in WEIGHTS:
-            raise ParameterError("move_weights", "'uniform', 'report' or a mapping", repr(weights))
+        check_fields("move_weights", [weights], WEIGHTS)
         return WEIGHTS[weights]
     if not isinstance(weights, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ParameterError("move_weights", "'uniform', 'report' or a mapping", repr(weights))

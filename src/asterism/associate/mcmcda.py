@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping  # noqa: TC003 - options are read off the annotations
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from asterism.associate.engine_method import EngineMethod, EngineState
 from asterism.associate.mcmc_moves import MOVES, checked_weights
-from asterism.errors import ParameterError, check_kind, check_number
+from asterism.errors import ParameterError, check_fields, check_kind, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,7 +37,7 @@ FLOOR = 1e-4
 """Least weight of a step of informed growth; to end in the last frame weighs 1."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class MCMCDA(EngineMethod):
     """Markov chain Monte Carlo data association: a walk over the partitions of a window.
 
@@ -192,9 +193,7 @@ class MCMCDA(EngineMethod):
             ("keep", ("best", "draw")),
             ("groups", SPLITS),
         ):
-            if getattr(self, name) not in choices:
-                wanted = " or ".join(map(repr, choices))
-                raise ParameterError(name, wanted, repr(getattr(self, name)))
+            check_fields(name, [getattr(self, name)], choices)
         for name in ("first_rules", "assignment"):
             if not isinstance(getattr(self, name), bool):
                 raise ParameterError(name, "True or False", repr(getattr(self, name)))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
 from asterism.associate.over_window import Hypotheses, branch_options
-from asterism.errors import ParameterError, check_number
+from asterism.errors import check_fields, check_number
+from asterism.records import record
 from asterism.solve import assign_multidimensional
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["MDA"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class MDA(Hypotheses):
     """Multidimensional assignment: the best way to share out all detections of a window at once.
 
@@ -63,8 +63,7 @@ class MDA(Hypotheses):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.solver not in ("exact", "relaxed"):
-            raise ParameterError("solver", "'exact' or 'relaxed'", repr(self.solver))
+        check_fields("solver", [self.solver], ("exact", "relaxed"))
         check_number("max_branches", self.max_branches, above=1, closed=True, integer=True)
 
     def _make(

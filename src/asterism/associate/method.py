@@ -7,12 +7,13 @@ or taken back. `run` is the same over many frames.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
 from asterism.errors import ParameterError, check_array, check_kind, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -46,7 +47,7 @@ def _nothing() -> NDArray[np.int64]:
     return np.empty(0, dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Update:
     """What one frame decided.
 
@@ -72,6 +73,13 @@ class Update:
     confidence: NDArray[np.float64] | None = None
     revised_confidence: NDArray[np.float64] | None = None
     info: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def __repr__(self) -> str:
+        sure = "" if self.confidence is None else ", with confidence"
+        return (
+            f"Update({len(self.labels)} detections, {int((self.labels >= 0).sum())} in tracks, "
+            f"{len(self.revised)} earlier labels revised{sure})"
+        )
 
 
 class Method(ABC, Generic[State]):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from asterism.associate.over_window import Hypotheses, branch_options
 from asterism.errors import ParameterError, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["MHT", "HypothesisCluster"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class HypothesisCluster:
     """The hypothesis matrix of a cluster: who has which detection, in each of its hypotheses.
 
@@ -44,7 +44,7 @@ class HypothesisCluster:
     probabilities: NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class MHT(Hypotheses):
     """Reid's multiple hypotheses: whole explanations of all detections, from frame to frame.
 

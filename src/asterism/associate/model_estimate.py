@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 from asterism.model import DWNA, RandomWalk
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["ModelEstimate", "motion_levels", "reasons_for"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class ModelEstimate:
     """A model estimated from a clip, with the reason for each value.
 
@@ -36,6 +37,9 @@ class ModelEstimate:
     model: TrackingModel
     reasons: tuple[tuple[str, str, str], ...]
     stds: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def __repr__(self) -> str:
+        return f"ModelEstimate({len(self.stds)} stds, {self.model!r})"
 
     def __str__(self) -> str:
         from rich.cells import cell_len, set_cell_size  # a bar over v takes no place of its own

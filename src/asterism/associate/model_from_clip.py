@@ -30,7 +30,7 @@ from asterism.associate.motion_fit import (
     polish,
 )
 from asterism.associate.open_population import draw_rates
-from asterism.errors import ParameterError, check_kind
+from asterism.errors import ParameterError, check_fields, check_kind
 from asterism.model import (
     DWNA,
     Detections,
@@ -108,10 +108,8 @@ def estimate_model(
     ParameterError
         If there are too few detections, or none that can be linked from frame to frame.
     """
-    if population not in ("closed", "open"):
-        raise ParameterError("population", "'closed' or 'open'", repr(population))
-    if misses not in ("independent", "runs"):
-        raise ParameterError("misses", "'independent' or 'runs'", repr(misses))
+    check_fields("population", [population], ("closed", "open"))
+    check_fields("misses", [misses], ("independent", "runs"))
     in_runs = misses == "runs"
     check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     detections = detections.measured()

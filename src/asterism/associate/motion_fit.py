@@ -10,7 +10,7 @@ are.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -25,6 +25,7 @@ from asterism.model import (
     TrackingModel,
     Tracks,
 )
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,7 +50,7 @@ JOLT = 0.1
 """Of the changes from quiet or busy, the share that are jolts; a jolt lasts two frames."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class MotionFit:
     """The most likely motion.
 
@@ -83,7 +84,7 @@ class MotionFit:
         return InteractingMotions(models=models, transitions=_transitions(self.stay))
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class FitBounds:
     """What is believed of noise and motion, whatever the tracks say.
 

@@ -7,7 +7,6 @@ be a biased teacher: it has every false point that fits.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from asterism.associate.clip_rates import Counts, Rates, count
 from asterism.associate.mcmcda import MCMCDA
 from asterism.associate.motion_fit import FitBounds, MotionFit, fit_motion, fit_one_motion
 from asterism.model import Detections, TrackingModel, Tracks
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,7 +30,7 @@ DRAWN_POINTS = 15_000
 _WALK = MCMCDA(keep="draw", confidence=0.0, end_odds=1.0)
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Drawn:
     """What stochastic EM came to.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.associate.with_bodies import WithBodies
 from asterism.errors import check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,7 +48,7 @@ def branch_options(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Hypotheses(WithBodies):
     """Options of every method that explains all detections of a window at once.
 

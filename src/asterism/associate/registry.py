@@ -13,15 +13,16 @@ from asterism.associate.smp import SMP
 from asterism.associate.tomht import TOMHT
 from asterism.associate.track_splitting import TrackSplitting
 from asterism.errors import check_fields
+from asterism.records import Registry
 
 if TYPE_CHECKING:
     from asterism.associate.method import Method
 
 __all__ = ["METHODS", "method_by_name"]
 
-METHODS: dict[str, type[Method[Any]]] = {
-    method.name: method for method in (GNN, SMP, JPDA, TrackSplitting, TOMHT, MDA, MHT, MCMCDA)
-}
+METHODS: dict[str, type[Method[Any]]] = Registry(
+    {method.name: method for method in (GNN, SMP, JPDA, TrackSplitting, TOMHT, MDA, MHT, MCMCDA)}
+)
 """Method by name, as the command line knows it."""
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from asterism.associate.over_window import branch_options, check_window
 from asterism.associate.with_bodies import WithBodies
-from asterism.errors import ParameterError, check_number
+from asterism.errors import ParameterError, check_fields, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,7 +28,7 @@ PRUNE_ODDS = 1e6
 """With a window: so many ways on are followed of each track, none so many times less likely."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class SMP(WithBodies):
     """Stable marriage: no track and detection would both rather have each other.
 
@@ -71,8 +71,7 @@ class SMP(WithBodies):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.proposers not in ("tracks", "detections"):
-            raise ParameterError("proposers", "'tracks' or 'detections'", repr(self.proposers))
+        check_fields("proposers", [self.proposers], ("tracks", "detections"))
 
         if not isinstance(self.strict, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise ParameterError("strict", "True or False", repr(self.strict))
@@ -154,5 +153,5 @@ def _check_number(n: int, wanted: int, where: str) -> None:
     if n != wanted:
         raise ParameterError(
             "points", f"{wanted} {where}, as many as in the first (strict=True)", n,
-            "strict=False knows misses, clutter, and markers that come and go",
+            "use strict=False, which knows misses, clutter, and markers that come and go",
         )  # fmt: skip

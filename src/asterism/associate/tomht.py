@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from asterism.associate.over_window import Hypotheses, branch_options
 from asterism.errors import check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from asterism import _engine
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["TOMHT"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class TOMHT(Hypotheses):
     """Track-oriented multiple hypotheses: the best compatible set of track hypotheses.
 

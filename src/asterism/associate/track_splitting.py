@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -12,6 +11,7 @@ import numpy as np
 from asterism.associate.over_window import branch_options, check_window
 from asterism.associate.with_bodies import WithBodies
 from asterism.errors import ParameterError, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +24,7 @@ MOST_FADING = 0.99
 _EXACT_LIMITS = 4096
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class TrackSplitting(WithBodies):
     """Track splitting: a branch for every detection in the gate and one for a miss.
 

@@ -8,11 +8,11 @@ where `bodies` is off.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from asterism.associate.frame_by_frame import FrameByFrame
 from asterism.errors import ParameterError, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from asterism import _engine
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["WithBodies"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class WithBodies(FrameByFrame):
     """Options of the methods whose hidden tracks are carried by their neighbours.
 

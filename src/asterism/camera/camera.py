@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -17,6 +17,7 @@ from asterism.camera.painter import Painting, in_painters_order
 from asterism.camera.project import CLEARANCE, as_coordinates, project_points
 from asterism.camera.surfaces import check_surfaces, compile_surfaces
 from asterism.errors import ParameterError, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["Camera"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Camera:
     """A camera that can be trusted to the last digit.
 

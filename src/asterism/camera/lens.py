@@ -9,13 +9,14 @@ so nothing is seen there.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from scipy.optimize import brentq
 
 from asterism.errors import check_array, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,7 +59,7 @@ class Lens(ABC):
         return _end_of_disc(k, p if p > 1e-15 else 0.0)
 
 
-@dataclass(frozen=True)
+@record(kw_only=False)
 class BrownConrady(Lens):
     """The common model, undistorted to distorted, as OpenCV has it.
 
@@ -96,7 +97,7 @@ class BrownConrady(Lens):
         return np.array([self.k1, self.k2, self.k3, self.p1, self.p2])
 
 
-@dataclass(frozen=True)
+@record(kw_only=False)
 class ReportRadial(Lens):
     """The radial model of the 2010 report (§3.2), distorted to undistorted.
 
@@ -122,7 +123,7 @@ class ReportRadial(Lens):
         return np.array([self.a1, self.a2, 0.0, 0.0, 0.0])
 
 
-@dataclass(frozen=True)
+@record(kw_only=False)
 class ViconRadial(Lens):
     """Vicon's radial model, measured to ideal pixels about the principal point.
 
@@ -149,7 +150,7 @@ class ViconRadial(Lens):
         return np.array([self.k1, self.k2, self.k3, 0.0, 0.0])
 
 
-@dataclass(frozen=True)
+@record(kw_only=False)
 class QuadraticCorrection(Lens):
     """A quadratic correction of each axis, measured to ideal, as MyPTV fits it.
 

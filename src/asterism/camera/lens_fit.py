@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from asterism.camera.lens import BrownConrady, QuadraticCorrection, ReportRadial, ViconRadial
 from asterism.errors import ParameterError, check_fields
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -32,7 +33,7 @@ _POWERS = {"k1": 2, "k2": 4, "k3": 6, "a1": 2, "a2": 4, "p1": 1, "p2": 1}
 """Power of the radius that each coefficient comes with, beyond the first."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class LensFit:
     """A camera with another lens, and how far it is from the old one.
 

@@ -7,7 +7,6 @@ then no order is right. The circles are found and told; the z-buffer has no such
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from asterism.camera.depth_image import DepthImage
 from asterism.camera.surfaces import Mesh, Polygon
 from asterism.errors import ParameterError, SolverLimit
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,7 +41,7 @@ class Face(NamedTuple):
     face: int
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Painting(DepthImage):
     """A picture made by the painter's algorithm.
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING
+
+from asterism.records import record
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,7 +35,7 @@ class Reason(IntEnum):
     """Behind a surface."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Projection:
     """Points as cameras see them; all arrays have the shape of the points, cameras first for a rig.
 
@@ -55,6 +56,10 @@ class Projection:
     depth: NDArray[np.float64]
     reason: NDArray[np.uint8]
     hidden_by: NDArray[np.int32]
+
+    def __repr__(self) -> str:
+        n = int(self.visible.sum())
+        return f"Projection({n} of {self.visible.size} visible, shape {self.visible.shape})"
 
     @property
     def visible(self) -> NDArray[np.bool_]:

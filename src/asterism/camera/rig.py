@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
@@ -10,7 +10,8 @@ import numpy as np
 from asterism.camera.camera import Camera
 from asterism.camera.matrices import intrinsics
 from asterism.camera.project import CLEARANCE, project_points
-from asterism.errors import ParameterError, check_array, check_number
+from asterism.errors import ParameterError, check_array, check_fields, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -26,7 +27,7 @@ SIZE_PX, FOCAL_PX = (1280, 1024), 900.0
 """A usual motion-capture camera: 1.3 megapixels, 71° wide."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Coverage:
     """How well a rig sees places.
 
@@ -49,13 +50,20 @@ class Coverage:
     covariance: NDArray[np.float64]
     sigma_px: float
 
+    def __repr__(self) -> str:
+        n = self.n_cameras
+        return (
+            f"Coverage({n.size} places, {int((n >= 2).sum())} of them seen by two cameras or more, "
+            f"noise {self.sigma_px:g} px)"
+        )
+
     @property
     def error(self) -> NDArray[np.float64]:
         """Root mean square distance of a triangulated point from its place, metres, shape (...)."""
         return np.sqrt(np.trace(self.covariance, axis1=-2, axis2=-1))
 
 
-@dataclass(frozen=True, eq=False)
+@record(eq=False, kw_only=False)
 class Rig:
     """Cameras in one world; a sequence, by number or by name.
 
@@ -264,8 +272,7 @@ class Rig:
         if isinstance(key, slice):
             return type(self)(self.cameras[key], self.warnings)
         if isinstance(key, str):
-            if key not in self.names:
-                raise ParameterError("camera", f"one of {', '.join(self.names)}", repr(key))
+            check_fields("camera", [key], self.names)
             return self.cameras[self.names.index(key)]
         return self.cameras[key]
 

@@ -6,13 +6,14 @@ They are seen by nobody themselves: curtains of the 2010 report (§3.4). Both si
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from asterism.camera.polygon import triangulate
 from asterism.errors import ParameterError, check_array, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,7 +52,7 @@ def _points(name: str, value: ArrayLike, n: int | str) -> NDArray[np.float64]:
     return array
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Polygon(Surface):
     """A planar polygon, convex or concave, without holes; a triangle has three corners.
 
@@ -87,7 +88,7 @@ class Polygon(Surface):
         return self if self.n_moments == 1 else replace(self, corners=self.corners[frames])
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Mesh(Surface):
     """Triangles that share corners.
 
@@ -134,7 +135,7 @@ class Mesh(Surface):
         return self if self.n_moments == 1 else replace(self, vertices=self.vertices[frames])
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Capsule(Surface):
     """All within a distance of a segment: a limb; a sphere where the ends are one.
 

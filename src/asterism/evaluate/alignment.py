@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from asterism.errors import ParameterError, check_kind, check_number
 from asterism.evaluate.matching import same_detections, same_frames
 from asterism.model import Tracks
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Alignment", "align", "marker_labels"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class Alignment:
     """Tracks and truth as two labels for each detection that either of them has.
 
@@ -39,6 +39,13 @@ class Alignment:
     i_truth: NDArray[np.int64]
     labels: NDArray[np.int64]
     truth_labels: NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        n_both = int(((self.i_tracks >= 0) & (self.i_truth >= 0)).sum())
+        return (
+            f"Alignment({len(self.times)} frames, {len(self.labels)} detections, "
+            f"{n_both} of them on both sides)"
+        )
 
 
 def align(tracks: Tracks, truth: Tracks, *, tolerance: float = 1e-6) -> Alignment:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.evaluate.counts import check_frames, check_labels, overlap, ratio, successions
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["AssociationScores", "association_scores", "right_links"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class AssociationScores:
     """What `association_scores` found. Percentages of nothing are NaN.
 

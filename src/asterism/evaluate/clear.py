@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.errors import check_array
 from asterism.evaluate.counts import check_frames, check_labels, ratio, successions
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["ClearScores", "clear_scores"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class ClearScores:
     """What `clear_scores` found. Shares of nothing are NaN.
 

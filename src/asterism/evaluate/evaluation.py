@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from asterism.evaluate.clear import ClearScores, clear_scores
 from asterism.evaluate.gospa import GospaScores, gospa_scores
 from asterism.evaluate.hota import HotaScores, hota_scores
 from asterism.evaluate.identity import IdentityScores, identity_scores
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Evaluation", "evaluate"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class Evaluation(ClearScores, IdentityScores, HotaScores, GospaScores, AssociationScores):
     """Every score of a result; the fields are described in the classes that it is made of.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.evaluate.counts import check_labels, overlap, ratio
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["HotaScores", "hota_scores"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class HotaScores:
     """What `hota_scores` found. Shares of nothing are NaN; without a match the rest is 0.
 

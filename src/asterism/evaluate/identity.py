@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.evaluate.counts import Overlap, check_labels, overlap, ratio
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["IdentityScores", "identity_scores"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class IdentityScores:
     """What `identity_scores` found. Shares of nothing are NaN.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from asterism.errors import ParameterError, check_array, check_kind, check_number
 from asterism.model import Detections, Tracks
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["PointScores", "point_scores"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class PointScores:
     """How points compare with markers, over all frames.
 

@@ -5,7 +5,6 @@ Symbols: D axes, ŷ where a track is foreseen, S its covariance on each axis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from asterism.errors import check_number
 from asterism.filter.kalman import filter_states
 from asterism.model.compiled import steps_of
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["GateGroups", "gate_groups"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class GateGroups:
     """What `gate_groups` found: G groups, in the order of their frames.
 
@@ -41,6 +41,12 @@ class GateGroups:
     frames: NDArray[np.int64]
     n_tracks: NDArray[np.int64]
     n_detections: NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        return (
+            f"GateGroups({len(self.frames)} groups in {len(self.times)} frames, the largest of "
+            f"{int(self.n_tracks.max(initial=0))} tracks)"
+        )
 
     @property
     def largest(self) -> NDArray[np.int64]:

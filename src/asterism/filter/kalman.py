@@ -5,7 +5,6 @@ Symbols: n states an axis, D axes, K tracks. The axes of a track share one covar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from asterism import _engine
 from asterism.errors import check_kind
 from asterism.model import TrackingModel, Tracks
 from asterism.model.compiled import motion_model, steps_of, with_noise
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["States", "filter_states", "predictive_log_densities", "smooth"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class States:
     """States of K tracks, each from its first detection to its last, gaps included.
 
@@ -45,6 +45,10 @@ class States:
     offsets: NDArray[np.int64]
     first_frames: NDArray[np.int64]
     log_densities: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        _, D, n = self.means.shape
+        return f"States({len(self.first_frames)} tracks, {len(self.means)} states of {D} × {n})"
 
     def positions(self, n_frames: int) -> NDArray[np.float64]:
         """Positions by frame and track, shape (n_frames, K, D), NaN outside a track's span."""

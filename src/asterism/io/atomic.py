@@ -7,7 +7,7 @@ import secrets
 from contextlib import contextmanager
 from typing import IO, TYPE_CHECKING
 
-from asterism.errors import FormatError
+from asterism.errors import not_written
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -45,10 +45,13 @@ def replacing(path: Path) -> Generator[IO[bytes], None, None]:
             return
         target = path.resolve()  # a symbolic link stays one, and its target is replaced
         if target.is_dir():
-            raise IsADirectoryError(0, "is a folder")
+            raise IsADirectoryError(0, "it is a folder")
         temporary = target.with_name(f".{secrets.token_hex(8)}.part")
         try:
-            with temporary.open("xb") as file:
+            # The file's name is that of its target: some formats hold it.
+            with open(
+                str(target), "xb", opener=lambda _, flags: os.open(temporary, flags, 0o666)
+            ) as file:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())
@@ -58,6 +61,4 @@ def replacing(path: Path) -> Generator[IO[bytes], None, None]:
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
-        what = error.strerror or str(error)
-        hint = "choose a folder that exists, may be written to and has room"
-        raise FormatError(path, "writing", "a file that can be written", what, hint) from error
+        raise not_written(path, error) from error

@@ -5,7 +5,15 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from asterism.errors import FormatError, ParameterError, check_kind, check_path
+from asterism.errors import (
+    FormatError,
+    ParameterError,
+    check_fields,
+    check_file,
+    check_kind,
+    check_path,
+    not_read,
+)
 from asterism.io.atomic import replacing
 from asterism.io.formats import FORMATS, Format
 from asterism.model import Capture, Tracks
@@ -14,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator
     from pathlib import Path
 
-__all__ = ["read", "read_tracks", "write"]
+__all__ = ["format_of", "format_to_write", "read", "read_tracks", "write"]
 
 _HEAD = 4096  # bytes that are enough to know a format by
 
@@ -46,7 +54,7 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     >>> read("nowhere.c3d")
     Traceback (most recent call last):
     ...
-    asterism.errors.FormatError: nowhere.c3d: opening: expected a file, got nothing of that name
+    asterism.errors.FormatError: nowhere.c3d: no such file
     """
     path = check_path("path", path)
     asked = None if format is None else _named(format)
@@ -113,33 +121,69 @@ def write(
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     path = check_path("path", path)
-    known = [f for f in FORMATS.values() if f.write is not None]
-    if format is None:
-        endings = [f for f in known if path.suffix.lower() in f.extensions and path.suffix]
-        if not endings:
-            every = ", ".join(dict.fromkeys(e for f in known for e in f.extensions if e))
-            hint = "or name the format"
-            raise ParameterError("path", f"a name ending in {every}", repr(path.name), hint)
-        chosen = endings[0]
-    else:
-        chosen = _named(format)
-    if chosen.write is None:
-        names = ", ".join(f.name for f in known)
-        raise ParameterError("format", f"one that can be written: {names}", repr(format))
+    chosen = format_to_write(path, format)
+    assert chosen.write is not None
     source = tracks.detections
     if isinstance(source, Capture) and not overwrite_input and _is_same(source.path, path):
         raise ParameterError(
             "path", "another file than the one that was read", str(path),
-            "overwrite_input=True if you mean it",
+            "give overwrite_input=True if you mean it",
         )  # fmt: skip
     if source.filled is not None and source.filled.any() and not (chosen.keeps_filled or unflagged):
-        able = ", ".join(f.name for f in known if f.keeps_filled)
+        able = ", ".join(f.name for f in FORMATS.values() if f.write and f.keeps_filled)
         raise ParameterError(
             "format", f"one that tells filled points from measured ones: {able}",
-            repr(chosen.name), "unflagged=True if they need not be told apart",
+            repr(chosen.name), "give unflagged=True if they need not be told apart",
         )  # fmt: skip
     with replacing(path) as file:
         chosen.write(tracks, file)
+
+
+def format_of(path: Path) -> Format:
+    """Tell the format of a file that exists, by the ending of its name or by its content.
+
+    Raises
+    ------
+    FormatError
+        If there is no such file, or it is of no known format.
+    """
+    with _about(path):
+        return _find(path, None)
+
+
+def format_to_write(path: Path, format: str | None) -> Format:
+    """Give the format to write, as asked or by the ending of the name.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    format : str or None
+        Key of `FORMATS`, where it was asked for.
+
+    Returns
+    -------
+    Format
+        One that can be written.
+
+    Raises
+    ------
+    ParameterError
+        If the format or the ending is unknown, or the format is only read.
+    """
+    known = [f for f in FORMATS.values() if f.write is not None]
+    if format is None:
+        for candidate in known:
+            if path.suffix and path.suffix.lower() in candidate.extensions:
+                return candidate
+        every = ", ".join(dict.fromkeys(e for f in known for e in f.extensions if e))
+        hint = "or name the format"
+        raise ParameterError("path", f"a name ending in {every}", repr(path.name), hint)
+    chosen = _named(format)
+    if chosen.write is None:
+        names = ", ".join(f.name for f in known)
+        raise ParameterError("format", f"one that can be written: {names}", repr(format))
+    return chosen
 
 
 def _is_same(a: Path, b: Path) -> bool:
@@ -150,17 +194,13 @@ def _is_same(a: Path, b: Path) -> bool:
 
 
 def _named(name: str) -> Format:
-    if name not in FORMATS:
-        raise ParameterError("format", f"one of {', '.join(FORMATS)}", repr(name))
+    check_fields("format", [name], FORMATS)
     return FORMATS[name]
 
 
 def _find(path: Path, asked: Format | None) -> Format:
     """Format of an existing file: as asked, or by its ending, or by its content."""
-    if not path.is_file():
-        got = "a folder" if path.is_dir() else "nothing of that name"
-        got = "a device or pipe" if path.exists() and not path.is_dir() else got
-        raise FormatError(path, "opening", "a file", got)
+    check_file(path)
     if asked is not None:
         return asked
     ending = path.suffix.lower()
@@ -183,6 +223,6 @@ def _about(path: Path) -> Generator[None, None, None]:
     try:
         yield
     except OSError as error:
-        raise FormatError(path, "reading", "a readable file", error.strerror) from error
+        raise not_read(path, error) from error
     except ParameterError as error:
         raise FormatError(path, error.name, error.expected, error.got, error.hint) from error

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING
 
 from asterism.io import c3d, c3d_write, csv_long, csv_wide, motive_csv, pointcloud, qtm_tsv, trc
+from asterism.records import Registry, record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["FORMATS", "Format"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Format:
     """A file format.
 
@@ -50,8 +50,8 @@ class Format:
     keeps_filled: bool = False
 
 
-FORMATS: dict[str, Format] = {
-    f.name: f
+FORMATS: dict[str, Format] = Registry(
+    (f.name, f)
     for f in (
         Format(
             name="c3d",
@@ -112,4 +112,4 @@ FORMATS: dict[str, Format] = {
             write=pointcloud.write,
         ),
     )
-}
+)

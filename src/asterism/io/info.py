@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.errors import check_kind
 from asterism.model import Capture
+from asterism.records import record
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,7 +20,7 @@ __all__ = ["CaptureInfo", "describe"]
 _MOST_FRAMES = 10_000  # whose neighbours are looked up; of longer captures an even sample is taken
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class CaptureInfo:
     """Figures of a capture; lengths in millimetres, NaN where there is nothing to measure.
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Observations
-from asterism.errors import FormatError, ParameterError, check_number, check_path
+from asterism.errors import FormatError, ParameterError, check_number, check_path, not_read
 from asterism.io.atomic import replacing
 from asterism.io.csv_columns import columns_of, quoted, whole
 from asterism.io.text_table import cells_of, check_times, read_lines
@@ -91,7 +91,7 @@ def read_observations(path: str | Path) -> Observations:
     try:
         lines = read_lines(path)
     except OSError as error:
-        raise FormatError(path, "opening", "a readable file", error.strerror) from error
+        raise not_read(path, error) from error
     while len(lines) > 1 and not lines[-1].strip():
         lines.pop()
     header = cells_of(lines[0])

@@ -5,6 +5,7 @@ Gaps are blank fields: zeros would be points, and NaN stops inverse kinematics.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
@@ -16,8 +17,6 @@ from asterism.io.units import judge_unit, parse_unit
 from asterism.model import Capture
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from asterism.model import Tracks
 
 __all__ = ["read", "sniff", "write"]
@@ -124,7 +123,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         Over 3-D detections at a fixed rate; tracks without a name are called ``T000`` …, clutter
         goes to columns ``*0``, ``*1`` …
     file : binary file
-        Where to.
+        Where to; the header holds its name.
 
     Raises
     ------
@@ -139,7 +138,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     spread = [text for name in names for text in (plain(name), "", "")]
     counts = [rate, rate, d.n_frames, len(names), unit, rate, first, d.n_frames]
     header = [
-        ["PathFileType", "4", "(X/Y/Z)", "tracks.trc"],
+        ["PathFileType", "4", "(X/Y/Z)", plain(Path(getattr(file, "name", "tracks.trc")).name)],
         list(_KEYS),
         [f"{c:.10g}" if isinstance(c, float) else str(c) for c in counts],
         ["Frame#", "Time", *spread],

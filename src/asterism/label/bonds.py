@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
@@ -14,6 +13,7 @@ from asterism.errors import FormatError, ParameterError, check_kind, check_numbe
 from asterism.label.distances import distances_between
 from asterism.model import Tracks
 from asterism.model.toml_file import read_toml, write_toml
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,7 +32,7 @@ share of its distance."""
 FORMAT = "asterism bonds"
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Bonds:
     """Pairs of markers that keep their distance, and one pose of them all.
 
@@ -152,9 +152,7 @@ class Bonds:
         path = Path(path)
         if content.get("format") != FORMAT:
             got = content.get("format", "none")
-            raise FormatError(
-                path, "format", f'"{FORMAT}"', got, "asterism bonds writes such files"
-            )
+            raise FormatError(path, "format", f'"{FORMAT}"', got, "write one by asterism bonds")
         try:
             return cls(**_from_plain(content))
         except ParameterError as error:

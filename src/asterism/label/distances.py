@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["Distances", "distances_between", "distances_from"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Distances:
     """Distances over some frames.
 

@@ -9,7 +9,7 @@ What this file is not: a guess of what came before a track, or after it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from asterism.label.gap.estimates import Take, estimate
 from asterism.label.gap.scores import Fill, settle
 from asterism.label.gap.spans import Span, find_gaps
 from asterism.model import TrackingModel, Tracks
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -33,7 +34,7 @@ __all__ = ["ESTIMATORS", "Filling", "Gap", "fill"]
 ESTIMATORS = ("smoother", "body", "pattern")
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Gap:
     """A gap of a track, and what was made of it.
 
@@ -86,7 +87,7 @@ class Gap:
         return self.last - self.first + 1
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Filling:
     """Tracks with their gaps filled.
 

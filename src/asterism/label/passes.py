@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism import _engine
 from asterism.model.compiled import motion_model, steps_of
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +21,7 @@ LEAST_ADVICE, MOST_ADVICE = 1.0, 5.0
 """Log odds that a join of the pass before is worth to the next."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Pass:
     """What a pass found.
 

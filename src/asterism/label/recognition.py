@@ -11,6 +11,7 @@ from asterism.errors import ParameterError, check_kind
 from asterism.label.bonds import BEND, MOST_FRAMES, Bonds
 from asterism.label.distances import distances_between
 from asterism.model import Tracks
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,7 +42,7 @@ WORTH = 0.25
 """Distances bend together: what they say is worth less than their sum."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Recognition:
     """Tracks named after the markers of an earlier take.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from asterism import _engine
@@ -13,6 +13,7 @@ from asterism.label.identify import fragment_model
 from asterism.label.stitching import check_options, stitch_options
 from asterism.model import TrackingModel
 from asterism.model.compiled import motion_model, no_transition, transition
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Stitched", "StitchedState"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class StitchedState:
     """The state of `Stitched`.
 
@@ -44,6 +45,13 @@ class StitchedState:
     n_axes: int
     last_time: float = float("-inf")
 
+    def __repr__(self) -> str:
+        stitcher = self.stitcher
+        return (
+            f"StitchedState({self.n_axes}-D, {self.n_seen} detections taken, "
+            f"{stitcher.n_joins} joins, {stitcher.n_cuts} cuts, {stitcher.n_ghosts} ghosts)"
+        )
+
     @property
     def n_seen(self) -> int:
         """Number of detections taken so far."""
@@ -64,7 +72,7 @@ def _over_three_frames() -> Method[Any]:
     return SMP(window=3)
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Stitched(Method[StitchedState]):
     """A method whose tracks are stitched as they come, for streams.
 

@@ -6,7 +6,6 @@ almost rigidly, so that those that keep their distance carry a hidden marker wit
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ from asterism.errors import check_kind, check_number
 from asterism.label.bonds import Bonds, learn_bonds
 from asterism.label.passes import go_through
 from asterism.model import TrackingModel, Tracks
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,7 +26,7 @@ __all__ = ["Join", "Stitching", "check_options", "stitch", "stitch_options"]
 GHOST = -2
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Join:
     """Two fragments that are one marker.
 
@@ -46,7 +46,7 @@ class Join:
     probability: float
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Stitching:
     """What was made of fragments.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -11,6 +11,7 @@ import numpy as np
 from asterism.errors import keep_array
 from asterism.model.detections import Detections
 from asterism.model.tracks import Tracks
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,7 +28,7 @@ def _unknown() -> NDArray[np.int64]:
     return _UNKNOWN
 
 
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+@record(eq=False)
 class Capture(Detections):
     """Detections that were read from a file, with what else the file knew.
 
@@ -63,7 +64,7 @@ class Capture(Detections):
 
     Examples
     --------
-    >>> from dataclasses import replace
+    >>> from dataclasses import field
     >>> capture = Capture.from_frames([0.0, 0.01], [[[0, 0, 0], [1, 0, 0]], [[0, 0, 0]]])
     >>> replace(capture, path=Path("arena.dots"), format="dots", units="cm")
     Capture('arena.dots', 2 frames, 3 points, 3-D, 0 to 0.01 s, 0 named)

@@ -5,13 +5,14 @@ Nothing here says which point is which marker; that is a `Tracks`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from asterism.errors import ParameterError, check_array, keep_array
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -24,7 +25,7 @@ FARTHEST = 1e9
 """Metres from the origin beyond which a coordinate is taken for a mistake."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Detections:
     """Unnamed points over time: one struct of arrays, ordered by frame.
 

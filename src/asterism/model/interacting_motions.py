@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from asterism.errors import ParameterError, keep_array
 from asterism.model.linear_motion import LinearMotion
 from asterism.model.motion import Motion, SingleMotion
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["InteractingMotions"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class InteractingMotions(Motion):
     """A marker that changes between motions: at rest, moving, thrown.
 

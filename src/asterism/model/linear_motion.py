@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from asterism.errors import ParameterError, check_number, keep_array
 from asterism.model.motion import SingleMotion
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -18,7 +18,7 @@ __all__ = ["LinearMotion"]
 MOST_STEPS = 100_000
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class LinearMotion(SingleMotion):
     """Any linear model of one axis, by its matrices for one step.
 

@@ -7,12 +7,12 @@ F, a process noise Q and an observation H. Symbols: Δ time from frame to frame 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from asterism.errors import check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -88,7 +88,7 @@ def _stack(rows: list[list[NDArray[np.float64]]]) -> NDArray[np.float64]:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class DWNA(SingleMotion):
     """Discrete white noise acceleration: constant velocity, shaken once a step.
 
@@ -135,7 +135,7 @@ class DWNA(SingleMotion):
         return np.diag([noise_sigma**2, (self.velocity_sigma or velocity_sigma) ** 2])
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class RandomWalk(SingleMotion):
     """Random walk: one state, ``F = 1``, ``Q = σ_w² Δ``.
 
@@ -170,7 +170,7 @@ class RandomWalk(SingleMotion):
         return np.array([[noise_sigma**2]])
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class DWPA(SingleMotion):
     """Discrete Wiener process acceleration: the acceleration itself walks.
 

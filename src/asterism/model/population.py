@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
-from asterism.errors import ParameterError, check_number
+from asterism.errors import check_fields, check_number
+from asterism.records import record
 
 __all__ = ["Population"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Population:
     """The population side of the generative model.
 
@@ -42,5 +42,4 @@ class Population:
         check_number("max_speed", self.max_speed, above=0, below=1e12)
         check_number("max_gap", self.max_gap, above=1, below=1e6, closed=True, integer=True)
         object.__setattr__(self, "max_gap", int(self.max_gap))
-        if self.termination not in ("marginal", "last"):
-            raise ParameterError("termination", "'marginal' or 'last'", repr(self.termination))
+        check_fields("termination", [self.termination], ("marginal", "last"))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from asterism.errors import check_number
+from asterism.records import record
 
 __all__ = ["Sensor"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Sensor:
     """The measurement side of the generative model.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from typing import TYPE_CHECKING, Any
 
-from asterism.errors import FormatError, check_path
+from asterism.errors import FormatError, check_file, check_path, not_read, not_written
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,8 +22,13 @@ def write_toml(content: Mapping[str, Any], path: str | Path | None) -> str:
     if path is not None:
         path = check_path("path", path)
         unfinished = path.with_name(f".{path.name}.part")
-        unfinished.write_text(text, encoding="utf-8")
-        unfinished.replace(path)
+        try:
+            unfinished.write_text(text, encoding="utf-8")
+            unfinished.replace(path)
+        except OSError as error:
+            raise not_written(path, error) from error
+        finally:
+            unfinished.unlink(missing_ok=True)
     return text
 
 
@@ -38,10 +43,11 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         If the file cannot be read, or is not TOML.
     """
     path = check_path("path", path)
+    check_file(path, what)
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise FormatError(path, "the file", what, error.strerror) from error
+        raise not_read(path, error) from error
     except UnicodeDecodeError as error:
         raise FormatError(path, f"byte {error.start}", "UTF-8 text", error.reason) from error
     except tomllib.TOMLDecodeError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
@@ -16,6 +15,7 @@ from asterism.model.motion import DWNA, DWPA, Motion, RandomWalk
 from asterism.model.population import Population
 from asterism.model.sensor import Sensor
 from asterism.model.toml_file import read_toml, write_toml
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -30,7 +30,7 @@ MOTIONS: dict[str, type[Motion]] = {
 """Every motion by its name in a model file: the one place to register a new one."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class TrackingModel:
     """How detections come about; every method searches its posterior.
 
@@ -58,6 +58,14 @@ class TrackingModel:
     motion: Motion
     sensor: Sensor
     population: Population
+
+    def __repr__(self) -> str:
+        sensor, population = self.sensor, self.population
+        return (
+            f"TrackingModel(noise {1e3 * sensor.noise_sigma:.3g} mm, P_d {sensor.p_detection:.4g}, "
+            f"clutter {sensor.clutter_density:.3g}/m^D, gaps ≤ {population.max_gap} frames, "
+            f"speeds ≤ {population.max_speed:.3g} m/s, {self.motion!r})"
+        )
 
     def __post_init__(self) -> None:
         for name, kind in (("motion", Motion), ("sensor", Sensor), ("population", Population)):
@@ -172,8 +180,7 @@ def _motion(name: str, table: object) -> Motion:
         raise ParameterError(name, "a table", repr(table))
     values = dict(table)
     kind = values.pop("kind", None)
-    if not isinstance(kind, str) or kind not in MOTIONS:
-        raise ParameterError(f"{name}.kind", f"one of {', '.join(MOTIONS)}", repr(kind))
+    check_fields(f"{name}.kind", [kind], MOTIONS)
     if "models" in values:
         models = values["models"]
         if not isinstance(models, list):

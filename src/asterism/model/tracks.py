@@ -6,7 +6,7 @@ the points: the labels lie beside the detections that they speak of.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from asterism.errors import ParameterError, check_kind, keep_array
 from asterism.model.detections import Detections
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,7 +27,7 @@ MOST_TRACKS = 10_000_000
 """There is an entry for every track up to the largest number; a larger one is a mistake."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Tracks:
     """A partition of detections into tracks and clutter.
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.errors import ParameterError, check_array, check_number
 from asterism.reconstruct.triangulation import per_camera
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,7 @@ CameraNumbers = float | tuple[float, ...]
 """One number for all cameras, or one for each."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class ImageModel:
     """What the images of a rig are like.
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.errors import ParameterError, keep_array
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Reconstruction", "Views"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Views:
     """Which image points each point in space was made of.
 
@@ -38,6 +38,9 @@ class Views:
     offsets: NDArray[np.int64]
     cameras: NDArray[np.int64]
     blobs: NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        return f"Views({len(self.counts)} points of {len(self.blobs)} views)"
 
     def __post_init__(self) -> None:
         offsets = keep_array("offsets", self.offsets, ("N + 1",), dtype=np.int64)
@@ -73,7 +76,7 @@ class Views:
         return list(zip(self.cameras[rows].tolist(), self.blobs[rows].tolist(), strict=True))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Reconstruction:
     """What `reconstruct` made of observations.
 
@@ -99,6 +102,9 @@ class Reconstruction:
     scores: NDArray[np.float64]
     model: ImageModel
     info: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        return f"Reconstruction({self.detections.summary()}, of {len(self.views.blobs)} views)"
 
     def markers(self, observations: Observations) -> NDArray[np.int64]:
         """Say whose each point is, where the truth of the image points is known.

@@ -5,13 +5,13 @@ Who is whom is known here; `asterism.reconstruct.correspondence` finds it out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.camera import Rig
 from asterism.errors import ParameterError, check_array, check_kind
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,7 @@ _LEAST_STEP = 1e-13  # of a place's distance from the cameras: smaller ones are 
 _FLATTEST = 1e12  # condition of the information beyond which depth is open, as in `Rig.coverage`
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Triangulation:
     """Places that were seen by several cameras.
 

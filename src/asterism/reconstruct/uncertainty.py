@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.camera import Camera, Coverage, Rig, intrinsics, volume_grid
 from asterism.errors import ParameterError, check_array, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +23,7 @@ _RING, _LEVELS = 24, 3  # places tried around the volume, at so many heights
 _CELLS = 12  # of the longest side of the volume, where no spacing is given
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class CameraSuggestion:
     """A camera that is not there yet.
 
@@ -43,7 +43,7 @@ class CameraSuggestion:
     share: float
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class TriangulationMap:
     """How exactly a rig places a point, all over its volume.
 
@@ -64,6 +64,13 @@ class TriangulationMap:
     error: float
     share: float
     suggestions: tuple[CameraSuggestion, ...]
+
+    def __repr__(self) -> str:
+        return (
+            f"TriangulationMap({self.coverage.n_cameras.size} places, {100 * self.share:.3g} % "
+            f"seen by two cameras or more, error {1e3 * self.error:.3g} mm root mean square, "
+            f"{len(self.suggestions)} suggestions)"
+        )
 
 
 def triangulation_map(

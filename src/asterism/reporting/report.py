@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import ParameterError, check_kind, check_path
+from asterism.errors import ParameterError, check_fields, check_kind, check_path
 from asterism.io.atomic import replacing
 from asterism.model import Capture, Tracks
 from asterism.reporting.connections import connections_of
@@ -86,8 +86,8 @@ def report(
         check_kind("truth", truth, Tracks)
     if rig is not None:
         check_kind("rig", rig, Rig, "am.read_rig(path)")
-    if up not in ("x", "y", "z", None):
-        raise ParameterError("up", "x, y, z or None", repr(up))
+    if up is not None:
+        check_fields("up", [up], ("x", "y", "z"))
     d, path = tracks.detections, check_path("path", path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise ParameterError("path", "a name ending in .html", repr(path.name))

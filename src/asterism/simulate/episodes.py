@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.errors import check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["Burst", "Ghosts", "Visits", "episodes", "stays"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Burst:
     """Markers hidden for a while: behind a limb, at the edge of the volume.
 
@@ -44,7 +44,7 @@ class Burst:
         check_number("longest", self.longest, above=self.shortest, closed=True, integer=True)
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Ghosts:
     """Short-lived false points that go along with a marker: reflections, wrong intersections.
 
@@ -76,7 +76,7 @@ class Ghosts:
         check_number("within", self.within, above=0)
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Visits:
     """Markers that enter and leave; one that comes again is another marker.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from asterism.camera import Observations, Rig
 from asterism.errors import ParameterError, check_kind, check_number
 from asterism.model import Tracks
+from asterism.records import record
 from asterism.simulate.seeing import Blobs, Seeing, see
 from asterism.simulate.truth import Truth
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["Film", "film"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@record(eq=False)
 class Film:
     """What a rig makes of moving markers.
 
@@ -43,6 +43,13 @@ class Film:
     projection: Projection
     blob_of: NDArray[np.int64]
     share: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        seen = self.observations
+        return (
+            f"Film({seen.n_cameras} cameras, {seen.n_frames} frames, "
+            f"{self.blob_of.shape[-1]} markers, {seen.n_points} image points)"
+        )
 
 
 def film(

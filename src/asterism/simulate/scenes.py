@@ -7,12 +7,13 @@ a `Truth`. Noise, misses and clutter come afterwards, from `asterism.simulate.se
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.errors import ParameterError
 from asterism.model import Capture, Tracks
+from asterism.records import Registry, record
 from asterism.simulate.people.hand import fingers
 from asterism.simulate.people.juggler import juggler
 from asterism.simulate.people.pair import two_people
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 __all__ = ["SCENES", "Scene", "from_capture"]
 
 
-class Scene(NamedTuple):
+@record(kw_only=False)
+class Scene:
     """A scene as a list shows it.
 
     Attributes
@@ -42,19 +44,21 @@ class Scene(NamedTuple):
     about: str
 
 
-SCENES: dict[str, Scene] = {
-    "cube": Scene(cube, "8 markers on a cube that turns and travels"),
-    "crossing": Scene(crossing, "16 markers: a turning cube flies through a still one"),
-    "wander": Scene(wander, "markers that change speed and direction all the time"),
-    "walk": Scene(walk, "markers that walk at random, with no velocity to predict from"),
-    "attracted": Scene(attracted, "8 markers that walk at random and crowd about the origin"),
-    "smooth": Scene(smooth, "any number of markers on smooth paths, at constant density"),
-    "swarm": Scene(swarm, "drones that spread out, bunch up and change places"),
-    "person": Scene(person, "a person who walks, runs, jumps or turns, with limbs that hide"),
-    "two_people": Scene(two_people, "two people who pass each other closely, or hug"),
-    "fingers": Scene(fingers, "a hand whose fingers bend and open"),
-    "juggler": Scene(juggler, "a person who juggles balls"),
-}
+SCENES: dict[str, Scene] = Registry(
+    {
+        "cube": Scene(cube, "8 markers on a cube that turns and travels"),
+        "crossing": Scene(crossing, "16 markers: a turning cube flies through a still one"),
+        "wander": Scene(wander, "markers that change speed and direction all the time"),
+        "walk": Scene(walk, "markers that walk at random, with no velocity to predict from"),
+        "attracted": Scene(attracted, "8 markers that walk at random and crowd about the origin"),
+        "smooth": Scene(smooth, "any number of markers on smooth paths, at constant density"),
+        "swarm": Scene(swarm, "drones that spread out, bunch up and change places"),
+        "person": Scene(person, "a person who walks, runs, jumps or turns, with limbs that hide"),
+        "two_people": Scene(two_people, "two people who pass each other closely, or hug"),
+        "fingers": Scene(fingers, "a hand whose fingers bend and open"),
+        "juggler": Scene(juggler, "a person who juggles balls"),
+    }
+)
 """Every scene by name."""
 
 

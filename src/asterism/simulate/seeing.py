@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from asterism.camera import Reason
 from asterism.errors import ParameterError, check_number
+from asterism.records import record
 from asterism.simulate.sensed_points import touching
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ _SAMPLES = 13  # points of a marker's disc that are looked at, spread like the s
 _CHUNK = 256  # frames at a time
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class Seeing:
     """What a camera makes of the markers before it.
 

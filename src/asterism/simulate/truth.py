@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from asterism.camera import Capsule, Mesh, Polygon
 from asterism.errors import ParameterError, keep_array
 from asterism.model import Tracks
+from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +30,7 @@ def _nobody() -> NDArray[np.int64]:
     return np.zeros(0, dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+@record(eq=False)
 class Truth(Tracks):
     """Ground truth: tracks, with the lines and colours of pictures and the surfaces that hide.
 

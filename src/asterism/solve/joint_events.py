@@ -6,13 +6,13 @@ caller's; so is what to do with the marginals.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from asterism import _engine
 from asterism.errors import ParameterError, SolverLimit, check_array, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,7 @@ _LARGEST_LOG = 1e100
 _MOST_STATES = 2**30
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class JointMarginals:
     """What `joint_marginals` found.
 
@@ -131,7 +131,7 @@ def joint_marginals(
         if not fits.all():
             place = tuple(int(i) for i in np.argwhere(~fits)[0])
             expected = f"logs of at most {_LARGEST_LOG:g} in size"
-            hint = "-inf for what lies outside the gate" if name == "log_weights" else ""
+            hint = "give -inf for what lies outside the gate" if name == "log_weights" else ""
             raise ParameterError(name, expected, f"{logs[place]} at index {place}", hint)
     try:
         marginals, log_total, best, bound, n_states = _engine.joint_marginals(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism import _engine
 from asterism.errors import ParameterError, SolverLimit, check_array, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -19,7 +19,7 @@ _LARGEST = 8192
 _GREATEST_GAIN = 1e100
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class KBestAssignments:
     """What `k_best_assignments` found.
 

@@ -6,13 +6,13 @@ a camera): a tuple takes one index of some of the dimensions and none of the oth
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from asterism import _engine
-from asterism.errors import ParameterError, check_array, check_number
+from asterism.errors import ParameterError, check_array, check_fields, check_number
+from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["MultidimensionalAssignment", "assign_multidimensional"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@record(eq=False)
 class MultidimensionalAssignment:
     """What `assign_multidimensional` found.
 
@@ -103,8 +103,7 @@ def assign_multidimensional(
     >>> found.chosen, found.value, found.gap
     (array([0, 2]), 4.0, 0.0)
     """
-    if method not in ("exact", "relaxed"):
-        raise ParameterError("method", "'exact' or 'relaxed'", repr(method))
+    check_fields("method", [method], ("exact", "relaxed"))
     check_number("max_rounds", max_rounds, above=1, closed=True, integer=True)
     w = check_array("weights", weights, ("C",))
     t = check_array("tuples", tuples, (len(w), "S"), dtype=np.int64)

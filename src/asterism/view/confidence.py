@@ -25,7 +25,9 @@ _MANY = 20_000  # cells beyond which a vector file holds them as one image
 
 
 def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
-    """Draw each track as a bar over time, the lighter the less sure its label is.
+    """Draw each track as a bar over time, shaded by the confidence of each link.
+
+    The confidence of a label is that of the link from the detection before; the lighter, the less.
 
     Parameters
     ----------
@@ -38,7 +40,7 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
     -------
     Axes
         Seconds across, one row a track, with a colour bar; in an inset above the mean confidence of
-        the labels of a frame, and the least.
+        the links into a frame, and the least.
 
     Raises
     ------
@@ -47,7 +49,7 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     if tracks.confidence is None:
-        hint = "jpda, mht and mcmcda say how sure they are; of the files a CSV keeps it"
+        hint = "track with jpda, mht or mcmcda; of the files a CSV keeps the confidence"
         raise ParameterError("tracks", "tracks with a confidence", "none", hint)
     d = tracks.detections
     rows = rows_of(tracks)
@@ -62,13 +64,13 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
             _edges(d.times), np.arange(len(cells) + 1) - 0.5, np.ma.masked_invalid(cells),
             cmap=f"{GRADIENT}_r", vmin=0, vmax=1, rasterized=cells.size > _MANY,
         )  # fmt: skip
-        draw_bar(axes, drawn, "confidence", ticks=np.linspace(0, 1, 6))
+        draw_bar(axes, drawn, "confidence of a link", ticks=np.linspace(0, 1, 6))
         # White between the rows, so that neighbours do not run into each other.
         for edge in np.arange(1, len(cells)) - 0.5:
             axes.axhline(edge, color="white", linewidth=2.0)
     frame_rows(axes, tracks, rows)
     axes.grid(visible=False)
-    told = f"mean confidence {sure.mean():.3f}" if len(sure) else "no labels"
+    told = f"confidence of links, mean {sure.mean():.3f}" if len(sure) else "no links"
     above = strip_above(axes, told)
     n = np.bincount(frame, minlength=d.n_frames)
     total = np.bincount(frame, weights=sure, minlength=d.n_frames)

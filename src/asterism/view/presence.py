@@ -78,7 +78,7 @@ def plot_errors(tracks: Tracks, truth: Tracks, ax: Axes | None = None) -> Axes:
     ):
         raise ParameterError(
             "truth", f"labels of the same {a.n_points} detections", f"{b.n_points} others",
-            "am.align finds the same detections in two captures",
+            "use am.align, which finds the same detections in two captures",
         )  # fmt: skip
     marker_of = _commonest_marker(tracks, truth)
     is_labelled = tracks.labels >= 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError, check_path
+from asterism.errors import ParameterError, check_path, not_written
 from asterism.view.style import CLUTTER, CYCLE
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def view(tracks: Tracks, *, rig: Rig | None = None, path: str | Path | None = No
     try:
         import rerun  # pyright: ignore[reportMissingImports]  # an extra
     except ImportError:
-        hint = "pip install 'asterism[view]'"
+        hint = "run pip install 'asterism[view]'"
         raise ParameterError("view", "Rerun, which is optional", "none installed", hint) from None
     if not tracks.detections.n_points:
         raise ParameterError("tracks", "at least one detection", "none")
@@ -86,9 +86,7 @@ def _save(rr: Any, tracks: Tracks, rig: Rig | None, path: Path) -> None:
         recording.disconnect()
         temporary.replace(path)
     except OSError as error:
-        what = error.strerror or str(error)
-        hint = "choose a folder that exists, may be written to and has room"
-        raise FormatError(path, "writing", "a file that can be written", what, hint) from error
+        raise not_written(path, error) from error
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from asterism.errors import FormatError
+from asterism.errors import FormatError, not_written
 
 __all__ = ["open_viewer", "switch_off_statistics"]
 
@@ -62,8 +62,7 @@ def switch_off_statistics(settings: Path) -> None:
             temporary.write_text(json.dumps(values), encoding="utf-8")
             temporary.replace(settings)
         except OSError as error:
-            what = error.strerror or str(error)
-            raise FormatError(settings, "writing", "a file that can be written", what) from error
+            raise not_written(settings, error) from error
         finally:
             temporary.unlink(missing_ok=True)
 

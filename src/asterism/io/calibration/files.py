@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import FormatError, ParameterError, check_kind, check_path
+from asterism.errors import (
+    FormatError,
+    ParameterError,
+    check_fields,
+    check_file,
+    check_kind,
+    check_path,
+    not_read,
+    not_written,
+)
 from asterism.io.atomic import replacing
 from asterism.io.calibration.formats import CALIBRATIONS, CalibrationFormat
 from asterism.io.units import PER_METRE, parse_unit
@@ -49,7 +58,7 @@ def read_rig(path: str | Path, *, format: str | None = None, units: str | None =
     >>> read_rig("none.toml")
     Traceback (most recent call last):
     ...
-    asterism.errors.FormatError: none.toml: opening: expected a calibration, got nothing ...
+    asterism.errors.FormatError: none.toml: no such file
     """
     path = check_path("path", path)
     chosen = None if format is None else _named(format)
@@ -62,11 +71,12 @@ def read_rig(path: str | Path, *, format: str | None = None, units: str | None =
         with np.errstate(all="ignore"):  # what is not finite any more the model refuses
             return chosen.read(path, unit)
     except OSError as error:
-        what = error.strerror or str(error)
-        raise FormatError(path, "reading", "a readable calibration", what) from error
+        raise not_read(path, error) from error
 
 
-def write_rig(rig: Rig, path: str | Path, *, format: str | None = None) -> None:
+def write_rig(
+    rig: Rig, path: str | Path, *, format: str | None = None, overwrite: bool = False
+) -> None:
     """Write cameras to a calibration; it is there as a whole afterwards, or untouched.
 
     Parameters
@@ -79,6 +89,8 @@ def write_rig(rig: Rig, path: str | Path, *, format: str | None = None) -> None:
     format : str, optional
         Key of `CALIBRATIONS`; by default it is told by the ending of the name, and ``.toml`` is
         the format "rig", which holds everything exactly.
+    overwrite : bool
+        Allow a folder that holds files, if each of them is one that is replaced.
 
     Raises
     ------
@@ -99,21 +111,26 @@ def write_rig(rig: Rig, path: str | Path, *, format: str | None = None) -> None:
         with replacing(path) as file:
             file.write(content)
     else:
-        _write_folder(path, content)
+        _write_folder(path, content, overwrite=overwrite)
 
 
-def _write_folder(path: Path, content: dict[str, bytes]) -> None:
+def _write_folder(path: Path, content: dict[str, bytes], *, overwrite: bool) -> None:
     try:
-        if path.exists() and (not path.is_dir() or any(path.iterdir())):
-            got = f"{path}, {'which holds files' if path.is_dir() else 'a file'}"
-            raise ParameterError("path", "a folder that is new or empty", got)
+        if path.exists() and not path.is_dir():
+            raise ParameterError("path", "a folder that is new or empty", f"{path}, a file")
+        there = sorted(file.name for file in path.iterdir()) if path.exists() else []
+        left = [name for name in there if name not in content] if overwrite else there
+        if left:
+            expected = (
+                "a folder without other files" if overwrite else "a folder that is new or empty"
+            )
+            raise ParameterError("path", expected, f"{path}, which holds {left[0]}")
         path.mkdir(exist_ok=True)
         for name, text in content.items():
             with replacing(path / name) as file:
                 file.write(text)
     except OSError as error:
-        what = error.strerror or str(error)
-        raise FormatError(path, "writing", "a folder that can be written", what) from error
+        raise not_written(path, error) from error
 
 
 def format_to_write(path: Path, format: str | None) -> CalibrationFormat:
@@ -147,8 +164,7 @@ def format_to_write(path: Path, format: str | None) -> CalibrationFormat:
 
 
 def _named(name: str) -> CalibrationFormat:
-    if name not in CALIBRATIONS:
-        raise ParameterError("format", f"one of {', '.join(CALIBRATIONS)}", repr(name))
+    check_fields("format", [name], CALIBRATIONS)
     return CALIBRATIONS[name]
 
 
@@ -169,15 +185,10 @@ def _openable(path: Path, chosen: CalibrationFormat) -> CalibrationFormat:
         return chosen
     kinds = [k for k, f in (("file", chosen.sniff), ("folder", chosen.sniff_folder)) if f]
     expected = f"a {' or a '.join(kinds)} of format {chosen.name}"
-    raise FormatError(path, "opening", expected, _what_it_is(path))
-
-
-def _what_it_is(path: Path) -> str:
-    if path.is_dir():
-        return "a folder"
-    if path.is_file():
-        return "a file"
-    return "a device or pipe" if path.exists() else "nothing of that name"
+    if is_folder:
+        raise FormatError(path, "", expected, "a folder")
+    check_file(path, expected)
+    raise FormatError(path, "", expected, "a file")
 
 
 def format_of(path: Path) -> CalibrationFormat:
@@ -204,8 +215,7 @@ def format_of(path: Path) -> CalibrationFormat:
                 return candidate
         expected = "camera1.Pmat.cal and so on, or camera files of MyPTV"
         raise FormatError(path, "its files", expected, "none of them")
-    if not path.is_file():
-        raise FormatError(path, "opening", "a calibration", _what_it_is(path))
+    check_file(path, "a calibration")
     with path.open("rb") as file:
         head = file.read(_HEAD)
     by_name = [c for c in every if path.name.lower().endswith(c.extensions)]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from asterism.io.calibration import anipose, flydra, myptv, opencv, qca, rig_toml, xcp
+from asterism.records import Registry, record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["CALIBRATIONS", "CalibrationFormat"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@record
 class CalibrationFormat:
     """A calibration format.
 
@@ -56,9 +56,14 @@ class CalibrationFormat:
     has_skew: bool = True
     has_k3: bool = True
 
+    @property
+    def is_folder(self) -> bool:
+        """Whether a rig is written as a folder of files."""
+        return not self.extensions
 
-CALIBRATIONS: dict[str, CalibrationFormat] = {
-    c.name: c
+
+CALIBRATIONS: dict[str, CalibrationFormat] = Registry(
+    (c.name, c)
     for c in (
         CalibrationFormat(
             name="rig",
@@ -134,4 +139,4 @@ CALIBRATIONS: dict[str, CalibrationFormat] = {
             sniff_folder=myptv.sniff_folder,
         ),
     )
-}
+)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError
+from asterism.errors import FormatError, ParameterError, check_fields, check_file, not_read
 from asterism.io.calibration.parts import read_bytes
 from asterism.io.units import PER_METRE, parse_unit
 
@@ -75,14 +75,13 @@ def read_sightings(
     ParameterError
         If the camera is unknown, or not told by the file's name.
     """
-    if not path.is_file():
-        raise FormatError(path, "opening", "a file", "a folder" if path.is_dir() else "nothing")
+    check_file(path)
     try:
         text = read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise FormatError(path, f"byte {error.start}", "text in UTF-8", error.reason) from error
     except OSError as error:
-        raise FormatError(path, "reading", "a readable file", error.strerror) from error
+        raise not_read(path, error) from error
     unit = None if units is None else parse_unit(units)
     if units is not None and unit is None:
         raise ParameterError("units", f"one of {', '.join(PER_METRE)}", repr(units))
@@ -96,9 +95,7 @@ def read_sightings(
         name = _whose(path, cameras) if camera is None else camera
         rows = [(name, *numbers) for numbers in _table(path, text)]
         scale = PER_METRE[unit or "mm"]
-    for name in dict.fromkeys(row[0] for row in rows):
-        if name not in cameras:
-            raise ParameterError("camera", f"one of {', '.join(cameras)}", repr(name))
+    check_fields("camera", dict.fromkeys(row[0] for row in rows), cameras)
     found: list[Sightings] = []
     for name in cameras:
         numbers = np.array([row[1:] for row in rows if row[0] == name]).reshape(-1, 5)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_fields
 from asterism.simulate.clock import clock
 from asterism.simulate.people.activities import Walker
 from asterism.simulate.people.course import Course
@@ -82,8 +82,7 @@ def two_people(
         check_person(n_markers, **{f"heights[{i}]": height})
     if max(heights) > 1.2 * min(heights) + 1e-9:
         raise ParameterError("heights", "heights not more than a fifth apart", repr(heights))
-    if activity not in PAIR_ACTIVITIES:
-        raise ParameterError("activity", f"one of {', '.join(PAIR_ACTIVITIES)}", repr(activity))
+    check_fields("activity", [activity], PAIR_ACTIVITIES)
     rng = np.random.default_rng(seed)
     bodies = [Body(height=float(height)) for height in heights]
     poses = PAIR_ACTIVITIES[activity](t, bodies, rng)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_number
+from asterism.errors import check_fields, check_number
 from asterism.simulate.clock import clock
 from asterism.simulate.people.activities import run, turn, walk
 from asterism.simulate.people.gait import Style
@@ -80,8 +80,7 @@ def person(
     """
     t = clock(frames, rate, seed)
     check_person(n_markers, height=height)
-    if activity not in ACTIVITIES:
-        raise ParameterError("activity", f"one of {', '.join(ACTIVITIES)}", repr(activity))
+    check_fields("activity", [activity], ACTIVITIES)
     rng = np.random.default_rng(seed)
     body = Body(height=float(height))
     pose = ACTIVITIES[activity](t, body, Style.drawn(rng), rng)

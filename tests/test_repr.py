@@ -1,0 +1,221 @@
+"""The ``repr`` of every public object: one short line that says what it is."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import inspect
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.records import MAX_REPR, record
+
+NAMESPACES = (
+    "asterism", "asterism.simulate", "asterism.camera", "asterism.model", "asterism.filter",
+    "asterism.associate", "asterism.label", "asterism.reconstruct", "asterism.solve",
+    "asterism.evaluate", "asterism.io", "asterism.io.calibration", "asterism.view",
+    "asterism.reporting", "asterism.errors",
+)  # fmt: skip
+
+
+def public():
+    """Every public class, by its name."""
+    found = {}
+    for name in NAMESPACES:
+        module = importlib.import_module(name)
+        found |= {
+            n: getattr(module, n) for n in module.__all__ if inspect.isclass(getattr(module, n))
+        }
+    return found
+
+
+PUBLIC = public()
+# Contracts that other classes fill, and the base of the lists of what can be chosen.
+ABSTRACT = {name for name, kind in PUBLIC.items() if inspect.isabstract(kind)} | {"Motion"}
+LONG = "a name that is much longer than any that people would give a camera or a marker " * 5
+
+
+def instances():
+    """Objects of all public classes: large ones, and options that all differ from the defaults."""
+    rng = np.random.default_rng(1)
+    truth = am.simulate.person(frames=30, seed=1)
+    d = truth.detections
+    capture = am.Capture.from_frames(d.times, [d.frame(t) for t in range(d.n_frames)])
+    capture = dataclasses.replace(capture, path=Path(f"{LONG}.c3d"))
+    plain = am.TrackingModel(
+        motion=am.DWNA(acceleration_sigma=20 / 3, velocity_sigma=1 / 3),
+        sensor=am.Sensor(
+            noise_sigma=1 / 3000,
+            p_detection=0.9 + 1 / 37,
+            clutter_density=1 / 7,
+            p_redetection=1 / 3,
+        ),
+        population=am.Population(
+            birth_density=1 / 7, p_disappear=1 / 300, max_speed=16 / 3, max_gap=50
+        ),
+    )
+    motions = tuple(am.DWNA(acceleration_sigma=a, velocity_sigma=1 / 3) for a in (1 / 7, 3.1, 30.7))
+    several = am.InteractingMotions(models=motions, transitions=np.full((3, 3), 1 / 3))
+    model = dataclasses.replace(plain, motion=several)
+    rig = am.Rig.ring(30, radius=4, height=2)
+    film = am.simulate.film(truth, rig)
+    tracks = am.track(d, am.JPDA(), model=plain)
+    aligned = am.align(tracks, truth)
+    labels = aligned.labels, aligned.truth_labels
+    by_frame = (*labels, aligned.frame_of)
+    state, update = am.GNN().step(am.GNN().init(plain), 0.0, d.frame(0))
+    space = am.triangulation_map(rig, (-1, -1, 0), (1, 1, 1))
+    made = am.reconstruct(film.observations, rig)
+    polygon = am.Polygon(corners=[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], name=LONG)
+    gap = am.Gap(
+        track=3, first=10, last=20, seconds=1 / 3, weights={"smoother": 1 / 3, "body": 2 / 3},
+        rms={"smoother": 1 / 300, "body": 1 / 300}, n_windows=7, std=1 / 300, n_neighbours=5,
+        reason="",
+    )  # fmt: skip
+    changed = {
+        "gate_probability": 1.23456789e-7, "confirm_probability": 0.987654, "delete_odds": 1e5 / 3,
+        "bodies": True, "max_carried": 12345, "bond_weight": 10 / 3, "window": 5, "max_states": 777,
+        "prune_odds": 1e5 / 3, "new_track_odds": 1e5 / 3, "max_hypotheses": 77,
+        "merged_within": 1 / 30, "guard": False,
+    }  # fmt: skip
+    methods = []
+    for kind in am.METHODS.values():
+        known = {f.name for f in dataclasses.fields(kind)}
+        methods += [kind(), kind(**{k: v for k, v in changed.items() if k in known - {"capacity"}})]
+    return [
+        *methods, am.Stitched(), am.Stitched().init(plain), state, update,
+        am.MCMCDA(window=50, moves=12.345, deadline=1 / 3, confidence=12.345, end_odds=123.4,
+                  chains=4, threads=2, doubt=3.21, bonds=3, bond_weight=1 / 3, at_doubts=0.25,
+                  proposal="uniform", move_weights="report"),
+        plain.motion, several, am.RandomWalk(walk_sigma=1 / 3),
+        am.DWPA(increment_sigma=1 / 3, acceleration_prior_sigma=20 / 3),
+        am.LinearMotion(F=np.eye(3), Q=np.eye(3), H=np.eye(3)[0], step=0.01,
+                        prior_covariance=np.eye(3)),
+        plain, model, plain.sensor, plain.population, am.estimate_model(d),
+        truth, d, capture, tracks, am.describe(capture),
+        rig, rig[0], dataclasses.replace(rig[0], name=LONG), film, film.projection,
+        film.observations, polygon, am.Mesh(vertices=np.eye(3), faces=[[0, 1, 2]]),
+        am.Capsule(ends=[[0, 0, 0], [0, 0, 1]], radius=0.1), am.Reason.VISIBLE,
+        rig[0].depth_image([polygon]), rig[0].paint([polygon]), am.Face(0, 0),
+        am.fit_lens(rig[0], am.BrownConrady), space, space.suggestions[0], space.coverage,
+        am.triangulate(np.zeros((30, 4, 2)), rig), made, made.views, made.model,
+        am.BrownConrady(k1=1 / 3, k2=1 / 3, p1=1 / 3, p2=1 / 3, k3=1 / 3),
+        am.ReportRadial(1 / 3, 1 / 3), am.ViconRadial(1 / 3, 1 / 3, 1 / 3),
+        am.QuadraticCorrection(ex=(1 / 3,) * 5, ey=(1 / 3,) * 5),
+        am.choose_method(d, plain), am.stitch(tracks, plain), am.fill(tracks), gap,
+        am.learn_bonds(truth), am.recognize(tracks, am.learn_bonds(truth)),
+        am.Join(marker=3, last=5, first=17, probability=1 / 3),
+        am.HypothesisCluster(
+            targets=np.arange(9), detections=np.arange(90), origins=np.zeros((50, 9), dtype=int),
+            probabilities=np.full(50, 1 / 50),
+        ),
+        am.filter_states(tracks, plain), am.gate_groups(tracks, plain), aligned,
+        am.evaluate(tracks, truth), am.point_scores(made.detections, truth),
+        am.hota_scores(*labels), am.identity_scores(*labels), am.clear_scores(*by_frame),
+        am.gospa_scores(*by_frame), am.association_scores(*by_frame),
+        am.calibration(rng.random(50), rng.random(50) < 0.5),
+        am.k_best_assignments(rng.random((20, 20)), k=9),
+        am.joint_marginals(np.zeros((9, 9)), np.zeros(9)),
+        am.assign_multidimensional([[0, 1], [1, 0]], [1 / 3, 2 / 3]),
+        am.simulate.Burst(n=3), am.simulate.Ghosts(n=3), am.simulate.Visits(),
+        am.simulate.Seeing(noise_px=1 / 3), *am.simulate.SCENES.values(), am.simulate.SCENES,
+        *am.FORMATS.values(), am.FORMATS, *am.CALIBRATIONS.values(), am.CALIBRATIONS, am.METHODS,
+        am.ParameterError(LONG, LONG, LONG, LONG), am.FormatError(LONG, LONG, LONG, LONG),
+        am.SolverLimit(LONG, 3, 2, LONG), am.AsterismError(LONG),
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def objects():
+    return instances()
+
+
+def test_each_public_class_has_an_instance_here(objects):
+    there = {kind.__name__ for value in objects for kind in type(value).__mro__}
+    assert set(PUBLIC) - ABSTRACT - there == set()
+
+
+def test_each_fits_in_a_line(objects):
+    for value in objects:
+        text = repr(value)
+        assert len(text) <= MAX_REPR, text
+        assert text.isprintable(), text
+        assert " at 0x" not in text, text
+        is_short = isinstance(value, am.simulate.Visits) or not dataclasses.is_dataclass(value)
+        assert is_short or text.startswith(f"{type(value).__name__}("), text
+
+
+def test_public_dataclasses_name_a_misspelt_argument():
+    for name, kind in PUBLIC.items():
+        if dataclasses.is_dataclass(kind) and name not in ABSTRACT:
+            with pytest.raises(am.ParameterError, match="xyzzy"):
+                kind(xyzzy=1)
+
+
+def test_the_key_numbers_are_in_it():
+    truth = am.simulate.cube(seed=1, frames=20)
+    d = truth.detections
+    model = am.TrackingModel(
+        motion=am.DWNA(acceleration_sigma=20),
+        sensor=am.Sensor(noise_sigma=0.0003, p_detection=0.95, clutter_density=0.1),
+        population=am.Population(birth_density=0.1, p_disappear=0.01, max_speed=8, max_gap=10),
+    )
+    state, update = am.GNN().step(am.GNN().init(model), 0.0, d.frame(0))
+    film = am.simulate.film(truth, am.Rig.ring(4, radius=4, height=1))
+    n = film.observations.n_points
+    said = {
+        "GNN(delete_odds=50)": am.GNN(delete_odds=50),
+        "GNN()": am.GNN(),
+        "TrackingModel(noise 0.3 mm, P_d 0.95, clutter 0.1/m^D, gaps ≤ 10 frames, "
+        "speeds ≤ 8 m/s, DWNA(acceleration_sigma=20))": model,
+        "EngineState(3-D, 1 frames and 8 detections taken, 0 tracks so far)": state,
+        "Update(8 detections, 0 in tracks, 0 earlier labels revised)": update,
+        f"Film(4 cameras, 20 frames, 8 markers, {n} image points)": film,
+        "Truth(8 tracks, 160 detections in them, 0 clutter, 20 frames)": truth,
+        "8 by name: gnn, smp, jpda, splitting, tomht, mda, mht, mcmcda": am.METHODS,
+    }
+    assert list(said) == [repr(value) for value in said.values()]
+
+
+@record
+class Record:
+    """Three fields, two of them optional."""
+
+    first: int
+    second_length: float = 2.0
+    third: tuple[int, ...] = ()
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Record(firstt=1), "Record: expected one of first, second_length, third, found "
+         "'firstt'. Did you mean 'first'?"),
+        (lambda: Record(first=1, lngth=1), "Did you mean 'second_length'?"),
+        (lambda: Record(), "Record.first: expected a value, found nothing"),
+        (lambda: Record(1), "expected options by name, found 1 without one. Write Record(first=…)"),
+        (lambda: am.GNN(gatee=3), "Did you mean 'gate_probability'?"),
+        (lambda: am.BrownConrady(1, 2, 3, 4, 5, 6), "expected 5 values without a name, found 6"),
+        (lambda: am.BrownConrady(1, k1=2), "BrownConrady.k1: expected one value, found two"),
+        (lambda: dataclasses.replace(am.GNN(), delete_ods=5), "Did you mean 'delete_odds'?"),
+    ],
+)  # fmt: skip
+def test_a_misspelt_argument_is_named(make, says):
+    with pytest.raises(am.ParameterError) as caught:
+        make()
+    assert says in str(caught.value)
+
+
+def test_errors_within_a_constructor_stay_as_they_are():
+    @record
+    class Broken:
+        value: int
+
+        def __post_init__(self):
+            raise TypeError("of its own")
+
+    with pytest.raises(TypeError, match="of its own"):
+        Broken(value=1)
