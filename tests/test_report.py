@@ -370,3 +370,16 @@ def test_commands_write_pages(tmp_path, monkeypatch, capsys):
         assert main(line.split()) == 2
         assert "Traceback" not in capsys.readouterr().err
     assert not (tmp_path / "a.csv").exists()
+
+
+def test_the_page_opens_where_the_capture_does(tmp_path):
+    # Usual are five points; a quarter of the frames is empty, then stray points come.
+    counts = [0] * 30 + [1] * 10 + [2] * 10 + [3] + [5] * 60
+    frames = [np.arange(3.0 * n).reshape(n, 3) for n in counts]
+    d = am.Detections.from_frames(np.arange(len(counts)) / 100, frames)
+    labels = np.concatenate([np.arange(n) for n in counts])
+    tracks = am.Tracks(detections=d, labels=labels)
+    assert unpacked(written(tmp_path, tracks))[0]["opens"] == 50
+    nothing = am.Detections.from_frames([0, 0.01], [np.empty((0, 3))] * 2)
+    empty = am.Tracks(detections=nothing, labels=[])
+    assert unpacked(written(tmp_path, empty))[0]["opens"] == 0

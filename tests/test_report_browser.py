@@ -237,3 +237,17 @@ def test_without_webgl_all_else_works(browser, person):
     assert int(page.run("document.getElementById('image').dataset.seen")) > 0
     assert page.events("Runtime.exceptionThrown") == []
     page.close()
+
+
+def test_the_page_opens_on_the_first_full_frame(browser, tmp_path):
+    truth = am.simulate.cube(seed=1, frames=60)
+    frames = [truth.detections.frame(t)[: 0 if t < 20 else 8] for t in range(60)]
+    d = am.Detections.from_frames(truth.detections.times, frames)
+    tracks = am.Tracks(detections=d, labels=np.tile(np.arange(8), 40))
+    am.report(tracks, tmp_path / "late.html")
+    page = browser.page(tmp_path / "late.html")
+    assert page.run("asterism.state().frame") == 20
+    assert page.run("document.getElementById('frame').value") == "20"
+    assert page.run("document.getElementById('clock').textContent") == "20.000 s · frame 20"
+    assert page.run("asterism.where(0)") is not None  # a marker is on the canvas
+    page.close()

@@ -7,7 +7,7 @@ export class State extends EventTarget {
   constructor(capture) {
     super();
     this.capture = capture;
-    this.frame = 0;
+    this.frame = capture.header.opens;
     this.chosen = -1;
     this.hovered = -1;
     this.follow = false;
@@ -15,7 +15,7 @@ export class State extends EventTarget {
     this.speed = 1;
     this.camera = 0;
     this.show = { names: false, lines: true, clutter: true, cameras: true, trails: 0.5 };
-    this.clock = 0; // time of playing, seconds; between frames it is not that of a frame
+    this.clock = capture.times[this.frame] ?? 0; // time of playing, seconds; between frames it is not that of a frame
     this.before = null;
   }
 

@@ -18,7 +18,7 @@ from asterism.view.style import CLUTTER, CYCLE, MISSED, WRONG
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.model import Tracks
+    from asterism.model import Detections, Tracks
     from asterism.view.report.contents import Contents
 
 __all__ = ["Played", "played"]
@@ -108,6 +108,7 @@ def played(contents: Contents, order: NDArray[np.int64]) -> Played:
         "names": track_names(tracks),
         "markers": [] if judged is None else list(judged.names),
         "frame": [_first_frame(full), stride],
+        "opens": _opening_frame(d),
         "cameras": cameras,
         "lensSide": SIDE,
         "colours": {"cycle": CYCLE, "clutter": CLUTTER, "wrong": WRONG, "missed": MISSED},
@@ -137,6 +138,17 @@ def _box(points: NDArray[np.float64]) -> list[list[float]]:
 def _first_frame(tracks: Tracks) -> int:
     d = tracks.detections
     return d.first_frame if isinstance(d, Capture) else 0
+
+
+def _opening_frame(d: Detections) -> int:
+    """Give the first frame with at least half of the usual number of points.
+
+    Usual is the median over the frames that hold any: many captures begin before the subject does.
+    """
+    counts = d.counts
+    if not counts.any():
+        return 0
+    return int(np.argmax(2 * counts >= np.median(counts[counts > 0])))
 
 
 def _cameras(
