@@ -146,7 +146,7 @@ def test_convert_refuses_before_it_writes(run, tmp_path):
         (("a.toml", "b"), "ending in"),
         (("a.toml", "b.toml", "--lens", "fish"), "--lens"),
         (("a.toml", "b.toml", "--format", "theia"), "format"),
-        (("none.xcp", "b.toml"), "nothing of that name"),
+        (("none.xcp", "b.toml"), "none.xcp: no such file"),
         (("a.toml", "b.xcp", "--lens", "brown"), "ViconRadial"),
         (("a.toml", "no/b.xcp"), "folder that exists"),
         (("a.toml", "b.xcp", "--units", "mm"), "units"),

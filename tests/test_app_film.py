@@ -259,7 +259,8 @@ def test_a_folder_with_files_and_the_input_are_safe(here, capsys):
     assert before == {p: p.read_bytes() for p in Path("out").iterdir()}
     run("film in.csv --rig ring3 -o out --pictures 0 -q --overwrite", capsys)
     assert before == {p: p.read_bytes() for p in Path("out").iterdir()}  # same input, same bytes
-    assert "a folder" in refused("film in.csv --rig ring3 -o in.csv", capsys)
+    Path("film.txt").write_text("a file")
+    assert "a folder" in refused("film in.csv --rig ring3 -o film.txt", capsys)
 
 
 def test_every_camera_has_its_tile_and_every_marker_its_colour(gappy):

@@ -80,7 +80,7 @@ def test_fields_types_defaults_and_texts():
     ],
 )
 def test_values(text, value):
-    (found,) = parsed("it", [text], method_options(Derived)).values()
+    (found,) = parsed("--option", "it", [text], method_options(Derived)).values()
     assert found == value
     assert type(found) is type(value)
 
@@ -90,19 +90,21 @@ def test_values(text, value):
 )
 def test_refused_values(text):
     with pytest.raises(ParameterError):
-        parsed("it", [text], method_options(Derived))
+        parsed("--option", "it", [text], method_options(Derived))
 
 
 def test_the_last_of_one_name_counts_and_dashes_will_do():
     options = method_options(am.METHODS["gnn"])
-    assert parsed("gnn", ["delete-odds=5", "delete_odds=7"], options) == {"delete_odds": 7.0}
+    assert parsed("--option", "gnn", ["delete-odds=5", "delete_odds=7"], options) == {
+        "delete_odds": 7.0
+    }
 
 
 def test_bodies_are_options_of_the_methods_that_have_them():
     having = {name for name in am.METHODS if "bodies" in method_options(am.METHODS[name])}
     assert having == set(am.METHODS) - {"mcmcda"}
     options = method_options(am.METHODS["gnn"])
-    given = parsed("gnn", ["bodies=yes", "max-carried=30", "bond-weight=0"], options)
+    given = parsed("--option", "gnn", ["bodies=yes", "max-carried=30", "bond-weight=0"], options)
     assert am.GNN(**given) == am.GNN(bodies=True, max_carried=30, bond_weight=0.0)
 
 

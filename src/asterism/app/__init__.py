@@ -29,7 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def run() -> None:
         from asterism.app.commands import app
+        from asterism.app.usage import run_app
 
-        app(args=None if arguments is None else list(arguments), prog_name="asterism")
+        run_app(app, None if arguments is None else list(arguments))
 
     return exit_code(run)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ def bonds(
     source: _In,
     out: _Out = None,
     neighbours: _Neighbours = 12,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -41,16 +42,17 @@ def bonds(
     """
     import asterism as am
     from asterism.app.files import check_ending, check_outputs
+    from asterism.app.run_folder import write_text
 
-    check_outputs({"-o": out}, [source])
-    check_ending("-o", out, ".toml")
+    check_ending("--out", out, ".toml")
+    check_outputs({"--out": out}, [source], overwrite=overwrite)
     capture = am.read(source)
     if not (capture.labels >= 0).any():
-        hint = "asterism track makes them first"
+        hint = "run asterism track first"
         raise ParameterError("IN", "a capture with tracks", f"none in {source}", hint)
     found = am.learn_bonds(capture.tracks, neighbours=neighbours)
     if out is not None:
-        found.to_toml(out)
+        write_text(out, found.to_toml())
     if json:
         written = None if out is None else str(out)
         print_json({"input": str(source), "output": written} | bond_figures(found))

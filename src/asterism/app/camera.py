@@ -15,8 +15,9 @@ from asterism.app.calibration_options import (
     read_calibration,
 )
 from asterism.app.camera_map import map_
-from asterism.app.console import Json, Quiet, print_json, print_table
-from asterism.errors import ParameterError
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table
+from asterism.app.options import with_option_names
+from asterism.errors import check_fields
 
 if TYPE_CHECKING:
     from asterism.app.camera_check import Check
@@ -126,6 +127,7 @@ def convert(
     lens: _LensOption = "auto",
     from_format: FromFormat = None,
     units: LengthUnits = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -142,20 +144,24 @@ def convert(
 
         asterism camera convert walk.qca.txt folder --format flydra
     """
-    from asterism.app.files import check_outputs
+    from asterism.app.files import Folder, check_outputs
     from asterism.app.options import as_options
     from asterism.camera import Rig
     from asterism.io.calibration import write_rig
     from asterism.io.calibration.files import format_to_write
 
-    check_outputs({"OUT": out}, [calibration])
     with as_options({"path": "OUT", "format": "--format"}):
         chosen = format_to_write(out, to_format)
+    check_fields("--lens", [lens], ("auto", *_LENSES))
+    target = Folder(out) if chosen.is_folder else out
+    check_outputs({"OUT": target}, [calibration], overwrite=overwrite)
     rig = read_calibration(calibration, from_format, units)
     fits = [_fitted(camera, lens, chosen) for camera in rig]
     cameras = [c if fit is None else fit.camera for c, fit in zip(rig, fits, strict=True)]
     with as_options({"path": "OUT"}):
-        write_rig(Rig(tuple(cameras)), out, format=chosen.name)
+        if chosen.is_folder:
+            out.mkdir(parents=True, exist_ok=True)
+        write_rig(Rig(tuple(cameras)), out, format=chosen.name, overwrite=overwrite)
     changes = [
         {
             "name": name,
@@ -179,16 +185,17 @@ def convert(
             print_table(_warnings(rig.warnings))
 
 
+_LENSES = ("brown", "vicon", "report", "none")
+
+
 def _fitted(camera: Any, lens: str, chosen: CalibrationFormat) -> LensFit | None:
     from asterism.camera import BrownConrady, ReportRadial, ViconRadial
     from asterism.io.calibration.fitting import fit_kind, fit_to_format
 
-    kinds = {"brown": BrownConrady, "vicon": ViconRadial, "report": ReportRadial, "none": None}
     if lens == "auto":
         return fit_to_format(camera, chosen)
-    if lens not in kinds:
-        raise ParameterError("--lens", f"one of auto, {', '.join(kinds)}", repr(lens))
-    kind = kinds[lens]
+    kinds = (BrownConrady, ViconRadial, ReportRadial, None)
+    kind = kinds[_LENSES.index(lens)]
     is_there = camera.lens is None if kind is None else isinstance(camera.lens, kind)
     if is_there and fit_to_format(camera, chosen) is None:
         return None
@@ -269,4 +276,4 @@ def _sightings(points: list[str], names: tuple[str, ...], units: str | None) -> 
     return found
 
 
-app.command("map")(map_)
+app.command("map")(with_option_names(map_))

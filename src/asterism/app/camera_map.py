@@ -13,7 +13,7 @@ from asterism.app.calibration_options import (
     LengthUnits,
     read_calibration,
 )
-from asterism.app.console import Json, Quiet, print_json, print_table
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ def map_(
     spacing: _Spacing = None,
     sigma: _Sigma = 0.3,
     suggest: _Suggest = 3,
+    overwrite: Overwrite = False,
     from_format: FromFormat = None,
     units: LengthUnits = None,
     quiet: Quiet = False,
@@ -74,8 +75,8 @@ def map_(
     from asterism.app.options import as_options
     from asterism.reconstruct import triangulation_map
 
-    check_outputs({"-o": out}, [calibration])
-    check_ending("-o", out, ".png")
+    check_ending("--out", out, ".png")
+    check_outputs({"--out": out}, [calibration], overwrite=overwrite)
     if (low is None) != (high is None):
         raise ParameterError("--low", "both --low and --high, or neither", "one of them")
     rig = read_calibration(calibration, from_format, units)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table, progress
 from asterism.app.reconstruct import Prior, about, expected_from, figures, true_tracks
 
 _Scene = Annotated[str, typer.Argument(metavar="SCENE", help="One of `asterism scenes`.")]
@@ -39,7 +39,6 @@ _Seeing = Annotated[
         show_default="noise_px=0.3",
     ),
 ]
-_Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let DIR hold files already.")]
 
 OBSERVATIONS, RIG, TRUTH, POINTS = "observations.csv", "rig.toml", "truth.csv", "points.csv"
 
@@ -55,7 +54,7 @@ def chain(
     option: _Options = None,
     seeing: _Seeing = None,
     prior: Prior = False,
-    overwrite: _Overwrite = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -74,18 +73,19 @@ def chain(
         asterism chain two_people --rig ring8 --seeing false=0.5 --seeing noise_px=0.3 -o chain
     """
     import asterism as am
+    from asterism.app.files import Folder, check_outputs
     from asterism.app.recording import made_scene, rig_from, seeing_from
-    from asterism.app.run_folder import check_folder
     from asterism.associate import AUTO
     from asterism.errors import check_fields
 
     names = method or [AUTO]
     check_fields("--method", names, (AUTO, *am.METHODS))
+    eyes = seeing_from(seeing or ["noise_px=0.3"])
     if out is not None:
-        check_folder(out, overwrite=overwrite)
+        files = (OBSERVATIONS, RIG, TRUTH, POINTS, *(f"tracks_{name}.csv" for name in names))
+        check_outputs({"--out": Folder(out, files)}, [Path(rig)], overwrite=overwrite)
     truth, values = made_scene(scene, {"frames": frames, "rate": rate, "seed": seed}, option or [])
     cameras, about_rig = rig_from(rig, truth.detections.points)
-    eyes = seeing_from(seeing or ["noise_px=0.3"])
     shot = am.simulate.film(truth, cameras, seeing=eyes, seed=seed)
     o = shot.observations
     start = time.perf_counter()

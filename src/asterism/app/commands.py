@@ -18,6 +18,7 @@ from asterism.app.fill import fill
 from asterism.app.film import film
 from asterism.app.info import info
 from asterism.app.methods import methods, scenes
+from asterism.app.options import with_option_names
 from asterism.app.plot import plot
 from asterism.app.recognize import recognize
 from asterism.app.reconstruct import reconstruct
@@ -65,5 +66,5 @@ _TITLES = {
 }
 for _title, _commands in _TITLES.items():
     for _command in _commands:
-        app.command(rich_help_panel=_title)(_command)
+        app.command(rich_help_panel=_title)(with_option_names(_command))
 app.add_typer(camera, rich_help_panel="Cameras")

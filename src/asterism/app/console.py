@@ -18,9 +18,19 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-__all__ = ["Json", "Quiet", "console", "print_json", "print_table", "progress", "to_json"]
+__all__ = [
+    "Json",
+    "Overwrite",
+    "Quiet",
+    "console",
+    "print_json",
+    "print_table",
+    "progress",
+    "to_json",
+]
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that exist.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 _PIPED_WIDTH = 200  # columns where there is no terminal to ask, so that lines stay whole

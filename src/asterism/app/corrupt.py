@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.errors import ParameterError
 
 log = logging.getLogger(__name__)
@@ -60,6 +60,7 @@ def corrupt(
     stride: _Stride = 1,
     sense: _Sense = None,
     seed: _Seed = 0,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -81,11 +82,17 @@ def corrupt(
     from asterism.app.files import check_outputs
     from asterism.app.options import as_options
     from asterism.app.recording import episode, switches_from
+    from asterism.io.files import format_to_write
     from asterism.simulate import Burst, Ghosts
 
-    check_outputs({"--out": out, "--truth": truth}, [source])
-    hiding = None if burst is None else Burst(**episode("--burst", burst))
-    haunting = None if ghosts is None else Ghosts(**episode("--ghosts", ghosts))
+    with as_options({"path": "--out"}):
+        format_to_write(out, None)
+    with as_options({"path": "--truth"}):
+        format_to_write(truth, None)
+    check_outputs({"--out": out, "--truth": truth}, [source], overwrite=overwrite)
+    hiding = None if burst is None else episode("--burst", Burst, burst)
+    haunting = None if ghosts is None else episode("--ghosts", Ghosts, ghosts)
+    more = switches_from(sense or [])
     known = am.read_tracks(source)
     if not known.n_tracks:
         expected = "a capture whose markers are labelled"
@@ -101,24 +108,32 @@ def corrupt(
     extent = float(np.ptp(known.detections.points, axis=0).max(initial=0.0))
     if noise > extent / 10:
         log.warning("--noise %g: metres; the markers are within %.3g m", noise, extent)
-    more = switches_from(sense or [])
-    with as_options({name: f"--{name}" for name in ("seed", *switches) if name not in more}):
+    options = {name: f"--{name}" for name in ("seed", *switches)}
+    with as_options(options | {name: f"--sense {name}" for name in more}):
         spoilt = am.simulate.sense(known, **switches | more, seed=seed)
     unnamed = am.Tracks(
         detections=spoilt.detections, labels=np.full(spoilt.detections.n_points, -1)
     )
     am.write(spoilt, truth)
     am.write(unnamed, out)
+    measured = known.measured()
+    is_marker = np.array([name is not None for name in measured.names], dtype=bool)
+    n_of_markers = int(measured.lengths[is_marker if is_marker.any() else slice(None)].sum())
     figures = {
         "n_frames": spoilt.detections.n_frames,
         "n_markers": spoilt.n_tracks,
         "n_detections": spoilt.detections.n_points,
-        "n_dropped": int((known.labels >= 0).sum()) - int((spoilt.labels >= 0).sum()),
+        "n_dropped": n_of_markers - int((spoilt.labels >= 0).sum()),
+        "n_unnamed": measured.detections.n_points - n_of_markers,
         "n_clutter": int((spoilt.labels < 0).sum()),
     }
     if json:
         record = spoilt.record
         print_json({"output": str(out), "truth": str(truth), "sense": record, **figures})
     elif not quiet:
-        rows = [(name.removeprefix("n_"), n) for name, n in figures.items()]
+        about = {
+            "n_dropped": "detections of markers dropped",
+            "n_unnamed": "unnamed points left out",
+        }
+        rows = [(about.get(name, name.removeprefix("n_")), n) for name, n in figures.items()]
         print_table([*rows, ("without names", out), ("truth", truth)])

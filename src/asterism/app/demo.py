@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 _Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the files.")]
 _Seed = Annotated[int, typer.Option(help="Chooses everything that is random.")]
-_Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let DIR hold files already.")]
 
 _N_MARKERS, _N_FRAMES, _RATE = 20, 300, 100.0
 _ABOUT = (
@@ -29,7 +28,7 @@ _SCORES = ("idf1", "mota", "hota", "switches", "wrong_percent", "missing_percent
 def demo(
     out: _Out = Path("demo"),
     seed: _Seed = 1,
-    overwrite: _Overwrite = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -44,11 +43,14 @@ def demo(
         asterism demo -o /tmp/demo --seed 7
     """
     import asterism as am
-    from asterism.app.run_folder import Job, check_folder, sha256_of, write_text
+    from asterism.app.files import Folder, check_outputs
+    from asterism.app.run_folder import Job, sha256_of, write_text
     from asterism.app.track import resolved_method
     from asterism.app.tracking import carry_out
+    from asterism.errors import check_number
 
-    check_folder(out, overwrite=overwrite)
+    check_number("--seed", seed, above=0, closed=True, integer=True)
+    check_outputs({"--out": Folder(out)}, [], overwrite=overwrite)
     out.mkdir(parents=True, exist_ok=True)
     truth = _experiment(out, seed)
     capture = am.read(out / "capture.c3d")

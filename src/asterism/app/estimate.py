@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table, progress
 
 _In = Annotated[Path, typer.Argument(metavar="IN", help="Capture.")]
 _Out = Annotated[Path | None, typer.Option("--out", "-o", help="TOML file for the model.")]
@@ -29,6 +29,7 @@ def estimate(
     out: _Out = None,
     open_population: _Open = False,
     runs: _Runs = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -50,8 +51,8 @@ def estimate(
     from asterism.app.files import check_ending, check_outputs
     from asterism.app.run_folder import write_text
 
-    check_outputs({"-o": out}, [source])
-    check_ending("-o", out, ".toml")
+    check_ending("--out", out, ".toml")
+    check_outputs({"--out": out}, [source], overwrite=overwrite)
     capture = am.read(source)
     with progress("estimating the model"):
         found = am.estimate_model(

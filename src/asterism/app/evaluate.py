@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asterism.app.console import Json, Quiet, console, print_json
+from asterism.app.console import Json, Overwrite, Quiet, console, print_json
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ def evaluate(
     labels: _Labels,
     truth: _Truth,
     by_frame: _ByFrame = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -44,7 +45,7 @@ def evaluate(
     import asterism as am
     from asterism.app.files import check_outputs, read_labels
 
-    check_outputs({"--by-frame": by_frame}, [labels, truth])
+    check_outputs({"--by-frame": by_frame}, [labels, truth], overwrite=overwrite)
     found, true = read_labels(labels), am.read_tracks(truth)
     if not true.n_tracks:
         expected = "a capture whose markers are labelled"

@@ -1,10 +1,20 @@
-"""Where commands may write, and the files that several of them read."""
+"""Where commands may write, and the files that several of them read.
+
+The rules for every file and folder that a command writes, held before it reads or computes:
+
+- A file or a folder with files that exists needs ``--overwrite``, which replaces files of the same
+  names and leaves others.
+- What is read is never written, ``--overwrite`` or not.
+- A file goes into a folder that exists. A folder is made, with its parents.
+"""
 
 from __future__ import annotations
 
+import os
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from asterism.errors import FormatError, ParameterError
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -12,36 +22,114 @@ if TYPE_CHECKING:
 
     import asterism as am
 
-__all__ = ["check_ending", "check_outputs", "read_labels", "read_model", "truth_of_each"]
+__all__ = [
+    "Folder",
+    "check_ending",
+    "check_outputs",
+    "read_labels",
+    "read_model",
+    "truth_of_each",
+]
 
 _MARKS_CLUTTER = ("c3d", "csv")  # as Asterism writes them
 
 
-def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | None]) -> None:
-    """Raise before any work if a file would be written that is read, two into one, or nowhere.
+@dataclass(frozen=True)
+class Folder:
+    """A folder that a command writes.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    names : tuple of str
+        Files that are written in it.
+    """
+
+    path: Path
+    names: tuple[str, ...] = ()
+
+
+def check_outputs(
+    outputs: Mapping[str, Path | Folder | None],
+    inputs: Iterable[Path | None],
+    *,
+    overwrite: bool,
+) -> None:
+    """Raise before any work unless everything can be written where it is asked for.
 
     Parameters
     ----------
     outputs : mapping
-        Files to write, by the option that names them.
+        Files and folders to write, by the option that names them.
     inputs : iterable
         Files that are read.
+    overwrite : bool
+        Whether what exists may be replaced.
 
     Raises
     ------
     ParameterError
         With the option at fault.
     """
-    seen = {_identity(path): f"the input {path}" for path in inputs if path is not None}
-    for option, path in outputs.items():
-        if path is None:
+    seen = {_identity(file): f"the input {file}" for path in inputs for file in _files_of(path)}
+    for option, output in outputs.items():
+        if output is None:
             continue
-        identity = _identity(path)
-        if identity in seen:
-            raise ParameterError(option, "a file of its own", f"{path}, {seen[identity]}")
-        seen[identity] = f"which {option} names too"
-        if not path.resolve().parent.is_dir():
-            raise ParameterError(option, "a file in a folder that exists", path)
+        is_folder = isinstance(output, Folder)
+        written = {option: output.path if is_folder else output}
+        if is_folder:
+            written |= {f"{option} ({name})": output.path / name for name in output.names}
+        for place, path in written.items():
+            identity = _identity(path)
+            if identity in seen:
+                raise ParameterError(place, "a place of its own", f"{path}, {seen[identity]}")
+            seen[identity] = f"which {place} names too"
+        if is_folder:
+            _check_folder(option, output.path, overwrite=overwrite)
+        else:
+            _check_file(option, output, overwrite=overwrite)
+
+
+def _files_of(path: Path | None) -> list[Path]:
+    """Give an input, and of a folder the files in it: any of them may be read."""
+    if path is None:
+        return []
+    return [path, *(sorted(path.iterdir()) if path.is_dir() else ())]
+
+
+def _check_file(option: str, path: Path, *, overwrite: bool) -> None:
+    if path.is_dir():
+        raise ParameterError(option, "a file", f"the folder {path}")
+    if path.exists() and not path.is_file():
+        return  # a device or a pipe, which is written as it stands
+    parent = path.resolve().parent
+    if not parent.is_dir():
+        raise ParameterError(option, "a file in a folder that exists", path)
+    _check_access(option, path, parent)
+    if path.is_file() and not overwrite:
+        hint = "give --overwrite to replace it"
+        raise ParameterError(option, "a new file", f"{path}, which exists", hint)
+
+
+def _check_folder(option: str, path: Path, *, overwrite: bool) -> None:
+    if path.exists() and not path.is_dir():
+        raise ParameterError(option, "a folder or a new name", f"the file {path}")
+    if path.is_dir() and any(path.iterdir()) and not overwrite:
+        hint = "give --overwrite to replace those of the same names"
+        raise ParameterError(option, "a new or an empty folder", f"{path}, which holds files", hint)
+    there = path.resolve()
+    while not there.exists():
+        there = there.parent
+    if not there.is_dir():
+        raise ParameterError(option, "a folder within folders", f"{path}, within a file")
+    _check_access(option, path, there)
+
+
+def _check_access(option: str, path: Path, folder: Path) -> None:
+    if not os.access(folder, os.W_OK | os.X_OK):
+        got = f"{path}, and no permission to write in {folder}"
+        raise ParameterError(option, "a place that can be written to", got)
 
 
 def check_ending(option: str, path: Path | None, *endings: str) -> None:
@@ -83,10 +171,7 @@ def read_model(path: Path) -> am.TrackingModel:
     """
     import asterism as am
 
-    try:
-        return am.TrackingModel.from_toml(path)
-    except OSError as error:
-        raise FormatError(path, "opening", "a model in TOML", error.strerror) from error
+    return am.TrackingModel.from_toml(path)
 
 
 def read_labels(path: Path) -> am.Tracks:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table, progress
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def fill(
     longest: _Longest = 1.0,
     model: _Model = None,
     unflagged: _Unflagged = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -59,20 +60,22 @@ def fill(
     from asterism.app.files import check_outputs, read_model
     from asterism.app.tracking import output_format
 
-    check_outputs({"-o": out}, [source, model])
+    format = output_format(out, None)
+    if not (am.FORMATS[format].keeps_filled or unflagged):
+        able = ", ".join(name for name, f in am.FORMATS.items() if f.keeps_filled)
+        raise ParameterError(
+            "--out", f"a format that tells filled points from measured ones: {able}", str(out),
+            "or give --unflagged",
+        )  # fmt: skip
+    check_outputs({"--out": out}, [source, model], overwrite=overwrite)
     check_number("--longest", longest, above=0, below=1e9)
     tracks = am.read_tracks(source)
     capture = tracks.detections
     assert isinstance(capture, am.Capture)
     if not (tracks.labels >= 0).any():
-        raise ParameterError("IN", "a capture with tracks", f"none in {source}", "asterism track")
-    format = output_format(capture, out, None)
-    if not (am.FORMATS[format].keeps_filled or unflagged):
-        able = ", ".join(name for name, f in am.FORMATS.items() if f.keeps_filled)
         raise ParameterError(
-            "-o", f"a format that tells filled points from measured ones: {able}", str(out),
-            "or --unflagged",
-        )  # fmt: skip
+            "IN", "a capture with tracks", f"none in {source}", "run asterism track first"
+        )
     given = None if model is None else read_model(model)
     with progress("filling") as advance:
         found = am.fill(tracks, model=given, longest=longest, progress=advance)

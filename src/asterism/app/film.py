@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table, progress
 from asterism.errors import ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -57,7 +57,6 @@ _Seeing = Annotated[
         "missing, false, quantum_px, timing); may be repeated. Ideal without it.",
     ),
 ]
-_Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let DIR hold files already.")]
 
 POINTS, RIG, SUMMARY, PICTURES = "observations.csv", "rig.toml", "film.json", "pictures"
 RIG_PICTURE, COVERAGE_PICTURE = "rig.png", "coverage.png"
@@ -74,7 +73,7 @@ def film(
     seed: _Seed = None,
     option: _Options = None,
     seeing: _Seeing = None,
-    overwrite: _Overwrite = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -95,7 +94,7 @@ def film(
         asterism film crossing --rig wall4 -o film --seeing noise_px=0.2 --seeing false=0.5
     """
     from asterism.app.console import to_json
-    from asterism.app.files import check_outputs
+    from asterism.app.files import Folder, check_outputs
     from asterism.app.film_pictures import (
         contact_sheet,
         coverage_picture,
@@ -104,28 +103,27 @@ def film(
     )
     from asterism.app.filming import film_all, frames_between
     from asterism.app.recording import rig_from, seeing_from
-    from asterism.app.run_folder import check_folder, versions, write_text
+    from asterism.app.run_folder import versions, write_text
     from asterism.io.calibration import write_rig
     from asterism.io.observations import write_observations
 
     check_number("--pictures", pictures, above=0, below=10_000, closed=True, integer=True)
-    check_folder(out, overwrite=overwrite)
+    names = (POINTS, RIG, SUMMARY, RIG_PICTURE, COVERAGE_PICTURE)
+    inputs = [Path(text) for text in (source, rig) if Path(text).exists()]
+    check_outputs({"--out": Folder(out, names)}, inputs, overwrite=overwrite)
+    eyes = seeing_from(seeing or [])
     given = {"frames": frames, "rate": rate, "seed": seed}
     given = {name: value for name, value in given.items() if value is not None}
     truth, first_frame = _truth(source, given, option or [], is_seeing=bool(seeing))
-    eyes = seeing_from(seeing or [])
     points = truth.detections.points[truth.labels >= 0]
     if not len(points):
-        hint = "asterism track makes tracks of points without names"
+        hint = "run asterism track first: it makes tracks of points without names"
         raise ParameterError("CAPTURE", "points in tracks", f"{source}, which has none", hint)
     if points.shape[1] != 3:
         raise ParameterError("CAPTURE", "points in 3-D", f"{source}, in {points.shape[1]}-D")
     cameras, about = rig_from(rig, points)
 
     out.mkdir(parents=True, exist_ok=True)
-    names = (POINTS, RIG, SUMMARY, RIG_PICTURE, COVERAGE_PICTURE)
-    inputs = [Path(text) for text in (source, rig) if Path(text).exists()]
-    check_outputs({f"-o ({name})": out / name for name in names}, inputs)
     with progress("filming", truth.detections.n_frames) as advance:
         footage = film_all(truth, cameras, advance, eyes, seed or 0)
     write_observations(footage.observations, out / POINTS, first_frame=first_frame)

@@ -62,7 +62,7 @@ def scenes(scene: _Scene = None, json: Json = False) -> None:
 
     known = am.simulate.SCENES
     if scene is not None:
-        check_fields("scene", [scene], known)
+        check_fields("SCENE", [scene], known)
     if scene is None and not json:
         print_table([(name, s.about) for name, s in known.items()])
         return

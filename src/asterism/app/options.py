@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 import re
 import types
@@ -11,6 +12,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Union
 
+import typer
+
 from asterism.errors import ParameterError, check_fields
 
 if TYPE_CHECKING:
@@ -18,7 +21,14 @@ if TYPE_CHECKING:
 
     from asterism.associate import Method
 
-__all__ = ["Option", "as_options", "method_options", "parsed", "scene_options"]
+__all__ = [
+    "Option",
+    "as_options",
+    "method_options",
+    "parsed",
+    "scene_options",
+    "with_option_names",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,13 +101,17 @@ def scene_options(scene: Callable[..., Any]) -> dict[str, Option]:
     }
 
 
-def parsed(owner: str, texts: Sequence[str], known: dict[str, Option]) -> dict[str, Any]:
+def parsed(
+    option: str, owner: str, texts: Sequence[str], known: dict[str, Option]
+) -> dict[str, Any]:
     """Read ``NAME=VALUE`` texts.
 
     Parameters
     ----------
+    option : str
+        The option of the command line that they follow, for the messages.
     owner : str
-        Whose options they are, for the messages.
+        What they are values of, for the messages.
     texts : sequence of str
         As given on the command line; of one name the last counts.
     known : dict
@@ -118,11 +132,12 @@ def parsed(owner: str, texts: Sequence[str], known: dict[str, Option]) -> dict[s
         name, equals, value = text.partition("=")
         name = name.strip().replace("-", "_")
         if not equals:
-            raise ParameterError(f"option of {owner}", "NAME=VALUE", repr(text))
+            raise ParameterError(option, f"NAME=VALUE for {owner}", repr(text))
         if not known:
-            raise ParameterError(owner, "no options", repr(name))
-        check_fields(f"option of {owner}", [name], known)
-        values[name] = known[name].parse(value.strip())
+            raise ParameterError(option, f"none for {owner}", repr(name))
+        check_fields(f"{option} ({owner})", [name], known)
+        with as_options({name: f"{option} {name}"}):
+            values[name] = known[name].parse(value.strip())
     return values
 
 
@@ -142,6 +157,23 @@ def as_options(names: Mapping[str, str]) -> Generator[None, None, None]:
             raise
         told = error.expected, error.got, error.hint
         raise ParameterError(names[error.name], *told) from error
+
+
+def with_option_names(command: Callable[..., None]) -> Callable[..., None]:
+    """Let errors of a command about an argument of the library name its option of that name."""
+    names: dict[str, str] = {}
+    for name, kind in typing.get_type_hints(command, include_extras=True).items():
+        for info in getattr(kind, "__metadata__", ()):
+            if isinstance(info, typer.models.OptionInfo):
+                long = [text for text in info.param_decls or () if text.startswith("--")]
+                names[name] = long[0] if long else f"--{name.replace('_', '-')}"
+
+    @functools.wraps(command)
+    def named(*arguments: Any, **options: Any) -> None:
+        with as_options(names):
+            command(*arguments, **options)
+
+    return named
 
 
 def _type_text(kind: Any) -> str:

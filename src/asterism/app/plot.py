@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.app.plot_kinds import KINDS, Kind, Request
 from asterism.errors import ParameterError, check_fields, check_number
 
@@ -70,6 +70,7 @@ def plot(
     camera: _Camera = None,
     moves: _Moves = None,
     seeds: _Seeds = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -102,7 +103,11 @@ def plot(
     _check(kind, chosen, asked)
     out = _default_output(files[0], kind) if out is None else out
     ending = _ending(out)
-    check_outputs({"-o": out}, [*files, truth, model, None if rig is None else Path(rig)])
+    check_outputs(
+        {"--out": out},
+        [*files, truth, model, None if rig is None else Path(rig)],
+        overwrite=overwrite,
+    )
     picture = figure_bytes(chosen.draw(asked), ending)
     with replacing(out) as file:
         file.write(picture)
@@ -131,7 +136,9 @@ def _check(name: str, kind: Kind, asked: Request) -> None:
             raise ParameterError(option, f"a file, which {name} needs", "nothing")
         if field.name not in kind.takes:
             fit = [k for k, other in KINDS.items() if field.name in other.needs | other.takes]
-            raise ParameterError(option, f"nothing for {name}", "one", f"for {', '.join(fit)}")
+            raise ParameterError(
+                option, f"nothing for {name}", "one", f"it is for {', '.join(fit)}"
+            )
     for n in asked.moves or ():
         check_number("--moves", n, above=0, below=1e6, closed=True)
     if asked.seeds is not None:
@@ -143,7 +150,7 @@ def _ending(out: Path) -> str:
 
     ending = out.suffix.lower().removeprefix(".")
     if ending not in ENDINGS:
-        raise ParameterError("-o", "a name ending in .pdf, .svg or .png", str(out))
+        raise ParameterError("--out", "a name ending in .pdf, .svg or .png", str(out))
     return ending
 
 

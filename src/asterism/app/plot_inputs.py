@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asterism.errors import FormatError, ParameterError
+from asterism.errors import FormatError, ParameterError, not_read
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,7 +35,9 @@ def sure_tracks(path: Path) -> am.Tracks:
     """Read a tracking that has a confidence."""
     tracks = tracks_of(path)
     if tracks.confidence is None:
-        hint = "asterism track --method mcmcda -o FILE.csv writes one; other formats have no place"
+        hint = (
+            "write one by asterism track --method mcmcda -o FILE.csv; other formats have no place"
+        )
         raise ParameterError("FILES", "tracks with a confidence", f"{path}, which has none", hint)
     return tracks
 
@@ -46,7 +48,7 @@ def solid_tracks(path: Path) -> am.Tracks:
 
     truth = am.read_tracks(path)
     if not (truth.labels >= 0).any():
-        hint = "asterism track makes tracks of points without names"
+        hint = "run asterism track first: it makes tracks of points without names"
         raise ParameterError("FILES", "points in tracks", f"{path}, which has none", hint)
     if truth.detections.n_axes != 3:
         raise ParameterError("FILES", "points in 3-D", f"{path}, in 2-D")
@@ -71,7 +73,7 @@ def is_observations(path: Path) -> bool:
         with path.open(encoding="utf-8", errors="replace") as file:
             columns = {word.strip().lower() for word in file.readline().split(",")}
     except OSError as error:
-        raise FormatError(path, "opening", "a file", error.strerror) from error
+        raise not_read(path, error) from error
     return {"camera", "u", "v"} <= columns
 
 
@@ -81,10 +83,14 @@ def summary_of(path: Path) -> dict[str, Any]:
 
     if not path.is_dir():
         return {}
-    hint = "asterism track --run makes one"
+    hint = "make one by asterism track --run"
     try:
         found = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except FileNotFoundError as error:
+        raise FormatError(path, SUMMARY, "a finished run", "no such file", hint) from error
+    except OSError as error:
+        raise not_read(path / SUMMARY, error) from error
+    except ValueError as error:
         raise FormatError(path, SUMMARY, "a finished run", error, hint) from error
     if not isinstance(found, dict) or "output" not in found:
         raise FormatError(path, SUMMARY, "a finished run", "no word of its output", hint)

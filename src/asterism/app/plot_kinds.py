@@ -229,7 +229,7 @@ KINDS: dict[str, Kind] = {
     "trajectories": Kind(about="the paths of all tracks in space", draw=_trajectories),
     "axes": Kind(about="x, y and z of every track over time", draw=_axes),
     "presence": Kind(about="when each track was there, and the clutter", draw=_presence),
-    "confidence": Kind(about="the same, shaded by how sure each label is", draw=_confidence),
+    "confidence": Kind(about="the same, shaded by the confidence of each link", draw=_confidence),
     "errors": Kind(about="where labels are wrong", draw=_errors, needs=_TRUTH),
     "reliability": Kind(
         about="how often labels are right, by their confidence; of one tracking or more",

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.errors import ParameterError
 
 __all__ = ["recognize"]
@@ -24,6 +24,7 @@ def recognize(
     source: _In,
     bonds: _Bonds,
     out: _Out,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -43,13 +44,13 @@ def recognize(
     from asterism.app.files import check_outputs
     from asterism.app.tracking import output_format
 
-    check_outputs({"-o": out}, [source, bonds])
+    format = output_format(out, None)
+    check_outputs({"--out": out}, [source, bonds], overwrite=overwrite)
     known = am.Bonds.from_toml(bonds)
     capture = am.read(source)
     if not (capture.labels >= 0).any():
-        hint = "asterism track --stitch makes them first"
+        hint = "run asterism track --stitch first"
         raise ParameterError("IN", "a capture with tracks", f"none in {source}", hint)
-    format = output_format(capture, out, None)
     tracks = capture.tracks.measured()
     found = am.recognize(tracks, known)
     am.write(found.tracks, out, format=format)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table, progress
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def reconstruct(
     merge: _Merge = 1.0,
     prior: Prior = False,
     threads: _Threads = 1,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -75,25 +76,24 @@ def reconstruct(
 
     import asterism as am
     from asterism.app.files import check_outputs
+    from asterism.app.options import as_options
     from asterism.app.tracking import output_format
 
-    check_outputs({"-o": out, "--truth": truth}, [source, rig])
+    formats = {path: output_format(path, None) for path in (out, truth) if path}
+    check_outputs({"--out": out, "--truth": truth}, [source, rig], overwrite=overwrite)
     observations = am.read_observations(source)
     if truth is not None and observations.markers is None:
         raise ParameterError("--truth", "image points with their markers", f"none in {source}")
     cameras = am.read_rig(rig)
     for warning in cameras.warnings:
         log.warning("%s: %s", rig, warning)
-    formats = {
-        path: output_format(am.Capture.from_frames([], []), path, None)
-        for path in (out, truth)
-        if path
-    }
     with progress("estimating noise, misses and clutter"):
         model = am.estimate_images(observations, cameras, sigma_px=sigma, gate=gate)
 
+    names = {"n_threads": "--threads", "merge_px": "--merge", "sigma_px": "--sigma"}
+
     def points(expected: am.Detections | None = None) -> am.Reconstruction:
-        with progress("reconstructing", observations.n_frames) as advance:
+        with as_options(names), progress("reconstructing", observations.n_frames) as advance:
             return am.reconstruct(
                 observations, cameras, model, min_views=min_views, gate=gate, merge_px=merge,
                 prior=expected, n_threads=threads, advance=advance,

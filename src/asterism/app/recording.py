@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from asterism.errors import ParameterError, check_fields
 
@@ -13,10 +13,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import asterism as am
+    from asterism.simulate import Burst, Ghosts
 
 __all__ = ["episode", "made_scene", "rig_from", "seeing_from", "switches_from"]
 
 log = logging.getLogger(__name__)
+
+E = TypeVar("E", "Burst", "Ghosts")
 
 
 def made_scene(
@@ -49,11 +52,11 @@ def made_scene(
     from asterism.app.options import as_options, parsed, scene_options
 
     scenes = am.simulate.SCENES
-    check_fields("scene", [name], scenes)
+    check_fields("SCENE", [name], scenes)
     known = scene_options(scenes[name].make)
-    values = parsed(f"scene {name}", texts, known)
+    values = parsed("--option", f"scene {name}", texts, known)
     given = {key: value for key, value in given.items() if value is not None}
-    options = {key: f"--{key}" for key in given}
+    options = {key: f"--option {key}" for key in values} | {key: f"--{key}" for key in given}
     if "markers" in given:
         number = next((n for n in ("n_markers", "n_drones") if n in known), None)
         if number is None:
@@ -114,30 +117,37 @@ def switches_from(texts: Sequence[str]) -> dict[str, Any]:
         for name, default in defaults.items()
         if name not in ("rig", "seed", "keep_unnamed")
     }
-    values = parsed("sensing", texts, known)
-    for name, kind in (("burst", Burst), ("ghosts", Ghosts)):
-        if name in values:
-            values[name] = kind(**episode(name, values[name]))
+    values = parsed("--sense", "what goes wrong", texts, known)
+    if "burst" in values:
+        values["burst"] = episode("--sense burst", Burst, values["burst"])
+    if "ghosts" in values:
+        values["ghosts"] = episode("--sense ghosts", Ghosts, values["ghosts"])
     if "visits" in values:
         match = re.fullmatch(r"(\d+)-(\d+)", values["visits"])
         if match is None:
-            raise ParameterError("visits", "MIN-MAX, 50-200 say", repr(values["visits"]))
+            raise ParameterError("--sense visits", "MIN-MAX, 50-200 say", repr(values["visits"]))
         values["visits"] = Visits(shortest=int(match[1]), longest=int(match[2]))
     return values
 
 
 def seeing_from(texts: Sequence[str]) -> am.simulate.Seeing | None:
     """Read ``NAME=VALUE`` fields of `asterism.simulate.Seeing`; None without any."""
-    from asterism.app.options import method_options, parsed
+    from asterism.app.options import as_options, method_options, parsed
     from asterism.simulate import Seeing
 
-    return Seeing(**parsed("seeing", texts, method_options(Seeing))) if texts else None  # pyright: ignore[reportArgumentType]
+    values = parsed("--seeing", "what cameras see", texts, method_options(Seeing))  # pyright: ignore[reportArgumentType]
+    with as_options({name: f"--seeing {name}" for name in values}):
+        return Seeing(**values) if texts else None
 
 
-def episode(option: str, text: str) -> dict[str, int]:
-    """Read ``N`` or ``N:MIN-MAX``."""
+def episode(option: str, kind: type[E], text: str) -> E:
+    """Read ``N`` or ``N:MIN-MAX`` of a `Burst` or of `Ghosts`."""
+    from asterism.app.options import as_options
+
     match = re.fullmatch(r"(\d+)(?::(\d+)-(\d+))?", text.strip())
     if match is None:
         raise ParameterError(option, "N or N:MIN-MAX, 5:5-60 say", repr(text))
     names = ("n", "shortest", "longest")
-    return {name: int(n) for name, n in zip(names, match.groups(), strict=True) if n is not None}
+    values = {name: int(n) for name, n in zip(names, match.groups(), strict=True) if n is not None}
+    with as_options({name: f"{option} ({name})" for name in names}):
+        return kind(**values)

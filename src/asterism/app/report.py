@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table, progress
 
 if TYPE_CHECKING:
     import asterism as am
@@ -34,6 +34,7 @@ def report(
     out: _Out = None,
     up: _Up = None,
     title: _Title = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -51,8 +52,8 @@ def report(
     from asterism.app.files import check_ending, check_outputs, read_labels
 
     page = out or source.with_suffix(".html")
-    check_outputs({"-o": page}, [source, truth, rig])
-    check_ending("-o", page, ".html", ".htm")
+    check_ending("--out", page, ".html", ".htm")
+    check_outputs({"--out": page}, [source, truth, rig], overwrite=overwrite)
     tracks = read_labels(source)
     true = None if truth is None else am.read_tracks(truth)
     cameras = None if rig is None else am.read_rig(rig)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import asterism as am
-from asterism.errors import FormatError, ParameterError, check_fields, check_number
+from asterism.errors import FormatError, ParameterError, check_fields, check_number, not_read
 from asterism.io.atomic import replacing
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ __all__ = [
     "LOG",
     "SUMMARY",
     "Job",
-    "check_folder",
     "sha256_of",
     "write_text",
     "writing_log",
@@ -117,7 +116,7 @@ class Job:
         try:
             values = tomllib.loads(path.read_text(encoding="utf-8"))
         except OSError as error:
-            raise FormatError(path, "opening", "a readable file", error.strerror) from error
+            raise not_read(path, error) from error
         except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise FormatError(path, "the file", "TOML", str(error)) from error
         try:
@@ -175,24 +174,7 @@ def sha256_of(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        raise FormatError(path, "opening", "a readable file", error.strerror) from error
-
-
-def check_folder(path: Path, *, overwrite: bool, option: str = "-o") -> None:
-    """Raise unless a folder for results, which an option names, may be made or used.
-
-    Raises
-    ------
-    ParameterError
-        If it is there, holds anything and `overwrite` is false, or is not a folder.
-    """
-    if path.exists() and not path.is_dir():
-        raise ParameterError(option, "a folder or a new name", f"the file {path}")
-    if path.is_dir() and any(path.iterdir()) and not overwrite:
-        raise ParameterError(
-            option, "a new or an empty folder", f"{path}, which holds files",
-            "--overwrite replaces those of the same names",
-        )  # fmt: skip
+        raise not_read(path, error) from error
 
 
 def write_text(path: Path, text: str) -> None:

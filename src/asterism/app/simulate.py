@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.errors import ParameterError
 
 _Scene = Annotated[str, typer.Argument(metavar="SCENE", help="One of `asterism scenes`.")]
@@ -65,6 +65,7 @@ def simulate(
     option: _Options = None,
     sense: _Sense = None,
     rig: _Rig = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -85,21 +86,30 @@ def simulate(
 
     import asterism as am
     from asterism.app.files import check_outputs
+    from asterism.app.options import as_options
     from asterism.app.recording import made_scene, rig_from, switches_from
+    from asterism.io.files import format_to_write
 
     if (sense or rig) and truth is None:
         expected = "a file for the truth, as --sense or --rig is given"
-        raise ParameterError("--truth", expected, "none", "without it nobody knows who is whom")
-    check_outputs({"--out": out, **({} if truth is None else {"--truth": truth})}, [])
+        hint = "without it no file would hold the true labels"
+        raise ParameterError("--truth", expected, "none", hint)
+    with as_options({"path": "--out"}):
+        format_to_write(out, None)
+    if truth is not None:
+        with as_options({"path": "--truth"}):
+            format_to_write(truth, None)
+    check_outputs({"--out": out, "--truth": truth}, [], overwrite=overwrite)
     given = {"frames": frames, "rate": rate, "seed": seed, "markers": markers}
-    made, values = made_scene(scene, given, option or [])
     switches: dict[str, Any] = switches_from(sense or [])
+    made, values = made_scene(scene, given, option or [])
     result: am.Tracks = made
     about = ""
     if truth is not None:
         if rig is not None:
             switches["rig"], about = rig_from(rig, made.detections.points)
-        sensed = am.simulate.sense(made, **switches, seed=values["seed"])
+        with as_options({name: f"--sense {name}" for name in switches}):
+            sensed = am.simulate.sense(made, **switches, seed=values["seed"])
         values |= {"sense": sensed.record}
         d = sensed.detections
         am.write(sensed, truth)

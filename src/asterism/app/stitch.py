@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table, progress
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def stitch(
     confirm: _Confirm = 15,
     ghost_radius: _Ghosts = 0.03,
     max_hidden: _MaxHidden = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -57,12 +58,12 @@ def stitch(
     from asterism.app.files import check_outputs, read_model
     from asterism.app.tracking import output_format
 
-    check_outputs({"-o": out}, [source, model])
+    format = output_format(out, None)
+    check_outputs({"--out": out}, [source, model], overwrite=overwrite)
     capture = am.read(source)
     if not (capture.labels >= 0).any():
-        hint = "asterism track --stitch makes them first"
+        hint = "run asterism track --stitch first"
         raise ParameterError("IN", "a capture with tracks", f"none in {source}", hint)
-    format = output_format(capture, out, None)
     if model is None:
         with progress("estimating the model"):
             given = am.estimate_model(capture).model

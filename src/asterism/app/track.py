@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table, progress
 from asterism.errors import FormatError, ParameterError, check_number
 
 if TYPE_CHECKING:
@@ -76,7 +76,6 @@ _From = Annotated[
 _Report = Annotated[
     Path | None, typer.Option("--report", metavar="PAGE", help="Page with a player to write too.")
 ]
-_Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let DIR hold files already.")]
 
 
 def track(
@@ -90,7 +89,7 @@ def track(
     start: _Start = False,
     stitch: _Stitch = False,
     run: _Run = None,
-    overwrite: _Overwrite = False,
+    overwrite: Overwrite = False,
     repeat: _From = None,
     report: _Report = None,
     quiet: Quiet = False,
@@ -122,26 +121,37 @@ def track(
         asterism track --from runs/first/run.toml -o again.c3d
     """
     import asterism as am
-    from asterism.app.files import check_ending, check_outputs, read_model
-    from asterism.app.run_folder import FILES, Job, check_folder, sha256_of
+    from asterism.app.files import Folder, check_ending, check_outputs, read_model
+    from asterism.app.run_folder import FILES, Job, sha256_of
     from asterism.app.tracking import carry_out, default_output, output_format
+    from asterism.associate import AUTO
+    from asterism.io.files import format_of
 
-    check_outputs({"-o": out, "--report": report}, [source, model, repeat])
     check_ending("--report", report, ".html", ".htm")
-    if run is not None:
-        check_folder(run, overwrite=overwrite, option="--run")
-    estimate: am.ModelEstimate | None = None
+    job: Job | None = None
     if repeat is not None:
         settings = {"--method": method, "--option": option, "--model": model, "--seed": seed,
                     "--start": start or None, "--stitch": stitch or None}  # fmt: skip
-        given_too = [name for name, value in settings.items() if value not in (None, [])]
-        job, capture = _repeated(repeat, source, given_too)
-        job = dataclasses.replace(job, format=output_format(capture, out, format or job.format))
+        job = _job_of(repeat, source, [k for k, v in settings.items() if v not in (None, [])])
+        source, format = job.source, format or job.format
+    if source is None:
+        raise ParameterError("IN", "a capture to track", "nothing", "see asterism track --help")
+    chosen_format = output_format(out, format, format_of(source).name)
+    if out is None:
+        out = default_output(source, chosen_format)
+        out = out if run is None else run / out.name
+    outputs: dict[str, Path | Folder | None] = {"--out": out, "--report": report}
+    if run is not None:
+        is_inside = out.resolve().parent == run.resolve()
+        outputs["--run"] = Folder(run, (*FILES, out.name) if is_inside else FILES)
+        outputs["--out"] = None if is_inside else out
+    check_outputs(outputs, [source, model, repeat], overwrite=overwrite)
+    estimate: am.ModelEstimate | None = None
+    if job is not None:
+        assert repeat is not None
+        capture = _same_capture(job, repeat)
+        job = dataclasses.replace(job, format=chosen_format)
     else:
-        if source is None:
-            raise ParameterError("IN", "a capture to track", "nothing", "asterism track --help")
-        from asterism.associate import AUTO
-
         name, options = method or AUTO, dict[str, Any]()
         if name != AUTO:
             name, options = resolved_method(name, option or [])
@@ -151,7 +161,6 @@ def track(
         check_number("--seed", seed or 0, above=0, closed=True, integer=True)
         given = None if model is None else read_model(model)
         capture = am.read(source)
-        chosen_format = output_format(capture, out, format)
         if start and name not in (AUTO, am.MCMCDA.name):
             expected = f"--method {am.MCMCDA.name} beside it, or none"
             raise ParameterError("--start", expected, f"--method {name}")
@@ -172,15 +181,8 @@ def track(
             model=am.fragment_model(given) if stitch else given, seed=seed or 0, start=start,
             stitch=stitch, format=chosen_format, chosen=chosen,
         )  # fmt: skip
-    if out is None:
-        out = default_output(job.source, job.format)
-        out = out if run is None else run / out.name
-    files = {"--report": report} if run is not None else {"-o": out, "--report": report}
-    check_outputs(files, [job.source, model, repeat])
     if run is not None:
         run.mkdir(parents=True, exist_ok=True)
-        written = {"--run": out} | {f"--run ({name})": run / name for name in FILES}
-        check_outputs(written | {"--report": report}, [job.source, model, repeat])
     talks = not (quiet or json)
     if talks:
         _print_capture(capture)
@@ -211,20 +213,20 @@ def all_options(method: am.Method[Any]) -> dict[str, Any]:
 def resolved_method(name: str, texts: list[str]) -> tuple[str, dict[str, Any]]:
     """Check the name of a method and its ``NAME=VALUE`` options; give all, the defaults too."""
     import asterism as am
-    from asterism.app.options import method_options, parsed
+    from asterism.app.options import as_options, method_options, parsed
     from asterism.errors import check_fields
 
     check_fields("--method", [name], am.METHODS)
     known = method_options(am.METHODS[name])
-    given = parsed(f"method {name}", texts, known)
-    made = am.method_by_name(name, **given)
+    given = parsed("--option", f"method {name}", texts, known)
+    with as_options({option: f"--option {option}" for option in given}):
+        made = am.method_by_name(name, **given)
     return name, all_options(made)
 
 
-def _repeated(path: Path, source: Path | None, settings: list[str]) -> tuple[Any, am.Capture]:
-    """Read a run and its capture, which must be the same byte for byte."""
-    import asterism as am
-    from asterism.app.run_folder import Job, sha256_of
+def _job_of(path: Path, source: Path | None, settings: list[str]) -> Job:
+    """Read the job of a run, with its input where it is now."""
+    from asterism.app.run_folder import Job
 
     if settings:
         raise ParameterError("--from", "the settings of the run alone", ", ".join(settings))
@@ -232,14 +234,22 @@ def _repeated(path: Path, source: Path | None, settings: list[str]) -> tuple[Any
     job = dataclasses.replace(job, source=source or job.source)
     if not job.source.is_file():
         hint = "say where it is now: asterism track IN --from RUN.TOML"
-        raise FormatError(job.source, "opening", "the input of the run", "nothing there", hint)
+        raise FormatError(job.source, "the input of the run", "", "no such file", hint)
+    return job
+
+
+def _same_capture(job: Job, path: Path) -> am.Capture:
+    """Read the capture of a run, which must be the same byte for byte."""
+    import asterism as am
+    from asterism.app.run_folder import sha256_of
+
     found = sha256_of(job.source)
     if found != job.sha256:
         raise FormatError(
             job.source, "its SHA-256", f"{job.sha256}, as {path} says", found,
             "a run can only be repeated with the same input",
         )  # fmt: skip
-    return job, am.read(job.source)
+    return am.read(job.source)
 
 
 def _write_report(

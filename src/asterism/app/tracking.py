@@ -10,7 +10,7 @@ import asterism as am
 from asterism.app.console import progress, to_json
 from asterism.app.run_folder import CONFIG, SUMMARY, write_text, writing_log
 from asterism.app.summary import Summary, summarize
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, check_fields
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,17 +25,17 @@ log = logging.getLogger(__name__)
 _WITHOUT_TRACKS = ("pointcloud",)
 
 
-def output_format(capture: am.Capture, out: Path | None, name: str | None) -> str:
+def output_format(out: Path | None, name: str | None, source: str = "c3d") -> str:
     """Choose the format of a result.
 
     Parameters
     ----------
-    capture : Capture
-        What is tracked.
     out : Path or None
         The file to write, where it is known.
     name : str or None
         The format, where it was asked for.
+    source : str
+        Format of the capture, which decides where neither does.
 
     Returns
     -------
@@ -54,19 +54,17 @@ def output_format(capture: am.Capture, out: Path | None, name: str | None) -> st
         if f.write is not None and f.name not in _WITHOUT_TRACKS
     }
     if name is not None:
-        if name not in known:
-            expected = f"one that holds tracks: {', '.join(known)}"
-            raise ParameterError("--format", expected, repr(name))
+        check_fields("--format", [name], known)
         return name
     if out is not None:
         for format in known.values():
             if out.suffix and out.suffix.lower() in format.extensions:
                 return format.name
         endings = ", ".join(dict.fromkeys(e for f in known.values() for e in f.extensions))
-        raise ParameterError("-o", f"a name ending in {endings}", str(out), "or give --format")
-    if capture.format in _WITHOUT_TRACKS:
+        raise ParameterError("--out", f"a name ending in {endings}", str(out), "or give --format")
+    if source in _WITHOUT_TRACKS:
         return "csv"
-    return capture.format if capture.format in known else "c3d"
+    return source if source in known else "c3d"
 
 
 def default_output(source: Path, format: str) -> Path:

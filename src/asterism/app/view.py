@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table
 
 _Tracked = Annotated[Path, typer.Argument(metavar="TRACKED", help="File with tracks.")]
 _Rig = Annotated[
@@ -24,6 +24,7 @@ def view(
     tracked: _Tracked,
     rig: _Rig = None,
     save: _Save = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -43,8 +44,10 @@ def view(
     from asterism.app.recording import rig_from
     from asterism.errors import ParameterError
 
-    check_outputs({"--save": save}, [tracked, None if rig is None else Path(rig)])
     check_ending("--save", save, ".rrd")
+    check_outputs(
+        {"--save": save}, [tracked, None if rig is None else Path(rig)], overwrite=overwrite
+    )
     tracks = read_labels(tracked)
     cameras: am.Rig | None = None
     if rig is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asterism.app.console import Json, Quiet, print_json, print_table, progress
+from asterism.app.console import Json, Overwrite, Quiet, print_json, print_table, progress
 from asterism.app.reproduce.parts import PARTS
 from asterism.errors import check_fields, check_number
 
@@ -33,7 +33,6 @@ _Seeds = Annotated[
     int | None, typer.Option(help="Seeds of all that is drawn.", show_default="50, quick 5")
 ]
 _Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the files.")]
-_Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let DIR hold files already.")]
 
 SEEDS, QUICK_SEEDS = 50, 5
 MOST_SEEDS = 1000
@@ -45,7 +44,7 @@ def reproduce(
     only: _Only = None,
     seeds: _Seeds = None,
     out: _Out = Path("reproduction"),
-    overwrite: _Overwrite = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -61,15 +60,15 @@ def reproduce(
 
         asterism reproduce --only mcmcda --only smp --seeds 20 -o tables
     """
+    from asterism.app.files import Folder, check_outputs
     from asterism.app.reproduce.pages import write_pages, write_part
     from asterism.app.reproduce.part import Effort, Made
     from asterism.app.reproduce.parts import load
-    from asterism.app.run_folder import check_folder
 
     check_fields("--only", only or [], PARTS)
     n_seeds = (QUICK_SEEDS if quick else SEEDS) if seeds is None else seeds
     check_number("--seeds", n_seeds, above=2, below=MOST_SEEDS, closed=True, integer=True)
-    check_folder(out, overwrite=overwrite)
+    check_outputs({"--out": Folder(out)}, [], overwrite=overwrite)
     out.mkdir(parents=True, exist_ok=True)
     effort = Effort(seeds=n_seeds, is_quick=quick)
     names = [name for name in PARTS if not only or name in only]

@@ -1,0 +1,89 @@
+"""Errors of the command line itself, an option misspelt say, told in the one line of all others."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from asterism.errors import ParameterError, check_fields
+
+if TYPE_CHECKING:
+    from typer import Typer
+
+__all__ = ["run_app"]
+
+# The parser's errors have no public name of their own in Typer: the base of one that has.
+_UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+_KINDS = {"int_parsing": "a whole number", "float_parsing": "a number"}
+
+
+def run_app(app: Typer, arguments: list[str] | None) -> None:
+    """Run the command line.
+
+    Parameters
+    ----------
+    app : Typer
+        The commands.
+    arguments : list of str or None
+        What follows the name of the program; those of the process unless given.
+
+    Raises
+    ------
+    ParameterError
+        Where the arguments fit no command.
+    SystemExit
+        Where a command ends with a code of its own.
+    """
+    try:
+        code = app(args=arguments, prog_name="asterism", standalone_mode=False)
+    except _UsageError as error:
+        message = str(getattr(error, "message", error))
+        if type(error).__name__ == "NoArgsIsHelpError":  # which has printed the help
+            raise SystemExit(2) from None
+        _diagnose(error, message)
+        where = _command(error)
+        raise ParameterError(where, "", message.rstrip("."), "see asterism --help") from error
+    if isinstance(code, int) and code:
+        raise SystemExit(code)
+
+
+def _command(error: Any) -> str:
+    """Name the command; the program itself is named before every message."""
+    path = "asterism" if error.ctx is None else error.ctx.command_path
+    return path.partition(" ")[2] or "COMMAND"
+
+
+def _diagnose(error: Any, message: str) -> None:
+    """Raise what is known of an error in the words of the library."""
+    command: Any = None if error.ctx is None else error.ctx.command
+    if hasattr(error, "possibilities"):
+        every = [name for p in command.params for name in p.opts if name.startswith("--")]
+        check_fields(_command(error), [error.option_name], [*every, "--help"])
+    elif hasattr(error, "option_name"):
+        counts = ("a value", "nothing") if "requires" in message else ("no value", "one")
+        raise ParameterError(error.option_name, *counts)
+    missing = re.match(r"No such command '(.*?)'", message)
+    if missing is not None:
+        check_fields(_command(error), [missing[1]], command.commands)
+    surplus = re.search(r"unexpected extra argument.*? \((.*)\)", message)
+    if surplus is not None:
+        raise ParameterError(_command(error), "no more arguments", repr(surplus[1]))
+    parameter = getattr(error, "param", None)
+    if parameter is None:
+        return
+    name: str = max(parameter.opts, key=len)
+    name = name if name.startswith("-") else parameter.metavar or name.upper()
+    if hasattr(error, "param_type"):
+        raise ParameterError(name, "a value", "nothing", f"see asterism {_command(error)} --help")
+    refused = getattr(error.__cause__, "errors", list[Any])()
+    if not refused:
+        raise ParameterError(name, "", message)
+    found = refused[0]["input"]
+    choices = re.search(r"is not one of (.*?)\.?$", message)
+    if choices is not None:
+        check_fields(name, [found], re.findall(r"'(.*?)'", choices[1]))
+    if refused[0]["type"] in _KINDS:
+        raise ParameterError(name, _KINDS[refused[0]["type"]], repr(found))
+    raise ParameterError(name, "", message)
