@@ -83,7 +83,9 @@ def test_stopped_while_tracking(folder, signum, code):
 @pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_stopped_while_writing(folder, signum):
     (folder / "out.csv").write_text("the old result")
-    process = start("track", "in.csv", "--model", "model.toml", "-o", "out.csv", cwd=folder)
+    process = start(
+        "track", "in.csv", "--model", "model.toml", "-o", "out.csv", "--overwrite", cwd=folder
+    )
     wait_for(lambda: any(folder.glob(".*.part")), process)
     code, _ = stopped(process, signum)
     assert code == (-signum if signum == signal.SIGKILL else 128 + signum)

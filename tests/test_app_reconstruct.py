@@ -62,10 +62,13 @@ def test_what_is_refused_leaves_no_file(film, tmp_path, capsys):
         ([str(tmp_path / "none.csv"), "--rig", str(rig), "-o", str(out)], "none.csv"),
         ([str(obs), "--rig", str(tmp_path / "none.toml"), "-o", str(out)], "none.toml"),
         ([str(obs), "--rig", str(rig), "-o", str(obs)], "a place of its own"),
-        ([str(obs), "--rig", str(rig), "-o", str(tmp_path / "p.xyz")], "-o"),
+        ([str(obs), "--rig", str(rig), "-o", str(tmp_path / "p.xyz")], "--out: expected a name"),
         ([str(obs), "--rig", str(rig), "-o", str(out), "--min-views", "9"], "--min-views"),
-        ([str(obs), "--rig", str(rig), "-o", str(out), "--sigma", "-1"], "sigma_px"),
-        ([str(untold), "--rig", str(rig), "-o", str(out), "--truth", str(out) + "2"], "--truth"),
+        ([str(obs), "--rig", str(rig), "-o", str(out), "--sigma", "-1"], "--sigma"),
+        (
+            [str(untold), "--rig", str(rig), "-o", str(out), "--truth", str(tmp_path / "q.csv")],
+            "--truth",
+        ),
     ):
         assert main(["reconstruct", *arguments]) == 2
         assert message in capsys.readouterr().err

@@ -651,12 +651,14 @@ def test_the_command_fills_and_says_what(made, tmp_path, monkeypatch, capsys):
         assert word in text
     d, expected = am.read(out), made[1]
     assert d.filled.sum() == expected.tracks.detections.filled.sum()
-    given = json.loads(run(f"fill in.c3d -o {out} --model model.toml --json", capsys))
+    given = json.loads(run(f"fill in.c3d -o {out} --model model.toml --json --overwrite", capsys))
     assert given["n_gaps"] == len(expected.gaps) == len(given["gaps"])
     assert given["largest_std"] == pytest.approx(max(gap.std for gap in expected.gaps))
     assert sum(given["estimators"].values()) == given["n_filled"]
     assert given["gaps"][0]["first"] == expected.gaps[0].first + 1
-    assert run(f"fill in.c3d -o {out} --model model.toml -q --longest 0.1", capsys) == ""
+    assert (
+        run(f"fill in.c3d -o {out} --model model.toml -q --longest 0.1 --overwrite", capsys) == ""
+    )
     assert am.read(out).filled.sum() < d.filled.sum()
 
 

@@ -80,11 +80,11 @@ def test_a_folder_that_is_not_there_or_not_writable(tracks, tmp_path, monkeypatc
     with pytest.raises(FormatError, match="folder"):
         write(tracks, tmp_path / "a.csv")
 
-    def refuse(path, mode):  # the rights themselves do not stop root
+    def refuse(path, *_):  # the rights themselves do not stop root
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(FormatError, match="Permission denied"):
+    monkeypatch.setattr(os, "open", refuse)
+    with pytest.raises(FormatError, match="cannot be written: permission denied"):
         write(tracks, tmp_path / "b.csv")
 
 

@@ -262,7 +262,6 @@ def test_the_command_saves_with_a_rig(rr, tmp_path, monkeypatch, capsys):
     ("options", "message"),
     [
         ("--save scene.txt", "a name ending in .rrd"),
-        ("--save in.csv", "a place of its own"),
         ("--rig no.xcp --save s.rrd", "ring8"),
     ],
 )

@@ -79,18 +79,18 @@ def reconstruct(
     from asterism.app.options import as_options
     from asterism.app.tracking import output_format
 
-    formats = {path: output_format(path, None) for path in (out, truth) if path}
-    check_outputs({"--out": out, "--truth": truth}, [source, rig], overwrite=overwrite)
+    outputs = {"--out": out, "--truth": truth}
+    formats = {p: output_format(p, None, option=name) for name, p in outputs.items() if p}
+    check_outputs(outputs, [source, rig], overwrite=overwrite)
     observations = am.read_observations(source)
     if truth is not None and observations.markers is None:
         raise ParameterError("--truth", "image points with their markers", f"none in {source}")
     cameras = am.read_rig(rig)
     for warning in cameras.warnings:
         log.warning("%s: %s", rig, warning)
-    with progress("estimating noise, misses and clutter"):
-        model = am.estimate_images(observations, cameras, sigma_px=sigma, gate=gate)
-
     names = {"n_threads": "--threads", "merge_px": "--merge", "sigma_px": "--sigma"}
+    with as_options(names), progress("estimating noise, misses and clutter"):
+        model = am.estimate_images(observations, cameras, sigma_px=sigma, gate=gate)
 
     def points(expected: am.Detections | None = None) -> am.Reconstruction:
         with as_options(names), progress("reconstructing", observations.n_frames) as advance:

@@ -25,7 +25,9 @@ log = logging.getLogger(__name__)
 _WITHOUT_TRACKS = ("pointcloud",)
 
 
-def output_format(out: Path | None, name: str | None, source: str = "c3d") -> str:
+def output_format(
+    out: Path | None, name: str | None, source: str = "c3d", *, option: str = "--out"
+) -> str:
     """Choose the format of a result.
 
     Parameters
@@ -36,6 +38,8 @@ def output_format(out: Path | None, name: str | None, source: str = "c3d") -> st
         The format, where it was asked for.
     source : str
         Format of the capture, which decides where neither does.
+    option : str
+        The option that names the file, for the messages.
 
     Returns
     -------
@@ -61,7 +65,7 @@ def output_format(out: Path | None, name: str | None, source: str = "c3d") -> st
             if out.suffix and out.suffix.lower() in format.extensions:
                 return format.name
         endings = ", ".join(dict.fromkeys(e for f in known.values() for e in f.extensions))
-        raise ParameterError("--out", f"a name ending in {endings}", str(out), "or give --format")
+        raise ParameterError(option, f"a name ending in {endings}", str(out), "or give --format")
     if source in _WITHOUT_TRACKS:
         return "csv"
     return source if source in known else "c3d"
