@@ -64,7 +64,7 @@ class Capture(Detections):
 
     Examples
     --------
-    >>> from dataclasses import field
+    >>> from dataclasses import replace
     >>> capture = Capture.from_frames([0.0, 0.01], [[[0, 0, 0], [1, 0, 0]], [[0, 0, 0]]])
     >>> replace(capture, path=Path("arena.dots"), format="dots", units="cm")
     Capture('arena.dots', 2 frames, 3 points, 3-D, 0 to 0.01 s, 0 named)
