@@ -185,11 +185,20 @@ def test_strangers_have_no_name():
     assert (found.probabilities[6:] == 0).all()
 
 
-def test_names_by_number_are_nobody_elses():
-    # Recognized in a take without names, a marker has the name of another one's number.
-    places = np.tile(np.random.default_rng(8).uniform(size=(4, 3)), (30, 1, 1))
-    take = am.Tracks.from_dense(np.arange(30) / 100, places, [None, "T000", "T004", None])
-    assert am.learn_bonds(take).names == ("T005", "T000", "T004", "T003")
+def test_tracks_without_a_name_are_never_learnt():
+    # A recorder's own channels are no markers: learnt, they would name real markers T003 or *12.
+    places = np.tile(np.random.default_rng(8).uniform(size=(6, 3)), (30, 1, 1))
+    names = [None, "T000", "T004", "*12", "Unlabeled 7", "LASI"]
+    bonds = am.learn_bonds(am.Tracks.from_dense(np.arange(30) / 100, places, names))
+    assert bonds.names == ("T000", "T004", "LASI")
+    assert [tuple(pair) for pair in bonds.pairs] == [(0, 1), (0, 2), (1, 2)]
+    np.testing.assert_allclose(bonds.distances[1], np.linalg.norm(places[0, 1] - places[0, 5]))
+
+
+def test_a_take_without_any_name_is_learnt_by_number():
+    places = np.tile(np.random.default_rng(8).uniform(size=(3, 3)), (30, 1, 1))
+    take = am.Tracks.from_dense(np.arange(30) / 100, places)
+    assert am.learn_bonds(take).names == ("T000", "T001", "T002")
 
 
 def test_takes_without_anything_to_tell():

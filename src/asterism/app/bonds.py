@@ -43,6 +43,7 @@ def bonds(
     import asterism as am
     from asterism.app.files import check_ending, check_outputs
     from asterism.app.run_folder import write_text
+    from asterism.io.marker_names import is_unlabelled
 
     check_ending("--out", out, ".toml")
     check_outputs({"--out": out}, [source], overwrite=overwrite)
@@ -50,14 +51,22 @@ def bonds(
     if not (capture.labels >= 0).any():
         hint = "run asterism track first"
         raise ParameterError("IN", "a capture with tracks", f"none in {source}", hint)
+    n_named = sum(bool(name) and not is_unlabelled(name) for name in capture.names)
+    n_unnamed = len(capture.names) - n_named
+    if not n_named:
+        hint = "name the markers first"
+        got = f"{n_unnamed} tracks without a name in {source}"
+        raise ParameterError("IN", "a capture with named markers", got, hint)
     found = am.learn_bonds(capture.tracks, neighbours=neighbours)
     if out is not None:
         write_text(out, found.to_toml())
     if json:
         written = None if out is None else str(out)
-        print_json({"input": str(source), "output": written} | bond_figures(found))
+        figures = {"n_markers": len(found.names), "n_left_out": n_unnamed} | bond_figures(found)
+        print_json({"input": str(source), "output": written} | figures)
     elif not quiet:
         rows = [("markers", str(len(found.names))), *bond_rows(found)]
+        rows += [("left out", f"{n_unnamed} tracks without a name")] if n_unnamed else []
         rows += [("written", str(out))] if out is not None else []
         print_table(rows, title="Bonds")
 

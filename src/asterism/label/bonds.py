@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self, cast
 import numpy as np
 
 from asterism.errors import FormatError, ParameterError, check_kind, check_number, keep_array
+from asterism.io.marker_names import is_unlabelled
 from asterism.label.distances import distances_between
 from asterism.model import Tracks
 from asterism.model.toml_file import read_toml, write_toml
@@ -174,8 +174,9 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = 20) -> Bon
     Parameters
     ----------
     tracks : Tracks
-        A take, with names where they are known; a track without one is called ``T000``, ``T001`` …
-        by its number, or by a higher one where another has that name.
+        A capture with the names of its markers. Tracks without a name are left out, and so are
+        tracks that carry a recorder's placeholder (``*12``, ``Unlabeled 7``). If no track has a
+        name, all are learnt as ``T000``, ``T001`` … by their number.
     neighbours : int
         Bonds that each marker has at least, where there are so many.
     least : int
@@ -202,9 +203,13 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = 20) -> Bon
     tracks = tracks.measured()
     d = tracks.detections
     every = max(1, -(-d.n_frames // MOST_FRAMES))
-    positions = tracks.positions()[::every]
+    named = [k for k, name in enumerate(tracks.names) if name and not is_unlabelled(name)]
+    names = [str(tracks.names[k]) for k in named]
+    if not named:
+        named, names = list(range(tracks.n_tracks)), [f"T{k:03d}" for k in range(tracks.n_tracks)]
+    positions = tracks.positions()[::every, named]
     between = distances_between(positions)
-    K = tracks.n_tracks
+    K = len(named)
     cost = between.spread + BEND * between.middle
     cost[(between.n_frames * every < least) | np.eye(K, dtype=bool)] = np.inf
     order = np.argsort(cost, axis=1, kind="stable")[:, :neighbours]
@@ -213,21 +218,12 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = 20) -> Bon
     chosen = (chosen | chosen.T) & np.isfinite(cost)
     i, j = np.nonzero(np.triu(chosen))
     return Bonds(
-        names=_all_names(tracks.names),
+        names=tuple(names),
         places=_pose(positions, between.middle),
         pairs=np.stack([i, j], axis=1),
         distances=between.middle[i, j],
         spreads=between.spread[i, j],
         frames=between.n_frames[i, j] * every,
-    )
-
-
-def _all_names(names: tuple[str | None, ...]) -> tuple[str, ...]:
-    """Name what has none by its number, or by the next that nobody has."""
-    numbered = (name for k in itertools.count(len(names)) if (name := f"T{k:03d}") not in names)
-    return tuple(
-        name or (own if (own := f"T{k:03d}") not in names else next(numbered))
-        for k, name in enumerate(names)
     )
 
 

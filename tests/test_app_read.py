@@ -1,0 +1,62 @@
+"""What commands make of the files that they read: names, damage, units."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from asterism.app import main
+from c3d_bytes import make_c3d
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def run(line, capsys):
+    """Run a command that must succeed; give what it printed and what it reported."""
+    capsys.readouterr()
+    code = main(line.split())
+    out, err = capsys.readouterr()
+    assert code == 0, err
+    return out, err
+
+
+def refused(line, capsys):
+    """Run a command that the user can mend; give the line that says how."""
+    capsys.readouterr()
+    assert main(line.split()) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "Traceback" not in err
+    return err
+
+
+def walk(n_frames=60, n_points=5, seed=0):
+    """A body of points in millimetres that wanders, with a fourth word of 0."""
+    rng = np.random.default_rng(seed)
+    shape = rng.uniform(100, 900, (n_points, 3))
+    path = np.cumsum(rng.normal(scale=3, size=(n_frames, 1, 3)), axis=0)
+    return np.concatenate([shape + path, np.zeros((n_frames, n_points, 1))], axis=2)
+
+
+def write_c3d(path, points, **options):
+    with open(path, "wb") as file:
+        file.write(make_c3d(points, **options))
+
+
+def test_bonds_leave_out_channels_without_a_name(tmp_path, capsys):
+    labels = ["LASI", "RASI", "SACR", "*12", "Unlabeled 7"]
+    write_c3d(tmp_path / "a.c3d", walk(), labels=labels)
+    out, _ = run("bonds a.c3d -o a.toml", capsys)
+    assert "2 tracks without a name" in out
+    assert "T00" not in (tmp_path / "a.toml").read_text()
+    told = json.loads(run("bonds a.c3d --json", capsys)[0])
+    assert (told["n_markers"], told["n_left_out"], told["n_bonds"]) == (3, 2, 3)
+    write_c3d(tmp_path / "b.c3d", walk(), labels=["*0", "*1", "", "U_4", "New 0001"])
+    err = refused("bonds b.c3d -o b.toml", capsys)
+    assert "a capture with named markers, got 5 tracks without a name in b.c3d" in err
+    assert not (tmp_path / "b.toml").exists()
