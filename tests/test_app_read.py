@@ -44,8 +44,7 @@ def walk(n_frames=60, n_points=5, seed=0):
 
 
 def write_c3d(path, points, **options):
-    with open(path, "wb") as file:
-        file.write(make_c3d(points, **options))
+    path.write_bytes(make_c3d(points, **options))
 
 
 def test_bonds_leave_out_channels_without_a_name(tmp_path, capsys):
@@ -60,3 +59,24 @@ def test_bonds_leave_out_channels_without_a_name(tmp_path, capsys):
     err = refused("bonds b.c3d -o b.toml", capsys)
     assert "a capture with named markers, got 5 tracks without a name in b.c3d" in err
     assert not (tmp_path / "b.toml").exists()
+
+
+def test_a_truncated_capture_is_tracked_and_the_result_says_so(tmp_path, capsys):
+    write_c3d(tmp_path / "whole.c3d", walk(), labels=["A", "B", "C", "D", "E"])
+    raw = (tmp_path / "whole.c3d").read_bytes()
+    begin = 512 * (int.from_bytes(raw[16:18], "little") - 1)  # of 60 frames of 80 bytes
+    (tmp_path / "cut.c3d").write_bytes(raw[: begin + 40 * 80 + 7])
+    said = "cut off in frame 41: expected 60 frames, found 40 complete, 1593 bytes are missing"
+    out, err = run("info cut.c3d", capsys)
+    assert said in out
+    assert said in err
+    assert said in json.loads(run("info cut.c3d --json", capsys)[0])["truncated"]
+    out, err = run("track cut.c3d -o out.c3d --run runs/a", capsys)
+    assert said in out
+    assert f"cut.c3d: {said}" in err
+    assert said in json.loads((tmp_path / "runs/a/summary.json").read_text())["truncated"]
+    assert said in run("info out.c3d", capsys)[0]
+    _, err = run("bonds cut.c3d -o a.toml", capsys)
+    assert f"cut.c3d: {said}" in err
+    (tmp_path / "none.c3d").write_bytes(raw[: begin + 79])
+    assert "the first is complete" in refused("info none.c3d", capsys)

@@ -214,6 +214,18 @@ def test_long_files_of_other_makers(load, more):
     assert capture.first_frame == (65_541 if more[0][0] == "TRIAL" else 1)
 
 
+def test_a_truncated_file_of_more_than_65535_frames(tmp_path):
+    more = [("POINT", "LONG_FRAMES", 4, (), reals([70_000]))]
+    raw = make_c3d(
+        np.ones((70_000, 1, 4)), labels=["A"], frames=0xFFFF, header_last=0xFFFF, more=more
+    )
+    begin = 512 * (raw[16] - 1)
+    (tmp_path / "a.c3d").write_bytes(raw[: begin + 66_000 * 16])
+    capture = read(tmp_path / "a.c3d")
+    assert capture.n_frames == 66_000
+    assert "expected 70000 frames, found 66000 complete, 64000 bytes" in capture.truncated
+
+
 def test_header_and_parameters_disagree(load):
     capture = load(grid(5), labels=["A", "B", "C"], frames=5, header_last=3)
     assert capture.n_frames == 5
@@ -253,12 +265,52 @@ def test_bad_files(tmp_path):
         b"PK\3\4" * 400: "header",
         b"time,x,y\n1,2,3\n": "header",
         good[:400]: "header",
-        good[:-1024]: "cut off",
+        good[: 512 * (good[16] - 1) + 47]: "cut off",
     }
     for raw, what in cases.items():
         path.write_bytes(raw)
         with pytest.raises(FormatError, match=what):
             read(path)
+
+
+def test_what_is_complete_of_a_truncated_file_is_read(tmp_path, caplog):
+    path = tmp_path / "cut.c3d"
+    analog = np.arange(200 * 6).reshape(200, 6)
+    more = [("ANALOG", "USED", 2, (), integers([3])), ("ANALOG", "RATE", 4, (), reals([200]))]
+    raw = make_c3d(grid(200), labels=["A", "B", "C"], analog=analog, n_samples=2, more=more)
+    frame = (4 * 3 + 6) * 4
+    begin = 512 * (int.from_bytes(raw[16:18], "little") - 1)
+    whole = raw[: begin + 200 * frame]
+    for n_bytes in (1, frame - 1, frame, 60 * frame + 11, 199 * frame):
+        path.write_bytes(whole[:-n_bytes])
+        n_complete = 200 - -(-n_bytes // frame)
+        caplog.clear()
+        capture = read(path)
+        assert capture.n_frames == n_complete
+        assert capture.names == ("A", "B", "C")
+        np.testing.assert_allclose(capture.points[-1] * 1000, grid(200)[n_complete - 1, 2, :3])
+        said = (
+            f"cut off in frame {n_complete + 1}: expected 200 frames, found {n_complete} "
+            f"complete, {n_bytes} bytes are missing. Copy the file again."
+        )
+        assert capture.truncated == said
+        assert caplog.messages == [f"{path}: {said}"]
+        assert read_c3d(path).analog.shape == (n_complete, 6)
+    # The writer says so too, and what is read of its file.
+    caplog.clear()
+    write(read(path).tracks, tmp_path / "b.c3d")
+    write(read(path).tracks, tmp_path / "b.csv")
+    assert sum("b.c3d: holds the complete frames of a trunc" in m for m in caplog.messages) == 1
+    assert sum("b.csv: holds the complete frames of a trunc" in m for m in caplog.messages) == 1
+    again = read(tmp_path / "b.c3d")
+    assert again.truncated == f"made from a capture that is {said}"
+    write(again.tracks, tmp_path / "c.c3d")
+    assert read(tmp_path / "c.c3d").truncated == again.truncated
+    # A file that is whole says nothing.
+    path.write_bytes(whole)
+    assert read(path).truncated == ""
+    write(read(path).tracks, tmp_path / "b.c3d")
+    assert b"TRUNCATED" not in (tmp_path / "b.c3d").read_bytes()
 
 
 def test_hostile_parameters(load):

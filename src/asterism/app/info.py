@@ -54,6 +54,7 @@ def _rows(found: am.CaptureInfo) -> list[tuple[str, str]]:
             f"median {_number(f.spacing_50)} mm",
         ),
         ("difficulty", f"{f.difficulty}: {f.reason}"),
+        *([("truncated", f.truncated)] if f.truncated else []),
         *(("warning" if i == 0 else "", text) for i, text in enumerate(f.warnings)),
     ]
 

@@ -67,6 +67,8 @@ class Summary:
         Detections whose label is held with less than `DOUBTFUL`; None from methods that do not say.
     info : dict
         What the method tells of itself; what was approximated, among others.
+    truncated : str
+        Where the capture is cut off and what is missing; empty for a whole one.
     """
 
     input: str
@@ -84,6 +86,7 @@ class Summary:
     log_posterior: float | None
     n_doubtful: int | None
     info: dict[str, float]
+    truncated: str = ""
 
     def rows(self) -> list[tuple[str, str]]:
         """Give the figures as people read them."""
@@ -101,6 +104,7 @@ class Summary:
             *stitching_rows(self.info),
             *self._doubts(),
             *self._posterior(),
+            *([("input truncated", self.truncated)] if self.truncated else []),
             ("time", f"{self.seconds:.3g} s, {self.frames_per_second:,.0f} frames/s"),
             ("written", self.output),
         ]
@@ -193,4 +197,5 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
         if tracks.confidence is None
         else int((tracks.confidence[order] < DOUBTFUL).sum()),
         info=info,
+        truncated=d.truncated,
     )

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CLUTTER",
+    "MADE_FROM",
     "OURS",
     "UNNAMED",
     "channel_descriptions",
@@ -34,7 +35,9 @@ UNNAMED, CLUTTER = "track without a name", "clutter"
 OURS = "ASTERISM"
 """Group of parameters of our own. FILLED: that samples whose residual and cameras are 0 were
 filled, and all others measured, as the format would always have it, but few files keep to.
-RESIDUALS: whether the residuals of the others say more than that."""
+RESIDUALS: whether the residuals of the others say more than that. TRUNCATED: that the capture
+behind the file was cut off, and where."""
+MADE_FROM = "made from a capture that is "
 
 
 def read(path: Path) -> Capture:
@@ -54,7 +57,7 @@ def read(path: Path) -> Capture:
     Raises
     ------
     FormatError
-        If the file is not C3D or is cut off.
+        If the file is not C3D, or is cut off before its first frame is complete.
     """
     file = read_c3d(path)
     warnings = list(file.warnings)
@@ -101,6 +104,7 @@ def read(path: Path) -> Capture:
         names=identity_names,
         modelled=tuple(name for name, gone in zip(names, modelled, strict=True) if gone),
         warnings=tuple(warnings),
+        truncated=file.truncated or " ".join(ours.strings("TRUNCATED")[:1]),
     )
 
 

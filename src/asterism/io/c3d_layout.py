@@ -47,6 +47,8 @@ class C3DFile:
         Size of one step of the residuals (and of integer points), positive.
     warnings : tuple of str
         What was odd.
+    truncated : str
+        Where the file is cut off and what is missing; empty for a whole file.
     """
 
     header: bytes
@@ -58,6 +60,7 @@ class C3DFile:
     rate: float
     scale: float
     warnings: tuple[str, ...]
+    truncated: str = ""
 
     def group(self, name: str) -> Group:
         """Give a group, an empty one where there is none."""
@@ -79,7 +82,12 @@ def read_c3d(path: Path) -> C3DFile:
     Raises
     ------
     FormatError
-        If it is not C3D, or ends before its last frame.
+        If it is not C3D, or holds not a single complete frame of those that it declares.
+
+    Notes
+    -----
+    Of a file that is cut off the complete frames are read. Analog samples of the incomplete frame
+    are dropped with it.
     """
     raw = path.read_bytes()
     if len(raw) < BLOCK or raw[1] != 0x50:
@@ -121,7 +129,14 @@ def read_c3d(path: Path) -> C3DFile:
         expected = f"data that begin within the file's {len(raw)} bytes"
         raise FormatError(path, "header, word 9", expected, f"byte {offset}")
     n_fit = (len(raw) - offset) // (n_items * item) if n_items else 0xFFFF
-    first, n_frames = _frames(path, groups, first, last, n_fit, warnings)
+    first, n_frames, n_declared = _frames(path, groups, first, last, n_fit, warnings)
+    truncated = ""
+    if n_declared > n_frames:
+        n_missing = offset + n_declared * n_items * item - len(raw)
+        truncated = (
+            f"cut off in frame {first + n_frames}: expected {n_declared} frames, found "
+            f"{n_frames} complete, {n_missing} bytes are missing. Copy the file again."
+        )
     n_values = n_frames * n_items
     if processor == INTEL:  # a view, because the file may be large
         kind = "<f4" if item == 4 else "<i2"
@@ -147,6 +162,7 @@ def read_c3d(path: Path) -> C3DFile:
         rate=_rate(rate, groups, words[9]),
         scale=abs(scale),
         warnings=tuple(warnings),
+        truncated=truncated,
     )
 
 
@@ -172,11 +188,11 @@ def _rate(in_header: float, groups: dict[str, Group], n_samples: int) -> float:
 
 def _frames(
     path: Path, groups: dict[str, Group], first: int, last: int, n_fit: int, warnings: list[str]
-) -> tuple[int, int]:
-    """First frame and number of frames.
+) -> tuple[int, int, int]:
+    """First frame, number of complete frames, and number of frames that the file declares.
 
-    The header's 16-bit words overflow at 65535, and every maker has another way round it; what a
-    file claims is believed only as far as it is long enough.
+    The header's 16-bit words overflow at 65535, and every maker has another way round it. Of
+    several numbers that a file states, the first that fits its length is taken as the declared one.
     """
     point, trial = groups.get("POINT", Group()), groups.get("TRIAL", Group())
     in_header = last - first + 1 if last >= first else 0
@@ -192,17 +208,22 @@ def _frames(
         if not counts and 0xFFFF in (*claimed, last) and n_fit > 0xFFFF + BLOCK:
             warnings.append("the number of frames is told by the length of the file")
             counts = [n_fit]
-        counts += [n for n in (*claimed, in_header) if n] or [0]
+        # 0xFFFF is where the words overflow: beside a longer count it says nothing.
+        counts += [n for n in (*claimed, in_header) if n and not (n == 0xFFFF and counts)]
+        counts = counts or [0]
     n_frames = next((n for n in counts if n <= n_fit), None)
-    if n_frames is None:
+    if n_frames is None and n_fit == 0:
         raise FormatError(
-            path, f"frame {first + n_fit}", f"{counts[0]} frames of data",
-            f"the end of the file after {n_fit}", "the file is cut off: copy it again",
+            path, f"frame {first}", f"{counts[0]} frames of data",
+            "the end of the file before the first is complete",
+            "the file is cut off: copy it again",
         )  # fmt: skip
+    if n_frames is None:
+        return first, n_fit, counts[0]
     if n_frames != counts[0]:
         warnings.append(f"{n_frames} frames are taken, for {counts[0]} the file is too short")
     elif n_frames != in_header and last < 0xFFFF:
         warnings.append(f"{n_frames} frames are taken; the header says {in_header}")
     if n_frames == 0:
         warnings.append("the file has no frames")
-    return first, n_frames
+    return first, n_frames, n_frames

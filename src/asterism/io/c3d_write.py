@@ -11,6 +11,7 @@ import asterism
 from asterism.errors import FormatError, ParameterError
 from asterism.io.c3d import (
     CLUTTER,
+    MADE_FROM,
     OURS,
     UNNAMED,
     channel_descriptions,
@@ -64,7 +65,8 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     is not there is written as 0, 0, 0 with residual -1, which is what other programs expect. Of
     the cameras that saw a point C3D has room for the first seven. A point that was filled has
     residual 0, which is what C3D has for it, and then every measured one has at least a step; a
-    parameter of ours says that it is so.
+    parameter of ours says that it is so. Where the capture was cut off, ASTERISM:TRUNCATED says
+    where and what is missing.
     """
     d = tracks.detections
     rate = fixed_rate(d, "C3D")
@@ -101,7 +103,8 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         )
     _set_parameters(groups, names, descriptions, d.n_frames, first_frame, rate, unit, scale)
     filled = d.filled if d.filled is not None and d.filled.any() else None
-    _set_filled(groups, filled is not None, d.residuals is not None)
+    truncated = d.truncated if isinstance(d, Capture) else ""
+    _set_ours(groups, filled is not None, d.residuals is not None, truncated)
     n_blocks = len(build(groups)) // BLOCK
     point = groups["POINT"].parameters  # the number of blocks is known now, and does not change
     point["DATA_START"] = Parameter.of_integers([2 + n_blocks], point["DATA_START"])
@@ -194,14 +197,19 @@ def _keep_residuals(
     block[frames - rows.start, channels[mine], 3] = words
 
 
-def _set_filled(groups: dict[str, Group], any_filled: bool, has_residuals: bool) -> None:
-    """Say whether residuals tell filled points; what an older file said of them is forgotten."""
+def _set_ours(
+    groups: dict[str, Group], any_filled: bool, has_residuals: bool, truncated: str
+) -> None:
+    """Set the parameters of our own; what an older file said there is forgotten."""
     old = groups.pop(OURS, Group())
-    for key in ("FILLED", "RESIDUALS"):
+    for key in ("FILLED", "RESIDUALS", "TRUNCATED"):
         old.parameters.pop(key, None)
     if any_filled:
         old.parameters["FILLED"] = Parameter.of_integers([1])
         old.parameters["RESIDUALS"] = Parameter.of_integers([int(has_residuals)])
+    if truncated:
+        about = truncated.removeprefix(MADE_FROM)
+        old.parameters["TRUNCATED"] = Parameter.of_strings([MADE_FROM + about])
     if old.parameters:
         groups[OURS] = old
 

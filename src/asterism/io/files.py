@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["format_of", "format_to_write", "read", "read_tracks", "write"]
 
+log = logging.getLogger(__name__)
+
 _HEAD = 4096  # bytes that are enough to know a format by
 
 
@@ -40,7 +43,8 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     Returns
     -------
     Capture
-        Detections in metres with the file's own identities; axes are those of the file.
+        Detections in metres with the file's own identities; axes are those of the file. Of a C3D
+        that is cut off the complete frames; `Capture.truncated` and a log message say so.
 
     Raises
     ------
@@ -59,7 +63,7 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     path = check_path("path", path)
     asked = None if format is None else _named(format)
     with _about(path):
-        return _find(path, asked).read(path)
+        return _told(_find(path, asked).read(path))
 
 
 def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
@@ -85,7 +89,9 @@ def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
     asked = None if format is None else _named(format)
     with _about(path):
         chosen = _find(path, asked)
-        return chosen.read(path).tracks if chosen.read_tracks is None else chosen.read_tracks(path)
+        if chosen.read_tracks is None:
+            return _told(chosen.read(path)).tracks
+        return chosen.read_tracks(path)
 
 
 def write(
@@ -137,6 +143,15 @@ def write(
         )  # fmt: skip
     with replacing(path) as file:
         chosen.write(tracks, file)
+    if isinstance(source, Capture) and source.truncated:
+        log.warning("%s: holds the complete frames of a truncated capture, %s", path, source.path)
+
+
+def _told(capture: Capture) -> Capture:
+    """Report that frames are missing, because whoever goes on with the rest must know it."""
+    if capture.truncated:
+        log.warning("%s: %s", capture.path, capture.truncated)
+    return capture
 
 
 def format_of(path: Path) -> Format:

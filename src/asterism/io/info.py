@@ -61,7 +61,7 @@ class CaptureInfo:
         "easy", "moderate", "hard", or "unknown" without identities or neighbours.
     reason : str
         Why.
-    warnings : tuple of str
+    warnings, truncated : tuple of str, str
         As in `Capture`.
     """
 
@@ -92,6 +92,7 @@ class CaptureInfo:
     difficulty: str
     reason: str
     warnings: tuple[str, ...]
+    truncated: str
 
 
 def describe(capture: Capture) -> CaptureInfo:
@@ -153,6 +154,7 @@ def describe(capture: Capture) -> CaptureInfo:
         difficulty=difficulty,
         reason=reason,
         warnings=capture.warnings,
+        truncated=capture.truncated,
     )
 
 

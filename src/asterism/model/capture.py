@@ -57,6 +57,9 @@ class Capture(Detections):
         Names of computed points (joint centres, angles, forces) that were left out.
     warnings : tuple of str
         What was odd about the file and how it was taken.
+    truncated : str
+        Where the file, or the one that it was made from, is cut off and what is missing; empty for
+        a whole file. The capture holds the complete frames.
 
     See Also
     --------
@@ -80,6 +83,7 @@ class Capture(Detections):
     names: tuple[str | None, ...] = ()
     modelled: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    truncated: str = ""
 
     PER_POINT: ClassVar[tuple[str, ...]] = (*Detections.PER_POINT, "channels", "labels")
 

@@ -98,7 +98,7 @@ def report(
     axis, about_up = _up(tracks, rig, up)
     if title is None:
         title = d.path.name if isinstance(d, Capture) else ""
-    warnings = d.warnings if isinstance(d, Capture) else ()
+    warnings = (*filter(None, [d.truncated]), *d.warnings) if isinstance(d, Capture) else ()
     contents = Contents(
         title=title or "Tracks",
         tracks=tracks,
