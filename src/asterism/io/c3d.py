@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.io.c3d_layout import C3DFile, read_c3d
+from asterism.io.c3d_parameters import BLOCK, DEC, INTEL, SGI
 from asterism.io.channels import identities
 from asterism.io.marker_names import find_modelled
 from asterism.io.units import PER_METRE, judge_unit, parse_unit
@@ -179,5 +180,12 @@ def _labels(
 
 
 def sniff(head: bytes) -> bool:
-    """Whether a file that begins so is C3D."""
-    return len(head) >= 512 and head[1] == 0x50 and head[0] > 1
+    """Whether a file that begins so is C3D.
+
+    The second byte is one of 256 that any binary file may have there. So the parameter section
+    must name a processor, or the header, where that section is damaged, a first frame.
+    """
+    if len(head) < BLOCK or head[1] != 0x50 or head[0] < 2:
+        return False
+    at = (head[0] - 1) * BLOCK + 3
+    return (at < len(head) and head[at] in (INTEL, DEC, SGI)) or any(head[6:8])

@@ -17,6 +17,7 @@ from asterism.errors import (
 )
 from asterism.io.atomic import replacing
 from asterism.io.formats import FORMATS, Format
+from asterism.io.text_table import as_utf8
 from asterism.model import Capture, Tracks
 
 if TYPE_CHECKING:
@@ -38,7 +39,8 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     path : path
         The file.
     format : str, optional
-        Key of `FORMATS`; by default it is told by the ending of the name and by the content.
+        Key of `FORMATS`; by default the content tells it, and where that fits several the ending
+        of the name.
 
     Returns
     -------
@@ -214,20 +216,24 @@ def _named(name: str) -> Format:
 
 
 def _find(path: Path, asked: Format | None) -> Format:
-    """Format of an existing file: as asked, or by its ending, or by its content."""
+    """Format of an existing file: as asked, or by its content.
+
+    The ending of the name decides between formats that the content fits alike, and where the
+    content fits none: then the reader of that format says what is amiss.
+    """
     check_file(path)
     if asked is not None:
         return asked
-    ending = path.suffix.lower()
-    candidates = [f for f in FORMATS.values() if ending in f.extensions] or list(FORMATS.values())
-    if len(candidates) == 1 and ending:
-        return candidates[0]
     with path.open("rb") as file:
         head = file.read(_HEAD)
-    for candidate in (*candidates, *FORMATS.values()):
-        if candidate.sniff(head):
-            return candidate
-    names = ", ".join(f"{f.name} ({f.description})" for f in candidates)
+    fitting = [f for f in FORMATS.values() if f.sniff(as_utf8(head))]
+    ending = path.suffix.lower()
+    named = [f for f in FORMATS.values() if ending and ending in f.extensions]
+    if fitting:
+        return next((f for f in fitting if f in named), fitting[0])
+    if len(named) == 1:
+        return named[0]
+    names = ", ".join(f"{f.name} ({f.description})" for f in named or FORMATS.values())
     got = repr(head[:40]) if head else "an empty file"
     raise FormatError(path, "its first bytes", f"one of: {names}", got)
 

@@ -23,18 +23,30 @@ __all__ = ["read", "sniff", "write"]
 
 _RECORD = struct.Struct("<II")
 _POINT = 12  # bytes
+_NEAREST, _FARTHEST = 1e-30, 1e6  # metres; anything: beyond what a coordinate can be, but for 0
 _MOST_POINTS = 100_000  # in one frame; a text file read as a log claims far more
 
 
 def sniff(head: bytes) -> bool:
-    """Whether a file that begins so is a log: records chain on, less than a day apart."""
-    at, last, n_records = 0, None, 0
+    """Whether a file that begins so is a log: records chain on, and hold places of points.
+
+    The header of a C3D and some texts chain on too, but as floats they are no metres.
+    """
+    at, last, n_records, n_points, is_rising = 0, -1, 0, 0, True
     while at + _RECORD.size <= len(head):
         time, n = _RECORD.unpack_from(head, at)
-        if n > _MOST_POINTS or (last is not None and abs(time - last) > 86_400_000):
+        if n > _MOST_POINTS or (n_records and abs(time - last) > 86_400_000):
             return False
-        at, last, n_records = at + _RECORD.size + _POINT * n, time, n_records + 1
-    return n_records > 0 and (at == len(head) or len(head) >= 4096)
+        at += _RECORD.size
+        n_here = min(n, (len(head) - at) // _POINT)
+        size = np.abs(np.frombuffer(head, "<f4", 3 * n_here, at))
+        if ((size > _FARTHEST) | ((size > 0) & (size < _NEAREST))).any():
+            return False
+        is_rising &= time > last
+        at, last = at + _POINT * n, time
+        n_records, n_points = n_records + 1, n_points + n_here
+    is_chain = n_records > 0 and (at == len(head) or len(head) >= 4096)
+    return is_chain and (n_points > 0 or (is_rising and n_records > 1))
 
 
 def read(path: Path) -> Capture:

@@ -20,17 +20,24 @@ if TYPE_CHECKING:
 
     from asterism.model import Tracks
 
-__all__ = ["capture_of", "cells_of", "check_times", "parse_rows", "plain", "read_lines", "rows_of"]
+__all__ = ["as_utf8", "capture_of", "cells_of", "check_times", "parse_rows", "plain",
+           "read_lines", "rows_of"]  # fmt: skip
 
 _CHUNK = 4096  # rows at a time, so that the fields as texts never fill the memory
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _GAPS = {"", "null", "nan", "none"}
+
+
+def as_utf8(head: bytes) -> bytes:
+    """Give the first bytes of a file in UTF-8 where they say that they are UTF-16."""
+    return head.decode("utf-16", "ignore").encode() if head[:2] in _UTF16 else head
 
 
 def read_lines(path: Path) -> list[str]:
     """Lines of a text file: UTF-8, UTF-16 if it says so, else Latin-1; any line ends."""
     raw = path.read_bytes()
     try:
-        text = raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+        text = raw.decode("utf-16" if raw[:2] in _UTF16 else "utf-8-sig")
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +33,7 @@ __all__ = ["read", "sniff", "write"]
 
 def sniff(head: bytes) -> bool:
     """Tell whether the first bytes of a file look like this format."""
-    return b"matrix" in head and b"distortions" in head
+    return all(re.search(rb"\b%b\"?\s*=" % key, head) for key in (b"matrix", b"distortions"))
 
 
 def read(path: Path, units: str | None) -> Rig:

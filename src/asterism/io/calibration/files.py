@@ -19,6 +19,7 @@ from asterism.errors import (
 )
 from asterism.io.atomic import replacing
 from asterism.io.calibration.formats import CALIBRATIONS, CalibrationFormat
+from asterism.io.text_table import as_utf8
 from asterism.io.units import PER_METRE, parse_unit
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def read_rig(path: str | Path, *, format: str | None = None, units: str | None =
     path : path
         The file or the folder.
     format : str, optional
-        Key of `CALIBRATIONS`; by default it is told by the name and by the content.
+        Key of `CALIBRATIONS`; by default the content tells it.
     units : {"mm", "cm", "m"}, optional
         The unit of length, for files that do not say it.
 
@@ -192,7 +193,10 @@ def _openable(path: Path, chosen: CalibrationFormat) -> CalibrationFormat:
 
 
 def format_of(path: Path) -> CalibrationFormat:
-    """Tell the format of a calibration that exists, by its name and its first bytes.
+    """Tell the format of a calibration that exists by its first bytes.
+
+    The ending of its name decides between formats that the content fits alike, and where the
+    content fits none.
 
     Parameters
     ----------
@@ -218,10 +222,10 @@ def format_of(path: Path) -> CalibrationFormat:
     check_file(path, "a calibration")
     with path.open("rb") as file:
         head = file.read(_HEAD)
+    fitting = [c for c in every if c.sniff is not None and c.sniff(as_utf8(head))]
     by_name = [c for c in every if path.name.lower().endswith(c.extensions)]
-    for candidate in (*by_name, *every):
-        if candidate.sniff is not None and candidate.sniff(head):
-            return candidate
+    if fitting:
+        return next((c for c in fitting if c in by_name), fitting[0])
     if by_name:
         return by_name[-1]  # its reader says what is amiss
     known = ", ".join(f"{c.name} ({c.description})" for c in every)
