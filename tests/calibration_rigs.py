@@ -23,8 +23,8 @@ LENSES = {
 }
 
 
-NAMES = {"rig": "a.toml", "anipose": "a.toml", "opencv": "a.yml", "qca": "a.qca.txt",
-         "xcp": "a.xcp", "flydra": "fly", "myptv": "ptv"}  # fmt: skip
+NAMES = {"rig": "a.toml", "caliscope": "a.toml", "anipose": "a.toml", "opencv": "a.yml",
+         "qca": "a.qca.txt", "xcp": "a.xcp", "flydra": "fly", "myptv": "ptv"}  # fmt: skip
 
 
 def target_points(n: int = 200) -> np.ndarray:

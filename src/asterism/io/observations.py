@@ -10,18 +10,20 @@ bits.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.camera import Observations
 from asterism.errors import FormatError, ParameterError, check_number, check_path, not_read
+from asterism.io import caliscope_xy
 from asterism.io.atomic import replacing
 from asterism.io.csv_columns import columns_of, quoted, whole
 from asterism.io.text_table import cells_of, check_times, read_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Generator, Iterable, Iterator, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -67,7 +69,10 @@ def write_observations(
 
 
 def read_observations(path: str | Path) -> Observations:
-    """Read image points from a CSV file as `write_observations` writes it.
+    """Read image points from a CSV file, as `write_observations` or as caliscope writes it.
+
+    The header tells which of the two it is. Cameras of caliscope's ``xy.csv`` are called ``cam_N``,
+    as `read_rig` calls those of its calibration.
 
     Columns and rows may stand in any order; of one camera and frame the points keep theirs.
     Cameras and markers need not be declared, if none of them is: then they come in the order in
@@ -95,13 +100,23 @@ def read_observations(path: str | Path) -> Observations:
     while len(lines) > 1 and not lines[-1].strip():
         lines.pop()
     header = cells_of(lines[0])
+    if caliscope_xy.is_header(header) and len(set(header)) == len(header):
+        with _faults_of(path):
+            return caliscope_xy.parse(path, lines, header)
     missing = [name for name in _COLUMNS[:-1] if name not in header]
     if missing or len(set(header)) < len(header) or not set(header) <= set(_COLUMNS):
         got = repr(", ".join(header)[:60])
         raise FormatError(path, "line 1", f"the columns {', '.join(_COLUMNS)}", got)
     numbers, texts = columns_of(path, lines, header, _TEXTS)
-    try:
+    with _faults_of(path):
         return _assemble(path, numbers, texts)
+
+
+@contextmanager
+def _faults_of(path: Path) -> Generator[None, None, None]:
+    """Turn what `Observations` refuses into an error about the file."""
+    try:
+        yield
     except ParameterError as error:
         raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
 

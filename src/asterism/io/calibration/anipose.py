@@ -1,4 +1,7 @@
-"""TOML of anipose, freemocap and caliscope: OpenCV's camera, the rotation as a Rodrigues vector."""
+"""TOML of anipose and freemocap: OpenCV's camera, the rotation as a Rodrigues vector.
+
+Caliscope's own file has the same entries, its rotations vectors or matrices; see `caliscope`.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from asterism.io.calibration.parts import (
     build_camera,
     build_rig,
     drop_skew,
+    nearest_rotation,
     per_metre,
     pose,
     whole_size,
@@ -25,6 +29,8 @@ from asterism.io.units import parse_unit
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from asterism.camera import Rig
 
@@ -56,7 +62,7 @@ def read(path: Path, units: str | None) -> Rig:
     metadata = content.get("metadata")
     if units is None and isinstance(metadata, dict):
         units = parse_unit(str(metadata.get("units", "")))
-    nested = content.pop("cameras", {})  # where caliscope has them
+    nested = content.pop("cameras", {})  # where caliscope has them, by number
     if isinstance(nested, dict):
         content |= {f"cam_{key}": entry for key, entry in nested.items()}
     for key, entry in content.items():
@@ -65,6 +71,8 @@ def read(path: Path, units: str | None) -> Rig:
                 warnings.append(f"the entry {key!r} is no camera and is left out")
         elif all(entry.get(k, "null") == "null" for k in ("rotation", "translation")):
             warnings.append(f"camera {entry.get('name', key)} has no pose and is left out")
+        elif entry.get("ignore") is True:
+            warnings.append(f"camera {entry.get('name', key)} is marked ignore and is left out")
         else:
             found.append(_camera(path, key, entry, warnings))
     scale = 1.0
@@ -88,23 +96,40 @@ def _camera(path: Path, key: str, entry: dict[str, Any], warnings: list[str]) ->
             path, f"{place}, fisheye", "false", "true", "fisheye lenses are not modelled"
         )
     size = as_array(path, f"{place}, size", entry.get("size"), (2,))
-    distortions = as_array(path, f"{place}, distortions", entry.get("distortions", []))
+    distortions = as_array(path, f"{place}, distortions", _flat(entry.get("distortions", [])))
     if len(distortions) > 5 and distortions[5:].any():
         expected = "k1, k2, p1, p2, k3, and nothing after them"
         raise FormatError(path, f"{place}, distortions", expected, f"{len(distortions)} numbers")
     k = np.zeros(5)
     k[: len(distortions[:5])] = distortions[:5]
     K = as_array(path, f"{place}, matrix", entry["matrix"], (3, 3))
-    rotation = as_array(path, f"{place}, rotation", entry.get("rotation"), (3,))
     return {
         "place": place,
         "name": name,
         "size": whole_size(path, f"{place}, size", size[0], size[1]),
         "K": drop_skew(place, K, warnings),
         "lens": BrownConrady(*k.tolist()) if k.any() else None,
-        "R": Rotation.from_rotvec(rotation).as_matrix(),
-        "t": as_array(path, f"{place}, translation", entry.get("translation"), (3,)),
+        "R": _rotation(path, f"{place}, rotation", entry.get("rotation")),
+        "t": as_array(path, f"{place}, translation", _flat(entry.get("translation")), (3,)),
     }
+
+
+def _flat(value: Any) -> Any:
+    """Give a row or a column, as some versions of caliscope nest them, as a plain list."""
+    if not isinstance(value, list):
+        return value
+    if len(value) == 1 and isinstance(value[0], list):
+        return value[0]
+    is_column = all(isinstance(row, list) and len(row) == 1 for row in value)
+    return [row[0] for row in value] if is_column else value
+
+
+def _rotation(path: Path, place: str, value: Any) -> NDArray[np.float64]:
+    """Read a rotation, a Rodrigues vector or a matrix."""
+    value = _flat(value)
+    if isinstance(value, list) and any(isinstance(row, list) for row in value):
+        return nearest_rotation(path, place, as_array(path, place, value, (3, 3)))
+    return Rotation.from_rotvec(as_array(path, place, value, (3,))).as_matrix()
 
 
 def write(rig: Rig) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from asterism.io.calibration import anipose, flydra, myptv, opencv, qca, rig_toml, xcp
+from asterism.io.calibration import anipose, caliscope, flydra, myptv, opencv, qca, rig_toml, xcp
 from asterism.records import Registry, record
 
 if TYPE_CHECKING:
@@ -76,9 +76,20 @@ CALIBRATIONS: dict[str, CalibrationFormat] = Registry(
             unit="m",
         ),
         CalibrationFormat(
+            name="caliscope",
+            extensions=(".toml",),
+            description="camera_array.toml of caliscope",
+            lens="BrownConrady",
+            read=caliscope.read,
+            write=caliscope.write,
+            sniff=caliscope.sniff,
+            unit="m",
+            has_skew=False,
+        ),
+        CalibrationFormat(
             name="anipose",
             extensions=(".toml",),
-            description="TOML of anipose, freemocap and caliscope",
+            description="TOML of anipose and freemocap",
             lens="BrownConrady",
             read=anipose.read,
             write=anipose.write,
