@@ -189,4 +189,4 @@ def test_a_unit_that_the_format_has_not_is_refused(tmp_path):
     with pytest.raises(ParameterError, match="mm, as in all files"):
         read_rig(tmp_path / "a.qca.txt", units="m")
     with pytest.raises(ParameterError, match="one of mm, cm, m"):
-        read_rig(tmp_path / "a.qca.txt", units="inch")
+        read_rig(tmp_path / "a.qca.txt", units="furlong")

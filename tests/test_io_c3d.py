@@ -76,6 +76,25 @@ def test_units(load, units, size):
     np.testing.assert_array_equal(capture.points, grid()[..., :3].reshape(-1, 3) / size)
 
 
+@pytest.mark.parametrize(
+    ("units", "unit", "metres"),
+    [("in", "in", 0.0254), ("Inches", "in", 0.0254), ("ft", "ft", 0.3048), ("feet", "ft", 0.3048)],
+)
+def test_inches_and_feet(load, tmp_path, units, unit, metres):
+    capture = load(grid(), labels=["A", "B", "C"], units=units)
+    np.testing.assert_allclose(capture.points, grid()[..., :3].reshape(-1, 3) * metres, rtol=1e-14)
+    assert (capture.units, capture.warnings) == (unit, ())
+    # Back in the same unit, with the same numbers, in each format that names one.
+    for name in ("b.c3d", "b.trc"):
+        write(capture.tracks, tmp_path / name)
+        again = read(tmp_path / name)
+        assert again.units == unit
+        np.testing.assert_array_equal(again.points, capture.points)
+    points = ezc3d.c3d(str(tmp_path / "b.c3d"))["data"]["points"]
+    np.testing.assert_array_equal(points[:3].transpose(2, 1, 0), grid()[..., :3])
+    assert f"\t{unit}\t" in (tmp_path / "b.trc").read_text()
+
+
 @pytest.mark.parametrize(("factor", "unit"), [(1, "mm"), (0.001, "m")])
 @pytest.mark.parametrize("units", [None, "", "furlong"])
 def test_unknown_units_are_judged_by_size_and_told_of(load, units, factor, unit):

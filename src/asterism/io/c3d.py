@@ -10,7 +10,7 @@ from asterism.io.c3d_layout import C3DFile, read_c3d
 from asterism.io.c3d_parameters import BLOCK, DEC, INTEL, SGI
 from asterism.io.channels import identities
 from asterism.io.marker_names import find_modelled
-from asterism.io.units import PER_METRE, judge_unit, parse_unit
+from asterism.io.units import PER_METRE, check_size, judge_unit, parse_unit
 from asterism.model import Capture
 
 if TYPE_CHECKING:
@@ -75,7 +75,10 @@ def read(path: Path) -> Capture:
     if unit is None:
         unit = judge_unit(points)
         warnings.append(f"POINT:UNITS is {stated!r}: by their size the coordinates are {unit}")
-    points /= PER_METRE[unit]
+        points /= PER_METRE[unit]
+    else:
+        points /= PER_METRE[unit]
+        warnings += check_size(points, unit)
     rate = file.rate
     if not rate:
         warnings.append("no frame rate is given: times count frames, one a second")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.errors import FormatError
+from asterism.io.units import PER_METRE
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -16,7 +17,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["columns_of", "quoted", "whole"]
+__all__ = ["SOURCE_UNIT", "columns_of", "quoted", "source_unit", "whole"]
+
+SOURCE_UNIT = "source_unit"
+"""Column of the unit of the file that a capture came from; the coordinates are metres."""
 
 _CHUNK = 4096  # lines at a time, so that the cells as texts never fill the memory
 _TO_QUOTE = frozenset(',"\r\n')
@@ -100,6 +104,32 @@ def whole(
         place = f"line {lines[bad[0]]}, column {column}"
         raise FormatError(path, place, "a whole number", f"{values[bad[0]]:g}")
     return values.astype(np.int64)
+
+
+def source_unit(path: Path, texts: Sequence[str]) -> str:
+    """Give the unit that the rows of a file name, "m" where none does.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    texts : sequence of str
+        Cells of the column, from line 2; some may be blank.
+
+    Raises
+    ------
+    FormatError
+        If one is no unit, or two differ.
+    """
+    found = dict.fromkeys(texts)
+    found.pop("", None)
+    for i, text in enumerate(found):
+        place = f"line {texts.index(text) + 2}, column {SOURCE_UNIT}"
+        if text not in PER_METRE:
+            raise FormatError(path, place, f"one of {', '.join(PER_METRE)}", repr(text)[:60])
+        if i:
+            raise FormatError(path, place, f"{next(iter(found))!r}, as above", repr(text))
+    return next(iter(found), "m")
 
 
 def quoted(text: str) -> str:

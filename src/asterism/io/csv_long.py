@@ -1,22 +1,26 @@
 """Asterism's own CSV: one row a detection, and nothing is lost.
 
-Columns ``frame, time_s, x_m, y_m, z_m, track, name, confidence, filled, std``; ``z_m`` is absent in
-2-D, the last three where there is nothing of the kind. Clutter is track -1; ``filled`` is 1 for a
-point that was not measured; ``std`` is the standard deviation of a coordinate in metres, 0 where it
-is not known. A row without coordinates is a frame without points; a row without frame and time
-declares a track that has no detection. Floats are written with as many digits as give back the same
-bits. Tabs and line ends in a name become blanks.
+Columns ``frame, time_s, x_m, y_m, z_m, track, name, confidence, filled, std, source_unit``; ``z_m``
+is absent in 2-D, the last four where there is nothing of the kind. Clutter is track -1; ``filled``
+is 1 for a point that was not measured; ``std`` is the standard deviation of a coordinate in metres,
+0 where it is not known. Coordinates are metres; ``source_unit`` is the unit of the file that the
+capture came from, where that is another one, and is the same in all rows: the formats that name a
+unit are written in it again. A row without coordinates is a frame without points; a row without
+frame and time declares a track that has no detection. Floats are written with as many digits as
+give back the same bits. Tabs and line ends in a name become blanks.
 """
 
 from __future__ import annotations
 
+from itertools import repeat
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
 from asterism.errors import FormatError
-from asterism.io.csv_columns import columns_of, quoted
+from asterism.io.csv_columns import SOURCE_UNIT, columns_of, quoted, source_unit
 from asterism.io.text_table import cells_of, check_times, plain, read_lines
+from asterism.io.units import check_size
 from asterism.model import Capture, Tracks
 
 if TYPE_CHECKING:
@@ -26,7 +30,9 @@ if TYPE_CHECKING:
 
 __all__ = ["read", "read_tracks", "sniff", "write"]
 
-_COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "track", "name", "confidence", "filled", "std")
+_COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "track", "name", "confidence", "filled", "std",
+            SOURCE_UNIT)  # fmt: skip
+_TEXTS = ("name", SOURCE_UNIT)
 _REQUIRED = ("frame", "time_s", "x_m", "y_m")
 _CHUNK = 4096  # lines or frames at a time
 _MOST_TRACKS = 10**6  # a number beyond it is a mistake, and would fill the memory
@@ -74,7 +80,7 @@ def _load(path: Path) -> tuple[Capture, Tracks]:
     if unknown or missing or len(set(header)) < len(header):
         got = ", ".join(header)[:200]
         raise FormatError(path, "line 1", f"the columns {', '.join(_COLUMNS)}", got)
-    numbers, texts = columns_of(path, lines, header, ("name",))
+    numbers, texts = columns_of(path, lines, header, _TEXTS)
     nothing = np.full(len(lines) - 1, np.nan)
     numbers = dict.fromkeys(("track",), nothing) | numbers
     names = texts.get("name", [""] * len(nothing))
@@ -111,6 +117,7 @@ def _load(path: Path) -> tuple[Capture, Tracks]:
     filled = numbers.get("filled")
     if filled is not None:
         filled = _whole(path, "filled", filled[kept], 0, 1).astype(np.bool_)
+    unit = source_unit(path, texts.get(SOURCE_UNIT, []))
     capture = Capture(
         times=times,
         offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
@@ -120,9 +127,11 @@ def _load(path: Path) -> tuple[Capture, Tracks]:
         path=path,
         format="csv",
         first_frame=int(numbered[0]) if len(numbered) else 1,
+        units=unit,
         channels=np.full(len(kept), -1),
         labels=track[kept],
         names=track_names,
+        warnings=check_size(points[kept], unit),
     )
     confidence = numbers["confidence"][kept] if "confidence" in header else None
     tracks = Tracks(
@@ -167,12 +176,15 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     filled = None if d.filled is None else d.filled.astype(np.int64)
     more = {"confidence": tracks.confidence, "filled": filled, "std": d.stds}
     last = {name: values for name, values in more.items() if values is not None}
-    header = [c for c in _COLUMNS if (c != "z_m" or d.n_axes == 3) and c not in more] + [*last]
+    unit = d.units if isinstance(d, Capture) and d.units != "m" else ""
+    absent = {*more, SOURCE_UNIT} | ({"z_m"} if d.n_axes == 2 else set[str]())
+    header = [c for c in _COLUMNS if c not in absent] + [*last] + [SOURCE_UNIT] * bool(unit)
     file.write((",".join(header) + "\n").encode())
     tails = [f"{k},{quoted(plain(name or ''))}" for k, name in enumerate(tracks.names)] + ["-1,"]
     first = d.first_frame if isinstance(d, Capture) else 1
     starts = [f"{first + t},{time!r}" for t, time in enumerate(d.times.tolist())]
-    blank = "," * (len(header) - 2)
+    end_of_blank = f",{unit}" if unit else ""
+    blank = "," * (len(header) - 2 - bool(unit)) + end_of_blank
     for begin in range(0, d.n_frames, _CHUNK):
         end = min(begin + _CHUNK, d.n_frames)
         rows = slice(int(d.offsets[begin]), int(d.offsets[end]))
@@ -180,11 +192,12 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         columns += [map(repr, d.points[rows, axis].tolist()) for axis in range(d.n_axes)]
         columns.append(map(tails.__getitem__, tracks.labels[rows].tolist()))
         columns += [map(repr, values[rows].tolist()) for values in last.values()]
+        columns += [repeat(unit, rows.stop - rows.start)] * bool(unit)
         lines = list(map(",".join, zip(*columns, strict=True)))
         # Backwards, so that the places of the others stay right.
         for t in begin + np.flatnonzero(d.counts[begin:end] == 0)[::-1]:
             lines.insert(int(d.offsets[t]) - rows.start, starts[t] + blank)
         file.write("".join(f"{line}\n" for line in lines).encode())
     for k in np.flatnonzero(tracks.lengths == 0):
-        line = "," * (2 + d.n_axes) + tails[k] + "," * len(last)
+        line = "," * (2 + d.n_axes) + tails[k] + "," * len(last) + end_of_blank
         file.write(f"{line}\n".encode())

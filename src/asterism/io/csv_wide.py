@@ -1,15 +1,18 @@
 """CSV with one row a frame and three columns a marker: ``time_s, LASI_x, LASI_y, LASI_z, …``.
 
-Metres; gaps are blank fields. The suffixes make out the markers; 2-D files have no ``_z``.
+Metres; gaps are blank fields. The suffixes make out the markers; 2-D files have no ``_z``. A last
+column ``source_unit`` names the unit of the file that the capture came from, where that is another.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from typing import IO, TYPE_CHECKING
 
 from asterism.errors import FormatError
+from asterism.io.csv_columns import SOURCE_UNIT, source_unit
 from asterism.io.text_table import (
     capture_of,
     cells_of,
@@ -19,11 +22,12 @@ from asterism.io.text_table import (
     read_lines,
     rows_of,
 )
+from asterism.model import Capture
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from asterism.model import Capture, Tracks
+    from asterism.model import Tracks
 
 __all__ = ["read", "sniff", "write"]
 
@@ -54,6 +58,12 @@ def read(path: Path) -> Capture:
     """
     lines = read_lines(path)
     titles = cells_of(lines[0])
+    unit = "m"
+    if titles[-1:] == [SOURCE_UNIT]:
+        titles.pop()
+        rows = [line.rpartition(",") for line in lines]
+        lines = [row[0] for row in rows]
+        unit = source_unit(path, [row[2].strip() for row in rows[1:]])
     is_flat = len(titles) > 1 and not any(title.endswith("_z") for title in titles)
     axes = "xy" if is_flat else "xyz"
     names = [title[:-2] for title in titles[1 :: len(axes)]]
@@ -65,7 +75,7 @@ def read(path: Path) -> Capture:
     values, numbers = parse_rows(path, lines, 1, len(titles), ",")
     values = values.reshape(len(numbers), len(titles))
     check_times(path, values[:, 0], numbers)
-    return capture_of(
+    capture = capture_of(
         path,
         "csv-wide",
         values[:, 0],
@@ -74,6 +84,7 @@ def read(path: Path) -> Capture:
         unit="m",
         zero_is_gap=False,
     )
+    return capture if unit == "m" else replace(capture, units=unit)
 
 
 def write(tracks: Tracks, file: IO[bytes]) -> None:
@@ -91,7 +102,9 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     axes = "xyz"[: tracks.detections.n_axes]
     header = io.StringIO()
     titles = ["time_s"] + [f"{plain(name)}_{axis}" for name in names for axis in axes]
-    csv.writer(header, lineterminator="\n").writerow(titles)
+    d = tracks.detections
+    unit = [d.units] if isinstance(d, Capture) and d.units != "m" else []
+    csv.writer(header, lineterminator="\n").writerow(titles + [SOURCE_UNIT] * len(unit))
     file.write(header.getvalue().encode())
-    for time, row in zip(tracks.detections.times.tolist(), rows, strict=True):
-        file.write((",".join([repr(time), *row]) + "\n").encode())
+    for time, row in zip(d.times.tolist(), rows, strict=True):
+        file.write((",".join([repr(time), *row, *unit]) + "\n").encode())

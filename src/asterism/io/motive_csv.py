@@ -78,7 +78,8 @@ def read(path: Path) -> Capture:
     stated = facts.get("Length Units", "Meters")
     unit = parse_unit(stated)
     if unit is None:
-        raise FormatError(path, "Length Units", "Meters, Centimeters or Millimeters", stated)
+        expected = "Meters, Centimeters, Millimeters, Inches or Feet"
+        raise FormatError(path, "Length Units", expected, stated)
     values, numbers = parse_rows(path, lines, titles_at + 1, n_columns, ",")
     values = values.reshape(len(numbers), n_columns)
     check_times(path, values[:, 1], numbers)

@@ -11,7 +11,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 
 from asterism.errors import FormatError, ParameterError
-from asterism.io.units import to_float32
+from asterism.io.units import check_size, to_float32
 from asterism.model import Capture
 
 if TYPE_CHECKING:
@@ -108,6 +108,7 @@ def read(path: Path) -> Capture:
         format="pointcloud",
         channels=nobody,
         labels=nobody,
+        warnings=check_size(points, "m"),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from asterism.errors import FormatError
 from asterism.io.channels import fill, identities, to_channels
-from asterism.io.units import PER_METRE, from_metres
+from asterism.io.units import PER_METRE, check_size, from_metres
 from asterism.model import Capture
 
 if TYPE_CHECKING:
@@ -147,6 +147,7 @@ def capture_of(
     rate: float = 0.0,
     first_frame: int = 1,
     zero_is_gap: bool,
+    is_stated: bool = True,
     modelled: Sequence[str] = (),
     warnings: Sequence[str] = (),
 ) -> Capture:
@@ -164,6 +165,8 @@ def capture_of(
         Of the C channels.
     zero_is_gap : bool
         Whether all zeros mean "not seen", as they do in files of recording systems.
+    is_stated : bool
+        Whether the file states its unit: then a size that contradicts it is a warning.
     """
     seen: NDArray[np.bool_] = np.all(np.isfinite(coordinates), axis=2)
     notes = list(warnings)
@@ -176,11 +179,13 @@ def capture_of(
             notes.append(f"{at_origin.sum()} points at exactly the origin are taken as not seen")
         seen &= ~at_origin
     labels, identity_names = identities(seen, names)
-    points = coordinates[seen].reshape(-1, coordinates.shape[2])
+    points = coordinates[seen].reshape(-1, coordinates.shape[2]) / PER_METRE[unit]
+    if is_stated:
+        notes += check_size(points, unit)
     return Capture(
         times=times,
         offsets=np.concatenate([[0], np.cumsum(seen.sum(axis=1))]),
-        points=points / PER_METRE[unit],
+        points=points,
         path=path,
         format=format,
         rate=rate,

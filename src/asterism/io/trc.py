@@ -77,6 +77,7 @@ def read(path: Path) -> Capture:
     coordinates = values[:, 2:].reshape(len(values), len(names), 3)
     stated = header.get("Units", "")
     unit = parse_unit(stated)
+    is_stated = unit is not None
     if unit is None:
         unit = judge_unit(coordinates[np.isfinite(coordinates).all(axis=2)])
         warnings.append(f"Units is {stated!r}: by their size the coordinates are {unit}")
@@ -94,6 +95,7 @@ def read(path: Path) -> Capture:
         rate=_rate(header),
         first_frame=int(first),
         zero_is_gap=True,
+        is_stated=is_stated,
         warnings=warnings,
     )
 

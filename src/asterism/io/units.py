@@ -15,18 +15,29 @@ from asterism.errors import ParameterError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["PER_METRE", "from_metres", "judge_unit", "parse_unit", "to_float32"]
+__all__ = ["PER_METRE", "check_size", "from_metres", "judge_unit", "parse_unit", "to_float32"]
 
-PER_METRE = {"mm": 1000.0, "cm": 100.0, "m": 1.0}
+PER_METRE = {"mm": 1000.0, "cm": 100.0, "m": 1.0, "in": 1 / 0.0254, "ft": 1 / 0.3048}
 _SPELLINGS = {
     **dict.fromkeys(("mm", "millimeter", "millimeters", "millimetre", "millimetres"), "mm"),
     **dict.fromkeys(("cm", "centimeter", "centimeters", "centimetre", "centimetres"), "cm"),
     **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), "m"),
+    **dict.fromkeys(("in", "inch", "inches"), "in"),
+    **dict.fromkeys(("ft", "foot", "feet"), "ft"),
 }
+_NEAREST, _FARTHEST = 0.02, 100.0
+"""Metres from the origin between which nine tenths of the points of a capture reach."""
+_MOST_POINTS = 100_000  # that are looked at, evenly spread
 
 
 def parse_unit(text: str) -> str | None:
-    """Give "mm", "cm" or "m" for its spelling in a file, None for anything else."""
+    """Give a key of `PER_METRE` for its spelling in a file, None for anything else.
+
+    Examples
+    --------
+    >>> [parse_unit(text) for text in ("Millimeters", "INCH", "feet", "furlong")]
+    ['mm', 'in', 'ft', None]
+    """
     return _SPELLINGS.get(text.strip().lower())
 
 
@@ -46,8 +57,50 @@ def judge_unit(points: NDArray[np.floating]) -> str:
     """
     if not len(points):
         return "mm"
-    far = np.quantile(np.abs(points).max(axis=1), 0.9)
-    return "mm" if far > 20 else "m"
+    return "mm" if _reach(points) > 20 else "m"
+
+
+def check_size(points: NDArray[np.floating], unit: str) -> tuple[str, ...]:
+    """Warn of metres that a file calls millimetres, and of millimetres that it calls metres.
+
+    Parameters
+    ----------
+    points : ndarray, shape (N, D)
+        Metres, as the file's own unit makes them.
+    unit : str
+        The unit that the file names.
+
+    Returns
+    -------
+    tuple of str
+        One warning, or none: where a factor of 1000 brings an impossible size to a usual one.
+
+    Examples
+    --------
+    >>> check_size(np.array([[0.9, 1.1, 0.4]]), "mm")
+    ()
+    >>> check_size(np.array([[0.0009, 0.0011, 0.0004]]), "mm")[0][:72]
+    'unit of length: expected coordinates in mm, as the file says, found the '
+    """
+    if not len(points):
+        return ()
+    far = _reach(points[:: -(-len(points) // _MOST_POINTS)])
+    if unit == "mm" and far < _NEAREST <= 1000 * far:
+        other = "m"
+    elif unit == "m" and far > _FARTHEST >= far / 1000:
+        other = "mm"
+    else:
+        return ()
+    return (
+        f"unit of length: expected coordinates in {unit}, as the file says, found the size of "
+        f"coordinates in {other} (nine tenths of the points lie within {far * PER_METRE[unit]:.3g} "
+        f"{unit} of the origin). Correct the unit in the file.",
+    )
+
+
+def _reach(points: NDArray[np.floating]) -> float:
+    """Largest coordinate that a tenth of the points exceed."""
+    return float(np.quantile(np.abs(points).max(axis=1), 0.9))
 
 
 def from_metres(metres: NDArray[np.float64], unit: str) -> NDArray[np.float64]:

@@ -39,7 +39,7 @@ def read_rig(path: str | Path, *, format: str | None = None, units: str | None =
         The file or the folder.
     format : str, optional
         Key of `CALIBRATIONS`; by default the content tells it.
-    units : {"mm", "cm", "m"}, optional
+    units : {"mm", "cm", "m", "in", "ft"}, optional
         The unit of length, for files that do not say it.
 
     Returns

@@ -60,7 +60,7 @@ def read_sightings(
         Names of the cameras there are.
     camera : str, optional
         Whose file it is; by default the one whose name the file's name begins with.
-    units : {"mm", "cm", "m"}, optional
+    units : {"mm", "cm", "m", "in", "ft"}, optional
         Of the points; by default metres in a CSV and millimetres in the others.
 
     Returns
