@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+import asterism as am
 from asterism.app import main
 from c3d_bytes import make_c3d
 
@@ -80,3 +81,34 @@ def test_a_truncated_capture_is_tracked_and_the_result_says_so(tmp_path, capsys)
     assert f"cut.c3d: {said}" in err
     (tmp_path / "none.c3d").write_bytes(raw[: begin + 79])
     assert "the first is complete" in refused("info none.c3d", capsys)
+
+
+def test_info_says_what_can_be_said_of_points_without_names(tmp_path, capsys):
+    points = walk(30, 4)
+    write_c3d(tmp_path / "unlabelled.c3d", points, labels=["*0", "*1", "", "U_7"])
+    out, _ = run("info unlabelled.c3d", capsys)
+    lines = {line[:17].strip(): line[17:].strip() for line in out.splitlines()}
+    assert lines["without a name"] == "4 channels in 4 pieces"
+    assert lines["step"].startswith("median ")
+    assert lines["step to nearest"] == lines["step"]  # the points are far apart
+    assert "another piece of a trajectory" in lines["difficulty"]
+    assert "absent" not in lines
+    assert "gaps" not in lines
+    run("corrupt unlabelled.c3d -o c.csv --truth t.csv", capsys)
+    for name in ("c.csv", "c.log"):
+        if name == "c.log":
+            am.write(am.read("c.csv").tracks, name)
+        out, _ = run(f"info {name}", capsys)
+        lines = {line[:17].strip(): line[17:].strip() for line in out.splitlines()}
+        assert lines["without a name"] == "120 of 120 points belong to no track"
+        assert lines["points a frame"] == "4 to 4, 4 on average"
+        assert "step" not in lines
+        assert float(lines["step to nearest"].split()[1].rstrip(",")) > 0
+        assert "inf" not in out
+        assert "–" not in out
+    (tmp_path / "one.csv").write_text("frame,time_s,x_m,y_m,z_m\n1,0,1,2,3\n2,0.01,1,2,3\n")
+    out, _ = run("info one.csv", capsys)
+    assert "none: a frame has one at most" in out
+    assert "–" not in out
+    told = json.loads(run("info one.csv --json", capsys)[0])
+    assert (told["n_points"], told["nearest_step_99"], told["spacing_50"]) == (2, 0, None)

@@ -59,6 +59,61 @@ def test_nothing_to_measure(tmp_path):
     assert describe(read(tmp_path / "b.csv")).n_frames == 0
 
 
+def test_points_without_identities(tmp_path):
+    # Two points 100 mm apart that both move by 10 mm, and a frame with the first alone.
+    dense = np.zeros((5, 2, 3))
+    dense[:, 1, 1] = 0.1
+    dense[..., 0] = 0.01 * np.arange(5)[:, None]
+    dense[4, 1] = np.nan
+    tracks = Tracks.from_dense(np.arange(5) / 50, dense)
+    write(tracks, tmp_path / "a.log")
+    info = describe(read(tmp_path / "a.log"))
+    assert (info.n_points, info.n_unidentified, info.n_named, info.n_pieces) == (9, 9, 0, 0)
+    # Rounded to 32 bits; the last step of the second goes to the first, as it alone is there.
+    np.testing.assert_allclose(info.nearest_step_median, 10, rtol=1e-5)
+    expected = np.percentile([*[10] * 7, np.hypot(10, 100)], 99)
+    np.testing.assert_allclose(info.nearest_step_99, expected, rtol=1e-5)
+    assert np.isnan(info.step_median)
+    np.testing.assert_allclose(info.spacing_50, 100, rtol=1e-5)
+    assert info.difficulty == "unknown"
+    assert "no identities" in info.reason
+    assert "times the distance of close ones" in info.reason
+
+
+def test_points_that_coincide_are_no_infinity(tmp_path):
+    for names in (["A", "B"], None):
+        dense = np.zeros((4, 2, 3))
+        dense[..., 0] = 0.01 * np.arange(4)[:, None]
+        write(Tracks.from_dense(np.arange(4) / 50, dense, names), tmp_path / "a.csv")
+        info = describe(read(tmp_path / "a.csv"))
+        assert "inf" not in info.reason
+        assert "10 mm, and 5 % of the points or more lie exactly on another" in info.reason
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(
+    ("name", "n_points", "steps", "spacing"),
+    [  # measured when the data were collected
+        ("recording_000", 890, (0.01, 0.03), None),
+        ("drone2", 4632, (2.1, 11.1), (162, 293, 476)),
+        ("marker3", 4138, (0.03, 10.7), (403, 459, 681)),
+    ],
+)
+def test_real_logs(name, n_points, steps, spacing):
+    found = sorted(DATA.rglob(name))
+    if not found:
+        pytest.skip("the real logs are not beside the project")
+    info = describe(read(found[0]))
+    assert info.n_points == info.n_unidentified == n_points
+    got = info.nearest_step_median, info.nearest_step_99
+    np.testing.assert_allclose(got, steps, rtol=0.02, atol=0.005)
+    if spacing is None:
+        assert np.isnan(info.spacing_50)
+    else:
+        got = info.spacing_1, info.spacing_5, info.spacing_50
+        np.testing.assert_allclose(got, spacing, atol=0.5)
+
+
 @pytest.mark.data
 @pytest.mark.parametrize("known", _entries(), ids=lambda f: Path(f["file"]).name if f else "none")
 def test_real_captures(known):

@@ -42,6 +42,8 @@ class CaptureInfo:
         Unbroken pieces of those.
     n_modelled : int
         Computed points that were left out.
+    n_points, n_unidentified : int
+        Points, and those of no identity: neither of a named marker nor of an unbroken piece.
     points_min, points_mean, points_max : float
         Points in a frame.
     absent_percent : float
@@ -52,6 +54,8 @@ class CaptureInfo:
         Their lengths in frames.
     step_median, step_99 : float
         Displacement of an identity from one frame to the next, 50th and 99th percentile.
+    nearest_step_median, nearest_step_99 : float
+        Distance of a point to the nearest point of the next frame, whichever that is, percentiles.
     spacing_1, spacing_5, spacing_50 : float
         Distance of a point to its nearest neighbour in its frame, percentiles.
     confusion_percent : float
@@ -76,6 +80,8 @@ class CaptureInfo:
     n_unlabelled: int
     n_pieces: int
     n_modelled: int
+    n_points: int
+    n_unidentified: int
     points_min: int
     points_mean: float
     points_max: int
@@ -85,6 +91,8 @@ class CaptureInfo:
     gap_longest: int
     step_median: float
     step_99: float
+    nearest_step_median: float
+    nearest_step_99: float
     spacing_1: float
     spacing_5: float
     spacing_50: float
@@ -119,12 +127,17 @@ def describe(capture: Capture) -> CaptureInfo:
     has_label = capture.labels >= 0
     is_named[has_label] = named[capture.labels[has_label]]
     gaps, n_present, n_missing = _gaps(capture, is_named)
-    steps, spacing, n_confused, n_followed = _neighbours(capture)
+    steps = _steps(capture)
+    nearest, spacing, n_confused, n_followed = _neighbours(capture)
     confusion = 100 * n_confused / n_followed if n_followed else np.nan
     rate = capture.rate or (1 / capture.step if capture.step else 0.0)
     counts = capture.counts
     absent = 100 * n_missing / n_present if n_present else np.nan
-    difficulty, reason = _verdict(confusion, absent, steps, spacing)
+    if n_followed and len(spacing):
+        another = "marker" if named.any() else "piece of a trajectory"
+        difficulty, reason = _verdict(confusion, absent, steps, spacing, another)
+    else:
+        difficulty, reason = "unknown", _without_identities(nearest, spacing)
     others = capture.channels[~is_named & (capture.channels >= 0)]
     return CaptureInfo(
         path=capture.path,
@@ -138,6 +151,8 @@ def describe(capture: Capture) -> CaptureInfo:
         n_unlabelled=len(np.unique(others)),
         n_pieces=int((~named).sum()),
         n_modelled=len(capture.modelled),
+        n_points=capture.n_points,
+        n_unidentified=int((~has_label).sum()),
         points_min=int(counts.min()) if len(counts) else 0,
         points_mean=float(counts.mean()) if len(counts) else 0.0,
         points_max=int(counts.max(initial=0)),
@@ -147,6 +162,8 @@ def describe(capture: Capture) -> CaptureInfo:
         gap_longest=int(gaps.max(initial=0)),
         step_median=_percentile(steps, 50),
         step_99=_percentile(steps, 99),
+        nearest_step_median=_percentile(nearest, 50),
+        nearest_step_99=_percentile(nearest, 99),
         spacing_1=_percentile(spacing, 1),
         spacing_5=_percentile(spacing, 5),
         spacing_50=_percentile(spacing, 50),
@@ -183,18 +200,25 @@ def _next_of_same(capture: Capture) -> NDArray[np.int64]:
     return following
 
 
+def _steps(capture: Capture) -> NDArray[np.float64]:
+    """Displacements of identities from one frame to the next, metres."""
+    following = _next_of_same(capture)
+    moved = following >= 0
+    return np.linalg.norm(capture.points[following[moved]] - capture.points[moved], axis=1)
+
+
 def _neighbours(
     capture: Capture,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int, int]:
-    """Displacements, distances to the nearest neighbour, and how often the nearest is another."""
+    """Distances to the nearest point of the next frame and of the own one, metres.
+
+    Also how many identities have another one nearest in the next frame, and of how many.
+    """
     from scipy import spatial
 
     following = _next_of_same(capture)
     points, offsets = capture.points, capture.offsets
-    moved = following >= 0
-    with np.errstate(over="ignore"):
-        difference = points[following[moved]] - points[moved]
-        steps: NDArray[np.float64] = np.linalg.norm(difference, axis=1)
+    steps: list[NDArray[np.float64]] = []
     spacing: list[NDArray[np.float64]] = []
     n_confused = n_followed = 0
     stride = max(-(-capture.n_frames // _MOST_FRAMES), 1)
@@ -207,12 +231,19 @@ def _neighbours(
         if n > 1:
             spacing.append(tree.query(points[here], k=2)[0][:, 1])
         before = slice(int(offsets[max(t - 1, 0)]), here.start)
-        old = before.start + np.flatnonzero(following[before] >= 0)
-        if len(old):
-            nearest = here.start + tree.query(points[old])[1]
-            n_confused += int((nearest != following[old]).sum())
-            n_followed += len(old)
-    return steps, np.concatenate([*spacing, np.empty(0)]), n_confused, n_followed
+        if before.start < before.stop:
+            distance, nearest = tree.query(points[before])
+            steps.append(distance)
+            is_followed = following[before] >= 0
+            n_confused += int((here.start + nearest != following[before])[is_followed].sum())
+            n_followed += int(is_followed.sum())
+    empty = np.empty(0)
+    return (
+        np.concatenate([*steps, empty]),
+        np.concatenate([*spacing, empty]),
+        n_confused,
+        n_followed,
+    )
 
 
 def _verdict(
@@ -220,17 +251,33 @@ def _verdict(
     absent: float,
     steps: NDArray[np.float64],
     spacing: NDArray[np.float64],
+    another: str,
 ) -> tuple[str, str]:
-    if np.isnan(confusion) or not len(spacing):
-        what = "the file has no identities to compare" if np.isnan(confusion) else "single points"
-        return "unknown", what
-    pace = _percentile(steps, 99) / _percentile(spacing, 5) if _percentile(spacing, 5) else np.inf
     reason = (
-        f"for {confusion:.2g} % of the points the nearest in the next frame is another marker; "
-        f"fast ones move {pace:.2g} times the distance of close ones"
+        f"for {confusion:.2g} % of the points the nearest in the next frame is another {another}"
     )
+    pace, text = _pace(steps, spacing)
+    reason += f"; fast ones move {text}"
     if absent > 10:
         reason += f"; {absent:.2g} % of the samples are absent"
     if confusion > 5:
         return "hard", reason
     return ("moderate" if confusion > 0.5 or pace > 1 or absent > 10 else "easy"), reason
+
+
+def _pace(steps: NDArray[np.float64], spacing: NDArray[np.float64]) -> tuple[float, str]:
+    """How far fast points move compared with the distance of close ones, and how that is put."""
+    fast, close = _percentile(steps, 99), _percentile(spacing, 5)
+    if close > 0:
+        return fast / close, f"{fast / close:.2g} times the distance of close ones"
+    return np.inf, f"{fast:.3g} mm, and 5 % of the points or more lie exactly on another"
+
+
+def _without_identities(nearest: NDArray[np.float64], spacing: NDArray[np.float64]) -> str:
+    if not len(spacing):
+        return "no frame holds two points that could be taken for each other"
+    reason = "the file has no identities to compare"
+    if not len(nearest):
+        return reason
+    text = _pace(nearest, spacing)[1]
+    return f"{reason}; to the nearest point of the next frame fast ones move {text}"
