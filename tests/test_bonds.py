@@ -113,6 +113,9 @@ def test_bonds_come_back_from_their_file(tmp_path):
         ("distance = ", "distanec = ", "distance"),
         ("distance = ", 'distance = "far" #', "distance"),
         ("spread = ", "spread = -", "spread"),
+        ("frames = ", f"frames = 1{'0' * 400} #", "frames of bond 1"),
+        ("frames = ", "frames = 1.5 #", "frames of bond 1"),
+        ('    "C",', '    "B",', r"pairs: .* got \(0, 1\)"),
         ("[[bond]]", "[[bond", "TOML"),
     ],
 )

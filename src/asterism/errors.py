@@ -201,7 +201,8 @@ def check_number(
         expected = f"{kind} in {left}{above:g}, {below:g}{right}"
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise ParameterError(name, expected, repr(value), hint)
-    number = float(value)
+    # A file may hold a whole number that no float can.
+    number = math.inf if isinstance(value, int) and abs(value) > 1e300 else float(value)
     if integer and not number.is_integer():
         raise ParameterError(name, expected, f"{number:g}", hint)
     inside = above <= number <= below if closed else above < number < below

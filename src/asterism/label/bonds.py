@@ -67,7 +67,8 @@ class Bonds:
     def __post_init__(self) -> None:
         names = tuple(self.names)
         if len(set(names)) < len(names) or not all(names):
-            raise ParameterError("names", "names that are all different", names)
+            got = next((name for i, name in enumerate(names) if name in ("", *names[:i])), "")
+            raise ParameterError("names", "names that are all different", repr(got))
         places = np.asarray(self.places, dtype=np.float64)
         if places.ndim != 2 or len(places) != len(names) or places.shape[1] not in (2, 3):
             raise ParameterError("places", f"shape ({len(names)}, 2 or 3)", places.shape)
@@ -75,8 +76,11 @@ class Bonds:
         M = len(pairs)
         if M and (pairs.min() < 0 or pairs.max() >= len(names)):
             raise ParameterError("pairs", f"markers from 0 to {len(names) - 1}", pairs.max())
-        if (pairs[:, 0] >= pairs[:, 1]).any() or len(np.unique(pairs, axis=0)) < M:
-            raise ParameterError("pairs", "two different markers, the lower first, once", pairs)
+        first = np.unique(pairs, axis=0, return_index=True)[1]
+        wrong = np.append(np.flatnonzero(pairs[:, 0] >= pairs[:, 1]), np.setdiff1d(range(M), first))
+        if len(wrong):
+            expected = "two different markers, the lower first, once"
+            raise ParameterError("pairs", expected, tuple(pairs[wrong[0]].tolist()))
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "places", places)
         object.__setattr__(self, "pairs", pairs)
@@ -284,7 +288,10 @@ def _from_plain(content: Mapping[str, Any]) -> dict[str, Any]:
         pairs.append(sorted(number[name] for name in ends))
         for key, all_ in values.items():
             value = _get(own, f"bond {n}", key)
-            check_number(f"{key} of bond {n}", value, above=0, closed=True)
+            check_number(
+                f"{key} of bond {n}", value, above=0, below=2**53, closed=True,
+                integer=key == "frames",
+            )  # fmt: skip
             all_.append(value)
     return {
         "names": tuple(names),
