@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 
 import pytest
@@ -14,7 +15,7 @@ from asterism.camera import (
     ViconRadial,
 )
 from asterism.errors import FormatError
-from asterism.io.calibration import read_rig
+from asterism.io.calibration import read_rig, write_rig
 from calibration_rigs import LENSES, rig_for
 
 BOMB = "<!DOCTYPE l [<!ENTITY a0 'ha'>" + "".join(
@@ -61,3 +62,14 @@ def test_lenses_are_all_tried():
     kinds = {BrownConrady, ReportRadial, ViconRadial, QuadraticCorrection}
     assert {type(lens) for lens in LENSES.values()} == kinds
     assert isinstance(rig_for("rig")[0], Camera)
+
+
+def test_whole_numbers_that_no_float_can_hold(tmp_path):
+    write_rig(rig_for("rig"), tmp_path / "a.toml")
+    text = (tmp_path / "a.toml").read_text()
+    for key in ("near", "far", "k1"):
+        changed = re.sub(rf"(?m)^{key} = .*$", f"{key} = 1{'0' * 400}", text, count=1)
+        assert changed != text
+        (tmp_path / "b.toml").write_text(changed)
+        with pytest.raises(FormatError, match=key):
+            read_rig(tmp_path / "b.toml")

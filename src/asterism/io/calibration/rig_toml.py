@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Any
 
 from asterism.camera import BrownConrady, Camera, QuadraticCorrection, ReportRadial, ViconRadial
@@ -80,7 +81,10 @@ def _camera(path: Path, number: int, entry: Any) -> Camera:
         if key in entry:
             if type(entry[key]) not in (int, float):
                 raise FormatError(path, f"{place}, {key}", "a number", repr(entry[key])[:60])
-            limits[key] = float(entry[key])
+            # A whole number in TOML may be larger than any float; only "inf" says that it is so.
+            is_finite = entry[key] != math.inf
+            place_of = f"{place}, {key}"
+            limits[key] = float(as_array(path, place_of, entry[key], ())) if is_finite else math.inf
     K_lens = entry.get("K_lens")
     if K_lens is not None:
         K_lens = as_array(path, f"{place}, K_lens", K_lens, (3, 3))
