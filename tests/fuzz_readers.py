@@ -275,7 +275,7 @@ def damage(raw: bytes, rng: random.Random, others: tuple[bytes, ...] = ()) -> by
         elif kind == 3:  # two pieces change places
             n = min(rng.randint(1, 64), b - a)
             data[a : a + n], data[b : b + n] = data[b : b + n], data[a : a + n]
-        elif kind == 4:  # counts and reals that nobody has
+        elif kind == 4:  # counts and reals beyond those of any real file
             word = rng.choice(EXTREMES)
             i -= i % 2 if rng.random() < 0.8 else 0
             data[i : i + len(word)] = word
@@ -374,10 +374,10 @@ def _child(name: str, seed: int, count: int, state: Path, folder: Path) -> None:
             outcome = bench.feed(*made)
         except BaseException:
             outcome = "failed"
-            told = traceback.format_exc()
-            (state / f"{name}_{seed}_{i}.txt").write_text(told)
+            report = traceback.format_exc()
+            (state / f"{name}_{seed}_{i}.txt").write_text(report)
             (state / f"{name}_{seed}_{i}_{made[1]}").write_bytes(made[2])
-            print(f"{name}: input {i}: {told.splitlines()[-1]}", flush=True)
+            print(f"{name}: input {i}: {report.splitlines()[-1]}", flush=True)
         signal.setitimer(signal.ITIMER_PROF, 0)
         numbers[1 + OUTCOMES.index(outcome)] += 1
     numbers[0] = count

@@ -65,7 +65,7 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     path = check_path("path", path)
     asked = None if format is None else _named(format)
     with _about(path):
-        return _told(_find(path, asked).read(path))
+        return _log_truncation(_find(path, asked).read(path))
 
 
 def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
@@ -92,7 +92,7 @@ def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
     with _about(path):
         chosen = _find(path, asked)
         if chosen.read_tracks is None:
-            return _told(chosen.read(path)).tracks
+            return _log_truncation(chosen.read(path)).tracks
         return chosen.read_tracks(path)
 
 
@@ -149,8 +149,8 @@ def write(
         log.warning("%s: holds the complete frames of a truncated capture, %s", path, source.path)
 
 
-def _told(capture: Capture) -> Capture:
-    """Report that frames are missing, because whoever goes on with the rest must know it."""
+def _log_truncation(capture: Capture) -> Capture:
+    """Log a warning where frames of the file are missing, and give the capture on."""
     if capture.truncated:
         log.warning("%s: %s", capture.path, capture.truncated)
     return capture
