@@ -1,8 +1,8 @@
 """Fingerprints of the labels of every method, to see whether a change of the code changes any.
 
 Ten pieces of real captures (``../shared/data``, or ``--data``), as captured and corrupted, some at
-half rate, and ten scenes; each tracked with its estimated model by every method, alone and stitched.
-Run it before and after a change:
+half rate, and ten scenes; each tracked with its estimated model by every method, alone and
+stitched. Run it before and after a change:
 
     python benchmarks/same_labels.py before.json
     python benchmarks/same_labels.py after.json --against before.json

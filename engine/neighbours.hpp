@@ -42,6 +42,7 @@ class Places {
     const Seen& slot = slots_[place(marker)];
     return slot.marker == marker ? &slot.at : nullptr;
   }
+  std::size_t capacity() const { return slots_.size(); }
 
  private:
   static constexpr std::int32_t kNobody = -1;
