@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ import pytest
 import asterism as am
 from chain_oracle import MOVES as MOVE_NAMES
 from partition_oracle import every_partition, every_track, tiny_model, tiny_problem
-from scenes import calibration_in_crowds, crowd, small_model, wanderers
+from scenes import calibration_in_crowds, crowd, interacting, small_model, wanderers
+
+REPRO = Path(__file__).resolve().parents[1].parent / "shared" / "repro"
 
 
 def crowd_model():
@@ -457,3 +460,55 @@ def test_options_are_checked(wrong, message):
 def test_a_seed_is_a_number():
     with pytest.raises(am.ParameterError, match="seed"):
         am.MCMCDA().init(small_model(), seed=-1)
+
+
+def test_a_capture_in_blocks_is_explained_as_well_as_in_one(monkeypatch):
+    truth = crowd(4, spread=0.1, n_frames=60)
+    d, model = truth.detections, crowd_model()
+    method = am.MCMCDA(window=None, moves=400, confidence=400, end_odds=1)
+    whole = am.track(d, method, model=model, seed=1)  # 60 frames fit into one block
+    monkeypatch.setattr("asterism.associate.mcmcda.BLOCK", 24)
+    blocks = am.track(d, method, model=model, seed=1)
+    # What is before and after a block counts: each alone would lose the tracks at every border.
+    assert blocks.info["log_posterior"] > whole.info["log_posterior"] - 3
+    same = (blocks.labels >= 0) == (whole.labels >= 0)
+    assert same.mean() > 0.97
+    assert abs(blocks.confidence - whole.confidence)[same].mean() < 0.05
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_a_long_capture_is_one_sequence_of_tracks_over_all_blocks(monkeypatch, several):
+    monkeypatch.setattr("asterism.associate.mcmcda.BLOCK", 20)
+    truth = wanderers(np.random.default_rng(11), n_markers=4, n_frames=150, clutter=0.3)
+    model = small_model(**({"motion": interacting()} if several else {}))
+    method = am.MCMCDA(window=None, moves=30)
+    tracks = am.track(truth.detections, method, model=model, seed=3)
+    assert tracks.info["log_posterior"] > am.log_posterior(truth, model) - 1
+    assert (tracks.n_tracks, am.evaluate(tracks, truth).switches) == (4, 0)
+    again = am.track(
+        truth.detections, am.MCMCDA(window=None, moves=30, threads=2), model=model, seed=3
+    )
+    assert again.labels.tobytes() == tracks.labels.tobytes()
+    assert again.confidence.tobytes() == tracks.confidence.tobytes()
+
+
+def test_fast_markers_in_a_whole_capture_end_no_process():
+    # A move that exchanged a settled detection corrupted the partition: some frames later an index
+    # lay outside an array.
+    for seed in range(4):
+        truth = crowd(20 + seed, spread=0.05, n_frames=80)
+        model = crowd_model()
+        tracks = am.track(truth.detections, am.MCMCDA(window=None), model=model, seed=seed)
+        order, _ = tracks.by_track
+        frames = truth.detections.frame_of[order]
+        inside = np.diff(tracks.labels[order]) == 0
+        assert (np.diff(frames)[inside] >= 1).all()
+
+
+@pytest.mark.skipif(not REPRO.is_dir(), reason=f"no inputs of known defects in {REPRO}")
+def test_a_racing_wheelchair_at_half_rate_ends_no_process():
+    z = np.load(REPRO / "whole_capture_crash.npz")
+    d = am.Detections(times=z["times"], points=z["points"], offsets=z["offsets"])
+    model = am.estimate_model(d).model
+    tracks = am.track(d, am.MCMCDA(window=None, moves=5), model=model)
+    assert tracks.info["log_posterior"] > 10_000

@@ -52,9 +52,10 @@ class MCMCDA(EngineMethod):
     Parameters
     ----------
     window : int or None
-        Frames until one is settled; 1 is the single-scan form. None is for whole takes: when all
-        frames have come, everything is opened again and walked over, with `moves` for each
-        detection.
+        Frames until one is settled; 1 is the single-scan form. None is for whole captures: when
+        all frames have come, the chains go over them again in blocks of 100 frames that overlap by
+        half, each block given all that is before and after it, with `moves` for each detection.
+        The time is linear in the length of the capture.
     moves : float or None
         Moves in a frame, for each of its detections (or each track, if these are more) that is in
         doubt; None with a `deadline` alone. Tracks begin by moves alone, so 0 is only for labels to
@@ -337,10 +338,11 @@ class MCMCDA(EngineMethod):
         if self.confidence > 0:
             about |= {
                 "confidence_moves": chain.n_sampled,
-                "rhat": chain.rhat,
-                "effective_samples": chain.ess,
                 "disagreements": chain.n_doubtful,
+                "unmoved_groups": chain.n_unmoved,
             }
+            if not math.isnan(chain.rhat):
+                about |= {"rhat": chain.rhat, "effective_samples": chain.ess}
         return about
 
 
