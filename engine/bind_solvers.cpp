@@ -117,11 +117,12 @@ Out<std::int32_t> k_best(const In<double>& cost, std::int64_t k) {
   return out.give({n_found, n});
 }
 
-// The k best ways for every tree to take one option, no resource twice. Options are listed by tree;
-// option o uses uses[first_use[o]:first_use[o + 1]]. Each tree needs one that uses nothing.
-nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& worths,
-               const In<std::int64_t>& first_use, const In<std::int32_t>& uses, std::int64_t k,
-               double drop, std::int64_t max_nodes) {
+// Options are listed by tree; option o uses uses[first_use[o]:first_use[o + 1]]. Each tree needs one
+// that uses nothing.
+std::vector<std::vector<PackingOption>> packing_trees(const In<std::int64_t>& first_option,
+                                                      const In<double>& worths,
+                                                      const In<std::int64_t>& first_use,
+                                                      const In<std::int32_t>& uses) {
   require(first_option.size() >= 1 && first_use.size() == worths.size() + 1, "one list of uses an option");
   const std::size_t n = first_option.size() - 1;
   require(first_option.data()[n] == static_cast<std::int64_t>(worths.size()) &&
@@ -141,6 +142,27 @@ nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& worths,
     }
     require(has_free, "an option that uses nothing in every tree");
   }
+  return trees;
+}
+
+// (what no packing is worth more than; by option, in the order given, what is lost with it).
+nb::tuple packing_losses(const In<std::int64_t>& first_option, const In<double>& worths,
+                           const In<std::int64_t>& first_use, const In<std::int32_t>& uses) {
+  const auto trees = packing_trees(first_option, worths, first_use, uses);
+  Owned<double> out(worths.size());
+  std::size_t o = 0;
+  const SetPacking::Losses losses = SetPacking(trees).losses();
+  for (const std::vector<double>& tree : losses.of)
+    for (const double loss : tree) out.data[o++] = loss;
+  return nb::make_tuple(losses.bound, out.give({worths.size()}));
+}
+
+// The k best ways for every tree to take one option, no resource twice.
+nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& worths,
+               const In<std::int64_t>& first_use, const In<std::int32_t>& uses, std::int64_t k,
+               double drop, std::int64_t max_nodes) {
+  const auto trees = packing_trees(first_option, worths, first_use, uses);
+  const std::size_t n = trees.size();
   std::vector<std::int32_t> all;
   std::vector<double> totals;
   PackingSummary summary;
@@ -168,6 +190,7 @@ void bind_solvers(nb::module_& module) {
   module.def("k_best", &k_best, "cost"_a, "k"_a);
   module.def("pack", &pack, "first_option"_a, "worths"_a, "first_use"_a, "uses"_a, "k"_a, "drop"_a,
              "max_nodes"_a);
+  module.def("packing_losses", &packing_losses, "first_option"_a, "worths"_a, "first_use"_a, "uses"_a);
   module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a);
 
   nb::register_exception_translator([](const std::exception_ptr& p, void*) {

@@ -183,7 +183,7 @@ class HypothesisForest {
     const BranchGrower grower(open_.live, open_.branches);
     std::vector<std::vector<PackingOption>> options;
     for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
-    const std::vector<std::vector<double>> losses = SetPacking(options).losses();
+    const std::vector<std::vector<double>> losses = SetPacking(options).losses().of;
     for (std::size_t c = 0; c < cluster.size(); ++c) {
       const std::size_t first = s_.ranked.size();
       // What is no option yet, such as the beginning of a track, is compared with no track.

@@ -50,18 +50,23 @@ class SetPacking {
     sort();
   }
 
-  // By how much the best packing with an option may be below the best of all, by tree and option, at
-  // the prices that bring the bound down: a packing is worth no more than the bound less the loss of
-  // each of its options. The options of a packing that is known lose nothing.
-  std::vector<std::vector<double>> losses() {
-    if (!search(1, 0, kUnpriced).is_exact) set_prices();
-    const Packing best = known_;
-    std::vector<std::vector<double>> out(n_trees());
+  // What an option loses, by tree and option, at the prices that bring the bound down: no packing is
+  // worth more than the bound less the loss of each of its options. The options of the best packing
+  // that is known lose nothing.
+  struct Losses {
+    double bound = 0;
+    std::vector<std::vector<double>> of;
+  };
+  Losses losses() {
+    search(1, 0, kUnpriced);
+    if (bound() > known_.worth + kBetter) set_prices();
+    Losses out{bound(), {}};
+    out.of.resize(n_trees());
     for (std::int32_t i = 0; i < n_trees(); ++i) {
-      const double most = *std::max_element(priced_.begin() + first_[i], priced_.begin() + first_[i + 1]);
-      out[i].resize(first_[i + 1] - first_[i]);
-      for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) out[i][number_[o]] = most - priced_[o];
-      out[i][best.own[i]] = 0;
+      const double most = most_priced(i);
+      out.of[i].resize(first_[i + 1] - first_[i]);
+      for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) out.of[i][number_[o]] = most - priced_[o];
+      out.of[i][known_.own[i]] = 0;
     }
     return out;
   }
@@ -105,6 +110,16 @@ class SetPacking {
     }
   };
 
+  double most_priced(std::int32_t tree) const {
+    return *std::max_element(priced_.begin() + first_[tree], priced_.begin() + first_[tree + 1]);
+  }
+  // What no packing is worth more than, at the prices.
+  double bound() const {
+    double sum = 0;
+    for (const double x : price_) sum += x;
+    for (std::int32_t i = 0; i < n_trees(); ++i) sum += most_priced(i);
+    return sum;
+  }
   std::int32_t n_trees() const { return static_cast<std::int32_t>(first_.size()) - 1; }
 
   // Options of every tree by what they are worth at the prices, the best first; who uses what.

@@ -33,6 +33,7 @@ TESTS = (
     "test_bodies.py",
     "test_stitch_parts.py",
     "test_stitched.py",
+    "test_engine_sweep.py",
 )
 LEFT_OUT = (
     "hundred_thousand or memory or many_points or blackboard or partitions or beside_birth or "
@@ -40,11 +41,11 @@ LEFT_OUT = (
     "bisection or changed_lens or lens_apart or term_by_term or stable_and_best or exact_solver or "
     "best_of_all_choices or too_many_rivals or full_group or lens_folds or used_twice or "
     "eight_cameras or harm[1e-310 or clusters_apart or single_scan or share_of_the_posterior or "
-    "no_worse or whole_take or more_chains or way_of_running or more_moves or window_s_best or "
+    "no_worse or window_s_best or "
     "identities_where_markers_hide or value_that_is_told or guessed_soon or too_long_to_be_read or "
     "blurred_helps or endless_run or chains_disagree or model_from_the_clip or wrong_links or "
     "deadline or keep_their_distances or no_harm_where or of_a_person_come_back or "
-    "loop_over_step or carrying_ends or settled_tracks or hand[0.004 or without_noise[1 or "
+    "carrying_ends or settled_tracks or hand[0.004 or without_noise[1 or "
     "without_noise[2 or without_noise[3 or without_noise[4 or without_noise[5"
 )
 """Too slow (a blackboard is Python, a posterior is sampled for millions of moves, numbers below the
@@ -88,6 +89,7 @@ def main() -> int:
             "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1",
             "UBSAN_OPTIONS": "print_stacktrace=1:halt_on_error=1",
             "PYTHONMALLOC": "malloc",
+            "ASTERISM_SANITIZED": "1",
         }
         arguments = [str(root / "tests" / name) for name in TESTS]
         return subprocess.run(

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 
 import asterism as am
+
+SANITIZED = bool(os.environ.get("ASTERISM_SANITIZED"))
+"""Whether the engine is the one with the sanitizers, which is ten times slower."""
+
+
+def sized(usual: int, sanitized: int) -> int:
+    """Size of a test: as usual, or cut down for the sanitizers."""
+    return sanitized if SANITIZED else usual
 
 
 def small_model(**changes) -> am.TrackingModel:

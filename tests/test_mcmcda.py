@@ -12,7 +12,15 @@ import pytest
 import asterism as am
 from chain_oracle import MOVES as MOVE_NAMES
 from partition_oracle import every_partition, every_track, tiny_model, tiny_problem
-from scenes import calibration_in_crowds, crowd, interacting, small_model, wanderers
+from scenes import (
+    SANITIZED,
+    calibration_in_crowds,
+    crowd,
+    interacting,
+    sized,
+    small_model,
+    wanderers,
+)
 
 REPRO = Path(__file__).resolve().parents[1].parent / "shared" / "repro"
 
@@ -65,16 +73,20 @@ def test_where_nothing_is_in_doubt_the_truth_is_found(seed):
 
 
 def test_more_moves_and_the_assignment_come_nearer():
-    d, model = crowd(2, spread=0.1, n_frames=60).detections, crowd_model()
+    d = crowd(2, spread=0.1, n_frames=sized(60, 15)).detections
+    model = crowd_model()
 
     def value(**options):
         values = [
             am.track(d, am.MCMCDA(**options), model=model, seed=seed).info["log_posterior"]
-            for seed in range(4)
+            for seed in range(sized(4, 1))
         ]
         return np.mean(values)
 
-    few, many = value(moves=2), value(moves=100)
+    few, many = value(moves=2), value(moves=sized(100, 20))
+    if SANITIZED:  # too short to tell them apart
+        value(moves=5, assignment=False, proposal="uniform", move_weights="report")
+        return
     assert many > few
     assert few > value(moves=2, assignment=False)
     assert value(moves=20) > value(moves=20, proposal="uniform", move_weights="report")
@@ -229,15 +241,19 @@ def test_chains_disagree_where_they_are_short_and_say_so():
 
 
 def test_more_chains_find_no_worse():
-    d, model = crowd(2, spread=0.1, n_frames=60).detections, crowd_model()
+    d = crowd(2, spread=0.1, n_frames=sized(60, 15)).detections
+    model = crowd_model()
 
     def value(chains):
         method = am.MCMCDA(moves=3, chains=chains, confidence=0)
         return np.mean(
-            [am.track(d, method, model=model, seed=s).info["log_posterior"] for s in range(6)]
+            [
+                am.track(d, method, model=model, seed=s).info["log_posterior"]
+                for s in range(sized(6, 1))
+            ]
         )
 
-    assert value(8) > value(1)
+    assert value(8) > value(1) or SANITIZED
 
 
 def test_groups_that_nothing_joins_are_walked_apart():
@@ -357,16 +373,17 @@ def test_a_start_is_for_those_who_can():
 
 
 def test_a_whole_take_is_walked_over_in_the_end():
-    truth = crowd(4, spread=0.1, n_frames=60)
+    truth = crowd(4, spread=0.1, n_frames=sized(60, 20))
     d, model = truth.detections, crowd_model()
-    method = am.MCMCDA(window=None, moves=200)
+    moves = sized(200, 20)
+    method = am.MCMCDA(window=None, moves=moves)
     done = []
     whole = am.track(d, method, model=model, seed=1, progress=done.append)
     assert done == sorted(done)
     assert done[-1] == d.n_frames
-    narrow = am.track(d, am.MCMCDA(window=1, moves=200), model=model, seed=1)
+    narrow = am.track(d, am.MCMCDA(window=1, moves=moves), model=model, seed=1)
     assert whole.info["log_posterior"] > narrow.info["log_posterior"]
-    assert whole.info["moves"] > 100 * d.n_points
+    assert whole.info["moves"] > moves / 2 * d.n_points
     assert ((whole.confidence > 0) & (whole.confidence <= 1)).all()
     with pytest.raises(am.ParameterError, match="window"):
         method.step(method.init(model), 0.0, d.points[:2])
@@ -465,12 +482,15 @@ def test_a_seed_is_a_number():
 def test_a_capture_in_blocks_is_explained_as_well_as_in_one(monkeypatch):
     truth = crowd(4, spread=0.1, n_frames=60)
     d, model = truth.detections, crowd_model()
-    method = am.MCMCDA(window=None, moves=400, confidence=400, end_odds=1)
+    n = sized(400, 20)
+    method = am.MCMCDA(window=None, moves=n, confidence=n, end_odds=1)
     whole = am.track(d, method, model=model, seed=1)  # 60 frames fit into one block
     monkeypatch.setattr("asterism.associate.mcmcda.BLOCK", 24)
     blocks = am.track(d, method, model=model, seed=1)
     # What is before and after a block counts: each alone would lose the tracks at every border.
-    assert blocks.info["log_posterior"] > whole.info["log_posterior"] - 3
+    assert blocks.info["log_posterior"] > whole.info["log_posterior"] - sized(3, 20)
+    if SANITIZED:
+        return
     same = (blocks.labels >= 0) == (whole.labels >= 0)
     assert same.mean() > 0.97
     assert abs(blocks.confidence - whole.confidence)[same].mean() < 0.05
@@ -479,7 +499,7 @@ def test_a_capture_in_blocks_is_explained_as_well_as_in_one(monkeypatch):
 @pytest.mark.parametrize("several", [False, True])
 def test_a_long_capture_is_one_sequence_of_tracks_over_all_blocks(monkeypatch, several):
     monkeypatch.setattr("asterism.associate.mcmcda.BLOCK", 20)
-    truth = wanderers(np.random.default_rng(11), n_markers=4, n_frames=150, clutter=0.3)
+    truth = wanderers(np.random.default_rng(11), n_markers=4, n_frames=sized(150, 60), clutter=0.3)
     model = small_model(**({"motion": interacting()} if several else {}))
     method = am.MCMCDA(window=None, moves=30)
     tracks = am.track(truth.detections, method, model=model, seed=3)
@@ -495,7 +515,7 @@ def test_a_long_capture_is_one_sequence_of_tracks_over_all_blocks(monkeypatch, s
 def test_fast_markers_in_a_whole_capture_end_no_process():
     # A move that exchanged a settled detection corrupted the partition: some frames later an index
     # lay outside an array.
-    for seed in range(4):
+    for seed in range(sized(4, 1)):
         truth = crowd(20 + seed, spread=0.05, n_frames=80)
         model = crowd_model()
         tracks = am.track(truth.detections, am.MCMCDA(window=None), model=model, seed=seed)
@@ -505,6 +525,7 @@ def test_fast_markers_in_a_whole_capture_end_no_process():
         assert (np.diff(frames)[inside] >= 1).all()
 
 
+@pytest.mark.skipif(SANITIZED, reason="a piece of it is in the sweep of methods")
 @pytest.mark.skipif(not REPRO.is_dir(), reason=f"no inputs of known defects in {REPRO}")
 def test_a_racing_wheelchair_at_half_rate_ends_no_process():
     z = np.load(REPRO / "whole_capture_crash.npz")

@@ -11,16 +11,19 @@ import asterism as am
 from asterism import _engine
 
 
-def pack(trees, k: int, drop: float = 1e9, max_nodes: int = 10**6):
-    """Give the engine trees of options, each a worth and the resources that it uses."""
+def arrays(trees):
+    """Trees of options, each a worth and the resources that it uses, as the engine takes them."""
     options = [option for tree in trees for option in tree]
-    return _engine.pack(
+    return (
         np.cumsum([0] + [len(tree) for tree in trees]),
         np.array([worth for worth, _ in options]),
         np.cumsum([0] + [len(uses) for _, uses in options]),
         np.array([r for _, uses in options for r in uses], dtype=np.int32),
-        k, drop, max_nodes,
-    )  # fmt: skip
+    )
+
+
+def pack(trees, k: int, drop: float = 1e9, max_nodes: int = 10**6):
+    return _engine.pack(*arrays(trees), k, drop, max_nodes)
 
 
 def every_packing(trees):
@@ -108,3 +111,39 @@ def test_the_engine_refuses_what_would_corrupt_memory():
         pack([[(1.0, [0])]], 1)
     with pytest.raises(ValueError, match="from 0"):
         pack([[(1.0, [-1]), (0.0, [])]], 1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_packing_is_worth_more_than_the_bound_less_its_losses(seed):
+    rng = np.random.default_rng(500 + seed)
+    gaps = []
+    for _ in range(60):
+        trees = random_trees(rng, int(rng.integers(1, 6)), 4, int(rng.integers(2, 7)))
+        bound, losses = _engine.packing_losses(*arrays(trees))
+        of = np.split(losses, np.cumsum([len(tree) for tree in trees])[:-1])
+        packings = every_packing(trees)
+        assert (losses >= 0).all()
+        for worth, choice in packings:
+            lost = sum(float(of[i][o]) for i, o in enumerate(choice))
+            assert worth <= bound - lost + 1e-9
+        gaps.append(bound - packings[0][0])
+    assert min(gaps) > -1e-9
+    assert np.mean(np.array(gaps) < 1e-3) > 0.7  # without prices half of them have a gap
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_large_sparse_problems_close_the_gap_and_are_packings(seed):
+    # Six hundred options of forty trees: the prices of a plain subgradient left tens of nats.
+    rng = np.random.default_rng(900 + seed)
+    trees = []
+    for _ in range(40):
+        tree = [(0.0, [])]
+        for _ in range(15):
+            uses = rng.choice(120, rng.integers(1, 6), replace=False)
+            tree.append((float(rng.normal(4, 3)), uses.tolist()))
+        trees.append(tree)
+    chosen, worth, _, bound, _ = pack(trees, 1, max_nodes=2000)
+    used = [r for tree, o in zip(trees, chosen[0], strict=True) for r in tree[o][1]]
+    assert len(used) == len(set(used))
+    assert worth[0] == pytest.approx(sum(t[o][0] for t, o in zip(trees, chosen[0], strict=True)))
+    assert bound - worth[0] < 0.05 * worth[0]

@@ -350,6 +350,12 @@ def pack(
     drop: float,
     max_nodes: int,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], bool, float, int]: ...
+def packing_losses(
+    first_option: NDArray[np.int64],
+    worths: NDArray[np.float64],
+    first_use: NDArray[np.int64],
+    uses: NDArray[np.int32],
+) -> tuple[float, NDArray[np.float64]]: ...
 def joint_marginals(
     log_weights: NDArray[np.float64], log_miss: NDArray[np.float64], max_states: int
 ) -> tuple[NDArray[np.float64], float, NDArray[np.int32], float, int]: ...
