@@ -58,7 +58,7 @@ def test_bonds_leave_out_channels_without_a_name(tmp_path, capsys):
     assert (told["n_markers"], told["n_left_out"], told["n_bonds"]) == (3, 2, 3)
     write_c3d(tmp_path / "b.c3d", walk(), labels=["*0", "*1", "", "U_4", "New 0001"])
     err = refused("bonds b.c3d -o b.toml", capsys)
-    assert "a capture with named markers, got 5 tracks without a name in b.c3d" in err
+    assert "a capture with named markers, found 5 tracks without a name in b.c3d" in err
     assert not (tmp_path / "b.toml").exists()
 
 

@@ -115,7 +115,7 @@ def test_bonds_come_back_from_their_file(tmp_path):
         ("spread = ", "spread = -", "spread"),
         ("frames = ", f"frames = 1{'0' * 400} #", "frames of bond 1"),
         ("frames = ", "frames = 1.5 #", "frames of bond 1"),
-        ('    "C",', '    "B",', r"pairs: .* got \(0, 1\)"),
+        ('    "C",', '    "B",', r"pairs: .* found \(0, 1\)"),
         ("[[bond]]", "[[bond", "TOML"),
     ],
 )

@@ -184,7 +184,7 @@ def test_image_points_without_times_count_frames(tmp_path, caplog):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("40,3,", "40,,", "line 6, column cam_id: expected a number, got nothing"),
+        ("40,3,", "40,,", "line 6, column cam_id: expected a number, found nothing"),
         ("40,3,", "40,3.5,", "line 6, column cam_id: expected a whole number"),
         ("40,3,", "40,-3,", "line 6, column cam_id: expected a number from 0"),
         ("40,3,", "40,x,", "line 6, column cam_id"),

@@ -106,8 +106,12 @@ def test_frames_without_points_and_tracks_without_detections_keep_the_columns(tm
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        (",mm\n", ",mile\n", "line 2, column source_unit: expected one of mm, cm, m, in, ft, got"),
-        (",mm\n", ",in\n", "line 3, column source_unit: expected 'in', as above, got 'mm'"),
+        (
+            ",mm\n",
+            ",mile\n",
+            "line 2, column source_unit: expected one of mm, cm, m, in, ft, found",
+        ),
+        (",mm\n", ",in\n", "line 3, column source_unit: expected 'in', as above, found 'mm'"),
     ],
 )
 @pytest.mark.parametrize("format", ["csv", "csv-wide"])

@@ -125,6 +125,22 @@ def test_carried_is_students_t_about_the_place(D):
     np.testing.assert_allclose(density, t.logpdf(points))
 
 
+def test_neighbours_in_one_line_do_not_turn_a_marker_about_it():
+    # How far they turned about their line is not known: a marker beside it was carried anywhere.
+    rng = np.random.default_rng(4)
+    a = np.outer(np.linspace(-0.3, 0.3, 5), [1.0, 0, 0]) + rng.normal(0, 1e-4, (5, 3))
+    b = a + np.array([0.02, 0, 0]) + rng.normal(0, 1e-4, (5, 3))
+    then = np.array([[0.0, 0.2, 0.0]])
+    place, scale, _ = _engine.carried(a, b, np.ones(5), then, 1e-3, then)
+    assert np.linalg.norm(place - [0.02, 0.2, 0]) < 1e-3
+    assert scale > 0.05  # the marker may be anywhere on a circle about the line
+    beside = np.concatenate([a, [[0, 0, 0.1]]])
+    turned = np.concatenate([b, [[0.02, 0, 0.1]]])
+    place, scale, _ = _engine.carried(beside, turned, np.ones(6), then, 1e-3, then)
+    assert np.linalg.norm(place - [0.02, 0.2, 0]) < 5e-3
+    assert scale < 0.01
+
+
 def test_few_neighbours_are_believed_less():
     a, there = np.eye(3)[[0, 1, 2, 2]] * [[1.0], [1], [1], [-1]], np.zeros((1, 3))
 

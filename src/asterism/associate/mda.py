@@ -36,16 +36,22 @@ class MDA(Hypotheses):
         By HiGHS, or by Lagrangian relaxation; ``info["gap"]`` says by how many nats the choice of
         a window may be below the best.
     max_branches : int
-        Most tuples of a track.
+        Tuples of a group of tracks that compete, for each of the tracks: kept in the order of what
+        the best choice of the whole group loses with them.
     prune_odds : float
-        A tuple is none when it is so many times less likely than the track's best would be if it
-        lost the marker and began another.
+        A tuple is left out when the best choice with it is so many times less likely than the best
+        of all, beyond the odds of losing the marker and beginning another.
     new_track_odds : float
         A detection that a believed track expects by more than these odds begins no track.
     gate_probability, confirm_probability, delete_odds : float
         See `FrameByFrame`.
     bodies, max_carried, bond_weight
         See `WithBodies`.
+
+    Notes
+    -----
+    With a window that covers the capture the result is the most probable partition of all if no
+    option excludes it; see `TOMHT`.
 
     Examples
     --------

@@ -31,10 +31,12 @@ class TOMHT(Hypotheses):
     window : int
         Frames until one is decided, 2 to 16.
     max_branches : int
-        Most branches of a tree.
+        Branches of a cluster, for each of its trees: the bound of memory and time. Branches are
+        kept in the order of what the best hypothesis of the whole cluster loses with them;
+        ``info["dropped_branches"]`` counts those that found no room.
     prune_odds : float
-        A branch ends when it is so many times less likely than its tree's best would be if it lost
-        the marker and began another.
+        A branch ends when the best hypothesis of its cluster with it is so many times less likely
+        than the best of all, beyond the odds of losing the marker and beginning another.
     max_hypotheses : int
         Most hypotheses of a cluster, for the confidence; of the best only those count that are not
         e^25 times less likely.
@@ -47,6 +49,14 @@ class TOMHT(Hypotheses):
         See `FrameByFrame`.
     bodies, max_carried, bond_weight
         See `WithBodies`.
+
+    Notes
+    -----
+    With a window that covers the capture the result is the most probable partition of all
+    (`log_posterior`) if no option excludes it: `prune_odds`, `max_branches` and `max_nodes` large
+    enough, `gate_probability` near 0, `new_track_odds` and `delete_odds` large, and
+    `confirm_probability` near 0.5. A track whose odds are below those of `confirm_probability` is
+    left out even where the most probable partition holds it.
 
     Examples
     --------
