@@ -196,9 +196,10 @@ class SetPacking {
     return summary;
   }
 
-  // Prices that bring the bound down: who is wanted by several becomes dear, who by none cheap. They
-  // follow a subgradient that remembers the steps before (Camerini, Fratta & Maffioli 1975), as far as
-  // the best packing that is known says (Polyak 1969); each step is a packing too, once it is repaired.
+  // Lowers the bound by a descent on the prices: a resource that several options use becomes dearer,
+  // one that none uses cheaper. The direction is a deflected subgradient (Camerini, Fratta & Maffioli
+  // 1975), the length of a step follows the best known packing (Polyak 1969). The options chosen in a
+  // round are repaired into a packing, which may become the best known one.
   void set_prices() {
     double least = std::numeric_limits<double>::infinity(), step = 1;
     std::vector<double> price(price_.size(), 0), used(price_.size()), way(price_.size(), 0);
@@ -234,7 +235,7 @@ class SetPacking {
       if (!(least > known_.worth + kBetter)) break;
       double along = 0, own = 0;
       for (std::size_t r = 0; r < price.size(); ++r) {
-        if (used[r] < 1 && price[r] <= 0) used[r] = 1;  // what nobody wants is free already
+        if (used[r] < 1 && price[r] <= 0) used[r] = 1;  // an unused resource is free already
         along += (1 - used[r]) * way[r];
         own += way[r] * way[r];
         length += (1 - used[r]) * (1 - used[r]);
@@ -273,7 +274,7 @@ class SetPacking {
       for (const double x : price_) node.bound += x;
       for (const std::int32_t o : node.chosen) node.bound += priced_[o];
     }
-    if (!known_.own.empty() && node.bound < known_.worth - drop_ - kBetter) return;  // none would count
+    if (!known_.own.empty() && node.bound < known_.worth - drop_ - kBetter) return;  // no packing in it would count
     node.number = n_pushed_++;
     heap_.push_back(std::move(node));
     std::push_heap(heap_.begin(), heap_.end());

@@ -1,4 +1,4 @@
-"""The format of a file is told by its content, whatever its name ends in."""
+"""The content of a file decides its format, whatever its suffix."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units: a size that contradicts them is told of, and CSV keeps them."""
+"""Units: a size that contradicts the unit gives a warning, and CSV keeps the unit."""
 
 from __future__ import annotations
 

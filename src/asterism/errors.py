@@ -40,7 +40,7 @@ _MAX_REPR = 200  # characters of the repr of an error
 
 
 def clipped(text: str, limit: int) -> str:
-    r"""Give a text as one line of at most `limit` characters.
+    r"""Shorten a text to one line of at most `limit` characters.
 
     Parameters
     ----------

@@ -39,8 +39,9 @@ class MDA(Hypotheses):
         Tuples of a group of tracks that compete, for each of the tracks: kept in the order of what
         the best choice of the whole group loses with them.
     prune_odds : float
-        A tuple is left out when the best choice with it is so many times less likely than the best
-        of all, beyond the odds of losing the marker and beginning another.
+        Odds by which a tuple may be worse. A tuple is left out when the best choice that holds it
+        is less probable than the best of all by more than these odds times the odds of ending the
+        track and beginning another.
     new_track_odds : float
         A detection that a believed track expects by more than these odds begins no track.
     gate_probability, confirm_probability, delete_odds : float

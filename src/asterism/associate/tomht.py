@@ -35,8 +35,9 @@ class TOMHT(Hypotheses):
         kept in the order of what the best hypothesis of the whole cluster loses with them;
         ``info["dropped_branches"]`` counts those that found no room.
     prune_odds : float
-        A branch ends when the best hypothesis of its cluster with it is so many times less likely
-        than the best of all, beyond the odds of losing the marker and beginning another.
+        Odds by which a branch may be worse. A branch is dropped when the best hypothesis of its
+        cluster that holds it is less probable than the best of all by more than these odds times
+        the odds of ending the track and beginning another.
     max_hypotheses : int
         Most hypotheses of a cluster, for the confidence; of the best only those count that are not
         e^25 times less likely.
