@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "budgets.hpp"
+#include "capture_sweep.hpp"
 #include "chain_stats.hpp"
 #include "neighbours.hpp"
 #include "parallel.hpp"
@@ -105,7 +106,75 @@ void places_by_number() {
   CHECK(sizeof(Places) < 100 && places.capacity() <= 512);
 }
 
+// What a change of two tracks gains in a block is what it gains in the whole capture: the detections
+// after the block count as well, and so do the frames in which a track that ends is not seen.
+using Swept = CaptureSweep<OneMotion>;
+
+double gain_of_exchange(const Swept::Part& part, std::int64_t from, bool is_cut) {
+  const Partition<OneMotion>& p = part.partition;
+  std::vector<std::int32_t> starts(2, -1);  // by track, its first detection from there on
+  for (std::int32_t i = 0; i < p.window().n_ids(); ++i)
+    if (part.numbers[i] >= 2 * from && part.numbers[i] < 2 * from + 2)
+      starts[part.numbers[i] % 2] = i;
+  std::vector<Edit<OneMotion>> edits(2);
+  for (int k = 0; k < 2; ++k) {
+    edits[k].track = p.track_of(starts[k]);
+    edits[k].keep = p.place_of(starts[k]);
+    const std::int32_t other = starts[1 - k];
+    const auto& nodes = p.track(p.track_of(other)).nodes;
+    if (!is_cut)
+      for (std::size_t n = p.place_of(other); n < nodes.size(); ++n) p.append(edits[k], nodes[n]);
+  }
+  double gain = 0;
+  for (const auto& edit : edits) gain += p.score_of(edit) - p.score_of(edit.track);
+  return gain;
+}
+
+void a_block_gains_what_the_capture_gains() {
+  constexpr std::int64_t T = 160, ended = 70;
+  constexpr double dt = 0.01, noise = 1e-3, acceleration = 5;
+  MotionModel m;
+  m.axis = {2, 2, {1, 0}, {noise * noise, 0, 0, 1}, noise * noise};
+  ScoreModel sm{.log_birth = -2, .log_clutter = -1, .log_survive = std::log(0.999),
+                .p_disappear = 1e-3, .p_detection = 0.9, .p_redetection = 0.05, .max_speed = 100,
+                .speed_margin = 1, .max_gap = 3};
+  MotionStep step;
+  const double q = acceleration * acceleration;
+  step.mode[0].F = {1, dt, 0, 1};
+  step.mode[0].Q = {q * dt * dt * dt * dt / 4, q * dt * dt * dt / 2, q * dt * dt * dt / 2, q * dt * dt};
+  for (const bool is_cut : {false, true}) {
+    // Two markers pass each other; where their ends are compared both are gone after some frames.
+    Swept short_blocks(40, sm.max_gap), one_block(1000, sm.max_gap);
+    for (Swept* sweep : {&short_blocks, &one_block}) {
+      for (std::int64_t t = 0; t < T; ++t) {
+        const double x = 1e-3 * static_cast<double>(t), wave = 2e-3 * std::sin(0.9 * t);
+        std::vector<Point> points;
+        if (!is_cut || t < ended) points = {Point{{x, wave}}, Point{{x + 2e-3, 3e-3 - 0.5 * wave}}};
+        sweep->add_frame(dt * static_cast<double>(t), step, points);
+        for (std::size_t k = 0; k < points.size(); ++k)
+          sweep->set_label(2 * t + static_cast<std::int64_t>(k), static_cast<std::int64_t>(k));
+      }
+      sweep->link_labels();
+    }
+    const Partition<OneMotion> empty(m, sm);
+    const Swept::Part whole = one_block.take(empty, one_block.blocks().front());
+    int n_checked = 0;
+    for (const Swept::Block& block : short_blocks.blocks()) {
+      const Swept::Part part = short_blocks.take(empty, block);
+      for (std::int64_t t = block.first + 2; t <= block.last && t < (is_cut ? ended : T - 2); ++t) {
+        const double own = gain_of_exchange(part, t, is_cut);
+        if (is_cut && block.last < ended) continue;  // goes on after the block, so it may not end in it
+        CHECK(std::abs(own - gain_of_exchange(whole, t, is_cut)) < 1e-6 * (1 + std::abs(own)));
+        ++n_checked;
+      }
+      short_blocks.keep_states(block, part);
+    }
+    CHECK(n_checked > 20);
+  }
+}
+
 int main() {
+  a_block_gains_what_the_capture_gains();
   exceptions_reach_the_caller();
   budgets_of_nothing_and_of_everything();
   each_half_has_half_of_the_time();
