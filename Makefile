@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo install test lint types contracts docs bench tables sanitize sanitized wheel web web-check clean
+.PHONY: demo install test lint types contracts docs bench tables sanitize sanitized odr wheel web web-check clean
 
 demo: $(VENV)/.demo
 	$(BIN)/asterism demo --out demo --overwrite
@@ -69,6 +69,15 @@ sanitized: $(VENV)/.python
 	  -DASTERISM_SANITIZE=ON -DASTERISM_WERROR=ON -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
 	  -Dnanobind_DIR="$$($(BIN)/python -m nanobind --cmake_dir)"
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake --build build/sanitize
+
+# A type or function that two files define differently is an error: the compiler sees all files of
+# the engine at once only when it links. Nothing of this build is used.
+odr: $(VENV)/.python
+	PATH="$(CURDIR)/$(BIN):$$PATH" cmake -S . -B build/odr -G Ninja -DCMAKE_BUILD_TYPE=None \
+	  -DCMAKE_CXX_FLAGS="-O0 -flto -Werror=odr -Werror=lto-type-mismatch" \
+	  -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
+	  -Dnanobind_DIR="$$($(BIN)/python -m nanobind --cmake_dir)"
+	PATH="$(CURDIR)/$(BIN):$$PATH" cmake --build build/odr
 
 # From the tree, where the engine is built already; and what is built from is all in the archive of
 # sources.

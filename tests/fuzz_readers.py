@@ -3,32 +3,17 @@
     python tests/fuzz_readers.py                             # 20 000 inputs for each reader
     python tests/fuzz_readers.py trc c3d --count 1000000 --state /tmp/fuzz
 
-Inputs are read in a child process with limits of memory and of processor time. A crash, a hang, a
-huge allocation, a warning of Python or any other exception is a failure. The input that caused it
-is kept in the folder of the state, with the traceback. An input follows from the name of the
-reader, the seed and its number, so that a run can be repeated. With ``--state`` a run that was
-stopped continues where it was, and one that is over can be made longer.
+`fuzzing.py` runs them, with limits of memory and of time, and keeps each input that fails.
 """
 
-# ruff: noqa: T201
 from __future__ import annotations
 
-import argparse
 import contextlib
-import logging
-import os
 import random
 import re
-import resource
-import shutil
-import signal
 import struct
-import subprocess
 import sys
 import tempfile
-import time
-import traceback
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import asterism as am
+import fuzzing
 from asterism.app.camera_check import check_rig
 from asterism.app.camera_info import describe_rig
 from asterism.errors import AsterismError
@@ -50,11 +36,8 @@ from calibration_rigs import NAMES, rig_for
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-MEMORY = 512 << 20  # bytes beyond what the modules themselves take
-SECONDS = 2  # of processor time
 LOOKED_AT = 8  # one in so many of the files that were read is described and written as well
 SNIFFED = 8  # one in so many is read by its content
-OUTCOMES = ("refused", "read", "failed", "died")
 
 MOTIVE = """Format Version,1.23,Take Name,a,Export Frame Rate,100.0,Length Units,Meters
 
@@ -343,94 +326,19 @@ class Bench:
             (home / file).write_bytes(files[file])
         if rng.randrange(LOOKED_AT) == 0:
             look(self.folder)
-        return "read"
+        return "accepted"
 
+    def prepare(self) -> None:
+        """Read the undamaged files, which loads all modules."""
+        for files, home in zip(self.reader.seeds, self.homes, strict=True):
+            path = home if len(files) > 1 else home / next(iter(files))
+            for is_sniffed in (False, True):
+                self.reader.read(path, is_sniffed)(self.folder)
 
-def _state(path: Path) -> np.memmap:
-    """Give the numbers that outlive a process: the next input, then the count of each outcome."""
-    shape = (1 + len(OUTCOMES),)
-    mode = "r+" if path.exists() else "w+"
-    return np.memmap(path, dtype=np.int64, mode=mode, shape=shape)
-
-
-def _child(name: str, seed: int, count: int, state: Path, folder: Path) -> None:
-    warnings.simplefilter("error")
-    logging.disable()
-    bench = Bench(name, folder, seed)
-    for files, home in zip(bench.reader.seeds, bench.homes, strict=True):  # loads all modules
-        path = home if len(files) > 1 else home / next(iter(files))
-        for is_sniffed in (False, True):
-            bench.reader.read(path, is_sniffed)(folder)
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
-    limit = pages * resource.getpagesize() + MEMORY
-    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    numbers = _state(state / f"{name}.state")
-    for i in range(int(numbers[0]), count):
-        numbers[0] = i
-        made = bench.damaged(i)
-        # Unhandled on purpose: the signal kills even where no Python runs.
-        signal.setitimer(signal.ITIMER_PROF, SECONDS)
-        try:
-            outcome = bench.feed(*made)
-        except BaseException:
-            outcome = "failed"
-            report = traceback.format_exc()
-            (state / f"{name}_{seed}_{i}.txt").write_text(report)
-            (state / f"{name}_{seed}_{i}_{made[1]}").write_bytes(made[2])
-            print(f"{name}: input {i}: {report.splitlines()[-1]}", flush=True)
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        numbers[1 + OUTCOMES.index(outcome)] += 1
-    numbers[0] = count
-
-
-def fuzz(name: str, count: int, seed: int, state: Path) -> int:
-    """Feed a reader until it has had `count` inputs; the number of failures."""
-    numbers = _state(state / f"{name}.state")
-    began, first = time.perf_counter(), int(numbers[0])
-    while numbers[0] < count:
-        shm = Path("/dev/shm")
-        folder = Path(tempfile.mkdtemp(prefix="fuzz_", dir=shm if shm.is_dir() else None))
-        command = [sys.executable, __file__, "--child", str(folder), name]
-        command += ["--count", str(count), "--seed", str(seed), "--state", str(state)]
-        environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
-        code = subprocess.run(command, check=False, env=environment).returncode
-        if code < 0:
-            i = int(numbers[0])
-            bench = Bench(name, Path(tempfile.mkdtemp(dir=folder)), seed)
-            _, file, content, _ = bench.damaged(i)
-            (state / f"{name}_{seed}_{i}_{file}").write_bytes(content)
-            print(f"{name}: input {i}: the process died of signal {-code}", flush=True)
-            numbers[1 + OUTCOMES.index("died")] += 1
-            numbers[0] += 1
-        shutil.rmtree(folder)
-        if code > 0:
-            raise RuntimeError(f"{name}: the child ended with {code}")
-    n = int(numbers[0]) - first
-    rate = n / max(time.perf_counter() - began, 1e-9)
-    outcomes = ", ".join(f"{o} {c}" for o, c in zip(OUTCOMES, numbers[1:].tolist(), strict=True))
-    print(f"{name}: {int(numbers[0])} inputs, {outcomes}; {rate:.0f} a second", flush=True)
-    return int(numbers[3:].sum())
-
-
-def main() -> int:
-    """Run the command line; the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("readers", nargs="*", help=f"of {', '.join(readers())}; all by default")
-    parser.add_argument("--count", type=int, default=20_000, help="inputs for each reader")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--state", type=Path, help="folder to continue in; a new one by default")
-    parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.child is not None:
-        _child(given.readers[0], given.seed, given.count, given.state, given.child)
-        return 0
-    state = given.state or Path(tempfile.mkdtemp(prefix="fuzz_"))
-    state.mkdir(exist_ok=True)
-    print(f"state and failures in {state}", flush=True)
-    names = given.readers or list(readers())
-    failures = sum(fuzz(name, given.count, given.seed, state) for name in names)
-    return int(failures > 0)
+    def kept(self, made: tuple[int, str, bytes, random.Random]) -> tuple[str, bytes]:
+        """Name and content of a file that repeats the input."""
+        return made[1], made[2]
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(fuzzing.main(__doc__, Bench, list(readers()), __file__))

@@ -346,6 +346,9 @@ def test_hostile_parameters(load):
         assert load(grid(), drop=["FRAMES"], more=[words, end, frames, long]).n_frames == 4
     with pytest.raises(FormatError, match="SCALE"):
         load(grid(), drop=["SCALE"], more=[("POINT", "SCALE", 4, (), reals([np.nan]))])
+    signalling = b"\x01\x00\xa0\x7f"  # a NaN of which NumPy warns when it is converted
+    with pytest.raises(FormatError, match="SCALE"):
+        load(grid(), drop=["SCALE"], more=[("POINT", "SCALE", 4, (), signalling)])
 
 
 def test_a_first_frame_that_no_c3d_can_count(tmp_path):

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asterism import _engine
+from fuzz_solvers import SOLVERS, Problems
 from oracles import best_pairing, is_blocking, stable_matchings
 
 
@@ -99,3 +100,10 @@ def test_the_engine_refuses_what_would_corrupt_memory():
             _engine.assign(2, 2, np.array(rows, np.int32), np.array(columns, np.int32), good[2])
     with pytest.raises(ValueError, match="receivers"):
         _engine.marry(np.array([0, 1]), np.array([3], np.int32), np.array([0.0]), 2)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_random_sparse_problems_are_solved(name, tmp_path):
+    problems = Problems(name, tmp_path, seed=7)
+    for i in range(150):
+        problems.feed(*problems.damaged(i))

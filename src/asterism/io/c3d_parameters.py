@@ -80,7 +80,8 @@ class Parameter:
         if self.kind == _TEXT:
             return []
         kind = {_BYTE: "u1", _INTEGER: "<u2", _REAL: "<f4"}[self.kind]
-        return np.frombuffer(self.data, dtype=kind).astype(np.float64).tolist()
+        with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
+            return np.frombuffer(self.data, dtype=kind).astype(np.float64).tolist()
 
     @classmethod
     def of_strings(cls, texts: Sequence[str], like: Parameter | None = None) -> Self:
