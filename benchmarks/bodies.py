@@ -24,7 +24,7 @@ from captures import captures
 from report import conditions, publish, table
 
 Found = dict[tuple[str, ...], list[tuple[float, ...]]]
-Make = Callable[[bool], am.Method[Any]]
+Make = Callable[[bool], am.tracking.Method[Any]]
 
 CAPTURES = ("JA1Gait35", "tennis", "mocap36", "runway_13", "testdata")
 SCENES = ("walk", "wander", "swarm", "attracted", "juggler")
@@ -42,11 +42,11 @@ HEAD = ("IDF1", "switches a 1000", "ghosts and clutter labelled, %", "ms a frame
 
 
 def bursts(truth: am.Tracks, seed: int) -> am.Tracks:
-    return am.simulate.sense(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
+    return am.simulate.corrupt(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
 
 
 def missing(truth: am.Tracks, seed: int) -> am.Tracks:
-    return am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=seed)
+    return am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=seed)
 
 
 CONDITIONS = {"bursts": bursts, "10 %/10 %": missing}
@@ -57,7 +57,7 @@ def figures(truth: am.Tracks, model: am.TrackingModel, make: Make, way: str) -> 
     d, method = truth.detections, make(way.startswith("on"))
     start = time.process_time()
     if way.endswith("stitched"):
-        tracks = am.identify(d, method, model=model, seed=0).tracks
+        tracks = am.track(d, method, model=model, seed=0, stitch=True)
     else:
         tracks = am.track(d, method, model=model, seed=0)
     ms = 1e3 * (time.process_time() - start) / d.n_frames
@@ -97,7 +97,7 @@ def main() -> None:
                 truth = spoil(recorded, seed)
                 model = am.estimate_model(truth.detections).model
                 for gap in (10, 60):
-                    floor = am.evaluate(am.floor(truth, gap), truth).idf1
+                    floor = am.evaluate(am.metrics.oracle_tracks(truth, gap), truth).idf1
                     floors.setdefault((condition, gap), []).append(floor)
                 for name in options.methods:
                     for way in WAYS:
@@ -132,7 +132,7 @@ def scene(name: str, method: str) -> list[str]:
     """IDF1 of a scene, without bodies and with them."""
     values: list[list[float]] = [[], []]
     for seed in (1, 2):
-        truth = am.simulate.sense(
+        truth = am.simulate.corrupt(
             getattr(am.simulate, name)(seed=seed), missing=0.1, clutter=0.1, noise=1e-3, seed=seed
         )
         model = am.estimate_model(truth.detections).model

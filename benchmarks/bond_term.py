@@ -43,7 +43,9 @@ def scene(case: str, seed: int) -> Problem:
 
 
 def bursts(capture: am.Capture, seed: int) -> am.Tracks:
-    return am.simulate.sense(capture.tracks, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
+    return am.simulate.corrupt(
+        capture.tracks, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed
+    )
 
 
 class Figures:
@@ -110,7 +112,7 @@ def corrupted(
             if way == "alone":
                 tracks = am.track(d, method, model=model, seed=0)
             else:
-                tracks = am.identify(d, method, model=model, seed=0).tracks
+                tracks = am.track(d, method, model=model, seed=0, stitch=True)
             taken = time.perf_counter() - start
             found[way, weight].add(tracks, truth, am.log_posterior(tracks, model), taken)
     for (way, weight), figures in found.items():

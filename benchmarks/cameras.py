@@ -16,13 +16,13 @@ import numpy as np
 import asterism as am
 from report import best_of, conditions, publish
 
-BROWN = am.BrownConrady(k1=-0.3, k2=0.1, p1=0.001, p2=-0.002, k3=0.02)
-LENSES: tuple[tuple[str, am.Lens | None], ...] = (
+BROWN = am.camera.BrownConrady(k1=-0.3, k2=0.1, p1=0.001, p2=-0.002, k3=0.02)
+LENSES: tuple[tuple[str, am.camera.Lens | None], ...] = (
     ("none", None),
     ("Brown–Conrady", BROWN),
-    ("report's radial, barrel", am.ReportRadial(a1=0.3, a2=0.1)),
-    ("report's radial, pincushion", am.ReportRadial(a1=-0.05, a2=-0.01)),
-    ("Vicon's radial", am.ViconRadial(k1=3.5e-8, k2=-2e-14)),
+    ("report's radial, barrel", am.camera.ReportRadial(a1=0.3, a2=0.1)),
+    ("report's radial, pincushion", am.camera.ReportRadial(a1=-0.05, a2=-0.01)),
+    ("Vicon's radial", am.camera.ViconRadial(k1=3.5e-8, k2=-2e-14)),
 )
 
 
@@ -51,14 +51,16 @@ def points_a_second() -> list[str]:
     return [*lines, "", f"Greatest difference to OpenCV over these points: {apart:.1g} px."]
 
 
-def ball(n: int = 71) -> am.Mesh:
+def ball(n: int = 71) -> am.camera.Mesh:
     """Make a sphere of about 2 n² triangles in the middle of the volume."""
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, n), np.linspace(0.03, np.pi - 0.03, n))
     ball = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1)
     i = np.arange(n * n).reshape(n, n)
     quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
     faces = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
-    return am.Mesh(vertices=0.6 * ball.reshape(-1, 3) + [0, 0, 1], faces=faces.astype(np.int32))
+    return am.camera.Mesh(
+        vertices=0.6 * ball.reshape(-1, 3) + [0, 0, 1], faces=faces.astype(np.int32)
+    )
 
 
 def occlusion() -> list[str]:
@@ -69,13 +71,13 @@ def occlusion() -> list[str]:
     points = rng.uniform([-1, -1, 0], [1, 1, 2], (T, 60, 3))
     corners = rng.uniform([-1, -1, 0], [1, 1, 2], (200, 1, 3)) + rng.normal(0, 0.15, (200, 3, 3))
     drift = rng.normal(0, 0.01, (T, 1, 3)).cumsum(axis=0)
-    standing = [am.Polygon(corners=c) for c in corners]
-    moving = [am.Polygon(corners=c + drift) for c in corners]
+    standing = [am.camera.Polygon(corners=c) for c in corners]
+    moving = [am.camera.Polygon(corners=c + drift) for c in corners]
     lines = ["| what | time | share hidden |", "|---|---:|---:|"]
-    cases: dict[str, list[am.Polygon]] = {"none": [], "standing": standing, "moving": moving}
+    cases: dict[str, list[am.camera.Polygon]] = {"none": [], "standing": standing, "moving": moving}
     for name, surfaces in cases.items():
         seconds = best_of(3, partial(rig.project, points, surfaces))
-        hidden = float((rig.project(points, surfaces).reason == am.Reason.HIDDEN).mean())
+        hidden = float((rig.project(points, surfaces).reason == am.camera.Reason.HIDDEN).mean())
         what = f"8 cameras × 60 markers × {T} frames, 200 triangles {name}"
         if name == "none":
             what = f"8 cameras × 60 markers × {T} frames, no surface"
@@ -83,7 +85,7 @@ def occlusion() -> list[str]:
     mesh = ball()
     one = points[0]
     seconds = best_of(20, lambda: rig.project(one, [mesh]))
-    hidden = float((rig.project(one, [mesh]).reason == am.Reason.HIDDEN).mean())
+    hidden = float((rig.project(one, [mesh]).reason == am.camera.Reason.HIDDEN).mean())
     what = (
         f"8 cameras × 60 markers, one frame, mesh of {len(mesh.faces)} triangles, tree built anew"
     )

@@ -30,19 +30,19 @@ def captures(folder: Path) -> list[Path]:
 
 def named_only(truth: am.Tracks) -> am.Tracks:
     """Leave out the unnamed points, of which nothing is known; all else stays as recorded."""
-    return am.simulate.sense(truth)
+    return am.simulate.corrupt(truth)
 
 
 def corrupted(truth: am.Tracks) -> am.Tracks:
     """10 % of the detections missing, 10 % clutter, 0.3 mm of noise."""
-    return am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1)
+    return am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1)
 
 
 def score(
     truth: am.Tracks, model: am.TrackingModel
-) -> tuple[dict[str, am.Evaluation], dict[str, float], dict[str, am.Tracks]]:
+) -> tuple[dict[str, am.metrics.Evaluation], dict[str, float], dict[str, am.Tracks]]:
     """Track by every method: how well, and how many frames a second."""
-    found: dict[str, am.Evaluation] = {}
+    found: dict[str, am.metrics.Evaluation] = {}
     speed: dict[str, float] = {}
     results: dict[str, am.Tracks] = {}
     for name, method in METHODS.items():
@@ -53,7 +53,7 @@ def score(
     return found, speed, results
 
 
-def details(e: am.Evaluation) -> list[str]:
+def details(e: am.metrics.Evaluation) -> list[str]:
     clutter = e.clutter_labelled_percent
     return [
         f"{e.wrong_links}, {e.broken_links}",
@@ -114,7 +114,9 @@ def main() -> None:
             model = am.estimate_model(truth.detections).model
             seconds = time.process_time() - start
             gap = model.population.max_gap
-            floors = [am.evaluate(am.floor(truth, g), truth).idf1 for g in (10, gap)]
+            floors = [
+                am.evaluate(am.metrics.oracle_tracks(truth, g), truth).idf1 for g in (10, gap)
+            ]
             found, speed, results = score(truth, model)
             row = [path.name, condition, f"{floors[0]:.3f}", f"{floors[1]:.3f} ({gap})"]
             for name, e in found.items():

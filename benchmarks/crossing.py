@@ -21,7 +21,7 @@ from methods import LinkConfidence, links
 from report import conditions, publish, table
 
 FRAMES, NOISE, ALARMS = 60, 0.02, 1.6
-METHODS: dict[str, am.Method[Any]] = {
+METHODS: dict[str, am.tracking.Method[Any]] = {
     "gnn": am.GNN(),
     "smp, window=3": am.SMP(window=3),
     "jpda": am.JPDA(),
@@ -77,7 +77,7 @@ def reliability(parts: dict[str, tuple[Any, Any]], path: Path) -> None:
     """Draw the share of right links by their confidence."""
     from matplotlib.figure import Figure
 
-    from asterism.view.style import CYCLE
+    from asterism.plot.style import CYCLE
 
     figure = Figure(figsize=(5.2, 4.2), dpi=110, layout="constrained")
     axes = figure.add_subplot()

@@ -90,7 +90,7 @@ def main() -> None:
         publish(lines, options.markdown / f"{name}.md" if options.markdown else None)
     if options.figure:
         with replacing(options.figure) as file:
-            file.write(am.figure_bytes(growth(found), options.figure.suffix[1:]))
+            file.write(am.plot.figure_bytes(growth(found), options.figure.suffix[1:]))
 
 
 if __name__ == "__main__":

@@ -88,7 +88,7 @@ def cut(truth: am.Tracks, n_frames: int, *, is_middle: bool = False) -> am.Track
 def _scene(name: str, seed: int, frames: int) -> am.Tracks:
     scene, options, noise = SCENES[name]
     truth = am.simulate.SCENES[scene].make(seed=seed, **options)
-    return cut(am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=noise, seed=seed), frames)
+    return cut(am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=noise, seed=seed), frames)
 
 
 def _scene_clips(name: str, seeds: range, frames: int) -> tuple[Clip, ...]:

@@ -34,7 +34,7 @@ NOT_RUN = "not run"
 LATE = "more than"
 """How an error begins where time ran out."""
 FLOORS = {"the truth, broken at gaps > 10": 10, "the truth, broken at gaps > 60": 60}
-OURS: dict[str, tuple[am.Method[Any] | None, bool]] = {
+OURS: dict[str, tuple[am.tracking.Method[Any] | None, bool]] = {
     "gnn": (am.GNN(), False),
     "gnn, stitched": (am.GNN(), True),
     "smp, window=3": (am.SMP(window=3), False),
@@ -54,7 +54,7 @@ class Score:
     clip : str
         Its name.
     idf1, switches, wrong, broken, tracks_per_true : float or int
-        As `asterism.evaluate` counts; switches for 1000 detections.
+        As `asterism.metrics` counts; switches for 1000 detections.
     ms, megabytes : float
         CPU time for a frame, and memory.
     prepared : float
@@ -150,7 +150,7 @@ def of_floor(kind: Kind, gap: int, options: argparse.Namespace, cache: Cache) ->
         truth = clip.make()
         d = truth.detections
         row = Score(clip=clip.name, points=d.n_points, frames=d.n_frames)
-        return judged(row, am.floor(truth, gap), truth)
+        return judged(row, am.metrics.oracle_tracks(truth, gap), truth)
 
     source = digest(HERE / "field_clips.py")
     return [
@@ -180,7 +180,7 @@ def of_ours(kind: Kind, name: str, options: argparse.Namespace, cache: Cache) ->
 
         def work() -> NDArray[np.int64]:
             if is_stitched:
-                return am.identify(truth.detections, method, model=model, seed=0).tracks.labels
+                return am.track(truth.detections, method, model=model, seed=0, stitch=True).labels
             return am.track(truth.detections, method, model=model, seed=0).labels
 
         return scored(clip.name, truth, work, options.limit, prepared)
@@ -202,8 +202,8 @@ def rows_of(kind: Kind, name: str, options: argparse.Namespace, cache: Cache) ->
 
 def warm() -> None:
     """Run ours once, for what they load on first use is not theirs alone to pay."""
-    truth = am.simulate.sense(am.simulate.cube(frames=30, seed=1), clutter=0.1, seed=1)
+    truth = am.simulate.corrupt(am.simulate.cube(frames=30, seed=1), clutter=0.1, seed=1)
     model = am.estimate_model(truth.detections).model
     for method, _ in OURS.values():
         am.track(truth.detections, method, model=model, seed=0)
-        am.identify(truth.detections, method, model=model, seed=0)
+        am.track(truth.detections, method, model=model, seed=0, stitch=True)

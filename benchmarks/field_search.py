@@ -81,7 +81,7 @@ def unloadable(peer: Peer) -> str:
     In a child first: what ends its process must not end the benchmark.
     """
     truth = am.simulate.smooth(n_markers=30, frames=12, seed=1)
-    truth = am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=0.005, seed=1)
+    truth = am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=0.005, seed=1)
     rng = np.random.default_rng(1)
     for setting in (peer.middle(), *(peer.draw(rng) for _ in range(3))):
         work = partial(peer.label, in_frames(truth.detections), setting)

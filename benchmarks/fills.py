@@ -1,8 +1,9 @@
 """Filled gaps against the truth: stretches of real captures hidden on purpose.
 
 Of markers that are seen around them, stretches of 10, 30, 60 and 120 frames are hidden, up to three
-at a time, at random places (seeded), and filled by `am.fill`, by a cubic spline through ten frames
-on each side, and by Kinetics Toolkit's `fill_missing_samples` (linear, its default, and cubic). The
+at a time, at random places (seeded), and filled by `am.fill_gaps`, by a cubic spline through ten
+frames on each side, and
+by Kinetics Toolkit's `fill_missing_samples` (linear, its default, and cubic). The
 gaps that the captures have themselves stay. Then 10 % of the points of an excerpt are hidden at
 random, wherever they are. A marker is *bonded* if the distance to three others or
 more varies by less than 10 mm (half of the middle 68 %).
@@ -23,7 +24,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 import asterism as am
-from asterism.label.distances import distances_from
+from asterism.tracking.rigidity.distances import distances_from
 from captures import captures, named_only
 from report import conditions, publish, table
 
@@ -104,7 +105,7 @@ def measure(name: str, truth: am.Tracks, length: int, seed: int) -> tuple[list[S
     model = am.estimate_model(tracks.detections).model
     longest = float(max(d.times[stop] - d.times[first - 1] for _, first, stop in stretches)) + 1e-6
     start = time.process_time()
-    filling = am.fill(tracks, model=model, longest=longest)
+    filling = am.fill_gaps(tracks, model=model, longest=longest)
     ms = 1e3 * (time.process_time() - start) / filling.n_filled
     gaps = {(gap.track, gap.first): gap for gap in filling.gaps}
     of_fill = filling.tracks.positions()
@@ -146,7 +147,7 @@ def scattered(truth: am.Tracks) -> list[str]:
     is_hidden = np.random.default_rng(0).random(whole.shape[:2]) < SCATTERED
     hidden = np.where(is_hidden[..., None], np.nan, whole)
     tracks = am.Tracks.from_dense(d.times[:EXCERPT], hidden, truth.names)
-    filling = am.fill(tracks)
+    filling = am.fill_gaps(tracks)
     e = filling.tracks.detections
     assert e.stds is not None
     frames, labels = e.frame_of[e.filled], filling.tracks.labels[e.filled]

@@ -26,14 +26,14 @@ from report import conditions, publish, table
 
 
 def bursts(truth: am.Tracks) -> am.Tracks:
-    return am.simulate.sense(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
+    return am.simulate.corrupt(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
 
 
 def half_rate(truth: am.Tracks) -> am.Tracks:
-    return am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=3e-4, stride=2, seed=1)
+    return am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=3e-4, stride=2, seed=1)
 
 
-METHODS: dict[str, am.Method[Any]] = {**QUICK, "mda": am.MDA()}
+METHODS: dict[str, am.tracking.Method[Any]] = {**QUICK, "mda": am.MDA()}
 CONDITIONS = {
     "as captured": named_only,
     "10 %/10 %": corrupted,
@@ -48,7 +48,7 @@ class Figures:
     def __init__(self) -> None:
         self.rows: list[tuple[float, ...]] = []
 
-    def add(self, e: am.Evaluation, ms: float) -> None:
+    def add(self, e: am.metrics.Evaluation, ms: float) -> None:
         """Count one capture, stitched in so many milliseconds a frame."""
         self.rows.append((e.idf1, e.switches_per_1000, e.clutter_labelled_percent, ms))
 
@@ -76,7 +76,7 @@ class Joins:
         self.said: list[float] = []
         self.is_right: list[bool] = []
 
-    def add(self, found: am.Stitching, truth: am.Tracks) -> None:
+    def add(self, found: am.tracking.Stitching, truth: am.Tracks) -> None:
         """Count the joins of one capture; right is what the marker was for the most part so far."""
         frame = truth.detections.frame_of
         for join in found.joins:
@@ -120,10 +120,10 @@ def main() -> None:
             truth = make(capture.tracks)
             d = truth.detections
             model = am.estimate_model(d).model
-            short = am.fragment_model(model)
+            short = am.tracking.tracklet_model(model)
             row = [path.name, condition]
             for gap in (10, 60):
-                value = am.evaluate(am.floor(truth, gap), truth).idf1
+                value = am.evaluate(am.metrics.oracle_tracks(truth, gap), truth).idf1
                 floors.setdefault((condition, gap), []).append(value)
                 row.append(f"{value:.3f}")
             for name in options.methods:

@@ -46,14 +46,14 @@ def sizes() -> list[list[str]]:
     cases |= {f"chain of {n}": chain(n) for n in (10, 100, 1000)}
     rows: list[list[str]] = []
     for name, group in cases.items():
-        found = am.joint_marginals(*group, max_states=2**22)
-        taken = best_of(5, lambda g=group: am.joint_marginals(*g, max_states=2**22))
+        found = am.solve.joint_marginals(*group, max_states=2**22)
+        taken = best_of(5, lambda g=group: am.solve.joint_marginals(*g, max_states=2**22))
         rows.append([name, found.method, "0", f"{found.n_states:,}", f"{taken * 1e3:.2f}"])
     for n in (20, 30, 60):
         for states in (2**12, 2**16):
             group = full(n)
-            found = am.joint_marginals(*group, max_states=states)
-            taken = best_of(3, lambda g=group, s=states: am.joint_marginals(*g, max_states=s))
+            found = am.solve.joint_marginals(*group, max_states=states)
+            taken = best_of(3, lambda g=group, s=states: am.solve.joint_marginals(*g, max_states=s))
             rows.append(
                 [
                     f"{n} × {n}, {states:,} states allowed",
@@ -155,10 +155,10 @@ def beside_stone_soup() -> list[list[str]]:
             for seed in range(seeds):
                 frame = StoneSoup(n, seed)
                 beta = frame.marginals(associator)
-                found = am.joint_marginals(frame.weights, frame.miss)
+                found = am.solve.joint_marginals(frame.weights, frame.miss)
                 worst = max(worst, float(abs(beta - found.marginals).max()))
                 theirs += best_of(1, partial(frame.marginals, associator))
-                ours += best_of(3, partial(am.joint_marginals, frame.weights, frame.miss))
+                ours += best_of(3, partial(am.solve.joint_marginals, frame.weights, frame.miss))
             assert worst < 1e-9, "two ways of summing the same events"
             rows.append(
                 [

@@ -32,8 +32,8 @@ def row_of(n: int, k: int, murty: Any, seeds: int) -> list[str]:
     ours = theirs = 0.0
     for seed in range(seeds):
         gains = np.random.default_rng(seed).normal(0, 5, (n, n))
-        found = am.k_best_assignments(gains, k, complete=True)
-        ours += best_of(5, partial(am.k_best_assignments, gains, k, complete=True)) / seeds
+        found = am.solve.k_best_assignments(gains, k, complete=True)
+        ours += best_of(5, partial(am.solve.k_best_assignments, gains, k, complete=True)) / seeds
         if murty is not None:
             assert np.allclose(np.asarray(murty(-gains, k).costs), -found.totals)
             theirs += best_of(2, partial(murty, -gains, k)) / seeds

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["METHODS", "LinkConfidence", "links"]
 
-METHODS: dict[str, am.Method[Any]] = {
+METHODS: dict[str, am.tracking.Method[Any]] = {
     "gnn": am.GNN(),
     "smp": am.SMP(),
     "smp, window=3": am.SMP(window=3),
@@ -61,7 +61,7 @@ class LinkConfidence:
         rows: list[list[str]] = []
         for name in self._parts:
             sure, right = self.links(name)
-            c = am.calibration(sure, right)
+            c = am.metrics.calibration_curve(sure, right)
             wrong = int((~right).sum())
             rows.append([name, f"{len(right):,}", f"{wrong:,}", f"{c.ece:.4f}", f"{c.auc:.3f}"])
         head = ["method", "links", "wrong", "expected calibration error", "AUC for wrong links"]

@@ -12,8 +12,8 @@ import argparse
 from pathlib import Path
 
 import asterism as am
-from asterism.app.reconstruct import true_tracks
-from asterism.app.rig_presets import place_preset
+from asterism.cli.commands.reconstruct import true_tracks
+from asterism.simulate.rig_presets import place_preset
 from reconstruction import REAL
 from report import conditions, publish, table
 
@@ -43,7 +43,7 @@ def main() -> None:
         prior: am.Detections | None = None
         for n in range(PASSES):
             made = am.reconstruct(shot.observations, rig, prior=prior)
-            s = am.point_scores(made.detections, truth, counted=seen, radius=0.02)
+            s = am.metrics.point_scores(made.detections, truth, counted=seen, radius=0.02)
             model = am.estimate_model(made.detections).model
             tracks = am.track(made.detections, am.SMP(window=3), model=model)
             e = am.evaluate(tracks, true_tracks(made, shot.observations))
@@ -58,7 +58,7 @@ def main() -> None:
                 ]
             )
             print(*rows[-1], flush=True)
-            prior = am.expected_places(tracks, model)
+            prior = am.filter.expected_positions(tracks, model)
     head = ["scene", "pass", "found, %", "ghosts, %", "SMP window 3, IDF1", "switches"]
     publish([*table(head, rows), "", conditions()], options.markdown)
 

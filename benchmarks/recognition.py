@@ -50,12 +50,12 @@ def row(path: Path, truth: am.Tracks) -> list[str]:
     was = np.random.default_rng(0).permutation(second.n_tracks)
     labels = np.where(second.labels >= 0, np.argsort(was)[second.labels], -1)
     start = time.perf_counter()
-    found = am.recognize(am.Tracks(detections=second.detections, labels=labels), bonds)
+    found = am.name_tracks(am.Tracks(detections=second.detections, labels=labels), bonds)
     seconds = time.perf_counter() - start
     is_there = second.lengths[was] > 0
     n_right = int((found.markers == was)[is_there].sum())
-    hidden = am.simulate.sense(second, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
-    named = am.recognize(am.identify(hidden.detections).tracks, bonds).tracks
+    hidden = am.simulate.corrupt(second, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
+    named = am.name_tracks(am.track(hidden.detections, stitch=True), bonds).tracks
     right, wrong = shares(named, hidden)
     return [
         path.name,

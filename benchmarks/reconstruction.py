@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import asterism as am
-from asterism.app.reconstruct import true_tracks
-from asterism.app.rig_presets import place_preset
+from asterism.cli.commands.reconstruct import true_tracks
+from asterism.simulate.rig_presets import place_preset
 from report import best_of, conditions, publish, table
 
 if TYPE_CHECKING:
@@ -43,13 +43,13 @@ def cloud(
 
 def scored(
     rig: am.Rig, truth: am.Tracks, shot: am.simulate.Film, radius: float = 0.02
-) -> tuple[am.Reconstruction, am.PointScores]:
+) -> tuple[am.multiview.Reconstruction, am.metrics.PointScores]:
     made = am.reconstruct(shot.observations, rig)
     seen = (shot.blob_of >= 0).sum(axis=0) >= 2
-    return made, am.point_scores(made.detections, truth, counted=seen, radius=radius)
+    return made, am.metrics.point_scores(made.detections, truth, counted=seen, radius=radius)
 
 
-def row_of(name: str, made: am.Reconstruction, s: am.PointScores) -> list[str]:
+def row_of(name: str, made: am.multiview.Reconstruction, s: am.metrics.PointScores) -> list[str]:
     return [
         name, str(s.n_markers), f"{100 * s.recall:.2f}", f"{100 * s.ghosts:.2f}",
         f"{s.median_mm:.3g}", f"{s.p95_mm:.3g}", f"{s.nees:.2f}", f"{made.info['gap']:.3g}",
@@ -104,7 +104,7 @@ def speeds() -> list[str]:
         for n_markers in (20, 60, 100):
             rig, _, shot = cloud(n_cameras, n_markers, 30, replace(SHARP, noise_px=0.3))
             o = shot.observations
-            model = am.estimate_images(o, rig)
+            model = am.multiview.estimate_images(o, rig)
             pace = 30 / best_of(3, lambda o=o, r=rig, m=model: am.reconstruct(o, r, m))
             made = am.reconstruct(o, rig, model)
             rows.append([
@@ -158,7 +158,7 @@ def flydra(folder: Path) -> list[str]:
     for at_once in (1, 25, 100, 253):
         o, truth = flydra_shuffled(folder, at_once)
         made = am.reconstruct(o, rig)
-        s = am.point_scores(made.detections, truth, radius=0.002)
+        s = am.metrics.point_scores(made.detections, truth, radius=0.002)
         rows.append(row_of(f"{at_once} points a frame", made, s))
     return table(HEAD, rows)
 
@@ -177,7 +177,9 @@ def myptv_blobs(folder: Path) -> am.Observations:
     )
 
 
-def myptv_matches(folder: Path, o: am.Observations, made: am.Reconstruction) -> tuple[int, int]:
+def myptv_matches(
+    folder: Path, o: am.Observations, made: am.multiview.Reconstruction
+) -> tuple[int, int]:
     """Count the matches that the files list, and those of them found, blob for blob."""
     theirs = np.loadtxt(folder / "particles")
     d, views = made.detections, made.views

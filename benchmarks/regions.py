@@ -49,7 +49,7 @@ def with_noise(truth: am.Tracks, extra: NDArray[np.float64]) -> am.Tracks:
 
 def density(truth: am.Tracks, model: am.TrackingModel, extra: NDArray[np.float64]) -> float:
     """Log density of the true tracks, nats."""
-    return float(am.filter_states(with_noise(truth, extra), model).log_densities.sum())
+    return float(am.filter.filter_states(with_noise(truth, extra), model).log_densities.sum())
 
 
 def searched(

@@ -60,7 +60,7 @@ def piece(path: Path, stride: int) -> am.Tracks:
     capture = am.read(path)
     truth: am.Tracks = capture.tracks
     if any(capture.names):
-        truth = am.simulate.sense(truth, stride=stride)
+        truth = am.simulate.corrupt(truth, stride=stride)
     d = truth.detections
     first = max((d.n_frames - FRAMES) // 2, 0)
     end = min(first + FRAMES, d.n_frames)
@@ -78,7 +78,7 @@ def inputs(data: Path) -> Iterator[tuple[str, am.Detections]]:
     for name, options in SCENES:
         truths[name] = am.simulate.SCENES[name].make(seed=1, **options)
     for name, truth in truths.items():
-        corrupted = am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1)
+        corrupted = am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1)
         yield name, truth.detections
         yield f"{name}, corrupted", corrupted.detections
 
@@ -92,7 +92,7 @@ def lines(data: Path) -> Iterator[tuple[str, list[Any]]]:
             tracks = am.track(detections, method, model=model, seed=1)
             yield f"{name}: {method_name}", fingerprint(tracks)
             if method_name in ("smp, window=3", "mcmcda"):
-                stitched = am.identify(detections, method, model=model, seed=1).tracks
+                stitched = am.track(detections, method, model=model, seed=1, stitch=True)
                 yield f"{name}: {method_name}, stitched", fingerprint(stitched)
 
 

@@ -49,7 +49,7 @@ def sensed(case: str, seed: int, *, through_cameras: bool) -> am.Tracks:
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         reach = 3.0 + float(np.ptp(points[:, :2], axis=0).max())
         rig = am.Rig.ring(4, radius=reach, height=2.8, target=middle)
-    return am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=noise, rig=rig, seed=seed)
+    return am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=noise, rig=rig, seed=seed)
 
 
 def row_of(
@@ -62,7 +62,7 @@ def row_of(
     for seed in range(seeds):
         truth = sensed(case, seed, through_cameras=through_cameras)
         model = am.estimate_model(truth.detections).model
-        floor = am.floor(truth, model.population.max_gap)
+        floor = am.metrics.oracle_tracks(truth, model.population.max_gap)
         floors.append(am.evaluate(floor, truth).idf1)
         seen.append(float((truth.labels >= 0).sum()) / truth.detections.n_frames / truth.n_tracks)
         for name, method in METHODS.items():

@@ -18,7 +18,7 @@ from methods import METHODS
 from report import conditions, publish, table
 from speed import model_of
 
-SEVERAL: dict[str, am.Method[Any]] = {
+SEVERAL: dict[str, am.tracking.Method[Any]] = {
     "tomht": am.TOMHT(),
     "mht": am.MHT(),
     "mda": am.MDA(),
@@ -31,9 +31,9 @@ def posterior_and_identities(scene: str, seeds: int) -> list[list[str]]:
     found: dict[str, list[tuple[float, ...]]] = {}
     for seed in range(seeds):
         clean = am.simulate.SCENES[scene].make(seed=seed)
-        truth = am.simulate.sense(clean, missing=0.1, clutter=0.1, noise=0.005, seed=seed)
+        truth = am.simulate.corrupt(clean, missing=0.1, clutter=0.1, noise=0.005, seed=seed)
         model = am.estimate_model(truth.detections).model
-        floor = am.floor(truth, model.population.max_gap)
+        floor = am.metrics.oracle_tracks(truth, model.population.max_gap)
         best = am.log_posterior(floor, model)
         results = {"floor": floor} | {
             name: am.track(truth.detections, method, model=model)
@@ -67,7 +67,7 @@ def cost() -> list[list[str]]:
     for n_markers, n_frames in ((8, 400), (50, 200), (200, 60)):
         scene = am.simulate.smooth(n_markers=n_markers, frames=n_frames, seed=1)
         for clutter in (0.0, 0.1, 0.25, 0.5):
-            truth = am.simulate.sense(scene, missing=0.1, clutter=clutter, noise=0.005, seed=2)
+            truth = am.simulate.corrupt(scene, missing=0.1, clutter=clutter, noise=0.005, seed=2)
             row = [str(n_markers), f"{100 * clutter:.0f} %"]
             for name, method in SEVERAL.items():
                 start = time.perf_counter()
@@ -93,8 +93,8 @@ def gaps() -> list[str]:
         tuples = np.unique(rng.integers(-1, n, (20 * n, S)), axis=0)
         tuples = tuples[(tuples >= 0).sum(axis=1) >= 2]
         weights = rng.exponential(1.0, len(tuples)) * (tuples >= 0).sum(axis=1)
-        exact = am.assign_multidimensional(tuples, weights)
-        relaxed = am.assign_multidimensional(tuples, weights, method="relaxed")
+        exact = am.solve.assign_multidimensional(tuples, weights)
+        relaxed = am.solve.assign_multidimensional(tuples, weights, method="relaxed")
         assert relaxed.value <= exact.value + 1e-6 <= relaxed.bound + 2e-6
         found.append((relaxed.gap / exact.value, (exact.value - relaxed.value) / exact.value))
     gap, short = np.array(found).T
@@ -116,14 +116,14 @@ def resident() -> float:
     return pages * resource.getpagesize() / 1e6
 
 
-def hour(name: str, method: am.Method[Any], rate: float) -> list[str]:
+def hour(name: str, method: am.tracking.Method[Any], rate: float) -> list[str]:
     """Stream an hour of eight markers, step by step, a minute made at a time."""
     minute = am.simulate.smooth(n_markers=8, frames=int(60 * rate), rate=1.0, seed=1)
     state = None
     memory: list[float] = []
     n, start = 0, time.perf_counter()
     for number in range(60):
-        truth = am.simulate.sense(minute, missing=0.1, clutter=0.1, noise=0.005, seed=number)
+        truth = am.simulate.corrupt(minute, missing=0.1, clutter=0.1, noise=0.005, seed=number)
         if state is None:
             state = method.init(model_of(truth, 3))
         for _, points in truth.detections:

@@ -20,7 +20,7 @@ import asterism as am
 from report import conditions, publish, table
 
 SIZES = ((53, 100), (53, 1000), (200, 300), (1000, 100))
-METHODS: dict[str, am.Method[Any]] = {
+METHODS: dict[str, am.tracking.Method[Any]] = {
     "mcmcda, without confidence": am.MCMCDA(end_odds=1, confidence=0),
     "mcmcda": am.MCMCDA(end_odds=1),
     "mcmcda, 2 threads": am.MCMCDA(end_odds=1, threads=2),
@@ -68,12 +68,12 @@ def throughput(seeds: int) -> list[list[str]]:
     rows: list[list[str]] = []
     for n, frames in SIZES:
         scenes = [smooth(n, frames, seed) for seed in range(seeds)]
-        floors = [(am.floor(truth, 8), truth, model) for truth, model in scenes]
+        floors = [(am.metrics.oracle_tracks(truth, 8), truth, model) for truth, model in scenes]
         floor = np.mean([am.evaluate(one, truth).idf1 for one, truth, _ in floors])
         true = [am.log_posterior(one, model) for one, _, model in floors]
         for name, method in METHODS.items():
             fps: list[float] = []
-            e: list[am.Evaluation] = []
+            e: list[am.metrics.Evaluation] = []
             value: list[float] = []
             for truth, model in scenes:
                 start = time.perf_counter()

@@ -31,7 +31,7 @@ def model_of(capture: am.Tracks, motions: int) -> am.TrackingModel:
     n_frames = capture.detections.n_frames
     levels = (0.006,) if motions == 1 else (0.003, 0.006, 0.06)
     single = tuple(am.DWNA(acceleration_sigma=a, velocity_sigma=0.03) for a in levels)
-    motion: am.Motion = single[0]
+    motion: am.model.Motion = single[0]
     if motions == 3:
         motion = am.InteractingMotions(
             models=single,
@@ -87,7 +87,7 @@ def frames_a_second() -> list[list[str]]:
     rows: list[list[str]] = []
     for n_markers, n_frames in SIZES:
         scene = am.simulate.smooth(n_markers=n_markers, frames=n_frames, seed=1)
-        capture = am.simulate.sense(scene, missing=0.1, clutter=0.1, noise=0.005, seed=2)
+        capture = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.005, seed=2)
         rows += [row_of(capture, n_markers, motions) for motions in (1, 3)]
     return rows
 

@@ -20,11 +20,11 @@ import asterism as am
 from asterism.simulate import Burst, Ghosts
 from report import conditions, publish, table
 
-METHODS: dict[str, am.Method[Any]] = {
+METHODS: dict[str, am.tracking.Method[Any]] = {
     "gnn": am.GNN(),
-    "gnn, stitched": am.Stitched(method=am.GNN()),
+    "gnn, stitched": am.tracking.Stitched(method=am.GNN()),
     "smp, window=3": am.SMP(window=3),
-    "smp, window=3, stitched": am.Stitched(method=am.SMP(window=3)),
+    "smp, window=3, stitched": am.tracking.Stitched(method=am.SMP(window=3)),
 }
 
 
@@ -43,12 +43,12 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
     person = am.simulate.person(seed=1, frames=options.frames)
-    capture = am.simulate.sense(person, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
+    capture = am.simulate.corrupt(person, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
     model = am.estimate_model(capture.detections).model
     frames = list(capture.detections)
     rows: list[list[str]] = []
     for name, method in METHODS.items():
-        state = method.init(am.fragment_model(model))
+        state = method.init(am.tracking.tracklet_model(model))
         taken: list[float] = []
         held = [0.0]
         for t, (now, points) in enumerate(frames):

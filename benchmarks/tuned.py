@@ -73,7 +73,7 @@ def drawn(model: am.TrackingModel, rng: np.random.Generator) -> am.TrackingModel
 def idf1(truth: am.Tracks, model: am.TrackingModel, name: str) -> float:
     method = METHODS[name.removesuffix(STITCHED)]
     if name.endswith(STITCHED):
-        found = am.identify(truth.detections, method, model=model, seed=1).tracks
+        found = am.track(truth.detections, method, model=model, seed=1, stitch=True)
     else:
         found = am.track(truth.detections, method, model=model, seed=1)
     return am.evaluate(found, truth).idf1

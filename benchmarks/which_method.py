@@ -25,7 +25,7 @@ from scenes import CASES, sensed
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-METHODS: dict[str, am.Method[Any]] = {
+METHODS: dict[str, am.tracking.Method[Any]] = {
     "gnn": am.GNN(),
     "smp, window=3": am.SMP(window=3),
     "mcmcda": am.MCMCDA(),
@@ -48,9 +48,9 @@ def row_of(group: str, truth: am.Tracks) -> Row:
     idf1: dict[str, float] = {}
     for name, method in METHODS.items():
         idf1[name] = am.evaluate(am.track(d, method, model=model, seed=0), truth).idf1
-        stitched = am.identify(d, method, model=model, seed=0).tracks
+        stitched = am.track(d, method, model=model, seed=0, stitch=True)
         idf1[f"{name}, stitched"] = am.evaluate(stitched, truth).idf1
-    choice = am.choose_method(d, model)
+    choice = am.tracking.choose_method(d, model)
     return Row(group=group, idf1=idf1, chosen=way_of(choice.method.name, choice.stitch))
 
 

@@ -23,7 +23,7 @@ MOVES = (0.3, 1, 3, 10, 30, 100)
 def experiment(noise: float) -> am.Tracks:
     """Two cubes that pass through each other, with misses and clutter; the truth."""
     scene = am.simulate.crossing(seed=SEED)
-    return am.simulate.sense(scene, missing=0.1, clutter=0.1, noise=noise, seed=1)
+    return am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=noise, seed=1)
 
 
 def film() -> Any:
@@ -32,7 +32,7 @@ def film() -> Any:
     points = truth.detections.points
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     rig = am.Rig.ring(6, radius=5, height=2.2, target=middle)
-    return am.plot_projections(am.simulate.film(truth, rig).observations, rig)
+    return am.plot.plot_projections(am.simulate.film(truth, rig).observations, rig)
 
 
 def posterior(d: am.Detections, model: am.TrackingModel, gnn: float) -> Any:
@@ -45,7 +45,7 @@ def posterior(d: am.Detections, model: am.TrackingModel, gnn: float) -> Any:
         ]
         for seed in range(3)
     ]  # fmt: skip
-    return am.plot_posterior(MOVES, climbs, others={"gnn": gnn})
+    return am.plot.plot_posterior(MOVES, climbs, others={"gnn": gnn})
 
 
 def main() -> None:
@@ -57,35 +57,35 @@ def main() -> None:
     milliseconds: dict[str, float] = {}
     for name in METHODS:
         start = time.process_time()
-        found[name] = am.track(d, am.method_by_name(name), model=model, seed=1)
+        found[name] = am.track(d, am.tracking.method_by_name(name), model=model, seed=1)
         milliseconds[name] = 1e3 * (time.process_time() - start) / d.n_frames
     scores = {name: am.evaluate(tracks, truth) for name, tracks in found.items()}
     reliability: dict[str, Any] = {}
     for name in ("jpda", "mht", "mcmcda"):
         tracks = found[name]
-        links, is_right = am.right_links(tracks.labels, truth.labels)
+        links, is_right = am.metrics.right_links(tracks.labels, truth.labels)
         assert tracks.confidence is not None
-        reliability[name] = am.calibration(tracks.confidence[links], is_right)
+        reliability[name] = am.metrics.calibration_curve(tracks.confidence[links], is_right)
     gnn, best = found["gnn"], found["mcmcda"]
     calm = experiment(0.015)
     figures: dict[str, Callable[[], Any]] = {
-        "trajectories": lambda: am.plot_trajectories(best),
-        "axes": lambda: am.plot_axes(best),
-        "presence": lambda: am.plot_presence(best),
-        "confidence": lambda: am.plot_confidence(best),
-        "errors": lambda: am.plot_errors(gnn, truth),
-        "reliability": lambda: am.plot_reliability(reliability),
-        "compare": lambda: am.plot_compare(scores, milliseconds=milliseconds),
+        "trajectories": lambda: am.plot.plot_trajectories(best),
+        "axes": lambda: am.plot.plot_axes(best),
+        "presence": lambda: am.plot.plot_presence(best),
+        "confidence": lambda: am.plot.plot_confidence(best),
+        "errors": lambda: am.plot.plot_errors(gnn, truth),
+        "reliability": lambda: am.plot.plot_reliability(reliability),
+        "compare": lambda: am.plot.plot_compare(scores, milliseconds=milliseconds),
         "projections": film,
         "posterior": lambda: posterior(d, model, gnn.info["log_posterior"]),
-        "groups": lambda: am.plot_groups(
-            am.gate_groups(calm, am.estimate_model(calm.detections).model)
+        "groups": lambda: am.plot.plot_groups(
+            am.filter.gate_groups(calm, am.estimate_model(calm.detections).model)
         ),
     }
     images = Path(__file__).parent / "images"
     for name in sys.argv[1:] or figures:
         # Few colours are enough, and a third of the bytes.
-        picture = Image.open(io.BytesIO(am.figure_bytes(figures[name](), "png")))
+        picture = Image.open(io.BytesIO(am.plot.figure_bytes(figures[name](), "png")))
         small = picture.convert("RGB").quantize(128)
         small.save(images / f"figure_{name}.png", optimize=True)
 

@@ -9,14 +9,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import asterism as am
-from asterism.view import plot_coverage, plot_image, plot_lens, plot_rig
-from asterism.view.style import CYCLE
+from asterism.plot import plot_coverage, plot_image, plot_lens, plot_rig
+from asterism.plot.style import CYCLE
 
 
 def crossing(path: Path) -> None:
     """Draw what goes in and what comes out: a turning cube flies through a still one."""
     scene = am.simulate.crossing(seed=3, rate=100)
-    truth = am.simulate.sense(scene, missing=0.1, clutter=0.1, noise=0.002, seed=4)
+    truth = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.002, seed=4)
     unnamed = am.Tracks(detections=truth.detections, labels=np.full(truth.detections.n_points, -1))
     tracks = am.track(truth.detections, am.GNN())
     figure = Figure(figsize=(11, 3.6), dpi=110)
@@ -25,7 +25,7 @@ def crossing(path: Path) -> None:
     ):
         # 3-D axes leave wide margins, which are let run out of the picture.
         axes: Any = figure.add_axes((0.5 * i - 0.09, -0.42, 0.68, 1.75), projection="3d")
-        am.plot_trajectories(shown, ax=axes)
+        am.plot.plot_trajectories(shown, ax=axes)
         axes.set_title("")
         figure.text(0.5 * i + 0.02, 0.93, title, fontsize=12)
         if not i:
@@ -63,7 +63,7 @@ _LINKS = (
         ("right hip", "right knee"), ("right knee", "right ankle"), ("right ankle", "right toe"),
     ),
 )  # fmt: skip
-_WALL = am.Polygon(
+_WALL = am.camera.Polygon(
     corners=np.array(
         [[0.7, -0.93, 0.0], [0.7, -0.93, 0.85], [-0.85, -0.93, 0.85], [-0.85, -0.93, 0.0]]
     ),
@@ -84,12 +84,12 @@ def _person() -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
 
 def lenses(path: Path) -> None:
     """Draw a square grid through the two kinds of radial distortion."""
-    K = am.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
+    K = am.camera.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
     figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
     kinds = (("barrel", 0.3), ("pincushion", -0.12))
     for axes, (name, a1) in zip(figure.subplots(1, 2), kinds, strict=True):
         camera = am.Camera.look_at(
-            (0, -4, 1), (0, 0, 1), K=K, size_px=(1280, 1024), lens=am.ReportRadial(a1=a1)
+            (0, -4, 1), (0, 0, 1), K=K, size_px=(1280, 1024), lens=am.camera.ReportRadial(a1=a1)
         )
         plot_lens(camera, ax=axes)
         axes.set_title(f"{name}: a₁ = {a1:g}", fontsize=11, loc="left")
@@ -100,12 +100,12 @@ def film(path: Path) -> None:
     """Draw a person in two cameras, one of which looks over a low wall."""
     points, connections = _person()
     figure = Figure(figsize=(11, 4.9), dpi=110, layout="constrained")
-    K = am.intrinsics(focal_length=1500, principal_point=(639.5, 511.5))
+    K = am.camera.intrinsics(focal_length=1500, principal_point=(639.5, 511.5))
     places = (("in front", (3.0, 1.6, 1.5)), ("behind the wall", (0.9, -3.2, 1.3)))
     for axes, (name, place) in zip(figure.subplots(1, 2), places, strict=True):
         camera = am.Camera.look_at(
             place, (0, 0, 0.85), K=K, size_px=(1280, 1024), name=name,
-            lens=am.BrownConrady(k1=-0.2),
+            lens=am.camera.BrownConrady(k1=-0.2),
         )  # fmt: skip
         seen = camera.project(points, [_WALL])
         plot_image(
@@ -123,7 +123,7 @@ def rig(path: Path) -> None:
     solid = figure.add_axes((-0.05, -0.1, 0.58, 1.2), projection="3d")
     plot_rig(cameras, points=points, surfaces=[_WALL], ax=solid)
     solid.set_title("")
-    level = am.volume_grid((-3, -3, 0.4), (3, 3, 0.4), 0.06)
+    level = am.camera.volume_grid((-3, -3, 0.4), (3, 3, 0.4), 0.06)
     flat = figure.add_axes((0.61, 0.11, 0.36, 0.8))
     plot_coverage(cameras.coverage(level, [_WALL]), ax=flat)
     flat.set_title("how many cameras see a place 0.4 m above the ground", fontsize=11, loc="left")
@@ -158,7 +158,7 @@ def scenes(path: Path) -> None:
         middle = (np.nanmin(shown, axis=(0, 1)) + np.nanmax(shown, axis=(0, 1))) / 2
         size = float(np.ptp(shown.reshape(-1, 3), axis=0).max()) + 0.05
         stand = middle + size * np.array([2.2, -2.6, 0.9])
-        K = am.intrinsics(focal_length=2000, principal_point=(1000.0, 1000.0))
+        K = am.camera.intrinsics(focal_length=2000, principal_point=(1000.0, 1000.0))
         camera = am.Camera.look_at(stand, middle, K=K, size_px=(2001, 2001))
         surfaces = [s.during(np.array([t])) for s in truth.surfaces]
         ways = camera.project(shown).pixels

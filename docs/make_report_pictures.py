@@ -74,7 +74,7 @@ def _captures(captures: Path, pages: Path) -> None:
         return next(captures.rglob(name))
 
     tennis = am.read(found("kinematics_tennis_serve_2players.c3d"))
-    am.report(am.identify(tennis).tracks, pages / "tennis.html")
+    am.report(am.track(tennis, stitch=True), pages / "tennis.html")
     walking = am.read(found("walking_1.c3d"))
     rig = am.read_rig(found("walking_1.xcp"))
     am.report(am.track(walking, am.JPDA()), pages / "walking.html", rig=rig)
@@ -84,11 +84,11 @@ def _captures(captures: Path, pages: Path) -> None:
 
 def _scenes(pages: Path) -> None:
     person = am.simulate.person(frames=400, seed=2)
-    truth = am.simulate.sense(person, missing=0.1, clutter=0.1, noise=0.001, seed=2)
+    truth = am.simulate.corrupt(person, missing=0.1, clutter=0.1, noise=0.001, seed=2)
     tracks = am.track(truth.detections, am.GNN())
     am.report(tracks, pages / "person.html", truth=truth, title="A person, spoilt")
     crossing = am.simulate.crossing(seed=3, rate=100)
-    truth = am.simulate.sense(crossing, missing=0.1, clutter=0.1, noise=0.002, seed=4)
+    truth = am.simulate.corrupt(crossing, missing=0.1, clutter=0.1, noise=0.002, seed=4)
     tracks = am.track(truth.detections, am.JPDA())
     am.report(tracks, pages / "crossing.html", truth=truth, title="Two cubes")
 

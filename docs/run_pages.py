@@ -186,7 +186,7 @@ def _commands(text: str) -> str:
 
 def _asterism(arguments: list[str]) -> str:
     """Run a command in this process, which saves a second each."""
-    from asterism.app import main
+    from asterism.cli import main
 
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):

@@ -13,7 +13,7 @@ import asterism as am
 
 def main(folder: Path) -> None:
     scene = am.simulate.crossing(seed=3, rate=100)
-    truth = am.simulate.sense(scene, missing=0.1, clutter=0.1, noise=0.002, seed=4)
+    truth = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.002, seed=4)
     capture = truth.detections  # points without names
 
     estimate = am.estimate_model(capture)
@@ -21,7 +21,7 @@ def main(folder: Path) -> None:
     tracks = am.track(capture, am.GNN(), model=estimate.model)
     am.write(tracks, folder / "crossing.c3d")
 
-    again = am.read_tracks(folder / "crossing.c3d")
+    again = am.io.read_tracks(folder / "crossing.c3d")
     print(am.evaluate(again, truth))
 
 

@@ -11,7 +11,7 @@ import asterism as am
 
 def main() -> None:
     scene = am.simulate.cube(seed=1, rate=100)
-    capture = am.simulate.sense(scene, missing=0.1, clutter=0.1, noise=0.001, seed=2).detections
+    capture = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.001, seed=2).detections
     model = am.estimate_model(capture).model  # of an earlier take, say
 
     method = am.GNN()

@@ -18,7 +18,7 @@ def matrix_product(K: Any, T: Any, points: Any) -> tuple[Any, Any]:
     return (product[:2] / product[2]).T, product[2]
 
 
-def report_radial(lens: am.ReportRadial, x: float, y: float) -> tuple[float, float]:
+def report_radial(lens: am.camera.ReportRadial, x: float, y: float) -> tuple[float, float]:
     """Solve r_d (1 + a1 r_d² + a2 r_d⁴) = r by bisection on the rising branch."""
     r = float(np.hypot(x, y))
     if r == 0:

@@ -93,7 +93,7 @@ class Oracle:
             labels = np.full(self.n, -1)
             labels[list(path)] = 0
             tracks = am.Tracks(detections=self.d, labels=labels)
-            self._scores[path] = float(am.track_scores(tracks, self.model)[0])
+            self._scores[path] = float(am.model.track_scores(tracks, self.model)[0])
         return self._scores[path]
 
     def so_far(self, path: Track) -> float:

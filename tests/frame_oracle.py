@@ -17,7 +17,7 @@ from oracles import chance_seen
 
 
 @cache
-def step_of(mode: am.Motion, dt: float):
+def step_of(mode: am.model.Motion, dt: float):
     """F and Q of one motion over a time; asked for again and again."""
     return mode.transition(dt)[0], mode.process_noise(dt)[0]
 

@@ -22,14 +22,14 @@ import numpy as np
 
 import asterism as am
 import fuzzing
-from asterism.app.camera_check import check_rig
-from asterism.app.camera_info import describe_rig
 from asterism.errors import AsterismError
-from asterism.io import FORMATS, describe, read, write
-from asterism.io.calibration import CALIBRATIONS, read_rig, write_rig
-from asterism.io.calibration.points import read_sightings
+from asterism.io import CAPTURE_FORMATS, describe, read, write
+from asterism.io.calibrations import CALIBRATION_FORMATS, read_rig, write_rig
+from asterism.io.calibrations.points import read_sightings
 from asterism.io.observations import read_observations, write_observations
 from asterism.model import Tracks
+from asterism.multiview.rig_check import check_rig
+from asterism.multiview.rig_info import describe_rig
 from c3d_bytes import DEC, SGI, integers, make_c3d, reals, text
 from calibration_rigs import NAMES, rig_for
 
@@ -74,9 +74,9 @@ def _capture_seeds(name: str) -> tuple[dict[str, bytes], ...]:
     dense = rng.normal(size=(4, 5, 3))
     dense[rng.random((4, 5)) < 0.2] = np.nan
     tracks = Tracks.from_dense(np.arange(4) / 100, dense, ["LASI", "RASI", None, "Ann:T10", "*4"])
-    ending = FORMATS[name].extensions[0]
+    ending = CAPTURE_FORMATS[name].extensions[0]
     made: list[dict[str, bytes]] = []
-    if FORMATS[name].write is not None:
+    if CAPTURE_FORMATS[name].write is not None:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"seed{ending}"
             write(tracks, path, format=name)
@@ -113,7 +113,7 @@ def _capture_seeds(name: str) -> tuple[dict[str, bytes], ...]:
 
 
 def _read_capture(name: str) -> Callable[[Path, bool], Callable[[Path], None]]:
-    ending = FORMATS[name].extensions[0]
+    ending = CAPTURE_FORMATS[name].extensions[0]
 
     def _read(path: Path, is_sniffed: bool) -> Callable[[Path], None]:
         capture = read(path, format=None if is_sniffed else name)
@@ -214,14 +214,14 @@ def _sightings() -> tuple[dict[str, bytes], ...]:
 def readers() -> dict[str, Callable[[], Reader]]:
     """Give what makes each reader, by its name."""
     made: dict[str, Callable[[], Reader]] = {}
-    for name in FORMATS:
+    for name in CAPTURE_FORMATS:
         made[name] = lambda name=name: Reader(_capture_seeds(name), _read_capture(name))
-    for name in CALIBRATIONS:
+    for name in CALIBRATION_FORMATS:
         made[f"rig-{name}"] = lambda name=name: Reader(_rig_seeds(name), _read_rig(name))
     made["observations"] = lambda: Reader(_observation_seeds(), _read_points)
     made["caliscope-xy"] = lambda: Reader(({"xy.csv": XY.encode()},), _read_points)
     made["sightings"] = lambda: Reader(_sightings(), _read_known_points)
-    made["bonds"] = lambda: _text_reader(_bonds(), am.Bonds.from_toml)
+    made["bonds"] = lambda: _text_reader(_bonds(), am.tracking.Bonds.from_toml)
     return made
 
 

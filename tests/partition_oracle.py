@@ -26,7 +26,7 @@ def every_track(detections: am.Detections, model: am.TrackingModel):
     for path in paths:
         labels = np.full(d.n_points, -1)
         labels[list(path)] = 0
-        scores.append(am.track_scores(am.Tracks(detections=d, labels=labels), model)[0])
+        scores.append(am.model.track_scores(am.Tracks(detections=d, labels=labels), model)[0])
     scores = np.array(scores)
     allowed = np.isfinite(scores)
     return [path for path, ok in zip(paths, allowed, strict=True) if ok], scores[allowed]

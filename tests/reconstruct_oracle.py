@@ -9,14 +9,14 @@ import numpy as np
 import asterism as am
 
 
-def score(rig, model: am.ImageModel, chosen, gate=4.0) -> float:
+def score(rig, model: am.multiview.ImageModel, chosen, gate=4.0) -> float:
     """Log likelihood ratio of image points (one or None of each camera) being one point.
 
     By the definition: the place is integrated out numerically exactly for a linear image (Laplace).
     """
     sigma, p_detection, clutter = model.of(rig)
     z = np.array([[np.full(2, np.nan) if p is None else p] for p in chosen])
-    found = am.triangulate(z, rig, sigma_px=sigma)
+    found = am.multiview.triangulate(z, rig, sigma_px=sigma)
     X, P = found.points[0], found.covariances[0]
     if not np.isfinite(P).all():
         return -np.inf

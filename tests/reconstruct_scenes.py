@@ -8,9 +8,9 @@ import asterism as am
 
 LENSES = {
     "none": None,
-    "brown": am.BrownConrady(k1=-0.2, k2=0.05, p1=1e-3, p2=-5e-4),
-    "report": am.ReportRadial(a1=0.15, a2=0.02),
-    "vicon": am.ViconRadial(k1=4e-8, k2=1e-14),
+    "brown": am.camera.BrownConrady(k1=-0.2, k2=0.05, p1=1e-3, p2=-5e-4),
+    "report": am.camera.ReportRadial(a1=0.15, a2=0.02),
+    "vicon": am.camera.ViconRadial(k1=4e-8, k2=1e-14),
 }
 
 
@@ -21,7 +21,7 @@ def random_rig(rng, n: int, lens=None, *, size_px=(1280, 1024)) -> am.Rig:
         way = rng.normal(size=3)
         place = way / np.linalg.norm(way) * rng.uniform(3, 6)
         f = rng.uniform(700, 1500)
-        K = am.intrinsics(focal_length=f, principal_point=tuple(rng.normal((640, 512), 20)))
+        K = am.camera.intrinsics(focal_length=f, principal_point=tuple(rng.normal((640, 512), 20)))
         target = rng.normal(scale=0.2, size=3)
         up = rng.normal(size=3)
         cameras.append(

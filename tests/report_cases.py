@@ -12,7 +12,7 @@ import numpy as np
 
 import asterism as am
 
-K = am.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
+K = am.camera.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
 HOSTILE = (
     "<script>alert(1)</script>",
     "</script><img src=x onerror=alert(2)>",
@@ -26,7 +26,7 @@ HOSTILE = (
 def spoilt_person(frames=120, seed=1):
     """A walking person with misses and clutter: the truth, and tracks of it with confidence."""
     scene = am.simulate.person(frames=frames, seed=seed)
-    truth = am.simulate.sense(scene, missing=0.06, clutter=0.06, noise=0.0005, seed=seed)
+    truth = am.simulate.corrupt(scene, missing=0.06, clutter=0.06, noise=0.0005, seed=seed)
     return truth, am.track(truth.detections, am.JPDA())
 
 
@@ -76,7 +76,7 @@ def full_page(path):
     labels[order[starts[7] + 40 : starts[7] + 49]] = -1  # that there is a long gap
     tracks = dataclasses.replace(tracks, confidence=confidence, labels=labels)
     ring = am.Rig.ring(8, radius=4, height=2.5).cameras
-    lens = am.BrownConrady(k1=-0.2)
+    lens = am.camera.BrownConrady(k1=-0.2)
     ring = tuple(dataclasses.replace(c, K=K, lens=lens) for c in ring)
     # One amid the points: some are behind it, some too near, some too far.
     amid = am.Camera.look_at((0, 0, 1), (2, 0.1, 1), K=K, size_px=(1280, 1024), name="amid")

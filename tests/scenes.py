@@ -121,4 +121,11 @@ def calibration_in_crowds(method):
         a, b = order[:-1][is_link], order[1:][is_link]
         right.append(truth.labels[a] == truth.labels[b])
         sure.append(tracks.confidence[b])
-    return am.calibration(np.concatenate(sure), np.concatenate(right))
+    return am.metrics.calibration_curve(np.concatenate(sure), np.concatenate(right))
+
+
+def stitched(detections, method=None, *, model=None, seed=None, **options):
+    """Return the stitching of a method's tracklets, with all that it knows of them."""
+    model = am.tracking.tracklet_model(model or am.estimate_model(detections).model)
+    tracklets = am.track(detections, method or am.SMP(window=3), model=model, seed=seed)
+    return am.stitch(tracklets, model, **options)

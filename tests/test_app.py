@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.app import main
+from asterism.cli import main
 
 
 @pytest.fixture(scope="module")
@@ -59,9 +59,9 @@ def refused(line, capsys):
 
 def test_misses_in_runs_are_made_and_learnt(scene, capsys):
     run("simulate person -o p.csv --frames 160 --seed 1", capsys)
-    line = "corrupt p.csv -o a.csv --truth t.csv --missing 0.15 --sense missing_run=4"
+    line = "corrupt p.csv -o a.csv --truth t.csv --missing 0.15 --corrupt missing_run=4"
     made = json.loads(run(f"{line} --noise 0.0003 --json", capsys))
-    assert made["sense"]["missing_run"] == 4.0
+    assert made["corruption"]["missing_run"] == 4.0
     found = json.loads(run("estimate a.csv --runs --json", capsys))
     assert found["model"]["sensor"]["p_redetection"] == pytest.approx(0.25, abs=0.05)
     run("estimate a.csv --runs -o runs.toml", capsys)
@@ -70,7 +70,7 @@ def test_misses_in_runs_are_made_and_learnt(scene, capsys):
 
 
 def test_corrupt_forgets_every_name_and_keeps_every_point(scene):
-    unnamed, truth = am.read("in.csv"), am.read_tracks("truth.csv")
+    unnamed, truth = am.read("in.csv"), am.io.read_tracks("truth.csv")
     assert (unnamed.labels == -1).all()
     assert set(truth.names) == {f"M{i:02d}" for i in range(16)}
     np.testing.assert_array_equal(unnamed.points, truth.detections.points)
@@ -97,7 +97,7 @@ def test_track_says_what_it_did(scene, capsys):
     text = run("track in.csv -o out.csv", capsys)
     for word in ("noise σ", "most likely", "detections labelled", "longest gaps", "frames/s"):
         assert word in text
-    tracks = am.read_tracks("out.csv")
+    tracks = am.io.read_tracks("out.csv")
     assert f"tracks               {tracks.n_tracks}" in text
     assert run("track in.csv -o out.csv --overwrite --quiet", capsys) == ""
 
@@ -106,14 +106,14 @@ def test_track_gives_the_same_as_the_library(scene, capsys):
     run("track in.csv -o out.csv --method smp --option proposers=detections", capsys)
     capture = am.read("in.csv")
     expected = am.track(capture, am.SMP(proposers="detections"))
-    np.testing.assert_array_equal(am.read_tracks("out.csv").labels, expected.labels)
+    np.testing.assert_array_equal(am.io.read_tracks("out.csv").labels, expected.labels)
 
 
 def test_summary_as_json(scene, capsys):
     summary = json.loads(
         run("track in.csv --method gnn --model model.toml -o out.csv --json", capsys)
     )
-    tracks = am.read_tracks("out.csv")
+    tracks = am.io.read_tracks("out.csv")
     assert summary["n_tracks"] == tracks.n_tracks
     assert summary["n_clutter"] == (tracks.labels == -1).sum()
     assert summary["n_labelled"] + summary["n_clutter"] == summary["n_detections"]
@@ -280,7 +280,7 @@ def test_damaged_run_files(scene, capsys):
 
 
 def test_formats_of_the_result(scene, capsys):
-    truth = am.read_tracks("truth.csv")
+    truth = am.io.read_tracks("truth.csv")
     am.write(truth, "a.bin")
     run("track a.bin --model model.toml", capsys)  # a log holds no tracks: CSV does
     am.write(truth, "wide.csv", format="csv-wide")
@@ -288,14 +288,14 @@ def test_formats_of_the_result(scene, capsys):
     assert am.read("wide.tracked.csv").format == "csv-wide"
     run("track in.csv --model model.toml -o b.csv --format csv-wide", capsys)
     assert am.read("b.csv").format == "csv-wide"
-    assert am.read_tracks("a.tracked.csv").n_tracks >= 16
+    assert am.io.read_tracks("a.tracked.csv").n_tracks >= 16
     run("track in.csv --model model.toml -o b.c3d", capsys)
     assert am.read("b.c3d").n_points == truth.detections.n_points
 
 
 def test_evaluate_prints_what_the_library_says(scene, capsys):
     run("track in.csv --model model.toml -o out.csv", capsys)
-    scores = am.evaluate(am.read_tracks("out.csv"), am.read_tracks("truth.csv"))
+    scores = am.evaluate(am.io.read_tracks("out.csv"), am.io.read_tracks("truth.csv"))
     assert run("evaluate out.csv truth.csv --by-frame frames.csv", capsys) == f"{scores}\n"
     as_json = json.loads(run("evaluate out.csv truth.csv --json", capsys))
     assert as_json["idf1"] == scores.idf1
@@ -311,7 +311,7 @@ def test_info(scene, capsys):
     found = json.loads(run("info in.csv --json", capsys))
     assert found["n_frames"] == 60
     assert found["step_median"] is None  # JSON has no NaN
-    am.write(am.read_tracks("truth.csv"), "t.c3d")
+    am.write(am.io.read_tracks("truth.csv"), "t.c3d")
     raw = bytearray((scene / "t.c3d").read_bytes())
     raw[raw.find(b"POINT") + 0 : raw.find(b"POINT") + 5] = b"PAINT"
     (scene / "odd.c3d").write_bytes(raw)
@@ -320,7 +320,7 @@ def test_info(scene, capsys):
 
 def test_methods_and_scenes_are_those_of_the_library(capsys):
     listed = json.loads(run("methods --json", capsys))
-    assert list(listed) == ["auto", *am.METHODS]
+    assert list(listed) == ["auto", *am.tracking.METHODS]
     options = listed["smp"]["options"]
     made = am.SMP()
     assert {name: option["default"] for name, option in options.items()} == {
@@ -342,27 +342,29 @@ def test_simulate_takes_the_options_of_the_scene(scene, capsys):
 
 def test_a_recording_of_a_scene_with_its_truth(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    given = "--sense missing=0.2 --sense clutter=0.3 --sense burst=2:3-6 --sense visits=10-20"
+    given = (
+        "--corrupt missing=0.2 --corrupt clutter=0.3 --corrupt burst=2:3-6 --corrupt visits=10-20"
+    )
     run(
         f"simulate crossing -o in.csv --truth t.csv --frames 40 --rate 100 --seed 3 {given}", capsys
     )
     sensing = {"missing": 0.2, "clutter": 0.3}
     scene = am.simulate.crossing(frames=40, rate=100, seed=3)
-    expected = am.simulate.sense(
+    expected = am.simulate.corrupt(
         scene, **sensing, burst=am.simulate.Burst(n=2, shortest=3, longest=6),
         visits=am.simulate.Visits(shortest=10, longest=20), seed=3,
     )  # fmt: skip
-    points, truth = am.read("in.csv"), am.read_tracks("t.csv")
+    points, truth = am.read("in.csv"), am.io.read_tracks("t.csv")
     np.testing.assert_array_equal(points.points, expected.detections.points)
     np.testing.assert_array_equal(truth.labels, expected.labels)
     assert not any(points.names)
     run("simulate cube -o a.csv --truth b.csv --rig ring4 --json", capsys)
     assert am.read("a.csv").n_points == 800
     for wrong in (
-        "simulate cube -o c.csv --sense missing=0.1",
-        "simulate cube -o c.csv --truth d.csv --sense mising=0.1",
-        "simulate cube -o c.csv --truth d.csv --sense missing=2",
-        "simulate cube -o c.csv --truth d.csv --sense visits=5",
+        "simulate cube -o c.csv --corrupt missing=0.1",
+        "simulate cube -o c.csv --truth d.csv --corrupt mising=0.1",
+        "simulate cube -o c.csv --truth d.csv --corrupt missing=2",
+        "simulate cube -o c.csv --truth d.csv --corrupt visits=5",
         "simulate cube -o c.csv --truth d.csv --rig nothing.xcp",
         "simulate cube -o c.csv --markers 9",
         "simulate cube -o c.csv --seed 1 --option seed=4",
@@ -380,7 +382,7 @@ def test_scenes_are_listed_a_line_each(tmp_path, monkeypatch, capsys):
     assert "activity" in run("scenes person", capsys)
     assert main(["scenes", "persn"]) == 2
     run("simulate swarm -o s.csv --frames 5 --markers 7", capsys)
-    assert am.read_tracks("s.csv").n_tracks == 7
+    assert am.io.read_tracks("s.csv").n_tracks == 7
 
 
 def test_help_and_version(capsys):
@@ -397,7 +399,7 @@ def test_examples_in_the_help_are_indented(capsys):
     # The help's margin is that of its second paragraph on: with nothing but examples there, theirs.
     from typer.main import get_command
 
-    from asterism.app.commands import app
+    from asterism.cli.program import app
 
     for command in get_command(app).commands:
         lines = run(f"{command} --help", capsys).splitlines()
@@ -430,7 +432,7 @@ def test_the_common_options_are_everywhere():
     # A command without --quiet or --json stops the script that passes them to all commands alike.
     from typer.main import get_command
 
-    from asterism.app.commands import app
+    from asterism.cli.program import app
 
     commands = dict(get_command(app).commands)
     commands |= {f"camera {name}": c for name, c in commands.pop("camera").commands.items()}
@@ -448,7 +450,7 @@ def test_the_common_options_are_everywhere():
     ("simulate cube -o a.c3d --frames 0", "--frames: expected"),
     ("simulate cube -o a.c3d --option frames=0", "frames: expected"),
     ("corrupt scene.csv -o a.csv --truth t.csv --missing 10", "--missing: expected"),
-    ("corrupt scene.csv -o a.csv --truth t.csv --sense missing=10", "missing: expected"),
+    ("corrupt scene.csv -o a.csv --truth t.csv --corrupt missing=10", "missing: expected"),
     ("camera map rig.toml --low 1,1,1 --high 0,0,0", "--high: expected"),
     ("camera map rig.toml --suggest -1", "--suggest: expected"),
     ("camera info rig.toml --from opncv", "--from: expected"),
@@ -464,7 +466,7 @@ def test_the_common_options_are_everywhere():
     ("reconstruct in.csv --rig rig.toml -o a.csv", "line 1: expected the columns"),
 ])  # fmt: skip
 def test_mistakes_are_told_by_the_names_of_the_command_line(scene, capsys, line, says):
-    am.write_rig(am.Rig.ring(4, radius=4, height=2.5), "rig.toml")
+    am.io.write_rig(am.Rig.ring(4, radius=4, height=2.5), "rig.toml")
     Path("empty.csv").touch()
     before = sorted(scene.iterdir())
     told = refused(line, capsys)
@@ -494,7 +496,7 @@ WRITES = {"-o", "--by-frame"}
     "camera map rig.toml --spacing 1",
 ])  # fmt: skip
 def test_quiet_prints_nothing_and_json_an_object(scene, capsys, line):
-    am.write_rig(am.Rig.ring(4, radius=4, height=2.5), "rig.toml")
+    am.io.write_rig(am.Rig.ring(4, radius=4, height=2.5), "rig.toml")
     assert run(line, capsys)
     again = f"{line} --overwrite" if WRITES.intersection(line.split()) else line
     assert run(f"{again} --quiet", capsys) == ""
@@ -504,7 +506,7 @@ def test_quiet_prints_nothing_and_json_an_object(scene, capsys, line):
 def test_demo(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     # Shorter than what people see, and drawn for one method: what is written is the same.
-    from asterism.app import demo
+    from asterism.cli.commands import demo
 
     draw = demo._draw
     monkeypatch.setattr(demo, "_N_FRAMES", 60)
@@ -549,15 +551,15 @@ def test_track_finds_hidden_markers_again(scene, capsys):
     run("track p.c3d --method gnn -o alone.c3d", capsys)
     out = run("track p.c3d --method gnn -o found.c3d --stitch --run r", capsys)
     assert "markers found again" in out
-    truth = am.read_tracks("pt.c3d")
-    alone, found = (am.evaluate(am.read_tracks(f), truth) for f in ("alone.c3d", "found.c3d"))
+    truth = am.io.read_tracks("pt.c3d")
+    alone, found = (am.evaluate(am.io.read_tracks(f), truth) for f in ("alone.c3d", "found.c3d"))
     assert found.idf1 > 0.985 > alone.idf1
     # The run repeats it, and says what the library says.
     run("track --from r/run.toml -o again.c3d", capsys)
     assert Path("again.c3d").read_bytes() == Path("found.c3d").read_bytes()
-    model = am.fragment_model(am.estimate_model(am.read("p.c3d")).model)
-    expected = am.identify(am.read("p.c3d"), am.GNN(), model=model).tracks
-    assert am.evaluate(am.read_tracks("found.c3d"), expected).idf1 == 1
+    model = am.tracking.tracklet_model(am.estimate_model(am.read("p.c3d")).model)
+    expected = am.track(am.read("p.c3d"), am.GNN(), model=model, stitch=True)
+    assert am.evaluate(am.io.read_tracks("found.c3d"), expected).idf1 == 1
 
 
 def test_stitch_says_what_it_joined(scene, capsys):
@@ -568,9 +570,9 @@ def test_stitch_says_what_it_joined(scene, capsys):
     told = json.loads(run("stitch pieces.c3d -o markers.csv --json", capsys))
     assert told["n_joins"] == len(told["joins"]) > 10
     assert told["n_tracks"] < told["n_tracks_before"]
-    truth = am.read_tracks("pt.c3d")
+    truth = am.io.read_tracks("pt.c3d")
     before, after = (
-        am.evaluate(am.read_tracks(f), truth).idf1 for f in ("pieces.c3d", "markers.c3d")
+        am.evaluate(am.io.read_tracks(f), truth).idf1 for f in ("pieces.c3d", "markers.c3d")
     )
     assert after > 0.98 > before
     assert run("stitch truth.csv -o quiet.csv -q", capsys) == ""
@@ -600,14 +602,14 @@ def test_bonds_of_one_take_name_the_next(scene, capsys):
     assert told["n_bonds"] > told["n_rigid"] > 50
     assert len(told["clusters"]) > 5
     run("track p.c3d --stitch -o tracked.c3d", capsys)
-    out = run("recognize tracked.c3d --bonds subject.toml -o named.c3d", capsys)
+    out = run("name tracked.c3d --bonds subject.toml -o named.c3d", capsys)
     assert "markers not found" in out
-    truth, named = am.read_tracks("person.csv"), am.read("named.c3d")
+    truth, named = am.io.read_tracks("person.csv"), am.read("named.c3d")
     names = [name for name in named.names if name]
     assert set(names) <= set(truth.names)
     assert len(names) > 0.95 * truth.n_tracks
-    told = json.loads(run("recognize tracked.c3d --bonds subject.toml -o n.csv --json", capsys))
-    assert told["n_recognized"] == len(told["names"]) >= len(names)
+    told = json.loads(run("name tracked.c3d --bonds subject.toml -o n.csv --json", capsys))
+    assert told["n_named"] == len(told["names"]) >= len(names)
     assert {one["name"] for one in told["names"]} == set(names)
     # The names are right: each point that has one lies where that marker was.
     places = truth.positions()
@@ -626,16 +628,16 @@ def test_bonds_of_one_take_name_the_next(scene, capsys):
         ("bonds in.csv", "asterism track"),
         ("bonds truth.csv -o truth.csv", "a name ending in .toml"),
         ("bonds truth.csv --neighbours 0", "neighbours"),
-        ("recognize in.csv --bonds b.toml -o out.csv", "asterism track --stitch"),
-        ("recognize truth.csv --bonds none.toml -o out.csv", "none.toml"),
-        ("recognize truth.csv --bonds truth.csv -o out.csv", "TOML"),
-        ("recognize truth.csv --bonds b.toml -o b.toml", "a name ending in .c3d"),
-        ("recognize truth.csv -o out.csv", "--bonds"),
+        ("name in.csv --bonds b.toml -o out.csv", "asterism track --stitch"),
+        ("name truth.csv --bonds none.toml -o out.csv", "none.toml"),
+        ("name truth.csv --bonds truth.csv -o out.csv", "TOML"),
+        ("name truth.csv --bonds b.toml -o b.toml", "a name ending in .c3d"),
+        ("name truth.csv -o out.csv", "--bonds"),
     ],
 )
 def test_what_bonds_and_recognize_refuse(scene, capsys, line, says):
     if "b.toml" in line:
-        am.learn_bonds(am.read_tracks("truth.csv")).to_toml("b.toml")
+        am.learn_bonds(am.io.read_tracks("truth.csv")).to_toml("b.toml")
     assert says in refused(line, capsys)
 
 
@@ -650,7 +652,7 @@ def test_corrupt_reports_markers_apart_from_unnamed_points(tmp_path, monkeypatch
     figures = json.loads(run(f"{line} --json", capsys))
     assert (figures["n_dropped"], figures["n_unnamed"]) == (0, 100)
     text = run(f"{line} --missing 0.5 --overwrite", capsys)
-    n_dropped = 6 * 50 - am.read_tracks("t.csv").detections.n_points
+    n_dropped = 6 * 50 - am.io.read_tracks("t.csv").detections.n_points
     assert 100 < n_dropped < 200
     assert re.search(rf"detections of markers dropped +{n_dropped} *\n", text)
     assert re.search(r"unnamed points left out +100 *\n", text)

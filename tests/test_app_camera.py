@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from asterism.app import main
 from asterism.camera import BrownConrady, Rig, ViconRadial
-from asterism.io.calibration import CALIBRATIONS, read_rig, write_rig
-from asterism.io.calibration.points import read_sightings
+from asterism.cli import main
+from asterism.io.calibrations import CALIBRATION_FORMATS, read_rig, write_rig
+from asterism.io.calibrations.points import read_sightings
 from calibration_rigs import rig_for, target_points
 
 
@@ -81,9 +81,9 @@ def test_info_of_a_lens_that_ends_within_the_image(run):
 # ---- convert -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("format", CALIBRATIONS)
+@pytest.mark.parametrize("format", CALIBRATION_FORMATS)
 def test_convert_to_every_format(run, format):
-    endings = CALIBRATIONS[format].extensions or ("",)
+    endings = CALIBRATION_FORMATS[format].extensions or ("",)
     code, out, err = run("convert", "a.toml", f"b{endings[0]}", "--format", format, "--json")
     assert code == 0, err
     told = json.loads(out)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from asterism.app import main
+from asterism.cli import main
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 pytestmark = [

@@ -11,12 +11,12 @@ import pytest
 from matplotlib.collections import PathCollection
 
 import asterism as am
-from asterism.app import main
-from asterism.app.film_pictures import contact_sheet, coverage_picture, rig_picture
-from asterism.app.filming import film_all, frames_between, names_apart
-from asterism.app.rig_presets import is_preset, place_preset
-from asterism.io.calibration import read_rig, write_rig
+from asterism.cli import main
+from asterism.cli.film_pictures import contact_sheet, coverage_picture, rig_picture
+from asterism.cli.filming import film_all, frames_between, names_apart
+from asterism.io.calibrations import read_rig, write_rig
 from asterism.io.observations import read_observations
+from asterism.simulate.rig_presets import is_preset, place_preset
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 
@@ -51,7 +51,7 @@ def here(tmp_path, monkeypatch):
 def gappy():
     """A scene with gaps, clutter, an empty frame, a nameless track, and some that come late."""
     scene = am.simulate.crossing(seed=3, rate=100)
-    spoilt = am.simulate.sense(scene, missing=0.2, clutter=0.2, seed=4)
+    spoilt = am.simulate.corrupt(scene, missing=0.2, clutter=0.2, seed=4)
     d = spoilt.detections
     is_late = (spoilt.labels % 2 == 0) & (spoilt.labels >= 0)
     is_kept = (d.frame_of != 30) & ~(is_late & (d.frame_of < 10))
@@ -69,7 +69,7 @@ NARROW = am.Rig.ring(4, radius=2, height=1, target=(0.3, 0, 0), focal_px=4000)
 
 
 def test_piece_by_piece_is_the_same_as_at_once(gappy, monkeypatch):
-    monkeypatch.setattr("asterism.app.filming._MOST_FRAMES", 7)
+    monkeypatch.setattr("asterism.cli.filming._MOST_FRAMES", 7)
     done = []
     footage = film_all(gappy, NARROW, done.append)
     whole = am.simulate.film(gappy, NARROW)
@@ -85,12 +85,12 @@ def test_piece_by_piece_is_the_same_as_at_once(gappy, monkeypatch):
 def test_the_counts_are_those_of_the_samples(gappy):
     footage = film_all(gappy, NARROW, lambda _: None)
     projection = am.simulate.film(gappy, NARROW).projection
-    is_there = projection.reason[0] != am.Reason.ABSENT
+    is_there = projection.reason[0] != am.camera.Reason.ABSENT
     assert footage.n_samples == is_there.sum() == (gappy.labels >= 0).sum()
     for c in range(4):
         counts = np.bincount(projection.reason[c][is_there], minlength=8)
         np.testing.assert_array_equal(footage.counts[c], counts)
-    assert footage.counts[:, am.Reason.OUTSIDE].all()
+    assert footage.counts[:, am.camera.Reason.OUTSIDE].all()
     assert (footage.counts.sum(axis=1) == footage.n_samples).all()
     by_two = (projection.visible.sum(axis=0)[is_there] >= 2).mean()
     assert 0 < by_two < 1
@@ -170,7 +170,7 @@ def test_the_summary_says_what_was_seen(here, capsys):
     projection = am.simulate.film(am.simulate.crossing(), NARROW).projection
     for c, name in enumerate(NARROW.names):
         counts = projection[c].counts()
-        del counts[am.Reason.ABSENT]
+        del counts[am.camera.Reason.ABSENT]
         assert summary["cameras"][name] == {r.name.lower(): n for r, n in counts.items()}
     by_two = 100 * (projection.visible.sum(axis=0) >= 2).mean()
     assert summary["seen_by_two_percent"] == pytest.approx(by_two)

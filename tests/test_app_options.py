@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import pytest
 
 import asterism as am
-from asterism.app.options import method_options, parsed, scene_options
+from asterism.cli.options import method_options, parsed, scene_options
 from asterism.errors import ParameterError
 
 
@@ -94,23 +94,27 @@ def test_refused_values(text):
 
 
 def test_the_last_of_one_name_counts_and_dashes_will_do():
-    options = method_options(am.METHODS["gnn"])
+    options = method_options(am.tracking.METHODS["gnn"])
     assert parsed("--option", "gnn", ["delete-odds=5", "delete_odds=7"], options) == {
         "delete_odds": 7.0
     }
 
 
 def test_bodies_are_options_of_the_methods_that_have_them():
-    having = {name for name in am.METHODS if "bodies" in method_options(am.METHODS[name])}
-    assert having == set(am.METHODS) - {"mcmcda"}
-    options = method_options(am.METHODS["gnn"])
+    having = {
+        name
+        for name in am.tracking.METHODS
+        if "bodies" in method_options(am.tracking.METHODS[name])
+    }
+    assert having == set(am.tracking.METHODS) - {"mcmcda"}
+    options = method_options(am.tracking.METHODS["gnn"])
     given = parsed("--option", "gnn", ["bodies=yes", "max-carried=30", "bond-weight=0"], options)
     assert am.GNN(**given) == am.GNN(bodies=True, max_carried=30, bond_weight=0.0)
 
 
-@pytest.mark.parametrize("name", am.METHODS)
+@pytest.mark.parametrize("name", am.tracking.METHODS)
 def test_every_method_explains_every_option(name):
-    for option in method_options(am.METHODS[name]).values():
+    for option in method_options(am.tracking.METHODS[name]).values():
         assert option.about
         assert not option.about.startswith("See ")
         text = "none" if option.default is None else str(option.default)

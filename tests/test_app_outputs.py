@@ -11,8 +11,8 @@ import pytest
 import typer
 
 import asterism as am
-from asterism.app import main
-from asterism.app.commands import app
+from asterism.cli import main
+from asterism.cli.program import app
 
 # Each file that a command can write, by a line with the file as OUT; in brackets its ending.
 FILES = {
@@ -22,7 +22,7 @@ FILES = {
     "stitch": ("stitch truth.csv -o OUT", ".csv"),
     "fill": ("fill truth.csv -o OUT", ".csv"),
     "bonds": ("bonds truth.csv -o OUT", ".toml"),
-    "recognize": ("recognize truth.csv --bonds bonds.toml -o OUT", ".csv"),
+    "name": ("name truth.csv --bonds bonds.toml -o OUT", ".csv"),
     "estimate": ("estimate in.csv -o OUT", ".toml"),
     "evaluate": ("evaluate in.csv truth.csv --by-frame OUT", ".csv"),
     "report": ("report truth.csv -o OUT", ".html"),
@@ -54,17 +54,17 @@ DEFAULTS = {
 }
 WORK = {
     "asterism": ("read", "read_tracks", "read_rig", "read_observations", "track", "estimate_model"),
-    "asterism.app.files": ("read_labels", "read_model"),
-    "asterism.app.recording": ("made_scene", "rig_from"),
-    "asterism.app.plot_inputs": ("tracks_of", "summary_of"),
-    "asterism.app.plot_kinds": ("tracks_of", "summary_of"),
-    "asterism.app.camera": ("read_calibration",),
-    "asterism.app.camera_map": ("read_calibration",),
-    "asterism.app.run_folder": ("sha256_of",),
-    "asterism.app.demo": ("_experiment",),
-    "asterism.app.reproduce.parts": ("load",),
-    "asterism.io.calibration.files": ("read_rig",),
-    "asterism.label.bonds": ("read_toml",),
+    "asterism.cli.outputs": ("read_labels", "read_model"),
+    "asterism.cli.recording": ("made_scene", "rig_from"),
+    "asterism.cli.plot_inputs": ("tracks_of", "summary_of"),
+    "asterism.cli.plot_kinds": ("tracks_of", "summary_of"),
+    "asterism.cli.commands.camera": ("read_calibration",),
+    "asterism.cli.commands.camera_map": ("read_calibration",),
+    "asterism.cli.run_folder": ("sha256_of",),
+    "asterism.cli.commands.demo": ("_experiment",),
+    "asterism.reproduction.parts": ("load",),
+    "asterism.io.calibrations.files": ("read_rig",),
+    "asterism.tracking.rigidity.bonds": ("read_toml",),
 }
 
 
@@ -72,13 +72,13 @@ WORK = {
 def inputs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("inputs")
     truth = am.simulate.cube(seed=1, frames=20)
-    sensed = am.simulate.sense(truth, noise=1e-3, seed=1)
+    sensed = am.simulate.corrupt(truth, noise=1e-3, seed=1)
     am.write(sensed, folder / "truth.csv")
     clutter = [-1] * sensed.detections.n_points
     am.write(am.Tracks(detections=sensed.detections, labels=clutter), folder / "in.csv")
     rig = am.Rig.ring(4, radius=5, height=2)
-    am.write_rig(rig, folder / "rig.toml")
-    am.write_observations(am.simulate.film(truth, rig).observations, folder / "seen.csv")
+    am.io.write_rig(rig, folder / "rig.toml")
+    am.io.write_observations(am.simulate.film(truth, rig).observations, folder / "seen.csv")
     am.learn_bonds(truth).to_toml(folder / "bonds.toml")
     return folder
 
@@ -185,7 +185,7 @@ INPUTS = {
     "stitch truth.csv -o truth.csv": "truth.csv",
     "fill truth.csv -o truth.csv": "truth.csv",
     "bonds bonds.toml -o bonds.toml": "bonds.toml",
-    "recognize truth.csv --bonds bonds.toml -o truth.csv": "truth.csv",
+    "name truth.csv --bonds bonds.toml -o truth.csv": "truth.csv",
     "evaluate in.csv truth.csv --by-frame in.csv": "in.csv",
     "corrupt truth.csv -o truth.csv --truth new.csv": "truth.csv",
     "reconstruct seen.csv --rig rig.toml -o seen.csv": "seen.csv",

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.app import main
-from asterism.app.plot_kinds import KINDS
+from asterism.cli import main
+from asterism.cli.plot_kinds import KINDS
 
 # Of each kind what follows its name, in the folder below.
 LINES = {
@@ -35,15 +35,15 @@ def made(tmp_path_factory):
     """A folder with a capture, its truth, a model, a finished run of mcmcda, and cameras."""
     folder = tmp_path_factory.mktemp("made")
     scene = am.simulate.crossing(frames=20, rate=50, seed=3)
-    truth = am.simulate.sense(scene, missing=0.1, clutter=0.1, noise=0.003, seed=1)
+    truth = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.003, seed=1)
     am.write(truth, folder / "truth.csv")
     nobody = np.full(truth.detections.n_points, -1)
     am.write(am.Tracks(detections=truth.detections, labels=nobody), folder / "in.csv")
     am.estimate_model(truth.detections).model.to_toml(folder / "model.toml")
     rig = am.Rig.ring(3, radius=4, height=2, target=(0, 0, 0))
-    am.write_rig(rig, folder / "rig.toml")
+    am.io.write_rig(rig, folder / "rig.toml")
     film = am.simulate.film(scene, rig)
-    am.write_observations(film.observations, folder / "film.csv")
+    am.io.write_observations(film.observations, folder / "film.csv")
     line = f"{folder}/in.csv --model {folder}/model.toml --method mcmcda --run {folder}/run -q"
     assert main(["track", *line.split()]) == 0
     return folder
@@ -105,7 +105,7 @@ def test_the_picture_lies_beside_what_it_shows(work, capsys):
 
 def test_compare_takes_the_time_from_the_run(work, capsys, monkeypatch):
     taken = {}
-    before = am.plot_compare
+    before = am.plot.plot_compare
 
     def plot_compare(scores, milliseconds):
         taken.update(scores=scores, milliseconds=milliseconds)
@@ -121,7 +121,7 @@ def test_compare_takes_the_time_from_the_run(work, capsys, monkeypatch):
 def test_errors_are_those_of_the_file(work, capsys, monkeypatch):
     """The truth is found detection by detection, though a file has an order of its own."""
     seen = []
-    before = am.plot_errors
+    before = am.plot.plot_errors
     monkeypatch.setattr(am, "plot_errors", lambda *a: seen.append(before(*a)) or seen[-1])
     run("errors truth.csv --truth truth.csv -o a.png", capsys)
     (above,) = seen[0].child_axes
@@ -130,10 +130,10 @@ def test_errors_are_those_of_the_file(work, capsys, monkeypatch):
 
 def test_observations_of_a_film_are_drawn_as_they_are(work, capsys, monkeypatch):
     seen = []
-    before = am.plot_projections
+    before = am.plot.plot_projections
     monkeypatch.setattr(am, "plot_projections", lambda *a: seen.extend(a) or before(*a))
     run("projections film.csv --rig rig.toml -o a.png", capsys)
-    np.testing.assert_array_equal(seen[0].pixels, am.read_observations("film.csv").pixels)
+    np.testing.assert_array_equal(seen[0].pixels, am.io.read_observations("film.csv").pixels)
     line = "projections film.csv --rig no.toml -o a.png"
     assert "no.toml: no such file" in refused(line.replace("a.png", "b.png"), capsys)
 

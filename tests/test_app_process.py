@@ -13,7 +13,7 @@ import pytest
 
 import asterism as am
 
-ASTERISM = (sys.executable, "-m", "asterism.app")
+ASTERISM = (sys.executable, "-m", "asterism.cli")
 
 
 def run(*arguments, cwd, **options):
@@ -126,7 +126,7 @@ def test_a_signal_where_exceptions_are_lost(where):
     body = "".join(f"    {line}\n" for line in where.splitlines())
     script = (
         "import signal, sys, os, time\n"
-        "from asterism.app.endings import exit_code\n"
+        "from asterism.cli.exit_codes import exit_code\n"
         "def ask(): os.kill(os.getpid(), signal.SIGTERM)\n"
         f"def run():\n{body}    for _ in range(1000): time.sleep(0.005)\n"
         "sys.exit(exit_code(run))\n"
@@ -144,7 +144,7 @@ def test_a_signal_while_handlers_are_set(nth):
     # this process.
     script = (
         "import signal, sys\n"
-        "from asterism.app.endings import exit_code\n"
+        "from asterism.cli.exit_codes import exit_code\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "set_handler, n = signal.signal, 0\n"
         "def at_once(number, handler):\n"
@@ -166,7 +166,7 @@ def test_an_ignored_signal_stays_ignored(tmp_path):
     script = (
         "import signal, sys, os\n"
         "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
-        "from asterism.app.endings import exit_code\n"
+        "from asterism.cli.exit_codes import exit_code\n"
         "sys.exit(exit_code(lambda: os.kill(os.getpid(), signal.SIGINT)))\n"
     )
     assert subprocess.run([sys.executable, "-c", script], timeout=30).returncode == 0
@@ -194,7 +194,7 @@ def test_exit_codes(tmp_path):
 def test_failures_inside(what, code, says):
     script = f"""
         import sys
-        import asterism.app.endings as endings
+        import asterism.cli.exit_codes as endings
         def command():
             {what}
         sys.exit(endings.exit_code(command))
@@ -229,7 +229,7 @@ def test_a_terminal_that_knows_no_greek(tmp_path):
 
 def test_same_bytes_in_every_process(tmp_path):
     truth = am.simulate.crossing(rate=100, seed=1)
-    am.write(am.simulate.sense(truth, missing=0.1, clutter=0.2, seed=1), tmp_path / "a.c3d")
+    am.write(am.simulate.corrupt(truth, missing=0.1, clutter=0.2, seed=1), tmp_path / "a.c3d")
     results = []
     for seed in ("1", "2"):  # of the hashes of texts, by which sets are ordered
         env = os.environ | {"PYTHONHASHSEED": seed}
@@ -242,7 +242,7 @@ def test_same_bytes_in_every_process(tmp_path):
 
 def test_help_loads_nothing_heavy():
     script = (
-        "import sys\nfrom asterism.app import main\nmain(['--help'])\n"
+        "import sys\nfrom asterism.cli import main\nmain(['--help'])\n"
         "heavy = ('scipy', 'ezc3d', 'matplotlib', 'pandas', 'asterism._engine')\n"
         "sys.exit(','.join(name for name in heavy if name in sys.modules) or 0)"
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.app import main
+from asterism.cli import main
 from c3d_bytes import make_c3d
 
 

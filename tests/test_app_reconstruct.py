@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.app import main
+from asterism.cli import main
 
 
 @pytest.fixture(scope="module")
@@ -18,8 +18,8 @@ def film(tmp_path_factory):
     rig = am.Rig.ring(4, radius=3, height=2, target=(0, 0, 0))
     seeing = am.simulate.Seeing(noise_px=0.2, merge=False, marker_radius=0)
     shot = am.simulate.film(scene, rig, seeing=seeing)
-    am.write_observations(shot.observations, folder / "obs.csv")
-    am.write_rig(rig, folder / "rig.toml")
+    am.io.write_observations(shot.observations, folder / "obs.csv")
+    am.io.write_rig(rig, folder / "rig.toml")
     return folder
 
 
@@ -31,14 +31,14 @@ def test_points_and_their_truth(film, tmp_path, capsys):
     points = am.read(out)
     assert said["n_points"] == points.n_points == 160
     assert (points.labels == -1).all()
-    named = am.read_tracks(truth)
+    named = am.io.read_tracks(truth)
     assert named.n_tracks == 8
     scene = am.simulate.cube(seed=1, frames=20)
-    scores = am.point_scores(named.detections, scene)
+    scores = am.metrics.point_scores(named.detections, scene)
     assert scores.recall == 1
     assert scores.ghosts == 0
     # Standard deviations go with the points, in the formats that hold them.
-    made = am.reconstruct(am.read_observations(film / "obs.csv"), am.read_rig(film / "rig.toml"))
+    made = am.reconstruct(am.io.read_observations(film / "obs.csv"), am.read_rig(film / "rig.toml"))
     np.testing.assert_allclose(points.stds, made.detections.stds, rtol=1e-6)
     assert main([*arguments, "-o", str(tmp_path / "points.c3d")]) == 0
     assert "by number of cameras" in capsys.readouterr().out
@@ -48,10 +48,10 @@ def test_points_and_their_truth(film, tmp_path, capsys):
 def test_what_is_refused_leaves_no_file(film, tmp_path, capsys):
     obs, rig, out = film / "obs.csv", film / "rig.toml", tmp_path / "p.csv"
     fewer = tmp_path / "fewer.toml"
-    am.write_rig(am.read_rig(rig)[:3], fewer)
+    am.io.write_rig(am.read_rig(rig)[:3], fewer)
     untold = tmp_path / "untold.csv"
-    seen = am.read_observations(obs)
-    am.write_observations(
+    seen = am.io.read_observations(obs)
+    am.io.write_observations(
         am.Observations(
             times=seen.times, cameras=seen.cameras, offsets=seen.offsets, pixels=seen.pixels
         ),
@@ -86,8 +86,8 @@ def test_the_whole_chain(tmp_path, capsys):
     assert set(said["identity"]) == {"gnn", "smp"}
     assert said["identity"]["gnn"]["idf1"] > 0.9
     again = am.evaluate(
-        am.read_tracks(tmp_path / "chain" / "tracks_gnn.csv"),
-        am.read_tracks(tmp_path / "chain" / "truth.csv"),
+        am.io.read_tracks(tmp_path / "chain" / "tracks_gnn.csv"),
+        am.io.read_tracks(tmp_path / "chain" / "truth.csv"),
     )
     assert again.idf1 == pytest.approx(said["identity"]["gnn"]["idf1"], abs=0.01)
     assert main(arguments) == 2
@@ -101,18 +101,18 @@ def test_the_whole_chain(tmp_path, capsys):
 def test_point_scores_by_hand():
     truth = am.Tracks.from_dense([0.0, 1.0], [[[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [np.nan] * 3]])
     d = am.Detections.from_frames([0.0, 1.0], [[[0.01, 0, 0], [5, 0, 0]], [[0, 0.003, 0]]])
-    s = am.point_scores(d, truth)
+    s = am.metrics.point_scores(d, truth)
     assert (s.n_markers, s.n_found, s.n_points, s.n_ghosts) == (3, 2, 3, 1)
     assert s.rms_mm == pytest.approx(np.sqrt((100 + 9) / 2))
     assert np.isnan(s.nees)
-    only = am.point_scores(d, truth, counted=[[True, False], [False, False]])
+    only = am.metrics.point_scores(d, truth, counted=[[True, False], [False, False]])
     assert (only.n_markers, only.n_found, only.n_ghosts) == (1, 1, 1)
     # One point cannot be two markers.
     near = am.Tracks.from_dense([0.0], [[[0, 0, 0], [0.001, 0, 0]]])
     one = am.Detections.from_frames([0.0], [[[0, 0, 0]]])
-    assert am.point_scores(one, near).n_found == 1
+    assert am.metrics.point_scores(one, near).n_found == 1
     with pytest.raises(am.ParameterError, match="truth"):
-        am.point_scores(one, truth)
+        am.metrics.point_scores(one, truth)
 
 
 def test_the_map_of_a_rig(film, tmp_path, capsys):

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.app import main
-from asterism.associate.auto import partners
+from asterism.cli import main
 from asterism.simulate import Burst
+from asterism.tracking.choose import partners
 
 
 def sensed(truth, noise=0.005, **more):
     more = {"missing": 0.1, "clutter": 0.1} | more
-    return am.simulate.sense(truth, noise=noise, seed=1, **more)
+    return am.simulate.corrupt(truth, noise=noise, seed=1, **more)
 
 
 CLIPS = {
     "bodies": (lambda: sensed(am.simulate.cube(seed=1)), "smp", True, "8 of 8 markers keep"),
     "a person in bursts": (
-        lambda: am.simulate.sense(
+        lambda: am.simulate.corrupt(
             am.simulate.person(seed=1), burst=Burst(), noise=3e-4, seed=1
         ),
         "smp",
@@ -53,18 +53,18 @@ def clip(name):
 def test_the_clip_chooses_and_says_why(name):
     _, method, stitch, why = CLIPS[name]
     truth, model = clip(name)
-    choice = am.choose_method(truth.detections, model)
+    choice = am.tracking.choose_method(truth.detections, model)
     assert (choice.method.name, choice.stitch) == (method, stitch)
     assert why in choice.reason
-    assert "\n" not in choice.text
-    assert choice == am.choose_method(truth.detections, model)
+    assert "\n" not in choice.reason
+    assert choice == am.tracking.choose_method(truth.detections, model)
 
 
 def test_no_method_is_the_one_that_was_chosen():
     truth, model = clip("bodies")
     tracks = am.track(truth.detections, model=model, seed=1)
-    assert tracks.info["chosen"] == am.choose_method(truth.detections, model).text
-    stitched = am.identify(truth.detections, am.SMP(window=3), model=model, seed=1).tracks
+    assert tracks.recipe.reason == am.tracking.choose_method(truth.detections, model).reason
+    stitched = am.track(truth.detections, am.SMP(window=3), model=model, seed=1, stitch=True)
     np.testing.assert_array_equal(tracks.labels, stitched.labels)
     assert "log_posterior" not in tracks.info  # the model knows no gap so long
     walkers, model = clip("walkers")
@@ -72,13 +72,13 @@ def test_no_method_is_the_one_that_was_chosen():
     named = am.track(walkers.detections, am.MCMCDA(), model=model, seed=1)
     np.testing.assert_array_equal(tracks.labels, named.labels)
     assert tracks.info["log_posterior"] == named.info["log_posterior"]
-    assert "chosen" not in named.info
+    assert named.recipe.chosen == ""
 
 
 def test_tracks_to_begin_with_are_for_mcmcda():
     truth = CLIPS["bodies"][0]()
     tracks = am.track(truth.detections, start=truth, seed=1)
-    assert tracks.info["chosen"].startswith("mcmcda: there are tracks to begin with")
+    assert tracks.recipe.chosen.startswith("mcmcda: there are tracks to begin with")
     assert am.evaluate(tracks, truth).idf1 > 0.99
 
 
@@ -103,9 +103,9 @@ def test_partners_are_counted_by_distances_alone():
 def test_many_markers_in_a_short_clip_are_no_bodies():
     # Of some ten thousand pairs, over a second, many keep their distance by chance.
     moving = am.simulate.smooth(n_markers=200, frames=24, seed=1)
-    truth = am.simulate.sense(moving, missing=0.1, clutter=0.1, noise=0.005, seed=1)
+    truth = am.simulate.corrupt(moving, missing=0.1, clutter=0.1, noise=0.005, seed=1)
     d = truth.detections
-    assert not am.choose_method(d, am.estimate_model(d).model).stitch
+    assert not am.tracking.choose_method(d, am.estimate_model(d).model).stitch
 
 
 @pytest.mark.parametrize("frames", [20, 80])
@@ -113,7 +113,7 @@ def test_the_first_detections_of_tracks_hide_no_rivals(frames):
     # They are in no gate; in a short clip they are a good part of all.
     truth = sensed(am.simulate.smooth(n_markers=200, frames=frames, seed=2))
     d = truth.detections
-    choice = am.choose_method(d, am.estimate_model(d).model)
+    choice = am.tracking.choose_method(d, am.estimate_model(d).model)
     assert choice.method.name == "mcmcda"
     assert 2 < float(choice.reason.split()[0]) < 5
 
@@ -122,21 +122,23 @@ def test_clips_of_nothing_and_of_one_point():
     model = am.estimate_model(am.simulate.cube(seed=1).detections).model
     for frames in ([np.empty((0, 3))] * 3, [np.zeros((1, 3))] * 3):
         d = am.Detections.from_frames(np.arange(3.0), frames)
-        choice = am.choose_method(d, model)
+        choice = am.tracking.choose_method(d, model)
         assert (choice.method.name, choice.stitch) == ("gnn", False)
     flat = np.random.default_rng(1).normal(size=(4, 2)) + np.arange(30)[:, None, None] * 0.01
     d = am.Tracks.from_dense(np.arange(30) / 100, flat).detections
-    assert am.choose_method(d, am.estimate_model(d).model).method.name in am.METHODS
+    assert (
+        am.tracking.choose_method(d, am.estimate_model(d).model).method.name in am.tracking.METHODS
+    )
     with pytest.raises(am.ParameterError, match="detections"):
-        am.choose_method(flat, model)
+        am.tracking.choose_method(flat, model)
     with pytest.raises(am.ParameterError, match="TrackingModel"):
-        am.choose_method(d, None)
+        am.tracking.choose_method(d, None)
 
 
 @pytest.fixture
 def person(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    truth = am.simulate.sense(
+    truth = am.simulate.corrupt(
         am.simulate.person(seed=1, frames=150), burst=Burst(), noise=3e-4, seed=1
     )
     am.write(am.Tracks(detections=truth.detections, labels=np.full(len(truth.labels), -1)), "p.csv")

@@ -195,7 +195,7 @@ def test_a_hidden_marker_is_known_when_it_comes_back(make):
 @functools.cache
 def hidden_person(seed):
     truth = am.simulate.person(seed=seed)
-    truth = am.simulate.sense(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
+    truth = am.simulate.corrupt(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
     return truth, am.estimate_model(truth.detections).model
 
 
@@ -221,7 +221,7 @@ def test_hidden_markers_of_a_person_come_back_as_themselves(make, seed):
 @functools.cache
 def spoilt(scene):
     made = getattr(am.simulate, scene)(seed=1)
-    truth = am.simulate.sense(made, missing=0.1, clutter=0.1, noise=1e-3, seed=1)
+    truth = am.simulate.corrupt(made, missing=0.1, clutter=0.1, noise=1e-3, seed=1)
     return truth, am.estimate_model(truth.detections).model
 
 

@@ -94,7 +94,7 @@ def test_bonds_come_back_from_their_file(tmp_path):
     truth = am.simulate.person(seed=3)
     bonds = am.learn_bonds(truth)
     text = bonds.to_toml(tmp_path / "bonds.toml")
-    again = am.Bonds.from_toml(tmp_path / "bonds.toml")
+    again = am.tracking.Bonds.from_toml(tmp_path / "bonds.toml")
     assert again.to_toml() == text
     assert again.names == bonds.names
     np.testing.assert_array_equal(again.pairs, bonds.pairs)
@@ -126,7 +126,7 @@ def test_files_that_are_wrong_are_refused(tmp_path, old, new, message):
     assert old in text
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(am.FormatError, match=message):
-        am.Bonds.from_toml(path)
+        am.tracking.Bonds.from_toml(path)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -135,7 +135,7 @@ def test_a_person_is_recognized_in_the_next_take(seed):
     half = truth.detections.n_frames // 2
     bonds = am.learn_bonds(part(truth, 0, half))
     take, was = shuffled(part(truth, half, 2 * half), seed)
-    found = am.recognize(take, bonds)
+    found = am.name_tracks(take, bonds)
     np.testing.assert_array_equal(found.markers, was)
     assert (found.probabilities > 0.9).mean() > 0.9
     assert found.tracks.names == tuple(bonds.names[k] for k in was)
@@ -149,7 +149,7 @@ def test_markers_may_be_stuck_on_anew(seed):
     bonds = am.learn_bonds(truth)
     places = truth.positions() + rng.normal(scale=0.003, size=(1, truth.n_tracks, 3))
     take, was = shuffled(am.Tracks.from_dense(truth.detections.times, places), seed)
-    found = am.recognize(take, bonds)
+    found = am.name_tracks(take, bonds)
     assert np.mean(found.markers == was) > 0.95
 
 
@@ -162,7 +162,7 @@ def test_a_body_and_its_mirror_image_are_told_apart():
         both = np.concatenate([own, other + np.array([2, 0, 0])], axis=1)
         bonds = am.learn_bonds(am.Tracks.from_dense(t[:60], both[:60]))
         take, was = shuffled(am.Tracks.from_dense(t[60:], both[60:]), seed)
-        np.testing.assert_array_equal(am.recognize(take, bonds).markers, was)
+        np.testing.assert_array_equal(am.name_tracks(take, bonds).markers, was)
 
 
 def test_pieces_of_a_marker_become_one_track():
@@ -171,7 +171,7 @@ def test_pieces_of_a_marker_become_one_track():
     labels = truth.labels.copy()
     labels[(labels == 7) & (d.frame_of >= 150) & (d.frame_of < 180)] = -1
     labels[(labels == 7) & (d.frame_of >= 180)] = truth.n_tracks
-    found = am.recognize(am.Tracks(detections=d, labels=labels), am.learn_bonds(truth))
+    found = am.name_tracks(am.Tracks(detections=d, labels=labels), am.learn_bonds(truth))
     assert found.markers[7] == found.markers[truth.n_tracks] == 7
     assert found.tracks.n_tracks == truth.n_tracks
     assert am.evaluate(found.tracks, truth).switches == 0
@@ -183,7 +183,7 @@ def test_strangers_have_no_name():
     bonds = am.learn_bonds(am.Tracks.from_dense(t, places[:, :6]))
     # Six that it knows, and three that belong to nobody.
     places[:, 6:] = 3 + np.cumsum(rng.normal(scale=0.02, size=(len(t), 3, 3)), axis=0)
-    found = am.recognize(am.Tracks.from_dense(t, places), bonds)
+    found = am.name_tracks(am.Tracks.from_dense(t, places), bonds)
     np.testing.assert_array_equal(found.markers, [0, 1, 2, 3, 4, 5, -1, -1, -1])
     assert (found.probabilities[6:] == 0).all()
 
@@ -207,11 +207,11 @@ def test_a_take_without_any_name_is_learnt_by_number():
 def test_takes_without_anything_to_tell():
     bonds = am.learn_bonds(am.simulate.person(seed=1))
     nobody = am.Tracks.from_dense(np.arange(5) / 100, np.full((5, 2, 3), np.nan))
-    found = am.recognize(nobody, bonds)
-    assert found.n_recognized == 0
+    found = am.name_tracks(nobody, bonds)
+    assert found.n_named == 0
     assert len(am.learn_bonds(nobody).pairs) == 0
     with pytest.raises(am.ParameterError, match="axes"):
-        am.recognize(am.Tracks.from_dense([0, 1], np.zeros((2, 1, 2))), bonds)
+        am.name_tracks(am.Tracks.from_dense([0, 1], np.zeros((2, 1, 2))), bonds)
 
 
 def test_two_axes_will_do():
@@ -221,7 +221,7 @@ def test_two_axes_will_do():
     flat = places[0, :, :2] @ Rotation.from_rotvec([[0, 0, a] for a in turn]).as_matrix()[:, :2, :2]
     bonds = am.learn_bonds(am.Tracks.from_dense(t, flat))
     take, was = shuffled(am.Tracks.from_dense(t, flat), 1)
-    np.testing.assert_array_equal(am.recognize(take, bonds).markers, was)
+    np.testing.assert_array_equal(am.name_tracks(take, bonds).markers, was)
 
 
 @pytest.mark.parametrize("wrong", [{"neighbours": 0}, {"least": 1}, {"neighbours": 2.5}])
@@ -234,7 +234,7 @@ def test_of_two_at_once_only_one_is_the_marker():
     shape = np.random.default_rng(9).uniform(-0.3, 0.3, (8, 3))
     t, places = moving(np.vstack([shape, shape[2] + 0.004]), noise=1e-4)
     bonds = am.learn_bonds(am.Tracks.from_dense(t, places[:, :8]))
-    found = am.recognize(am.Tracks.from_dense(t, places), bonds)
+    found = am.name_tracks(am.Tracks.from_dense(t, places), bonds)
     assert sorted(found.markers) == [-1, *range(8)]
     assert found.markers[2] == 2 or found.markers[8] == 2
     assert found.tracks.n_tracks == 9
@@ -275,7 +275,7 @@ def test_names_are_as_probable_as_among_all_ways_of_naming(seed):
     weights = np.exp(0.25 * (score - score.max()))
     best = np.array(ways[int(np.argmax(score))])
     probable = (np.array(ways) == best).T @ weights / weights.sum()
-    found = am.recognize(take, bonds)
+    found = am.name_tracks(take, bonds)
     np.testing.assert_array_equal(found.markers, best)
     np.testing.assert_allclose(found.probabilities, probable, atol=2e-3)
 
@@ -289,7 +289,7 @@ def test_a_body_may_be_elsewhere_in_the_next_take():
     kept = {n: getattr(learnt, n)[inside] for n in ("pairs", "distances", "spreads", "frames")}
     bonds = dataclasses.replace(learnt, **kept)
     take = am.Tracks.from_dense(t, np.concatenate([body, stick + np.array([3, 0, 0])], axis=1))
-    np.testing.assert_array_equal(am.recognize(take, bonds).markers, np.arange(11))
+    np.testing.assert_array_equal(am.name_tracks(take, bonds).markers, np.arange(11))
 
 
 def test_who_comes_when_a_marker_has_gone_is_not_yet_that_marker():
@@ -298,7 +298,7 @@ def test_who_comes_when_a_marker_has_gone_is_not_yet_that_marker():
     bonds = am.learn_bonds(am.Tracks.from_dense(t, places[:, :6]))
     places[:, 6] = 1 + np.cumsum(rng.normal(scale=0.02, size=(len(t), 3)), axis=0)
     places[60:, 5] = places[:60, 6] = np.nan
-    found = am.recognize(am.Tracks.from_dense(t, places), bonds)
+    found = am.name_tracks(am.Tracks.from_dense(t, places), bonds)
     np.testing.assert_array_equal(found.markers, [0, 1, 2, 3, 4, 5, -1])
 
 

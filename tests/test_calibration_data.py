@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asterism.app import main
-from asterism.app.camera_info import meeting_point
-from asterism.io.calibration import CALIBRATIONS, read_rig, write_rig
-from asterism.io.calibration.fitting import fit_to_format
+from asterism.cli import main
+from asterism.io.calibrations import CALIBRATION_FORMATS, read_rig, write_rig
+from asterism.io.calibrations.fitting import fit_to_format
+from asterism.multiview.rig_info import meeting_point
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 pytestmark = [
@@ -91,10 +91,10 @@ def test_a_laboratory_is_above_its_floor_and_no_mirror_of_itself(path, n, height
 
 
 @pytest.mark.parametrize("source", [FLYDRA, MYPTV, VICON, QUALISYS], ids=lambda p: p.name)
-@pytest.mark.parametrize("format", CALIBRATIONS)
+@pytest.mark.parametrize("format", CALIBRATION_FORMATS)
 def test_real_rigs_go_through_every_format(tmp_path, source, format):
     rig = read_rig(source)[:2]
-    form = CALIBRATIONS[format]
+    form = CALIBRATION_FORMATS[format]
     fits = [fit_to_format(camera, form) for camera in rig]
     cameras = tuple(c if f is None else f.camera for c, f in zip(rig, fits, strict=True))
     path = tmp_path / f"a{(form.extensions or ('',))[0]}"

@@ -12,12 +12,12 @@ from asterism.camera import (
     Rig,
 )
 from asterism.errors import FormatError, ParameterError
-from asterism.io.calibration import CALIBRATIONS, read_rig, write_rig
+from asterism.io.calibrations import CALIBRATION_FORMATS, read_rig, write_rig
 from calibration_rigs import LENSES, NAMES, rig_for, same_pixels
 
 
 def test_every_format_is_tried_here():
-    assert set(NAMES) == set(CALIBRATIONS)
+    assert set(NAMES) == set(CALIBRATION_FORMATS)
 
 
 @pytest.mark.parametrize("format", NAMES)

@@ -15,7 +15,7 @@ from asterism.camera import (
     ViconRadial,
 )
 from asterism.errors import FormatError
-from asterism.io.calibration import read_rig, write_rig
+from asterism.io.calibrations import read_rig, write_rig
 from calibration_rigs import LENSES, rig_for
 
 BOMB = "<!DOCTYPE l [<!ENTITY a0 'ha'>" + "".join(

@@ -13,7 +13,7 @@ from asterism.camera import (
     Rig,
 )
 from asterism.errors import FormatError
-from asterism.io.calibration import read_rig, write_rig
+from asterism.io.calibrations import read_rig, write_rig
 from calibration_rigs import rig_for, target_points
 
 

@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import asterism as am
-from asterism.app import main
+from asterism.cli import main
 from asterism.errors import FormatError
-from asterism.io.calibration.files import format_of
+from asterism.io.calibrations.files import format_of
 from calibration_rigs import rig_for, same_pixels, target_points
 
 
@@ -114,13 +114,13 @@ def test_what_is_wrong_is_told_by_its_camera(tmp_path, old, new, says):
 
 
 def test_there_and_back_keeps_numbers_and_names(tmp_path):
-    am.write_rig(numbered(), tmp_path / "a.toml", format="caliscope")
+    am.io.write_rig(numbered(), tmp_path / "a.toml", format="caliscope")
     assert format_of(tmp_path / "a.toml").name == "caliscope"
     assert "[cameras.3]" in (tmp_path / "a.toml").read_text()
     assert am.read_rig(tmp_path / "a.toml").names == ("cam_0", "cam_3", "cam_7")
     same_pixels(numbered(), am.read_rig(tmp_path / "a.toml"))
     mixed = am.Rig(tuple(c.replace(name=n) for c, n in zip(numbered(), "xyz", strict=True)))
-    am.write_rig(mixed, tmp_path / "b.toml", format="caliscope")
+    am.io.write_rig(mixed, tmp_path / "b.toml", format="caliscope")
     assert "[cameras.2]" in (tmp_path / "b.toml").read_text()
     assert am.read_rig(tmp_path / "b.toml").names == ("x", "y", "z")
 
@@ -155,7 +155,7 @@ def test_image_points(tmp_path, camera, caplog):
     rig = numbered()
     path = tmp_path / "xy_CHARUCO.csv"
     path.write_text(xy(rig, camera=camera))
-    seen = am.read_observations(path)
+    seen = am.io.read_observations(path)
     assert seen.cameras == rig.names
     np.testing.assert_allclose(seen.times, 7 + np.arange(40, 46) / 50 + 0.001)
     assert set(seen.markers) == {0, 10, 20, 30, 40}
@@ -165,8 +165,8 @@ def test_image_points(tmp_path, camera, caplog):
             kept = [k for k in range(5) if (t + 40 + c + k) % 7]
             np.testing.assert_array_equal(seen.points(t, c), cam.project(body).pixels[kept])
     # There and back by the format in which image points are written.
-    am.write_observations(seen, tmp_path / "o.csv")
-    again = am.read_observations(tmp_path / "o.csv")
+    am.io.write_observations(seen, tmp_path / "o.csv")
+    again = am.io.read_observations(tmp_path / "o.csv")
     np.testing.assert_array_equal(again.pixels, seen.pixels)
     np.testing.assert_array_equal(again.times, seen.times)
     np.testing.assert_array_equal(again.markers, seen.markers)
@@ -177,7 +177,7 @@ def test_image_points(tmp_path, camera, caplog):
 def test_image_points_without_times_count_frames(tmp_path, caplog):
     path = tmp_path / "xy.csv"
     path.write_text(xy(numbered(), time=False, board=False))
-    np.testing.assert_array_equal(am.read_observations(path).times, np.arange(40, 46))
+    np.testing.assert_array_equal(am.io.read_observations(path).times, np.arange(40, 46))
     assert caplog.messages == [f"{path}: no frame_time is given: times count frames, one a second"]
 
 
@@ -197,7 +197,7 @@ def test_wrong_rows_are_told_by_their_line(tmp_path, old, new, says):
     path = tmp_path / "xy.csv"
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(FormatError, match=says):
-        am.read_observations(path)
+        am.io.read_observations(path)
 
 
 def test_the_command_line_reconstructs_from_both(tmp_path, monkeypatch, capsys):

@@ -10,7 +10,7 @@ import pytest
 import asterism as am
 from camera_oracle import random_pose
 
-K = am.intrinsics(focal_length=800.0, principal_point=(639.5, 511.5))
+K = am.camera.intrinsics(focal_length=800.0, principal_point=(639.5, 511.5))
 SIZE = (1280, 1024)
 
 
@@ -20,19 +20,19 @@ def camera(**changes):
 
 
 REASONS = [
-    ((0, 0, 1), am.Reason.VISIBLE, "on the axis"),
-    ((np.nan, 0, 1), am.Reason.ABSENT, "one coordinate missing"),
-    ((np.nan, np.nan, np.nan), am.Reason.ABSENT, "all missing"),
-    ((np.inf, 0, 1), am.Reason.ABSENT, "nowhere"),
-    ((0, -4.5, 1), am.Reason.BEHIND, "behind"),
-    ((0, -4, 1), am.Reason.BEHIND, "at the optical centre"),
-    ((0, -4, 3), am.Reason.BEHIND, "in the plane of the camera"),
-    ((0, -3.6, 1), am.Reason.NEAR, "nearer than 0.5 m"),
-    ((5, -3.6, 1), am.Reason.NEAR, "near comes before outside"),
-    ((0, 5, 1), am.Reason.FAR, "farther than 8 m"),
-    ((0, 5, 99), am.Reason.FAR, "far comes before outside"),
-    ((3.5, 0, 1), am.Reason.OUTSIDE, "right of the image"),
-    ((0, 0, 4), am.Reason.OUTSIDE, "above it"),
+    ((0, 0, 1), am.camera.Reason.VISIBLE, "on the axis"),
+    ((np.nan, 0, 1), am.camera.Reason.ABSENT, "one coordinate missing"),
+    ((np.nan, np.nan, np.nan), am.camera.Reason.ABSENT, "all missing"),
+    ((np.inf, 0, 1), am.camera.Reason.ABSENT, "nowhere"),
+    ((0, -4.5, 1), am.camera.Reason.BEHIND, "behind"),
+    ((0, -4, 1), am.camera.Reason.BEHIND, "at the optical centre"),
+    ((0, -4, 3), am.camera.Reason.BEHIND, "in the plane of the camera"),
+    ((0, -3.6, 1), am.camera.Reason.NEAR, "nearer than 0.5 m"),
+    ((5, -3.6, 1), am.camera.Reason.NEAR, "near comes before outside"),
+    ((0, 5, 1), am.camera.Reason.FAR, "farther than 8 m"),
+    ((0, 5, 99), am.camera.Reason.FAR, "far comes before outside"),
+    ((3.5, 0, 1), am.camera.Reason.OUTSIDE, "right of the image"),
+    ((0, 0, 4), am.camera.Reason.OUTSIDE, "above it"),
 ]
 
 
@@ -40,16 +40,16 @@ REASONS = [
 def test_reasons(point, reason, why):
     projection = camera(near=0.5, far=8.0).project(point)
     assert projection.reason == reason
-    assert projection.visible == (reason == am.Reason.VISIBLE)
+    assert projection.visible == (reason == am.camera.Reason.VISIBLE)
     assert projection.hidden_by == -1
-    has_pixel = reason not in (am.Reason.ABSENT, am.Reason.BEHIND)
+    has_pixel = reason not in (am.camera.Reason.ABSENT, am.camera.Reason.BEHIND)
     assert np.isfinite(projection.pixels).all() == has_pixel
 
 
 def test_beyond_the_lens_is_a_reason_of_its_own():
-    projection = camera(lens=am.BrownConrady(k1=-0.3)).project([[1, 0, 1], [6, 0, 1]])
-    assert projection.reason.tolist() == [am.Reason.VISIBLE, am.Reason.LENS]
-    assert projection.counts()[am.Reason.LENS] == 1
+    projection = camera(lens=am.camera.BrownConrady(k1=-0.3)).project([[1, 0, 1], [6, 0, 1]])
+    assert projection.reason.tolist() == [am.camera.Reason.VISIBLE, am.camera.Reason.LENS]
+    assert projection.counts()[am.camera.Reason.LENS] == 1
 
 
 def test_the_image_ends_half_a_pixel_beyond_the_outer_centres():
@@ -87,22 +87,22 @@ def test_moving_everything_changes_nothing(seed):
     rng = np.random.default_rng(seed)
     M = random_pose(rng)
     points = rng.normal(size=(200, 3)) * 2
-    lens = am.BrownConrady(k1=-0.2, k2=0.03, p1=0.002)
+    lens = am.camera.BrownConrady(k1=-0.2, k2=0.03, p1=0.002)
     one = camera(lens=lens)
     moved = one.replace(T_camera_world=one.T_camera_world @ np.linalg.inv(M))
     surfaces = [
-        am.Polygon(corners=rng.normal(size=(3, 3))),
-        am.Capsule(ends=rng.normal(size=(2, 3)), radius=0.3),
+        am.camera.Polygon(corners=rng.normal(size=(3, 3))),
+        am.camera.Capsule(ends=rng.normal(size=(2, 3)), radius=0.3),
     ]
     there = [
-        am.Polygon(corners=surfaces[0].corners[0] @ M[:3, :3].T + M[:3, 3]),
-        am.Capsule(ends=surfaces[1].ends[0] @ M[:3, :3].T + M[:3, 3], radius=0.3),
+        am.camera.Polygon(corners=surfaces[0].corners[0] @ M[:3, :3].T + M[:3, 3]),
+        am.camera.Capsule(ends=surfaces[1].ends[0] @ M[:3, :3].T + M[:3, 3], radius=0.3),
     ]
     a = one.project(points, surfaces)
     b = moved.project(points @ M[:3, :3].T + M[:3, 3], there)
     np.testing.assert_array_equal(a.reason, b.reason)
     np.testing.assert_array_equal(a.hidden_by, b.hidden_by)
-    assert (a.reason == am.Reason.HIDDEN).any()
+    assert (a.reason == am.camera.Reason.HIDDEN).any()
     np.testing.assert_allclose(a.pixels, b.pixels, atol=1e-8)
 
 
@@ -110,15 +110,15 @@ def test_moving_everything_changes_nothing(seed):
     "lens",
     [
         None,
-        am.BrownConrady(k1=-0.2, k2=0.05, p1=0.003, p2=-0.004),
-        am.ReportRadial(a1=0.2, a2=0.1),
-        am.ViconRadial(k1=3e-8),
-        am.QuadraticCorrection(ex=(0.01, 0.02, 0.03, 0, 0.01), ey=(0, 0, 0.02, 0.01, 0)),
+        am.camera.BrownConrady(k1=-0.2, k2=0.05, p1=0.003, p2=-0.004),
+        am.camera.ReportRadial(a1=0.2, a2=0.1),
+        am.camera.ViconRadial(k1=3e-8),
+        am.camera.QuadraticCorrection(ex=(0.01, 0.02, 0.03, 0, 0.01), ey=(0, 0, 0.02, 0.01, 0)),
     ],
     ids=repr,
 )
 @pytest.mark.parametrize(
-    "K_lens", [None, am.intrinsics(focal_length=700.0, principal_point=(600, 500))]
+    "K_lens", [None, am.camera.intrinsics(focal_length=700.0, principal_point=(600, 500))]
 )
 def test_jacobian_equals_differences(lens, K_lens):
     c = camera(lens=lens, K_lens=K_lens)
@@ -148,7 +148,7 @@ def test_a_projection_matrix_comes_apart(seed):
 def test_coverage_of_two_cameras_at_right_angles():
     # At depth z one camera tells two coordinates to sigma z / f: the third comes from the other.
     f, z, sigma = 1000.0, 4.0, 0.5
-    K = am.intrinsics(focal_length=f, principal_point=(639.5, 511.5))
+    K = am.camera.intrinsics(focal_length=f, principal_point=(639.5, 511.5))
     rig = am.Rig(
         (
             am.Camera.look_at((0, -z, 0), (0, 0, 0), K=K, size_px=SIZE),
@@ -194,7 +194,7 @@ def test_one_line_has_no_depth():
 
 def test_coverage_is_lost_behind_a_wall():
     rig = am.Rig.ring(8, radius=4, height=2)
-    wall = am.Polygon(corners=[[1, -9, -9], [1, 9, -9], [1, 9, 9], [1, -9, 9]])
+    wall = am.camera.Polygon(corners=[[1, -9, -9], [1, 9, -9], [1, 9, 9], [1, -9, 9]])
     place = [0.0, 0.0, 1.0]
     assert rig.coverage(place).n_cameras == 8
     assert rig.coverage(place, [wall]).n_cameras == 5  # three of the eight stand beyond x = 1
@@ -261,9 +261,9 @@ BAD = [
     (lambda: am.Camera.look_at((0, 0, 1), (0, 0, 0), K=K, size_px=SIZE), "up"),
     (lambda: am.Camera.from_matrix(np.ones((3, 4)), size_px=SIZE), "P"),
     (lambda: am.Camera.from_matrix(np.full((3, 4), np.nan), size_px=SIZE), "P"),
-    (lambda: am.intrinsics(focal_length=0, principal_point=(1, 1)), "focal_length"),
+    (lambda: am.camera.intrinsics(focal_length=0, principal_point=(1, 1)), "focal_length"),
     (
-        lambda: am.intrinsics(focal_length=1, principal_point=(1, 1), pixels_per_metre=0),
+        lambda: am.camera.intrinsics(focal_length=1, principal_point=(1, 1), pixels_per_metre=0),
         "pixels_per",
     ),
     (lambda: am.Rig(()), "at least one"),
@@ -272,8 +272,8 @@ BAD = [
     (lambda: am.Rig((good(name="a"),))["b"], "expected a, found"),
     (lambda: am.Rig.ring(0, radius=1, height=1), "n:"),
     (lambda: am.Rig.ring(3, radius=0, height=1), "radius"),
-    (lambda: am.volume_grid((0, 0, 0), (1, 1, -1), 0.1), "high"),
-    (lambda: am.volume_grid((0, 0, 0), (1, 1, 1), 1e-5), "spacing"),
+    (lambda: am.camera.volume_grid((0, 0, 0), (1, 1, -1), 0.1), "high"),
+    (lambda: am.camera.volume_grid((0, 0, 0), (1, 1, 1), 1e-5), "spacing"),
     (lambda: am.Rig.ring(3, radius=1, height=1).coverage([0, 0, 0], sigma_px=0), "sigma_px"),
 ]
 
@@ -299,13 +299,16 @@ def test_the_optical_centre_is_never_seen():
     for _ in range(500):
         place, target = rng.normal(size=(2, 3)) * rng.choice([0.1, 1.0, 1000.0])
         c = am.Camera.look_at(place, target, K=K, size_px=SIZE, up=rng.normal(size=3))
-        assert c.project(c.center).reason == am.Reason.BEHIND
+        assert c.project(c.center).reason == am.camera.Reason.BEHIND
         assert c.project(c.center + 1e-3 * c.axis).visible
 
 
 def test_masked_points_are_absent_and_ragged_ones_refused():
     points = np.ma.array([[0.0, 0, 1], [9999.0] * 3], mask=[[0] * 3, [1] * 3])
-    assert camera().project(points).reason.tolist() == [am.Reason.VISIBLE, am.Reason.ABSENT]
+    assert camera().project(points).reason.tolist() == [
+        am.camera.Reason.VISIBLE,
+        am.camera.Reason.ABSENT,
+    ]
     with pytest.raises(am.ParameterError, match="points"):
         camera().project([[0, 0, 1], [0, 0]])
 
@@ -314,7 +317,7 @@ def test_rigs_are_pickled_and_copied_before_and_after_their_first_use():
     import copy
     import pickle
 
-    rig = am.Rig.ring(3, radius=3, height=2, lens=am.BrownConrady(k1=-0.1))
+    rig = am.Rig.ring(3, radius=3, height=2, lens=am.camera.BrownConrady(k1=-0.1))
     points = np.random.default_rng(0).normal(size=(20, 3))
     expected = rig.project(points).pixels
     rig[0].depth_image([])

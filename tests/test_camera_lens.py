@@ -12,25 +12,27 @@ import asterism as am
 from camera_oracle import matrix_product, random_pose, report_radial
 
 SIZE = (1280, 1024)
-K = am.intrinsics(focal_length=900.0, principal_point=(630.0, 500.0))
+K = am.camera.intrinsics(focal_length=900.0, principal_point=(630.0, 500.0))
 
 # Mild, strong, both signs, folding inside and outside the image, and what never folds.
 LENSES = [
     None,
-    am.BrownConrady(k1=-0.05, k2=0.01),
-    am.BrownConrady(k1=-0.4, k2=0.15, p1=0.003, p2=-0.002, k3=0.02),
-    am.BrownConrady(k1=-0.35),
-    am.BrownConrady(k1=0.4, k2=0.2),
-    am.BrownConrady(p1=0.05, p2=-0.03),
-    am.ReportRadial(a1=0.4, a2=0.2),
-    am.ReportRadial(a1=2.0),
-    am.ReportRadial(a1=-0.3),
-    am.ReportRadial(a1=-0.2, a2=-0.1),
-    am.ReportRadial(a1=-0.5, a2=0.4),
-    am.ViconRadial(k1=3.5e-8, k2=-2e-14),
-    am.ViconRadial(k1=-2e-7, k2=1e-14, k3=1e-20),
-    am.QuadraticCorrection(ex=(0.01, 0.02, 0.03, -0.02, 0.01), ey=(-0.01, 0.0, 0.05, 0.03, 0.02)),
-    am.QuadraticCorrection(ex=(0.0, 0.0, 0.9, 0.1, 0.2), ey=(0.0, 0.0, 0.0, 0.6, -0.1)),
+    am.camera.BrownConrady(k1=-0.05, k2=0.01),
+    am.camera.BrownConrady(k1=-0.4, k2=0.15, p1=0.003, p2=-0.002, k3=0.02),
+    am.camera.BrownConrady(k1=-0.35),
+    am.camera.BrownConrady(k1=0.4, k2=0.2),
+    am.camera.BrownConrady(p1=0.05, p2=-0.03),
+    am.camera.ReportRadial(a1=0.4, a2=0.2),
+    am.camera.ReportRadial(a1=2.0),
+    am.camera.ReportRadial(a1=-0.3),
+    am.camera.ReportRadial(a1=-0.2, a2=-0.1),
+    am.camera.ReportRadial(a1=-0.5, a2=0.4),
+    am.camera.ViconRadial(k1=3.5e-8, k2=-2e-14),
+    am.camera.ViconRadial(k1=-2e-7, k2=1e-14, k3=1e-20),
+    am.camera.QuadraticCorrection(
+        ex=(0.01, 0.02, 0.03, -0.02, 0.01), ey=(-0.01, 0.0, 0.05, 0.03, 0.02)
+    ),
+    am.camera.QuadraticCorrection(ex=(0.0, 0.0, 0.9, 0.1, 0.2), ey=(0.0, 0.0, 0.0, 0.6, -0.1)),
 ]
 
 
@@ -79,10 +81,10 @@ coefficient = st.floats(-2, 2)
 @settings(max_examples=150, deadline=None)
 @given(
     lens=st.one_of(
-        st.builds(am.BrownConrady, coefficient, coefficient, st.floats(-0.2, 0.2),
+        st.builds(am.camera.BrownConrady, coefficient, coefficient, st.floats(-0.2, 0.2),
                   st.floats(-0.2, 0.2), coefficient),
-        st.builds(am.ReportRadial, coefficient, coefficient),
-        st.builds(am.ViconRadial, st.floats(-1e-6, 1e-6), st.floats(-1e-12, 1e-12)),
+        st.builds(am.camera.ReportRadial, coefficient, coefficient),
+        st.builds(am.camera.ViconRadial, st.floats(-1e-6, 1e-6), st.floats(-1e-12, 1e-12)),
     ),
     seed=st.integers(0, 2**32 - 1),
 )  # fmt: skip
@@ -96,7 +98,7 @@ def test_no_lens_folds_points_into_the_image(lens, seed):
     seen = projection.visible
     back = camera.undistort(projection.pixels[seen])
     np.testing.assert_allclose(back, x[seen], rtol=1e-7, atol=1e-9)
-    lost = projection.reason == am.Reason.LENS
+    lost = projection.reason == am.camera.Reason.LENS
     assert np.isnan(projection.pixels[lost]).all()
 
 
@@ -106,7 +108,7 @@ def test_matrix_product_of_the_report_with_skew(seed):
     f, ku, kv, s, u0, v0 = rng.uniform(
         [0.004, 8e4, 8e4, -900, 300, 200], [0.03, 2e5, 2e5, 900, 900, 800]
     )
-    built = am.intrinsics(
+    built = am.camera.intrinsics(
         focal_length=f, pixels_per_metre=(ku, kv), skew=s, principal_point=(u0, v0)
     )
     K_report = np.array([[ku, s, u0], [0, kv, v0], [0, 0, 1]])
@@ -127,7 +129,7 @@ def test_matrix_product_of_the_report_with_skew(seed):
 @pytest.mark.parametrize("seed", range(8))
 def test_brown_conrady_equals_opencv(seed):
     rng = np.random.default_rng(seed)
-    lens = am.BrownConrady(
+    lens = am.camera.BrownConrady(
         *rng.uniform([-0.3, -0.1, -0.01, -0.01, -0.02], [0.3, 0.2, 0.01, 0.01, 0.05])
     )
     T = random_pose(rng)
@@ -141,7 +143,9 @@ def test_brown_conrady_equals_opencv(seed):
     np.testing.assert_allclose(camera.project(points).pixels, theirs, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("lens", [x for x in LENSES if isinstance(x, am.ReportRadial)], ids=repr)
+@pytest.mark.parametrize(
+    "lens", [x for x in LENSES if isinstance(x, am.camera.ReportRadial)], ids=repr
+)
 def test_report_radial_equals_bisection(lens):
     camera = camera_of(lens)
     x = np.random.default_rng(3).uniform(-1.5, 1.5, (400, 2))
@@ -151,7 +155,7 @@ def test_report_radial_equals_bisection(lens):
 
 
 def test_vicon_radial_works_on_pixels_about_the_principal_point():
-    lens = am.ViconRadial(k1=3e-8, k2=-1e-14)
+    lens = am.camera.ViconRadial(k1=3e-8, k2=-1e-14)
     camera = camera_of(lens, K=np.array([[900.0, 0, 630], [0, 850, 500], [0, 0, 1]]))
     measured = np.array([[1200.0, 30.0], [10.0, 900.0]])
     offset = measured - [630, 500]
@@ -163,7 +167,7 @@ def test_vicon_radial_works_on_pixels_about_the_principal_point():
 
 def test_quadratic_correction_of_raw_pixels():
     ex, ey = (0.0036, -0.002, -3.8e-6, -7.9e-7, 2.4e-6), (0.0003, -3e-6, -3.9e-8, 2.4e-6, -2.4e-6)
-    camera = camera_of(am.QuadraticCorrection(ex=ex, ey=ey), K_lens=np.eye(3))
+    camera = camera_of(am.camera.QuadraticCorrection(ex=ex, ey=ey), K_lens=np.eye(3))
     u, v = 1000.0, 200.0
     terms = np.array([u, v, u * u, v * v, u * v])
     ideal = np.array([u + terms @ ex, v + terms @ ey, 1.0])
@@ -172,8 +176,8 @@ def test_quadratic_correction_of_raw_pixels():
 
 
 def test_a_lens_in_coordinates_of_its_own():
-    K_lens = am.intrinsics(focal_length=800.0, principal_point=(600.0, 520.0))
-    lens = am.BrownConrady(k1=-0.2, k2=0.05, p1=0.001)
+    K_lens = am.camera.intrinsics(focal_length=800.0, principal_point=(600.0, 520.0))
+    lens = am.camera.BrownConrady(k1=-0.2, k2=0.05, p1=0.001)
     camera = camera_of(lens, K_lens=K_lens)
     x = np.array([0.3, -0.2])
     ideal = K @ [*x, 1.0]
@@ -187,7 +191,7 @@ def test_a_lens_in_coordinates_of_its_own():
 @pytest.mark.parametrize("seed", range(20))
 def test_the_domain_is_where_the_derivative_stretches(seed):
     rng = np.random.default_rng(seed)
-    lens = am.BrownConrady(*rng.normal(size=5) * [0.5, 0.3, 0.1, 0.1, 0.2])
+    lens = am.camera.BrownConrady(*rng.normal(size=5) * [0.5, 0.3, 0.1, 0.1, 0.2])
     camera = am.Camera(
         K=np.eye(3) + [[0] * 3] * 3, T_camera_world=np.eye(4), size_px=(9, 9), lens=lens
     )
@@ -214,17 +218,23 @@ def test_barrel_and_pincushion_have_their_signs():
     straight = camera_of(None).distort(corner)
     centre = K[:2, 2]
     for lens, is_barrel in (
-        (am.ReportRadial(a1=0.2), True),
-        (am.ReportRadial(a1=-0.2), False),
-        (am.BrownConrady(k1=-0.2), True),
-        (am.BrownConrady(k1=0.2), False),
-        (am.ViconRadial(k1=2e-7), True),
+        (am.camera.ReportRadial(a1=0.2), True),
+        (am.camera.ReportRadial(a1=-0.2), False),
+        (am.camera.BrownConrady(k1=-0.2), True),
+        (am.camera.BrownConrady(k1=0.2), False),
+        (am.camera.ViconRadial(k1=2e-7), True),
     ):
         bent = camera_of(lens).distort(corner)
         assert (np.linalg.norm(bent - centre) < np.linalg.norm(straight - centre)) == is_barrel
 
 
-KINDS = [am.BrownConrady, am.ReportRadial, am.ViconRadial, am.QuadraticCorrection, None]
+KINDS = [
+    am.camera.BrownConrady,
+    am.camera.ReportRadial,
+    am.camera.ViconRadial,
+    am.camera.QuadraticCorrection,
+    None,
+]
 
 
 def away(old, new):
@@ -240,49 +250,51 @@ def away(old, new):
 @pytest.mark.parametrize("lens", LENSES[1:], ids=repr)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_changed_lens_tells_what_it_leaves_over(lens, kind):
-    K_lens = np.eye(3) if kind is am.QuadraticCorrection and type(lens) is kind else None
+    K_lens = np.eye(3) if kind is am.camera.QuadraticCorrection and type(lens) is kind else None
     if K_lens is not None:  # a correction of raw pixels, as the fitted one is
-        lens = am.QuadraticCorrection(
+        lens = am.camera.QuadraticCorrection(
             ex=(0.0036, -0.002, -3.8e-6, -7.9e-7, 2.4e-6), ey=(0.0003, -3e-6, 0, 2.4e-6, -2.4e-6)
         )
     camera = camera_of(lens, K_lens=K_lens)
-    fit = am.fit_lens(camera, kind)
+    fit = am.camera.fit_lens(camera, kind)
     met = away(camera, fit.camera)
     assert type(fit.camera.lens) is (kind or type(None))
     assert np.sqrt(np.mean(met**2)) == pytest.approx(fit.rms_px, rel=0.1, abs=1e-6)
     assert met.max() <= 1.25 * fit.max_px + 1e-6
-    if kind is not am.QuadraticCorrection:  # no fit is worse than no lens at all
-        assert fit.rms_px <= 1.001 * am.fit_lens(camera, None).rms_px
+    if kind is not am.camera.QuadraticCorrection:  # no fit is worse than no lens at all
+        assert fit.rms_px <= 1.001 * am.camera.fit_lens(camera, None).rms_px
     if type(lens) is kind:
         assert fit.max_px < 1e-6
 
 
 def test_coefficients_can_be_left_out():
     camera = camera_of(
-        am.BrownConrady(k1=-0.2, k2=0.05, k3=0.02, p1=0.002),
+        am.camera.BrownConrady(k1=-0.2, k2=0.05, k3=0.02, p1=0.002),
         K=K + np.array([[0, 4.0, 0], [0] * 3, [0] * 3]),
     )
-    fit = am.fit_lens(camera, am.BrownConrady, refit_camera=True, without=("k3", "skew", "p2"))
+    fit = am.camera.fit_lens(
+        camera, am.camera.BrownConrady, refit_camera=True, without=("k3", "skew", "p2")
+    )
     assert fit.camera.lens.k3 == fit.camera.lens.p2 == fit.camera.K[0, 1] == 0
     assert fit.camera.lens.k1 != 0
     assert away(camera, fit.camera).max() <= 1.1 * fit.max_px
 
 
 def test_a_mild_lens_is_converted_well_and_a_sign_flip_is_not_enough():
-    camera = camera_of(am.ReportRadial(a1=0.1, a2=0.02))
-    fit = am.fit_lens(camera, am.BrownConrady)
+    camera = camera_of(am.camera.ReportRadial(a1=0.1, a2=0.02))
+    fit = am.camera.fit_lens(camera, am.camera.BrownConrady)
     assert fit.max_px < 0.05
-    flipped = camera.replace(lens=am.BrownConrady(k1=-0.1, k2=-0.02))
+    flipped = camera.replace(lens=am.camera.BrownConrady(k1=-0.1, k2=-0.02))
     off = np.linalg.norm(flipped.distort(camera.undistort(whole_image())) - whole_image(), axis=-1)
     assert off.max() > 5.0
 
 
 def test_a_lens_apart_is_taken_into_the_camera():
-    K_lens = am.intrinsics(focal_length=880.0, principal_point=(640.0, 510.0))
-    camera = camera_of(am.BrownConrady(k1=-0.15, k2=0.03), K_lens=K_lens)
+    K_lens = am.camera.intrinsics(focal_length=880.0, principal_point=(640.0, 510.0))
+    camera = camera_of(am.camera.BrownConrady(k1=-0.15, k2=0.03), K_lens=K_lens)
     fixed, free = (
-        am.fit_lens(camera, am.BrownConrady),
-        am.fit_lens(camera, am.BrownConrady, refit_camera=True),
+        am.camera.fit_lens(camera, am.camera.BrownConrady),
+        am.camera.fit_lens(camera, am.camera.BrownConrady, refit_camera=True),
     )
     assert free.rms_px < 0.9 * fixed.rms_px
     assert free.camera.K_lens is None
@@ -295,14 +307,25 @@ def test_a_lens_apart_is_taken_into_the_camera():
 @pytest.mark.parametrize(
     ("make", "word"),
     [
-        (lambda: am.BrownConrady(k1=np.nan), "k1"),
-        (lambda: am.ReportRadial(a1="0.1"), "a1"),
-        (lambda: am.ViconRadial(k2=np.inf), "k2"),
-        (lambda: am.QuadraticCorrection(ex=(0, 0, 0, 0), ey=(0, 0, 0, 0, 0)), "ex"),
-        (lambda: camera_of(am.QuadraticCorrection(ex=(-2, 0, 0, 0, 0), ey=(0,) * 5)), "lens"),
-        (lambda: am.fit_lens(camera_of(None), am.Lens), "kind"),
-        (lambda: am.fit_lens(camera_of(None), am.BrownConrady, without=("k9",)), "without"),
-        (lambda: am.fit_lens(camera_of(am.BrownConrady(k1=-1e4)), am.ViconRadial), "reaches"),
+        (lambda: am.camera.BrownConrady(k1=np.nan), "k1"),
+        (lambda: am.camera.ReportRadial(a1="0.1"), "a1"),
+        (lambda: am.camera.ViconRadial(k2=np.inf), "k2"),
+        (lambda: am.camera.QuadraticCorrection(ex=(0, 0, 0, 0), ey=(0, 0, 0, 0, 0)), "ex"),
+        (
+            lambda: camera_of(am.camera.QuadraticCorrection(ex=(-2, 0, 0, 0, 0), ey=(0,) * 5)),
+            "lens",
+        ),
+        (lambda: am.camera.fit_lens(camera_of(None), am.camera.Lens), "kind"),
+        (
+            lambda: am.camera.fit_lens(camera_of(None), am.camera.BrownConrady, without=("k9",)),
+            "without",
+        ),
+        (
+            lambda: am.camera.fit_lens(
+                camera_of(am.camera.BrownConrady(k1=-1e4)), am.camera.ViconRadial
+            ),
+            "reaches",
+        ),
     ],
 )
 def test_bad_lenses(make, word):
@@ -311,7 +334,9 @@ def test_bad_lenses(make, word):
 
 
 def test_a_fold_is_refused_at_the_centre_of_the_image_and_nowhere_else():
-    lens = am.QuadraticCorrection(ex=(0, 0, 0, 0, 0), ey=(0, 0, 0, 800 / 900, 0))  # 450 px up
+    lens = am.camera.QuadraticCorrection(
+        ex=(0, 0, 0, 0, 0), ey=(0, 0, 0, 800 / 900, 0)
+    )  # 450 px up
     upright = [[800, 0, 639.5], [0, 800, 511.5], [0, 0, 1]]
     camera = am.Camera(K=upright, T_camera_world=np.eye(4), size_px=(1280, 1024), lens=lens)
     top, middle = camera.rays([[639.5, 0.0], [639.5, 511.5]])

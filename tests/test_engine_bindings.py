@@ -20,7 +20,7 @@ def rig():
 
 def test_a_moment_that_moving_surfaces_do_not_have_is_refused():
     corners = np.array([[-1.0, -1, 1], [1, -1, 1], [1, 1, 1]])
-    moving = am.Polygon(corners=np.stack([corners, corners + 0.1]))
+    moving = am.camera.Polygon(corners=np.stack([corners, corners + 0.1]))
     surfaces = compile_surfaces([moving], 2)
     camera = rig().cameras[0].engine
     grid = _engine.RayGrid(camera)

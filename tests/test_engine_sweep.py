@@ -62,8 +62,8 @@ def piece(name: str) -> tuple[am.Detections, am.TrackingModel]:
         found = sorted(DATA.rglob(file))
         if not found:
             pytest.skip(f"no {file} in {DATA}")
-        truth = am.simulate.sense(am.read(found[0]).tracks, stride=stride)
-    d = am.simulate.sense(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1).detections
+        truth = am.simulate.corrupt(am.read(found[0]).tracks, stride=stride)
+    d = am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1).detections
     first, n = d.n_frames // 2, sized(16, 8)
     model = am.estimate_model(d.part(max(first - 60, 0), min(first + 60, d.n_frames))).model
     motion = am.DWNA(

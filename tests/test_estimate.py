@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.associate.clip_misses import Sightings, count_sightings
+from asterism.tracking.estimation.occlusions import Sightings, count_sightings
 from scenes import wanderers
 
 
@@ -136,7 +136,7 @@ def test_misses_in_runs_are_told_from_single_ones():
     seed = 1
     quiet = am.simulate.SCENES["person"].make(activity="walk", frames=160, seed=seed)
     runs = {"missing": 0.15, "missing_run": 4.0, "noise": 3e-4, "clutter": 0.1, "seed": seed}
-    d = am.simulate.sense(quiet, **runs).detections
+    d = am.simulate.corrupt(quiet, **runs).detections
     found = am.estimate_model(d, misses="runs")
     sensor, stds = found.model.sensor, found.stds
     P_d = 1 - 0.15 / 0.85 / 4
@@ -148,7 +148,7 @@ def test_misses_in_runs_are_told_from_single_ones():
     one = am.estimate_model(d).model.sensor
     assert one.p_redetection is None
     assert one.p_detection == pytest.approx(0.85, abs=0.02)
-    single = am.simulate.sense(quiet, **runs | {"missing_run": 0.0}).detections
+    single = am.simulate.corrupt(quiet, **runs | {"missing_run": 0.0}).detections
     found = am.estimate_model(single, misses="runs")
     assert found.model.sensor.p_redetection is None
     assert "no more than by chance" in str(found)

@@ -8,6 +8,7 @@ import pytest
 
 import asterism as am
 from asterism.simulate import Burst, Ghosts
+from scenes import stitched
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 
@@ -16,8 +17,8 @@ DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 def test_of_the_fits_the_one_that_loses_least_is_taken():
     # The last fit sees a sample of the tracks without those that jolt, and loses them: 0.950.
     (source,) = DATA.rglob("mocap36.c3d")
-    truth = am.simulate.sense(
+    truth = am.simulate.corrupt(
         am.read(source).tracks, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1
     )
-    found = am.identify(truth.detections)
+    found = stitched(truth.detections)
     assert am.evaluate(found.tracks, truth).idf1 > 0.97

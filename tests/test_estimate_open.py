@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.associate.clip_rates import Counts, Rates, count
+from asterism.tracking.estimation.rates import Counts, Rates, count
 from chain_oracle import as_partition
 from partition_oracle import every_partition, problem_of_size
 from scenes import wanderers

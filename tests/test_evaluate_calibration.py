@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asterism.errors import ParameterError
-from asterism.evaluate import calibration
+from asterism.metrics import calibration_curve
 
 
 @settings(max_examples=100, deadline=None)
@@ -20,7 +20,7 @@ from asterism.evaluate import calibration
 )
 def test_equal_to_counting(pairs, bins):
     p, right = [c for c, _ in pairs], [r for _, r in pairs]
-    found = calibration(p, np.array(right, dtype=bool), bins)
+    found = calibration_curve(p, np.array(right, dtype=bool), bins)
     ece = 0.0
     for k in range(bins):
         low, high = found.edges[k], found.edges[k + 1]
@@ -45,13 +45,13 @@ def test_honest_confidence_is_calibrated_and_a_boast_is_not():
     p = rng.random(100_000)
     right = rng.random(100_000) < p
     # In each of ten bins the share right has a standard error of at most 0.005.
-    assert calibration(p, right).ece < 0.01
-    assert calibration(np.ones(100_000), right).ece == pytest.approx(0.5, abs=0.01)
-    assert calibration(p, right).auc == pytest.approx(5 / 6, abs=0.01)
+    assert calibration_curve(p, right).ece < 0.01
+    assert calibration_curve(np.ones(100_000), right).ece == pytest.approx(0.5, abs=0.01)
+    assert calibration_curve(p, right).auc == pytest.approx(5 / 6, abs=0.01)
 
 
 def test_reads_as_a_table():
-    text = str(calibration([0.95, 0.9, 0.1], [True, False, False]))
+    text = str(calibration_curve([0.95, 0.9, 0.1], [True, False, False]))
     assert "0.90 to 1.00          2      0.9250   0.5000" in text
     assert text.endswith("AUC 1.0000")
     assert len(text.splitlines()) == 4  # a head, two bins that are used, the summary
@@ -69,4 +69,4 @@ def test_reads_as_a_table():
 )
 def test_what_is_no_confidence_is_refused(p, right, bins, what):
     with pytest.raises(ParameterError, match=what):
-        calibration(p, right, bins)
+        calibration_curve(p, right, bins)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from asterism.evaluate import evaluate, floor
 from asterism.io import read, write
-from asterism.simulate import Burst, Ghosts, sense
+from asterism.metrics import evaluate, floor
+from asterism.simulate import Burst, Ghosts, corrupt
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 CAPTURES = [
@@ -26,7 +26,7 @@ def test_truth_survives_its_file(name, kind, stride, tmp_path):
     path = DATA / name
     if not path.is_file():
         pytest.skip(f"no {path}")
-    truth = sense(
+    truth = corrupt(
         read(path).tracks, missing=0.1, clutter=0.1, noise=3e-4, burst=Burst(), ghosts=Ghosts(),
         stride=stride, seed=1,
     )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from asterism.evaluate import clear_scores, hota_scores, identity_scores
+from asterism.metrics import clear_scores, hota_scores, identity_scores
 
 
 def _case(seed):

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asterism.errors import ParameterError
-from asterism.evaluate import (
+from asterism.metrics import (
     association_scores,
     clear_scores,
     gospa_scores,
@@ -18,7 +18,7 @@ from asterism.evaluate import (
     identity_scores,
     right_links,
 )
-from asterism.evaluate.counts import successions
+from asterism.metrics.counts import successions
 
 
 def _all_scores(labels, truth, frames):

@@ -12,15 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asterism.errors import ParameterError
-from asterism.evaluate import align, evaluate, floor
-from asterism.evaluate.matching import same_detections
+from asterism.metrics import align, evaluate, floor
+from asterism.metrics.matching import same_detections
 from asterism.model import Detections, Tracks
-from asterism.simulate import Burst, cube, sense, smooth
+from asterism.simulate import Burst, corrupt, cube, smooth
 
 
 def _truth(seed=0, **switches):
     truth = smooth(n_markers=8, frames=60, rate=100, seed=seed)
-    return sense(truth, **{"missing": 0.1, "clutter": 0.1, "noise": 0.001, **switches}, seed=seed)
+    return corrupt(truth, **{"missing": 0.1, "clutter": 0.1, "noise": 0.001, **switches}, seed=seed)
 
 
 def _result(truth, seed=0):
@@ -120,7 +120,7 @@ def test_detections_of_one_side_are_missed_or_false():
 
 def test_frames_of_one_side_are_kept_in_the_order_of_time():
     truth = _truth(missing=0.0, clutter=0.0)
-    half = sense(truth, stride=2)
+    half = corrupt(truth, stride=2)
     found = evaluate(half, truth)
     assert len(found.times) == 60
     assert found.missing_percent == 50
@@ -217,7 +217,7 @@ def test_names_of_the_result_do_not_matter():
 
 def test_true_positions_enter_motp():
     exact = smooth(n_markers=8, frames=60, rate=100)
-    truth = sense(exact, noise=0.002, missing=0.1, clutter=0.2, seed=3)
+    truth = corrupt(exact, noise=0.002, missing=0.1, clutter=0.2, seed=3)
     places = np.full(truth.detections.points.shape, np.nan)
     is_true = truth.labels >= 0
     dense = exact.positions()
@@ -276,7 +276,7 @@ def test_alignment_says_which_is_which():
 def test_package_may_be_called():
     # Importing a submodule first must not turn the function into something that cannot be called.
     code = (
-        "import asterism, asterism.evaluate.counts, asterism.simulate as s;"
+        "import asterism, asterism.metrics.counts, asterism.simulate as s;"
         "t = s.cube(frames=3); assert asterism.evaluate(t, t).idf1 == 1"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -314,7 +314,7 @@ def test_floor_of_the_reference_scene():
     def mean(max_gap):
         found = []
         for seed in range(40):
-            truth = sense(cube(seed=seed), missing=0.1, clutter=0.1, noise=0.005, seed=seed)
+            truth = corrupt(cube(seed=seed), missing=0.1, clutter=0.1, noise=0.005, seed=seed)
             scores = evaluate(floor(truth, max_gap), truth)
             found.append([100 * (1 - scores.idp), scores.n_tracks])
         return np.mean(found, axis=0)

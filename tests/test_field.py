@@ -27,7 +27,7 @@ OPTIONS = Namespace(trials=6, budget=20.0, limit=1.0, frames=30, tuning_frames=3
 
 
 def clip(seed):
-    return am.simulate.sense(am.simulate.cube(seed=seed, frames=30), clutter=0.1, seed=seed)
+    return am.simulate.corrupt(am.simulate.cube(seed=seed, frames=30), clutter=0.1, seed=seed)
 
 
 def broken_by(d, setting):

@@ -16,16 +16,16 @@ from scipy.spatial.transform import Rotation
 
 import asterism as am
 from asterism import _engine
-from asterism.app import main
-from asterism.io.c3d_layout import read_c3d
-from asterism.label.distances import distances_from
-from asterism.label.gap import estimates
-from asterism.label.gap.bodies import fit_body
-from asterism.label.gap.ends import CAREFUL, NOISES, OFFSETS, SPANS, bridges, is_steady
-from asterism.label.gap.patterns import RIDGES, learn_pattern
-from asterism.label.gap.scores import _doubt, _profile, _weights
-from asterism.label.gap.spans import Span, find_gaps, held_out, n_apart, usable_ends
+from asterism.cli import main
+from asterism.io.captures.c3d_layout import read_c3d
 from asterism.simulate import Burst
+from asterism.tracking.filling import estimates
+from asterism.tracking.filling.ends import CAREFUL, NOISES, OFFSETS, SPANS, bridges, is_steady
+from asterism.tracking.filling.neighbours import fit_body
+from asterism.tracking.filling.patterns import RIDGES, learn_pattern
+from asterism.tracking.filling.scores import _doubt, _profile, _weights
+from asterism.tracking.filling.spans import Span, find_gaps, held_out, n_apart, usable_ends
+from asterism.tracking.rigidity.distances import distances_from
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 MODEL = am.TrackingModel(
@@ -222,7 +222,7 @@ def test_weights_are_the_best_of_a_fine_grid(seed, J):
 @pytest.mark.parametrize("n_markers", [4, 6])  # three neighbours are flat, and easily mirrored
 def test_a_rigid_body_carries_its_marker_exactly(n_axes, length, n_markers):
     truth = rigid(n_markers, n_axes=n_axes)
-    filling = am.fill(hidden_at(truth, (2, 100, 99 + length)), model=MODEL)
+    filling = am.fill_gaps(hidden_at(truth, (2, 100, 99 + length)), model=MODEL)
     e, std = errors(filling, truth)
     assert len(e) == length
     assert np.abs(e).max() < 1e-9
@@ -236,14 +236,14 @@ def test_irregular_times():
     rng = np.random.default_rng(3)
     times = np.cumsum(rng.uniform(0.006, 0.014, 300))
     truth = rigid(times=times, noise=1e-4)
-    filling = am.fill(hidden_at(truth, (2, 100, 130)), model=MODEL)
+    filling = am.fill_gaps(hidden_at(truth, (2, 100, 130)), model=MODEL)
     e, _ = errors(filling, truth)
     assert np.sqrt((e**2).sum(axis=1).mean()) < 1e-3
 
 
 def test_a_take_too_short_to_try_says_so():
     truth = rigid(frames=60)
-    filling = am.fill(hidden_at(truth, (2, 15, 44)), model=MODEL)
+    filling = am.fill_gaps(hidden_at(truth, (2, 15, 44)), model=MODEL)
     (gap,) = filling.gaps
     assert gap.n_windows == 0
     assert gap.rms == {}
@@ -255,7 +255,7 @@ def test_a_take_too_short_to_try_says_so():
 @pytest.mark.parametrize("n_markers", [1, 2, 3])
 def test_few_neighbours_or_none(n_markers):
     truth = rigid(n_markers, noise=1e-4)
-    filling = am.fill(hidden_at(truth, (0, 100, 109)), model=MODEL)
+    filling = am.fill_gaps(hidden_at(truth, (0, 100, 109)), model=MODEL)
     (gap,) = filling.gaps
     assert gap.is_filled
     assert gap.n_neighbours == n_markers - 1
@@ -267,7 +267,7 @@ def test_few_neighbours_or_none(n_markers):
 def test_fills_meet_their_ends_without_a_kink():
     truth = am.simulate.person(seed=2)
     spans = [(k, 60 + 3 * k, 60 + 3 * k + 25) for k in range(0, 50, 7)]
-    filled = am.fill(hidden_at(truth, *spans), model=MODEL).tracks.positions()
+    filled = am.fill_gaps(hidden_at(truth, *spans), model=MODEL).tracks.positions()
     whole = truth.positions()
     for k, first, last in spans:
         off = filled[first : last + 1, k] - whole[first : last + 1, k]
@@ -283,14 +283,14 @@ def test_fills_meet_their_ends_without_a_kink():
 
 def test_std_is_small_at_the_ends():
     truth = am.simulate.person(seed=3)
-    d = am.fill(hidden_at(truth, (8, 120, 160)), model=MODEL).tracks.detections
+    d = am.fill_gaps(hidden_at(truth, (8, 120, 160)), model=MODEL).tracks.detections
     std = d.stds[d.filled]
     assert std[[0, -1]].max() < std[10:-10].min()
 
 
 def test_nothing_measured_is_changed():
-    truth = am.simulate.sense(am.simulate.person(seed=4), burst=Burst(), clutter=0.05, seed=4)
-    filling = am.fill(truth, model=MODEL)
+    truth = am.simulate.corrupt(am.simulate.person(seed=4), burst=Burst(), clutter=0.05, seed=4)
+    filling = am.fill_gaps(truth, model=MODEL)
     again = filling.tracks.measured()
     np.testing.assert_array_equal(again.detections.points, truth.detections.points)
     np.testing.assert_array_equal(again.detections.offsets, truth.detections.offsets)
@@ -304,7 +304,7 @@ def test_nothing_measured_is_changed():
 def test_only_gaps_with_two_ends_that_are_not_too_long():
     truth = rigid(frames=400)
     tracks = hidden_at(truth, (0, 0, 20), (1, 380, 399), (2, 100, 148), (2, 200, 249), (3, 50, 350))
-    filling = am.fill(tracks, model=MODEL, longest=0.5)
+    filling = am.fill_gaps(tracks, model=MODEL, longest=0.5)
     assert [(g.track, g.first, g.last, g.is_filled) for g in filling.gaps] == [
         (2, 100, 148, True), (2, 200, 249, False), (3, 50, 350, False),
     ]  # fmt: skip
@@ -323,7 +323,7 @@ def test_a_marker_that_flickers_before_it_is_lost():
     positions[97:100, 2] += [0.03, -0.02, 0.03]
     positions[121, 2] += [0.0, 0.04, 0.0]
     spoilt = am.Tracks.from_dense(truth.detections.times, positions)
-    e, _ = errors(am.fill(spoilt, model=MODEL), truth)
+    e, _ = errors(am.fill_gaps(spoilt, model=MODEL), truth)
     assert np.linalg.norm(e, axis=1).max() < 2e-3
 
 
@@ -336,19 +336,19 @@ def test_frames_after_a_jump_are_not_believed():
 
 
 def test_the_same_input_gives_the_same():
-    truth = am.simulate.sense(am.simulate.person(seed=5), burst=Burst(), seed=5)
-    one, two = (am.fill(truth, model=MODEL).tracks.detections for _ in range(2))
+    truth = am.simulate.corrupt(am.simulate.person(seed=5), burst=Burst(), seed=5)
+    one, two = (am.fill_gaps(truth, model=MODEL).tracks.detections for _ in range(2))
     np.testing.assert_array_equal(one.points, two.points)
     np.testing.assert_array_equal(one.stds, two.stds)
 
 
 @pytest.mark.parametrize("turn", [0, 1])
 def test_where_the_room_is_does_not_matter(turn):
-    truth = am.simulate.sense(am.simulate.person(seed=6), noise=3e-4, seed=1)
+    truth = am.simulate.corrupt(am.simulate.person(seed=6), noise=3e-4, seed=1)
     tracks = hidden_at(truth, (11, 100, 130))
     R = Rotation.from_euler("xyz", [0.3, 0.2, 1.0]).as_matrix() if turn else np.eye(3)
     moved = am.Tracks.from_dense(truth.detections.times, tracks.positions() @ R.T + [3, -2, 1.0])
-    one, two = (am.fill(t, model=MODEL).tracks for t in (tracks, moved))
+    one, two = (am.fill_gaps(t, model=MODEL).tracks for t in (tracks, moved))
     np.testing.assert_allclose(
         one.positions()[100:131, 11] @ R.T + [3, -2, 1.0], two.positions()[100:131, 11], atol=1e-6
     )
@@ -359,13 +359,13 @@ def people_filled():
     for seed in range(10):
         activity = ("walk", "run", "jump")[seed % 3]
         truth = am.simulate.person(activity=activity, seed=seed, frames=600)
-        noisy = am.simulate.sense(truth, noise=3e-4, seed=seed)
+        noisy = am.simulate.corrupt(truth, noise=3e-4, seed=seed)
         rng = np.random.default_rng(seed)
         spans = [
             (int(k), int(a), int(a + rng.integers(5, 60)))
             for k, a in zip(rng.permutation(53)[:8], rng.integers(30, 500, 8), strict=True)
         ]
-        filling = am.fill(hidden_at(noisy, *spans), model=MODEL)
+        filling = am.fill_gaps(hidden_at(noisy, *spans), model=MODEL)
         assert all(gap.n_windows for gap in filling.gaps)
         one, its = errors(filling, noisy)
         e.append(one)
@@ -386,8 +386,8 @@ def test_fills_are_as_sure_as_they_say():
 def test_points_missing_at_random_are_tried_too(missing, tried):
     person = am.simulate.person(activity="walk", seed=3, frames=200)
     some = am.Tracks.from_dense(person.detections.times, person.positions()[:, :8])
-    noisy = am.simulate.sense(some, noise=3e-4, seed=3)
-    filling = am.fill(am.simulate.sense(noisy, missing=missing, seed=4), model=MODEL)
+    noisy = am.simulate.corrupt(some, noise=3e-4, seed=3)
+    filling = am.fill_gaps(am.simulate.corrupt(noisy, missing=missing, seed=4), model=MODEL)
     assert np.mean([gap.n_windows > 0 for gap in filling.gaps]) > tried
     e, std = errors(filling, noisy)
     assert np.median(np.linalg.norm(e, axis=1)) < 1e-3  # of noise alone 0.46 mm
@@ -474,15 +474,15 @@ def test_doubt_grows_as_estimators_disagree():
 
 
 def test_points_filled_before_are_no_measurements():
-    truth = am.simulate.sense(am.simulate.person(seed=7), burst=Burst(), seed=7)
-    once = am.fill(truth, model=MODEL)
-    twice = am.fill(once.tracks, model=MODEL)
+    truth = am.simulate.corrupt(am.simulate.person(seed=7), burst=Burst(), seed=7)
+    once = am.fill_gaps(truth, model=MODEL)
+    twice = am.fill_gaps(once.tracks, model=MODEL)
     np.testing.assert_array_equal(once.tracks.detections.points, twice.tracks.detections.points)
     d = once.tracks.detections
     for got in (
         am.track(d, model=MODEL),
         am.stitch(once.tracks, MODEL).tracks,
-        am.simulate.sense(once.tracks),
+        am.simulate.corrupt(once.tracks),
     ):
         assert got.detections.n_points == truth.detections.n_points
         assert got.detections.filled is None
@@ -499,7 +499,7 @@ def test_confidence_of_a_fill_is_that_of_its_ends():
     d = truth.detections
     confidence = np.full(d.n_points, 0.9)
     confidence[(d.frame_of == 111) & (truth.labels == 2)] = 0.4
-    tracks = am.fill(dataclasses.replace(truth, confidence=confidence), model=MODEL).tracks
+    tracks = am.fill_gaps(dataclasses.replace(truth, confidence=confidence), model=MODEL).tracks
     assert set(tracks.confidence[tracks.detections.filled]) == {0.4}
     assert (np.sort(tracks.confidence[~tracks.detections.filled]) == np.sort(confidence)).all()
 
@@ -509,7 +509,7 @@ def test_little_or_nothing(frames):
     at = np.zeros((frames, 2, 3)) + np.arange(2)[:, None] + np.arange(frames)[:, None, None]
     at[1:2, 1] = np.nan
     tracks = am.Tracks.from_dense(np.arange(frames) / 100, at)
-    filling = am.fill(tracks, model=MODEL)
+    filling = am.fill_gaps(tracks, model=MODEL)
     assert len(filling.gaps) == (frames == 3)
     if frames == 3:
         np.testing.assert_allclose(filling.tracks.positions()[1, 1], [2, 2, 2], atol=0.01)
@@ -527,9 +527,9 @@ def test_little_or_nothing(frames):
 )
 def test_options_are_checked(wrong, text):
     with pytest.raises(am.ParameterError, match=text):
-        am.fill(rigid(frames=10), **wrong)
+        am.fill_gaps(rigid(frames=10), **wrong)
     with pytest.raises(am.ParameterError, match=r"am\.track"):
-        am.fill(rigid(frames=10).detections)
+        am.fill_gaps(rigid(frames=10).detections)
 
 
 # --- flags in Detections and in files
@@ -548,17 +548,17 @@ def test_flags_are_checked():
 def made(tmp_path_factory):
     """A folder with a file that has gaps, and what filling it gives."""
     folder = tmp_path_factory.mktemp("made")
-    truth = am.simulate.sense(am.simulate.person(seed=8), burst=Burst(), noise=3e-4, seed=8)
+    truth = am.simulate.corrupt(am.simulate.person(seed=8), burst=Burst(), noise=3e-4, seed=8)
     am.write(truth, folder / "in.c3d")
     MODEL.to_toml(folder / "model.toml")
-    return folder, am.fill(am.read_tracks(folder / "in.c3d"), model=MODEL)
+    return folder, am.fill_gaps(am.io.read_tracks(folder / "in.c3d"), model=MODEL)
 
 
 @pytest.mark.parametrize("form", ["c3d", "csv"])
 def test_files_give_back_the_flags(made, form, tmp_path):
     tracks = made[1].tracks
     am.write(tracks, tmp_path / f"a.{form}")
-    again = am.read_tracks(tmp_path / f"a.{form}")
+    again = am.io.read_tracks(tmp_path / f"a.{form}")
     before, after = (
         set(zip(d.frame_of[d.filled], one.labels[d.filled], strict=True))
         for one, d in ((tracks, tracks.detections), (again, again.detections))
@@ -585,7 +585,7 @@ def test_c3d_has_residual_0_for_filled_points_alone(tmp_path, known):
             tracks,
             detections=dataclasses.replace(tracks.detections, residuals=residuals, cameras=cameras),
         )
-    filled = am.fill(tracks, model=MODEL).tracks
+    filled = am.fill_gaps(tracks, model=MODEL).tracks
     am.write(filled, tmp_path / "a.c3d")
     words = read_c3d(tmp_path / "a.c3d").points[..., 3]
     assert (words[100:111, 2] == 0).all()
@@ -692,9 +692,9 @@ def test_the_command_on_points_without_tracks(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize("name", ["walking_1.c3d", "HC030A22.c3d"])
 def test_real_captures(name):
     (path,) = DATA.rglob(name)
-    truth = am.simulate.sense(am.read(path).tracks)
+    truth = am.simulate.corrupt(am.read(path).tracks)
     spans = [(k, 60 + 8 * k, 60 + 8 * k + 39) for k in range(1, 31, 3)]
-    filling = am.fill(hidden_at(truth, *spans), model=MODEL)
+    filling = am.fill_gaps(hidden_at(truth, *spans), model=MODEL)
     e, std = errors(filling, truth)
     # Splines through the same ends are off by 5 to 50 mm.
     assert np.median(np.linalg.norm(e, axis=1)) < 1.5e-3

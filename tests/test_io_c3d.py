@@ -10,8 +10,8 @@ import pytest
 
 from asterism.errors import FormatError, ParameterError
 from asterism.io import read, write
-from asterism.io.c3d_layout import read_c3d
-from asterism.io.marker_names import find_modelled, is_unlabelled
+from asterism.io.captures.c3d_layout import read_c3d
+from asterism.io.captures.marker_names import find_modelled, is_unlabelled
 from asterism.model import Capture, Detections, Tracks
 from c3d_bytes import DEC, INTEL, SGI, integers, make_c3d, reals, text
 

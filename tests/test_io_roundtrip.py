@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from asterism.io import FORMATS, read, read_tracks, write
+from asterism.io import CAPTURE_FORMATS, read, read_tracks, write
 from asterism.io.units import PER_METRE, from_metres
 from asterism.model import Detections, Tracks
 from c3d_bytes import make_c3d
@@ -221,6 +221,6 @@ def test_next_to_nothing(form, n_frames, n_markers, seen, tmp_path):
 
 def test_every_written_format_has_its_round_trip():
     """A new format must find its way into the tests above."""
-    assert [name for name, f in FORMATS.items() if f.write] == [
+    assert [name for name, f in CAPTURE_FORMATS.items() if f.write] == [
         "c3d", "trc", "csv", "csv-wide", "qtm", "pointcloud",
     ]  # fmt: skip

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asterism.io import FORMATS, read, write
-from asterism.io.calibration import CALIBRATIONS, read_rig, write_rig
+from asterism.io import CAPTURE_FORMATS, read, write
+from asterism.io.calibrations import CALIBRATION_FORMATS, read_rig, write_rig
 from asterism.model import Tracks
 from c3d_bytes import DEC, SGI, make_c3d
 from calibration_rigs import NAMES, rig_for, same_pixels
@@ -25,11 +25,11 @@ def tracks():
     return Tracks.from_dense(np.arange(30) / 100, dense, ["A", "B", "C", "D"])
 
 
-@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize("format", CAPTURE_FORMATS)
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_captures_by_content(tmp_path, format, ending):
     path = tmp_path / f"file{ending}"
-    if FORMATS[format].write is None:
+    if CAPTURE_FORMATS[format].write is None:
         path.write_text(MOTIVE)
     else:
         write(tracks(), tmp_path / "made", format=format)
@@ -68,7 +68,9 @@ def test_text_in_utf16_without_an_ending(tmp_path):
     assert read(tmp_path / "bare").format == "trc"
 
 
-@pytest.mark.parametrize("format", [f for f, c in CALIBRATIONS.items() if c.sniff is not None])
+@pytest.mark.parametrize(
+    "format", [f for f, c in CALIBRATION_FORMATS.items() if c.sniff is not None]
+)
 @pytest.mark.parametrize("ending", ["", ".toml", ".yml", ".qca.txt", ".xcp", ".txt"])
 def test_calibrations_by_content(tmp_path, format, ending):
     rig = rig_for(format)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from asterism.errors import FormatError
-from asterism.io import FORMATS, read, read_tracks, write
+from asterism.io import CAPTURE_FORMATS, read, read_tracks, write
 from asterism.model import Tracks
 from c3d_bytes import make_c3d
 
@@ -131,5 +131,5 @@ def test_no_real_capture_contradicts_its_unit():
         pytest.skip("the real captures are not beside the project")
     for path in paths:
         capture = read(path)
-        assert capture.format in FORMATS
+        assert capture.format in CAPTURE_FORMATS
         assert not any("unit of length" in text for text in capture.warnings), path

@@ -188,4 +188,6 @@ def test_options_are_checked():
     for wrong in ({"max_states": 0}, {"max_states": 2**31}, {"guard": 1}, {"sure_until_gap": None}):
         with pytest.raises(am.ParameterError, match=next(iter(wrong))):
             am.JPDA(**wrong)
-    assert dataclasses.replace(am.JPDA(), guard=False) == am.method_by_name("jpda", guard=False)
+    assert dataclasses.replace(am.JPDA(), guard=False) == am.tracking.method_by_name(
+        "jpda", guard=False
+    )

@@ -26,7 +26,7 @@ def every_pairing(gains: np.ndarray, *, complete: bool):
 
 
 def check(gains: np.ndarray, k: int, *, complete: bool) -> None:
-    found = am.k_best_assignments(gains, k, complete=complete)
+    found = am.solve.k_best_assignments(gains, k, complete=complete)
     wanted = every_pairing(gains, complete=complete)
     assert len(found.matches) == min(k, len(wanted))
     assert np.allclose(found.totals, [t for t, _ in wanted[:k]], rtol=0, atol=1e-9)
@@ -51,16 +51,16 @@ def test_equals_sorted_enumeration(seed, complete):
 
 def test_all_alike():
     # Every pairing of the same sum is one of them, and each comes once.
-    found = am.k_best_assignments(np.zeros((3, 3)), 100)
+    found = am.solve.k_best_assignments(np.zeros((3, 3)), 100)
     assert len(found.matches) == 34  # 1 + 9 + 18 + 6
-    assert len(am.k_best_assignments(np.zeros((4, 4)), 100, complete=True).matches) == 24
+    assert len(am.solve.k_best_assignments(np.zeros((4, 4)), 100, complete=True).matches) == 24
 
 
 @pytest.mark.parametrize("n", [20, 60])
 def test_the_first_is_the_best_and_the_others_follow(n):
     rng = np.random.default_rng(n)
     gains = rng.normal(0, 5, (n, n + 3))
-    found = am.k_best_assignments(gains, 200, complete=True)
+    found = am.solve.k_best_assignments(gains, 200, complete=True)
     rows, columns = linear_sum_assignment(-gains)
     assert found.totals[0] == pytest.approx(gains[rows, columns].sum(), rel=1e-12)
     assert (np.diff(found.totals) <= 1e-9).all()
@@ -81,14 +81,14 @@ def test_the_order_of_rows_and_columns_does_not_matter(seed, n, m):
     rng = np.random.default_rng(seed)
     gains = rng.normal(0, 2, (n, m))
     rows, columns = rng.permutation(n), rng.permutation(m)
-    a = am.k_best_assignments(gains, 30).totals
-    b = am.k_best_assignments(gains[rows][:, columns], 30).totals
+    a = am.solve.k_best_assignments(gains, 30).totals
+    b = am.solve.k_best_assignments(gains[rows][:, columns], 30).totals
     assert np.allclose(a, b, rtol=0, atol=1e-9)
 
 
 def test_the_same_bytes_every_time():
     gains = np.round(np.random.default_rng(3).normal(0, 2, (12, 12)))
-    a, b = (am.k_best_assignments(gains, 50).matches for _ in range(2))
+    a, b = (am.solve.k_best_assignments(gains, 50).matches for _ in range(2))
     assert (a == b).all()
 
 
@@ -105,12 +105,12 @@ def test_the_same_bytes_every_time():
 )
 def test_bad_input_is_refused_by_name(gains, k, message):
     with pytest.raises(am.ParameterError, match=message):
-        am.k_best_assignments(gains, k)
+        am.solve.k_best_assignments(gains, k)
 
 
 def test_nothing_and_too_much():
-    assert am.k_best_assignments(np.empty((0, 3)), 5).matches.shape == (1, 0)
-    assert am.k_best_assignments(np.empty((2, 0)), 5).matches.tolist() == [[-1, -1]]
-    assert len(am.k_best_assignments(np.empty((2, 0)), 5, complete=True).matches) == 0
+    assert am.solve.k_best_assignments(np.empty((0, 3)), 5).matches.shape == (1, 0)
+    assert am.solve.k_best_assignments(np.empty((2, 0)), 5).matches.tolist() == [[-1, -1]]
+    assert len(am.solve.k_best_assignments(np.empty((2, 0)), 5, complete=True).matches) == 0
     with pytest.raises(am.SolverLimit, match="8192"):
-        am.k_best_assignments(np.zeros((5000, 5000)), 1)
+        am.solve.k_best_assignments(np.zeros((5000, 5000)), 1)

@@ -44,7 +44,7 @@ def test_the_window_s_best_partition_is_found():
         tuples = np.full((len(paths), d.n_frames), -1)
         for k, path in enumerate(paths):
             tuples[k, d.frame_of[list(path)]] = path
-        best = am.assign_multidimensional(tuples, scores).value
+        best = am.solve.assign_multidimensional(tuples, scores).value
         tracks = am.track(d, am.MCMCDA(window=5, moves=5000, end_odds=1), model=model, seed=seed)
         assert tracks.info["log_posterior"] <= best + 1e-5
         n += 1
@@ -345,7 +345,7 @@ def test_fragments_are_repaired(window):
     # What it is given it does not throw away: with no move to spare it is what comes out.
     few = am.MCMCDA(window=window, moves=0, confidence=0)
     kept = am.track(truth.detections, few, model=model, start=truth)
-    assert am.evaluate(kept, am.floor(truth, model.population.max_gap)).idf1 > 0.99
+    assert am.evaluate(kept, am.metrics.oracle_tracks(truth, model.population.max_gap)).idf1 > 0.99
 
 
 @pytest.mark.parametrize("window", [10, None])
@@ -485,7 +485,7 @@ def test_a_capture_in_blocks_is_explained_as_well_as_in_one(monkeypatch):
     n = sized(400, 20)
     method = am.MCMCDA(window=None, moves=n, confidence=n, end_odds=1)
     whole = am.track(d, method, model=model, seed=1)  # 60 frames fit into one block
-    monkeypatch.setattr("asterism.associate.mcmcda.BLOCK", 24)
+    monkeypatch.setattr("asterism.tracking.methods.mcmcda.BLOCK", 24)
     blocks = am.track(d, method, model=model, seed=1)
     # What is before and after a block counts: each alone would lose the tracks at every border.
     assert blocks.info["log_posterior"] > whole.info["log_posterior"] - sized(3, 20)
@@ -498,7 +498,7 @@ def test_a_capture_in_blocks_is_explained_as_well_as_in_one(monkeypatch):
 
 @pytest.mark.parametrize("several", [False, True])
 def test_a_long_capture_is_one_sequence_of_tracks_over_all_blocks(monkeypatch, several):
-    monkeypatch.setattr("asterism.associate.mcmcda.BLOCK", 20)
+    monkeypatch.setattr("asterism.tracking.methods.mcmcda.BLOCK", 20)
     truth = wanderers(np.random.default_rng(11), n_markers=4, n_frames=sized(150, 60), clutter=0.3)
     model = small_model(**({"motion": interacting()} if several else {}))
     method = am.MCMCDA(window=None, moves=30)

@@ -173,7 +173,7 @@ def test_bonds_of_a_chain_are_checked(pairs, lengths, known, text):
 
 def body_in_bursts(seed=1, frames=120):
     truth = am.simulate.person(seed=seed, frames=frames)
-    return am.simulate.sense(
+    return am.simulate.corrupt(
         truth, burst=am.simulate.Burst(), ghosts=am.simulate.Ghosts(), noise=3e-4, seed=seed
     )
 
@@ -182,7 +182,7 @@ def test_bonds_keep_identities_where_markers_hide_among_ghosts():
     wrong = {0.0: 0, 5.0: 0}
     for seed in (1, 2):
         truth = body_in_bursts(seed)
-        model = am.fragment_model(am.estimate_model(truth.detections).model)
+        model = am.tracking.tracklet_model(am.estimate_model(truth.detections).model)
         for weight in wrong:
             tracks = am.track(truth.detections, am.MCMCDA(bond_weight=weight), model=model)
             wrong[weight] += am.evaluate(tracks, truth).wrong_links
@@ -206,7 +206,7 @@ def test_whoever_keeps_no_distance_is_left_alone():
 
 def test_the_value_that_is_told_is_the_common_one():
     truth = body_in_bursts()
-    model = am.fragment_model(am.estimate_model(truth.detections).model)
+    model = am.tracking.tracklet_model(am.estimate_model(truth.detections).model)
     tracks = am.track(truth.detections, am.MCMCDA(bond_weight=5), model=model)
     assert tracks.info["log_posterior"] == pytest.approx(am.log_posterior(tracks, model))
 
@@ -214,7 +214,10 @@ def test_the_value_that_is_told_is_the_common_one():
 @pytest.mark.parametrize("options", [{}, {"groups": "whole"}, {"window": None, "moves": 10}])
 def test_neither_threads_nor_the_way_of_running_change_a_byte(options):
     truth = body_in_bursts(frames=60)
-    d, model = truth.detections, am.fragment_model(am.estimate_model(truth.detections).model)
+    d, model = (
+        truth.detections,
+        am.tracking.tracklet_model(am.estimate_model(truth.detections).model),
+    )
     runs = [
         am.track(d, am.MCMCDA(bond_weight=5, threads=n, **options), model=model, seed=2)
         for n in (1, 3)

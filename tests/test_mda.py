@@ -51,8 +51,8 @@ def test_the_same_as_multiple_hypotheses_where_both_are_exact(solver):
 
 def test_a_gap_of_the_relaxation_is_told(monkeypatch):
     # One round of prices closes no gap where markers walk over each other.
-    short = functools.partial(am.assign_multidimensional, max_rounds=1)
-    monkeypatch.setattr("asterism.associate.mda.assign_multidimensional", short)
+    short = functools.partial(am.solve.assign_multidimensional, max_rounds=1)
+    monkeypatch.setattr("asterism.tracking.methods.mda.assign_multidimensional", short)
     truth = crowd(3, spread=0.08)
     model = small_model(
         motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,

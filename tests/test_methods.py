@@ -74,7 +74,7 @@ def same_partition(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def test_every_registered_method_is_in_the_table():
-    assert {m.name for m in METHODS.values()} == set(am.METHODS)
+    assert {m.name for m in METHODS.values()} == set(am.tracking.METHODS)
 
 
 @each_method
@@ -292,10 +292,12 @@ def test_options_are_checked():
     with pytest.raises(am.ParameterError, match="proposers"):
         am.SMP(proposers="nobody")
     with pytest.raises(am.ParameterError, match="Did you mean 'gate_probability'"):
-        am.method_by_name("gnn", gate_probabilty=0.1)
+        am.tracking.method_by_name("gnn", gate_probabilty=0.1)
     with pytest.raises(am.ParameterError, match="Did you mean 'gnn'"):
-        am.method_by_name("gn")
-    assert am.method_by_name("smp", proposers="detections") == am.SMP(proposers="detections")
+        am.tracking.method_by_name("gn")
+    assert am.tracking.method_by_name("smp", proposers="detections") == am.SMP(
+        proposers="detections"
+    )
 
 
 def test_what_is_no_capture_is_refused():
@@ -307,7 +309,7 @@ def test_what_is_no_capture_is_refused():
 
 
 def test_points_too_dense_for_the_model_are_a_clear_limit(monkeypatch):
-    monkeypatch.setattr("asterism.associate.engine_method.MAX_CANDIDATES", 1000)
+    monkeypatch.setattr("asterism.tracking.methods.engine_method.MAX_CANDIDATES", 1000)
     rng = np.random.default_rng(1)
     d = am.Detections.from_frames([0.0, 0.1], [rng.normal(0, 0.01, (200, 3)) for _ in range(2)])
     with pytest.raises(am.SolverLimit, match="at most 1000"):
@@ -338,7 +340,7 @@ def test_absurd_numbers_do_no_harm(method, motion, scale, step, changes):
     d = am.Detections.from_frames(np.arange(5) * step, frames)
     tracks = am.track(d, method, model=model)
     assert (tracks.labels >= -1).all()
-    assert len(am.filter_states(tracks, model).log_densities) == d.n_points
+    assert len(am.filter.filter_states(tracks, model).log_densities) == d.n_points
 
 
 def test_a_hundred_thousand_points_in_a_frame():

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.app import main
+from asterism.cli import main
 
 TRUTH = am.simulate.cube(seed=1)
 D = TRUTH.detections
@@ -23,10 +23,12 @@ RIG = am.Rig.ring(2, radius=3, height=2)
 
 MISTAKES = {
     "a name for a method": (
-        lambda: am.track(D, "gnn"),
-        "method: expected a Method, found 'gnn'. Try am.GNN(), or am.method_by_name(\"gnn\").",
+        lambda: am.track(D, "gn"),
+        "Did you mean 'gnn'?",
     ),
-    "a class for a method": (lambda: am.identify(D, am.GNN), "method: .*found the class GNN"),
+    "a class for a method": (
+        lambda: am.track(D, am.GNN, stitch=True), "method: .*found the class GNN",
+    ),
     "tracks for points": (
         lambda: am.track(TRUTH),
         "detections: expected Detections, found Truth. Try its .detections.",
@@ -49,45 +51,60 @@ MISTAKES = {
     ),
     "a file's name for what it holds": (
         lambda: am.evaluate(TRUTH, "truth.c3d"),
-        "truth: expected Tracks, found 'truth.c3d'. Try am.read_tracks(path).",
+        "truth: expected Tracks, found 'truth.c3d'. Try am.io.read_tracks(path).",
     ),
     "no model for a stream": (lambda: am.GNN().init(None), "model: expected a TrackingModel"),
-    "no model for a smoother": (lambda: am.smooth(TRUTH, None), "model: expected a TrackingModel"),
-    "points to a picture of tracks": (lambda: am.plot_presence(D), "tracks: expected Tracks"),
-    "points to a picture in space": (lambda: am.plot_trajectories(D), "tracks: expected Tracks"),
-    "points to a picture over time": (lambda: am.plot_axes(D), "tracks: expected Tracks"),
-    "points to a picture of errors": (lambda: am.plot_errors(TRUTH, D), "truth: expected Tracks"),
-    "a camera for a rig": (lambda: am.plot_rig(RIG[0]), "rig: expected a Rig, found Camera"),
-    "a rig for a picture": (lambda: am.plot_image(RIG, 3), "camera: expected a Camera, found Rig"),
+    "no model for a smoother": (
+        lambda: am.filter.smooth_states(TRUTH, None), "model: expected a TrackingModel",
+    ),
+    "points to a picture of tracks": (lambda: am.plot.plot_presence(D), "tracks: expected Tracks"),
+    "points to a picture in space": (
+        lambda: am.plot.plot_trajectories(D), "tracks: expected Tracks",
+    ),
+    "points to a picture over time": (lambda: am.plot.plot_axes(D), "tracks: expected Tracks"),
+    "points to a picture of errors": (
+        lambda: am.plot.plot_errors(TRUTH, D), "truth: expected Tracks",
+    ),
+    "a camera for a rig": (lambda: am.plot.plot_rig(RIG[0]), "rig: expected a Rig, found Camera"),
+    "a rig for a picture": (
+        lambda: am.plot.plot_image(RIG, 3), "camera: expected a Camera, found Rig",
+    ),
     "a number for what a camera sees": (
-        lambda: am.plot_image(RIG[0], 3),
+        lambda: am.plot.plot_image(RIG[0], 3),
         "projection: expected a Projection, found int. Try camera.project(points).",
     ),
-    "a rig for a lens": (lambda: am.plot_lens(RIG), "camera: expected a Camera, found Rig"),
-    "a rig for what it covers": (lambda: am.plot_coverage(RIG), "expected a Coverage, found Rig"),
-    "points for groups": (lambda: am.plot_groups(D), "groups: expected GateGroups, found Detec"),
+    "a rig for a lens": (lambda: am.plot.plot_lens(RIG), "camera: expected a Camera, found Rig"),
+    "a rig for what it covers": (
+        lambda: am.plot.plot_coverage(RIG), "expected a Coverage, found Rig",
+    ),
+    "points for groups": (
+        lambda: am.plot.plot_groups(D), "groups: expected GateGroups, found Detec",
+    ),
     "a film for what was seen": (
-        lambda: am.plot_projections(am.simulate.film(TRUTH, RIG), RIG),
+        lambda: am.plot.plot_projections(am.simulate.film(TRUTH, RIG), RIG),
         "observations: expected Observations, found Film. Try its .observations.",
     ),
     "a score without a name": (
-        lambda: am.plot_compare(am.evaluate(TRUTH, TRUTH)),
+        lambda: am.plot.plot_compare(am.evaluate(TRUTH, TRUTH)),
         'scores: expected a Mapping, found Evaluation. Try {"a name": am.evaluate(tracks, truth)}.',
     ),
     "tracks for their score": (
-        lambda: am.plot_compare({"gnn": TRUTH}),
+        lambda: am.plot.plot_compare({"gnn": TRUTH}),
         "scores: expected an Evaluation by each name, found Truth of gnn",
     ),
     "confidences for a calibration": (
-        lambda: am.plot_reliability({"gnn": TRUTH}), "expected a Calibration, found Truth",
+        lambda: am.plot.plot_reliability({"gnn": TRUTH}),
+        "expected a CalibrationCurve, found Truth",
     ),
     "a number for a file": (lambda: am.read(3), "path: expected the name of a file, found int"),
-    "points for a file": (lambda: am.read_tracks(D), "the name of a file, found Detections"),
+    "points for a file": (lambda: am.io.read_tracks(D), "the name of a file, found Detections"),
     "nothing to write to": (lambda: am.write(TRUTH, None), "the name of a file, found NoneType"),
     "a number for a calibration": (lambda: am.read_rig(3), "path: expected the name of a file"),
-    "a number for image points": (lambda: am.read_observations(3), "path: expected the name of"),
+    "a number for image points": (lambda: am.io.read_observations(3), "path: expected the name of"),
     "a number for a model": (lambda: am.TrackingModel.from_toml(3), "path: expected the name of"),
-    "a number for bonds": (lambda: am.Bonds.from_toml(3), "path: expected the name of a file"),
+    "a number for bonds": (
+        lambda: am.tracking.Bonds.from_toml(3), "path: expected the name of a file",
+    ),
     "a number for a page": (lambda: am.report(TRUTH, 3), "path: expected the name of a file"),
     "no state to go on from": (
         lambda: am.GNN().step(None, 0.0, D.frame(0)),
@@ -96,27 +113,38 @@ MISTAKES = {
     "no state for mcmcda": (lambda: am.MCMCDA().step(None, 0.0, []), "state: expected an Engine"),
     "a model for a state": (lambda: am.SMP().run(MODEL, D), "state: expected an EngineState"),
     "another method's state": (
-        lambda: am.Stitched().step(am.GNN().init(MODEL), 0.0, []),
+        lambda: am.tracking.Stitched().step(am.GNN().init(MODEL), 0.0, []),
         "state: expected a StitchedState, found EngineState. Try method.init(model).",
     ),
-    "no state to stitch from": (lambda: am.Stitched().run(None, D), "state: expected a MethodS"),
-    "no model to stitch with": (lambda: am.Stitched().init(None), "model: expected a TrackingM"),
-    "points to fill": (lambda: am.fill(D), "expected Tracks, found Detections. Try am.track(det"),
-    "an estimate to fill with": (
-        lambda: am.fill(TRUTH, model=am.estimate_model(D)), "found ModelEstimate. Try its .model.",
+    "no state to stitch from": (
+        lambda: am.tracking.Stitched().run(None, D), "state: expected a MethodS",
     ),
-    "points to write as a rig": (lambda: am.write_rig(D, "x.toml"), "rig: expected a Rig"),
+    "no model to stitch with": (
+        lambda: am.tracking.Stitched().init(None), "model: expected a TrackingM",
+    ),
+    "points to fill": (
+        lambda: am.fill_gaps(D), "expected Tracks, found Detections. Try am.track(det",
+    ),
+    "an estimate to fill with": (
+        lambda: am.fill_gaps(TRUTH, model=am.estimate_model(D)),
+        "found ModelEstimate. Try its .model.",
+    ),
+    "points to write as a rig": (lambda: am.io.write_rig(D, "x.toml"), "rig: expected a Rig"),
     "labels of labels": (
         lambda: am.Tracks(detections=TRUTH, labels=TRUTH.labels), "found Truth. Try its .detec",
     ),
-    "detections for a capture": (lambda: am.describe(D), "capture: expected a Capture"),
+    "detections for a capture": (lambda: am.io.describe(D), "capture: expected a Capture"),
     "tracks to estimate from": (lambda: am.estimate_model(TRUTH), "Try its .detections"),
-    "a floor of points": (lambda: am.floor(D, 10), "truth: expected Tracks"),
-    "points scored as tracks": (lambda: am.point_scores(TRUTH, TRUTH), "points: expected Detec"),
+    "a floor of points": (lambda: am.metrics.oracle_tracks(D, 10), "truth: expected Tracks"),
+    "points scored as tracks": (
+        lambda: am.metrics.point_scores(TRUTH, TRUTH), "points: expected Detec",
+    ),
     "a number for a seeing": (
         lambda: am.simulate.film(TRUTH, RIG, seeing=5), "seeing: expected a Seeing, found int",
     ),
-    "a class for a name": (lambda: am.method_by_name(am.GNN), "method: expected one of gnn"),
+    "a class for a name": (
+        lambda: am.tracking.method_by_name(am.GNN), "method: expected one of gnn",
+    ),
     "a page that is no page": (
         lambda: am.report(TRUTH, "x.pdf"), "path: expected a name ending in .html, found 'x.pdf'",
     ),
@@ -141,12 +169,10 @@ def test_a_wrong_method_is_told_before_the_model_is_estimated(monkeypatch):
     def never(*_, **__):
         raise AssertionError
 
-    for module in ("automatic", "identify"):
-        home = importlib.import_module(f"asterism.label.{module}")
-        monkeypatch.setattr(home, "estimate_model", never)
-    for run in (am.track, am.identify):
+    monkeypatch.setattr(importlib.import_module("asterism.tracking.plan"), "estimate_model", never)
+    for wrong in ("gn", am.GNN, 3):
         with pytest.raises(am.ParameterError, match="method"):
-            run(D, "gnn")
+            am.track(D, wrong)
 
 
 def test_millimetres_for_metres_are_doubted(caplog):
@@ -174,13 +200,13 @@ def files(tmp_path_factory):
     """Files that are right, and some that are not, for wrong commands."""
     folder = tmp_path_factory.mktemp("files")
     truth = am.simulate.cube(seed=1, frames=20)
-    sensed = am.simulate.sense(truth, noise=1e-3, seed=1)
+    sensed = am.simulate.corrupt(truth, noise=1e-3, seed=1)
     unnamed = am.Tracks(detections=sensed.detections, labels=[-1] * sensed.detections.n_points)
     am.write(sensed, folder / "truth.csv")
     am.write(unnamed, folder / "in.csv")
     rig = am.Rig.ring(4, radius=5, height=2)
-    am.write_rig(rig, folder / "rig.toml")
-    am.write_observations(am.simulate.film(truth, rig).observations, folder / "seen.csv")
+    am.io.write_rig(rig, folder / "rig.toml")
+    am.io.write_observations(am.simulate.film(truth, rig).observations, folder / "seen.csv")
     am.learn_bonds(truth).to_toml(folder / "bonds.toml")
     model = MODEL.to_toml(folder / "model.toml")
     (folder / "misspelt.toml").write_text(model.replace("noise_sigma", "noise_sgima"))
@@ -298,18 +324,18 @@ WRONG = (
     ),
     ("bonds folder", "folder: expected a file", "found a folder"),
     (
-        "recognize truth.csv --bonds bad.toml -o x.csv",
+        "name truth.csv --bonds bad.toml -o x.csv",
         "bad.toml: the file: expected TOML",
         "found Invalid value (at end of document)",
     ),
     (
-        "recognize truth.csv --bonds model.toml -o x.csv",
+        "name truth.csv --bonds model.toml -o x.csv",
         'model.toml: format: expected "asterism bonds"',
         "found none. Write one by asterism bonds.",
     ),
-    ("recognize truth.csv --bonds nowhere.toml -o x.csv", "nowhere.toml: no such file", ""),
+    ("name truth.csv --bonds nowhere.toml -o x.csv", "nowhere.toml: no such file", ""),
     (
-        "recognize in.csv --bonds bonds.toml -o x.csv",
+        "name in.csv --bonds bonds.toml -o x.csv",
         "IN: expected a capture with tracks",
         "found none in in.csv. Run asterism track --stitch first.",
     ),
@@ -409,13 +435,13 @@ WRONG = (
         "found 3",
     ),
     (
-        "corrupt truth.csv -o x.csv --truth y.csv --sense mising=1",
-        "--sense (what goes wrong): expected",
+        "corrupt truth.csv -o x.csv --truth y.csv --corrupt mising=1",
+        "--corrupt (what goes wrong): expected",
         "Did you mean 'missing'?",
     ),
     (
-        "corrupt truth.csv -o x.csv --truth y.csv --sense jitter=5",
-        "--sense jitter: expected a number in [0, 1)",
+        "corrupt truth.csv -o x.csv --truth y.csv --corrupt jitter=5",
+        "--corrupt jitter: expected a number in [0, 1)",
         "found 5.0",
     ),
     (
@@ -424,8 +450,8 @@ WRONG = (
         "found 0",
     ),
     (
-        "corrupt truth.csv -o x.csv --truth y.csv --sense visits=5",
-        "--sense visits: expected MIN-MAX, 50-200 say",
+        "corrupt truth.csv -o x.csv --truth y.csv --corrupt visits=5",
+        "--corrupt visits: expected MIN-MAX, 50-200 say",
         "found '5'",
     ),
     ("simulate cubee -o x.csv", "SCENE: expected", "Did you mean 'cube'?"),
@@ -447,8 +473,8 @@ WRONG = (
         "Did you mean 'walk'?",
     ),
     (
-        "simulate cube -o x.csv --sense noise=1",
-        "--truth: expected a file for the truth, as --sense or --rig ",
+        "simulate cube -o x.csv --corrupt noise=1",
+        "--truth: expected a file for the truth, as --corrupt or --rig ",
         "found none. Without it no file would hold the true label",
     ),
     (

@@ -117,7 +117,7 @@ MODELS = {
     "dwpa": small_model(motion=am.DWPA(increment_sigma=1.0, acceleration_prior_sigma=3.0)),
     "interacting": small_model(motion=interacting()),
     "linear": small_model(
-        motion=am.LinearMotion(
+        motion=am.model.LinearMotion(
             F=[[1, 0.1], [0, 0.9]], Q=np.eye(2) * 1e-3, H=[1, 0], step=0.1,
             prior_covariance=np.eye(2),
         )
@@ -173,12 +173,12 @@ def test_a_bad_model_file_is_named_with_the_place(old, new, message, tmp_path):
         (lambda: am.RandomWalk(walk_sigma=float("nan")), "walk_sigma"),
         (lambda: am.DWNA(acceleration_sigma=True), "acceleration_sigma: expected a number"),
         (
-            lambda: am.LinearMotion(F=np.eye(2), Q=-np.eye(2), H=[1, 0], step=1,
+            lambda: am.model.LinearMotion(F=np.eye(2), Q=-np.eye(2), H=[1, 0], step=1,
                                     prior_covariance=np.eye(2)),
             "Q: expected a positive semi-definite",
         ),
         (
-            lambda: am.LinearMotion(F=np.eye(2), Q=np.eye(2), H=[0, 0], step=1,
+            lambda: am.model.LinearMotion(F=np.eye(2), Q=np.eye(2), H=[0, 0], step=1,
                                     prior_covariance=np.eye(2)),
             "H: expected a row that sees the state",
         ),

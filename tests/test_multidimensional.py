@@ -52,8 +52,8 @@ def test_exact_is_the_best_of_all_and_the_relaxation_is_bounded(seed):
         n, S = int(rng.integers(0, 13)), int(rng.integers(1, 6))
         tuples, weights = random_problem(rng, n, S, int(rng.integers(1, 4)))
         wanted = best_by_hand(tuples, weights)
-        exact = am.assign_multidimensional(tuples, weights)
-        relaxed = am.assign_multidimensional(tuples, weights, method="relaxed")
+        exact = am.solve.assign_multidimensional(tuples, weights)
+        relaxed = am.solve.assign_multidimensional(tuples, weights, method="relaxed")
         for found in (exact, relaxed):
             check_choice(tuples, weights, found)
         assert exact.value == pytest.approx(wanted, abs=1e-6)
@@ -72,7 +72,9 @@ def test_two_dimensions_are_linear_assignment(seed):
     rows, columns = linear_sum_assignment(-np.maximum(gains, 0))
     wanted = np.maximum(gains, 0)[rows, columns].sum()
     for method in ("exact", "relaxed"):
-        found = am.assign_multidimensional(np.stack([i, j], axis=1), gains.ravel(), method=method)
+        found = am.solve.assign_multidimensional(
+            np.stack([i, j], axis=1), gains.ravel(), method=method
+        )
         assert found.value == pytest.approx(wanted, abs=1e-6)
         assert found.gap == pytest.approx(0, abs=1e-6)
 
@@ -97,8 +99,8 @@ def tracks_over_scans(rng: np.random.Generator, n: int, S: int):
 def test_a_problem_of_thousands_of_tuples_is_solved_and_bounded():
     tuples, weights = tracks_over_scans(np.random.default_rng(1), 80, 4)
     assert len(tuples) > 1000
-    exact = am.assign_multidimensional(tuples, weights)
-    relaxed = am.assign_multidimensional(tuples, weights, method="relaxed")
+    exact = am.solve.assign_multidimensional(tuples, weights)
+    relaxed = am.solve.assign_multidimensional(tuples, weights, method="relaxed")
     for found in (exact, relaxed):
         check_choice(tuples, weights, found)
     assert relaxed.value <= exact.value + 1e-6 <= relaxed.bound + 2e-6
@@ -113,23 +115,23 @@ def test_neither_order_nor_numbering_matters(seed):
     tuples, weights = random_problem(rng, 12, 3, 4)
     order, numbers = rng.permutation(12), rng.permutation(4)
     other = np.where(tuples >= 0, numbers[tuples], -1)[order][:, rng.permutation(3)]
-    a = am.assign_multidimensional(tuples, weights).value
-    b = am.assign_multidimensional(other, weights[order]).value
+    a = am.solve.assign_multidimensional(tuples, weights).value
+    b = am.solve.assign_multidimensional(other, weights[order]).value
     assert a == pytest.approx(b, abs=1e-6)
 
 
 def test_the_same_choice_every_time():
     tuples, weights = tracks_over_scans(np.random.default_rng(2), 20, 3)
     for method in ("exact", "relaxed"):
-        a, b = (am.assign_multidimensional(tuples, weights, method=method) for _ in range(2))
+        a, b = (am.solve.assign_multidimensional(tuples, weights, method=method) for _ in range(2))
         assert (a.chosen == b.chosen).all()
         assert (a.value, a.bound, a.rounds) == (b.value, b.bound, b.rounds)
 
 
 def test_nothing_to_choose():
     for method in ("exact", "relaxed"):
-        none = am.assign_multidimensional(np.empty((0, 3)), [], method=method)
-        bad = am.assign_multidimensional([[0, 1]], [-1.0], method=method)
+        none = am.solve.assign_multidimensional(np.empty((0, 3)), [], method=method)
+        bad = am.solve.assign_multidimensional([[0, 1]], [-1.0], method=method)
         for found in (none, bad):
             assert (len(found.chosen), found.value, found.gap) == (0, 0.0, 0.0)
 
@@ -148,4 +150,4 @@ def test_nothing_to_choose():
 )
 def test_bad_input_is_refused_by_name(tuples, weights, options, message):
     with pytest.raises(am.ParameterError, match=message):
-        am.assign_multidimensional(tuples, weights, **options)
+        am.solve.assign_multidimensional(tuples, weights, **options)

@@ -29,7 +29,7 @@ def test_scores_and_states_are_those_of_the_textbook(n_axes):
     extra[::3] = 0
     noisy, model = with_variances(truth, extra), small_model()
     d, (order, offsets) = truth.detections, truth.by_track
-    scores, states = am.track_scores(noisy, model), am.filter_states(noisy, model)
+    scores, states = am.model.track_scores(noisy, model), am.filter.filter_states(noisy, model)
     for k in range(truth.n_tracks):
         own = order[offsets[k] : offsets[k + 1]]
         frames, points = d.frame_of[own], d.points[own]
@@ -42,7 +42,7 @@ def test_scores_and_states_are_those_of_the_textbook(n_axes):
         assert np.allclose(states.means[rows].reshape(len(means), -1), means, atol=1e-12)
         n = states.covariances.shape[1]
         assert np.allclose(states.covariances[rows], np.array(P)[:, :n, :n], rtol=1e-7)
-    assert not np.allclose(scores, am.track_scores(truth, model))
+    assert not np.allclose(scores, am.model.track_scores(truth, model))
 
 
 def split_in_two(model: am.TrackingModel, share: float) -> tuple[am.TrackingModel, float]:

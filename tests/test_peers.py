@@ -23,7 +23,7 @@ MODULES = {"nrl-tracker": "pytcl"}
 
 def tiny():
     truth = am.simulate.cube(seed=1, frames=25)
-    return am.simulate.sense(truth, missing=0.05, clutter=0.05, noise=0.002, seed=1)
+    return am.simulate.corrupt(truth, missing=0.05, clutter=0.05, noise=0.002, seed=1)
 
 
 @pytest.mark.filterwarnings("default")  # of others' making

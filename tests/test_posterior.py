@@ -33,7 +33,7 @@ def test_scores_are_the_formula_term_by_term(termination, motion):
             else kalman(model, d.times, frames, points)[-1]
         )
         expected.append(track_score(model, d.times, frames, points, densities))
-    scores = am.track_scores(truth, model)
+    scores = am.model.track_scores(truth, model)
     assert np.isfinite(scores).sum() >= 8
     assert np.allclose(scores, expected, rtol=1e-9)
     assert am.log_posterior(truth, model) == pytest.approx(sum(expected), rel=1e-9)
@@ -51,7 +51,7 @@ def test_what_the_model_forbids_scores_minus_infinity(frames, x, why):
     points = [[[x[frames.index(t)], 0, 0]] if t in frames else [] for t in range(6)]
     detections = am.Detections.from_frames(np.arange(6) * 0.1, points)
     tracks = am.Tracks(detections=detections, labels=np.zeros(len(frames), dtype=int))
-    assert am.track_scores(tracks, small_model())[0] == -math.inf, why
+    assert am.model.track_scores(tracks, small_model())[0] == -math.inf, why
 
 
 def test_all_clutter_is_the_zero_of_the_scale():

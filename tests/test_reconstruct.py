@@ -15,7 +15,7 @@ from asterism import _engine
 from reconstruct_oracle import every_set, score
 from reconstruct_scenes import LENSES, filmed, observations, random_rig
 
-MODEL = am.ImageModel(
+MODEL = am.multiview.ImageModel(
     sigma_px=0.3, p_detection=0.9, clutter=0.5, density=5.0, volume=((-2, -2, -2), (2, 2, 2))
 )
 
@@ -79,7 +79,7 @@ def test_with_noise_as_exact_as_can_be_and_honest(n):
     low, high = chi2.ppf([0.0005, 0.9995], 3 * len(off)) / len(off)
     assert low < nees.mean() < high
     np.testing.assert_allclose(d.stds, np.sqrt(bound / 3))
-    estimated = am.estimate_images(shot.observations, rig)
+    estimated = am.multiview.estimate_images(shot.observations, rig)
     np.testing.assert_allclose(estimated.sigma_px, 0.3, rtol=0.15)
 
 
@@ -110,7 +110,7 @@ def test_finds_the_best_of_all_choices():
         ).observations
         model = dataclasses.replace(MODEL, sigma_px=0.5, density=1e3)
         tuples, scores = every_set(rig, model, [o.points(0, c) for c in range(3)])
-        best = am.assign_multidimensional(tuples, scores)
+        best = am.solve.assign_multidimensional(tuples, scores)
         made = am.reconstruct(o, rig, model, merge_px=0)
         n_contested += len(tuples) > len(best.chosen)
         assert made.scores.sum() == pytest.approx(best.value, abs=0.05 * max(len(tuples), 1) ** 0.5)
@@ -128,7 +128,7 @@ def test_the_choice_is_that_of_the_exact_solver():
         tuples = np.full((n, m), -1)
         for i, use in enumerate(uses):
             tuples[i, use] = 0
-        best = am.assign_multidimensional(tuples, scores)
+        best = am.solve.assign_multidimensional(tuples, scores)
         chosen, is_exact, gap = _engine.choose_candidates(
             scores, np.cumsum([0] + [len(u) for u in uses]), np.concatenate(uses), 10**6
         )
@@ -157,7 +157,7 @@ def test_a_search_that_is_cut_says_by_how_much():
     tuples = np.full((n, m), -1)
     for i, use in enumerate(uses):
         tuples[i, use] = 0
-    best = am.assign_multidimensional(tuples, scores).value
+    best = am.solve.assign_multidimensional(tuples, scores).value
     assert not is_exact
     assert scores[chosen].sum() <= best + 1e-6 <= scores[chosen].sum() + gap + 2e-6
 
@@ -208,7 +208,7 @@ def test_threads_change_nothing():
 
 def test_a_miss_counts_only_where_the_camera_could_see():
     rig = am.Rig.ring(3, radius=4, height=2)
-    K = am.intrinsics(focal_length=900, principal_point=(640, 512))
+    K = am.camera.intrinsics(focal_length=900, principal_point=(640, 512))
     away = am.Camera.look_at((4, 4, 2), (9, 9, 2), K=K, size_px=(1280, 1024), name="away")
     towards = am.Camera.look_at((4, 4, 2), (0, 0, 1), K=K, size_px=(1280, 1024), name="towards")
     near = towards.replace(near=20.0, name="near")
@@ -308,7 +308,7 @@ def test_expected_places_help_and_invent_nothing():
     truth = am.Tracks.from_dense(o.times, X)
 
     def scores(prior=None):
-        return am.point_scores(am.reconstruct(o, rig, MODEL, prior=prior).detections, truth)
+        return am.metrics.point_scores(am.reconstruct(o, rig, MODEL, prior=prior).detections, truth)
 
     plain = scores()
     helped = scores(expected_at(o.times, X + rng.normal(0, 0.005, X.shape)))
@@ -393,9 +393,9 @@ def test_bad_input():
         {"volume": ((0, 0, 0), (0, 1, 1))}, {"volume": 3}, {"p_detection": (0.5, 1.5)},
     ):  # fmt: skip
         with pytest.raises(am.ParameterError, match=next(iter(wrong))):
-            am.ImageModel(**wrong)
+            am.multiview.ImageModel(**wrong)
     with pytest.raises(am.ParameterError, match="sigma_px"):
-        am.reconstruct(o, rig, am.ImageModel(sigma_px=(0.1, 0.2)))
+        am.reconstruct(o, rig, am.multiview.ImageModel(sigma_px=(0.1, 0.2)))
     with pytest.raises(am.ParameterError, match="observations"):
         am.reconstruct(3, rig)
     with pytest.raises(am.ParameterError, match="rig"):
@@ -416,7 +416,7 @@ def test_covariances_are_checked():
 
 def test_a_person_before_eight_cameras():
     truth = am.simulate.SCENES["person"].make(frames=60, seed=4, activity="walk")
-    from asterism.app.rig_presets import place_preset
+    from asterism.simulate.rig_presets import place_preset
 
     points = truth.detections.points
     rig, _ = place_preset("ring8", points.min(axis=0), points.max(axis=0))

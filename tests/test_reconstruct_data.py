@@ -33,7 +33,7 @@ def test_flydras_points_shuffled(bench, at_once):
     folder = DATA / bench.FLYDRA
     o, truth = bench.flydra_shuffled(folder, at_once)
     made = am.reconstruct(o, am.read_rig(folder))
-    scores = am.point_scores(made.detections, truth, radius=0.002)
+    scores = am.metrics.point_scores(made.detections, truth, radius=0.002)
     assert scores.recall > 0.99
     assert scores.ghosts < 0.01
     assert scores.median_mm < 0.12

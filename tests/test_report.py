@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.app import main
+from asterism.cli import main
 from asterism.reporting.judgement import judge
-from asterism.view.report import find_troubles
-from asterism.view.report.lenses import lens_table, pixels_by
-from asterism.view.report.packing import residuals
-from asterism.view.report.thinning import stride_for
+from asterism.reporting.page import find_troubles
+from asterism.reporting.page.lenses import lens_table, pixels_by
+from asterism.reporting.page.packing import residuals
+from asterism.reporting.page.thinning import stride_for
 from report_cases import HOSTILE, positions, spoilt_person, unpacked
 
 
@@ -242,8 +242,8 @@ def test_connections_are_those_that_keep_their_distance():
 
 
 def test_lens_tables_are_as_exact_as_they_say():
-    K = am.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
-    for lens in (am.BrownConrady(k1=-0.3, p1=0.002), am.ReportRadial(a1=0.3), None):
+    K = am.camera.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
+    for lens in (am.camera.BrownConrady(k1=-0.3, p1=0.002), am.camera.ReportRadial(a1=0.3), None):
         camera = am.Camera.look_at((3, 1, 2), (0, 0, 1), K=K, size_px=(1280, 1024), lens=lens)
         table, bounds, error = lens_table(camera)
         if lens is None:
@@ -278,7 +278,7 @@ def test_up_is_told_by_where_the_feet_are(tmp_path, places, axis):
 
 def test_up_is_told_by_the_cameras_and_by_who_asks(tmp_path, person):
     _, tracks = person
-    K = am.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
+    K = am.camera.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
     cameras = [
         am.Camera.look_at(p, (0, 1, 0), K=K, size_px=(1280, 1024), up=(0, 1, 0), name=str(n))
         for n, p in enumerate([(3, 2, 0), (0, 2, 3), (-3, 2, 1)])
@@ -288,7 +288,7 @@ def test_up_is_told_by_the_cameras_and_by_who_asks(tmp_path, person):
 
 
 def test_long_captures_are_thinned_and_say_so(tmp_path, monkeypatch):
-    monkeypatch.setattr("asterism.view.report.thinning.MOST_POINTS", 300)
+    monkeypatch.setattr("asterism.reporting.page.thinning.MOST_POINTS", 300)
     assert stride_for(300) == 1
     assert stride_for(301) == 2
     tracks = tracks_of(straight(200))
@@ -313,11 +313,13 @@ def test_far_clutter_is_counted_not_drawn(tmp_path):
 
 def test_a_film_of_fifty_three_markers_is_small(tmp_path):
     scene = am.simulate.person(frames=600, seed=1)
-    truth = am.simulate.sense(scene, missing=0.05, clutter=0.05, noise=0.0005, seed=1)
-    K = am.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
+    truth = am.simulate.corrupt(scene, missing=0.05, clutter=0.05, noise=0.0005, seed=1)
+    K = am.camera.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
     ring = am.Rig.ring(8, radius=4, height=2.5)
     rig = am.Rig(
-        tuple(dataclasses.replace(c, K=K, lens=am.BrownConrady(k1=-0.2)) for c in ring.cameras)
+        tuple(
+            dataclasses.replace(c, K=K, lens=am.camera.BrownConrady(k1=-0.2)) for c in ring.cameras
+        )
     )
     tracks = dataclasses.replace(
         truth, confidence=np.random.default_rng(1).random(len(truth.labels))
@@ -346,9 +348,8 @@ def test_what_makes_no_sense_is_refused(tmp_path, person):
 
 def test_commands_write_pages(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    made = (
-        "simulate crossing -o in.csv --truth truth.csv --sense missing=0.05 --sense clutter=0.05 -q"
-    )
+    made = "simulate crossing -o in.csv --truth truth.csv -q "
+    made += "--corrupt missing=0.05 --corrupt clutter=0.05"
     assert main(made.split()) == 0
     assert (
         main(["track", "in.csv", "-o", "out.csv", "--method", "jpda", "--report", "first.html"])

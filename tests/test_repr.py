@@ -15,8 +15,8 @@ from asterism.records import MAX_REPR, record
 
 NAMESPACES = (
     "asterism", "asterism.simulate", "asterism.camera", "asterism.model", "asterism.filter",
-    "asterism.associate", "asterism.label", "asterism.reconstruct", "asterism.solve",
-    "asterism.evaluate", "asterism.io", "asterism.io.calibration", "asterism.view",
+    "asterism.tracking.methods", "asterism.tracking", "asterism.multiview", "asterism.solve",
+    "asterism.metrics", "asterism.io", "asterism.io.calibrations", "asterism.plot",
     "asterism.reporting", "asterism.errors",
 )  # fmt: skip
 
@@ -63,14 +63,14 @@ def instances():
     rig = am.Rig.ring(30, radius=4, height=2)
     film = am.simulate.film(truth, rig)
     tracks = am.track(d, am.JPDA(), model=plain)
-    aligned = am.align(tracks, truth)
+    aligned = am.metrics.align(tracks, truth)
     labels = aligned.labels, aligned.truth_labels
     by_frame = (*labels, aligned.frame_of)
     state, update = am.GNN().step(am.GNN().init(plain), 0.0, d.frame(0))
-    space = am.triangulation_map(rig, (-1, -1, 0), (1, 1, 1))
+    space = am.multiview.triangulation_map(rig, (-1, -1, 0), (1, 1, 1))
     made = am.reconstruct(film.observations, rig)
-    polygon = am.Polygon(corners=[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], name=LONG)
-    gap = am.Gap(
+    polygon = am.camera.Polygon(corners=[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], name=LONG)
+    gap = am.tracking.Gap(
         track=3, first=10, last=20, seconds=1 / 3, weights={"smoother": 1 / 3, "body": 2 / 3},
         rms={"smoother": 1 / 300, "body": 1 / 300}, n_windows=7, std=1 / 300, n_neighbours=5,
         reason="",
@@ -82,47 +82,50 @@ def instances():
         "merged_within": 1 / 30, "guard": False,
     }  # fmt: skip
     methods = []
-    for kind in am.METHODS.values():
+    for kind in am.tracking.METHODS.values():
         known = {f.name for f in dataclasses.fields(kind)}
         methods += [kind(), kind(**{k: v for k, v in changed.items() if k in known - {"capacity"}})]
     return [
-        *methods, am.Stitched(), am.Stitched().init(plain), state, update,
+        *methods, am.tracking.Stitched(), am.tracking.Stitched().init(plain), state, update,
         am.MCMCDA(window=50, moves=12.345, deadline=1 / 3, confidence=12.345, end_odds=123.4,
                   chains=4, threads=2, doubt=3.21, bonds=3, bond_weight=1 / 3, at_doubts=0.25,
                   proposal="uniform", move_weights="report"),
         plain.motion, several, am.RandomWalk(walk_sigma=1 / 3),
         am.DWPA(increment_sigma=1 / 3, acceleration_prior_sigma=20 / 3),
-        am.LinearMotion(F=np.eye(3), Q=np.eye(3), H=np.eye(3)[0], step=0.01,
+        am.model.LinearMotion(F=np.eye(3), Q=np.eye(3), H=np.eye(3)[0], step=0.01,
                         prior_covariance=np.eye(3)),
         plain, model, plain.sensor, plain.population, am.estimate_model(d),
-        truth, d, capture, tracks, am.describe(capture),
+        truth, d, capture, tracks, am.io.describe(capture),
         rig, rig[0], dataclasses.replace(rig[0], name=LONG), film, film.projection,
-        film.observations, polygon, am.Mesh(vertices=np.eye(3), faces=[[0, 1, 2]]),
-        am.Capsule(ends=[[0, 0, 0], [0, 0, 1]], radius=0.1), am.Reason.VISIBLE,
-        rig[0].depth_image([polygon]), rig[0].paint([polygon]), am.Face(0, 0),
-        am.fit_lens(rig[0], am.BrownConrady), space, space.suggestions[0], space.coverage,
-        am.triangulate(np.zeros((30, 4, 2)), rig), made, made.views, made.model,
-        am.BrownConrady(k1=1 / 3, k2=1 / 3, p1=1 / 3, p2=1 / 3, k3=1 / 3),
-        am.ReportRadial(1 / 3, 1 / 3), am.ViconRadial(1 / 3, 1 / 3, 1 / 3),
-        am.QuadraticCorrection(ex=(1 / 3,) * 5, ey=(1 / 3,) * 5),
-        am.choose_method(d, plain), am.stitch(tracks, plain), am.fill(tracks), gap,
-        am.learn_bonds(truth), am.recognize(tracks, am.learn_bonds(truth)),
-        am.Join(marker=3, last=5, first=17, probability=1 / 3),
-        am.HypothesisCluster(
+        film.observations, polygon, am.camera.Mesh(vertices=np.eye(3), faces=[[0, 1, 2]]),
+        am.camera.Capsule(ends=[[0, 0, 0], [0, 0, 1]], radius=0.1), am.camera.Reason.VISIBLE,
+        rig[0].depth_image([polygon]), rig[0].paint([polygon]), am.camera.Face(0, 0),
+        am.camera.fit_lens(rig[0], am.camera.BrownConrady), space,
+        space.suggestions[0], space.coverage,
+        am.multiview.triangulate(np.zeros((30, 4, 2)), rig), made, made.views, made.model,
+        am.camera.BrownConrady(k1=1 / 3, k2=1 / 3, p1=1 / 3, p2=1 / 3, k3=1 / 3),
+        am.camera.ReportRadial(1 / 3, 1 / 3), am.camera.ViconRadial(1 / 3, 1 / 3, 1 / 3),
+        am.camera.QuadraticCorrection(ex=(1 / 3,) * 5, ey=(1 / 3,) * 5),
+        am.tracking.choose_method(d, plain), am.stitch(tracks, plain), am.fill_gaps(tracks), gap,
+        am.learn_bonds(truth), am.name_tracks(tracks, am.learn_bonds(truth)),
+        am.tracking.Join(marker=3, last=5, first=17, probability=1 / 3),
+        am.tracking.HypothesisCluster(
             targets=np.arange(9), detections=np.arange(90), origins=np.zeros((50, 9), dtype=int),
             probabilities=np.full(50, 1 / 50),
         ),
-        am.filter_states(tracks, plain), am.gate_groups(tracks, plain), aligned,
-        am.evaluate(tracks, truth), am.point_scores(made.detections, truth),
-        am.hota_scores(*labels), am.identity_scores(*labels), am.clear_scores(*by_frame),
-        am.gospa_scores(*by_frame), am.association_scores(*by_frame),
-        am.calibration(rng.random(50), rng.random(50) < 0.5),
-        am.k_best_assignments(rng.random((20, 20)), k=9),
-        am.joint_marginals(np.zeros((9, 9)), np.zeros(9)),
-        am.assign_multidimensional([[0, 1], [1, 0]], [1 / 3, 2 / 3]),
+        am.filter.filter_states(tracks, plain), am.filter.gate_groups(tracks, plain), aligned,
+        am.evaluate(tracks, truth), am.metrics.point_scores(made.detections, truth),
+        am.metrics.hota_scores(*labels), am.metrics.identity_scores(*labels),
+        am.metrics.clear_scores(*by_frame),
+        am.metrics.gospa_scores(*by_frame), am.metrics.association_scores(*by_frame),
+        am.metrics.calibration_curve(rng.random(50), rng.random(50) < 0.5),
+        am.solve.k_best_assignments(rng.random((20, 20)), k=9),
+        am.solve.joint_marginals(np.zeros((9, 9)), np.zeros(9)),
+        am.solve.assign_multidimensional([[0, 1], [1, 0]], [1 / 3, 2 / 3]),
         am.simulate.Burst(n=3), am.simulate.Ghosts(n=3), am.simulate.Visits(),
         am.simulate.Seeing(noise_px=1 / 3), *am.simulate.SCENES.values(), am.simulate.SCENES,
-        *am.FORMATS.values(), am.FORMATS, *am.CALIBRATIONS.values(), am.CALIBRATIONS, am.METHODS,
+        *am.io.CAPTURE_FORMATS.values(), am.io.CAPTURE_FORMATS,
+        *am.io.CALIBRATION_FORMATS.values(), am.io.CALIBRATION_FORMATS, am.tracking.METHODS,
         am.ParameterError(LONG, LONG, LONG, LONG), am.FormatError(LONG, LONG, LONG, LONG),
         am.SolverLimit(LONG, 3, 2, LONG), am.AsterismError(LONG),
     ]  # fmt: skip
@@ -175,7 +178,7 @@ def test_the_key_numbers_are_in_it():
         "Update(8 detections, 0 in tracks, 0 earlier labels revised)": update,
         f"Film(4 cameras, 20 frames, 8 markers, {n} image points)": film,
         "Truth(8 tracks, 160 detections in them, 0 clutter, 20 frames)": truth,
-        "8 by name: gnn, smp, jpda, splitting, tomht, mda, mht, mcmcda": am.METHODS,
+        "8 by name: gnn, smp, jpda, splitting, tomht, mda, mht, mcmcda": am.tracking.METHODS,
     }
     assert list(said) == [repr(value) for value in said.values()]
 
@@ -198,8 +201,11 @@ class Record:
         (lambda: Record(), "Record.first: expected a value, found nothing"),
         (lambda: Record(1), "expected options by name, found 1 without one. Write Record(first=…)"),
         (lambda: am.GNN(gatee=3), "Did you mean 'gate_probability'?"),
-        (lambda: am.BrownConrady(1, 2, 3, 4, 5, 6), "expected 5 values without a name, found 6"),
-        (lambda: am.BrownConrady(1, k1=2), "BrownConrady.k1: expected one value, found two"),
+        (
+            lambda: am.camera.BrownConrady(1, 2, 3, 4, 5, 6),
+            "expected 5 values without a name, found 6",
+        ),
+        (lambda: am.camera.BrownConrady(1, k1=2), "BrownConrady.k1: expected one value, found two"),
         (lambda: dataclasses.replace(am.GNN(), delete_ods=5), "Did you mean 'delete_odds'?"),
     ],
 )  # fmt: skip

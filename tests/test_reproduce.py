@@ -13,11 +13,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from asterism.app import main
-from asterism.app.reproduce.inline_svg import inline
-from asterism.app.reproduce.marriage import marry, worst
-from asterism.app.reproduce.parts import PARTS, load
-from asterism.app.reproduce.rules import alike, differs, exact, spread, within
+from asterism.cli import main
+from asterism.reproduction.inline_svg import inline
+from asterism.reproduction.marriage import marry, worst
+from asterism.reproduction.parts import PARTS, load
+from asterism.reproduction.rules import alike, differs, exact, spread, within
 
 QUICK = ("--quick", "--seeds", "2", "--only", "preferences", "--only", "splitting")
 
@@ -75,7 +75,7 @@ def test_files_of_a_part(made):
 def test_the_same_seeds_give_the_same_bytes(made, tmp_path):
     # In another process: nothing may come from the order of sets or from what ran before.
     subprocess.run(
-        [sys.executable, "-m", "asterism.app", "reproduce", *QUICK, "-o", "again", "-q"],
+        [sys.executable, "-m", "asterism.cli", "reproduce", *QUICK, "-o", "again", "-q"],
         cwd=tmp_path, check=True, timeout=120,
     )  # fmt: skip
     first, second = files_of(made), files_of(tmp_path / "again")
@@ -167,7 +167,7 @@ def test_what_is_finished_is_written_when_it_is_stopped(tmp_path):
     # The second part would take a minute.
     line = ["--only", "gates", "--only", "mcmcda", "--seeds", "30", "-o", "out"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "asterism.app", "reproduce", *line],
+        [sys.executable, "-m", "asterism.cli", "reproduce", *line],
         cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip

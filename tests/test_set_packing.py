@@ -82,7 +82,7 @@ def test_equals_the_exact_solver_where_there_are_many():
                 row[1 + np.array(uses, dtype=int)] = 0
                 tuples.append(row)
                 weights.append(worth - none)
-        exact = am.assign_multidimensional(tuples, weights)
+        exact = am.solve.assign_multidimensional(tuples, weights)
         _, totals, is_exact, _, _ = pack(trees, 1)
         assert is_exact
         assert totals[0] == pytest.approx(exact.value + free, abs=1e-6)

@@ -45,7 +45,7 @@ def strict_by_hand(detections: am.Detections, model: am.TrackingModel, proposers
 @pytest.mark.parametrize("seed", range(4))
 def test_strict_is_the_reports_method(proposers, seed):
     scene = am.simulate.walk(n_markers=6, frames=25, rate=10, stride=0.03, seed=seed)
-    detections = am.simulate.sense(scene, noise=0.004, seed=seed).detections
+    detections = am.simulate.corrupt(scene, noise=0.004, seed=seed).detections
     model = small_model(motion=am.DWNA(acceleration_sigma=5.0, velocity_sigma=0.8))
     method = am.SMP(strict=True, proposers=proposers)
     by_hand = strict_by_hand(detections, model, proposers)
@@ -71,7 +71,7 @@ def test_the_reports_first_three_tests_are_all_correct(seed):
         (am.simulate.walk(seed=seed, stride=0.005), am.RandomWalk(walk_sigma=0.005)),
     ]
     for scene, motion in cases:
-        detections = am.simulate.sense(scene, noise=0.0005, seed=seed)
+        detections = am.simulate.corrupt(scene, noise=0.0005, seed=seed)
         model = small_model(motion=motion, **quiet)
         tracks = am.track(detections.detections, am.SMP(strict=True), model=model)
         assert am.evaluate(tracks, detections).wrong_links == 0
@@ -79,7 +79,7 @@ def test_the_reports_first_three_tests_are_all_correct(seed):
 
 def test_strict_refuses_what_it_cannot_handle():
     scene = am.simulate.cube(frames=6, rate=10)
-    d = am.simulate.sense(scene, missing=0.2, seed=3).detections
+    d = am.simulate.corrupt(scene, missing=0.2, seed=3).detections
     uneven = int(np.flatnonzero(d.counts != d.counts[0])[0])
     method, model = am.SMP(strict=True), small_model()
     with pytest.raises(am.ParameterError, match=rf"frame {uneven}.*strict"):
@@ -129,7 +129,7 @@ def test_proposals_grow_like_n_log_n():
 @pytest.mark.parametrize("seed", range(5))
 def test_hospitals_and_residents_equal_the_blackboard(proposers, capacity, seed):
     scene = am.simulate.walk(n_markers=5, frames=25, rate=10, stride=0.03, seed=seed)
-    d = am.simulate.sense(
+    d = am.simulate.corrupt(
         scene, noise=0.004, missing=0.1, clutter=0.2, doubled=0.4, doubled_apart=0.012, seed=seed
     ).detections
     model = small_model(motion=am.DWNA(acceleration_sigma=5.0, velocity_sigma=0.8))
@@ -141,7 +141,7 @@ def test_hospitals_and_residents_equal_the_blackboard(proposers, capacity, seed)
 
 def test_a_marker_seen_as_two_blobs_is_one_track():
     scene = am.simulate.smooth(n_markers=10, frames=150, seed=1)
-    sensed = am.simulate.sense(scene, noise=0.003, doubled=0.7, doubled_apart=0.01, seed=2)
+    sensed = am.simulate.corrupt(scene, noise=0.003, doubled=0.7, doubled_apart=0.01, seed=2)
     model = small_model(
         motion=am.DWNA(acceleration_sigma=0.006, velocity_sigma=0.03), max_speed=0.2
     )

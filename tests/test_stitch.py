@@ -12,21 +12,22 @@ from scipy.spatial.transform import Rotation
 import asterism as am
 from asterism import _engine
 from asterism.simulate import Burst, Ghosts
+from scenes import stitched
 
 PERSON = am.simulate.person
 
 
 def disturbed(seed, *, scene=PERSON, **more):
     truth = scene(seed=seed)
-    return am.simulate.sense(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed, **more)
+    return am.simulate.corrupt(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed, **more)
 
 
 @functools.cache
 def person(seed):
-    """A disturbed person, its model, and its markers as `identify` finds them."""
+    """A disturbed person, its model, and its markers as `stitch` finds them."""
     truth = disturbed(seed)
     model = am.estimate_model(truth.detections).model
-    return truth, model, am.identify(truth.detections, model=model)
+    return truth, model, stitched(truth.detections, model=model)
 
 
 def kabsch(a, b, w):
@@ -88,7 +89,7 @@ def test_hidden_markers_of_a_person_are_found_again(method, seed):
     truth, model, found = person(seed)
     lost = am.evaluate(am.track(truth.detections, method, model=model, seed=1), truth)
     if method != am.SMP(window=3):
-        found = am.identify(truth.detections, method, model=model, seed=1)
+        found = stitched(truth.detections, method, model=model, seed=1)
     e = am.evaluate(found.tracks, truth)
     assert e.idf1 > 0.985 > 0.96 > lost.idf1
     assert e.switches_per_1000 < 0.5
@@ -128,9 +129,9 @@ def test_joins_are_right_as_often_as_they_say():
 )
 def test_it_does_no_harm(scene, noise):
     plain: list[float] = []
-    stitched: list[float] = []
+    joined: list[float] = []
     for seed in range(2):
-        truth = am.simulate.sense(
+        truth = am.simulate.corrupt(
             am.simulate.SCENES[scene].make(seed=seed),
             missing=0.1,
             clutter=0.1,
@@ -140,9 +141,9 @@ def test_it_does_no_harm(scene, noise):
         model = am.estimate_model(truth.detections).model
         tracks = am.track(truth.detections, am.SMP(window=3), model=model)
         plain.append(am.evaluate(tracks, truth).idf1)
-        found = am.identify(truth.detections, model=model)
-        stitched.append(am.evaluate(found.tracks, truth).idf1)
-    assert np.mean(stitched) > np.mean(plain) - 0.001
+        found = stitched(truth.detections, model=model)
+        joined.append(am.evaluate(found.tracks, truth).idf1)
+    assert np.mean(joined) > np.mean(plain) - 0.001
 
 
 def test_where_neighbours_carry_nobody_motion_decides():
@@ -150,13 +151,13 @@ def test_where_neighbours_carry_nobody_motion_decides():
     for seed in range(4):
         made = am.simulate.smooth(seed=seed)
         hidden = Burst(n=4, shortest=5, longest=12)
-        truth = am.simulate.sense(made, burst=hidden, noise=0.005, seed=seed)
-        found.append(am.evaluate(am.identify(truth.detections).tracks, truth).idf1)
+        truth = am.simulate.corrupt(made, burst=hidden, noise=0.005, seed=seed)
+        found.append(am.evaluate(stitched(truth.detections).tracks, truth).idf1)
     assert np.mean(found) > 0.99  # 0.987 where the bodies are always believed
 
 
 def test_a_link_that_the_neighbours_contradict_is_cut():
-    truth = am.simulate.sense(PERSON(seed=2), noise=3e-4, seed=2)
+    truth = am.simulate.corrupt(PERSON(seed=2), noise=3e-4, seed=2)
     d = truth.detections
     labels = truth.labels.copy()
     late = d.frame_of >= d.n_frames // 2
@@ -171,7 +172,7 @@ def test_a_link_that_the_neighbours_contradict_is_cut():
 
 
 def test_whoever_cuts_nothing_and_hides_nothing_changes_nothing():
-    truth = am.simulate.sense(PERSON(seed=3), noise=3e-4, seed=3)
+    truth = am.simulate.corrupt(PERSON(seed=3), noise=3e-4, seed=3)
     model = am.estimate_model(truth.detections).model
     found = am.stitch(truth, model)
     assert found.n_cuts <= 4  # in two passes over 15 847 links
@@ -181,7 +182,7 @@ def test_whoever_cuts_nothing_and_hides_nothing_changes_nothing():
 
 def test_names_and_confidence_stay():
     truth, model, _ = person(1)
-    model = am.fragment_model(model)
+    model = am.tracking.tracklet_model(model)
     fragments = am.track(truth.detections, am.MCMCDA(), model=model, seed=1)
     named = dataclasses.replace(fragments, names=tuple(f"t{k}" for k in range(fragments.n_tracks)))
     found = am.stitch(named, model)
@@ -222,7 +223,7 @@ def test_labels_come_from_fragments_and_joins_from_both():
 
 def test_the_same_input_gives_the_same():
     truth, model, one = person(5)
-    two = am.identify(truth.detections, model=model)
+    two = stitched(truth.detections, model=model)
     np.testing.assert_array_equal(one.tracks.labels, two.tracks.labels)
     np.testing.assert_array_equal(one.probabilities, two.probabilities)
 
@@ -239,7 +240,7 @@ def test_in_the_plane():
     at[100:140, 3] = np.nan
     at[120:150, 5] = np.nan
     truth = am.Tracks.from_dense(t / 100, at)
-    found = am.identify(truth.detections)
+    found = stitched(truth.detections)
     assert am.evaluate(found.tracks, truth).idf1 == 1
     assert {(join.last, join.first) for join in found.joins} >= {(99, 140), (119, 150)}
 
@@ -261,7 +262,7 @@ def test_little_or_nothing(n_frames):
 
 def test_a_marker_that_is_forgotten_is_new():
     truth, model, remembered = person(6)
-    forgotten = am.identify(truth.detections, model=model, max_hidden=30)
+    forgotten = stitched(truth.detections, model=model, max_hidden=30)
     longest = max(join.first - join.last for join in forgotten.joins)
     assert longest <= 30 + 15
     assert forgotten.tracks.n_tracks > remembered.tracks.n_tracks

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 import asterism as am
 from asterism import _engine
-from asterism.label.passes import Pass, go_through
-from asterism.label.stitching import stitch_options
 from asterism.model.compiled import motion_model, steps_of, transition
+from asterism.tracking.stitching.passes import Pass, go_through
+from asterism.tracking.stitching.whole import stitch_options
 
 NOISE = 1e-3
 MODEL = am.TrackingModel(
@@ -426,11 +426,11 @@ def test_where_there_is_no_body_a_marker_goes_on_as_it_moved():
 
 
 def test_a_backward_pass_is_a_forward_one_through_the_take_reversed():
-    truth = am.simulate.sense(am.simulate.person(seed=1), burst=am.simulate.Burst(), seed=1)
+    truth = am.simulate.corrupt(am.simulate.person(seed=1), burst=am.simulate.Burst(), seed=1)
     d = truth.detections
     inside = d.frame_of < 120
     d = am.Detections(times=d.times[:120], offsets=d.offsets[:121], points=d.points[inside])
-    model = am.fragment_model(MODEL)
+    model = am.tracking.tracklet_model(MODEL)
     labels = am.track(d, am.GNN(), model=model).labels
     turned = am.Detections(
         times=-d.times[::-1], offsets=d.n_points - d.offsets[::-1], points=d.points[::-1]

@@ -9,6 +9,7 @@ import pytest
 
 import asterism as am
 from asterism.simulate import Burst, Ghosts
+from scenes import stitched
 
 MODEL = am.TrackingModel(
     motion=am.RandomWalk(walk_sigma=0.05),
@@ -21,7 +22,7 @@ MODEL = am.TrackingModel(
 def disturbed(seed, frames=300):
     """A person and its model."""
     truth = am.simulate.person(seed=seed, frames=frames)
-    truth = am.simulate.sense(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
+    truth = am.simulate.corrupt(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
     return truth, am.estimate_model(truth.detections).model
 
 
@@ -44,7 +45,7 @@ def streamed(method, detections, model):
 def streamed_person(seed):
     """The same of a person, by the method as it is."""
     truth, model = disturbed(seed)
-    return streamed(am.Stitched(), truth.detections, model)
+    return streamed(am.tracking.Stitched(), truth.detections, model)
 
 
 @pytest.mark.parametrize(
@@ -58,11 +59,11 @@ def streamed_person(seed):
 def test_a_stream_is_as_good_as_the_whole_take(method, seed):
     truth, model = disturbed(seed)
     d = truth.detections
-    whole = am.evaluate(am.identify(d, method, model=model, seed=1).tracks, truth)
-    if method == am.Stitched().method:
+    whole = am.evaluate(stitched(d, method, model=model, seed=1).tracks, truth)
+    if method == am.tracking.Stitched().method:
         state, labels, *_ = streamed_person(seed)
     else:
-        state, labels, *_ = streamed(am.Stitched(method=method), d, model)
+        state, labels, *_ = streamed(am.tracking.Stitched(method=method), d, model)
     e = am.evaluate(am.Tracks(detections=d, labels=labels), truth)
     assert e.idf1 > whole.idf1 - 0.005
     assert e.switches_per_1000 < 0.6
@@ -74,7 +75,7 @@ def test_a_stream_is_as_good_as_the_whole_take(method, seed):
 def test_what_comes_back_is_guessed_soon(seed):
     truth, _ = disturbed(seed)
     d = truth.detections
-    method = am.Stitched()
+    method = am.tracking.Stitched()
     _, final, first, when = streamed_person(seed)
     frame = d.frame_of
     late = when - frame
@@ -98,7 +99,7 @@ def test_run_is_the_loop_over_step():
     truth, model = disturbed(1)
     d = truth.detections
     _, labels, *_ = streamed_person(1)
-    tracks = am.track(d, am.Stitched(), model=model, seed=1)
+    tracks = am.track(d, am.tracking.Stitched(), model=model, seed=1)
     np.testing.assert_array_equal(tracks.labels, labels)
     assert tracks.info["joins"] > 10
 
@@ -106,7 +107,7 @@ def test_run_is_the_loop_over_step():
 def test_a_state_is_a_value():
     truth, model = disturbed(1, frames=100)
     frames = list(truth.detections)
-    method = am.Stitched()
+    method = am.tracking.Stitched()
     state = method.init(model)
     for time, points in frames[:60]:
         state, _ = method.step(state, time, points)
@@ -126,7 +127,7 @@ def test_a_state_is_a_value():
 def test_empty_frames_and_two_axes():
     rng = np.random.default_rng(0)
     corner = rng.uniform(0, 1, (8, 2))
-    method = am.Stitched(confirm=5)
+    method = am.tracking.Stitched(confirm=5)
     state = method.init(MODEL, n_axes=2)
     for t in range(60):
         points = corner + 0.002 * t
@@ -140,7 +141,7 @@ def test_empty_frames_and_two_axes():
 def test_an_endless_run_remembers_what_it_may():
     rng = np.random.default_rng(3)
     _, model = disturbed(0)
-    method = am.Stitched(max_hidden=50, confirm=3)
+    method = am.tracking.Stitched(max_hidden=50, confirm=3)
     state = method.init(model)
     place = np.zeros(3)
     for t in range(1500):
@@ -163,12 +164,12 @@ def test_an_endless_run_remembers_what_it_may():
 )
 def test_options_out_of_range_are_refused(wrong, name):
     with pytest.raises(am.ParameterError, match=name):
-        am.Stitched(**wrong)
+        am.tracking.Stitched(**wrong)
 
 
 @pytest.mark.parametrize(("time", "points"), [(0.0, []), (-1, []), (1, [[np.nan] * 3])])
 def test_frames_that_are_wrong_are_refused(time, points):
-    method = am.Stitched()
+    method = am.tracking.Stitched()
     state = method.init(MODEL)
     state, _ = method.step(state, 0.0, [[0, 0, 0]])
     with pytest.raises(am.ParameterError):

@@ -11,9 +11,13 @@ from matplotlib.path import Path as Outline
 import asterism as am
 from camera_oracle import capsule_entry, first_triangle
 
-K = am.intrinsics(focal_length=300.0, principal_point=(159.5, 119.5))
+K = am.camera.intrinsics(focal_length=300.0, principal_point=(159.5, 119.5))
 SIZE = (320, 240)
-LENSES = [None, am.BrownConrady(k1=-0.25, k2=0.08, p1=0.002), am.ReportRadial(a1=-0.2)]
+LENSES = [
+    None,
+    am.camera.BrownConrady(k1=-0.25, k2=0.08, p1=0.002),
+    am.camera.ReportRadial(a1=-0.2),
+]
 
 
 def camera(lens=None, position=(0.0, -4.0, 1.0)):
@@ -30,7 +34,7 @@ def triangles_of(rng, n, size=0.6):
 
 def loose_mesh(triangles):
     faces = np.arange(3 * len(triangles)).reshape(-1, 3)
-    return am.Mesh(vertices=triangles.reshape(-1, 3), faces=faces)
+    return am.camera.Mesh(vertices=triangles.reshape(-1, 3), faces=faces)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -39,17 +43,17 @@ def test_triangles_hide_as_the_oracle_says(seed):
     corners = triangles_of(rng, rng.integers(1, 40))
     points = cloud(rng, 300)
     c = camera()
-    as_polygons = c.project(points, [am.Polygon(corners=t) for t in corners])
-    mesh = am.Mesh(
+    as_polygons = c.project(points, [am.camera.Polygon(corners=t) for t in corners])
+    mesh = am.camera.Mesh(
         vertices=corners.reshape(-1, 3), faces=np.arange(3 * len(corners)).reshape(-1, 3)
     )
     as_mesh = c.project(points, [mesh])
     expected = np.array([first_triangle(c.center, p, corners) for p in points])
-    in_image = np.isin(as_polygons.reason, (am.Reason.VISIBLE, am.Reason.HIDDEN))
+    in_image = np.isin(as_polygons.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN))
     assert (expected[in_image] >= 0).any()
     np.testing.assert_array_equal(as_polygons.hidden_by[in_image], expected[in_image])
     np.testing.assert_array_equal(
-        as_polygons.reason == am.Reason.HIDDEN, as_polygons.hidden_by >= 0
+        as_polygons.reason == am.camera.Reason.HIDDEN, as_polygons.hidden_by >= 0
     )
     np.testing.assert_array_equal(as_mesh.hidden_by[in_image], np.minimum(expected[in_image], 0))
 
@@ -63,9 +67,9 @@ def test_a_thousand_triangles_far_from_the_origin(far_away):
     shift = np.array([far_away, -far_away, far_away])
     stand, target = shift + np.array([0.0, -4.0, 1.0]), shift + np.array([0.0, 0.0, 1.0])
     c = am.Camera.look_at(stand, target, K=K, size_px=SIZE)
-    found = c.project(points + shift, [am.Polygon(corners=t + shift) for t in corners])
+    found = c.project(points + shift, [am.camera.Polygon(corners=t + shift) for t in corners])
     expected = [first_triangle(c.center, p + shift, corners + shift) for p in points]
-    in_image = np.isin(found.reason, (am.Reason.VISIBLE, am.Reason.HIDDEN))
+    in_image = np.isin(found.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN))
     np.testing.assert_array_equal(found.hidden_by[in_image], np.array(expected)[in_image])
 
 
@@ -87,17 +91,17 @@ def test_concave_polygons_hide_what_lies_within_their_outline(seed):
     on_plane = rng.uniform(-1.4, 1.4, (400, 2))
     targets = np.column_stack([on_plane[:, 0], np.zeros(400), 1 + on_plane[:, 1]])
     points = c.center + 1.5 * (targets - c.center)
-    found = c.project(points, [am.Polygon(corners=corners)])
+    found = c.project(points, [am.camera.Polygon(corners=corners)])
     inside = Outline(outline).contains_points(on_plane)
-    in_image = np.isin(found.reason, (am.Reason.VISIBLE, am.Reason.HIDDEN))
+    in_image = np.isin(found.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN))
     np.testing.assert_array_equal((found.hidden_by == 0)[in_image], inside[in_image])
-    before = c.project(c.center + 0.9 * (targets - c.center), [am.Polygon(corners=corners)])
+    before = c.project(c.center + 0.9 * (targets - c.center), [am.camera.Polygon(corners=corners)])
     assert (before.hidden_by == -1).all()
 
 
 def test_a_polygon_in_the_shape_of_a_u_lets_points_through_its_gap():
     u = [[-1, 0], [1, 0], [1, 2], [0.5, 2], [0.5, 0.5], [-0.5, 0.5], [-0.5, 2], [-1, 2]]
-    curtain = am.Polygon(corners=[[x, 0, z] for x, z in u], name="u")
+    curtain = am.camera.Polygon(corners=[[x, 0, z] for x, z in u], name="u")
     behind = camera().project(
         [[0, 0.01, 1.5], [0.75, 0.01, 1.5], [0, 0.01, 0.25], [0.75, -0.01, 1.5]], [curtain]
     )
@@ -108,12 +112,12 @@ def test_a_polygon_in_the_shape_of_a_u_lets_points_through_its_gap():
 def test_capsules_hide_as_marching_says(seed):
     rng = np.random.default_rng(seed)
     c = camera()
-    capsules = [am.Capsule(ends=cloud(rng, 2), radius=r) for r in (0.3, 0.15)]
-    capsules.append(am.Capsule(ends=np.tile(cloud(rng, 1), (2, 1)), radius=0.4))  # a ball
+    capsules = [am.camera.Capsule(ends=cloud(rng, 2), radius=r) for r in (0.3, 0.15)]
+    capsules.append(am.camera.Capsule(ends=np.tile(cloud(rng, 1), (2, 1)), radius=0.4))  # a ball
     points = cloud(rng, 60)
     found = c.project(points, capsules)
     for p, who, reason in zip(points, found.hidden_by, found.reason, strict=True):
-        if reason not in (am.Reason.VISIBLE, am.Reason.HIDDEN):
+        if reason not in (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN):
             continue
         entries = [
             capsule_entry(c.center, p - c.center, k.ends[0], k.radius, 1.0) for k in capsules
@@ -124,7 +128,7 @@ def test_capsules_hide_as_marching_says(seed):
 
 
 def test_markers_lie_on_the_skin_of_a_capsule():
-    capsule = am.Capsule(ends=[[0, 0, 0.5], [0, 0, 1.5]], radius=0.2)
+    capsule = am.camera.Capsule(ends=[[0, 0, 0.5], [0, 0, 1.5]], radius=0.2)
     angles = 2 * np.pi * np.arange(16) / 16
     on_skin = np.column_stack([0.2 * np.cos(angles), 0.2 * np.sin(angles), np.full(16, 1.0)])
     found = camera().project(on_skin, [capsule])
@@ -140,7 +144,7 @@ def test_no_ray_slips_through_the_seams_of_a_mesh():
     i = np.arange(n * n).reshape(n, n)
     quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
     faces = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
-    mesh = am.Mesh(vertices=vertices, faces=faces)
+    mesh = am.camera.Mesh(vertices=vertices, faces=faces)
     edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     s = rng.uniform(size=(len(edges), 1))
     on_seams = vertices[edges[:, 0]] * (1 - s) + vertices[edges[:, 1]] * s
@@ -148,7 +152,7 @@ def test_no_ray_slips_through_the_seams_of_a_mesh():
     c = camera()
     for targets in (on_seams[inner], vertices[i[1:-1, 1:-1].ravel()]):
         found = c.project(c.center + 1.3 * (targets - c.center), [mesh])
-        seen = np.isin(found.reason, (am.Reason.VISIBLE, am.Reason.HIDDEN))
+        seen = np.isin(found.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN))
         assert (found.hidden_by[seen] == 0).all()
 
 
@@ -158,21 +162,21 @@ def test_surfaces_that_move_equal_those_that_stand_frame_by_frame():
     points = rng.uniform([-1, -1, 0], [1, 2, 2], (T, 100, 3))
     shift = rng.normal(0, 0.3, (T, 1, 3))
     base = triangles_of(rng, 8, size=0.2)
-    wall = am.Polygon(corners=[[-1, -1, 0], [0, -1, 0], [0, -1, 1]])
+    wall = am.camera.Polygon(corners=[[-1, -1, 0], [0, -1, 0], [0, -1, 1]])
     moving = [
         wall,
-        am.Mesh(vertices=base.reshape(-1, 3) + shift, faces=np.arange(24).reshape(-1, 3)),
-        am.Polygon(corners=base[0] + [0.1, -0.1, 0] + shift),
-        am.Capsule(ends=rng.normal(size=(2, 3)) + shift, radius=0.2),
+        am.camera.Mesh(vertices=base.reshape(-1, 3) + shift, faces=np.arange(24).reshape(-1, 3)),
+        am.camera.Polygon(corners=base[0] + [0.1, -0.1, 0] + shift),
+        am.camera.Capsule(ends=rng.normal(size=(2, 3)) + shift, radius=0.2),
     ]
     rig = am.Rig((camera(), camera(position=(3.0, -2.0, 2.0))))
     together = rig.project(points, moving)
     for t in range(T):
         standing = [
             wall,
-            am.Mesh(vertices=moving[1].vertices[t], faces=moving[1].faces),
-            am.Polygon(corners=moving[2].corners[t]),
-            am.Capsule(ends=moving[3].ends[t], radius=0.2),
+            am.camera.Mesh(vertices=moving[1].vertices[t], faces=moving[1].faces),
+            am.camera.Polygon(corners=moving[2].corners[t]),
+            am.camera.Capsule(ends=moving[3].ends[t], radius=0.2),
         ]
         alone = rig.project(points[t], standing)
         np.testing.assert_array_equal(together.hidden_by[:, t], alone.hidden_by)
@@ -183,10 +187,12 @@ def test_surfaces_that_move_equal_those_that_stand_frame_by_frame():
 
 
 def scene_of(rng, n=12):
-    surfaces = [am.Polygon(corners=t) for t in triangles_of(rng, n)]
-    surfaces.append(am.Capsule(ends=cloud(rng, 2), radius=0.25))
+    surfaces = [am.camera.Polygon(corners=t) for t in triangles_of(rng, n)]
+    surfaces.append(am.camera.Capsule(ends=cloud(rng, 2), radius=0.25))
     surfaces.append(
-        am.Mesh(vertices=triangles_of(rng, 4).reshape(-1, 3), faces=np.arange(12).reshape(4, 3))
+        am.camera.Mesh(
+            vertices=triangles_of(rng, 4).reshape(-1, 3), faces=np.arange(12).reshape(4, 3)
+        )
     )
     return surfaces
 
@@ -223,9 +229,9 @@ def test_the_z_buffer_hides_points_as_rays_do_away_from_edges(lens):
     c, surfaces = camera(lens), scene_of(rng)
     image = c.depth_image(surfaces)
     projection = c.project(cloud(rng, 4000), surfaces)
-    exact = projection.reason == am.Reason.HIDDEN
+    exact = projection.reason == am.camera.Reason.HIDDEN
     # Away from edges: all pixels around are of one surface, whose depth hardly changes.
-    in_image = np.isin(projection.reason, (am.Reason.VISIBLE, am.Reason.HIDDEN))
+    in_image = np.isin(projection.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN))
     v, u = np.rint(projection.pixels[in_image][:, ::-1]).astype(int).T
     inner = (u > 0) & (v > 0) & (u < SIZE[0] - 1) & (v < SIZE[1] - 1)
     around = np.array(
@@ -255,7 +261,7 @@ def bars(n=3, lift=0.3):
         p, q = p - 0.25 * (q - p), q + 0.25 * (q - p)
         side = np.cross(q - p, [0, 1, 0])
         side *= 0.12 / np.linalg.norm(side)
-        result.append(am.Polygon(corners=[p - side, p + side, q + side, q - side]))
+        result.append(am.camera.Polygon(corners=[p - side, p + side, q + side, q - side]))
     return result
 
 
@@ -277,8 +283,12 @@ def test_the_painter_fails_on_a_cycle_and_says_so(lens, n):
 
 
 def test_the_painter_tells_of_faces_that_pass_through_each_other():
-    one = am.Polygon(corners=[[-1, -0.5, 0.5], [1, 0.5, 0.5], [1, 0.5, 1.5], [-1, -0.5, 1.5]])
-    other = am.Polygon(corners=[[-1, 0.5, 0.6], [1, -0.5, 0.6], [1, -0.5, 1.6], [-1, 0.5, 1.6]])
+    one = am.camera.Polygon(
+        corners=[[-1, -0.5, 0.5], [1, 0.5, 0.5], [1, 0.5, 1.5], [-1, -0.5, 1.5]]
+    )
+    other = am.camera.Polygon(
+        corners=[[-1, 0.5, 0.6], [1, -0.5, 0.6], [1, -0.5, 1.6], [-1, 0.5, 1.6]]
+    )
     assert len(camera().paint([one, other]).cycles) == 1
 
 
@@ -286,9 +296,9 @@ def test_the_painter_tells_of_faces_that_pass_through_each_other():
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(0, 14))
 def test_the_painter_is_right_wherever_there_is_an_order(seed, n):
     rng = np.random.default_rng(seed)
-    surfaces = [am.Polygon(corners=t) for t in triangles_of(rng, n, size=0.3)]
+    surfaces = [am.camera.Polygon(corners=t) for t in triangles_of(rng, n, size=0.3)]
     surfaces.append(
-        am.Mesh(
+        am.camera.Mesh(
             vertices=triangles_of(rng, 2, size=0.3).reshape(-1, 3), faces=[[0, 1, 2], [3, 4, 5]]
         )
     )
@@ -300,8 +310,8 @@ def test_the_painter_is_right_wherever_there_is_an_order(seed, n):
 
 
 def test_what_stands_behind_the_camera_hides_nothing():
-    behind = am.Polygon(corners=[[-9, -5, -9], [9, -5, -9], [0, -5, 9]])
-    before = am.Polygon(corners=[[0.5, -5, 0], [0.5, 3, 0], [0.5, 3, 2]])
+    behind = am.camera.Polygon(corners=[[-9, -5, -9], [9, -5, -9], [0, -5, 9]])
+    before = am.camera.Polygon(corners=[[0.5, -5, 0], [0.5, 3, 0], [0.5, 3, 2]])
     for surfaces in ([behind], [behind, before]):
         found = camera().project([[0, 0, 1], [-0.5, 1, 0.5]], surfaces)
         assert found.visible.all()
@@ -310,9 +320,9 @@ def test_what_stands_behind_the_camera_hides_nothing():
 
 def test_of_two_surfaces_at_one_place_the_first_is_named():
     rng = np.random.default_rng(8)
-    wall = am.Polygon(corners=[[-1, 0, 0], [1, 0, 0], [0, 0, 2.0]])
-    ball = am.Capsule(ends=[[0, 2, 1], [0, 2, 1]], radius=0.5)
-    others = [am.Polygon(corners=t + np.array([0, 9, 0])) for t in triangles_of(rng, 20)]
+    wall = am.camera.Polygon(corners=[[-1, 0, 0], [1, 0, 0], [0, 0, 2.0]])
+    ball = am.camera.Capsule(ends=[[0, 2, 1], [0, 2, 1]], radius=0.5)
+    others = [am.camera.Polygon(corners=t + np.array([0, 9, 0])) for t in triangles_of(rng, 20)]
     surfaces = [*others[:10], wall, wall, ball, ball, *others[10:], wall, ball]
     points = [[0.1, 0.5, 1], [0.0, 4, 1.0]]
     assert camera().project(points, surfaces).hidden_by.tolist() == [10, 10]
@@ -324,16 +334,16 @@ def test_of_two_surfaces_at_one_place_the_first_is_named():
 
 def test_a_surface_around_the_camera_hides_everything():
     c = camera()
-    ball = am.Capsule(ends=np.tile(c.center, (2, 1)), radius=0.1)
+    ball = am.camera.Capsule(ends=np.tile(c.center, (2, 1)), radius=0.1)
     found = c.project([[0, 0, 1], [0, 0.5, 1.2]], [ball])
-    assert (found.reason == am.Reason.HIDDEN).all()
+    assert (found.reason == am.camera.Reason.HIDDEN).all()
     image = c.depth_image([ball])
     np.testing.assert_array_equal(image.surface, 0)
     assert image.depth.min() > 0
 
 
 def test_a_floor_that_passes_under_the_camera():
-    floor = am.Polygon(corners=[[-50, -50, 0], [50, -50, 0], [50, 50, 0], [-50, 50, 0]])
+    floor = am.camera.Polygon(corners=[[-50, -50, 0], [50, -50, 0], [50, 50, 0], [-50, 50, 0]])
     c = camera()
     image = c.depth_image([floor])
     below = np.arange(SIZE[1]) > K[1, 2] + 300 * 1 / 50  # rays that reach the floor before its end
@@ -347,15 +357,15 @@ def test_a_floor_that_passes_under_the_camera():
 
 def test_edge_on_hides_nothing_and_both_sides_hide():
     c = camera()
-    edge_on = am.Polygon(corners=[[0, -1, 0], [0, 1, 0], [0, 1, 2], [0, -1, 2]])
+    edge_on = am.camera.Polygon(corners=[[0, -1, 0], [0, 1, 0], [0, 1, 2], [0, -1, 2]])
     assert c.project([[0.001, 0.5, 1], [-0.001, 0.5, 1]], [edge_on]).visible.all()
     corners = np.array([[-1, 0, 0], [1, 0, 0], [0, 0, 2.0]])
     for one in (corners, corners[::-1]):
-        assert c.project([0, 1, 1], [am.Polygon(corners=one)]).hidden_by == 0
+        assert c.project([0, 1, 1], [am.camera.Polygon(corners=one)]).hidden_by == 0
 
 
 def test_clearance():
-    wall = am.Polygon(corners=[[-1, 0, 0], [1, 0, 0], [0, 0, 2.0]])
+    wall = am.camera.Polygon(corners=[[-1, 0, 0], [1, 0, 0], [0, 0, 2.0]])
     just_behind = [0, 0.01, 1]
     assert camera().project(just_behind, [wall]).hidden_by == 0
     assert camera().project(just_behind, [wall], clearance=0.02).visible
@@ -364,26 +374,26 @@ def test_clearance():
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1.0]])
 
 
-MOVING = am.Polygon(corners=np.stack([SQUARE] * 4))
+MOVING = am.camera.Polygon(corners=np.stack([SQUARE] * 4))
 
 BAD = [
-    (lambda: am.Polygon(corners=SQUARE[:2]), "at least 3"),
-    (lambda: am.Polygon(corners=SQUARE + 0.01 * np.eye(4)[:, 3:] * [0, 1, 0]), "plane"),
-    (lambda: am.Polygon(corners=SQUARE[[0, 1, 3, 2]]), "area|cross"),
-    (lambda: am.Polygon(corners=[[0, 0, 0], [2, 0, 2], [2, 0, 0], [0, 0, 1]]), "cross"),
-    (lambda: am.Polygon(corners=[[0, 0, 0], [1, 0, 0], [2, 0, 0]]), "area"),
-    (lambda: am.Polygon(corners=np.zeros((4, 3))), "area"),
-    (lambda: am.Polygon(corners=SQUARE * np.nan), "finite"),
-    (lambda: am.Polygon(corners=SQUARE[:, :2]), "shape"),
-    (lambda: am.Polygon(corners=np.stack([SQUARE, SQUARE * 0])), "area.*moment 1"),
-    (lambda: am.Polygon(corners=np.empty((0, 4, 3))), "moment"),
-    (lambda: am.Mesh(vertices=SQUARE, faces=[[0, 1, 4]]), "face 0"),
-    (lambda: am.Mesh(vertices=SQUARE, faces=[[0, 1, -1]]), "faces"),
-    (lambda: am.Mesh(vertices=SQUARE, faces=[[0.5, 1, 2]]), "faces"),
-    (lambda: am.Mesh(vertices=SQUARE, faces=[[0, 1]]), "shape"),
-    (lambda: am.Capsule(ends=SQUARE[:2], radius=0.0), "radius"),
-    (lambda: am.Capsule(ends=SQUARE[:3], radius=1.0), "shape"),
-    (lambda: am.Capsule(ends=SQUARE[:2] + np.inf, radius=1.0), "finite"),
+    (lambda: am.camera.Polygon(corners=SQUARE[:2]), "at least 3"),
+    (lambda: am.camera.Polygon(corners=SQUARE + 0.01 * np.eye(4)[:, 3:] * [0, 1, 0]), "plane"),
+    (lambda: am.camera.Polygon(corners=SQUARE[[0, 1, 3, 2]]), "area|cross"),
+    (lambda: am.camera.Polygon(corners=[[0, 0, 0], [2, 0, 2], [2, 0, 0], [0, 0, 1]]), "cross"),
+    (lambda: am.camera.Polygon(corners=[[0, 0, 0], [1, 0, 0], [2, 0, 0]]), "area"),
+    (lambda: am.camera.Polygon(corners=np.zeros((4, 3))), "area"),
+    (lambda: am.camera.Polygon(corners=SQUARE * np.nan), "finite"),
+    (lambda: am.camera.Polygon(corners=SQUARE[:, :2]), "shape"),
+    (lambda: am.camera.Polygon(corners=np.stack([SQUARE, SQUARE * 0])), "area.*moment 1"),
+    (lambda: am.camera.Polygon(corners=np.empty((0, 4, 3))), "moment"),
+    (lambda: am.camera.Mesh(vertices=SQUARE, faces=[[0, 1, 4]]), "face 0"),
+    (lambda: am.camera.Mesh(vertices=SQUARE, faces=[[0, 1, -1]]), "faces"),
+    (lambda: am.camera.Mesh(vertices=SQUARE, faces=[[0.5, 1, 2]]), "faces"),
+    (lambda: am.camera.Mesh(vertices=SQUARE, faces=[[0, 1]]), "shape"),
+    (lambda: am.camera.Capsule(ends=SQUARE[:2], radius=0.0), "radius"),
+    (lambda: am.camera.Capsule(ends=SQUARE[:3], radius=1.0), "shape"),
+    (lambda: am.camera.Capsule(ends=SQUARE[:2] + np.inf, radius=1.0), "finite"),
     (lambda: camera().project([0, 0, 0], ["wall"]), r"surfaces\[0\]"),
     (
         lambda: camera().project(np.zeros((5, 2, 3)), [MOVING]),
@@ -393,8 +403,8 @@ BAD = [
         lambda: camera().project(np.zeros(3), [MOVING]),
         "one moment",
     ),
-    (lambda: camera().depth_image([am.Polygon(corners=SQUARE)], moment=1), "moment"),
-    (lambda: camera().paint([am.Capsule(ends=SQUARE[:2], radius=0.1)]), "flat faces"),
+    (lambda: camera().depth_image([am.camera.Polygon(corners=SQUARE)], moment=1), "moment"),
+    (lambda: camera().paint([am.camera.Capsule(ends=SQUARE[:2], radius=0.1)]), "flat faces"),
 ]
 
 
@@ -410,12 +420,12 @@ def test_a_polygon_that_bends_while_moving_is_refused():
     inside_out[
         3, 0
     ] = -0.5  # the notch becomes a corner: the triangles chosen first do not cover it
-    am.Polygon(corners=np.stack([arrow, arrow + 1]))
+    am.camera.Polygon(corners=np.stack([arrow, arrow + 1]))
     with pytest.raises(am.ParameterError, match=r"turned over"):
-        am.Polygon(corners=np.stack([inside_out, arrow]))
+        am.camera.Polygon(corners=np.stack([inside_out, arrow]))
 
 
 def test_too_many_faces_for_the_painter():
     faces = np.tile([[0, 1, 2]], (2001, 1))
     with pytest.raises(am.SolverLimit, match="2001"):
-        camera().paint([am.Mesh(vertices=SQUARE, faces=faces)])
+        camera().paint([am.camera.Mesh(vertices=SQUARE, faces=faces)])

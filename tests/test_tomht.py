@@ -51,7 +51,7 @@ def best_by_solver(d: am.Detections, model: am.TrackingModel) -> float:
     tuples = np.full((len(paths), d.n_frames), -1)
     for k, path in enumerate(paths):
         tuples[k, d.frame_of[list(path)]] = path
-    return am.assign_multidimensional(tuples, scores).value
+    return am.solve.assign_multidimensional(tuples, scores).value
 
 
 @pytest.mark.parametrize("seed", range(3))

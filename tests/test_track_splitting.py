@@ -9,14 +9,14 @@ import pytest
 from scipy.stats import chi2
 
 import asterism as am
-from asterism.associate.track_splitting import chi2_limits
+from asterism.tracking.methods.track_splitting import chi2_limits
 from scenes import calibration_in_crowds, crowd, interacting, small_model, wanderers
 from tree_oracle import trees_by_hand
 
 NO_TEST = 1e-300
 
 
-def crowd_model(motion: am.Motion | None = None) -> am.TrackingModel:
+def crowd_model(motion: am.model.Motion | None = None) -> am.TrackingModel:
     return small_model(
         motion=motion or am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
         max_speed=1.5, clutter_density=3.0, birth_density=1.0,

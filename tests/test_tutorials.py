@@ -29,7 +29,7 @@ pages = load("run_pages")
 @pytest.fixture(autouse=True)
 def lists_as_they_were():
     """Take back what a page adds to the lists of methods and formats."""
-    before = [(entries, dict(entries)) for entries in (am.METHODS, am.FORMATS)]
+    before = [(entries, dict(entries)) for entries in (am.tracking.METHODS, am.io.CAPTURE_FORMATS)]
     yield
     for entries, old in before:
         entries.clear()

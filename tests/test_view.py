@@ -13,8 +13,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 import asterism as am
-from asterism.view import plot_errors, plot_presence, plot_trajectories
-from asterism.view.style import CLUTTER, CYCLE, RIGHT, WRONG
+from asterism.plot import plot_errors, plot_presence, plot_trajectories
+from asterism.plot.style import CLUTTER, CYCLE, RIGHT, WRONG
 
 
 def tracks_of(table, n_axes=3, names=()):
@@ -128,7 +128,7 @@ def test_the_title_is_the_callers_own_and_nothing_lies_on_it(kind, part):
         ax = figure.subfigures(1, 2, wspace=0.1)[0].add_subplot()
     else:
         ax = figure.add_subplot(*((2, 1, 2) if part == "half" else ()))
-    draw = {"presence": plot_presence, "confidence": am.plot_confidence,
+    draw = {"presence": plot_presence, "confidence": am.plot.plot_confidence,
             "errors": lambda t, ax: plot_errors(t, t, ax=ax)}[kind]  # fmt: skip
     axes = draw(tracks, ax=ax)
     axes.set_title("A title of the caller, as long as titles are in papers")
@@ -143,7 +143,7 @@ def test_the_title_is_the_callers_own_and_nothing_lies_on_it(kind, part):
     inches = np.array([strip.y0 - main.y1, strip.height]) / figure.dpi
     np.testing.assert_allclose(inches, [0.1, 0.55], atol=0.02)
     np.testing.assert_allclose([strip.x0, strip.x1], [main.x0, main.x1], atol=1)
-    assert am.figure_bytes(axes, "png")[1:4] == b"PNG"  # of the whole figure
+    assert am.plot.figure_bytes(axes, "png")[1:4] == b"PNG"  # of the whole figure
 
 
 @pytest.mark.parametrize("n_axes", [2, 3])
@@ -179,7 +179,7 @@ def test_no_global_state():
 
     script = (
         "import sys, asterism as am\n"
-        "from asterism.view import plot_presence, plot_trajectories\n"
+        "from asterism.plot import plot_presence, plot_trajectories\n"
         "assert 'matplotlib' not in sys.modules\n"
         "truth = am.simulate.cube()\n"
         "plot_presence(truth), plot_trajectories(truth)\n"

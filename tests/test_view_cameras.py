@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Path3DCollection
 
 import asterism as am
-from asterism.view import plot_coverage, plot_depth, plot_image, plot_lens, plot_rig
-from asterism.view.outlines import outlines
-from asterism.view.style import CYCLE
+from asterism.plot import plot_coverage, plot_depth, plot_image, plot_lens, plot_rig
+from asterism.plot.outlines import outlines
+from asterism.plot.style import CYCLE
 
-K = am.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
-WALL = am.Polygon(corners=[[0.5, 0, 0], [0.5, 0, 2], [2, 0, 2], [2, 0, 0]], name="wall")
+K = am.camera.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
+WALL = am.camera.Polygon(corners=[[0.5, 0, 0], [0.5, 0, 2], [2, 0, 2], [2, 0, 0]], name="wall")
 # Seen, seen, hidden by the wall, beside the image, behind the camera, absent.
 POINTS = np.array(
     [[0, 1, 1], [-0.5, 1, 1.5], [1, 1, 1], [9, 1, 1], [0, -9, 1], [np.nan] * 3], dtype=float
@@ -39,7 +39,7 @@ def dots_of(axes, kind=PathCollection):
     return [c for c in axes.collections if isinstance(c, kind)]
 
 
-@pytest.mark.parametrize("lens", [None, am.BrownConrady(k1=-0.05)])
+@pytest.mark.parametrize("lens", [None, am.camera.BrownConrady(k1=-0.05)])
 def test_points_are_drawn_where_the_camera_sees_them(lens):
     camera, projection = filmed(lens, name="left")
     axes = plot_image(camera, projection)
@@ -112,7 +112,7 @@ def test_colours_and_names_go_with_their_points():
 
 
 def test_a_surface_is_drawn_with_the_bend_of_the_lens():
-    camera, projection = filmed(am.ReportRadial(a1=0.3))
+    camera, projection = filmed(am.camera.ReportRadial(a1=0.3))
     axes = plot_image(camera, projection, surfaces=[WALL])
     (edge,) = axes.lines
     drawn = np.stack(edge.get_data(), axis=1)
@@ -145,7 +145,9 @@ def test_a_projection_of_more_than_one_frame_is_refused():
         plot_image(camera, camera.project(POINTS[None]))
 
 
-@pytest.mark.parametrize("lens", [am.ReportRadial(a1=0.3), am.ReportRadial(a1=-0.2), None])
+@pytest.mark.parametrize(
+    "lens", [am.camera.ReportRadial(a1=0.3), am.camera.ReportRadial(a1=-0.2), None]
+)
 def test_the_grid_is_bent_by_the_lens_and_square_without_it(lens):
     camera = camera_of(lens)
     ideal, bent = (c for c in plot_lens(camera).collections if isinstance(c, LineCollection))
@@ -168,12 +170,12 @@ def test_barrel_and_pincushion_bend_the_two_ways():
         )
         return np.abs(np.concatenate(bent.get_segments()) - 639.5).max()
 
-    assert corner(am.ReportRadial(a1=0.3)) < 610
-    assert corner(am.ReportRadial(a1=-0.2)) > 680
+    assert corner(am.camera.ReportRadial(a1=0.3)) < 610
+    assert corner(am.camera.ReportRadial(a1=-0.2)) > 680
 
 
 def test_the_title_says_how_far_the_lens_shifts():
-    lens = am.BrownConrady(k1=-0.1)
+    lens = am.camera.BrownConrady(k1=-0.1)
     camera = camera_of(lens, name="c")
     w, h = camera.size_px
     pixels = np.stack(np.meshgrid(np.arange(w), np.arange(h)), axis=-1)
@@ -185,7 +187,7 @@ def test_the_title_says_how_far_the_lens_shifts():
 
 
 def test_the_end_of_the_lens_model_is_drawn_where_it_is():
-    lens = am.BrownConrady(k1=-0.6)
+    lens = am.camera.BrownConrady(k1=-0.6)
     camera = camera_of(lens)
     angles = np.linspace(0, 2 * np.pi, 64)
     edge = camera.distort(lens.radius * (1 - 1e-9) * np.stack([np.cos(angles), np.sin(angles)], 1))
@@ -200,7 +202,7 @@ def test_the_end_of_the_lens_model_is_drawn_where_it_is():
     ]
     distance = np.linalg.norm(np.concatenate(drawn) - [639.5, 511.5], axis=1)
     np.testing.assert_allclose(distance, radius, atol=2.5)  # as fine as it is sampled
-    assert plot_lens(camera_of(am.BrownConrady(k1=-0.01))).get_legend() is None
+    assert plot_lens(camera_of(am.camera.BrownConrady(k1=-0.01))).get_legend() is None
 
 
 def test_a_rig_stands_where_its_cameras_do():
@@ -230,7 +232,7 @@ def test_a_pyramid_ends_where_the_corners_of_the_image_look():
 
 
 def test_a_pyramid_shrinks_to_what_the_lens_reaches():
-    camera = camera_of(am.BrownConrady(k1=-0.6))
+    camera = camera_of(am.camera.BrownConrady(k1=-0.6))
     assert np.isnan(camera.rays([-0.5, -0.5])).any()
     (lines,) = dots_of(plot_rig(am.Rig((camera,)), length=1.0), Line3DCollection)
     *edges, base = (np.asarray(line) for line in lines._segments3d)
@@ -245,7 +247,7 @@ def test_a_pyramid_shrinks_to_what_the_lens_reaches():
 def test_surfaces_are_drawn_by_their_outlines_at_their_moment():
     here = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
     there = [[0, 0, 5], [1, 0, 5], [0, 1, 5]]
-    moving = am.Polygon(corners=[here, there])
+    moving = am.camera.Polygon(corners=[here, there])
     axes = plot_rig(am.Rig.ring(2, radius=3, height=2), surfaces=[moving], moment=1)
     (line,) = axes.lines
     np.testing.assert_array_equal(np.stack(line.get_data_3d(), axis=1), [*there, there[0]])
@@ -256,7 +258,7 @@ def test_surfaces_are_drawn_by_their_outlines_at_their_moment():
 
 def test_a_mesh_shows_each_edge_once():
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
-    edges = outlines(am.Mesh(vertices=corners, faces=[[0, 1, 2], [0, 2, 3]]))
+    edges = outlines(am.camera.Mesh(vertices=corners, faces=[[0, 1, 2], [0, 2, 3]]))
     pairs = {tuple(sorted(map(tuple, edge))) for edge in edges}
     assert len(edges) == len(pairs) == 5
 
@@ -264,7 +266,7 @@ def test_a_mesh_shows_each_edge_once():
 @pytest.mark.parametrize("ends", [[[0, 0, 1], [0, 0.3, 2]], [[1, 2, 3], [1, 2, 3]]])
 def test_the_outlines_of_a_capsule_lie_on_it(ends):
     a, b = np.array(ends, dtype=float)
-    for line in outlines(am.Capsule(ends=ends, radius=0.2)):
+    for line in outlines(am.camera.Capsule(ends=ends, radius=0.2)):
         along = np.clip((line - a) @ (b - a) / max((b - a) @ (b - a), 1e-300), 0, 1)
         distance = np.linalg.norm(line - a - along[:, None] * (b - a), axis=1)
         np.testing.assert_allclose(distance, 0.2)
@@ -273,7 +275,7 @@ def test_the_outlines_of_a_capsule_lie_on_it(ends):
 
 def test_what_given_axes_show_stays_in_sight():
     scene = am.simulate.cube(seed=1, frames=20)
-    axes = am.plot_trajectories(scene)
+    axes = am.plot.plot_trajectories(scene)
     before = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     assert plot_rig(am.Rig.ring(3, radius=2, height=5, target=(9, 0, 0)), ax=axes) is axes
     after = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
@@ -285,7 +287,7 @@ def test_what_given_axes_show_stays_in_sight():
 @pytest.fixture(scope="module")
 def coverage():
     rig = am.Rig.ring(3, radius=2.5, height=2, focal_px=1800)
-    return rig.coverage(am.volume_grid((-2, -1, 0), (2, 1.5, 2), 0.5))
+    return rig.coverage(am.camera.volume_grid((-2, -1, 0), (2, 1.5, 2), 0.5))
 
 
 def test_a_level_of_the_coverage(coverage):
@@ -344,7 +346,7 @@ def test_what_is_no_level_of_a_grid_is_refused(coverage):
 @pytest.mark.parametrize("place", [(0.0, 0.0, 1.0), (50.0, 0.0, 1.0)])
 def test_one_cell_is_a_level_too(what, place):
     rig = am.Rig.ring(3, radius=2.5, height=2)
-    axes = plot_coverage(rig.coverage(am.volume_grid(place, place, 0.5)), what=what)
+    axes = plot_coverage(rig.coverage(am.camera.volume_grid(place, place, 0.5)), what=what)
     axes.figure.draw_without_rendering()
 
 

@@ -15,7 +15,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 import asterism as am
-from asterism.view.style import CLUTTER, CYCLE
+from asterism.plot.style import CLUTTER, CYCLE
 
 
 def tracks_of(table, n_axes=3, sure=None):
@@ -39,7 +39,7 @@ def group_sizes(groups):
 @pytest.mark.parametrize("n_axes", [2, 3])
 def test_axes_show_each_coordinate_and_break_at_gaps(n_axes):
     tracks = tracks_of(["0*", "01", "", "0", "0"], n_axes=n_axes)
-    panels = am.plot_axes(tracks)
+    panels = am.plot.plot_axes(tracks)
     assert [p.get_ylabel() for p in panels] == ["x [m]", "y [m]", "z [m]"][:n_axes]
     d = tracks.detections
     for i, axes in enumerate(panels):
@@ -64,7 +64,7 @@ def test_axes_show_each_coordinate_and_break_at_gaps(n_axes):
 def test_confidence_shades_each_label_where_it_is():
     sure = [0.9, 0.5, 0.8, 0.1, 0.3, 1.0]
     tracks = tracks_of(["1*", "1", "0", "01"], sure=sure)
-    axes = am.plot_confidence(tracks)
+    axes = am.plot.plot_confidence(tracks)
     (mesh,) = (c for c in axes.collections if isinstance(c, QuadMesh))
     nan = np.nan
     # Track 1 comes first, in the upper row; clutter has no row.
@@ -81,12 +81,12 @@ def test_confidence_shades_each_label_where_it_is():
 def test_confidence_must_be_there():
     truth = am.simulate.cube(seed=1)
     with pytest.raises(am.ParameterError, match=r"tracks with a confidence.*mcmcda"):
-        am.plot_confidence(truth)
+        am.plot.plot_confidence(truth)
 
 
 def test_reliability_shows_the_bins_and_how_few_labels_tell():
-    part = am.calibration([0.95] * 98 + [0.15, 0.15], [True] * 98 + [True, False])
-    axes = am.plot_reliability({"a": part})
+    part = am.metrics.calibration_curve([0.95] * 98 + [0.15, 0.15], [True] * 98 + [True, False])
+    axes = am.plot.plot_reliability({"a": part})
     bars = axes.containers[0]
     points, _, (spread,) = bars.lines
     np.testing.assert_allclose(points.get_xydata(), [[0.15, 0.5], [0.95, 1.0]])
@@ -96,10 +96,10 @@ def test_reliability_shows_the_bins_and_how_few_labels_tell():
     (above,) = axes.child_axes
     np.testing.assert_array_equal(above.patches[0].get_data().values, part.counts)
     assert f"a: error {part.ece:.3f}" in [t.get_text() for t in axes.get_legend().get_texts()]
-    alone = am.plot_reliability(part)
+    alone = am.plot.plot_reliability(part)
     assert f"error {part.ece:.3f}" in [t.get_text() for t in alone.get_legend().get_texts()]
     with pytest.raises(am.ParameterError, match="at least one"):
-        am.plot_reliability({})
+        am.plot.plot_reliability({})
 
 
 def test_compare_draws_the_scores_and_the_time():
@@ -109,7 +109,7 @@ def test_compare_draws_the_scores_and_the_time():
     swapped[late & (truth.labels < 2)] = 1 - swapped[late & (truth.labels < 2)]
     worse = am.Tracks(detections=truth.detections, labels=swapped)
     scores = {"right": am.evaluate(truth, truth), "swapped": am.evaluate(worse, truth)}
-    panels = am.plot_compare(scores, milliseconds={"swapped": 0.25})
+    panels = am.plot.plot_compare(scores, milliseconds={"swapped": 0.25})
     widths = [[round(bar.get_width(), 9) for bar in axes.patches] for axes in panels]
     assert widths[0] == [1.0, round(scores["swapped"].idf1, 9)]
     assert widths[1] == [0, scores["swapped"].switches]
@@ -118,16 +118,16 @@ def test_compare_draws_the_scores_and_the_time():
     assert last.get_x() + last.get_width() == pytest.approx(0.25)
     assert [t.get_text() for t in panels[0].get_yticklabels()] == ["right", "swapped"]
     assert [t.get_text() for t in panels[2].texts] == ["–", "0.25"]
-    assert len(am.plot_compare(scores)) == 2
+    assert len(am.plot.plot_compare(scores)) == 2
     for wrong in ({"nobody": 1.0}, {"right": 0.0}):
         with pytest.raises(am.ParameterError, match="milliseconds"):
-            am.plot_compare(scores, milliseconds=wrong)
+            am.plot.plot_compare(scores, milliseconds=wrong)
     with pytest.raises(am.ParameterError, match="at least one"):
-        am.plot_compare({})
+        am.plot.plot_compare({})
 
 
 def test_posterior_is_measured_from_the_best_of_all():
-    axes = am.plot_posterior([0, 1, 10], [[0, 80, 98], [0, 90, 100]], others={"gnn": 104})
+    axes = am.plot.plot_posterior([0, 1, 10], [[0, 80, 98], [0, 90, 100]], others={"gnn": 104})
     one, other, mean, gnn = axes.lines
     np.testing.assert_allclose(one.get_ydata(), [-104, -24, -6])
     np.testing.assert_allclose(other.get_ydata(), [-104, -14, -4])
@@ -141,13 +141,13 @@ def test_posterior_is_measured_from_the_best_of_all():
 
 
 def test_a_forbidden_partition_is_left_out_of_the_posterior():
-    axes = am.plot_posterior([1, 2], [[-np.inf, 5.0], [4.0, 6.0]])
+    axes = am.plot.plot_posterior([1, 2], [[-np.inf, 5.0], [4.0, 6.0]])
     *_, mean = axes.lines
     np.testing.assert_array_equal(mean.get_ydata(), [np.nan, -0.5])
-    am.plot_posterior([1], [-np.inf]).figure.draw_without_rendering()
+    am.plot.plot_posterior([1], [-np.inf]).figure.draw_without_rendering()
     for moves, values in (([], []), ([2, 1], [1, 2]), ([-1], [1]), ([1, 2], [1, 2, 3])):
         with pytest.raises(am.ParameterError):
-            am.plot_posterior(moves, values)
+            am.plot.plot_posterior(moves, values)
 
 
 def model_of(noise=0.001):
@@ -172,31 +172,33 @@ def still(*places, frames=3, extra=()):
 def test_groups_are_tracks_and_detections_that_gates_link():
     # Alone; two within each other's gates; two that one false point links, which lies between.
     tracks = still(0.0, 1.0, 1.004, 2.0, 2.015, extra=(2.0075,))
-    found = am.gate_groups(tracks, model_of())
+    found = am.filter.gate_groups(tracks, model_of())
     assert sorted(group_sizes(found)) == [
         (t, n_tracks, n) for t in (1, 2) for n_tracks, n in ((1, 1), (2, 2), (2, 3))
     ]
     np.testing.assert_array_equal(found.largest, [0, 2, 2])
-    tight = am.gate_groups(tracks, model_of(), gate_probability=0.5)
+    tight = am.filter.gate_groups(tracks, model_of(), gate_probability=0.5)
     assert {(n, m) for _, n, m in group_sizes(tight)} == {(1, 1)}
     with pytest.raises(am.ParameterError, match="gate_probability"):
-        am.gate_groups(tracks, model_of(), gate_probability=1)
+        am.filter.gate_groups(tracks, model_of(), gate_probability=1)
 
 
 def test_a_track_in_a_gap_is_a_group_without_a_detection():
     times = np.arange(4) / 100
     places = np.zeros((4, 1, 3))
     places[1] = np.nan
-    found = am.gate_groups(am.Tracks.from_dense(times, places), model_of())
+    found = am.filter.gate_groups(am.Tracks.from_dense(times, places), model_of())
     assert group_sizes(found) == [(1, 1, 0), (2, 1, 1), (3, 1, 1)]
-    none = am.gate_groups(am.Tracks.from_dense(times, np.full((4, 1, 3), np.nan)), model_of())
+    none = am.filter.gate_groups(
+        am.Tracks.from_dense(times, np.full((4, 1, 3), np.nan)), model_of()
+    )
     assert group_sizes(none) == []
     assert none.largest.tolist() == [0] * 4
 
 
 def test_groups_are_stacked_by_size():
     tracks = still(0.0, 1.0, 1.004, 2.0, 2.015, extra=(2.0075,))
-    axes = am.plot_groups(am.gate_groups(tracks, model_of()))
+    axes = am.plot.plot_groups(am.filter.gate_groups(tracks, model_of()))
     shares = [c for c in axes.collections if isinstance(c, PolyCollection)]
     tops = [c.get_paths()[0].vertices[:, 1].max() for c in shares]
     assert tops == [4, 5]  # four in pairs, on these one alone
@@ -209,7 +211,7 @@ def test_projections_show_what_each_camera_saw():
     rig = am.Rig.ring(3, radius=4, height=2)
     shot = am.simulate.film(am.simulate.cube(frames=10, seed=1), rig)
     o = shot.observations
-    panels = am.plot_projections(o, rig, frames=slice(2, 4))
+    panels = am.plot.plot_projections(o, rig, frames=slice(2, 4))
     assert len(panels) == 3
     for c, axes in enumerate(panels):
         (dots,) = axes.collections
@@ -222,15 +224,19 @@ def test_projections_show_what_each_camera_saw():
         assert axes.get_title(loc="left") == f"cam{c + 1}: {len(seen)} points"
         assert axes.get_ylim()[0] > axes.get_ylim()[1]  # v down
     with pytest.raises(am.ParameterError, match="cameras of the film"):
-        am.plot_projections(o, am.Rig.ring(2, radius=4, height=2))
+        am.plot.plot_projections(o, am.Rig.ring(2, radius=4, height=2))
 
 
 @pytest.mark.parametrize("n_axes", [2, 3])
 @pytest.mark.parametrize("table", [[], ["", ""], ["*", "*"], ["0"], ["0", "", "0"], ["3", "3"]])
 def test_odd_tracks_can_be_drawn(table, n_axes):
     tracks = tracks_of(table, n_axes=n_axes)
-    groups = am.gate_groups(tracks, model_of())
-    axes = (am.plot_axes(tracks)[0], am.plot_confidence(tracks), am.plot_groups(groups))
+    groups = am.filter.gate_groups(tracks, model_of())
+    axes = (
+        am.plot.plot_axes(tracks)[0],
+        am.plot.plot_confidence(tracks),
+        am.plot.plot_groups(groups),
+    )
     for drawn in axes:
         drawn.figure.draw_without_rendering()
 
@@ -238,22 +244,23 @@ def test_odd_tracks_can_be_drawn(table, n_axes):
 def test_given_axes_are_drawn_on_and_given_back():
     tracks = tracks_of(["01*", "01"])
     flat = Figure().subplots(3)
-    assert am.plot_axes(tracks, flat) == list(flat)
+    assert am.plot.plot_axes(tracks, flat) == list(flat)
     with pytest.raises(am.ParameterError, match="ax: expected 3 axes"):
-        am.plot_axes(tracks, flat[:2])
+        am.plot.plot_axes(tracks, flat[:2])
     one = Figure().add_subplot()
-    part = am.calibration([0.5], [True])
-    groups = am.gate_groups(tracks, model_of())
+    part = am.metrics.calibration_curve([0.5], [True])
+    groups = am.filter.gate_groups(tracks, model_of())
     for plot, data in (
-        (am.plot_confidence, tracks), (am.plot_reliability, part), (am.plot_groups, groups),
+        (am.plot.plot_confidence, tracks), (am.plot.plot_reliability, part),
+        (am.plot.plot_groups, groups),
     ):  # fmt: skip
         one = Figure().add_subplot()
         assert plot(data, ax=one) is one
     one = Figure().add_subplot()
-    assert am.plot_posterior([1], [2], ax=one) is one
+    assert am.plot.plot_posterior([1], [2], ax=one) is one
     scores = {"a": am.evaluate(am.simulate.cube(seed=1), am.simulate.cube(seed=1))}
     two = list(Figure().subplots(1, 2))
-    assert am.plot_compare(scores, ax=two) == two
+    assert am.plot.plot_compare(scores, ax=two) == two
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
@@ -261,7 +268,7 @@ def test_the_same_picture_gives_the_same_bytes(ending):
     tracks = tracks_of(["01*", "01", "1"])
 
     def made():
-        return am.figure_bytes(am.plot_axes(tracks), ending)
+        return am.plot.figure_bytes(am.plot.plot_axes(tracks), ending)
 
     first = made()
     time.sleep(1.1)  # a date in them would have changed
@@ -272,16 +279,16 @@ def test_the_same_picture_gives_the_same_bytes(ending):
 
 def test_figure_bytes_takes_figures_axes_and_lists():
     tracks = tracks_of(["01", "01"])
-    expected = am.figure_bytes(am.plot_presence(tracks), "svg")
-    assert am.figure_bytes(am.plot_presence(tracks).figure, "svg") == expected
-    axes = am.plot_presence(tracks)
-    assert am.figure_bytes([axes], "svg") == expected
+    expected = am.plot.figure_bytes(am.plot.plot_presence(tracks), "svg")
+    assert am.plot.figure_bytes(am.plot.plot_presence(tracks).figure, "svg") == expected
+    axes = am.plot.plot_presence(tracks)
+    assert am.plot.figure_bytes([axes], "svg") == expected
     with pytest.raises(am.ParameterError, match="one of pdf, png, svg"):
-        am.figure_bytes(axes, "jpg")
+        am.plot.figure_bytes(axes, "jpg")
 
 
 def test_text_in_a_pdf_is_text():
-    assert b"/FontFile2" in am.figure_bytes(am.plot_presence(tracks_of(["0"])), "pdf")
+    assert b"/FontFile2" in am.plot.figure_bytes(am.plot.plot_presence(tracks_of(["0"])), "pdf")
 
 
 def test_names_are_not_mathematics():
@@ -290,10 +297,12 @@ def test_names_are_not_mathematics():
     tracks = am.Tracks(detections=d, labels=np.tile(np.arange(8), d.n_frames), names=names,
                        confidence=np.ones(d.n_points))  # fmt: skip
     score = am.evaluate(tracks, tracks)
-    part = am.calibration([0.5], [True])
+    part = am.metrics.calibration_curve([0.5], [True])
     for axes in (
-        am.plot_presence(tracks), am.plot_confidence(tracks), am.plot_reliability({"$\\x": part}),
-        am.plot_compare({"$\\frac{": score})[0], am.plot_posterior([1], [2], others={"$\\x": 1}),
+        am.plot.plot_presence(tracks), am.plot.plot_confidence(tracks),
+        am.plot.plot_reliability({"$\\x": part}),
+        am.plot.plot_compare({"$\\frac{": score})[0],
+        am.plot.plot_posterior([1], [2], others={"$\\x": 1}),
     ):  # fmt: skip
         axes.figure.savefig(io.BytesIO())
 
@@ -301,9 +310,9 @@ def test_names_are_not_mathematics():
 def test_no_global_state():
     script = (
         "import sys, asterism as am\n"
-        "am.plot_axes\n"
+        "am.plot.plot_axes\n"
         "assert 'matplotlib' not in sys.modules and 'rerun' not in sys.modules\n"
-        "am.figure_bytes(am.plot_axes(am.simulate.cube()), 'png')\n"
+        "am.plot.figure_bytes(am.plot.plot_axes(am.simulate.cube()), 'png')\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
         "import matplotlib\n"
         "assert matplotlib.rcParams['svg.hashsalt'] is None\n"
@@ -314,7 +323,7 @@ def test_no_global_state():
 def test_confidence_says_of_what_it_is():
     truth = am.simulate.cube(seed=1, frames=20)
     sure = np.full(truth.detections.n_points, 0.875)
-    axes = am.plot_confidence(dataclasses.replace(truth, confidence=sure))
+    axes = am.plot.plot_confidence(dataclasses.replace(truth, confidence=sure))
     (above,) = axes.child_axes
     assert above.get_xlabel() == "confidence of links, mean 0.875"
     bars = [a.get_ylabel() for a in axes.figure.axes if a is not axes]

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.app import main
-from asterism.view import scene, viewer
-from asterism.view.style import CYCLE
+from asterism.cli import main
+from asterism.plot import rerun_scene, viewer
+from asterism.plot.style import CYCLE
 
 
 def tracks_of(table, sure=None, names=(), n_axes=3):
@@ -67,7 +67,7 @@ def path_of(rr, parts):
 
 def logged(rr, tracks, rig=None):
     recorder = Recorder()
-    scene._log(rr, recorder, tracks, rig)
+    rerun_scene._log(rr, recorder, tracks, rig)
     return recorder
 
 
@@ -156,7 +156,7 @@ def test_names_of_any_kind_stay_apart(rr):
 
 def test_a_saved_scene_can_be_read_and_leaves_no_scraps(rr, tmp_path):
     tracks = tracks_of(["0*", "0", "", "01"], sure=np.ones(5))
-    am.view(tracks, rig=am.Rig.ring(2, radius=4, height=2), path=tmp_path / "scene.rrd")
+    am.plot.view(tracks, rig=am.Rig.ring(2, radius=4, height=2), path=tmp_path / "scene.rrd")
     assert [p.name for p in tmp_path.iterdir()] == ["scene.rrd"]
     command = [sys.executable, "-m", "rerun", "rrd", "verify", str(tmp_path / "scene.rrd")]
     # With settings of its own: nobody's are touched by a test.
@@ -174,26 +174,26 @@ def test_saving_needs_neither_viewer_nor_settings(rr, tmp_path, monkeypatch):
 
     monkeypatch.setattr(subprocess, "run", refused)
     monkeypatch.setattr(subprocess, "Popen", refused)
-    am.view(tracks_of(["0", "0"]), path=tmp_path / "scene.rrd")
+    am.plot.view(tracks_of(["0", "0"]), path=tmp_path / "scene.rrd")
 
 
 def test_a_folder_that_is_not_there(rr, tmp_path):
     with pytest.raises(am.FormatError, match="a file that can be written"):
-        am.view(tracks_of(["0"]), path=tmp_path / "nowhere" / "scene.rrd")
+        am.plot.view(tracks_of(["0"]), path=tmp_path / "nowhere" / "scene.rrd")
 
 
 def test_nothing_is_nothing_to_look_at(rr, tmp_path):
     with pytest.raises(am.ParameterError, match="at least one detection"):
-        am.view(tracks_of(["", ""]), path=tmp_path / "scene.rrd")
-    am.view(tracks_of(["*", "*"]), path=tmp_path / "scene.rrd")
-    am.view(tracks_of(["0"]), path=tmp_path / "one.rrd")
+        am.plot.view(tracks_of(["", ""]), path=tmp_path / "scene.rrd")
+    am.plot.view(tracks_of(["*", "*"]), path=tmp_path / "scene.rrd")
+    am.plot.view(tracks_of(["0"]), path=tmp_path / "one.rrd")
 
 
 def test_without_rerun_one_line_says_what_to_install(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "rerun", None)
     tracks = am.simulate.cube(seed=1)
     with pytest.raises(am.ParameterError, match=r"pip install 'asterism\[view\]'"):
-        am.view(tracks, path=tmp_path / "scene.rrd")
+        am.plot.view(tracks, path=tmp_path / "scene.rrd")
     am.write(tracks, tmp_path / "in.csv")
     assert main(["view", str(tmp_path / "in.csv"), "--save", str(tmp_path / "s.rrd")]) == 2
     err = capsys.readouterr().err
@@ -245,7 +245,7 @@ def test_a_viewer_that_does_not_open_says_so(tmp_path, monkeypatch):
 def test_the_viewer_gets_the_scene(rr, monkeypatch):
     sizes = []
     monkeypatch.setattr(viewer, "open_viewer", lambda path: sizes.append(path.stat().st_size))
-    am.view(tracks_of(["0", "0"]))
+    am.plot.view(tracks_of(["0", "0"]))
     assert sizes
     assert sizes[0] > 1000
 

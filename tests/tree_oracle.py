@@ -13,7 +13,7 @@ from scipy.special import chdtrc, chdtri
 from scipy.stats import chi2
 
 import asterism as am
-from asterism.associate.track_splitting import chi2_limits
+from asterism.tracking.methods.track_splitting import chi2_limits
 from frame_oracle import OneTrack, pair, propose
 from jpda_oracle import components, marginals_of
 from oracles import chance_seen

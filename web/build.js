@@ -9,7 +9,7 @@ import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
 
 const here = fileURLToPath(new URL(".", import.meta.url));
-const target = fileURLToPath(new URL("../src/asterism/view/report/", import.meta.url));
+const target = fileURLToPath(new URL("../src/asterism/reporting/page/", import.meta.url));
 const licence = (await readFile(`${here}node_modules/three/LICENSE`, "utf8")).trim();
 
 const { outputFiles } = await build({

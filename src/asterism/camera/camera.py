@@ -112,7 +112,7 @@ class Camera:
         if self.K_lens is not None:
             object.__setattr__(self, "K_lens", checked_intrinsics("K_lens", self.K_lens))
         if isinstance(self.lens, QuadraticCorrection) and not self.lens.reaches(
-            *middle_of_image(self)
+            *middle_of_image(self.lens_matrix, self.size_px)
         ):
             raise ParameterError("lens", "no fold at the centre of the image", self.lens)
 
@@ -347,7 +347,15 @@ class Camera:
     @cached_property
     def engine(self) -> _engine.Camera:
         """The camera as the engine has it."""
-        return compile_camera(self)
+        return compile_camera(
+            K=self.K,
+            lens_matrix=self.lens_matrix,
+            T_camera_world=self.T_camera_world,
+            lens=self.lens,
+            near=self.near,
+            far=self.far,
+            size_px=self.size_px,
+        )
 
     @cached_property
     def _ray_grid(self) -> _engine.RayGrid:

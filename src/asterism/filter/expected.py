@@ -13,13 +13,13 @@ from asterism.model.compiled import steps_of
 if TYPE_CHECKING:
     from asterism.model import TrackingModel, Tracks
 
-__all__ = ["expected_places"]
+__all__ = ["expected_positions"]
 
 
-def expected_places(tracks: Tracks, model: TrackingModel, *, coast: int = 5) -> Detections:
+def expected_positions(tracks: Tracks, model: TrackingModel, *, coast: int = 5) -> Detections:
     """Predict where the marker of each track is in each frame, from the frames before alone.
 
-    For `asterism.reconstruct`: where markers were heading may tell the image points of a frame
+    For `asterism.multiview`: where markers were heading may tell the image points of a frame
     apart.
 
     Parameters

@@ -18,7 +18,7 @@ from asterism.records import record
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["States", "filter_states", "predictive_log_densities", "smooth"]
+__all__ = ["States", "filter_states", "predictive_log_densities", "smooth_states"]
 
 
 @record(eq=False)
@@ -129,7 +129,7 @@ def filter_states(tracks: Tracks, model: TrackingModel) -> States:
     return _states(tracks, model, smoothed=False)
 
 
-def smooth(tracks: Tracks, model: TrackingModel) -> States:
+def smooth_states(tracks: Tracks, model: TrackingModel) -> States:
     """Rauch-Tung-Striebel smoother of every track: its state given the whole take.
 
     Rauch, Tung & Striebel 1965, AIAA Journal 3(8).

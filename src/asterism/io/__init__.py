@@ -5,8 +5,30 @@
 >>> am.write(capture.tracks, "trial.csv")                 # doctest: +SKIP
 """
 
-from asterism.io.files import read, read_tracks, write
-from asterism.io.formats import FORMATS, Format
-from asterism.io.info import CaptureInfo, describe
+from asterism.io.calibrations import CALIBRATION_FORMATS, CalibrationFormat, read_rig, write_rig
+from asterism.io.captures import (
+    CAPTURE_FORMATS,
+    CaptureFormat,
+    CaptureInfo,
+    describe,
+    read,
+    read_tracks,
+    write,
+)
+from asterism.io.observations import read_observations, write_observations
 
-__all__ = ["FORMATS", "CaptureInfo", "Format", "describe", "read", "read_tracks", "write"]
+__all__ = [
+    "CALIBRATION_FORMATS",
+    "CAPTURE_FORMATS",
+    "CalibrationFormat",
+    "CaptureFormat",
+    "CaptureInfo",
+    "describe",
+    "read",
+    "read_observations",
+    "read_rig",
+    "read_tracks",
+    "write",
+    "write_observations",
+    "write_rig",
+]

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator
     from pathlib import Path
 
-__all__ = ["replacing"]
+__all__ = ["replacing", "write_text"]
 
 
 @contextmanager
@@ -62,3 +62,9 @@ def replacing(path: Path) -> Generator[IO[bytes], None, None]:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise not_written(path, error) from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file as a whole or not at all."""
+    with replacing(path) as file:
+        file.write(text.encode())

@@ -6,6 +6,8 @@ from asterism.model.interacting_motions import InteractingMotions
 from asterism.model.linear_motion import LinearMotion
 from asterism.model.motion import DWNA, DWPA, Motion, RandomWalk, SingleMotion
 from asterism.model.population import Population
+from asterism.model.posterior import log_posterior, track_scores
+from asterism.model.recipe import Recipe
 from asterism.model.sensor import Sensor
 from asterism.model.tracking_model import TrackingModel
 from asterism.model.tracks import Tracks
@@ -20,8 +22,11 @@ __all__ = [
     "Motion",
     "Population",
     "RandomWalk",
+    "Recipe",
     "Sensor",
     "SingleMotion",
     "TrackingModel",
     "Tracks",
+    "log_posterior",
+    "track_scores",
 ]

@@ -37,7 +37,7 @@ class Capture(Detections):
     path : Path
         The file; writing a result in the same format takes from it all that is not a point.
     format : str
-        Its format, a key of `asterism.io.FORMATS`.
+        Its format, a key of `asterism.io.CAPTURE_FORMATS`.
     rate : float
         Frames a second as the file states it, 0 where it does not.
     first_frame : int

@@ -44,7 +44,7 @@ class Detections:
     residuals : array_like, shape (N,), optional
         How far their rays pass by each point, where known, metres.
     filled : array_like of bool, shape (N,), optional
-        Which points were not measured but estimated, as `asterism.fill` does; none by default.
+        Which points were not measured but estimated, as `asterism.fill_gaps` does; none by default.
     stds : array_like, shape (N,), optional
         Standard deviation of each coordinate where it is known, metres; 0 where it is not.
     covariances : array_like, shape (N, D, D), optional
@@ -202,7 +202,7 @@ class Detections:
         """Leave out what was filled.
 
         The one place where it is: whoever takes points for measurements (`estimate_model`,
-        `track`, `stitch`, `fill`, `simulate.sense`) asks for these.
+        `track`, `stitch`, `fill`, `simulate.corrupt`) asks for these.
 
         Returns
         -------

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
+
+    from asterism.model.recipe import Recipe
 
 __all__ = ["MOST_TRACKS", "Tracks"]
 
@@ -44,8 +46,9 @@ class Tracks:
     confidence : array_like, shape (N,), optional
         Probability in [0, 1] that the label is right, from methods that know it.
     info : mapping, optional
-        How the labels were found, from methods: numbers, of what was approximated and by how much
-        and what it took; and as text which method was chosen, and why.
+        Numbers from the method: what was approximated and by how much, and what the run took.
+    recipe : Recipe, optional
+        What repeats the tracking, from `track`.
 
     Raises
     ------
@@ -65,7 +68,8 @@ class Tracks:
     labels: NDArray[np.int64]
     names: tuple[str | None, ...] = ()
     confidence: NDArray[np.float64] | None = None
-    info: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    info: Mapping[str, float] = field(default_factory=dict[str, float])
+    recipe: Recipe | None = None
 
     def __post_init__(self) -> None:
         check_kind(

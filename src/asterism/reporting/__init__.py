@@ -1,5 +1,5 @@
-"""From tracks to their report: what is known about them is gathered here and drawn by `view`."""
+"""From tracks to their report: what is known about them is gathered here and drawn by `page`."""
 
-from asterism.reporting.report import report
+from asterism.reporting.gather import report
 
 __all__ = ["report"]

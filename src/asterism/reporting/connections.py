@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.label import learn_bonds
-from asterism.view.report import Connections
-from asterism.view.report.thinning import thinned
+from asterism.reporting.page import Connections
+from asterism.reporting.page.thinning import thinned
+from asterism.tracking.rigidity import learn_bonds
 
 if TYPE_CHECKING:
     from asterism.model import Tracks

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.evaluate import Evaluation, align, evaluate
-from asterism.view.report import Judgement, Score, Verdict
+from asterism.metrics import Evaluation, align, evaluate
+from asterism.reporting.page import Judgement, Score, Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.evaluate import Alignment
+    from asterism.metrics import Alignment
     from asterism.model import Tracks
 
 __all__ = ["judge"]

@@ -1,5 +1,7 @@
 """Captures whose truth is known: scenes in motion, and what goes wrong when one is recorded."""
 
+from asterism.simulate.centroids import Seeing
+from asterism.simulate.corruption import corrupt
 from asterism.simulate.episodes import Burst, Ghosts, Visits
 from asterism.simulate.film import Film, film
 from asterism.simulate.people.hand import fingers
@@ -8,8 +10,6 @@ from asterism.simulate.people.pair import two_people
 from asterism.simulate.people.person import person
 from asterism.simulate.points import attracted, crossing, cube, smooth, walk, wander
 from asterism.simulate.scenes import SCENES, Scene, from_capture
-from asterism.simulate.seeing import Seeing
-from asterism.simulate.sensing import sense
 from asterism.simulate.swarm import swarm
 from asterism.simulate.truth import Truth
 
@@ -23,6 +23,7 @@ __all__ = [
     "Truth",
     "Visits",
     "attracted",
+    "corrupt",
     "crossing",
     "cube",
     "film",
@@ -30,7 +31,6 @@ __all__ = [
     "from_capture",
     "juggler",
     "person",
-    "sense",
     "smooth",
     "swarm",
     "two_people",

@@ -10,7 +10,7 @@ from asterism.camera import Observations, Rig
 from asterism.errors import ParameterError, check_kind, check_number
 from asterism.model import Tracks
 from asterism.records import record
-from asterism.simulate.seeing import Blobs, Seeing, see
+from asterism.simulate.centroids import Blobs, Seeing, see
 from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.simulate.sensed_points import Points
+    from asterism.simulate.corrupted_points import Points
 
 __all__ = ["kept_frames", "shaken"]
 

@@ -1,7 +1,7 @@
 """The one list of scenes: truth in motion, in which every marker is seen in every frame.
 
 A scene is a function of keyword-only arguments, among them `frames`, `rate` and `seed`, that gives
-a `Truth`. Noise, misses and clutter come afterwards, from `asterism.simulate.sense`; cameras from
+a `Truth`. Noise, misses and clutter come afterwards, from `asterism.simulate.corrupt`; cameras from
 `asterism.simulate.film`.
 """
 

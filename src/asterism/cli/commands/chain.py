@@ -1,0 +1,170 @@
+"""``asterism chain``: a scene through cameras, back into space, tracked; scored at each stage."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from asterism.cli.commands.reconstruct import Prior, about, expected_from, figures, true_tracks
+from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
+
+_Scene = Annotated[str, typer.Argument(metavar="SCENE", help="One of `asterism scenes`.")]
+_Rig = Annotated[
+    str, typer.Option("--rig", metavar="RIG", help="A calibration, or ring8, wall4 and the like.")
+]
+_Out = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="DIR", help="Folder for what every stage made."),
+]
+_Methods = Annotated[
+    list[str] | None,
+    typer.Option("--method", help="Method to track with; may be repeated.", show_default="auto"),
+]
+_Frames = Annotated[int | None, typer.Option(help="Number of frames.", show_default="the scene's")]
+_Rate = Annotated[float | None, typer.Option(help="Frames a second.", show_default="the scene's")]
+_Seed = Annotated[int, typer.Option(help="Chooses everything that is random.")]
+_Options = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="NAME=VALUE", help="Option of the scene; may be repeated."),
+]
+_Seeing = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--seeing",
+        metavar="NAME=VALUE",
+        help="What the cameras make of markers, as in `asterism film`; may be repeated.",
+        show_default="noise_px=0.3",
+    ),
+]
+
+OBSERVATIONS, RIG, TRUTH, POINTS = "observations.csv", "rig.toml", "truth.csv", "points.csv"
+
+
+def chain(
+    scene: _Scene,
+    rig: _Rig = "ring8",
+    out: _Out = None,
+    method: _Methods = None,
+    frames: _Frames = None,
+    rate: _Rate = None,
+    seed: _Seed = 0,
+    option: _Options = None,
+    seeing: _Seeing = None,
+    prior: Prior = False,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Simulate a scene, film it, make points of the image points, track them, and score all that.
+
+    2-D: what the cameras saw of the markers. 3-D: which of the markers that two cameras or more
+    saw were found, ghosts, errors, and whether the covariance is honest. Identity: how well each
+    method keeps the markers apart.
+
+    For example:
+
+        asterism chain person --rig ring8 --method gnn --method mcmcda
+
+        asterism chain person --rig ring4 --prior
+
+        asterism chain two_people --rig ring8 --seeing false=0.5 --seeing noise_px=0.3 -o chain
+    """
+    import asterism as am
+    from asterism.cli.outputs import Folder, check_outputs
+    from asterism.cli.recording import made_scene, rig_from, seeing_from
+    from asterism.errors import check_fields
+    from asterism.tracking.choose import AUTO
+
+    names = method or [AUTO]
+    check_fields("--method", names, (AUTO, *am.tracking.METHODS))
+    eyes = seeing_from(seeing or ["noise_px=0.3"])
+    if out is not None:
+        files = (OBSERVATIONS, RIG, TRUTH, POINTS, *(f"tracks_{name}.csv" for name in names))
+        check_outputs({"--out": Folder(out, files)}, [Path(rig)], overwrite=overwrite)
+    truth, values = made_scene(scene, {"frames": frames, "rate": rate, "seed": seed}, option or [])
+    cameras, about_rig = rig_from(rig, truth.detections.points)
+    shot = am.simulate.film(truth, cameras, seeing=eyes, seed=seed)
+    o = shot.observations
+    start = time.perf_counter()
+    with progress("reconstructing", o.n_frames) as advance:
+        made = am.reconstruct(o, cameras, advance=advance)
+    if prior:
+        with progress("reconstructing again", o.n_frames) as advance:
+            made = am.reconstruct(o, cameras, prior=expected_from(made), advance=advance)
+    seconds = time.perf_counter() - start
+    seen = (shot.blob_of >= 0).sum(axis=0)
+    scores = am.metrics.point_scores(made.detections, truth, counted=seen >= 2)
+    who = true_tracks(made, o)
+    tracks: dict[str, am.Tracks] = {}
+    identity: dict[str, dict[str, Any]] = {}
+    model = am.estimate_model(made.detections).model
+    for name in names:
+        with progress(f"tracking with {name}", o.n_frames) as advance:
+            tracks[name] = am.track(
+                made.detections,
+                None if name == AUTO else am.tracking.method_by_name(name),
+                model=model, seed=seed, progress=advance,
+            )  # fmt: skip
+        identity[name] = am.evaluate(tracks[name], who).to_dict()
+    n_there = max(int((shot.projection.reason[0] != am.camera.Reason.ABSENT).sum()), 1)
+    two_d = {
+        "n_image_points": o.n_points,
+        "n_false": int((o.markers < 0).sum()) if o.markers is not None else 0,
+        "seen_by_one_percent": 100 * float((seen >= 1).sum()) / n_there,
+        "seen_by_two_percent": 100 * float((seen >= 2).sum()) / n_there,
+    }
+    if out is not None:
+        _write(out, o, cameras, who, tracks)
+    if json:
+        print_json({
+            "scene": scene, "options": values, "rig": about_rig, "2d": two_d,
+            "3d": figures(made, o) | scores.to_dict() | {"frames_per_second": o.n_frames / seconds},
+            "identity": identity, "folder": None if out is None else str(out),
+        })  # fmt: skip
+    elif not quiet:
+        n_markers = f"{truth.n_tracks} markers, {o.n_frames} frames, {about_rig}"
+        print_table([
+            (scene, n_markers),
+            ("seen by one camera or more", f"{two_d['seen_by_one_percent']:.2f} %"),
+            ("by two or more", f"{two_d['seen_by_two_percent']:.2f} %"),
+            ("image points", f"{o.n_points}, {two_d['n_false']} of them false"),
+        ], title="2-D")  # fmt: skip
+        print_table([
+            *about(made, o),
+            ("found, of those seen by two", f"{100 * scores.recall:.2f} %"),
+            ("ghosts", f"{100 * scores.ghosts:.2f} % of the points"),
+            ("error", f"{scores.median_mm:.3g} mm median, {scores.p95_mm:.3g} mm in 95 %"),
+            ("squared error by covariance", f"{scores.nees:.3g} (1 if it is honest)"),
+            ("speed", f"{o.n_frames / seconds:.0f} frames/s"),
+        ], title="\n3-D")  # fmt: skip
+        print_table(
+            [
+                (name, f"{s['idf1']:.4f}", s["switches"], f"{s['mota']:.4f}", s["n_tracks"])
+                for name, s in identity.items()
+            ],
+            ("method", "IDF1", "switches", "MOTA", "tracks"),
+            title="\nIdentity",
+        )
+        if AUTO in tracks and (recipe := tracks[AUTO].recipe) is not None:
+            print_table([("chosen", recipe.chosen)])
+        if out is not None:
+            print_table([("written", out)])
+
+
+def _write(out: Path, observations: Any, rig: Any, who: Any, tracks: dict[str, Any]) -> None:
+    """Write what every stage made."""
+    import numpy as np
+
+    import asterism as am
+
+    out.mkdir(parents=True, exist_ok=True)
+    am.io.write_observations(observations, out / OBSERVATIONS)
+    am.io.write_rig(rig, out / RIG)
+    am.write(who, out / TRUTH)
+    d = who.detections
+    am.write(am.Tracks(detections=d, labels=np.full(d.n_points, -1)), out / POINTS)
+    for name, found in tracks.items():
+        am.write(found, out / f"tracks_{name}.csv")

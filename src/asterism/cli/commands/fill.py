@@ -1,0 +1,142 @@
+"""``asterism fill``: tracks with gaps in, tracks without out."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
+from asterism.errors import ParameterError, check_number
+
+if TYPE_CHECKING:
+    import asterism as am
+
+_In = Annotated[Path, typer.Argument(metavar="IN", help="Tracks whose gaps are to be filled.")]
+_Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
+_Longest = Annotated[float, typer.Option(help="Longer gaps are left, seconds.")]
+_Model = Annotated[
+    Path | None,
+    typer.Option(help="Model to use, TOML; by default it is estimated from IN."),
+]
+_Unflagged = Annotated[
+    bool,
+    typer.Option(
+        "--unflagged",
+        help="Write a format in which nothing tells filled points from measured ones.",
+    ),
+]
+_MOST = 10  # gaps that are shown
+
+
+def fill(
+    source: _In,
+    out: _Out,
+    longest: _Longest = 1.0,
+    model: _Model = None,
+    unflagged: _Unflagged = False,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Fill the gaps of tracks, and say how sure each fill is.
+
+    A marker's own motion, the body it sits on and all other markers tell where it was; where as
+    much was hidden on purpose shows which of them to believe. Filled points are flagged: in C3D by
+    residual 0, in CSV by a column. What was filled before is left out first.
+
+    For example:
+
+        asterism fill trial.tracked.c3d -o filled.c3d
+
+        asterism fill tracks.csv -o filled.csv --longest 0.5 --json
+
+        asterism fill trial.tracked.c3d -o filled.trc --unflagged
+    """
+    import asterism as am
+    from asterism.cli.outputs import check_outputs, read_model
+    from asterism.cli.tracking import output_format
+
+    format = output_format(out, None)
+    if not (am.io.CAPTURE_FORMATS[format].keeps_filled or unflagged):
+        able = ", ".join(name for name, f in am.io.CAPTURE_FORMATS.items() if f.keeps_filled)
+        raise ParameterError(
+            "--out", f"a format that tells filled points from measured ones: {able}", str(out),
+            "or give --unflagged",
+        )  # fmt: skip
+    check_outputs({"--out": out}, [source, model], overwrite=overwrite)
+    check_number("--longest", longest, above=0, below=1e9)
+    tracks = am.io.read_tracks(source)
+    capture = tracks.detections
+    assert isinstance(capture, am.Capture)
+    if not (tracks.labels >= 0).any():
+        raise ParameterError(
+            "IN", "a capture with tracks", f"none in {source}", "run asterism track first"
+        )
+    given = None if model is None else read_model(model)
+    with progress("filling") as advance:
+        found = am.fill_gaps(tracks, model=given, longest=longest, progress=advance)
+    am.write(found.tracks, out, format=format, unflagged=unflagged)
+    figures: dict[str, Any] = _figures(found) | {"input": str(source), "output": str(out)}
+    if json:
+        print_json(figures | {"gaps": [_plain(gap, capture) for gap in found.gaps]})
+    elif not quiet:
+        by = ", ".join(f"{name} {n}" for name, n in figures["estimators"].items())
+        rows = [
+            ("gaps", str(figures["n_gaps"])),
+            ("filled", f"{figures['n_filled']}, {figures['n_points']} points"),
+            *([("mostly by", by)] if by else []),
+            *[
+                ("" if n else "left", f"{count}, {reason}")
+                for n, (reason, count) in enumerate(figures["left"].items())
+            ],
+            *_least_sure(found, capture),
+            ("written", str(out)),
+        ]
+        print_table(rows, title="Filled")
+
+
+def _figures(found: am.tracking.Filling) -> dict[str, Any]:
+    filled = [gap for gap in found.gaps if gap.is_filled]
+    return {
+        "n_gaps": len(found.gaps),
+        "n_filled": len(filled),
+        "n_points": sum(map(len, filled)),
+        "estimators": dict(Counter(gap.estimator for gap in filled).most_common()),
+        "left": dict(Counter(gap.reason for gap in found.gaps if gap.reason).most_common()),
+        "largest_std": max((gap.std for gap in filled), default=math.nan),
+    }
+
+
+def _plain(gap: am.tracking.Gap, capture: am.Capture) -> dict[str, Any]:
+    """Give a gap as plain values, its frames as the file counts them."""
+    return {
+        "track": gap.track,
+        "first": capture.first_frame + gap.first,
+        "last": capture.first_frame + gap.last,
+        "seconds": gap.seconds,
+        "estimator": gap.estimator,
+        "weights": dict(gap.weights),
+        "rms": dict(gap.rms),
+        "n_windows": gap.n_windows,
+        "std": gap.std,
+        "n_neighbours": gap.n_neighbours,
+        "reason": gap.reason,
+    }
+
+
+def _least_sure(found: am.tracking.Filling, capture: am.Capture) -> list[tuple[str, str]]:
+    filled = [gap for gap in found.gaps if gap.is_filled]
+    names = found.tracks.names
+    return [
+        (
+            "" if n else "least sure",
+            f"{names[gap.track] or f'track {gap.track}'}, frames {capture.first_frame + gap.first} "
+            f"to {capture.first_frame + gap.last}: ±{1e3 * gap.std:.3g} mm, {gap.estimator}"
+            + ("" if gap.n_windows else " (nowhere in the take could it be tried)"),
+        )
+        for n, gap in enumerate(sorted(filled, key=lambda gap: -gap.std)[:_MOST])
+    ]

@@ -1,0 +1,88 @@
+"""``asterism info``: what a file holds, and how hard it is."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from asterism.cli.console import Json, Quiet, print_json, print_table
+
+if TYPE_CHECKING:
+    import asterism as am
+
+_File = Annotated[Path, typer.Argument(metavar="FILE", help="Capture to look at.")]
+
+
+def info(file: _File, quiet: Quiet = False, json: Json = False) -> None:
+    """Say what a capture holds, what is odd about it, and how hard its markers are to tell apart.
+
+    Nothing is tracked and nothing written.
+
+    For example:
+
+        asterism info trial.c3d
+
+        asterism info trial.c3d --json
+    """
+    import asterism as am
+
+    found = am.io.describe(am.read(file))
+    if json:
+        print_json(dataclasses.asdict(found))
+    elif not quiet:
+        print_table(_rows(found))
+
+
+def _rows(found: am.io.CaptureInfo) -> list[tuple[str, str]]:
+    f = found
+    rows = [
+        ("file", f"{f.path} ({f.format}, units {f.units})"),
+        ("frames", f"{f.n_frames} from frame {f.first_frame}, {f.rate:g} Hz, {f.duration:.4g} s"),
+        ("named markers", f"{f.n_named}"),
+        ("without a name", _unnamed(f)),
+        ("left out", f"{f.n_modelled} computed points"),
+        ("points a frame", f"{f.points_min} to {f.points_max}, {f.points_mean:.4g} on average"),
+    ]
+    if f.n_named:
+        gaps = f", median {_number(f.gap_median)}, longest {f.gap_longest} frames"
+        rows += [
+            ("absent", f"{_number(f.absent_percent)} % of the samples of named markers"),
+            ("gaps", f"{f.n_gaps}{gaps if f.n_gaps else ''}"),
+        ]
+    rows += _steps("step", f.step_median, f.step_99)
+    if not f.n_named:
+        rows += _steps("step to nearest", f.nearest_step_median, f.nearest_step_99)
+    spacing = (
+        f"1 % below {_number(f.spacing_1)}, 5 % below {_number(f.spacing_5)}, "
+        f"median {_number(f.spacing_50)} mm"
+    )
+    return [
+        *rows,
+        ("nearest neighbour", spacing if f.points_max > 1 else "none: a frame has one at most"),
+        ("difficulty", f"{f.difficulty}: {f.reason}"),
+        *([("truncated", f.truncated)] if f.truncated else []),
+        *(("warning" if i == 0 else "", text) for i, text in enumerate(f.warnings)),
+    ]
+
+
+def _unnamed(f: am.io.CaptureInfo) -> str:
+    """Say what there is beside named markers: pieces of trajectories, and points of nothing."""
+    parts = [f"{f.n_unlabelled} channels"] if f.n_unlabelled else []
+    if f.n_pieces:
+        parts = [f"{parts[0]} in {f.n_pieces} pieces" if parts else f"{f.n_pieces} tracks"]
+    if f.n_unidentified:
+        parts.append(f"{f.n_unidentified} of {f.n_points} points belong to no track")
+    return "; ".join(parts) or "nothing"
+
+
+def _steps(what: str, median: float, most: float) -> list[tuple[str, str]]:
+    if median != median:
+        return []
+    return [(what, f"median {_number(median)}, 99 % below {_number(most)} mm a frame")]
+
+
+def _number(value: float) -> str:
+    return "–" if value != value else f"{value:.3g}"

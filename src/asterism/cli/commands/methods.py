@@ -1,0 +1,97 @@
+"""``asterism methods`` and ``asterism scenes``: what there is to choose from."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from asterism.cli.console import Json, print_json, print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from asterism.cli.options import Option
+
+
+_Scene = Annotated[
+    str | None, typer.Argument(metavar="SCENE", help="Show the options of this one.")
+]
+
+
+def methods(json: Json = False) -> None:
+    """List the methods and their options.
+
+    `asterism track --method NAME --option NAME=VALUE` takes them.
+
+    For example:
+
+        asterism methods
+
+        asterism methods --json
+    """
+    import asterism as am
+    from asterism.cli.options import method_options
+    from asterism.tracking.choose import AUTO
+
+    _show(
+        {AUTO: ("The clip chooses one of these, and whether to stitch, and says why.", {})}
+        | {
+            name: (_first_line(method), method_options(method))
+            for name, method in am.tracking.METHODS.items()
+        },
+        json,
+    )
+
+
+def scenes(scene: _Scene = None, json: Json = False) -> None:
+    """List the scenes that can be simulated, or the options of one.
+
+    `asterism simulate SCENE --option NAME=VALUE` takes them.
+
+    For example:
+
+        asterism scenes
+
+        asterism scenes person
+    """
+    import asterism as am
+    from asterism.cli.options import scene_options
+    from asterism.errors import check_fields
+
+    known = am.simulate.SCENES
+    if scene is not None:
+        check_fields("SCENE", [scene], known)
+    if scene is None and not json:
+        print_table([(name, s.about) for name, s in known.items()])
+        return
+    chosen = known if scene is None else {scene: known[scene]}
+    _show({name: (s.about, scene_options(s.make)) for name, s in chosen.items()}, json)
+
+
+def _show(things: Mapping[str, tuple[str, Mapping[str, Option]]], json: bool) -> None:
+    if json:
+        print_json({name: _plain(about, options) for name, (about, options) in things.items()})
+        return
+    for i, (name, (about, options)) in enumerate(things.items()):
+        rows = [(f"  {o.name}", o.type_text, str(o.default), o.about) for o in options.values()]
+        title = ("\n" if i else "") + f"{name}: {about}"
+        if rows:
+            print_table(rows, ("  option", "type", "default", "meaning"), title=title)
+        else:
+            print_table([("  no options",)], title=title)
+
+
+def _plain(about: str, options: Mapping[str, Option]) -> dict[str, Any]:
+    return {
+        "about": about,
+        "options": {
+            o.name: {"type": o.type_text, "default": o.default, "about": o.about}
+            for o in options.values()
+        },
+    }
+
+
+def _first_line(documented: object) -> str:
+    return inspect.cleandoc(documented.__doc__ or "").split("\n", 1)[0]

@@ -1,0 +1,83 @@
+"""``asterism report``: tracks as a page with a player."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    import asterism as am
+
+__all__ = ["report"]
+
+_In = Annotated[Path, typer.Argument(metavar="TRACKED", help="Tracks to show.")]
+_Truth = Annotated[Path | None, typer.Option(help="What is so: wrong labels are marked.")]
+_Rig = Annotated[Path | None, typer.Option(help="Calibration of the cameras.")]
+_Out = Annotated[
+    Path | None, typer.Option("--out", "-o", help="Page to write; by default TRACKED.html.")
+]
+_Up = Annotated[
+    Literal["x", "y", "z"] | None,
+    typer.Option(help="Axis that points up; told by the rig or by the format unless given."),
+]
+_Title = Annotated[str | None, typer.Option(help="Title of the page; by default the file's name.")]
+
+
+def report(
+    source: _In,
+    truth: _Truth = None,
+    rig: _Rig = None,
+    out: _Out = None,
+    up: _Up = None,
+    title: _Title = None,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Write tracks as one HTML page: a player, a timeline, and what to look at first.
+
+    The page needs nothing but a browser, and asks nobody for anything.
+
+    For example:
+
+        asterism report trial.tracked.c3d
+
+        asterism report tracked.c3d --truth truth.c3d --rig trial.xcp -o page.html
+    """
+    import asterism as am
+    from asterism.cli.outputs import check_ending, check_outputs, read_labels
+
+    page = out or source.with_suffix(".html")
+    check_ending("--out", page, ".html", ".htm")
+    check_outputs({"--out": page}, [source, truth, rig], overwrite=overwrite)
+    tracks = read_labels(source)
+    true = None if truth is None else am.io.read_tracks(truth)
+    cameras = None if rig is None else am.read_rig(rig)
+    with progress("writing the page"):
+        am.report(
+            tracks, page, truth=true, rig=cameras, up=up, title=title, summary=_origin(tracks)
+        )
+    size = page.stat().st_size
+    if json:
+        print_json({"input": str(source), "output": str(page), "bytes": size})
+    elif not quiet:
+        rows: list[tuple[str, Any]] = [("written", f"{page}, {size / 1e6:.2f} MB")]
+        print_table(rows, title="Report")
+
+
+def _origin(tracks: am.Tracks) -> list[tuple[str, str]]:
+    """Say what the file tells of itself."""
+    import asterism as am
+
+    d = tracks.detections
+    if not isinstance(d, am.Capture):
+        return []
+    rate = f", {d.rate:g} frames/s" if d.rate else ""
+    return [
+        ("file", d.path.name),
+        ("format", f"{am.io.CAPTURE_FORMATS[d.format].description}{rate}"),
+    ]

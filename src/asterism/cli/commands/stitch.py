@@ -1,0 +1,117 @@
+"""``asterism stitch``: fragments in, markers out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
+from asterism.errors import ParameterError
+
+if TYPE_CHECKING:
+    import asterism as am
+
+_In = Annotated[Path, typer.Argument(metavar="IN", help="Tracks to stitch.")]
+_Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
+_Model = Annotated[
+    Path | None,
+    typer.Option(help="Model to use, TOML; by default it is estimated from IN."),
+]
+_Confirm = Annotated[int, typer.Option(help="Frames until it is decided what a fragment is.")]
+_Ghosts = Annotated[
+    float, typer.Option("--ghost-radius", help="Ghosts are about so far from a marker, metres.")
+]
+_MaxHidden = Annotated[
+    int | None,
+    typer.Option(help="Frames after which a hidden marker is forgotten.", show_default="never"),
+]
+_MOST = 10  # joins that are shown
+
+
+def stitch(
+    source: _In,
+    out: _Out,
+    model: _Model = None,
+    confirm: _Confirm = 15,
+    ghost_radius: _Ghosts = 0.03,
+    max_hidden: _MaxHidden = None,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Tell which track goes on with which, through gaps of any length, and write the markers.
+
+    Neighbours that keep their distance carry a hidden marker to where it must be when it comes
+    back. For the tracks of a file as they are; `asterism track --stitch` makes fragments that are
+    surer.
+
+    For example:
+
+        asterism stitch pieces.c3d -o markers.c3d
+
+        asterism stitch tracks.csv -o markers.csv --json
+    """
+    import asterism as am
+    from asterism.cli.commands.bonds import bond_figures, bond_rows
+    from asterism.cli.outputs import check_outputs, read_model
+    from asterism.cli.tracking import output_format
+
+    format = output_format(out, None)
+    check_outputs({"--out": out}, [source, model], overwrite=overwrite)
+    capture = am.read(source)
+    if not (capture.labels >= 0).any():
+        hint = "run asterism track --stitch first"
+        raise ParameterError("IN", "a capture with tracks", f"none in {source}", hint)
+    if model is None:
+        with progress("estimating the model"):
+            given = am.estimate_model(capture).model
+    else:
+        given = read_model(model)
+    found = am.stitch(
+        capture.tracks,
+        am.tracking.tracklet_model(given),
+        confirm=confirm,
+        ghost_radius=ghost_radius,
+        max_hidden=max_hidden,
+    )
+    am.write(found.tracks, out, format=format)
+    figures = {
+        "input": str(source),
+        "output": str(out),
+        "n_tracks_before": int((capture.tracks.lengths > 0).sum()),
+        "n_tracks": found.tracks.n_tracks,
+        "n_joins": len(found.joins),
+        "n_cuts": found.n_cuts,
+        "n_ghosts": found.n_ghosts,
+    }
+    if json:
+        joins = [
+            {"marker": j.marker, "last": j.last, "first": j.first, "probability": j.probability}
+            for j in found.joins
+        ]
+        print_json(figures | bond_figures(found.bonds) | {"joins": joins})
+    elif not quiet:
+        rows = [
+            ("tracks", f"{figures['n_tracks']}, of {figures['n_tracks_before']}"),
+            ("markers found again", str(len(found.joins))),
+            ("links cut", str(found.n_cuts)),
+            ("ghosts", str(found.n_ghosts)),
+            *bond_rows(found.bonds),
+            *_least_sure(found, capture),
+            ("written", str(out)),
+        ]
+        print_table(rows, title="Stitched")
+
+
+def _least_sure(found: am.tracking.Stitching, capture: am.Capture) -> list[tuple[str, str]]:
+    doubtful = sorted(found.joins, key=lambda join: join.probability)[:_MOST]
+    return [
+        (
+            "" if n else "least sure",
+            f"track {j.marker}, frames {capture.first_frame + j.last} to "
+            f"{capture.first_frame + j.first}: {100 * j.probability:.1f} %",
+        )
+        for n, j in enumerate(doubtful)
+    ]

@@ -1,0 +1,278 @@
+"""``asterism track``: detections in, tracks out."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
+from asterism.errors import FormatError, ParameterError, check_number
+
+if TYPE_CHECKING:
+    import asterism as am
+    from asterism.cli.run_folder import Run
+    from asterism.cli.summary import Summary
+    from asterism.model import Recipe
+
+log = logging.getLogger(__name__)
+
+_In = Annotated[Path | None, typer.Argument(metavar="IN", help="Capture to track.")]
+_Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        "-o",
+        help="File to write; by default IN with .tracked in its name.",
+    ),
+]
+_Format = Annotated[
+    str | None, typer.Option(help="Format of the result; by default told by its name.")
+]
+_Method = Annotated[
+    str | None,
+    typer.Option(
+        help="Method, one of `asterism methods`; auto chooses by the capture, and says why.",
+        show_default="auto",
+    ),
+]
+_Options = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="NAME=VALUE", help="Option of the method; may be repeated."),
+]
+_Model = Annotated[
+    Path | None,
+    typer.Option(help="Model to use, TOML; by default it is estimated from the capture."),
+]
+_Seed = Annotated[int | None, typer.Option(help="For methods that draw.", show_default="0")]
+_Start = Annotated[
+    bool,
+    typer.Option(
+        "--start", help="Begin with the tracks that IN carries, and repair them (mcmcda)."
+    ),
+]
+_Stitch = Annotated[
+    bool,
+    typer.Option(
+        "--stitch",
+        help="Give up hidden markers early, and tell by their neighbours which comes back.",
+    ),
+]
+_Run = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        help="Folder for the result and for all that repeats the run.",
+    ),
+]
+_From = Annotated[
+    Path | None,
+    typer.Option(
+        "--from", metavar="RUN.TOML", help="Repeat a run; IN says where its input is now."
+    ),
+]
+_Report = Annotated[
+    Path | None, typer.Option("--report", metavar="PAGE", help="Page with a player to write too.")
+]
+
+
+def track(
+    source: _In = None,
+    out: _Out = None,
+    format: _Format = None,
+    method: _Method = None,
+    option: _Options = None,
+    model: _Model = None,
+    seed: _Seed = None,
+    start: _Start = False,
+    stitch: _Stitch = False,
+    run: _Run = None,
+    overwrite: Overwrite = False,
+    repeat: _From = None,
+    report: _Report = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Tell which detection is which marker, and write the tracks.
+
+    The model is estimated from the capture unless one is given; names in the capture play no part.
+    The same input, options and seed give the same bytes.
+
+    For example:
+
+        asterism track trial.c3d
+
+        asterism track trial.c3d --method gnn
+
+        asterism track trial.c3d --method smp --option proposers=detections
+
+        asterism track trial.c3d -o tracks.csv --model model.toml
+
+        asterism track pieces.c3d --method mcmcda --start
+
+        asterism track trial.c3d --stitch
+
+        asterism track trial.c3d --report trial.html
+
+        asterism track trial.c3d --run runs/first
+
+        asterism track --from runs/first/run.toml -o again.c3d
+    """
+    import asterism as am
+    from asterism.cli.outputs import Folder, check_ending, check_outputs, read_model
+    from asterism.cli.run_folder import FILES, Run
+    from asterism.cli.tracking import carry_out, default_output, output_format
+    from asterism.io.captures.files import format_of
+
+    check_ending("--report", report, ".html", ".htm")
+    job: Run | None = None
+    if repeat is not None:
+        settings = {"--method": method, "--option": option, "--model": model, "--seed": seed,
+                    "--start": start or None, "--stitch": stitch or None}  # fmt: skip
+        job = _run_of(repeat, source, [k for k, v in settings.items() if v not in (None, [])])
+        source, format = job.source, format or job.format
+    if source is None:
+        raise ParameterError("IN", "a capture to track", "nothing", "see asterism track --help")
+    chosen_format = output_format(out, format, format_of(source).name)
+    if out is None:
+        out = default_output(source, chosen_format)
+        out = out if run is None else run / out.name
+    outputs: dict[str, Path | Folder | None] = {"--out": out, "--report": report}
+    if run is not None:
+        is_inside = out.resolve().parent == run.resolve()
+        outputs["--run"] = Folder(run, (*FILES, out.name) if is_inside else FILES)
+        outputs["--out"] = None if is_inside else out
+    check_outputs(outputs, [source, model, repeat], overwrite=overwrite)
+    chosen_method = made_method(method, option or [])
+    check_number("--seed", seed or 0, above=0, closed=True, integer=True)
+    given = None if model is None else read_model(model)
+    capture = am.read(source)
+    if job is not None:
+        assert repeat is not None
+        recipe, estimate = _checked(job, capture, repeat), None
+    else:
+        if start and method not in (None, am.tracking.AUTO, am.MCMCDA.name):
+            expected = f"--method {am.MCMCDA.name} beside it, or none"
+            raise ParameterError("--start", expected, f"--method {method}")
+        if start and not (capture.labels >= 0).any():
+            raise ParameterError("--start", "a capture with tracks", f"none in {source}")
+        with progress("estimating the model"):
+            plan = am.tracking.plan_tracking(
+                capture, chosen_method, model=given, stitch=True if stitch else "auto",
+                seed=seed or 0, start=capture.tracks if start else None,
+            )  # fmt: skip
+        recipe, estimate = plan.recipe, plan.estimate
+    if run is not None:
+        run.mkdir(parents=True, exist_ok=True)
+    talks = not (quiet or json)
+    if talks:
+        _print_capture(capture)
+        if estimate is not None:
+            print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
+        if recipe.chosen:
+            print_table([("method", recipe.chosen)])
+    job = Run(recipe=recipe, source=source, format=chosen_format)
+    tracks, summary = carry_out(job, capture, out, run)
+    if report is not None:
+        _write_report(tracks, report, recipe, estimate, summary)
+    if talks:
+        rows = summary.rows() + ([("report", str(report))] if report is not None else [])
+        print_table(rows, title=f"\nTracked with {recipe.method}")
+    if json:
+        page = {} if report is None else {"report": str(report)}
+        told = {
+            "options": recipe.options,
+            "stitch": recipe.stitch,
+            "model": recipe.model.to_dict(),
+        }
+        told |= {"chosen": recipe.chosen} if recipe.chosen else {}
+        print_json(summary.to_dict() | told | page)
+
+
+def made_method(name: str | None, texts: list[str]) -> am.tracking.Method[Any] | None:
+    """Make a method from its name and its ``NAME=VALUE`` options; None for ``auto``."""
+    import asterism as am
+    from asterism.cli.options import as_options, method_options, parsed
+    from asterism.errors import check_fields
+
+    if name in (None, am.tracking.AUTO):
+        if texts:
+            expected = "a method to have it"
+            hint = "name the method: --method smp"
+            raise ParameterError("--option", expected, f"--method {am.tracking.AUTO}", hint)
+        return None
+    check_fields("--method", [name], am.tracking.METHODS)
+    known = method_options(am.tracking.METHODS[name])
+    given = parsed("--option", f"method {name}", texts, known)
+    with as_options({option: f"--option {option}" for option in given}):
+        return am.tracking.method_by_name(name, **given)
+
+
+def _run_of(path: Path, source: Path | None, settings: list[str]) -> Run:
+    """Read a run, with its input where it is now."""
+    from asterism.cli.run_folder import Run
+
+    if settings:
+        raise ParameterError("--from", "the settings of the run alone", ", ".join(settings))
+    job = Run.read(path)
+    job = dataclasses.replace(job, source=source or job.source)
+    if not job.source.is_file():
+        hint = "say where it is now: asterism track IN --from RUN.TOML"
+        raise FormatError(job.source, "the input of the run", "", "no such file", hint)
+    return job
+
+
+def _checked(job: Run, capture: am.Capture, path: Path) -> Recipe:
+    """Return the recipe of a run if the capture is the one that it is of."""
+    from asterism.model.recipe import sha256_of
+
+    recipe = job.recipe
+    found = sha256_of(capture, capture.labels if recipe.has_start else None)
+    if found != recipe.sha256:
+        raise FormatError(
+            job.source, "the SHA-256 of its points", f"{recipe.sha256}, as {path} says", found,
+            "a run can only be repeated with the same input",
+        )  # fmt: skip
+    return recipe
+
+
+def _write_report(
+    tracks: am.Tracks,
+    page: Path,
+    recipe: Recipe,
+    estimate: am.tracking.ModelEstimate | None,
+    summary: Summary,
+) -> None:
+    """Write the page, with the method, its figures and the model."""
+    import asterism as am
+
+    stitched = ", then stitched" if recipe.stitch else ""
+    options = ", ".join(f"{name}={value}" for name, value in recipe.options.items())
+    told = [("method", recipe.method + stitched)]
+    told += [("chosen by the capture", recipe.chosen)] if recipe.chosen else []
+    told += [("options", options)] if options else []
+    told += summary.rows()
+    made = f"Tracked with {recipe.method}{stitched + ',' * recipe.stitch} in "
+    made += f"{summary.seconds:.2g} s ({summary.frames_per_second:,.0f} frames a second). "
+    if estimate is None:
+        told.append(("model", "given, not estimated"))
+        made += "The model was given."
+    else:
+        reasons = estimate.reasons
+        told += [(f"model: {name}", f"{value}: {why}") for name, value, why in reasons]
+        name, value, _ = reasons[0]
+        made += f"The model was estimated from the capture ({name} {value}; all of it is below)."
+    with progress("writing the report"):
+        am.report(tracks, page, made=made, summary=told)
+
+
+def _print_capture(capture: am.Capture) -> None:
+    rate = capture.rate or (1 / capture.step if capture.step else 0.0)
+    print_table(
+        [(capture.path, f"{capture.n_frames} frames, {capture.n_points} points, {rate:g} Hz")]
+    )
+    for warning in capture.warnings:
+        log.warning("%s: %s", capture.path, warning)

@@ -1,0 +1,115 @@
+"""Printing: results go to stdout, news and progress to stderr."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from asterism.cli.exit_codes import BROKEN_PIPE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+
+    from rich.console import Console
+
+__all__ = [
+    "Json",
+    "Overwrite",
+    "Quiet",
+    "console",
+    "print_json",
+    "print_table",
+    "progress",
+    "to_json",
+]
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that exist.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+
+_PIPED_WIDTH = 200  # columns where there is no terminal to ask, so that lines stay whole
+
+
+def console(*, stderr: bool = False) -> Console:
+    """Give the console for results, or for news with ``stderr=True``."""
+    from rich.console import Console
+
+    class PipeConsole(Console):
+        def on_broken_pipe(self) -> NoReturn:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise SystemExit(BROKEN_PIPE)
+
+    stream = sys.stderr if stderr else sys.stdout
+    has_width = stream.isatty() or "COLUMNS" in os.environ
+    return PipeConsole(stderr=stderr, highlight=False, width=None if has_width else _PIPED_WIDTH)
+
+
+def print_table(
+    rows: Iterable[Sequence[object]], header: Sequence[str] = (), *, title: str = ""
+) -> None:
+    """Print rows of cells as a table without lines; markup in the cells is not looked at."""
+    from rich.table import Table
+    from rich.text import Text
+
+    rows = [[str(cell) for cell in row] for row in rows]
+    table = Table(box=None, pad_edge=False, show_header=bool(header))
+    for i in range(max(map(len, [*rows, header]))):
+        table.add_column(header[i] if header else "", overflow="fold")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    screen = console()
+    if title:
+        screen.print(Text(title, style="bold"))
+    screen.print(table)
+
+
+def to_json(value: Mapping[str, Any]) -> str:
+    """Give plain values as JSON text; NaN and infinities, which JSON does not know, become null."""
+    return json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """Print plain values as one JSON object."""
+    console().print(to_json(value), markup=False, soft_wrap=True)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    return value.item() if hasattr(value, "item") else str(value)
+
+
+@contextmanager
+def progress(what: str, total: int | None = None) -> Generator[Callable[[int], None], None, None]:
+    """Show a bar on stderr while the block runs, if stderr is a terminal.
+
+    Parameters
+    ----------
+    what : str
+        What is being done.
+    total : int, optional
+        Steps there are; a bar that only moves where that is not known.
+
+    Yields
+    ------
+    callable
+        To be told how many steps are done.
+    """
+    from rich.progress import Progress
+
+    screen = console(stderr=True)
+    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda done: bar.update(task, completed=done)

@@ -1,0 +1,228 @@
+"""Options derived from the library: names, types, defaults and texts are those of the API."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+import re
+import types
+import typing
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, Union
+
+import typer
+
+from asterism.errors import ParameterError, check_fields
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Mapping, Sequence
+
+    from asterism.tracking.methods import Method
+
+__all__ = [
+    "Option",
+    "as_options",
+    "method_options",
+    "parsed",
+    "scene_options",
+    "with_option_names",
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """One option of a method or a scene.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    kind : object
+        Its type, as annotated.
+    default : object
+        Its default.
+    about : str
+        What the docstring says of it.
+    """
+
+    name: str
+    kind: Any
+    default: Any
+    about: str
+
+    @property
+    def type_text(self) -> str:
+        """The type as people write it."""
+        return _type_text(self.kind)
+
+    def parse(self, text: str) -> Any:
+        """Read a value of this option.
+
+        Raises
+        ------
+        ParameterError
+            If the text is not of its type; its range is for the library to check.
+        """
+        return _parse(self.name, self.kind, text)
+
+
+def method_options(method: type[Method[Any]]) -> dict[str, Option]:
+    """Give the options of a method by name: the fields of its dataclass."""
+    if not dataclasses.is_dataclass(method):
+        return {}
+    kinds = typing.get_type_hints(method)
+    about: dict[str, str] = {}
+    for kind in method.__mro__:  # a subclass often only says where its base explains the option
+        about |= _about_parameters(kind)
+    return {
+        f.name: Option(
+            name=f.name, kind=kinds[f.name], default=f.default, about=about.get(f.name, "")
+        )
+        for f in dataclasses.fields(method)
+        if f.init
+    }
+
+
+def scene_options(scene: Callable[..., Any]) -> dict[str, Option]:
+    """Give the options of a scene by name: the arguments of its function."""
+    about = _about_parameters(scene)
+    kinds = typing.get_type_hints(scene)
+    arguments = inspect.signature(scene).parameters
+    return {
+        a.name: Option(
+            name=a.name,
+            kind=kinds[a.name],
+            default=a.default,
+            about=about.get(a.name, ""),
+        )
+        for a in arguments.values()
+    }
+
+
+def parsed(
+    option: str, owner: str, texts: Sequence[str], known: dict[str, Option]
+) -> dict[str, Any]:
+    """Read ``NAME=VALUE`` texts.
+
+    Parameters
+    ----------
+    option : str
+        The option of the command line that they follow, for the messages.
+    owner : str
+        What they are values of, for the messages.
+    texts : sequence of str
+        As given on the command line; of one name the last counts.
+    known : dict
+        The options there are.
+
+    Returns
+    -------
+    dict
+        Values by name.
+
+    Raises
+    ------
+    ParameterError
+        At a text without ``=``, an unknown name, or a value of another type.
+    """
+    values: dict[str, Any] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        name = name.strip().replace("-", "_")
+        if not equals:
+            raise ParameterError(option, f"NAME=VALUE for {owner}", repr(text))
+        if not known:
+            raise ParameterError(option, f"none for {owner}", repr(name))
+        check_fields(f"{option} ({owner})", [name], known)
+        with as_options({name: f"{option} {name}"}):
+            values[name] = known[name].parse(value.strip())
+    return values
+
+
+@contextmanager
+def as_options(names: Mapping[str, str]) -> Generator[None, None, None]:
+    """Let errors about arguments of the library name the options that these came from.
+
+    Parameters
+    ----------
+    names : mapping of str to str
+        The option by the argument; errors about others stay as they are.
+    """
+    try:
+        yield
+    except ParameterError as error:
+        if error.name not in names:
+            raise
+        told = error.expected, error.got, error.hint
+        raise ParameterError(names[error.name], *told) from error
+
+
+def with_option_names(command: Callable[..., None]) -> Callable[..., None]:
+    """Let errors of a command about an argument of the library name its option of that name."""
+    names: dict[str, str] = {}
+    for name, kind in typing.get_type_hints(command, include_extras=True).items():
+        for info in getattr(kind, "__metadata__", ()):
+            if isinstance(info, typer.models.OptionInfo):
+                long = [text for text in info.param_decls or () if text.startswith("--")]
+                names[name] = long[0] if long else f"--{name.replace('_', '-')}"
+
+    @functools.wraps(command)
+    def named(*arguments: Any, **options: Any) -> None:
+        with as_options(names):
+            command(*arguments, **options)
+
+    return named
+
+
+def _type_text(kind: Any) -> str:
+    if typing.get_origin(kind) is Literal:
+        return "|".join(map(str, typing.get_args(kind)))
+    if typing.get_origin(kind) in (Union, types.UnionType):
+        # What can be typed: the first of them, and none.
+        inner = [k for k in typing.get_args(kind) if k is not type(None)]
+        is_optional = len(inner) < len(typing.get_args(kind))
+        return _type_text(inner[0]) + (" | None" if is_optional else "")
+    return getattr(kind, "__name__", str(kind))
+
+
+def _parse(name: str, kind: Any, text: str) -> Any:
+    if kind is bool:
+        words = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+        if text.lower() not in words:
+            raise ParameterError(name, "true or false", repr(text))
+        return words[text.lower()]
+    if kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            what = "a whole number" if kind is int else "a number"
+            raise ParameterError(name, what, repr(text)) from None
+    if typing.get_origin(kind) in (Union, types.UnionType):
+        inner = [k for k in typing.get_args(kind) if k is not type(None)]
+        return None if text.lower() == "none" else _parse(name, inner[0], text)
+    if typing.get_origin(kind) is tuple:
+        parts = [part.strip() for part in text.strip("() ").split(",")]
+        inner = typing.get_args(kind)
+        if Ellipsis not in inner and len(parts) != len(inner):
+            raise ParameterError(name, f"{len(inner)} values with commas between", repr(text))
+        return tuple(_parse(name, inner[0], part) for part in parts)
+    if typing.get_origin(kind) is Literal:
+        choices = [str(choice) for choice in typing.get_args(kind)]
+        check_fields(name, [text], choices)
+        return typing.get_args(kind)[choices.index(text)]
+    return text
+
+
+def _about_parameters(documented: object) -> dict[str, str]:
+    """Read the section ``Parameters`` of a NumPy-style docstring."""
+    doc = inspect.cleandoc(getattr(documented, "__doc__", None) or "")
+    section = re.search(r"^Parameters\n-+\n(.*?)(?=^\S[^\n]*\n---|\Z)", doc, re.M | re.S)
+    about: dict[str, str] = {}
+    if section is None:
+        return about
+    for entry in re.finditer(r"^(\S[^\n]*?) : [^\n]*\n((?:[ \t]+[^\n]*\n?|\n)*)", section[1], re.M):
+        text = " ".join(entry[2].split())
+        about |= {name.strip(): text for name in entry[1].split(",")}
+    return about

@@ -1,0 +1,265 @@
+"""The kinds of figures that ``asterism plot`` draws, and what each is drawn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from asterism.cli.plot_inputs import (
+    is_observations,
+    model_for,
+    named,
+    solid_tracks,
+    summary_of,
+    sure_tracks,
+    tracks_of,
+)
+from asterism.errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    import asterism as am
+
+__all__ = ["KINDS", "Kind", "Request"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What a figure was asked for with; the fields are the options of the command."""
+
+    files: Sequence[Path]
+    truth: Path | None = None
+    rig: str | None = None
+    model: Path | None = None
+    frame: int | None = None
+    camera: str | None = None
+    moves: Sequence[float] | None = None
+    seeds: int | None = None
+
+    @property
+    def file(self) -> Path:
+        """The one file of kinds that take one."""
+        return self.files[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """One kind of figure.
+
+    Parameters
+    ----------
+    about : str
+        What it shows, for the help.
+    draw : callable
+        Makes it: takes a `Request`, gives a figure or axes of it.
+    many : bool
+        Whether it takes several files.
+    needs, takes : frozenset of str
+        Options that it cannot do without; that it may have besides.
+    """
+
+    about: str
+    draw: Callable[[Request], Any]
+    many: bool = False
+    needs: frozenset[str] = field(default_factory=frozenset[str])
+    takes: frozenset[str] = field(default_factory=frozenset[str])
+
+
+def _trajectories(asked: Request) -> Any:
+    import asterism as am
+
+    return am.plot.plot_trajectories(tracks_of(asked.file))
+
+
+def _axes(asked: Request) -> Any:
+    import asterism as am
+
+    return am.plot.plot_axes(tracks_of(asked.file))
+
+
+def _presence(asked: Request) -> Any:
+    import asterism as am
+
+    return am.plot.plot_presence(tracks_of(asked.file))
+
+
+def _confidence(asked: Request) -> Any:
+    import asterism as am
+
+    return am.plot.plot_confidence(sure_tracks(asked.file))
+
+
+def _errors(asked: Request) -> Any:
+    import asterism as am
+    from asterism.cli.outputs import truth_of_each
+
+    tracks = tracks_of(asked.file)
+    return am.plot.plot_errors(tracks, truth_of_each(tracks, _truth(asked)))
+
+
+def _reliability(asked: Request) -> Any:
+    import asterism as am
+    from asterism.cli.outputs import truth_of_each
+    from asterism.metrics import CalibrationCurve, right_links
+
+    truth = _truth(asked)
+    parts: dict[str, CalibrationCurve] = {}
+    for name, file in named(asked.files).items():
+        tracks = sure_tracks(file)
+        assert tracks.confidence is not None
+        links, is_right = right_links(tracks.labels, truth_of_each(tracks, truth).labels)
+        parts[name] = am.metrics.calibration_curve(tracks.confidence[links], is_right)
+    axes: Any = am.plot.plot_reliability(parts)
+    # The confidence of a label is that of the link that leads to it.
+    axes.set_xlabel("confidence of a link")
+    return axes
+
+
+def _compare(asked: Request) -> Any:
+    import asterism as am
+
+    truth = _truth(asked)
+    scores: dict[str, am.metrics.Evaluation] = {}
+    times: dict[str, float] = {}
+    for name, file in named(asked.files).items():
+        scores[name] = am.evaluate(tracks_of(file), truth)
+        pace = summary_of(file).get("frames_per_second")
+        if pace:
+            times[name] = 1e3 / float(pace)
+    return am.plot.plot_compare(scores, milliseconds=times)
+
+
+def _projections(asked: Request) -> Any:
+    import asterism as am
+    from asterism.cli.recording import rig_from
+
+    if is_observations(asked.file):
+        seen = am.io.read_observations(asked.file)
+        # A ring or a wall is placed about points in space, of which there are none here.
+        rig = am.read_rig(Path(asked.rig or ""))
+    else:
+        from asterism.cli.console import progress
+        from asterism.cli.filming import film_all
+
+        truth = solid_tracks(asked.file)
+        rig, _ = rig_from(asked.rig or "", truth.detections.points[truth.labels >= 0])
+        with progress("filming", truth.detections.n_frames) as advance:
+            seen = film_all(truth, rig, advance).observations
+    return am.plot.plot_projections(seen, rig)
+
+
+def _image(asked: Request) -> Any:
+    import asterism as am
+    from asterism.cli.film_pictures import contact_sheet
+    from asterism.cli.recording import rig_from
+
+    truth = solid_tracks(asked.file)
+    rig, _ = rig_from(asked.rig or "", truth.detections.points[truth.labels >= 0])
+    d = truth.detections
+    first = d.first_frame if isinstance(d, am.Capture) else 0
+    frame = first + d.n_frames // 2 if asked.frame is None else asked.frame
+    if not first <= frame < first + d.n_frames:
+        raise ParameterError("--frame", f"{first} to {first + d.n_frames - 1}", frame)
+    t = frame - first
+    title = f"{asked.file.name}, frame {frame}, {d.times[t]:.3f} s"
+    return contact_sheet(truth, rig, t, title)
+
+
+def _posterior(asked: Request) -> Any:
+    import asterism as am
+    from asterism.cli.console import progress
+
+    capture = am.read(asked.file).measured()
+    model = model_for(asked.model, capture)
+    moves = sorted(set(asked.moves or (0.3, 1, 3, 10, 30, 100)))
+    seeds = asked.seeds or 3
+    values: list[list[float]] = []
+    with progress("walking", seeds * len(moves)) as advance:
+        for seed in range(seeds):
+            values.append([])
+            for n in moves:
+                # Without walks for the confidence, and on the model's own posterior: ends weigh
+                # as they do in the number that is drawn.
+                method = am.MCMCDA(moves=n, confidence=0, end_odds=1)
+                found = am.track(capture, method, model=model, seed=seed)
+                values[-1].append(found.info["log_posterior"])
+                advance(sum(map(len, values)))
+    others = {"gnn": am.track(capture, am.GNN(), model=model).info["log_posterior"]}
+    return am.plot.plot_posterior(moves, values, others=others)
+
+
+def _groups(asked: Request) -> Any:
+    import asterism as am
+
+    tracks = tracks_of(asked.file)
+    return am.plot.plot_groups(
+        am.filter.gate_groups(tracks, model_for(asked.model, tracks.detections))
+    )
+
+
+def _rig(asked: Request) -> Any:
+    import asterism as am
+
+    return am.plot.plot_rig(am.read_rig(asked.file))
+
+
+def _lens(asked: Request) -> Any:
+    import asterism as am
+    from asterism.errors import check_fields
+
+    rig = am.read_rig(asked.file)
+    name = asked.camera or rig.names[0]
+    check_fields("--camera", [name], rig.names)
+    axes: Any = am.plot.plot_lens(rig[rig.names.index(name)])
+    axes.set_title(f"{name}: {axes.get_title(loc='left')}", loc="left", parse_math=False)
+    return axes
+
+
+def _truth(asked: Request) -> am.Tracks:
+    import asterism as am
+
+    assert asked.truth is not None
+    return am.io.read_tracks(asked.truth)
+
+
+_TRUTH, _RIG = frozenset({"truth"}), frozenset({"rig"})
+_MODEL = frozenset({"model"})
+
+KINDS: dict[str, Kind] = {
+    "trajectories": Kind(about="the paths of all tracks in space", draw=_trajectories),
+    "axes": Kind(about="x, y and z of every track over time", draw=_axes),
+    "presence": Kind(about="when each track was there, and the clutter", draw=_presence),
+    "confidence": Kind(about="the same, shaded by the confidence of each link", draw=_confidence),
+    "errors": Kind(about="where labels are wrong", draw=_errors, needs=_TRUTH),
+    "reliability": Kind(
+        about="how often labels are right, by their confidence; of one tracking or more",
+        draw=_reliability, many=True, needs=_TRUTH,
+    ),
+    "compare": Kind(
+        about="IDF1, switches and, of run folders, milliseconds a frame; of one tracking or more",
+        draw=_compare, many=True, needs=_TRUTH,
+    ),
+    "projections": Kind(
+        about="what every camera sees in the course of a capture or of a film's observations",
+        draw=_projections, needs=_RIG,
+    ),
+    "image": Kind(
+        about="what every camera sees in one frame of a capture, by default the middle one",
+        draw=_image, needs=_RIG, takes=frozenset({"frame"}),
+    ),
+    "posterior": Kind(
+        about="how far mcmcda climbs with the number of its moves, beside gnn",
+        draw=_posterior, takes=_MODEL | {"moves", "seeds"},
+    ),
+    "groups": Kind(
+        about="how many tracks are in each other's gates, over time", draw=_groups, takes=_MODEL
+    ),
+    "rig": Kind(about="the cameras of a calibration in their world", draw=_rig),
+    "lens": Kind(
+        about="what a camera's lens does to a square grid; by default the first camera's",
+        draw=_lens, takes=frozenset({"camera"}),
+    ),
+}  # fmt: skip
+"""By the name on the command line, which is also that of the function: `am.plot_<kind>`."""

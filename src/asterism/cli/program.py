@@ -1,0 +1,70 @@
+"""The list of commands."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+import asterism
+from asterism.cli.commands.bonds import bonds
+from asterism.cli.commands.camera import app as camera
+from asterism.cli.commands.chain import chain
+from asterism.cli.commands.corrupt import corrupt
+from asterism.cli.commands.demo import demo
+from asterism.cli.commands.estimate import estimate
+from asterism.cli.commands.evaluate import evaluate
+from asterism.cli.commands.fill import fill
+from asterism.cli.commands.film import film
+from asterism.cli.commands.info import info
+from asterism.cli.commands.methods import methods, scenes
+from asterism.cli.commands.name import name
+from asterism.cli.commands.plot import plot
+from asterism.cli.commands.reconstruct import reconstruct
+from asterism.cli.commands.report import report
+from asterism.cli.commands.reproduce import reproduce
+from asterism.cli.commands.simulate import simulate
+from asterism.cli.commands.stitch import stitch
+from asterism.cli.commands.track import track
+from asterism.cli.commands.view import view
+from asterism.cli.options import with_option_names
+
+__all__ = ["app"]
+
+app = typer.Typer(
+    name="asterism",
+    help="Asterism: name the points of light. Tells which point of an optical motion capture is "
+    "which marker, over time.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"asterism {asterism.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(  # pyright: ignore[reportUnusedFunction]
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version.", callback=_version, is_eager=True),
+    ] = False,
+) -> None:
+    del version
+
+
+_TITLES = {
+    "From points to markers": (track, stitch, fill, bonds, name, estimate, methods),
+    "What there is, and what came of it": (info, evaluate, report, plot, view),
+    "Experiments with a known truth": (corrupt, simulate, scenes, demo, reproduce),
+    "Cameras": (film, reconstruct, chain),
+}
+for _title, _commands in _TITLES.items():
+    for _command in _commands:
+        app.command(rich_help_panel=_title)(with_option_names(_command))
+app.add_typer(camera, rich_help_panel="Cameras")

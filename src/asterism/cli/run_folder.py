@@ -1,0 +1,101 @@
+"""A run and its folder: everything that is needed to repeat a tracking bit for bit.
+
+``run.toml`` holds the recipe and where its input lies, ``log.txt`` the log messages,
+``summary.json`` the figures, and the result lies beside them. ``summary.json`` is written last:
+where it is, the run is complete.
+"""
+
+from __future__ import annotations
+
+import logging
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+import asterism as am
+from asterism.errors import FormatError, ParameterError, check_fields
+from asterism.io.atomic import write_text
+from asterism.model import Recipe
+from asterism.model.toml_file import read_toml, write_toml
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+__all__ = ["CONFIG", "FILES", "LOG", "SUMMARY", "Run", "writing_log"]
+
+FILES = CONFIG, LOG, SUMMARY = "run.toml", "log.txt", "summary.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A recipe with its input and the format of its result.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        What to do.
+    source : Path
+        The capture.
+    format : str
+        Format of the result, a key of `asterism.io.CAPTURE_FORMATS`.
+    """
+
+    recipe: Recipe
+    source: Path
+    format: str
+
+    def write(self, path: Path) -> None:
+        """Write a ``run.toml``."""
+        values = self.recipe.to_dict()
+        values["input"] = {"path": str(self.source.resolve()), **values["input"]}
+        write_text(path, write_toml({**values, "output": {"format": self.format}}, None))
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read a ``run.toml``.
+
+        Raises
+        ------
+        FormatError
+            If the file is not there, or not what `write` writes.
+        """
+        values = read_toml(path, "a run.toml")
+        try:
+            names = ("input", "output", "method", "model", "versions")
+            check_fields("run", values, names)
+            for name in names:
+                if not isinstance(values.get(name), dict):
+                    raise ParameterError(name, "a table", repr(values.get(name)))
+            source, format = values["input"].get("path"), values.pop("output").get("format")
+            for name, text in (("input.path", source), ("output.format", format)):
+                if not isinstance(text, str):
+                    raise ParameterError(name, "a text", repr(text))
+            check_fields("output.format", [format], am.io.CAPTURE_FORMATS)
+            recipe = Recipe.from_dict(values)
+            am.tracking.method_by_name(recipe.method, **recipe.options)
+        except ParameterError as error:
+            raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
+        return cls(recipe=recipe, source=Path(source), format=format)
+
+
+@contextmanager
+def writing_log(folder: Path) -> Generator[None, None, None]:
+    """Write the log messages to the log of a folder while the block runs."""
+    handler = logging.FileHandler(folder / LOG, mode="w", encoding="utf-8")
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    logger = logging.getLogger("asterism")
+    level = logger.level
+    logger.setLevel(logging.INFO)
+    logger.addHandler(handler)
+    try:
+        yield
+    except BaseException as end:
+        # To this file alone: what else hears of it is decided where the program ends.
+        text = f"ended by {type(end).__name__}: {end}"
+        handler.handle(logging.makeLogRecord({"levelname": "ERROR", "msg": text}))
+        raise
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
+        handler.close()

@@ -1,0 +1,139 @@
+"""From a capture and a recipe to a result file and, where asked for, a run folder."""
+
+from __future__ import annotations
+
+import logging
+import time
+from typing import TYPE_CHECKING
+
+import asterism as am
+from asterism.cli.console import progress, to_json
+from asterism.cli.run_folder import CONFIG, SUMMARY, writing_log
+from asterism.cli.summary import Summary, summarize
+from asterism.errors import ParameterError, check_fields
+from asterism.io.atomic import write_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from asterism.cli.run_folder import Run
+
+__all__ = ["carry_out", "default_output", "output_format"]
+
+log = logging.getLogger(__name__)
+
+# A log of point clouds has no place for identities.
+_WITHOUT_TRACKS = ("pointcloud",)
+
+
+def output_format(
+    out: Path | None, name: str | None, source: str = "c3d", *, option: str = "--out"
+) -> str:
+    """Choose the format of a result.
+
+    Parameters
+    ----------
+    out : Path or None
+        The file to write, where it is known.
+    name : str or None
+        The format, where it was asked for.
+    source : str
+        Format of the capture, which decides where neither does.
+    option : str
+        The option that names the file, for the messages.
+
+    Returns
+    -------
+    str
+        As asked for, or told by the name of the file, or that of the capture; where that cannot be
+        written C3D, and where it has no place for tracks CSV.
+
+    Raises
+    ------
+    ParameterError
+        If the format is unknown or cannot hold tracks.
+    """
+    known = {
+        f.name: f
+        for f in am.io.CAPTURE_FORMATS.values()
+        if f.write is not None and f.name not in _WITHOUT_TRACKS
+    }
+    if name is not None:
+        check_fields("--format", [name], known)
+        return name
+    if out is not None:
+        for format in known.values():
+            if out.suffix and out.suffix.lower() in format.extensions:
+                return format.name
+        endings = ", ".join(dict.fromkeys(e for f in known.values() for e in f.extensions))
+        raise ParameterError(option, f"a name ending in {endings}", str(out), "or give --format")
+    if source in _WITHOUT_TRACKS:
+        return "csv"
+    return source if source in known else "c3d"
+
+
+def default_output(source: Path, format: str) -> Path:
+    """Name the result after the capture: ``trial.tracked.c3d`` beside ``trial.c3d``."""
+    endings = am.io.CAPTURE_FORMATS[format].extensions
+    ending = source.suffix if source.suffix.lower() in endings else endings[0]
+    return source.with_name(f"{source.stem}.tracked{ending}")
+
+
+def carry_out(
+    run: Run, capture: am.Capture, out: Path, folder: Path | None
+) -> tuple[am.Tracks, Summary]:
+    """Track, and write the result and, where a folder is given, the run's files.
+
+    Parameters
+    ----------
+    run : Run
+        What to do.
+    capture : Capture
+        The capture of the run.
+    out : Path
+        The file to write.
+    folder : Path or None
+        An existing folder for ``run.toml``, ``log.txt`` and ``summary.json``.
+
+    Returns
+    -------
+    Tracks, Summary
+    """
+    if folder is None:
+        return _carry_out(run, capture, out)
+    with writing_log(folder):
+        run.write(folder / CONFIG)
+        tracks, summary = _carry_out(run, capture, out)
+        write_text(folder / SUMMARY, to_json(summary.to_dict()) + "\n")
+        return tracks, summary
+
+
+def _carry_out(run: Run, capture: am.Capture, out: Path) -> tuple[am.Tracks, Summary]:
+    recipe = run.recipe
+    for warning in capture.warnings:
+        log.info("%s: %s", capture.path, warning)
+    if recipe.chosen:
+        log.info("method chosen: %s", recipe.chosen)
+    log.info(
+        "tracking %s (%d frames) with %s %s",
+        capture.path, capture.n_frames, recipe.method, recipe.options,
+    )  # fmt: skip
+    method = am.tracking.method_by_name(recipe.method, **recipe.options)
+    method.init(recipe.model, n_axes=capture.n_axes)  # loads the engine before the clock starts
+    start = time.perf_counter()
+    with progress(f"tracking with {recipe.method}", capture.n_frames) as advance:
+        tracks = am.track(
+            capture, recipe=recipe, progress=advance,
+            start=capture.tracks if recipe.has_start else None,
+        )  # fmt: skip
+    seconds = time.perf_counter() - start
+    if capture.n_points and not tracks.n_tracks:
+        log.warning(
+            "%s: no track was confirmed, all points are clutter; does the model fit the capture?",
+            capture.path,
+        )
+    am.write(tracks, out, format=run.format)
+    summary = summarize(tracks, out=out, method=recipe.method, seconds=seconds)
+    for name, text in summary.rows():
+        log.info("%s %s", name, text)
+    return tracks, summary

@@ -1,0 +1,11 @@
+"""Calibrations in and out: one file a format; units and conventions are converted here only.
+
+>>> from asterism.io.calibrations import read_rig, write_rig
+>>> rig = read_rig("walk.xcp")                             # doctest: +SKIP
+>>> write_rig(rig, "walk.toml")                            # doctest: +SKIP
+"""
+
+from asterism.io.calibrations.files import read_rig, write_rig
+from asterism.io.calibrations.formats import CALIBRATION_FORMATS, CalibrationFormat
+
+__all__ = ["CALIBRATION_FORMATS", "CalibrationFormat", "read_rig", "write_rig"]

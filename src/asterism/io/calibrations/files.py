@@ -1,0 +1,234 @@
+"""Reading and writing calibrations of any known format."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.camera import Rig
+from asterism.errors import (
+    FormatError,
+    ParameterError,
+    check_fields,
+    check_file,
+    check_kind,
+    check_path,
+    not_read,
+    not_written,
+)
+from asterism.io.atomic import replacing
+from asterism.io.calibrations.formats import CALIBRATION_FORMATS, CalibrationFormat
+from asterism.io.text_table import as_utf8
+from asterism.io.units import PER_METRE, parse_unit
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = ["format_of", "format_to_write", "read_rig", "write_rig"]
+
+_HEAD = 1 << 16  # bytes that are enough to know a format by
+
+
+def read_rig(path: str | Path, *, format: str | None = None, units: str | None = None) -> Rig:
+    """Read the cameras of a calibration.
+
+    Parameters
+    ----------
+    path : path
+        The file or the folder.
+    format : str, optional
+        Key of `CALIBRATION_FORMATS`; by default the content tells it.
+    units : {"mm", "cm", "m", "in", "ft"}, optional
+        The unit of length, for files that do not say it.
+
+    Returns
+    -------
+    Rig
+        Cameras in metres and pixels. What had to be guessed or was left out is in its `warnings`.
+
+    Raises
+    ------
+    FormatError
+        If the calibration is not there, or is of no known format, or not what its format says.
+    ParameterError
+        If `format` or `units` is unknown, or the format has another unit by definition.
+
+    Examples
+    --------
+    >>> read_rig("none.toml")
+    Traceback (most recent call last):
+    ...
+    asterism.errors.FormatError: none.toml: no such file
+    """
+    path = check_path("path", path)
+    chosen = None if format is None else _named(format)
+    unit = _unit(units)
+    try:
+        chosen = format_of(path) if chosen is None else _openable(path, chosen)
+        if unit is not None and chosen.unit not in (None, unit):
+            expected = f"{chosen.unit}, as in all files of format {chosen.name}"
+            raise ParameterError("units", expected, repr(units))
+        with np.errstate(all="ignore"):  # what is not finite any more the model refuses
+            return chosen.read(path, unit)
+    except OSError as error:
+        raise not_read(path, error) from error
+
+
+def write_rig(
+    rig: Rig, path: str | Path, *, format: str | None = None, overwrite: bool = False
+) -> None:
+    """Write cameras to a calibration; it is there as a whole afterwards, or untouched.
+
+    Parameters
+    ----------
+    rig : Rig
+        The cameras.
+    path : path
+        The file, which is replaced if it exists; for a format that is a folder (flydra, myptv) the
+        folder, which must be new or empty: among the files of another rig these would be lost.
+    format : str, optional
+        Key of `CALIBRATION_FORMATS`; by default it follows from the suffix, and ``.toml`` is
+        the format "rig", which holds everything exactly.
+    overwrite : bool
+        Allow a folder that holds files, if each of them is one that is replaced.
+
+    Raises
+    ------
+    ParameterError
+        If the format is unknown or cannot hold a camera as it is: then `fit_lens` gives
+        the nearest that it can, and says how near. Or if the folder is not empty.
+    FormatError
+        If the file cannot be written.
+    """
+    check_kind("rig", rig, Rig)
+    path = check_path("path", path)
+    chosen = format_to_write(path, format)
+    for i, camera in enumerate(rig):
+        if not camera.name.isprintable():
+            raise ParameterError(f"the name of camera {i}", "printable text", repr(camera.name))
+    content = chosen.write(rig)
+    if isinstance(content, bytes):
+        with replacing(path) as file:
+            file.write(content)
+    else:
+        _write_folder(path, content, overwrite=overwrite)
+
+
+def _write_folder(path: Path, content: dict[str, bytes], *, overwrite: bool) -> None:
+    try:
+        if path.exists() and not path.is_dir():
+            raise ParameterError("path", "a folder that is new or empty", f"{path}, a file")
+        there = sorted(file.name for file in path.iterdir()) if path.exists() else []
+        left = [name for name in there if name not in content] if overwrite else there
+        if left:
+            expected = (
+                "a folder without other files" if overwrite else "a folder that is new or empty"
+            )
+            raise ParameterError("path", expected, f"{path}, which holds {left[0]}")
+        path.mkdir(exist_ok=True)
+        for name, text in content.items():
+            with replacing(path / name) as file:
+                file.write(text)
+    except OSError as error:
+        raise not_written(path, error) from error
+
+
+def format_to_write(path: Path, format: str | None) -> CalibrationFormat:
+    """Give the format to write, as asked or by the ending of the name.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    format : str or None
+        What was asked for.
+
+    Returns
+    -------
+    CalibrationFormat
+
+    Raises
+    ------
+    ParameterError
+        If it is unknown.
+    """
+    if format is not None:
+        return _named(format)
+    for candidate in CALIBRATION_FORMATS.values():
+        if path.name.lower().endswith(candidate.extensions):
+            return candidate
+    every = ", ".join(dict.fromkeys(e for c in CALIBRATION_FORMATS.values() for e in c.extensions))
+    folders = " and ".join(
+        c.name for c in CALIBRATION_FORMATS.values() if c.sniff_folder is not None
+    )
+    hint = f"or name the format: {folders} are folders"
+    raise ParameterError("path", f"a name ending in {every}", repr(path.name), hint)
+
+
+def _named(name: str) -> CalibrationFormat:
+    check_fields("format", [name], CALIBRATION_FORMATS)
+    return CALIBRATION_FORMATS[name]
+
+
+def _unit(units: str | None) -> str | None:
+    if units is None:
+        return None
+    unit = parse_unit(units)
+    if unit is None:
+        raise ParameterError("units", f"one of {', '.join(PER_METRE)}", repr(units))
+    return unit
+
+
+def _openable(path: Path, chosen: CalibrationFormat) -> CalibrationFormat:
+    """Check that there is a file, or a folder, where the format is one."""
+    is_folder = path.is_dir()
+    fits = chosen.sniff_folder is not None if is_folder else chosen.sniff is not None
+    if (is_folder or path.is_file()) and fits:
+        return chosen
+    kinds = [k for k, f in (("file", chosen.sniff), ("folder", chosen.sniff_folder)) if f]
+    expected = f"a {' or a '.join(kinds)} of format {chosen.name}"
+    if is_folder:
+        raise FormatError(path, "", expected, "a folder")
+    check_file(path, expected)
+    raise FormatError(path, "", expected, "a file")
+
+
+def format_of(path: Path) -> CalibrationFormat:
+    """Tell the format of a calibration that exists by its first bytes.
+
+    The ending of its name decides between formats that the content fits alike, and where the
+    content fits none.
+
+    Parameters
+    ----------
+    path : Path
+        The file or the folder.
+
+    Returns
+    -------
+    CalibrationFormat
+
+    Raises
+    ------
+    FormatError
+        If there is nothing, or nothing known.
+    """
+    every = list(CALIBRATION_FORMATS.values())
+    if path.is_dir():
+        for candidate in every:
+            if candidate.sniff_folder is not None and candidate.sniff_folder(path):
+                return candidate
+        expected = "camera1.Pmat.cal and so on, or camera files of MyPTV"
+        raise FormatError(path, "its files", expected, "none of them")
+    check_file(path, "a calibration")
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    fitting = [c for c in every if c.sniff is not None and c.sniff(as_utf8(head))]
+    by_name = [c for c in every if path.name.lower().endswith(c.extensions)]
+    if fitting:
+        return next((c for c in fitting if c in by_name), fitting[0])
+    if by_name:
+        return by_name[-1]  # its reader says what is amiss
+    known = ", ".join(f"{c.name} ({c.description})" for c in every)
+    raise FormatError(path, "its first bytes", f"one of: {known}", repr(head[:40]))

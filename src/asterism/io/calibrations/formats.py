@@ -1,0 +1,153 @@
+"""The one list of calibration formats."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from asterism.io.calibrations import anipose, caliscope, flydra, myptv, opencv, qca, rig_toml, xcp
+from asterism.records import Registry, record
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from asterism.camera import Rig
+
+__all__ = ["CALIBRATION_FORMATS", "CalibrationFormat"]
+
+
+@record
+class CalibrationFormat:
+    """A calibration format.
+
+    Parameters
+    ----------
+    name : str
+        Its key in `CALIBRATION_FORMATS`.
+    extensions : tuple of str
+        Endings of its files; none where a folder holds the rig.
+    description : str
+        One line for people.
+    lens : {"any", "BrownConrady", "ViconRadial", "QuadraticCorrection"}
+        The lens that it can hold, beside none at all.
+    read : callable
+        Path, and the unit of length that the caller knows, to `Rig`.
+    write : callable
+        `Rig` to the content of the file, or to the names and contents of a folder's files.
+    sniff : callable or None
+        Whether the first bytes of a file look like this format; None where it is never one file.
+    sniff_folder : callable or None
+        Whether a folder looks like this format; None where it never is one.
+    unit : {"mm", "m"} or None
+        The unit that all its files have; None where they do not say, or not all the same.
+    has_skew, has_k3 : bool
+        Whether it can hold a K with skew, and a `BrownConrady` lens with k3.
+    """
+
+    name: str
+    extensions: tuple[str, ...]
+    description: str
+    lens: str
+    read: Callable[[Path, str | None], Rig]
+    write: Callable[[Rig], bytes | dict[str, bytes]]
+    sniff: Callable[[bytes], bool] | None = None
+    sniff_folder: Callable[[Path], bool] | None = None
+    unit: str | None = None
+    has_skew: bool = True
+    has_k3: bool = True
+
+    @property
+    def is_folder(self) -> bool:
+        """Whether a rig is written as a folder of files."""
+        return not self.extensions
+
+
+CALIBRATION_FORMATS: dict[str, CalibrationFormat] = Registry(
+    (c.name, c)
+    for c in (
+        CalibrationFormat(
+            name="rig",
+            extensions=(".toml",),
+            description="TOML of Asterism; keeps everything",
+            lens="any",
+            read=rig_toml.read,
+            write=rig_toml.write,
+            sniff=rig_toml.sniff,
+            unit="m",
+        ),
+        CalibrationFormat(
+            name="caliscope",
+            extensions=(".toml",),
+            description="camera_array.toml of caliscope",
+            lens="BrownConrady",
+            read=caliscope.read,
+            write=caliscope.write,
+            sniff=caliscope.sniff,
+            unit="m",
+            has_skew=False,
+        ),
+        CalibrationFormat(
+            name="anipose",
+            extensions=(".toml",),
+            description="TOML of anipose and freemocap",
+            lens="BrownConrady",
+            read=anipose.read,
+            write=anipose.write,
+            sniff=anipose.sniff,
+            has_skew=False,
+        ),
+        CalibrationFormat(
+            name="opencv",
+            extensions=(".yml", ".yaml"),
+            description="YAML of OpenCV's FileStorage",
+            lens="BrownConrady",
+            read=opencv.read,
+            write=opencv.write,
+            sniff=opencv.sniff,
+            has_skew=False,
+        ),
+        CalibrationFormat(
+            name="qca",
+            extensions=(".qca.txt", ".qca"),
+            description="XML as Qualisys Track Manager exports it",
+            lens="BrownConrady",
+            read=qca.read,
+            write=qca.write,
+            sniff=qca.sniff,
+            unit="mm",
+            has_skew=False,
+        ),
+        CalibrationFormat(
+            name="xcp",
+            extensions=(".xcp",),
+            description="XML of Vicon",
+            lens="ViconRadial",
+            read=xcp.read,
+            write=xcp.write,
+            sniff=xcp.sniff,
+            unit="mm",
+            has_skew=False,
+        ),
+        CalibrationFormat(
+            name="flydra",
+            extensions=(),
+            description="folder of flydra and the Multi-Camera Self-Calibration toolbox",
+            lens="BrownConrady",
+            read=flydra.read,
+            write=flydra.write,
+            sniff_folder=flydra.sniff_folder,
+            has_skew=False,  # beside a lens
+            has_k3=False,
+        ),
+        CalibrationFormat(
+            name="myptv",
+            extensions=(),
+            description="folder of MyPTV's Tsai camera files, or one of them",
+            lens="QuadraticCorrection",
+            read=myptv.read,
+            write=myptv.write,
+            sniff=myptv.sniff,
+            sniff_folder=myptv.sniff_folder,
+        ),
+    )
+)

@@ -1,0 +1,144 @@
+"""Qualisys calibrations: the XML in ``.qca.txt``.
+
+Lengths are millimetres, image coordinates 1/64 pixel of the whole sensor. The matrix takes world to
+camera, but to a camera whose y points up and whose z points back: turned by half a turn about x it
+is ours. Distortion is OpenCV's, in plain numbers: only the image coordinates are in 1/64.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from asterism.camera import BrownConrady
+from asterism.errors import FormatError
+from asterism.io.calibrations.limits import brown_coefficients, names_of, no_skew
+from asterism.io.calibrations.parts import (
+    build_camera,
+    build_rig,
+    nearest_rotation,
+    pose,
+    split_numbers,
+    whole_size,
+)
+from asterism.io.calibrations.xml_tree import load, to_bytes
+from asterism.io.units import from_metres
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from asterism.camera import Camera, Rig
+
+__all__ = ["read", "sniff", "write"]
+
+_SUBPIXELS = 64
+_HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x; its own inverse
+_LENS = ("radialDistortion1", "radialDistortion2", "tangentalDistortion1", "tangentalDistortion2",
+         "radialDistortion3")  # fmt: skip
+
+
+def sniff(head: bytes) -> bool:
+    """Tell whether the first bytes of a file look like this format."""
+    return b"<calibration" in head
+
+
+def read(path: Path, units: str | None) -> Rig:
+    """Read a rig.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    units : None
+        It is in millimetres.
+
+    Returns
+    -------
+    Rig
+        The cameras that were calibrated; the others are named in its warnings.
+    """
+    del units
+    cameras: list[Camera] = []
+    warnings: list[str] = []
+    for i, element in enumerate(load(path, "calibration").iterfind("cameras/camera")):
+        name = element.get("serial", "")
+        place = f"camera {name or i + 1}"
+        if element.get("active", "1") == "0" or element.get("calibrated", "true") == "false":
+            warnings.append(f"{place} is not calibrated and is left out")
+            continue
+        cameras.append(_camera(path, place, name, element))
+    return build_rig(path, cameras, warnings)
+
+
+def _camera(path: Path, place: str, name: str, element: Element) -> Camera:
+    def number(child: str, key: str, otherwise: str | None = None) -> float:
+        found = element.find(child)
+        text = otherwise if found is None else found.get(key, otherwise)
+        return split_numbers(path, f"{place}, {child} {key}", text, 1)[0]
+
+    # What the camera sends is cut out of the sensor, and image coordinates begin at the cut.
+    window = "fov_video" if "video" in element.get("model", "").lower() else "fov_marker"
+    if element.find(window) is None:
+        window = {"fov_video": "fov_marker", "fov_marker": "fov_video"}[window]
+    left, top, right, bottom = (number(window, k) for k in ("left", "top", "right", "bottom"))
+    size = whole_size(path, f"{place}, {window}", right - left + 1, bottom - top + 1)
+    if number("intrinsic", "skew", "0") != 0:
+        got = f"{number('intrinsic', 'skew'):g}"
+        raise FormatError(path, f"{place}, intrinsic skew", "0, as Qualisys writes it", got)
+    K = np.eye(3)
+    K[0, 0], K[1, 1] = (number("intrinsic", f"focalLength{k}") / _SUBPIXELS for k in "UV")
+    K[0, 2] = number("intrinsic", "centerPointU") / _SUBPIXELS - left
+    K[1, 2] = number("intrinsic", "centerPointV") / _SUBPIXELS - top
+    k = [number("intrinsic", key, "0") for key in _LENS]
+    entries = [number("transform", f"r{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)]
+    given = np.array(entries).reshape(3, 3)
+    R = _HALF_TURN @ nearest_rotation(path, f"{place}, transform", given)
+    center = np.array([number("transform", axis) for axis in "xyz"]) / 1000
+    return build_camera(
+        path, place, K=K, T_camera_world=pose(R, -R @ center), size_px=size, name=name,
+        lens=BrownConrady(*k) if any(k) else None,
+    )  # fmt: skip
+
+
+def write(rig: Rig) -> bytes:
+    """Write a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        With lenses in the manner of OpenCV, and no skew.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
+    """
+    root = Element("calibration", {"type": "regular", "source": "Asterism"})
+    cameras = SubElement(root, "cameras")
+    for camera, name in zip(rig, names_of(rig), strict=True):
+        no_skew(camera, "qca")
+        width, height = camera.size_px
+        element = SubElement(
+            cameras, "camera", {"active": "1", "calibrated": "true", "serial": name, "model": "",
+                                "viewrotation": "0"},
+        )  # fmt: skip
+        edges = {"left": 0, "top": 0, "right": width - 1, "bottom": height - 1}
+        for window in ("fov_marker", "fov_marker_max", "fov_video", "fov_video_max"):
+            SubElement(element, window, {key: str(n) for key, n in edges.items()})
+        center = from_metres(np.array(camera.center, dtype=np.float64), "mm")
+        M = _HALF_TURN @ camera.T_camera_world[:3, :3]
+        transform = {axis: repr(float(x)) for axis, x in zip("xyz", center, strict=True)}
+        transform |= {f"r{i + 1}{j + 1}": repr(float(M[i, j])) for i in range(3) for j in range(3)}
+        SubElement(element, "transform", transform)
+        K = camera.K * _SUBPIXELS
+        intrinsic: dict[str, float] = {
+            "sensorMinU": 0, "sensorMaxU": width * _SUBPIXELS - 1,
+            "sensorMinV": 0, "sensorMaxV": height * _SUBPIXELS - 1,
+            "focalLengthU": K[0, 0], "focalLengthV": K[1, 1],
+            "centerPointU": K[0, 2], "centerPointV": K[1, 2], "skew": 0,
+            **dict(zip(_LENS, brown_coefficients(camera, "qca"), strict=True)),
+        }  # fmt: skip
+        SubElement(element, "intrinsic", {key: repr(float(x)) for key, x in intrinsic.items()})
+    return to_bytes(root)

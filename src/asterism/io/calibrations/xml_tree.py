@@ -1,0 +1,85 @@
+"""XML of calibrations, from files that may be damaged or mean harm."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+from asterism.errors import FormatError
+from asterism.io.calibrations.parts import read_bytes
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = ["load", "to_bytes"]
+
+_DEEPEST = 64  # levels; real files have five
+_PIECE = 1 << 16  # bytes that are parsed between two looks at what they held
+
+
+class _Forbidden(Exception):
+    """What no calibration has was met."""
+
+
+class _CarefulBuilder(ElementTree.TreeBuilder):
+    def __init__(self) -> None:
+        super().__init__()
+        self.depth = 0
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> ElementTree.Element:
+        self.depth += 1
+        if self.depth > _DEEPEST:
+            raise _Forbidden(f"more than {_DEEPEST} levels of elements")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> ElementTree.Element:
+        self.depth -= 1
+        return super().end(tag)
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        # Entities, which may refer to other files or grow without end, are declared there.
+        raise _Forbidden("a document type declaration")
+
+
+def load(path: Path, root: str) -> ElementTree.Element:
+    """Read an XML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    root : str
+        Name that its outermost element must have.
+
+    Returns
+    -------
+    Element
+
+    Raises
+    ------
+    FormatError
+        If it is not such a file.
+    """
+    raw = read_bytes(path)
+    parser = ElementTree.XMLParser(target=_CarefulBuilder())
+    try:
+        for start in range(0, len(raw), _PIECE):
+            parser.feed(raw[start : start + _PIECE])
+        tree = parser.close()
+    except ElementTree.ParseError as error:
+        line, column = error.position
+        place = f"line {line}, column {column + 1}"
+        raise FormatError(path, place, "XML", str(error)) from error
+    except _Forbidden as error:
+        raise FormatError(path, "its structure", "a plain calibration", str(error)) from error
+    except (LookupError, ValueError) as error:
+        raise FormatError(path, "its encoding", "one that XML knows", str(error)) from error
+    if tree.tag != root:
+        raise FormatError(path, "the outermost element", f"<{root}>", f"<{tree.tag[:60]}>")
+    return tree
+
+
+def to_bytes(root: ElementTree.Element) -> bytes:
+    """Write an element and all within it as an XML file."""
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"

@@ -1,0 +1,229 @@
+"""The bytes of a C3D file: header, parameters, and one block of points and analog values a frame.
+
+A reader of its own, because the file may be damaged (what can be read is read), hostile (nothing
+is allocated that the file is not long enough to fill) or long (more than 65535 frames).
+Format: the C3D user guide, https://www.c3d.org.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asterism.errors import FormatError
+from asterism.io.captures.c3d_parameters import BLOCK, DEC, INTEL, SGI, Group, decode, parse
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+__all__ = ["C3DFile", "read_c3d"]
+
+
+@dataclass(frozen=True, eq=False)
+class C3DFile:
+    """A C3D file in memory.
+
+    Parameters
+    ----------
+    header : bytes
+        The first block, in Intel order.
+    groups : dict of str to Group
+        The parameters.
+    points : ndarray, shape (T, K, 4), float32
+        x, y, z in the file's unit, and the word of residual and cameras (negative: not seen).
+    analog : ndarray, shape (T, A), float32
+        Analog values as stored, all samples of a frame in a row.
+    n_samples : int
+        Analog samples a frame.
+    first_frame : int
+        The file's number of its first frame.
+    rate : float
+        Frames a second, 0 where the file does not say.
+    scale : float
+        Size of one step of the residuals (and of integer points), positive.
+    warnings : tuple of str
+        What was odd.
+    truncated : str
+        Where the file is cut off and what is missing; empty for a whole file.
+    """
+
+    header: bytes
+    groups: dict[str, Group]
+    points: NDArray[np.float32]
+    analog: NDArray[np.float32]
+    n_samples: int
+    first_frame: int
+    rate: float
+    scale: float
+    warnings: tuple[str, ...]
+    truncated: str = ""
+
+    def group(self, name: str) -> Group:
+        """Give a group, an empty one where there is none."""
+        return self.groups.get(name, Group())
+
+
+def read_c3d(path: Path) -> C3DFile:
+    """Read a C3D file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    C3DFile
+
+    Raises
+    ------
+    FormatError
+        If it is not C3D, or holds not a single complete frame of those that it declares.
+
+    Notes
+    -----
+    Of a file that is cut off the complete frames are read. Analog samples of the incomplete frame
+    are dropped with it.
+    """
+    raw = path.read_bytes()
+    if len(raw) < BLOCK or raw[1] != 0x50:
+        got = f"{len(raw)} bytes, beginning with {raw[:4]!r}"
+        raise FormatError(path, "header", "a C3D header of 512 bytes, byte 2 = 0x50", got)
+    warnings: list[str] = []
+    groups: dict[str, Group] = {}
+    at = (raw[0] - 1) * BLOCK
+    processor = raw[at + 3] if 0 < at <= len(raw) - 4 else 0
+    if processor in (INTEL, DEC, SGI):
+        start = int.from_bytes(raw[16:18], "big" if processor == SGI else "little")
+        end = (start - 1) * BLOCK if (start - 1) * BLOCK > at else len(raw)
+        groups, problem = parse(raw[at + 4 : end], processor)
+        if problem:
+            warnings.append(f"damaged parameter section, read as far as it goes: {problem}")
+    else:
+        processor = INTEL
+        warnings.append("there is no parameter section where the header says")
+    if not groups:
+        warnings.append("without parameters the points have neither names nor a unit")
+
+    header = _intel_header(raw[:BLOCK], processor)
+    words = [int(w) for w in np.frombuffer(header, "<u2", 10)]
+    n_points, n_analog, first, last = words[1:5]
+    scale, rate = (float(np.frombuffer(header, "<f4", 1, byte)[0]) for byte in (12, 20))
+    point = groups.get("POINT", Group())
+    stated = next((n for n in point.counts("USED") if n <= 0xFFFF), n_points)
+    if stated != n_points:
+        warnings.append(f"{stated} points (POINT:USED) are taken; the header says {n_points}")
+        n_points = stated
+    scale = next(iter(point.numbers("SCALE")), 0.0) or scale
+    if not np.isfinite(scale) or scale == 0:
+        raise FormatError(path, "POINT:SCALE", "a number other than 0", scale)
+
+    item = 4 if scale < 0 else 2
+    n_items = 4 * n_points + n_analog
+    offset = (words[8] - 1) * BLOCK
+    if n_items and not 0 < offset <= len(raw):
+        expected = f"data that begin within the file's {len(raw)} bytes"
+        raise FormatError(path, "header, word 9", expected, f"byte {offset}")
+    n_fit = (len(raw) - offset) // (n_items * item) if n_items else 0xFFFF
+    first, n_frames, n_declared = _frames(path, groups, first, last, n_fit, warnings)
+    truncated = ""
+    if n_declared > n_frames:
+        n_missing = offset + n_declared * n_items * item - len(raw)
+        truncated = (
+            f"cut off in frame {first + n_frames}: expected {n_declared} frames, found "
+            f"{n_frames} complete, {n_missing} bytes are missing. Copy the file again."
+        )
+    n_values = n_frames * n_items
+    if processor == INTEL:  # a view, because the file may be large
+        kind = "<f4" if item == 4 else "<i2"
+        values = np.frombuffer(raw, kind, n_values, offset if n_values else 0)
+    else:
+        values = decode(raw[offset : offset + n_values * item], item, processor)
+    values = values.reshape(n_frames, n_items)
+    points: NDArray[Any] = values[:, : 4 * n_points].reshape(n_frames, n_points, 4)
+    analog: NDArray[Any] = values[:, 4 * n_points :]
+    if item == 2:
+        points = points.astype(np.float32)
+        with np.errstate(over="ignore"):  # what overflows is not finite and so not seen
+            points[..., :3] *= np.float32(scale)
+        is_unsigned = groups.get("ANALOG", Group()).strings("FORMAT")[:1] == ["UNSIGNED"]
+        analog = (analog.view(np.uint16) if is_unsigned else analog).astype(np.float32)
+    return C3DFile(
+        header=header,
+        groups=groups,
+        points=points,
+        analog=analog,
+        n_samples=words[9],
+        first_frame=first,
+        rate=_rate(rate, groups, words[9]),
+        scale=abs(scale),
+        warnings=tuple(warnings),
+        truncated=truncated,
+    )
+
+
+def _intel_header(header: bytes, processor: int) -> bytes:
+    """Header with its words, reals and event times in Intel order; event labels are bytes."""
+    if processor == INTEL:
+        return header
+    words = decode(header, 2, processor).tobytes()
+    result = bytearray(words[:376] + header[376:])
+    for begin, end in ((12, 16), (20, 24), (304, 376)):  # scale, rate, 18 event times
+        result[begin:end] = decode(header[begin:end], 4, processor).tobytes()
+    result[:2] = header[:2]
+    return bytes(result)
+
+
+def _rate(in_header: float, groups: dict[str, Group], n_samples: int) -> float:
+    """Frames a second: POINT:RATE, else the header's, else that of the analog channels; else 0."""
+    analog = groups.get("ANALOG", Group()).numbers("RATE")
+    candidates = [*groups.get("POINT", Group()).numbers("RATE")[:1], in_header]
+    candidates += [r / n_samples for r in analog[:1] if n_samples]
+    return next((r for r in candidates if np.isfinite(r) and 1e-6 < r < 1e9), 0.0)
+
+
+def _frames(
+    path: Path, groups: dict[str, Group], first: int, last: int, n_fit: int, warnings: list[str]
+) -> tuple[int, int, int]:
+    """First frame, number of complete frames, and number of frames that the file declares.
+
+    The header's 16-bit words overflow at 65535, and every maker has another way round it. Of
+    several numbers that a file states, the first that fits its length is taken as the declared one.
+    """
+    point, trial = groups.get("POINT", Group()), groups.get("TRIAL", Group())
+    in_header = last - first + 1 if last >= first else 0
+    claimed = point.counts("FRAMES")[:1]
+    counts = [in_header]
+    if last == 0xFFFF or claimed != counts:
+        counts = [n for n in point.counts("LONG_FRAMES")[:1] if n]
+        ends = [trial.counts(f"ACTUAL_{end}_FIELD") for end in ("START", "END")]
+        if all(len(words) == 2 and max(words) <= 0xFFFF for words in ends):
+            begin, stop = (low + 65536 * high for low, high in ends)
+            if stop >= begin:
+                first, counts = begin, [stop - begin + 1, *counts]
+        if not counts and 0xFFFF in (*claimed, last) and n_fit > 0xFFFF + BLOCK:
+            warnings.append("the number of frames is told by the length of the file")
+            counts = [n_fit]
+        # 0xFFFF is where the words overflow: beside a longer count it says nothing.
+        counts += [n for n in (*claimed, in_header) if n and not (n == 0xFFFF and counts)]
+        counts = counts or [0]
+    n_frames = next((n for n in counts if n <= n_fit), None)
+    if n_frames is None and n_fit == 0:
+        raise FormatError(
+            path, f"frame {first}", f"{counts[0]} frames of data",
+            "the end of the file before the first is complete",
+            "the file is cut off: copy it again",
+        )  # fmt: skip
+    if n_frames is None:
+        return first, n_fit, counts[0]
+    if n_frames != counts[0]:
+        warnings.append(f"{n_frames} frames are taken, for {counts[0]} the file is too short")
+    elif n_frames != in_header and last < 0xFFFF:
+        warnings.append(f"{n_frames} frames are taken; the header says {in_header}")
+    if n_frames == 0:
+        warnings.append("the file has no frames")
+    return first, n_frames, n_frames

@@ -1,0 +1,249 @@
+"""Reading and writing files of any known format."""
+
+from __future__ import annotations
+
+import logging
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from asterism.errors import (
+    FormatError,
+    ParameterError,
+    check_fields,
+    check_file,
+    check_kind,
+    check_path,
+    not_read,
+)
+from asterism.io.atomic import replacing
+from asterism.io.captures.formats import CAPTURE_FORMATS, CaptureFormat
+from asterism.io.text_table import as_utf8
+from asterism.model import Capture, Tracks
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+    from pathlib import Path
+
+__all__ = ["format_of", "format_to_write", "read", "read_tracks", "write"]
+
+log = logging.getLogger(__name__)
+
+_HEAD = 4096  # bytes that are enough to know a format by
+
+
+def read(path: str | Path, *, format: str | None = None) -> Capture:
+    """Read a capture from a file.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    format : str, optional
+        Key of `CAPTURE_FORMATS`; by default it follows from the content, then from the suffix
+        of the name.
+
+    Returns
+    -------
+    Capture
+        Detections in metres with the file's own identities; axes are those of the file. Of a C3D
+        that is cut off the complete frames; `Capture.truncated` and a log message say so.
+
+    Raises
+    ------
+    FormatError
+        If the file is not there, or is of no known format, or not what its format says.
+    ParameterError
+        If `path` is no path, or `format` is unknown.
+
+    Examples
+    --------
+    >>> read("nowhere.c3d")
+    Traceback (most recent call last):
+    ...
+    asterism.errors.FormatError: nowhere.c3d: no such file
+    """
+    path = check_path("path", path)
+    asked = None if format is None else _named(format)
+    with _about(path):
+        return _log_truncation(_find(path, asked).read(path))
+
+
+def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
+    """Read what a file says about who is whom.
+
+    Parameters
+    ----------
+    path, format
+        As in `read`.
+
+    Returns
+    -------
+    Tracks
+        Over a `Capture`. Asterism's own CSV gives back labels, names and confidence as they were
+        written; other formats the identities of their channels, as `Capture.tracks`.
+
+    Raises
+    ------
+    FormatError, ParameterError
+        As in `read`.
+    """
+    path = check_path("path", path)
+    asked = None if format is None else _named(format)
+    with _about(path):
+        chosen = _find(path, asked)
+        if chosen.read_tracks is None:
+            return _log_truncation(chosen.read(path)).tracks
+        return chosen.read_tracks(path)
+
+
+def write(
+    tracks: Tracks,
+    path: str | Path,
+    *,
+    format: str | None = None,
+    overwrite_input: bool = False,
+    unflagged: bool = False,
+) -> None:
+    """Write tracks to a file; it is there as a whole afterwards, or untouched.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        What to write: every detection, those that are clutter too.
+    path : path
+        The file. One that exists is replaced, except the one that the detections came from.
+    format : str, optional
+        Key of `CAPTURE_FORMATS`; by default it is told by the ending of the name.
+    overwrite_input : bool
+        Allow `path` to be the file that the detections were read from.
+    unflagged : bool
+        Allow points that were filled in a format in which nothing tells them from measured ones.
+
+    Raises
+    ------
+    ParameterError
+        If `path` is the input and that was not allowed, its ending is unknown, or the format
+        cannot hold these tracks, or cannot tell which of their points were filled.
+    FormatError
+        If the file cannot be written, or its source cannot be read again.
+    """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    path = check_path("path", path)
+    chosen = format_to_write(path, format)
+    assert chosen.write is not None
+    source = tracks.detections
+    if isinstance(source, Capture) and not overwrite_input and _is_same(source.path, path):
+        raise ParameterError(
+            "path", "another file than the one that was read", str(path),
+            "give overwrite_input=True if you mean it",
+        )  # fmt: skip
+    if source.filled is not None and source.filled.any() and not (chosen.keeps_filled or unflagged):
+        able = ", ".join(f.name for f in CAPTURE_FORMATS.values() if f.write and f.keeps_filled)
+        raise ParameterError(
+            "format", f"one that tells filled points from measured ones: {able}",
+            repr(chosen.name), "give unflagged=True if they need not be told apart",
+        )  # fmt: skip
+    with replacing(path) as file:
+        chosen.write(tracks, file)
+    if isinstance(source, Capture) and source.truncated:
+        log.warning("%s: holds the complete frames of a truncated capture, %s", path, source.path)
+
+
+def _log_truncation(capture: Capture) -> Capture:
+    """Log a warning where frames of the file are missing, and give the capture on."""
+    if capture.truncated:
+        log.warning("%s: %s", capture.path, capture.truncated)
+    return capture
+
+
+def format_of(path: Path) -> CaptureFormat:
+    """Tell the format of a file that exists, by the ending of its name or by its content.
+
+    Raises
+    ------
+    FormatError
+        If there is no such file, or it is of no known format.
+    """
+    with _about(path):
+        return _find(path, None)
+
+
+def format_to_write(path: Path, format: str | None) -> CaptureFormat:
+    """Give the format to write, as asked or by the ending of the name.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    format : str or None
+        Key of `CAPTURE_FORMATS`, where it was asked for.
+
+    Returns
+    -------
+    CaptureFormat
+        One that can be written.
+
+    Raises
+    ------
+    ParameterError
+        If the format or the ending is unknown, or the format is only read.
+    """
+    known = [f for f in CAPTURE_FORMATS.values() if f.write is not None]
+    if format is None:
+        for candidate in known:
+            if path.suffix and path.suffix.lower() in candidate.extensions:
+                return candidate
+        every = ", ".join(dict.fromkeys(e for f in known for e in f.extensions if e))
+        hint = "or name the format"
+        raise ParameterError("path", f"a name ending in {every}", repr(path.name), hint)
+    chosen = _named(format)
+    if chosen.write is None:
+        names = ", ".join(f.name for f in known)
+        raise ParameterError("format", f"one that can be written: {names}", repr(format))
+    return chosen
+
+
+def _is_same(a: Path, b: Path) -> bool:
+    try:
+        return a.samefile(b)
+    except OSError:
+        return a.resolve() == b.resolve()
+
+
+def _named(name: str) -> CaptureFormat:
+    check_fields("format", [name], CAPTURE_FORMATS)
+    return CAPTURE_FORMATS[name]
+
+
+def _find(path: Path, asked: CaptureFormat | None) -> CaptureFormat:
+    """Format of an existing file: as asked, or by its content.
+
+    The ending of the name decides between formats that the content fits alike, and where the
+    content fits none: then the reader of that format says what is amiss.
+    """
+    check_file(path)
+    if asked is not None:
+        return asked
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    fitting = [f for f in CAPTURE_FORMATS.values() if f.sniff(as_utf8(head))]
+    ending = path.suffix.lower()
+    named = [f for f in CAPTURE_FORMATS.values() if ending and ending in f.extensions]
+    if fitting:
+        return next((f for f in fitting if f in named), fitting[0])
+    if len(named) == 1:
+        return named[0]
+    names = ", ".join(f"{f.name} ({f.description})" for f in named or CAPTURE_FORMATS.values())
+    got = repr(head[:40]) if head else "an empty file"
+    raise FormatError(path, "its first bytes", f"one of: {names}", got)
+
+
+@contextmanager
+def _about(path: Path) -> Generator[None, None, None]:
+    """Turn what the system or the data model refuses into an error about the file."""
+    try:
+        yield
+    except OSError as error:
+        raise not_read(path, error) from error
+    except ParameterError as error:
+        raise FormatError(path, error.name, error.expected, error.got, error.hint) from error

@@ -1,0 +1,124 @@
+"""The one list of file formats."""
+
+from __future__ import annotations
+
+from typing import IO, TYPE_CHECKING
+
+from asterism.io.captures import (
+    c3d,
+    c3d_write,
+    csv_long,
+    csv_wide,
+    motive_csv,
+    pointcloud,
+    qtm_tsv,
+    trc,
+)
+from asterism.records import Registry, record
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from asterism.model import Capture, Tracks
+
+__all__ = ["CAPTURE_FORMATS", "CaptureFormat"]
+
+
+@record
+class CaptureFormat:
+    """A file format.
+
+    Parameters
+    ----------
+    name : str
+        Its key in `CAPTURE_FORMATS`.
+    extensions : tuple of str
+        Endings of its files, "" for none.
+    description : str
+        One line for people.
+    sniff : callable
+        Whether the first bytes of a file look like this format.
+    read : callable
+        Path to `Capture`.
+    write : callable or None
+        Writes `Tracks` to an open binary file; None where the format is only read.
+    read_tracks : callable or None
+        Path to `Tracks`, for a format that holds more than a `Capture` can.
+    keeps_filled : bool
+        Whether filled points are told from measured ones in it.
+    """
+
+    name: str
+    extensions: tuple[str, ...]
+    description: str
+    sniff: Callable[[bytes], bool]
+    read: Callable[[Path], Capture]
+    write: Callable[[Tracks, IO[bytes]], None] | None = None
+    read_tracks: Callable[[Path], Tracks] | None = None
+    keeps_filled: bool = False
+
+
+CAPTURE_FORMATS: dict[str, CaptureFormat] = Registry(
+    (f.name, f)
+    for f in (
+        CaptureFormat(
+            name="c3d",
+            extensions=(".c3d",),
+            description="C3D of biomechanics, with all that its source held",
+            sniff=c3d.sniff,
+            read=c3d.read,
+            write=c3d_write.write,
+            keeps_filled=True,
+        ),
+        CaptureFormat(
+            name="trc",
+            extensions=(".trc",),
+            description="TRC of OpenSim and Motion Analysis",
+            sniff=trc.sniff,
+            read=trc.read,
+            write=trc.write,
+        ),
+        CaptureFormat(
+            name="csv",
+            extensions=(".csv",),
+            description="CSV, one row a detection; keeps labels, names and confidence bit by bit",
+            sniff=csv_long.sniff,
+            read=csv_long.read,
+            write=csv_long.write,
+            read_tracks=csv_long.read_tracks,
+            keeps_filled=True,
+        ),
+        CaptureFormat(
+            name="csv-wide",
+            extensions=(".csv",),
+            description="CSV, one row a frame and three columns a marker",
+            sniff=csv_wide.sniff,
+            read=csv_wide.read,
+            write=csv_wide.write,
+        ),
+        CaptureFormat(
+            name="motive",
+            extensions=(".csv",),
+            description="CSV as OptiTrack Motive exports it",
+            sniff=motive_csv.sniff,
+            read=motive_csv.read,
+        ),
+        CaptureFormat(
+            name="qtm",
+            extensions=(".tsv",),
+            description="TSV as Qualisys Track Manager exports it",
+            sniff=qtm_tsv.sniff,
+            read=qtm_tsv.read,
+            write=qtm_tsv.write,
+        ),
+        CaptureFormat(
+            name="pointcloud",
+            extensions=(".log", ".bin", ""),
+            description="binary log of unlabelled point clouds (librigidbodytracker)",
+            sniff=pointcloud.sniff,
+            read=pointcloud.read,
+            write=pointcloud.write,
+        ),
+    )
+)

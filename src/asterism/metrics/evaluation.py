@@ -1,0 +1,165 @@
+"""All scores of a result at once."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asterism.errors import check_array
+from asterism.metrics.alignment import align
+from asterism.metrics.association import AssociationScores, association_scores
+from asterism.metrics.clear import ClearScores, clear_scores
+from asterism.metrics.gospa import GospaScores, gospa_scores
+from asterism.metrics.hota import HotaScores, hota_scores
+from asterism.metrics.identity import IdentityScores, identity_scores
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism.model import Tracks
+
+__all__ = ["Evaluation", "evaluate"]
+
+
+@record(eq=False)
+class Evaluation(ClearScores, IdentityScores, HotaScores, GospaScores, AssociationScores):
+    """Every score of a result; the fields are described in the classes that it is made of.
+
+    Attributes
+    ----------
+    times : ndarray, shape (T,)
+        Times of the frames, seconds; all fields that start with ``frame_`` go by them.
+    """
+
+    times: NDArray[np.float64]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the overall scores by name, as plain numbers that JSON can hold."""
+        fields = (f.name for f in dataclasses.fields(self))
+        values = {name: getattr(self, name) for name in sorted(fields) if not _is_by_frame(name)}
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
+
+    def by_frame(self) -> dict[str, NDArray[Any]]:
+        """Give the times and the scores by frame, as columns of one table, each of shape (T,)."""
+        fields = (f.name for f in dataclasses.fields(self))
+        return {"times": self.times} | {
+            name.removeprefix("frame_"): getattr(self, name)
+            for name in sorted(fields)
+            if name.startswith("frame_")
+        }
+
+    def __str__(self) -> str:
+        table = ", ".join(f"{n} with {k}" for k, n in enumerate(self.frames_by_wrong) if n)
+        rows = [
+            ("frames, markers, tracks", f"{len(self.times)}, {self.n_markers}, {self.n_tracks}"),
+            ("IDF1 (IDP, IDR)", f"{self.idf1:.4f} ({self.idp:.4f}, {self.idr:.4f})"),
+            ("MOTA, MOTP", f"{self.mota:.4f}, {self.motp_mm:.3f} mm"),
+            ("HOTA (DetA, AssA)", f"{self.hota:.4f} ({self.deta:.4f}, {self.assa:.4f})"),
+            ("GOSPA", f"{1000 * self.gospa:.3f} mm a frame"),
+            ("switches", f"{self.switches} ({self.switches_per_1000:.3f} per 1000 detections)"),
+            ("fragments", f"{self.fragments}"),
+            ("missed, false labels", f"{self.missed}, {self.false_labels}"),
+            ("mostly tracked, lost", f"{self.mostly_tracked}, {self.mostly_lost}"),
+            ("wrong associations", f"{self.wrong_percent:.3f} %"),
+            ("… by a track's first marker", f"{self.wrong_first_percent:.3f} %"),
+            ("missing labels", f"{self.missing_percent:.3f} %"),
+            ("clutter labelled", _percent(self.clutter_labelled_percent)),
+            ("tracks a marker", f"{self.tracks_per_marker:.3f}"),
+            ("wrong links, broken links", f"{self.wrong_links}, {self.broken_links}"),
+            ("frames by wrong ones", table),
+        ]
+        width = max(len(name) for name, _ in rows)
+        return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
+
+    def __repr__(self) -> str:
+        return (
+            f"Evaluation(idf1={self.idf1:.4f}, mota={self.mota:.4f}, hota={self.hota:.4f}, "
+            f"switches={self.switches}, n_tracks={self.n_tracks}, n_markers={self.n_markers})"
+        )
+
+
+def _is_by_frame(name: str) -> bool:
+    return name == "times" or name.startswith("frame_")
+
+
+def evaluate(
+    tracks: Tracks,
+    truth: Tracks,
+    *,
+    truth_positions: ArrayLike | None = None,
+    c: float = 0.1,
+    tolerance: float = 1e-6,
+) -> Evaluation:
+    """Score tracks against the truth.
+
+    Detections are the same by identity, not by distance from a marker: both must speak of the same
+    capture. If they do not share one `Detections`, equal times and positions tell which is which,
+    as `asterism.metrics.align` says. In the truth, tracks without a name are clutter as soon as
+    one track has a name. The names of `tracks` play no part.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        What a method found.
+    truth : Tracks
+        What is so.
+    truth_positions : array_like, shape (N, D), optional
+        Where the marker of each detection of `truth` truly was, metres; NaN for clutter. For
+        `motp_mm` and `gospa`; unless given, the detections are taken to be exact.
+    c : float
+        Cut-off of GOSPA, metres.
+    tolerance : float
+        Greatest difference of a coordinate between the same detections, metres.
+
+    Returns
+    -------
+    Evaluation
+
+    Raises
+    ------
+    ParameterError
+        If fewer than half of the detections of either side are found on the other, or an argument
+        is out of range.
+
+    Examples
+    --------
+    >>> from asterism.metrics import oracle_tracks
+    >>> from asterism.model import Tracks
+    >>> import numpy as np
+    >>> positions = np.ones((10, 2, 3)) * [[0.0], [1.0]]
+    >>> positions[3:6, 1] = np.nan
+    >>> truth = Tracks.from_dense(np.arange(10), positions, ["LASI", "RASI"])
+    >>> evaluate(oracle_tracks(truth, max_gap=2), truth)
+    Evaluation(idf1=0.8235, mota=0.9412, hota=0.8935, switches=1, n_tracks=3, n_markers=2)
+    """
+    both = align(tracks, truth, tolerance=tolerance)
+    labels, truth_labels, frame_of = both.labels, both.truth_labels, both.frame_of
+    n_frames = len(both.times)
+    error = None
+    if truth_positions is not None:
+        d = truth.detections
+        places = check_array(
+            "truth_positions", truth_positions, (d.n_points, d.n_axes), finite=False
+        )
+        error = np.full(len(labels), np.nan)
+        is_on_both = (both.i_tracks >= 0) & (both.i_truth >= 0)
+        seen = tracks.detections.points[both.i_tracks[is_on_both]]
+        error[is_on_both] = np.linalg.norm(seen - places[both.i_truth[is_on_both]], axis=1)
+    parts = (
+        clear_scores(labels, truth_labels, frame_of, n_frames=n_frames, error=error),
+        identity_scores(labels, truth_labels),
+        hota_scores(labels, truth_labels),
+        gospa_scores(labels, truth_labels, frame_of, c=c, n_frames=n_frames, error=error),
+        association_scores(labels, truth_labels, frame_of, n_frames=n_frames),
+    )
+    scores: dict[str, Any] = {}
+    for part in parts:
+        scores |= vars(part)
+    return Evaluation(times=both.times, **scores)
+
+
+def _percent(share: float) -> str:
+    return "–" if np.isnan(share) else f"{share:.3f} %"

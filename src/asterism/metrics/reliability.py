@@ -1,0 +1,116 @@
+"""Whether confidence means what it says: of labels held at 90 %, nine in ten should be right."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import ParameterError, check_array, check_number
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["CalibrationCurve", "calibration_curve"]
+
+
+@record(eq=False)
+class CalibrationCurve:
+    """A reliability table and its two summaries.
+
+    Attributes
+    ----------
+    edges : ndarray, shape (B + 1,)
+        Ends of the bins of confidence; a bin holds its lower end, the last one both.
+    counts : ndarray of int, shape (B,)
+        Labels in each bin.
+    confidence, right : ndarray, shape (B,)
+        Mean confidence and right share of each bin; NaN where it is empty.
+    ece : float
+        Expected calibration error: mean of ``|confidence − right|`` over the labels; NaN without
+        any.
+    auc : float
+        Probability that a right label is held with more confidence than a wrong one, ties counting
+        half; NaN where all are right or all are wrong.
+    """
+
+    edges: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    confidence: NDArray[np.float64]
+    right: NDArray[np.float64]
+    ece: float
+    auc: float
+
+    def __str__(self) -> str:
+        rows = [
+            f"{low:5.2f} to {high:4.2f}  {n:9d}  {c:10.4f}  {r:7.4f}"
+            for low, high, n, c, r in zip(
+                self.edges[:-1], self.edges[1:], self.counts, self.confidence, self.right,
+                strict=True,
+            )
+            if n
+        ]  # fmt: skip
+        head = "confidence        labels        mean    right"
+        return "\n".join([head, *rows, f"ECE {self.ece:.4f}, AUC {self.auc:.4f}"])
+
+
+def calibration_curve(
+    confidence: ArrayLike, is_right: ArrayLike, bins: int = 10
+) -> CalibrationCurve:
+    """Hold confidence against what turned out right.
+
+    Parameters
+    ----------
+    confidence : array_like, shape (N,)
+        Probability in [0, 1] that a label (or link) is right.
+    is_right : array_like of bool, shape (N,)
+        Whether it is.
+    bins : int
+        Number of bins of equal width.
+
+    Returns
+    -------
+    CalibrationCurve
+
+    Raises
+    ------
+    ParameterError
+        If the arrays do not fit each other, or a confidence is no probability.
+
+    Examples
+    --------
+    >>> c = calibration_curve([0.9, 0.9, 0.9, 0.9, 0.2], [True, True, True, False, False])
+    >>> round(c.ece, 3), c.auc
+    (0.16, 0.75)
+    """
+    check_number("bins", bins, above=1, closed=True, integer=True)
+    p = check_array("confidence", confidence, ("N",))
+    if p.size and (p.min() < 0 or p.max() > 1):
+        raise ParameterError(
+            "confidence", "probabilities in [0, 1]", p.min() if p.min() < 0 else p.max()
+        )
+    right = check_array("is_right", is_right, (len(p),), dtype=np.bool_)
+
+    edges = np.linspace(0.0, 1.0, bins + 1)
+    bin_of = np.clip(np.searchsorted(edges, p, side="right") - 1, 0, bins - 1)
+    counts = np.bincount(bin_of, minlength=bins)
+    sums = (np.bincount(bin_of, weights=w, minlength=bins) for w in (p, right.astype(np.float64)))
+    mean, share = (np.divide(s, counts, out=np.full(bins, np.nan), where=counts > 0) for s in sums)
+    used = counts > 0
+    ece = float(np.sum(counts[used] * np.abs(mean - share)[used]) / len(p)) if len(p) else math.nan
+    return CalibrationCurve(
+        edges=edges, counts=counts, confidence=mean, right=share, ece=ece, auc=_auc(p, right)
+    )
+
+
+def _auc(p: NDArray[np.float64], right: NDArray[np.bool_]) -> float:
+    n_right = int(np.count_nonzero(right))
+    n_wrong = len(right) - n_right
+    if not n_right or not n_wrong:
+        return math.nan
+    _, level = np.unique(p, return_inverse=True)
+    wrong_at = np.bincount(level[~right], minlength=level.max() + 1)
+    below = np.cumsum(wrong_at) - wrong_at / 2
+    return float(below[level[right]].sum() / (n_right * n_wrong))

@@ -1,0 +1,155 @@
+"""What repeats a tracking bit for bit."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from asterism.errors import ParameterError, check_fields, check_number
+from asterism.model.tracking_model import TrackingModel
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from asterism.model.detections import Detections
+
+__all__ = ["Recipe", "sha256_of", "versions"]
+
+NONE = "none"
+"""How an option that is None is written, here as on the command line."""
+
+
+@record
+class Recipe:
+    """A tracking with everything decided; ``am.track(detections, recipe=recipe)`` repeats it.
+
+    Parameters
+    ----------
+    method : str
+        Name of the method.
+    options : dict
+        All its options.
+    model : TrackingModel
+        The model that is searched.
+    stitch : bool
+        Whether tracks are stitched through gaps of any length.
+    seed : int, optional
+        Of the methods that draw.
+    has_start : bool
+        Whether the method begins with given tracks, which a repeat must be given too.
+    reason : str
+        Why this method was chosen; empty where the caller named it.
+    sha256 : str
+        Hash of the detections and of the tracks to begin with (`sha256_of`).
+    versions : dict of str
+        Versions on which the result may depend.
+    """
+
+    method: str
+    options: dict[str, Any]
+    model: TrackingModel
+    stitch: bool
+    seed: int | None
+    has_start: bool
+    reason: str
+    sha256: str
+    versions: dict[str, str]
+
+    @property
+    def chosen(self) -> str:
+        """Method and reason, one line; empty where the caller named the method."""
+        window = self.options.get("window")
+        options = f", window={window}" if self.method == "smp" and window else ""
+        stitched = ", then stitched" if self.stitch else ""
+        return f"{self.method}{options}{stitched}: {self.reason}" if self.reason else ""
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
+        """Return the recipe as nested plain values, as it stands in a TOML file."""
+        return {
+            "input": {"sha256": self.sha256},
+            "method": {
+                "name": self.method,
+                **({} if self.seed is None else {"seed": self.seed}),
+                "start": self.has_start,
+                "stitch": self.stitch,
+                **({"reason": self.reason} if self.reason else {}),
+                # TOML has no null.
+                "options": {k: NONE if v is None else v for k, v in self.options.items()},
+            },
+            "model": self.model.to_dict(),
+            "versions": self.versions,
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Make a recipe from nested plain values; the inverse of `to_dict`.
+
+        Raises
+        ------
+        ParameterError
+            At an unknown, missing or impossible value.
+        """
+        check_fields("recipe", map(str, values), ("input", "method", "model", "versions"))
+        method = _table(values, "method")
+        keys = ("name", "seed", "start", "stitch", "reason", "options")
+        check_fields("method", map(str, method), keys)
+        if (seed := method.get("seed")) is not None:
+            check_number("method.seed", seed, above=0, closed=True, integer=True)
+        return cls(
+            method=_value(method, "method.name", str),
+            options={
+                str(k): None if v == NONE else v for k, v in _table(method, "options").items()
+            },
+            model=TrackingModel.from_dict(_table(values, "model")),
+            stitch=_value(method, "method.stitch", bool),
+            seed=seed,
+            has_start=_value(method, "method.start", bool),
+            reason=_value({"reason": "", **method}, "method.reason", str),
+            sha256=_value(_table(values, "input"), "input.sha256", str),
+            versions={str(k): str(v) for k, v in _table(values, "versions").items()},
+        )
+
+
+def sha256_of(detections: Detections, start: NDArray[np.int64] | None = None) -> str:
+    """Return the SHA-256, in hexadecimal, of detections and of labels to begin with."""
+    d = detections.measured()
+    arrays = [d.times, d.offsets, d.points, d.covariances, start]
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(b"-" if array is None else f"{array.dtype.str}{array.shape}".encode())
+        if array is not None:
+            digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """Return the versions on which a result may depend."""
+    import scipy
+
+    from asterism import __version__
+
+    return {
+        "asterism": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "platform": platform.platform(),
+    }
+
+
+def _table(values: Mapping[str, Any], name: str) -> dict[str, Any]:
+    return _value(values, name, dict)
+
+
+def _value(values: Mapping[str, Any], name: str, kind: type) -> Any:
+    value = values.get(name.rpartition(".")[2])
+    if not isinstance(value, kind):
+        expected = {dict: "a table", str: "a text", bool: "true or false"}[kind]
+        raise ParameterError(name, expected, repr(value))
+    return value

@@ -1,0 +1,102 @@
+"""What images are like: noise, misses, clutter, and how many points there are to be seen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.errors import ParameterError, check_array, check_number
+from asterism.multiview.triangulation import per_camera
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism.camera import Rig
+
+__all__ = ["CameraNumbers", "ImageModel", "widest_base"]
+
+_REACH = 10  # base lines; beyond, depth is worth nothing
+
+CameraNumbers = float | tuple[float, ...]
+"""One number for all cameras, or one for each."""
+
+
+@record
+class ImageModel:
+    """What the images of a rig are like.
+
+    Parameters
+    ----------
+    sigma_px : float or tuple of float
+        Standard deviation of an image point, pixels per axis.
+    p_detection : float or tuple of float
+        Probability that a camera reports a point that stands in its view, in (0, 1). What bodies
+        hide counts as missed: where they hide much this is low, and a miss cheap.
+    clutter : float or tuple of float
+        Expected image points a camera and frame that belong to no point in space: false ones, and
+        those of markers that no other camera sees.
+    density : float
+        Points in space by cubic metre of the volume.
+    volume : (low, high), each 3 floats, optional
+        Corners of the box in which there are points, world metres. By default one about the
+        cameras, that reaches ten times the distance of the two farthest apart each way.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range, here or, where there is one for each camera, in use.
+    """
+
+    sigma_px: CameraNumbers = 0.3
+    p_detection: CameraNumbers = 0.9
+    clutter: CameraNumbers = 1.0
+    density: float = 10.0
+    volume: tuple[ArrayLike, ArrayLike] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("sigma_px", "p_detection", "clutter"):
+            value = getattr(self, name)
+            below = 1.0 if name == "p_detection" else np.inf
+            if isinstance(value, (tuple, list, np.ndarray)):
+                value = tuple(float(v) for v in value)
+                object.__setattr__(self, name, value)
+                for i, number in enumerate(value):
+                    check_number(f"{name}[{i}]", number, above=0, below=below)
+            else:
+                check_number(name, value, above=0, below=below)
+        check_number("density", self.density, above=0)
+        if self.volume is not None:
+            if not isinstance(self.volume, (tuple, list)) or len(self.volume) != 2:  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise ParameterError("volume", "two corners, low and high", repr(self.volume))
+            low, high = (check_array("volume", corner, (3,)).tolist() for corner in self.volume)
+            if not np.all(np.less(low, high)):
+                raise ParameterError("volume", f"a corner beyond {low}", high)
+            object.__setattr__(self, "volume", (tuple(low), tuple(high)))
+
+    def of(self, rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Give noise, probability of detection and clutter by pixel², each of shape (C,)."""
+        area = np.array([float(np.prod(camera.size_px)) for camera in rig])
+        return (
+            per_camera("sigma_px", self.sigma_px, rig),
+            per_camera("p_detection", self.p_detection, rig, below=1.0),
+            per_camera("clutter", self.clutter, rig) / area,
+        )
+
+    def box(self, rig: Rig) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Give the corners of the volume, world metres, whether it is given or not."""
+        if self.volume is not None:
+            low, high = (np.asarray(corner).tolist() for corner in self.volume)
+        else:
+            centers = np.stack([camera.center for camera in rig])
+            middle = centers.mean(axis=0)
+            reach = _REACH * widest_base(rig)
+            low, high = (middle - reach).tolist(), (middle + reach).tolist()
+        return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+
+
+def widest_base(rig: Rig) -> float:
+    """Give the distance between the two cameras that are farthest apart, metres."""
+    centers = np.stack([camera.center for camera in rig])
+    return float(np.linalg.norm(centers[:, None] - centers, axis=-1).max())

@@ -1,0 +1,210 @@
+"""Places from their images in cameras: linear start, Gauss-Newton on pixels, covariance.
+
+Who is whom is known here; `asterism.multiview.correspondence` finds it out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.camera import Rig
+from asterism.errors import ParameterError, check_array, check_kind
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Triangulation", "per_camera", "triangulate"]
+
+_ROUNDS = 20
+_LEAST_STEP = 1e-13  # of a place's distance from the cameras: smaller ones are rounding
+_FLATTEST = 1e12  # condition of the information beyond which depth is open, as in `Rig.coverage`
+
+
+@record(eq=False)
+class Triangulation:
+    """Places that were seen by several cameras.
+
+    Attributes
+    ----------
+    points : ndarray, shape (N, 3)
+        World metres; NaN where under two cameras see a place, or none is before them all.
+    covariances : ndarray, shape (N, 3, 3)
+        Of the points, m²: the inverse of the summed information ``Jᵀ J / σ²`` (the Cramér-Rao
+        bound); NaN where a point is, or where all rays are one line.
+    residuals : ndarray, shape (C, N, 2)
+        Pixel that was seen less pixel of the point; NaN where there is none.
+    n_views : ndarray of int, shape (N,)
+        How many cameras saw each.
+    """
+
+    points: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    residuals: NDArray[np.float64]
+    n_views: NDArray[np.int64]
+
+
+def triangulate(
+    pixels: ArrayLike, rig: Rig, *, sigma_px: ArrayLike = 0.3, start: ArrayLike | None = None
+) -> Triangulation:
+    """Find the places whose images are nearest to those that cameras saw.
+
+    The linear start is the place nearest to all rays; from there
+    ``Σ_c |z_c - h_c(X)|² / σ_c²`` is brought to its minimum by Gauss-Newton steps, damped where a
+    full one would not descend, with the derivative through the lens.
+
+    Parameters
+    ----------
+    pixels : array_like, shape (C, N, 2)
+        What each camera saw of each point; NaN where nothing.
+    rig : Rig
+        The C cameras.
+    sigma_px : array_like, shape (), (C,) or (C, N)
+        Standard deviation of an image point, pixels per axis: of all, of each camera's, or of each.
+    start : array_like, shape (N, 3), optional
+        Places to begin at instead, world metres.
+
+    Returns
+    -------
+    Triangulation
+
+    Raises
+    ------
+    ParameterError
+        If the arrays do not fit the rig.
+
+    References
+    ----------
+    R. Hartley, A. Zisserman, Multiple View Geometry (2004), §12.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(3, radius=4, height=2)
+    >>> seen = rig.project([[0.1, 0.2, 1.0]]).pixels
+    >>> found = am.multiview.triangulate(seen, rig)
+    >>> found.points.round(9), found.n_views
+    (array([[0.1, 0.2, 1. ]]), array([3]))
+    """
+    z = check_array("pixels", pixels, (len(_checked(rig)), "N", 2), finite=False)
+    if np.isinf(z).any():
+        raise ParameterError("pixels", "finite numbers, or NaN for nothing", "infinities")
+    if np.ndim(sigma_px) == 2:
+        sigma = check_array("sigma_px", sigma_px, z.shape[:2])
+        if (sigma <= 0).any():
+            raise ParameterError("sigma_px", "numbers > 0", float(sigma.min()))
+    else:
+        sigma = per_camera("sigma_px", sigma_px, rig)[:, None]
+    rays = np.stack([camera.rays(p) for camera, p in zip(rig, z, strict=True)])
+    is_seen = np.isfinite(rays[..., 0])
+    n_views = is_seen.sum(axis=0)
+    if start is None:
+        points = _nearest_to_rays(rig, rays, is_seen)
+    else:
+        points = check_array("start", start, (z.shape[1], 3), finite=False).copy()
+    points[n_views < 2] = np.nan
+    weights = np.where(is_seen, sigma**-2.0, 0.0)
+    points = _descended(points, z, weights, rig)
+    points[~np.isfinite(_cost(points, z, weights, rig))] = np.nan
+    information, _ = _normal_equations(points, z, weights, rig)
+    covariances = np.full(information.shape, np.nan)
+    known = np.flatnonzero(np.isfinite(points[:, 0]))
+    is_known = known[np.linalg.cond(information[known]) < _FLATTEST]
+    covariances[is_known] = np.linalg.inv(information[is_known])
+    residuals = np.where(is_seen[..., None], z - rig.project(points).pixels, np.nan)
+    return Triangulation(
+        points=points, covariances=covariances, residuals=residuals, n_views=n_views
+    )
+
+
+def per_camera(
+    name: str, value: ArrayLike, rig: Rig, *, below: float = np.inf, closed: bool = False
+) -> NDArray[np.float64]:
+    """Give a number for each camera, above 0 (or from 0 if closed); from one or from as many."""
+    numbers = np.asarray(value)
+    if numbers.ndim == 0:
+        numbers = np.full(len(rig), numbers)
+    numbers = check_array(name, numbers, (len(rig),))
+    is_low = (numbers < 0) if closed else (numbers <= 0)
+    if is_low.any() or (numbers >= below).any():
+        expected = f"numbers {'≥' if closed else '>'} 0"
+        expected += f" and < {below:g}" if np.isfinite(below) else ""
+        raise ParameterError(name, expected, numbers.tolist())
+    return numbers
+
+
+def _checked(rig: Rig) -> Rig:
+    check_kind("rig", rig, Rig, "am.read_rig(path)")
+    return rig
+
+
+def _nearest_to_rays(
+    rig: Rig, rays: NDArray[np.float64], is_seen: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Give the place with the least sum of squared distances to the rays of each point, (N, 3)."""
+    N = rays.shape[1]
+    A, b = np.zeros((N, 3, 3)), np.zeros((N, 3))
+    for camera, d, seen in zip(rig, rays, is_seen, strict=True):
+        across = np.eye(3) - d[seen, :, None] * d[seen, None, :]
+        A[seen] += across
+        b[seen] += across @ camera.center
+    points = np.full((N, 3), np.nan)
+    is_known = is_seen.sum(axis=0) >= 2
+    is_known[is_known] = np.linalg.cond(A[is_known]) < _FLATTEST
+    points[is_known] = np.linalg.solve(A[is_known], b[is_known, :, None])[..., 0]
+    return points
+
+
+def _descended(
+    points: NDArray[np.float64], z: NDArray[np.float64], weights: NDArray[np.float64], rig: Rig
+) -> NDArray[np.float64]:
+    """Bring places to the least cost. Each goes on until its steps are rounding."""
+    points = points.copy()
+    reach = np.stack([np.linalg.norm(points - camera.center, axis=1) for camera in rig]).max(axis=0)
+    damping = np.zeros(len(points))
+    cost = _cost(points, z, weights, rig)
+    active = np.flatnonzero(np.isfinite(cost))  # NaN stays NaN
+    for _ in range(_ROUNDS):
+        if not len(active):
+            break
+        A, g = _normal_equations(points[active], z[:, active], weights[:, active], rig)
+        diagonal = np.trace(A, axis1=1, axis2=2) / 3
+        # 1e-13 keeps what all rays leave open (one line) where it is.
+        A += ((damping[active] + 1e-13) * diagonal)[:, None, None] * np.eye(3)
+        step = np.linalg.solve(A, g[..., None])[..., 0]
+        there = points[active] + step
+        new = _cost(there, z[:, active], weights[:, active], rig)
+        descends = new <= cost[active]
+        chosen = active[descends]
+        points[chosen], cost[chosen] = there[descends], new[descends]
+        damping[chosen] /= 10
+        damping[active[~descends]] = np.maximum(10 * damping[active[~descends]], 1e-3)
+        is_large = np.linalg.norm(step, axis=1) > _LEAST_STEP * reach[active]
+        active = active[is_large]
+    return points
+
+
+def _cost(
+    points: NDArray[np.float64], z: NDArray[np.float64], weights: NDArray[np.float64], rig: Rig
+) -> NDArray[np.float64]:
+    """Give the weighted sum of squares in pixels; infinite where a camera cannot see a place."""
+    off = ((z - rig.project(points).pixels) ** 2).sum(axis=-1) * weights
+    cost = np.where(weights > 0, off, 0.0).sum(axis=0)
+    return np.where(np.isfinite(cost) & np.isfinite(points[:, 0]), cost, np.inf)
+
+
+def _normal_equations(
+    points: NDArray[np.float64], z: NDArray[np.float64], weights: NDArray[np.float64], rig: Rig
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the information ``Σ w Jᵀ J`` (N, 3, 3) and the slope ``Σ w Jᵀ (z - h)`` (N, 3)."""
+    A, g = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
+    projected = rig.project(points).pixels
+    for camera, seen_at, h, w in zip(rig, z, projected, weights, strict=True):
+        seen = (w > 0) & np.isfinite(h[:, 0])
+        J = camera.jacobian(points[seen])
+        scaled = np.swapaxes(J, 1, 2) * w[seen, None, None]
+        A[seen] += scaled @ J
+        g[seen] += (scaled @ (seen_at[seen] - h[seen])[..., None])[..., 0]
+    return A, g

@@ -1,0 +1,225 @@
+"""How exactly a rig can place a point in its volume, and where one more camera helps most."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.camera import Camera, Coverage, Rig, intrinsics, volume_grid
+from asterism.errors import ParameterError, check_array, check_number
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism.camera import Surface
+
+__all__ = ["CameraSuggestion", "TriangulationMap", "suggest_cameras", "triangulation_map"]
+
+_RING, _LEVELS = 24, 3  # places tried around the volume, at so many heights
+_CELLS = 12  # of the longest side of the volume, where no spacing is given
+
+
+@record(eq=False)
+class CameraSuggestion:
+    """A camera that is not there yet.
+
+    Attributes
+    ----------
+    camera : Camera
+        Where it would stand and look.
+    error : float
+        Root mean square error of a point over the volume with it, metres; a place that a rig does
+        not see is as unsure as the volume is wide.
+    share : float
+        Share of the volume that two cameras or more would see.
+    """
+
+    camera: Camera
+    error: float
+    share: float
+
+
+@record(eq=False)
+class TriangulationMap:
+    """How exactly a rig places a point, all over its volume.
+
+    Attributes
+    ----------
+    coverage : Coverage
+        Of an even grid of places: how many cameras see each, and the covariance of a point there.
+    error : float
+        Root mean square error of a point over the volume, metres; a place that the rig does not
+        see is as unsure as the volume is wide.
+    share : float
+        Share of the volume that two cameras or more see.
+    suggestions : tuple of CameraSuggestion
+        Where one more camera helps most, the best first; each by itself, not after the others.
+    """
+
+    coverage: Coverage
+    error: float
+    share: float
+    suggestions: tuple[CameraSuggestion, ...]
+
+    def __repr__(self) -> str:
+        return (
+            f"TriangulationMap({self.coverage.n_cameras.size} places, {100 * self.share:.3g} % "
+            f"seen by two cameras or more, error {1e3 * self.error:.3g} mm root mean square, "
+            f"{len(self.suggestions)} suggestions)"
+        )
+
+
+def triangulation_map(
+    rig: Rig,
+    low: ArrayLike,
+    high: ArrayLike,
+    *,
+    spacing: float | None = None,
+    sigma_px: float = 0.3,
+    surfaces: Sequence[Surface] = (),
+    n_suggestions: int = 1,
+) -> TriangulationMap:
+    """Say how exactly a rig can place a point in a box, and where one more camera helps most.
+
+    Parameters
+    ----------
+    rig : Rig
+        The cameras.
+    low, high : array_like, shape (3,)
+        Corners of the box, world metres.
+    spacing : float, optional
+        Between the places looked at, metres; by default a twelfth of the longest side.
+    sigma_px : float
+        Standard deviation of an image point, pixels per axis.
+    surfaces : sequence of Surface
+        What may hide places.
+    n_suggestions : int
+        How many places for a camera to suggest; 0 for none.
+
+    Returns
+    -------
+    TriangulationMap
+        To be drawn by `asterism.plot.plot_coverage` of its `coverage`.
+
+    Raises
+    ------
+    ParameterError
+        If the box is none, or a number is out of range.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=4, height=2.5)[:2]
+    >>> found = am.multiview.triangulation_map(rig, (-1, -1, 0), (1, 1, 2), spacing=0.5)
+    >>> bool(found.suggestions[0].error < found.error)
+    True
+    """
+    low, high = check_array("low", low, (3,)), check_array("high", high, (3,))
+    longest = float((high - low).max())
+    if longest <= 0:
+        raise ParameterError("high", f"a corner beyond {low.tolist()}", high.tolist())
+    check_number("n_suggestions", n_suggestions, above=0, closed=True, integer=True)
+    grid = volume_grid(low, high, longest / _CELLS if spacing is None else spacing)
+    coverage = rig.coverage(grid, surfaces, sigma_px=sigma_px)
+    width = float(np.linalg.norm(high - low))
+    suggestions: tuple[CameraSuggestion, ...] = ()
+    if n_suggestions:
+        tried = around(rig, low, high)
+        best = suggest_cameras(rig, grid, tried, sigma_px=sigma_px, surfaces=surfaces, width=width)
+        suggestions = tuple(best[: int(n_suggestions)])
+    return TriangulationMap(
+        coverage=coverage,
+        error=_error(_information(rig, grid.reshape(-1, 3), surfaces, sigma_px), width),
+        share=float((coverage.n_cameras >= 2).mean()),
+        suggestions=suggestions,
+    )
+
+
+def suggest_cameras(
+    rig: Rig,
+    points: ArrayLike,
+    candidates: Sequence[Camera],
+    *,
+    sigma_px: float = 0.3,
+    surfaces: Sequence[Surface] = (),
+    width: float = 1.0,
+) -> list[CameraSuggestion]:
+    """Order cameras by how much each would help a rig, the best first.
+
+    The measure is the mean square error of a point over the places (A-optimality), each place
+    known beforehand to `width`, so that those that are not seen count as well.
+
+    Parameters
+    ----------
+    rig : Rig
+        The cameras there are.
+    points : array_like, shape (..., 3)
+        Places that matter, world metres.
+    candidates : sequence of Camera
+        Cameras that there might be.
+    sigma_px : float
+        Standard deviation of an image point, pixels per axis.
+    surfaces : sequence of Surface
+        What may hide places.
+    width : float
+        How well a place is known unseen, one standard deviation, metres.
+
+    Returns
+    -------
+    list of CameraSuggestion
+    """
+    places = check_array("points", np.reshape(points, (-1, 3)), ("N", 3))
+    check_number("sigma_px", sigma_px, above=0)
+    check_number("width", width, above=0)
+    now = _information(rig, places, surfaces, sigma_px)
+    n_cameras = rig.project(places, surfaces).visible.sum(axis=0)
+    found: list[CameraSuggestion] = []
+    for camera in candidates:
+        alone = Rig((camera,))
+        more = _information(alone, places, surfaces, sigma_px)
+        seen = n_cameras + alone.project(places, surfaces).visible[0]
+        found.append(
+            CameraSuggestion(
+                camera=camera, error=_error(now + more, width), share=float((seen >= 2).mean())
+            )
+        )
+    return sorted(found, key=lambda s: s.error)
+
+
+def around(rig: Rig, low: NDArray[np.float64], high: NDArray[np.float64]) -> list[Camera]:
+    """Give cameras like those of a rig, in rings about a box at their heights, looking into it."""
+    middle = (low + high) / 2
+    centers = np.stack([camera.center for camera in rig])
+    radius = float(np.median(np.linalg.norm((centers - middle)[:, :2], axis=1)))
+    radius = max(radius, 0.6 * float(np.linalg.norm((high - low)[:2])))
+    heights = np.unique(np.linspace(centers[:, 2].min(), centers[:, 2].max(), _LEVELS).round(6))
+    focal = float(np.median([camera.K[0, 0] for camera in rig]))
+    w, h = rig[0].size_px
+    K = intrinsics(focal_length=focal, principal_point=((w - 1) / 2, (h - 1) / 2))
+    cameras: list[Camera] = []
+    for z in heights.tolist():
+        for angle in 2 * np.pi * np.arange(_RING) / _RING:
+            place = middle + radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+            place[2] = z
+            cameras.append(Camera.look_at(place, middle, K=K, size_px=(w, h), name="suggested"))
+    return cameras
+
+
+def _information(
+    rig: Rig, places: NDArray[np.float64], surfaces: Sequence[Surface], sigma_px: float
+) -> NDArray[np.float64]:
+    """Give what the cameras that see each place tell of it, (N, 3, 3), 1/m²."""
+    A = np.zeros((len(places), 3, 3))
+    for camera, seen in zip(rig, rig.project(places, surfaces).visible, strict=True):
+        J = camera.jacobian(places[seen])
+        A[seen] += np.swapaxes(J, 1, 2) @ J / sigma_px**2
+    return A
+
+
+def _error(information: NDArray[np.float64], width: float) -> float:
+    P = np.linalg.inv(information + np.eye(3) / width**2)
+    return float(np.sqrt(np.trace(P, axis1=1, axis2=2).mean()))

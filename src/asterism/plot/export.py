@@ -1,0 +1,66 @@
+"""A picture as bytes, the same whenever it is made."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+from asterism.errors import check_fields
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["ENDINGS", "figure_bytes"]
+
+ENDINGS = ("pdf", "png", "svg")
+"""What a picture can be written as."""
+
+# Without dates, versions and random names, all of which would differ from run to run.
+_METADATA: dict[str, dict[str, Any]] = {
+    "pdf": {"CreationDate": None, "ModDate": None, "Producer": None, "Creator": None},
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+}
+# TrueType in PDF: text that can be searched and edited, and that journals accept.
+_OPTIONS: Any = {"svg.hashsalt": "asterism", "pdf.fonttype": 42}
+
+
+def figure_bytes(picture: Figure | Axes | Sequence[Axes], ending: str) -> bytes:
+    """Render a picture; one that is made anew from the same data gives the same bytes.
+
+    Parameters
+    ----------
+    picture : Figure, Axes or sequence of Axes
+        What a plot function gave, or the figure that holds it.
+    ending : {"pdf", "png", "svg"}
+        The format.
+
+    Returns
+    -------
+    bytes
+        Of a whole file. Its metadata hold neither date nor version.
+
+    Raises
+    ------
+    ParameterError
+        If the ending is another.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.plot.figure_bytes(am.plot.plot_presence(am.simulate.cube(seed=1)), "pdf")[:5]
+    b'%PDF-'
+    """
+    import matplotlib
+
+    check_fields("ending", [ending], ENDINGS)
+    first: Any = picture[0] if isinstance(picture, (list, tuple)) else picture
+    figure = getattr(first, "figure", first)
+    figure = getattr(figure, "figure", figure)  # of a part of a figure the whole
+    file = io.BytesIO()
+    with matplotlib.rc_context(_OPTIONS):
+        figure.savefig(file, format=ending, metadata=_METADATA[ending])
+    return file.getvalue()

@@ -1,0 +1,89 @@
+"""Rows of tracks over time, and a strip of figures by frame above them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asterism.errors import check_kind
+from asterism.model import Tracks
+from asterism.plot.style import GRID, INK, new_axes, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+__all__ = ["axes_for", "frame_rows", "legend_above", "rows_of", "strip_above"]
+
+_MOST_NAMES = 60  # rows that can be named legibly
+
+
+def rows_of(tracks: Tracks) -> NDArray[np.int64]:
+    """Row of each track, shape (K,), by first frame and then by number; -1 where it is empty."""
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    order, offsets = tracks.by_track
+    there = np.flatnonzero(tracks.lengths)
+    first = tracks.detections.frame_of[order[offsets[there]]]
+    rows = np.full(tracks.n_tracks, -1)
+    rows[there[np.argsort(first, kind="stable")]] = np.arange(len(there))
+    return rows
+
+
+def axes_for(rows: NDArray[np.int64]) -> Axes:
+    """Make axes high enough for so many rows."""
+    return new_axes(height=float(np.clip(2.0 + 0.16 * (rows.max(initial=0) + 1), 3.5, 11.0)))
+
+
+def frame_rows(axes: Any, tracks: Tracks, rows: NDArray[np.int64]) -> None:
+    """Give axes the times of a capture, the names of its tracks, and the style."""
+    d = tracks.detections
+    n_rows = int(rows.max(initial=-1)) + 1
+    axes.set_ylim(n_rows - 0.3, -0.7)
+    if d.n_frames:
+        half = d.step / 2 or 0.5
+        axes.set_xlim(d.times[0] - half, d.times[-1] + half)
+    axes.set_xlabel("time [s]", color=INK)
+    axes.grid(axis="x", color=GRID, linewidth=0.8)
+    tidy(axes)
+    if n_rows <= _MOST_NAMES:
+        there = np.flatnonzero(rows >= 0)
+        names = [tracks.names[k] or f"{k}" for k in there]
+        axes.set_yticks(rows[there], names, fontsize=7, parse_math=False)
+        axes.tick_params(axis="y", length=0)
+    axes.set_ylabel("track, by first frame", color=INK)
+
+
+def strip_above(axes: Any, says: str = "") -> Any:
+    """Make axes above others, over the same times, as high on every figure.
+
+    Parameters
+    ----------
+    axes : Axes
+        Those below. Their title stays free for the caller's own words, and clear of the strip.
+    says : str
+        The result in words, above the strip.
+    """
+    from matplotlib.transforms import ScaledTranslation, blended_transform_factory
+
+    # Across a share of the axes below, upwards inches from their upper edge: whatever the layout
+    # makes of them later, and in a part of a figure too.
+    inches = axes.figure.dpi_scale_trans + ScaledTranslation(0, 1, axes.transAxes)
+    place = blended_transform_factory(axes.transAxes, inches)
+    above = axes.inset_axes((0.0, 0.1, 1.0, 0.55), transform=place, sharex=axes)
+    tidy(above)
+    above.tick_params(axis="x", labelbottom=False, length=0)
+    above.tick_params(axis="y", labelsize=7)
+    above.yaxis.get_major_locator().set_params(integer=True, nbins=2)
+    # A label and not a title: matplotlib lifts the title of the axes below over it.
+    above.xaxis.set_label_position("top")
+    above.set_xlabel(says, fontsize=11, color=INK, loc="left", labelpad=5)
+    return above
+
+
+def legend_above(strip: Any) -> None:
+    """Give a strip its legend, on the right beside what it says and no higher than that."""
+    strip.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, fontsize=8,
+        labelcolor=INK, handlelength=1.2, borderpad=0, borderaxespad=0.5,
+    )  # fmt: skip

@@ -1,0 +1,153 @@
+"""One call from tracks to a page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.camera import Rig
+from asterism.errors import ParameterError, check_fields, check_kind, check_path
+from asterism.io.atomic import replacing
+from asterism.model import Capture, Tracks
+from asterism.reporting.connections import connections_of
+from asterism.reporting.judgement import judge
+from asterism.reporting.page import Contents, page
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from asterism.reporting.page.contents import Axis
+
+__all__ = ["report"]
+
+_Y_UP = ("motive_csv", "trc")
+"""Formats of programs in which y is up."""
+_BY_THE_GROUND, _OFF_THE_GROUND = 0.1, 0.3  # metres
+_FRAMES_FOR_UP = 500
+
+
+def report(
+    tracks: Tracks,
+    path: str | Path,
+    *,
+    truth: Tracks | None = None,
+    rig: Rig | None = None,
+    made: str = "",
+    summary: Iterable[tuple[str, str]] = (),
+    title: str | None = None,
+    up: Axis | None = None,
+    overwrite_input: bool = False,
+) -> None:
+    """Write tracks as one self-contained HTML page with a player.
+
+    The page opens from the disk and asks nobody for anything. Above 3 million points every second,
+    third … frame is shown, and the page says so.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        2-D or 3-D, with or without names and confidence.
+    path : path
+        The file; one that exists is replaced, except the one that the detections came from.
+    truth : Tracks, optional
+        What is so, as for `evaluate`: wrong labels are marked, and the scores explained.
+    rig : Rig, optional
+        The cameras, drawn in the scene; the player looks through each. Only with 3-D tracks.
+    made : str
+        How the tracks were made, in a sentence or two: by which method, under which model.
+    summary : iterable of (str, str)
+        What else is to be told about how the tracks were made: names and values.
+    title : str, optional
+        Of the page; the name of the file that was tracked unless given.
+    up : "x", "y" or "z", optional
+        The axis that points up. Unless given, it is the one that is up in the images of the `rig`;
+        without a rig y for TRC, for Motive's CSV and where the lowest points stay by y = 0 and far
+        from z = 0; and z for all else. The page says which, and can change it.
+    overwrite_input : bool
+        Allow `path` to be the file that the detections were read from.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is of another kind, the truth is of another capture, or `path` is the input.
+    FormatError
+        If the page cannot be written.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(seed=1)
+    >>> am.report(am.track(truth.detections), "cube.html", truth=truth)  # doctest: +SKIP
+    """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    if truth is not None:
+        check_kind("truth", truth, Tracks)
+    if rig is not None:
+        check_kind("rig", rig, Rig, "am.read_rig(path)")
+    if up is not None:
+        check_fields("up", [up], ("x", "y", "z"))
+    d, path = tracks.detections, check_path("path", path)
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise ParameterError("path", "a name ending in .html", repr(path.name))
+    if rig is not None and d.n_axes != 3:
+        raise ParameterError("rig", "tracks in space to look at", f"{d.n_axes}-D tracks")
+    if isinstance(d, Capture) and not overwrite_input and path.resolve() == d.path.resolve():
+        raise ParameterError("path", "another file than the one that was read", str(path))
+    axis, about_up = _up(tracks, rig, up)
+    if title is None:
+        title = d.path.name if isinstance(d, Capture) else ""
+    warnings = (*filter(None, [d.truncated]), *d.warnings) if isinstance(d, Capture) else ()
+    contents = Contents(
+        title=title or "Tracks",
+        tracks=tracks,
+        made=made,
+        summary=tuple((str(name), str(text)) for name, text in summary),
+        warnings=(*warnings, *(rig.warnings if rig is not None else ()), *_oddities(tracks)),
+        up=axis,
+        about_up=about_up,
+        connections=connections_of(tracks),
+        judgement=None if truth is None else judge(tracks, truth),
+        rig=rig,
+    )
+    text = page(contents)
+    with replacing(path) as file:
+        file.write(text)
+
+
+def _up(tracks: Tracks, rig: Rig | None, asked: Axis | None) -> tuple[Axis, str]:
+    """Choose the axis that points up, and say how it is known."""
+    if asked is not None:
+        return asked, f"The {asked} axis points up, as was asked for."
+    if rig is not None:
+        # An image has its rows from top to bottom.
+        mean = np.mean([-camera.T_camera_world[1, :3] for camera in rig.cameras], axis=0)
+        axes: tuple[Axis, ...] = ("x", "y", "z")
+        axis = axes[int(np.argmax(np.abs(mean)))]
+        return axis, f"The {axis} axis points up: it does so in the images of the cameras."
+    d = tracks.detections
+    if isinstance(d, Capture) and d.format in _Y_UP:
+        return "y", "The y axis points up, as in most files of this format."
+    if d.n_axes == 3 and _stands_on_y(tracks):
+        text = "The y axis is taken to point up: the lowest points stay near y = 0, far from z = 0."
+        return "y", f"{text} It can be changed under the player."
+    return "z", "The z axis is taken to point up; change it under the player if another does."
+
+
+def _stands_on_y(tracks: Tracks) -> bool:
+    """Whether what is lowest stays by the ground y = 0, and nowhere near z = 0."""
+    d = tracks.detections
+    frames = range(0, d.n_frames, max(1, d.n_frames // _FRAMES_FOR_UP))
+    lowest = [d.frame(t).min(axis=0) for t in frames if len(d.frame(t))]
+    if not lowest:
+        return False
+    _, y, z = np.abs(np.median(lowest, axis=0))
+    return bool(y < _BY_THE_GROUND and z > _OFF_THE_GROUND)
+
+
+def _oddities(tracks: Tracks) -> list[str]:
+    d = tracks.detections
+    if d.n_points and not (tracks.labels >= 0).any():
+        return ["No track was believed: all points are clutter. Does the model fit the capture?"]
+    return []

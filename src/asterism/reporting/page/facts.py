@@ -1,0 +1,126 @@
+"""What tracks come to, in figures and in a sentence."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from asterism.reporting.page.findings import DOUBTFUL
+from asterism.reporting.page.runs import gaps_of
+
+if TYPE_CHECKING:
+    from asterism.model import Tracks
+
+__all__ = ["Facts", "cards", "facts_of", "in_words"]
+
+
+class Facts(NamedTuple):
+    """Counts of a result.
+
+    Attributes
+    ----------
+    n_frames, n_points, n_tracks, n_named, n_labelled, n_clutter, n_filled : int
+        Frames; points measured or filled; tracks with a point, those with a name; points in tracks,
+        in none, and filled.
+    seconds, rate : float
+        From the first to the last frame; usual frames a second.
+    n_gaps : int
+        Gaps within tracks.
+    longest_gap : float
+        Seconds.
+    n_doubtful : int or None
+        Labels held below `DOUBTFUL`; None where nothing says how surely they are held.
+    """
+
+    n_frames: int
+    n_points: int
+    n_tracks: int
+    n_named: int
+    n_labelled: int
+    n_clutter: int
+    n_filled: int
+    seconds: float
+    rate: float
+    n_gaps: int
+    longest_gap: float
+    n_doubtful: int | None
+
+
+def facts_of(tracks: Tracks) -> Facts:
+    """Count what there is."""
+    d = tracks.detections
+    is_labelled = tracks.labels >= 0
+    gaps = gaps_of(tracks)
+    names = np.array([name is not None for name in tracks.names], dtype=bool)
+    c = tracks.confidence
+    return Facts(
+        n_frames=d.n_frames,
+        n_points=d.n_points,
+        n_tracks=int(np.count_nonzero(tracks.lengths)),
+        n_named=int(np.count_nonzero(names & (tracks.lengths > 0))),
+        n_labelled=int(is_labelled.sum()),
+        n_clutter=int((~is_labelled).sum()),
+        n_filled=0 if d.filled is None else int(d.filled.sum()),
+        seconds=float(d.times[-1] - d.times[0]) if d.n_frames else 0.0,
+        rate=1 / d.step if d.step else 0.0,
+        n_gaps=len(gaps.track),
+        longest_gap=float(gaps.seconds.max(initial=0.0)),
+        n_doubtful=None if c is None else int((c[is_labelled] < DOUBTFUL).sum()),
+    )
+
+
+def in_words(facts: Facts, n_axes: int) -> str:
+    """Say in a sentence or two what is in the result."""
+    if not facts.n_frames:
+        return "An empty capture: no frame, no point, no track."
+    span = _count(facts.n_frames, "frame") + ("" if n_axes == 3 else " of a flat capture")
+    if facts.rate:
+        span += f" ({facts.seconds:.3g} s at {facts.rate:.4g} Hz)"
+    if not facts.n_points:
+        return f"{span}, and not a single point."
+    if not facts.n_tracks:
+        return f"{span}. None of the {_count(facts.n_points, 'point')} is in a track: all clutter."
+    named = "" if not facts.n_named else ", all named," if facts.n_named == facts.n_tracks else ""
+    if facts.n_named and not named:
+        named = f", {facts.n_named:,} of them named,"
+    share = 100 * facts.n_labelled / facts.n_points
+    text = f"{_count(facts.n_tracks, 'track')}{named} over {span}. "
+    text += f"{_percent(share)} of {_count(facts.n_points, 'point')} carry a label"
+    if facts.n_clutter:
+        text += f"; {facts.n_clutter:,} are clutter"
+    return text + "."
+
+
+def cards(facts: Facts) -> list[tuple[str, str, str]]:
+    """Give the figures at the top: a key for scripts, the number, and what it is of."""
+    share = _percent(100 * facts.n_labelled / facts.n_points) if facts.n_points else "–"
+    gap = f", the longest {facts.longest_gap:.3g} s" if facts.n_gaps else ""
+    found = [
+        ("tracks", f"{facts.n_tracks:,}", _only("track", facts.n_tracks)),
+        ("labelled", share, f"of {_count(facts.n_points, 'point')} labelled"),
+        ("gaps", f"{facts.n_gaps:,}", f"{_only('gap', facts.n_gaps)} within tracks{gap}"),
+        ("clutter", f"{facts.n_clutter:,}", "points taken for clutter"),
+    ]
+    if facts.n_doubtful is not None:
+        found.append(
+            ("doubtful", f"{facts.n_doubtful:,}", f"labels held below {100 * DOUBTFUL:.0f}\xa0%")
+        )
+    if facts.n_filled:
+        found.append(("filled", f"{facts.n_filled:,}", "points filled in, not measured"))
+    return found
+
+
+def _percent(share: float) -> str:
+    """Round, but never up to all or down to none."""
+    if share in (0.0, 100.0):
+        return f"{share:.0f} %"
+    return f"{min(max(share, 0.1), 99.9):.1f} %"
+
+
+def _only(noun: str, n: int) -> str:
+    return noun if n == 1 else noun + "s"
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n:,} {_only(noun, n)}"

@@ -1,0 +1,147 @@
+"""What to look at first: where tracks are most likely wrong, with the reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asterism.reporting.page.errors import errors
+from asterism.reporting.page.names import track_names
+from asterism.reporting.page.runs import gaps_of
+from asterism.reporting.page.strange_steps import StrangeStep, strange_steps
+from asterism.reporting.page.stretches import stretches
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from asterism.model import Tracks
+    from asterism.reporting.page.contents import Judgement
+
+__all__ = ["DOUBTFUL", "Finding", "find_troubles"]
+
+DOUBTFUL = 0.9
+"""Confidence below which a label is doubtful."""
+LONG = 0.1
+"""Seconds from which a gap is long."""
+_WEIGHT = {  # what each kind counts beside the others
+    "wrong marker": 100.0, "switch": 80.0, "likely swap": 50.0, "jump": 10.0, "low confidence": 4.0,
+    "begun midway": 3.0, "ends early": 2.0, "long gap": 1.0, "missed": 1.0,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """A place that deserves a look.
+
+    Parameters
+    ----------
+    kind : str
+        Such as ``"likely swap"``.
+    track : int
+        The track, -1 where it is not about one.
+    frame : int
+        Where to look, counted from 0.
+    weight : float
+        How bad it may be; only good for sorting.
+    reason : str
+        What was seen, for people.
+    """
+
+    kind: str
+    track: int
+    frame: int
+    weight: float
+    reason: str
+
+
+def find_troubles(tracks: Tracks, judgement: Judgement | None = None) -> list[Finding]:
+    """Look through tracks for what is most likely wrong.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        What was found.
+    judgement : Judgement, optional
+        What the truth says; then the wrong ones are known, and said.
+
+    Returns
+    -------
+    list of Finding
+        The worst first.
+    """
+    found = [*_doubts(tracks), *_gaps(tracks), *_ends(tracks), *_steps(tracks)]
+    if judgement is not None:
+        found += [
+            _finding(kind, track, frame, size, reason)
+            for kind, track, frame, size, reason in errors(tracks, judgement)
+        ]
+    return sorted(found, key=lambda f: (-f.weight, f.frame, f.track))
+
+
+def _finding(kind: str, track: Any, frame: Any, size: float, reason: str) -> Finding:
+    return Finding(
+        kind=kind, track=int(track), frame=int(frame), weight=_WEIGHT[kind] * size, reason=reason
+    )
+
+
+def _doubts(tracks: Tracks) -> Iterator[Finding]:
+    if tracks.confidence is None:
+        return
+    c, frame = tracks.confidence, tracks.detections.frame_of
+    for track, group in stretches(tracks, np.flatnonzero((tracks.labels >= 0) & (c < DOUBTFUL))):
+        least = group[np.argmin(c[group])]
+        reason = f"held with {100 * c[least]:.0f} % at the worst" + (
+            f"; {len(group)} points below {100 * DOUBTFUL:.0f} %" if len(group) > 1 else ""
+        )
+        yield _finding("low confidence", track, frame[least], float((1 - c[group]).sum()), reason)
+
+
+def _gaps(tracks: Tracks) -> Iterator[Finding]:
+    gaps = gaps_of(tracks)
+    for k, first, n, seconds in zip(*gaps, strict=True):
+        if seconds >= LONG:
+            reason = f"not seen for {seconds:.3g} s ({n} frames), then taken up again"
+            yield _finding("long gap", k, first + n, float(seconds), reason)
+
+
+def _ends(tracks: Tracks) -> Iterator[Finding]:
+    """Tracks that begin or end in the middle: often one marker in two pieces."""
+    d = tracks.detections
+    order, starts = tracks.by_track
+    for k in np.flatnonzero(tracks.lengths):
+        first, last = (d.frame_of[order[i]] for i in (starts[k], starts[k + 1] - 1))
+        since, left = d.times[first] - d.times[0], d.times[-1] - d.times[last]
+        if since >= LONG:
+            reason = f"begins {since:.3g} s after the start: a marker found again, or a ghost?"
+            yield _finding("begun midway", k, first, 1.0, reason)
+        if left >= LONG:
+            reason = f"ends {left:.3g} s before the end"
+            yield _finding("ends early", k, last, 1.0, reason)
+
+
+def _steps(tracks: Tracks) -> Iterator[Finding]:
+    names, frame = track_names(tracks), tracks.detections.frame_of
+    jumps: dict[int, StrangeStep] = {}
+    swaps: dict[tuple[int, int], list[StrangeStep]] = {}
+    for step in strange_steps(tracks):
+        k = int(tracks.labels[step.detection])
+        if step.other >= 0:
+            swaps.setdefault((min(k, step.other), max(k, step.other)), []).append(step)
+        else:
+            jumps[step.detection] = step
+    for steps in swaps.values():
+        first = min(steps, key=lambda step: step.detection)
+        reason = f"{_off(first)}; that is where {names[first.other]} was heading, and vice versa"
+        reason += f"; {len(steps)} times in all" if len(steps) > 1 else ""
+        k = tracks.labels[first.detection]
+        yield _finding("likely swap", k, frame[first.detection], 1.0, reason)
+    for k, group in stretches(tracks, np.array(sorted(jumps), dtype=np.int64)):
+        worst = max((jumps[int(i)] for i in group), key=lambda step: step.off)
+        reason = _off(worst) + (f"; {len(group)} such steps" if len(group) > 1 else "")
+        yield _finding("jump", k, frame[worst.detection], min(worst.ratio / 50, 2.0), reason)
+
+
+def _off(step: StrangeStep) -> str:
+    return f"{1e3 * step.off:.0f} mm off its course, {step.ratio:.0f} × as much as usual"

@@ -1,0 +1,195 @@
+"""The player's part of the page; what it does is in the bundled script."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from asterism.reporting.page.markup import Markup, element, joined
+
+if TYPE_CHECKING:
+    from asterism.reporting.page.contents import Contents
+
+__all__ = ["HELP", "player"]
+
+_KEYS = (
+    ("Space", "play, pause"),
+    ("← →", "one frame back or on; ten with Shift"),
+    ("Home, End", "first and last frame"),
+    ("N, P", "next and previous place to look at"),
+    ("[ ]", "previous and next track, in the order of the timeline"),
+    ("F", "follow the chosen track"),
+    ("Esc", "choose none"),
+    ("L", "names on and off"),
+    ("W A S D", "turn the view"),
+    ("+ −", "nearer, farther"),
+    ("0", "the whole scene again"),
+)
+
+
+def player(contents: Contents, findings: Markup) -> Markup:
+    """Make the player, its timeline and the list of what to look at."""
+    solid = contents.tracks.detections.n_axes == 3
+    does = "turn" if solid else "move"
+    hint = f"Drag to {does}, scroll to come nearer, click a marker to choose it."
+    stage = element(
+        "div",
+        element(
+            "canvas", id="scene", tabindex=0, role="img",
+            aria_label="Markers in space. Drag to turn; a click or [ and ] choose a marker.",
+        ),
+        element("canvas", id="names", aria_hidden="true"),
+        element("p", hint, class_="hint", aria_hidden="true"),
+        element("p", id="scale", class_="scale", aria_hidden="true"),
+        element("p", "Unpacking …", id="state", role="status"),
+        class_="stage",
+    )  # fmt: skip
+    return element(
+        "section",
+        element("h2", "Player", class_="hidden"),
+        element(
+            "noscript",
+            element("p", "Figures and reasons are all here; the player needs JavaScript."),
+        ),
+        element(
+            "div",
+            element("div", stage, _chosen(), _transport(), class_="left"),
+            element("div", _camera(contents), _places(findings), class_="right"),
+            class_="split",
+        ),
+        _settings(contents, solid),
+        _timeline(contents),
+        id="player",
+    )
+
+
+def _transport() -> Markup:
+    speeds = [
+        element("option", f"{s:g} ×", value=f"{s:g}", selected=s == 1)
+        for s in (0.05, 0.1, 0.25, 0.5, 1, 2, 4)
+    ]
+    return element(
+        "div",
+        _button("play", "▶", "Play"),
+        _button("back", "‹", "One frame back"),
+        _button("on", "›", "One frame on"),
+        element(
+            "input", type="range", id="frame", min=0, max=0, value=0, step=1, aria_label="Frame"
+        ),
+        element("output", "", id="clock", for_="frame"),
+        element("select", *speeds, id="speed", aria_label="Speed"),
+        class_="transport",
+    )
+
+
+def _button(name: str, sign: str, label: str) -> Markup:
+    return element("button", sign, type="button", id=name, aria_label=label, title=label)
+
+
+def _chosen() -> Markup:
+    return element(
+        "div",
+        element("h3", "Chosen marker", class_="hidden"),
+        element("dl", id="chosen"),
+        element("label", element("input", type="checkbox", id="follow"), "Follow it"),
+        element("button", "×", type="button", id="release", aria_label="Choose none"),
+        id="about",
+        hidden=True,
+    )
+
+
+def _camera(contents: Contents) -> Markup:
+    if contents.rig is None:
+        return Markup()
+    options = [
+        element("option", camera.name or f"{i + 1}", value=i)
+        for i, camera in enumerate(contents.rig.cameras)
+    ]
+    return element(
+        "div",
+        element(
+            "label", "Through camera ", element("select", *options, id="camera"), class_="heading"
+        ),
+        element("canvas", id="image", role="img", aria_label="Markers in the image of the camera"),
+        element("p", id="image-count", class_="quiet"),
+        class_="camera",
+    )
+
+
+def _places(findings: Markup) -> Markup:
+    return element("div", element("h3", "Look at these first"), findings, class_="places")
+
+
+def _settings(contents: Contents, solid: bool) -> Markup:
+    tails = [
+        element("option", name, value=value, selected=value == "0.5")
+        for name, value in (("none", "0"), ("0.5 s", "0.5"), ("2 s", "2"), ("10 s", "10"))
+    ]
+    up = [element("option", axis, value=axis, selected=axis == contents.up) for axis in "xyz"]
+    parts = [
+        _check("show-names", "Names", on=False),
+        element("label", "Trails ", element("select", *tails, id="trails")),
+        _check("show-lines", "Connections"),
+        _check("show-clutter", "Clutter"),
+    ]
+    if contents.rig is not None:
+        parts.append(_check("show-cameras", "Cameras"))
+    if solid:
+        parts.append(element("label", "Up ", element("select", *up, id="up")))
+    parts.append(element("button", "Whole scene", type="button", id="fit"))
+    return element("div", *parts, class_="settings")
+
+
+def _check(name: str, text: str, *, on: bool = True) -> Markup:
+    return element("label", element("input", type="checkbox", id=name, checked=on), text)
+
+
+def _timeline(contents: Contents) -> Markup:
+    orders = [
+        element("option", text, value=value)
+        for value, text in (("trouble", "trouble"), ("first", "first frame"), ("name", "name"))
+    ]
+    signs = [("seen", "seen")]
+    if contents.tracks.confidence is not None:
+        signs = [("fading", "confidence, 100 % to 50 %")]
+    if contents.judgement is not None:
+        signs.append(("wrong", "wrong marker"))
+        signs.append(("missed", "missed (in clutter)"))
+    signs.append(("gap", "gap"))
+    legend = [
+        joined(element("i", class_=f"sign {name}", aria_hidden="true"), text)
+        for name, text in signs
+    ]
+    return element(
+        "div",
+        element(
+            "div",
+            element("h3", "Timeline"),
+            element("ul", *(element("li", entry) for entry in legend), class_="legend"),
+            element("label", "Sorted by ", element("select", *orders, id="order")),
+            class_="bar",
+        ),
+        element(
+            "div",
+            element(
+                "canvas", id="strips", tabindex=0, role="img",
+                aria_label="When each track was there. A click goes to that time; arrows up and "
+                "down choose a track.",
+            ),
+            element("div", id="rows", aria_hidden="true"),
+            id="timeline",
+        ),
+        class_="times",
+    )  # fmt: skip
+
+
+HELP = element(
+    "details",
+    element("summary", "Keys"),
+    element(
+        "dl",
+        *(element("div", element("dt", element("kbd", k)), element("dd", v)) for k, v in _KEYS),
+    ),
+    class_="keys",
+    id="keys",
+)
+"""What the keys do."""

@@ -1,0 +1,236 @@
+"""From visible points to what a motion-capture camera reports: blobs and their centroids."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from asterism.camera import Reason
+from asterism.errors import ParameterError, check_number
+from asterism.records import record
+from asterism.simulate.corrupted_points import touching
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from asterism.camera import Camera, Rig, Surface
+
+__all__ = ["Blobs", "Seeing", "see"]
+
+_SAMPLES = 13  # points of a marker's disc that are looked at, spread like the seeds of a sunflower
+_CHUNK = 256  # frames at a time
+
+
+@record
+class Seeing:
+    """What a camera makes of the markers before it.
+
+    Parameters
+    ----------
+    marker_radius : float
+        Metres; 0 for points. Where the middle of a marker is before all surfaces, its rim may dip
+        into the one on which it sits, up to three radii deep, without being hidden by it.
+    smallest_share : float
+        A marker of which less than this share is to be seen is not seen; of the others the
+        centroid is that of the part that is seen.
+    merge : bool
+        Whether blobs that touch in the image become one, at their common centroid.
+    noise_px : float
+        Standard deviation of a centroid on each axis, pixels.
+    missing : float
+        Probability that a camera misses a blob.
+    false : float
+        Expected false blobs a camera and frame, anywhere in the image.
+    quantum_px : float
+        Centroids are rounded to multiples of this, pixels; 0 for not at all.
+    timing : float
+        Each camera is early or late by its own time, normal with this standard deviation, seconds.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range.
+    """
+
+    marker_radius: float = 0.007
+    smallest_share: float = 0.3
+    merge: bool = True
+    noise_px: float = 0.1
+    missing: float = 0.0
+    false: float = 0.0
+    quantum_px: float = 0.0
+    timing: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("marker_radius", "noise_px", "false", "quantum_px", "timing"):
+            check_number(name, getattr(self, name), above=0, closed=True)
+        for name in ("smallest_share", "missing"):
+            check_number(name, getattr(self, name), above=0, below=1, closed=True)
+        check_number("false", self.false, below=1e6)
+        if not isinstance(self.merge, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise ParameterError("merge", "True or False", repr(self.merge))
+
+
+class Blobs(NamedTuple):
+    """All blobs of all cameras and frames, by frame and camera.
+
+    Attributes
+    ----------
+    cell : ndarray of int, shape (N,)
+        Frame × cameras + camera.
+    pixels : ndarray, shape (N, 2)
+        Centroids.
+    markers : ndarray of int, shape (N,)
+        The marker with the largest part in each; -1 for false ones.
+    blob_of : ndarray of int, shape (C, T, K)
+        The blob that holds each marker's image, -1 if there is none.
+    share : ndarray, shape (C, T, K)
+        Share of each marker's disc that is seen, 0 where it has no image.
+    """
+
+    cell: NDArray[np.int64]
+    pixels: NDArray[np.float64]
+    markers: NDArray[np.int64]
+    blob_of: NDArray[np.int64]
+    share: NDArray[np.float64]
+
+
+def see(
+    times: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    rig: Rig,
+    surfaces: Sequence[Surface],
+    seeing: Seeing,
+    seed: int,
+) -> Blobs:
+    """Look at markers through every camera.
+
+    Parameters
+    ----------
+    times : ndarray, shape (T,)
+        Seconds.
+    positions : ndarray, shape (T, K, 3)
+        World metres, NaN where a marker is not there.
+    rig : Rig
+        The cameras.
+    surfaces : sequence of Surface
+        What hides markers.
+    seeing : Seeing
+        What the cameras make of them.
+    seed : int
+        Chooses everything that is random; each switch has a stream of its own, and none is that of
+        a scene with the same seed.
+    """
+    streams = np.random.SeedSequence(seed).spawn(5)
+    rng_timing, rng_missing, rng_noise, rng_false, rng_order = map(np.random.default_rng, streams)
+    T, K = positions.shape[:2]
+    C = len(rig)
+    late = seeing.timing * rng_timing.standard_normal(C)
+    velocity = _velocity(times, positions) if seeing.timing else None
+    centroid, area = np.full((T, C, K, 2), np.nan), np.zeros((T, C, K))
+    share = np.zeros((C, T, K))
+    for c, camera in enumerate(rig):
+        moved = positions if velocity is None else positions + late[c] * velocity
+        for begin in range(0, T, _CHUNK):
+            rows = np.arange(begin, min(begin + _CHUNK, T))
+            here = [s.during(rows) for s in surfaces]
+            centroid[rows, c], share[c, rows] = _discs(camera, moved[rows], here, seeing)
+            depth = (moved[rows] - camera.center) @ camera.axis
+            with np.errstate(divide="ignore", invalid="ignore"):
+                radius = seeing.marker_radius * camera.K[0, 0] / depth
+            area[rows, c] = share[c, rows] * radius**2
+    is_seen = np.isfinite(centroid[..., 0])
+    where = np.nonzero(is_seen)
+    cell, pixels = where[0] * C + where[1], centroid[where]
+    weight = np.maximum(area[where], 1e-12)  # points have no area, and weigh alike
+    group = np.arange(len(cell))
+    if seeing.merge and len(cell):
+        group = touching(pixels, cell, np.sqrt(area[where]))
+    n = int(group.max(initial=-1)) + 1
+    total = np.bincount(group, weight, n)
+    together = np.stack([np.bincount(group, weight * p, n) / total for p in pixels.T], axis=1)
+    alone = np.bincount(group, minlength=n)[group] == 1
+    together[group[alone]] = pixels[alone]  # to the last bit
+    # The largest part last, so that it stays.
+    order = np.lexsort((-where[2], weight))
+    markers, cells = np.empty(n, np.int64), np.empty(n, np.int64)
+    markers[group[order]], cells[group[order]] = where[2][order], cell[order]
+
+    together += seeing.noise_px * rng_noise.standard_normal((n, 2))
+    kept = rng_missing.random(n) >= seeing.missing
+    n_false = rng_false.poisson(seeing.false, T * C)
+    false_cell = np.repeat(np.arange(T * C), n_false)
+    size = np.array([camera.size_px for camera in rig], dtype=np.float64)
+    false_pixels = rng_false.random((len(false_cell), 2)) * size[false_cell % C] - 0.5
+    all_pixels = np.concatenate([together, false_pixels])
+    all_cells = np.concatenate([cells, false_cell])
+    if seeing.quantum_px:
+        all_pixels = np.rint(all_pixels / seeing.quantum_px) * seeing.quantum_px
+    inside = (all_pixels >= -0.5) & (all_pixels < size[all_cells % C] - 0.5)
+    kept = np.append(kept, np.ones(len(false_cell), dtype=bool)) & inside.all(axis=1)
+
+    # By cell, and at random within it: the order gives nothing away.
+    chosen = np.flatnonzero(kept)
+    chosen = chosen[np.lexsort((rng_order.random(len(kept))[chosen], all_cells[chosen]))]
+    number = np.full(len(kept) + 1, -1)
+    number[chosen] = np.arange(len(chosen))
+    blob_of = np.full((T, C, K), -1)
+    blob_of[where] = number[group]
+    return Blobs(
+        all_cells[chosen],
+        all_pixels[chosen],
+        np.append(markers, np.full(len(false_cell), -1))[chosen],
+        np.ascontiguousarray(np.swapaxes(blob_of, 0, 1)),
+        share,
+    )
+
+
+def _discs(
+    camera: Camera, positions: NDArray[np.float64], surfaces: Sequence[Surface], seeing: Seeing
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give centroid (T, K, 2) and share (T, K) of the part of each marker that is seen."""
+    r = seeing.marker_radius
+    middle = camera.project(positions, surfaces)
+    in_view = np.isin(middle.reason, (Reason.VISIBLE, Reason.HIDDEN))
+    if not surfaces or not r:
+        share = middle.visible.astype(np.float64)
+        return np.where(middle.visible[..., None], middle.pixels, np.nan), share
+    towards = positions - camera.center
+    with np.errstate(invalid="ignore", divide="ignore"):
+        towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
+        right = np.cross(towards, camera.T_camera_world[1, :3])
+        right /= np.linalg.norm(right, axis=-1, keepdims=True)
+    down = np.cross(towards, right)
+    i = np.arange(_SAMPLES)
+    turn, reach = i * np.pi * (3 - np.sqrt(5)), r * np.sqrt((i + 0.5) / _SAMPLES)
+    offset = (
+        np.cos(turn)[:, None] * right[..., None, :] + np.sin(turn)[:, None] * down[..., None, :]
+    ) * reach[:, None]
+    disc = positions[..., None, :] + offset
+    forgiving = camera.project(disc, surfaces, clearance=3 * r)
+    exact = camera.project(disc, surfaces)
+    # A marker whose middle is hidden does not sit on what hides it.
+    is_hidden = (middle.reason == Reason.HIDDEN)[..., None]
+    seen = np.where(is_hidden, exact.visible, forgiving.visible)
+    counted = np.isin(exact.reason, (Reason.VISIBLE, Reason.HIDDEN))  # not beside the image
+    with np.errstate(invalid="ignore", divide="ignore"):
+        count = seen.sum(axis=-1)
+        share = np.where(in_view & (count > 0), count / counted.sum(axis=-1), 0.0)
+        part = np.where(seen[..., None], exact.pixels, 0.0).sum(axis=-2) / count[..., None]
+    is_seen = (share > 0) & (share >= seeing.smallest_share)
+    centroid = np.where((share == 1)[..., None], middle.pixels, part)
+    return np.where(is_seen[..., None], centroid, np.nan), share
+
+
+def _velocity(times: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the velocity of each marker, from the frames beside; 0 where it has no neighbour."""
+    if len(times) < 2:
+        return np.zeros_like(positions)
+    steps = np.diff(positions, axis=0) / np.diff(times)[:, None, None]
+    pad = np.full_like(positions[:1], np.nan)
+    both = np.stack([np.concatenate([pad, steps]), np.concatenate([steps, pad])])
+    known = np.isfinite(both)
+    return np.where(known, both, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)

@@ -1,0 +1,124 @@
+"""What of the markers a recording does not show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.simulate.corrupted_points import Points, touching
+from asterism.simulate.episodes import episodes, stays
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from asterism.camera import Rig, Surface
+    from asterism.simulate.episodes import Burst, Visits
+
+__all__ = ["come_and_go", "in_runs", "merge", "seen_by_rig", "shadowed"]
+
+
+def in_runs(
+    rng: np.random.Generator, share: float, length: float, n_frames: int, n_markers: int
+) -> NDArray[np.bool_]:
+    """Draw misses that come in runs, shape (n_frames, n_markers): Gilbert's channel of two states.
+
+    Parameters
+    ----------
+    rng : Generator
+        For the draws.
+    share : float
+        Of the frames, in the long run.
+    length : float
+        Of a run in the mean, frames.
+    n_frames, n_markers : int
+        How many.
+    """
+    again = 1.0 / length
+    dice = rng.random((n_frames, n_markers))
+    is_missed = np.empty((n_frames, n_markers), dtype=bool)
+    chance = np.full(n_markers, share)
+    for t in range(n_frames):
+        is_missed[t] = dice[t] < chance
+        chance = np.where(is_missed[t], 1.0 - again, share * again / (1.0 - share))
+    return is_missed
+
+
+def shadowed(
+    rng: np.random.Generator, burst: Burst, points: Points, n_frames: int, n_markers: int
+) -> NDArray[np.bool_]:
+    """Say which points fall into the shadows of a burst."""
+    is_dark = np.zeros((n_frames, n_markers), dtype=bool)
+    for start, stop in episodes(rng, burst, n_frames):
+        is_dark[start:stop, rng.integers(n_markers)] = True
+    is_marker = points.markers >= 0
+    result = np.zeros(len(is_marker), dtype=bool)
+    result[is_marker] = is_dark[points.frames[is_marker], points.markers[is_marker]]
+    return result
+
+
+def seen_by_rig(
+    points: Points, rig: Rig, surfaces: Sequence[Surface], n_frames: int
+) -> NDArray[np.int64]:
+    """Say which cameras see each marker past the surfaces: bit i for camera i, shape (N,)."""
+    is_marker = points.markers >= 0
+    n_markers = int(points.markers.max(initial=-1)) + 1
+    result = np.zeros(len(is_marker), dtype=np.int64)
+    if not n_markers:
+        return result
+    dense = np.full((n_frames, n_markers, 3), np.nan)
+    at = points.frames[is_marker], points.markers[is_marker]
+    dense[at] = points.places[is_marker]
+    for i, camera in enumerate(rig):  # one at a time: all at once would fill the memory
+        result[is_marker] |= camera.project(dense, surfaces).visible[at].astype(np.int64) << i
+    return result
+
+
+def come_and_go(
+    rng: np.random.Generator, visits: Visits, points: Points, n_frames: int, n_markers: int
+) -> tuple[Points, NDArray[np.int64]]:
+    """Let markers leave and others come in their place.
+
+    Returns
+    -------
+    Points
+        Without those of absent markers; the markers numbered anew.
+    ndarray of int, shape (markers,)
+        Which of the old markers each new one goes on.
+    """
+    number = np.full((n_frames, n_markers), -1)
+    origin: list[int] = []
+    for k in range(n_markers):
+        for start, stop in stays(rng, visits, n_frames):
+            number[start:stop, k] = len(origin)
+            origin.append(k)
+    is_marker = points.markers >= 0
+    markers = np.full(len(is_marker), -1)
+    markers[is_marker] = number[points.frames[is_marker], points.markers[is_marker]]
+    there = ~is_marker | (markers >= 0)
+    return points._replace(markers=markers).where(there), np.array(origin, dtype=np.int64)
+
+
+def merge(points: Points, distance: float) -> Points:
+    """Make one point of points of a frame that are nearer to each other than a distance.
+
+    Groups are followed from neighbour to neighbour. The point lies in the middle of its group and
+    is of the marker with the lowest number in it.
+    """
+    if not len(points.frames):
+        return points
+    group = touching(points.places, points.frames, np.full(len(points.frames), distance / 2))
+    n_groups = int(group.max()) + 1
+    size = np.bincount(group, minlength=n_groups)
+    places = np.stack(
+        [np.bincount(group, axis, n_groups) / size for axis in points.places.T], axis=1
+    )
+    order = np.lexsort(
+        (np.where(points.markers < 0, np.iinfo(np.int64).max, points.markers), group)
+    )
+    first = order[np.unique(group[order], return_index=True)[1]]
+    alone = size[group[first]] == 1
+    places[group[first[alone]]] = points.places[first[alone]]  # to the last bit
+    return Points(points.frames[first], places[group[first]], points.markers[first])

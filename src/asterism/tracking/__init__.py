@@ -1,0 +1,47 @@
+"""Detections in, tracks of named markers out: one room for each step of the pipeline."""
+
+from asterism.tracking.choose import AUTO, Choice, choose_method
+from asterism.tracking.estimation import ModelEstimate, estimate_model
+from asterism.tracking.filling import Filling, Gap, fill_gaps
+from asterism.tracking.methods import METHODS, HypothesisCluster, Method, Update, method_by_name
+from asterism.tracking.naming import Naming, name_tracks
+from asterism.tracking.pipeline import track
+from asterism.tracking.plan import Plan, plan_tracking
+from asterism.tracking.rigidity import Bonds, learn_bonds
+from asterism.tracking.stitching import (
+    Join,
+    Stitched,
+    StitchedState,
+    Stitching,
+    stitch,
+    tracklet_model,
+)
+
+__all__ = [
+    "AUTO",
+    "METHODS",
+    "Bonds",
+    "Choice",
+    "Filling",
+    "Gap",
+    "HypothesisCluster",
+    "Join",
+    "Method",
+    "ModelEstimate",
+    "Naming",
+    "Plan",
+    "Stitched",
+    "StitchedState",
+    "Stitching",
+    "Update",
+    "choose_method",
+    "estimate_model",
+    "fill_gaps",
+    "learn_bonds",
+    "method_by_name",
+    "name_tracks",
+    "plan_tracking",
+    "stitch",
+    "track",
+    "tracklet_model",
+]

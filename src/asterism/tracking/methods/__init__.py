@@ -1,0 +1,29 @@
+"""Methods of association: one file a method, and what methods share."""
+
+from asterism.tracking.methods.base import Method, Update
+from asterism.tracking.methods.gnn import GNN
+from asterism.tracking.methods.jpda import JPDA
+from asterism.tracking.methods.mcmcda import MCMCDA
+from asterism.tracking.methods.mda import MDA
+from asterism.tracking.methods.mht import MHT, HypothesisCluster
+from asterism.tracking.methods.registry import METHODS, method_by_name, options_of
+from asterism.tracking.methods.smp import SMP
+from asterism.tracking.methods.tomht import TOMHT
+from asterism.tracking.methods.track_splitting import TrackSplitting
+
+__all__ = [
+    "GNN",
+    "JPDA",
+    "MCMCDA",
+    "MDA",
+    "METHODS",
+    "MHT",
+    "SMP",
+    "TOMHT",
+    "HypothesisCluster",
+    "Method",
+    "TrackSplitting",
+    "Update",
+    "method_by_name",
+    "options_of",
+]

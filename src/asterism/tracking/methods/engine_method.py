@@ -1,0 +1,216 @@
+"""What methods share whose loop is in the engine: a state that is a value, many frames at once."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asterism.errors import ParameterError, SolverLimit, check_kind
+from asterism.model import TrackingModel
+from asterism.records import record
+from asterism.tracking.methods.base import (
+    Method,
+    Update,
+    checked_covariances,
+    checked_frame,
+    refuse_start,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism import _engine
+    from asterism.model import Detections
+
+    Tracker = (
+        _engine.FrameTracker
+        | _engine.JointTracker
+        | _engine.TreeTracker
+        | _engine.HypothesisTracker
+        | _engine.MatrixTracker
+        | _engine.OneMotionTracker
+        | _engine.SeveralMotionsTracker
+    )
+
+__all__ = ["MAX_CANDIDATES", "EngineMethod", "EngineState"]
+
+MAX_CANDIDATES = 50_000_000
+"""Pairs of track and detection within the gates of one frame (1.2 GB of them)."""
+
+FRAMES_A_CALL = 1000
+"""The engine takes so many frames at a time: few enough to show progress and to be stopped."""
+
+
+@record(eq=False)
+class EngineState:
+    """The state of a method in the engine.
+
+    Parameters
+    ----------
+    model : TrackingModel
+        The model.
+    n_axes : int
+        2 or 3.
+    tracker : one of the engine's trackers
+        The live tracks, in the engine.
+    about : callable
+        What the method tells of a frame or of all so far.
+    """
+
+    model: TrackingModel
+    n_axes: int
+    tracker: Tracker
+    about: Callable[[_engine.FrameStats], dict[str, float]]
+
+    def __repr__(self) -> str:
+        return (
+            f"EngineState({self.n_axes}-D, {self.tracker.n_frames} frames and {self.n_seen} "
+            f"detections taken, {self.n_ids} tracks so far)"
+        )
+
+    @property
+    def n_ids(self) -> int:
+        """Number of identities given so far."""
+        return self.tracker.n_ids
+
+    @property
+    def n_seen(self) -> int:
+        """Number of detections taken so far."""
+        return self.tracker.n_seen
+
+    @property
+    def info(self) -> dict[str, float]:
+        """Sums of what is counted and the worst of what is a size or a bound, over all frames."""
+        return self.about(self.tracker.total)
+
+    def live(self) -> dict[str, NDArray[Any]]:
+        """Give the believed tracks as they are now, for a display say.
+
+        Returns
+        -------
+        dict
+            ``ids (k,)``, ``gaps (k,)`` frames since the last detection, ``log_odds (k,)`` that the
+            marker exists, ``means (k, D, n)`` and ``covariances (k, n, n)`` of the state, SI units;
+            of tracks with branches also ``chi2 (k,)`` λ and ``updates (k,)`` detections so far.
+        """
+        from asterism import _engine
+
+        names = ("ids", "gaps", "log_odds", "means", "covariances")
+        live: dict[str, NDArray[Any]] = dict(zip(names, self.tracker.tracks(), strict=True))
+        if isinstance(self.tracker, _engine.TreeTracker):
+            live |= zip(("chi2", "updates"), self.tracker.chi2(), strict=True)
+        return live
+
+
+@record
+class EngineMethod(Method[EngineState]):
+    """A method whose frames are taken by one of the engine's trackers."""
+
+    @abstractmethod
+    def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> Tracker:
+        """Make the engine's tracker."""
+
+    @abstractmethod
+    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        """Tell what a frame, or a run of them, took."""
+
+    def init(
+        self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None
+    ) -> EngineState:
+        """Make the state before the first frame; see `Method.init`."""
+        if n_axes not in (2, 3):
+            raise ParameterError("n_axes", "2 or 3", repr(n_axes))
+        check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
+        tracker = self._tracker(model, n_axes, seed)
+        return EngineState(model=model, n_axes=n_axes, tracker=tracker, about=self._about)
+
+    def step(
+        self,
+        state: EngineState,
+        time: float,
+        points: ArrayLike,
+        *,
+        covariances: ArrayLike | None = None,
+    ) -> tuple[EngineState, Update]:
+        """Take the next frame; see `Method.step`."""
+        from asterism.model.compiled import no_transition, transition, with_noise
+
+        check_kind("state", state, EngineState, "method.init(model)")
+        before = state.tracker
+        frame = checked_frame(time, before.last_time, points, state.n_axes)
+        if covariances is not None:
+            frame = with_noise(frame, checked_covariances(covariances, frame))
+        # The first frame has no step before it, and no track that would take it.
+        dt = time - before.last_time if before.n_frames else None
+        motion = state.model.motion
+        F, Q = transition(motion, dt) if dt else no_transition(motion)
+        try:
+            after, labels, sure, revised, revised_labels, revised_sure, stats = before.step(
+                time, F, Q, frame
+            )
+        except OverflowError as error:
+            raise _too_many(error) from error
+        update = Update(
+            labels=labels,
+            revised=revised,
+            revised_labels=revised_labels,
+            confidence=sure if before.has_confidence else None,
+            revised_confidence=revised_sure if before.has_confidence else None,
+            info=self._about(stats),
+        )
+        return replace(state, tracker=after), update
+
+    def run(
+        self,
+        state: EngineState,
+        detections: Detections,
+        *,
+        progress: Callable[[int], Any] | None = None,
+        start: NDArray[np.int64] | None = None,
+    ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
+        """Take all frames in the engine; the same labels as the loop over `step`."""
+        from asterism.model.compiled import steps_of, with_noise
+
+        check_kind("state", state, EngineState, "method.init(model)")
+        refuse_start(start)
+        points = with_noise(detections.points, detections.covariances)
+        tracker = state.tracker.copy()
+        times, offsets = detections.times, detections.offsets
+        first = tracker.n_seen
+        labels = np.full(first + detections.n_points, -1, dtype=np.int64)
+        sure = np.zeros(len(labels) if tracker.has_confidence else 0)
+        if detections.n_frames:
+            checked_frame(float(times[0]), tracker.last_time, [], state.n_axes)
+        # A state that has seen frames before is led on from the last of them.
+        n_before = min(tracker.n_frames, 1)
+        known = np.concatenate([np.full(n_before, tracker.last_time), times])
+        kind, F, Q = steps_of(state.model.motion, known)
+        for t in range(0, detections.n_frames, FRAMES_A_CALL):
+            end = min(t + FRAMES_A_CALL, detections.n_frames)
+            some = points[offsets[t] : offsets[end]]
+            starts = offsets[t : end + 1] - offsets[t]
+            kinds = kind[n_before + t : n_before + end]
+            try:
+                tracker.run(times[t:end], kinds, F, Q, starts, some, labels, sure)
+            except OverflowError as error:
+                raise _too_many(error) from error
+            if progress is not None:
+                progress(end)
+        confidence = sure[first:] if tracker.has_confidence else None
+        return replace(state, tracker=tracker), labels[first:], confidence
+
+
+def _too_many(error: OverflowError) -> SolverLimit:
+    if "compete" in str(error):
+        return SolverLimit("tracks that compete at once", 1025, 1024, "gate more narrowly")
+    return SolverLimit(
+        "pairs of track and detection within the gates of one frame",
+        MAX_CANDIDATES + 1,
+        MAX_CANDIDATES,
+        "the model's maximal speed or noise is too large for points so dense",
+    )

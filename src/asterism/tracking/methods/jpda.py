@@ -1,0 +1,98 @@
+"""Joint probabilistic data association (§2.1 of the report; Bar-Shalom & Li 1995, ch. 6)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from asterism.errors import ParameterError, check_number
+from asterism.records import record
+from asterism.tracking.methods.with_bodies import WithBodies
+
+if TYPE_CHECKING:
+    from asterism import _engine
+
+__all__ = ["JPDA"]
+
+
+@record
+class JPDA(WithBodies):
+    """Joint probabilistic data association: each frame averaged over all that it may mean.
+
+    Every way of sharing the detections out among the believed tracks has a probability, and so has
+    every pairing: ``β_ij``, summed over all of them, exactly where a group takes no more than
+    `max_states` (`joint_marginals`). A pairing a billion times less likely than a miss is none. A
+    track is moved by all its detections, each with its probability, and brought back to one
+    Gaussian; the axes share one covariance, so what the detections differ by is shared out evenly
+    among them.
+
+    Each track has a probability ``r`` to exist (JIPDA; Musicki & Evans 2004): it is missed with
+    probability ``1 - r P_d``, and what it is seen or missed with changes it. Tentative tracks take
+    what the believed ones leave over by the likeliest event; how sure each is of its part is told
+    as if the others had theirs.
+
+    Labels are those of the most probable joint event; their confidence is the marginal of the
+    pairing. Where there is no label, it is the probability that the point is of no track.
+
+    Parameters
+    ----------
+    max_states : int
+        Most states of the exact sum over a group's events, 1 to 2^30; beyond that it is taken over
+        a beam of as many, and ``info`` says how far off it can be.
+    guard : bool
+        Whether to guard against coalescence: of all events that differ only by who is who, the
+        likeliest alone moves the tracks (JPDA*; Blom & Bloem 2000). Marginals and labels are the
+        same with it and without.
+    sure_until_gap : bool
+        Whether a believed track counts as existing until its gap exceeds d̄: markers hide in bursts,
+        of which a probability of detection knows nothing. Otherwise, as in JIPDA, each miss makes
+        it less likely to exist and to take a detection, and it ends below
+        ``1 - confirm_probability``.
+    gate_probability, confirm_probability, delete_odds : float
+        See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(seed=1)
+    >>> tracks = am.track(truth.detections, am.JPDA())
+    >>> tracks.n_tracks, tracks.info["bound"]
+    (8, 0.0)
+    """
+
+    max_states: int = 2**14
+    guard: bool = True
+    sure_until_gap: bool = True
+
+    name: ClassVar[str] = "jpda"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_number("max_states", self.max_states, above=1, below=2**30, closed=True, integer=True)
+        for flag in ("guard", "sure_until_gap"):
+            if not isinstance(getattr(self, flag), bool):
+                raise ParameterError(flag, "True or False", repr(getattr(self, flag)))
+
+    def _make(
+        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    ) -> _engine.JointTracker:
+        from asterism import _engine
+
+        return _engine.JointTracker(
+            motion,
+            score,
+            life,
+            max_states=int(self.max_states),
+            is_guarded=self.guard,
+            is_sure_until_gap=self.sure_until_gap,
+            carry=self._carry(),
+        )
+
+    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        return super()._about(stats) | {
+            "approximate_groups": stats.n_beams,
+            "bound": stats.bound,
+            "most_states": stats.n_states,
+            "unguarded_groups": stats.n_unguarded,
+        }

@@ -1,0 +1,361 @@
+"""Markov chain Monte Carlo data association (§2.5, §4 of the report; Oh, Russell & Sastry 2009)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping  # noqa: TC003 - options are read off the annotations
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+
+from asterism.errors import ParameterError, check_fields, check_kind, check_number
+from asterism.records import record
+from asterism.tracking.methods.engine_method import EngineMethod, EngineState
+from asterism.tracking.methods.mcmc_moves import MOVES, checked_weights
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from asterism import _engine
+    from asterism.model import Detections, TrackingModel
+    from asterism.tracking.methods.base import Update
+    from asterism.tracking.methods.engine_method import Tracker
+
+__all__ = ["MCMCDA"]
+
+SPLITS = ("whole", "likelihood", "cells", "clusters")
+MOST = 1_000_000
+"""Of moves for a marker in a frame, which are then some seconds, and of frames in a window."""
+FIRST_PASS = 10
+"""Window of the pass over a whole capture from which the chains over all of it begin."""
+BLOCK = 100
+"""Frames of a whole capture that are open at a time; blocks overlap by half."""
+FLOOR = 1e-4
+"""Least weight of a step of informed growth; to end in the last frame weighs 1."""
+
+
+@record
+class MCMCDA(EngineMethod):
+    """Markov chain Monte Carlo data association: a walk over the partitions of a window.
+
+    A move draws a new partition from the present one and is taken with the probability of
+    Metropolis and Hastings, so that partitions are visited as often as the posterior has them
+    (`log_posterior`). In each frame the walk begins at the exact assignment of the new detections
+    and the best partition met is kept. A frame that leaves the window is settled by it; behind the
+    window only the filter states of the tracks are kept: the past informs, and costs nothing.
+
+    Until a frame is settled its labels are those of the best partition so far, and may change.
+
+    Parameters
+    ----------
+    window : int or None
+        Frames until one is settled; 1 is the single-scan form. None is for whole captures: when
+        all frames have come, the chains go over them again in blocks of 100 frames that overlap by
+        half, each block given all that is before and after it, with `moves` for each detection.
+        The time is linear in the length of the capture.
+    moves : float or None
+        Moves in a frame, for each of its detections (or each track, if these are more) that is in
+        doubt; None with a `deadline` alone. Tracks begin by moves alone, so 0 is only for labels to
+        start from: it leaves them as they are, and says how sure they are.
+    deadline : float or None
+        Seconds after the arrival of a frame at which the walk stops; then results depend on the
+        machine, and ``info["moves"]`` says how far it came.
+    confidence : float
+        Moves for the confidence of labels, counted as above; 0 for none. A confidence is the share
+        of a walk in which a detection follows the one that it follows (the first of a track: in
+        which the next follows it; clutter: in which it is in no track).
+    end_odds : float
+        A track counts as so many times less likely to end than the model has it, so that it is not
+        broken where a marker moves as the model does not foresee; 1 samples the model's own
+        posterior.
+    chains : int
+        Walks beside each other in each frame: the best partition of all counts, and their
+        agreement tells whether they found the same confidence.
+    threads : int
+        Walks at the same time. The result does not depend on it.
+    groups : {"likelihood", "clusters", "cells", "whole"}
+        What is walked over apart: tracks and detections that no plausible link joins; that are
+        further than `distance` from each other; that are in different cells of space with that
+        edge, which are shifted by half a cell in every other frame; or nothing.
+    doubt : float
+        Nats. A link that is less plausible by more is not in doubt.
+    distance : float or None
+        Metres; for "clusters" and "cells" alone.
+    bonds : {0, 2, 3, 4}
+        Tracks that were seen in every frame of the window, so many of which kept their distances
+        two by two, are sure: the walk leaves them as they are. 0 for none.
+    bond_tolerance : float or None
+        Metres by which a distance that is kept may vary; by default 6√2 times the noise.
+    bond_weight : float
+        Nats by which distances to other markers may speak for a detection, or against it; 0 for
+        none. What the walk samples is then the posterior with a term more (see Notes).
+    proposal : {"informed", "uniform"}
+        How moves lengthen a track: detections drawn by what they add to the score, or all alike
+        with a fixed probability to stop, as in the report.
+    move_weights : {"uniform", "report"} or mapping
+        How often each kind of move is drawn: all alike, by equation 4.7 of the report (whose eight
+        these are), or weights by kind.
+    at_doubts : float
+        Share of the moves that are drawn at the links in doubt, where two tracks change what they
+        have; 0 for none, as in the report.
+    chain : {"metropolis", "ascent"}
+        The report draws from the best partition so far and weighs against the last one taken
+        ("ascent"): that climbs and does not sample.
+    keep : {"best", "draw"}
+        What is kept of a walk: the best partition that it met, or the one where it ends, which is
+        drawn from the posterior of the open frames given the settled ones. Draws with different
+        seeds show what the data leave open; a model is estimated from them.
+    first_rules : bool
+        The report's: nothing but births while there is no track, and neither merge nor switch while
+        there is one.
+    assignment : bool
+        Whether the walk begins at the exact assignment of a new frame; otherwise its detections are
+        nobody's at first, as in the report.
+
+    Notes
+    -----
+    With a `bond_weight` w the walk is over log π(ω) + B(ω), with
+
+        B(ω) = Σ_t Σ_AC w/n_AC · (1 − z²)/(1 + z²),    z = (|y_A(t) − y_C(t)| − μ) / s,
+
+    over the open frames t and the bonded markers A, C that both have a detection there. A distance
+    as it should be speaks for both, one that is off by s says nothing, one that is farther off
+    speaks against both; n_AC is the number of bonds of that one which has more (at least 3), so
+    that whatever bonds say of a detection lies within ±w. A track is the marker that it was when it
+    was last settled; tracks of which nothing is settled have no bonds. Bonds are learnt from
+    settled frames: of each marker the six that kept their distance best, over 30 frames or more, μ
+    being the mean, s three times the spread and 2 % of μ. They do not change while a walk lasts.
+    Neighbours in other groups are where they are when it begins.
+
+    The confidence, the best partition and ``info["rhat"]`` are of this posterior;
+    ``info["log_posterior"]`` of `track` stays that of the common model, by which methods are
+    compared. ``info["bonds"]`` are the bonds in the last frame, ``info["bond_score"]`` what they
+    said of all settled frames together, in nats.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(seed=1)
+    >>> am.track(truth.detections, am.MCMCDA(), seed=1).n_tracks
+    8
+    """
+
+    window: int | None = 10
+    moves: float | None = 25.0
+    deadline: float | None = None
+    confidence: float = 25.0
+    end_odds: float = 1000.0
+    chains: int = 1
+    threads: int = 1
+    groups: Literal["likelihood", "clusters", "cells", "whole"] = "likelihood"
+    doubt: float = 10.0
+    distance: float | None = None
+    bonds: Literal[0, 2, 3, 4] = 0
+    bond_tolerance: float | None = None
+    bond_weight: float = 0.0
+    proposal: Literal["informed", "uniform"] = "informed"
+    move_weights: Literal["uniform", "report"] | Mapping[str, float] = "uniform"
+    at_doubts: float = 0.5
+    chain: Literal["metropolis", "ascent"] = "metropolis"
+    keep: Literal["best", "draw"] = "best"
+    first_rules: bool = False
+    assignment: bool = True
+
+    name: ClassVar[str] = "mcmcda"
+
+    def __post_init__(self) -> None:
+        if self.window is not None:
+            check_number("window", self.window, above=1, below=MOST, closed=True, integer=True)
+        elif self.deadline is not None:
+            raise ParameterError("deadline", "none for a whole take", repr(self.deadline))
+        if self.moves is not None:
+            check_number("moves", self.moves, above=0, below=MOST, closed=True)
+        elif self.deadline is None:
+            raise ParameterError("moves", "a number, or a deadline beside it", "None")
+        if self.deadline is not None:
+            check_number("deadline", self.deadline, above=0)
+        check_number("confidence", self.confidence, above=0, below=MOST, closed=True)
+        check_number("end_odds", self.end_odds, above=1, below=1e12, closed=True)
+        check_number("chains", self.chains, above=1, below=1024, closed=True, integer=True)
+        check_number("threads", self.threads, above=1, below=1024, closed=True, integer=True)
+        check_number("at_doubts", self.at_doubts, above=0, below=0.99, closed=True)
+        check_number("doubt", self.doubt, above=0, closed=True)
+        check_number("bond_weight", self.bond_weight, above=0, below=100, closed=True)
+        if self.bond_tolerance is not None:
+            check_number("bond_tolerance", self.bond_tolerance, above=0)
+        if repr(self.bonds) not in ("0", "2", "3", "4"):
+            raise ParameterError("bonds", "0, 2, 3 or 4", repr(self.bonds))
+        for name, choices in (
+            ("proposal", ("informed", "uniform")),
+            ("chain", ("metropolis", "ascent")),
+            ("keep", ("best", "draw")),
+            ("groups", SPLITS),
+        ):
+            check_fields(name, [getattr(self, name)], choices)
+        for name in ("first_rules", "assignment"):
+            if not isinstance(getattr(self, name), bool):
+                raise ParameterError(name, "True or False", repr(getattr(self, name)))
+        is_by_distance = self.groups in ("clusters", "cells")
+        if self.distance is not None:
+            check_number("distance", self.distance, above=0)
+        if is_by_distance != (self.distance is not None):
+            wanted = "a length in metres" if is_by_distance else "none, or groups by distance"
+            raise ParameterError("distance", wanted, repr(self.distance))
+        if self.keep == "draw" and self.chain == "ascent":
+            hint = "only the metropolis chain samples"
+            raise ParameterError("keep", "'best' with the ascent", "'draw'", hint)
+        for name in ("confidence", "at_doubts"):
+            if self.chain == "ascent" and getattr(self, name) > 0:
+                raise ParameterError(
+                    name, "0 with the ascent", repr(getattr(self, name)),
+                    "only the metropolis chain samples",
+                )  # fmt: skip
+        checked_weights(self.move_weights)
+
+    def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> Tracker:
+        from asterism import _engine
+        from asterism.model.compiled import motion_model, score_model
+
+        weights = checked_weights(self.move_weights)
+        chain = _engine.ChainOptions(
+            weights=np.array([weights.get(move, 0.0) for move in MOVES]),
+            is_informed=self.proposal == "informed",
+            stop=model.population.p_disappear,
+            floor=FLOOR,
+            has_first_rules=self.first_rules,
+            is_ascent=self.chain == "ascent",
+            share_at_doubts=self.at_doubts,
+            is_draw=self.keep == "draw",
+        )
+        options = _engine.McmcOptions(
+            window=FIRST_PASS if self.window is None else int(self.window),
+            is_whole=self.window is None,
+            block=BLOCK,
+            moves=math.inf if self.moves is None else self.moves,
+            deadline=self.deadline or 0.0,
+            has_assignment=self.assignment,
+            confidence=self.confidence,
+            chains=int(self.chains),
+            threads=int(self.threads),
+            split_by=SPLITS.index(self.groups),
+            doubt=self.doubt,
+            distance=self.distance or 0.0,
+            bonds=self.bonds,
+            tolerance=self.bond_tolerance or 6 * math.sqrt(2) * model.sensor.noise_sigma,
+            bond_weight=self.bond_weight,
+        )
+        is_one = len(model.motion.modes) == 1
+        make = _engine.OneMotionTracker if is_one else _engine.SeveralMotionsTracker
+        population = model.population
+        rare = replace(population, p_disappear=population.p_disappear / self.end_odds)
+        score = score_model(replace(model, population=rare))
+        return make(motion_model(model, n_axes), score, chain, options, _checked_seed(seed))
+
+    def step(
+        self,
+        state: EngineState,
+        time: float,
+        points: ArrayLike,
+        *,
+        covariances: ArrayLike | None = None,
+    ) -> tuple[EngineState, Update]:
+        """Take the next frame; see `Method.step`."""
+        if self.window is None:
+            raise ParameterError("window", "a number of frames", "None", "a stream has no end")
+        self._refuse_to_stand(state, None)
+        return super().step(state, time, points, covariances=covariances)
+
+    def run(
+        self,
+        state: EngineState,
+        detections: Detections,
+        *,
+        progress: Callable[[int], Any] | None = None,
+        start: NDArray[np.int64] | None = None,
+    ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
+        """Take all frames in the engine; see `Method.run`."""
+        self._refuse_to_stand(state, start)
+        tracker = _own_copy(state)
+        if start is not None:
+            tracker.start_from(np.ascontiguousarray(start, dtype=np.int64))
+        state = replace(state, tracker=tracker)
+        if self.window is not None:
+            return super().run(state, detections, progress=progress)
+        T = detections.n_frames
+        n_before = state.n_seen
+
+        def tell(share: float) -> bool:
+            if progress is not None:
+                progress(int(T * share))
+            return True
+
+        # Most of the work comes after the last frame.
+        part = 1 / (1 + FIRST_PASS)
+        state, labels, sure = super().run(
+            state, detections, progress=lambda t: tell(part * t / max(T, 1))
+        )
+        labels = np.concatenate([np.full(n_before, -1, dtype=np.int64), labels])
+        confidence = np.zeros(len(labels) if sure is not None else 0)
+        tracker = _own_copy(state)
+        tracker.finish(labels, confidence, lambda share: tell(part + (1 - part) * share))
+        tell(1.0)
+        state = replace(state, tracker=tracker)
+        return state, labels[n_before:], None if sure is None else confidence[n_before:]
+
+    def _refuse_to_stand(self, state: EngineState, start: object) -> None:
+        """Raise where no track could ever begin, neither by a move nor with a label."""
+        check_kind("state", state, EngineState, "method.init(model)")
+        if self.moves == 0 and start is None and state.n_seen == 0:
+            hint = "tracks begin by moves alone; gnn pairs frame by frame without any"
+            raise ParameterError("moves", "a number > 0, or labels to start from", "0", hint)
+
+    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        chain = stats.chain
+        drawn, _, taken = chain.moves.T
+        about: dict[str, float] = {
+            "tracks": stats.n_confirmed,
+            "detections": stats.n_pending,
+            "candidates": stats.n_candidates,
+            "groups": stats.n_groups,
+            "largest_group": stats.largest_group,
+            "groups_in_doubt": chain.n_walked,
+            "cut_links": chain.n_cut,
+            "moves": chain.n_search,
+        }
+        about |= {
+            f"accepted_{move}": float(n / max(all_, 1))
+            for move, n, all_ in zip(MOVES, taken, drawn, strict=True)
+        }
+        if chain.n_given:
+            about |= {"given_links": chain.n_given, "refused_links": chain.n_refused}
+        if self.bonds:
+            about["sure_tracks"] = chain.n_sure
+        if self.bond_weight > 0:
+            about |= {"bonds": stats.n_bonds, "bond_score": stats.bond_score}
+        if self.confidence > 0:
+            about |= {
+                "confidence_moves": chain.n_sampled,
+                "disagreements": chain.n_doubtful,
+                "unmoved_groups": chain.n_unmoved,
+            }
+            if not math.isnan(chain.rhat):
+                about |= {"rhat": chain.rhat, "effective_samples": chain.ess}
+        return about
+
+
+def _own_copy(state: EngineState) -> _engine.OneMotionTracker | _engine.SeveralMotionsTracker:
+    from asterism import _engine
+
+    tracker = state.tracker.copy()
+    assert isinstance(tracker, (_engine.OneMotionTracker, _engine.SeveralMotionsTracker))
+    return tracker
+
+
+def _checked_seed(seed: int | None) -> int:
+    if seed is None:
+        return 0
+    check_number("seed", seed, above=0, below=2**64 - 1, closed=True, integer=True)
+    return int(seed)

@@ -1,0 +1,130 @@
+"""Multidimensional assignment over a sliding window (§2.4 of the report; Poore 1994; Deb 1997)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from asterism.errors import check_fields, check_number
+from asterism.records import record
+from asterism.solve import assign_multidimensional
+from asterism.tracking.methods.over_window import Hypotheses, branch_options
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism import _engine
+
+__all__ = ["MDA"]
+
+
+@record
+class MDA(Hypotheses):
+    """Multidimensional assignment: the best way to share out all detections of a window at once.
+
+    A tuple takes a track, or none for a new one, and a detection or none of each frame of the
+    window; it is worth its part of the log posterior (`log_posterior`). The best set of tuples of
+    which no two share a track or a detection is found by `assign_multidimensional`, and the oldest
+    frame is decided by it. Until then labels are what would be decided now, and may change.
+
+    Parameters
+    ----------
+    window : int
+        Frames that are shared out at once, 2 to 16.
+    solver : {"exact", "relaxed"}
+        By HiGHS, or by Lagrangian relaxation; ``info["gap"]`` says by how many nats the choice of
+        a window may be below the best.
+    max_branches : int
+        Tuples of a group of tracks that compete, for each of the tracks: kept in the order of what
+        the best choice of the whole group loses with them.
+    prune_odds : float
+        Odds by which a tuple may be worse. A tuple is left out when the best choice that holds it
+        is less probable than the best of all by more than these odds times the odds of ending the
+        track and beginning another.
+    new_track_odds : float
+        A detection that a believed track expects by more than these odds begins no track.
+    gate_probability, confirm_probability, delete_odds : float
+        See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
+
+    Notes
+    -----
+    With a window that covers the capture the result is the most probable partition of all if no
+    option excludes it; see `TOMHT`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(seed=1)
+    >>> tracks = am.track(truth.detections, am.MDA())
+    >>> tracks.n_tracks, tracks.info["gap"]
+    (8, 0.0)
+    """
+
+    solver: Literal["exact", "relaxed"] = "exact"
+    max_branches: int = 200
+
+    name: ClassVar[str] = "mda"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_fields("solver", [self.solver], ("exact", "relaxed"))
+        check_number("max_branches", self.max_branches, above=1, closed=True, integer=True)
+
+    def _make(
+        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    ) -> _engine.HypothesisTracker:
+        from asterism import _engine
+
+        branches = branch_options(
+            window=self.window, max_branches=self.max_branches, prune_odds=self.prune_odds
+        )
+        return _engine.HypothesisTracker(
+            motion,
+            score,
+            life,
+            branches,
+            max_hypotheses=1,
+            max_nodes=1000,  # of tracks that share nothing: one suffices
+            new_track_claim=self.new_track_odds,
+            carry=self._carry(),
+            choose=self._choose,
+        )
+
+    def _choose(
+        self,
+        first_option: NDArray[np.int64],
+        worths: NDArray[np.float64],
+        first_use: NDArray[np.int64],
+        uses: NDArray[np.int32],
+        first_resource: NDArray[np.int32],
+    ) -> tuple[NDArray[np.int32], float]:
+        """Choose an option of each tree; every tree has one that uses nothing."""
+        n_trees = len(first_option) - 1
+        tree = np.repeat(np.arange(n_trees), np.diff(first_option))
+        n_uses = np.diff(first_use)
+        # The best option that uses nothing is what a tree has where no tuple of it is chosen.
+        free = np.full(n_trees, -1)
+        for o in np.flatnonzero(n_uses == 0):
+            if free[tree[o]] < 0 or worths[o] > worths[free[tree[o]]]:
+                free[tree[o]] = o
+        tuples = np.full((len(worths), 1 + len(first_resource)), -1)
+        tuples[:, 0] = tree
+        frame = np.searchsorted(first_resource, uses, side="right") - 1
+        tuples[np.repeat(np.arange(len(worths)), n_uses), 1 + frame] = uses
+        takes = np.flatnonzero(n_uses > 0)
+        found = assign_multidimensional(
+            tuples[takes], worths[takes] - worths[free[tree[takes]]], method=self.solver
+        )
+        own = free.copy()
+        own[tree[takes[found.chosen]]] = takes[found.chosen]
+        return (own - first_option[:-1]).astype(np.int32), found.bound + float(worths[free].sum())
+
+    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        return super()._about(stats) | {
+            "dropped_branches": stats.n_limited,
+            "windows_with_a_gap": stats.n_beams,
+            "gap": stats.gap,
+        }

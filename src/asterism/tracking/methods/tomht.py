@@ -1,0 +1,108 @@
+"""Track-oriented multiple hypothesis tracking (Kurien 1990; Blackman 2004)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from asterism.errors import check_number
+from asterism.records import record
+from asterism.tracking.methods.over_window import Hypotheses, branch_options
+
+if TYPE_CHECKING:
+    from asterism import _engine
+
+__all__ = ["TOMHT"]
+
+
+@record
+class TOMHT(Hypotheses):
+    """Track-oriented multiple hypotheses: the best compatible set of track hypotheses.
+
+    Each track is a tree: a branch for every detection in its gate and one for a miss, over a window
+    of frames; every detection may begin a new one. A hypothesis takes one branch of each tree, no
+    detection twice, and is worth its log posterior (`log_posterior`). In each cluster of trees that
+    share detections the best one is found by exact set packing, and the oldest frame is decided by
+    it (N-scan pruning). Until then labels are what would be decided now, and may change.
+
+    The confidence of a label is its probability over the best hypotheses of its cluster.
+
+    Parameters
+    ----------
+    window : int
+        Frames until one is decided, 2 to 16.
+    max_branches : int
+        Branches of a cluster, for each of its trees: the bound of memory and time. Branches are
+        kept in the order of what the best hypothesis of the whole cluster loses with them;
+        ``info["dropped_branches"]`` counts those that found no room.
+    prune_odds : float
+        Odds by which a branch may be worse. A branch is dropped when the best hypothesis of its
+        cluster that holds it is less probable than the best of all by more than these odds times
+        the odds of ending the track and beginning another.
+    max_hypotheses : int
+        Most hypotheses of a cluster, for the confidence; of the best only those count that are not
+        e^25 times less likely.
+    max_nodes : int
+        Most nodes of the search in a cluster; where it is cut short, a compatible set is made of
+        what was found, and ``info`` says by how many nats it may be below the best.
+    new_track_odds : float
+        A detection that a believed track expects by more than these odds begins no track.
+    gate_probability, confirm_probability, delete_odds : float
+        See `FrameByFrame`.
+    bodies, max_carried, bond_weight
+        See `WithBodies`.
+
+    Notes
+    -----
+    With a window that covers the capture the result is the most probable partition of all
+    (`log_posterior`) if no option excludes it: `prune_odds`, `max_branches` and `max_nodes` large
+    enough, `gate_probability` near 0, `new_track_odds` and `delete_odds` large, and
+    `confirm_probability` near 0.5. A track whose odds are below those of `confirm_probability` is
+    left out even where the most probable partition holds it.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(seed=1)
+    >>> tracks = am.track(truth.detections, am.TOMHT())
+    >>> tracks.n_tracks, tracks.info["gap"]
+    (8, 0.0)
+    """
+
+    max_branches: int = 30
+    max_hypotheses: int = 20
+    max_nodes: int = 2000
+
+    name: ClassVar[str] = "tomht"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("max_branches", "max_hypotheses", "max_nodes"):
+            check_number(name, getattr(self, name), above=1, closed=True, integer=True)
+
+    def _make(
+        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    ) -> _engine.HypothesisTracker:
+        from asterism import _engine
+
+        branches = branch_options(
+            window=self.window, max_branches=self.max_branches, prune_odds=self.prune_odds
+        )
+        return _engine.HypothesisTracker(
+            motion,
+            score,
+            life,
+            branches,
+            max_hypotheses=int(self.max_hypotheses),
+            max_nodes=int(self.max_nodes),
+            new_track_claim=self.new_track_odds,
+            carry=self._carry(),
+        )
+
+    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        return super()._about(stats) | {
+            "dropped_branches": stats.n_limited,
+            "most_hypotheses": stats.n_hypotheses,
+            "nodes": stats.n_nodes,
+            "clusters_cut_short": stats.n_beams,
+            "gap": stats.gap,
+        }

@@ -1,0 +1,126 @@
+"""The pipeline: model, method, association, stitching."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from typing import TYPE_CHECKING, Any, Literal
+
+from asterism.errors import ParameterError, check_kind
+from asterism.model import Detections, Recipe, TrackingModel, Tracks
+from asterism.model.recipe import sha256_of, versions
+from asterism.tracking.methods import METHODS, method_by_name
+from asterism.tracking.methods.associate import associate
+from asterism.tracking.plan import plan_tracking
+from asterism.tracking.stitching import stitch as stitch_tracklets
+from asterism.tracking.stitching import tracklet_model
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from asterism.tracking.methods import Method
+
+__all__ = ["track"]
+
+log = logging.getLogger(__name__)
+
+
+def track(
+    detections: Detections,
+    method: Method[Any] | str | None = None,
+    *,
+    model: TrackingModel | None = None,
+    stitch: bool | Literal["auto"] = "auto",
+    seed: int | None = None,
+    start: Tracks | None = None,
+    recipe: Recipe | None = None,
+    progress: Callable[[int], Any] | None = None,
+) -> Tracks:
+    """Decide which detection is which marker.
+
+    Parameters
+    ----------
+    detections : Detections
+        Unnamed points; names that a `Capture` carries are not used.
+    method : Method or str, optional
+        The method of association, or its name for the default options. By default `choose_method`
+        selects one from measured properties of the capture.
+    model : TrackingModel, optional
+        The model that is searched; by default it is estimated from the capture.
+    stitch : bool or "auto"
+        Whether tracks are joined through gaps of any length. The method then terminates tracklets
+        after `MAX_TRACKLET_GAP` missed frames, and `stitch` joins them by the markers around them.
+        "auto" stitches where no method is given and the markers sit on bodies.
+    seed : int, optional
+        Seed of the methods that draw; 0 by default.
+    start : Tracks, optional
+        Tracks of the same detections to begin with, the tracklets of a file for example; `MCMCDA`
+        repairs them by merging, splitting and switching.
+    recipe : Recipe, optional
+        ``tracks.recipe`` of an earlier call, which is repeated bit for bit. It stands in the place
+        of `method`, `model`, `stitch` and `seed`.
+    progress : callable, optional
+        Called now and then with the number of frames done.
+
+    Returns
+    -------
+    Tracks
+        Labels for the same detections, without those that were filled; tracks are numbered in the
+        order of confirmation. ``recipe`` repeats the call (None for a method that is not in
+        `METHODS`); ``recipe.chosen`` names the method and
+        the reason, where none was given. ``info["log_posterior"]`` is the number by which methods
+        are compared (`log_posterior`); stitched tracks have none, because the model excludes gaps
+        of that length. The rest of ``info`` depends on the method.
+
+    Raises
+    ------
+    ParameterError
+        If there is nothing from which to estimate a model, an argument has the wrong type, or the
+        recipe is of other detections.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(seed=1)
+    >>> tracks = am.track(truth.detections)
+    >>> tracks.recipe.chosen
+    'smp, window=3, then stitched: 8 of 8 markers keep their distance to another: bodies'
+    >>> again = am.track(truth.detections, recipe=tracks.recipe)
+    >>> bool((again.labels == tracks.labels).all())
+    True
+    """
+    if recipe is None:
+        plan = plan_tracking(detections, method, model=model, stitch=stitch, seed=seed, start=start)
+        recipe, made = plan.recipe, plan.method
+    else:
+        given = {"method": method, "model": model, "seed": seed}
+        given["stitch"] = None if stitch == "auto" else stitch
+        _check_recipe(recipe, given, detections, start)
+        made = method_by_name(recipe.method, **recipe.options)
+    model = tracklet_model(recipe.model) if recipe.stitch else recipe.model
+    tracks = associate(made, detections, model, seed=recipe.seed, start=start, progress=progress)
+    if recipe.stitch:
+        tracks = stitch_tracklets(tracks, model).tracks
+    return dataclasses.replace(tracks, recipe=recipe if made.name in METHODS else None)
+
+
+def _check_recipe(
+    recipe: Recipe, given: dict[str, Any], detections: Detections, start: Tracks | None
+) -> None:
+    """Raise `ParameterError` unless the recipe stands alone and is of the same input."""
+    check_kind("recipe", recipe, Recipe, "tracks.recipe")
+    beside = [name for name, value in given.items() if value is not None]
+    if beside:
+        raise ParameterError("recipe", "nothing that it decides itself", ", ".join(beside))
+    check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
+    if recipe.has_start != (start is not None):
+        expected = "the tracks to begin with" if recipe.has_start else "none"
+        raise ParameterError("start", expected, "none" if start is None else "tracks")
+    found = sha256_of(detections, None if start is None else start.labels)
+    if found != recipe.sha256:
+        hint = "a recipe repeats a tracking of the same input only"
+        raise ParameterError("detections", f"SHA-256 {recipe.sha256}", found, hint)
+    for name, version in versions().items():
+        before = recipe.versions.get(name)
+        if before != version:
+            log.warning("the recipe was made with %s %s, this is %s", name, before, version)

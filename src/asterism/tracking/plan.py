@@ -1,0 +1,110 @@
+"""Everything that a tracking decides before it begins: model, method, stitching."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+from asterism.errors import ParameterError, check_kind, check_number
+from asterism.model import Detections, Recipe, TrackingModel
+from asterism.model.recipe import sha256_of, versions
+from asterism.records import record
+from asterism.tracking.choose import choose_method
+from asterism.tracking.estimation import estimate_model
+from asterism.tracking.methods import SMP, Method, method_by_name, options_of
+
+if TYPE_CHECKING:
+    from asterism.model import Tracks
+    from asterism.tracking.estimation import ModelEstimate
+
+__all__ = ["Plan", "plan_tracking"]
+
+
+@record
+class Plan:
+    """A tracking that is decided and not yet done.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        What to do; ``am.track(detections, recipe=plan.recipe)`` does it.
+    method : Method
+        The method, with its options.
+    estimate : ModelEstimate, optional
+        How the model was estimated; None where it was given.
+    """
+
+    recipe: Recipe
+    method: Method[Any]
+    estimate: ModelEstimate | None = None
+
+
+def plan_tracking(
+    detections: Detections,
+    method: Method[Any] | str | None = None,
+    *,
+    model: TrackingModel | None = None,
+    stitch: bool | Literal["auto"] = "auto",
+    seed: int | None = None,
+    start: Tracks | None = None,
+) -> Plan:
+    """Decide the model, the method and the stitching of a tracking.
+
+    Parameters
+    ----------
+    detections, method, model, stitch, seed, start
+        As for `track`.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    ParameterError
+        If there is nothing from which to estimate a model, or an argument has the wrong type.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> plan = am.tracking.plan_tracking(am.simulate.cube(seed=1).detections)
+    >>> plan.recipe.method, plan.recipe.stitch, plan.recipe.reason
+    ('smp', True, '8 of 8 markers keep their distance to another: bodies')
+    """
+    check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
+    if stitch not in (True, False, "auto"):
+        raise ParameterError("stitch", 'True, False or "auto"', repr(stitch))
+    if seed is not None:
+        check_number("seed", seed, above=0, closed=True, integer=True)
+    if method is not None:  # before the model is estimated, which takes its time
+        method = _checked(method)
+    estimate = None
+    if model is None:
+        estimate = estimate_model(detections)
+        model = estimate.model
+    check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
+    reason = ""
+    if method is None and stitch is True and start is None:
+        method, reason = SMP(window=3), "tracks are to be stitched"
+    elif method is None:
+        choice = choose_method(detections, model, has_start=start is not None)
+        method, reason = choice.method, choice.reason
+        stitch = choice.stitch if stitch == "auto" else stitch
+    recipe = Recipe(
+        method=method.name,
+        options=options_of(method),
+        model=model,
+        stitch=stitch is True,
+        seed=seed,
+        has_start=start is not None,
+        reason=reason,
+        sha256=sha256_of(detections, None if start is None else start.labels),
+        versions=versions(),
+    )
+    return Plan(recipe=recipe, method=method, estimate=estimate)
+
+
+def _checked(method: Method[Any] | str) -> Method[Any]:
+    if isinstance(method, str):
+        return method_by_name(method)
+    check_kind("method", method, Method, 'am.GNN(), or "gnn"')
+    return method

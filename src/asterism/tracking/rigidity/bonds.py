@@ -1,0 +1,318 @@
+"""Which markers keep their distances: learnt from one take, used in the next."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self, cast
+
+import numpy as np
+
+from asterism.errors import FormatError, ParameterError, check_kind, check_number, keep_array
+from asterism.io.captures.marker_names import is_unlabelled
+from asterism.model import Tracks
+from asterism.model.toml_file import read_toml, write_toml
+from asterism.records import record
+from asterism.tracking.rigidity.distances import distances_between
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+__all__ = ["Bonds", "learn_bonds"]
+
+MOST_FRAMES = 1000
+"""Frames of a take, evenly spread, in which distances are measured."""
+BEND = 0.02
+"""Share of a distance that is held against it: what is far changes more, sooner or later."""
+LOOSE, LOOSE_SHARE = 2.5, 0.01
+"""A pair is rigid that varies no more than so many times what the steadiest pairs do, and this
+share of its distance."""
+FORMAT = "asterism bonds"
+
+
+@record(eq=False)
+class Bonds:
+    """Pairs of markers that keep their distance, and one pose of them all.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the K markers, all different.
+    places : array_like, shape (K, D)
+        One pose, metres, about its middle; NaN for markers that were not seen in it.
+    pairs : array_like of int, shape (M, 2)
+        The bonded markers, the lower first.
+    distances : array_like, shape (M,)
+        Medians, metres.
+    spreads : array_like, shape (M,)
+        What each distance varied by, as a standard deviation, metres.
+    frames : array_like of int, shape (M,)
+        Frames that this was learnt from.
+
+    Raises
+    ------
+    ParameterError
+        If the arrays do not fit each other.
+    """
+
+    names: tuple[str, ...]
+    places: NDArray[np.float64]
+    pairs: NDArray[np.int64]
+    distances: NDArray[np.float64]
+    spreads: NDArray[np.float64]
+    frames: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        names = tuple(self.names)
+        if len(set(names)) < len(names) or not all(names):
+            got = next((name for i, name in enumerate(names) if name in ("", *names[:i])), "")
+            raise ParameterError("names", "names that are all different", repr(got))
+        places = np.asarray(self.places, dtype=np.float64)
+        if places.ndim != 2 or len(places) != len(names) or places.shape[1] not in (2, 3):
+            raise ParameterError("places", f"shape ({len(names)}, 2 or 3)", places.shape)
+        pairs = keep_array("pairs", self.pairs, ("M", 2), dtype=np.int64)
+        M = len(pairs)
+        if M and (pairs.min() < 0 or pairs.max() >= len(names)):
+            raise ParameterError("pairs", f"markers from 0 to {len(names) - 1}", pairs.max())
+        first = np.unique(pairs, axis=0, return_index=True)[1]
+        wrong = np.append(np.flatnonzero(pairs[:, 0] >= pairs[:, 1]), np.setdiff1d(range(M), first))
+        if len(wrong):
+            expected = "two different markers, the lower first, once"
+            raise ParameterError("pairs", expected, tuple(pairs[wrong[0]].tolist()))
+        object.__setattr__(self, "names", names)
+        object.__setattr__(self, "places", places)
+        object.__setattr__(self, "pairs", pairs)
+        for name, kind in (
+            ("distances", np.float64),
+            ("spreads", np.float64),
+            ("frames", np.int64),
+        ):
+            array = keep_array(name, getattr(self, name), (M,), dtype=kind)
+            if M and array.min() < 0:
+                raise ParameterError(name, "numbers ≥ 0", array.min())
+            object.__setattr__(self, name, array)
+
+    @cached_property
+    def rigid(self) -> NDArray[np.bool_]:
+        """Pairs that are rigid within what the steadiest pairs of this take vary by, shape (M,)."""
+        if not len(self.pairs):
+            return np.zeros(0, dtype=bool)
+        steadiest = np.full(len(self.names), np.inf)
+        for side in self.pairs.T:
+            np.minimum.at(steadiest, side, self.spreads)
+        usual = float(np.quantile(steadiest[np.isfinite(steadiest)], 0.25))
+        return self.spreads <= LOOSE * usual + LOOSE_SHARE * self.distances
+
+    @cached_property
+    def clusters(self) -> tuple[tuple[int, ...], ...]:
+        """Rigid clusters: three markers or more, all rigid pairs, none in two of them."""
+        friends: list[set[int]] = [set() for _ in self.names]
+        for i, j in self.pairs[self.rigid]:
+            friends[i].add(int(j))
+            friends[j].add(int(i))
+        found: list[tuple[int, ...]] = []
+        while (largest := _largest_clique(friends)) is not None:
+            found.append(largest)
+            for i in largest:
+                for j in friends[i]:
+                    friends[j].discard(i)
+                friends[i] = set()
+        return tuple(found)
+
+    def to_toml(self, path: str | Path | None = None) -> str:
+        """Give the bonds as TOML text, and write it to `path` where one is given."""
+        markers: list[dict[str, Any]] = []
+        for name, place in zip(self.names, self.places, strict=True):
+            own: dict[str, Any] = {"name": name}
+            if np.isfinite(place).all():
+                own["place"] = [round(float(x), 6) for x in place]
+            markers.append(own)
+        bonds = [
+            {
+                "between": [self.names[i], self.names[j]],
+                "distance": round(float(distance), 6),
+                "spread": round(float(spread), 6),
+                "frames": int(n),
+            }
+            for (i, j), distance, spread, n in zip(
+                self.pairs, self.distances, self.spreads, self.frames, strict=True
+            )
+        ]
+        content = {"format": FORMAT, "axes": self.places.shape[1], "marker": markers, "bond": bonds}
+        return write_toml(content, path)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Self:
+        """Read bonds from a TOML file.
+
+        Raises
+        ------
+        FormatError
+            If the file cannot be read, is not TOML, or holds no bonds.
+        """
+        content = read_toml(path, "bonds in TOML")
+        path = Path(path)
+        if content.get("format") != FORMAT:
+            got = content.get("format", "none")
+            raise FormatError(path, "format", f'"{FORMAT}"', got, "write one by asterism bonds")
+        try:
+            return cls(**_from_plain(content))
+        except ParameterError as error:
+            raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
+
+    def __repr__(self) -> str:
+        return (
+            f"Bonds({len(self.names)} markers, {len(self.pairs)} pairs, {int(self.rigid.sum())} "
+            f"rigid, {len(self.clusters)} clusters)"
+        )
+
+
+def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = 20) -> Bonds:
+    """Learn which markers keep their distances.
+
+    Of each marker the `neighbours` steadiest are kept, judged by what the distance varies by and by
+    a small share of it.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        A capture with the names of its markers. Tracks without a name are left out, and so are
+        tracks that carry a recorder's placeholder (``*12``, ``Unlabeled 7``). If no track has a
+        name, all are learnt as ``T000``, ``T001`` … by their number.
+    neighbours : int
+        Bonds that each marker has at least, where there are so many.
+    least : int
+        Frames in which two must have been seen together.
+
+    Returns
+    -------
+    Bonds
+
+    Raises
+    ------
+    ParameterError
+        If an option is out of range, or two tracks have the same name.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.learn_bonds(am.simulate.person(seed=1))  # doctest: +ELLIPSIS
+    Bonds(53 markers, ... pairs, ... rigid, ... clusters)
+    """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
+    check_number("neighbours", neighbours, above=1, below=1000, closed=True, integer=True)
+    check_number("least", least, above=2, below=1e6, closed=True, integer=True)
+    tracks = tracks.measured()
+    d = tracks.detections
+    every = max(1, -(-d.n_frames // MOST_FRAMES))
+    named = [k for k, name in enumerate(tracks.names) if name and not is_unlabelled(name)]
+    names = [str(tracks.names[k]) for k in named]
+    if not named:
+        named, names = list(range(tracks.n_tracks)), [f"T{k:03d}" for k in range(tracks.n_tracks)]
+    positions = tracks.positions()[::every, named]
+    between = distances_between(positions)
+    K = len(named)
+    cost = between.spread + BEND * between.middle
+    cost[(between.n_frames * every < least) | np.eye(K, dtype=bool)] = np.inf
+    order = np.argsort(cost, axis=1, kind="stable")[:, :neighbours]
+    chosen = np.zeros((K, K), dtype=bool)
+    np.put_along_axis(chosen, order, values=True, axis=1)
+    chosen = (chosen | chosen.T) & np.isfinite(cost)
+    i, j = np.nonzero(np.triu(chosen))
+    return Bonds(
+        names=tuple(names),
+        places=_pose(positions, between.middle),
+        pairs=np.stack([i, j], axis=1),
+        distances=between.middle[i, j],
+        spreads=between.spread[i, j],
+        frames=between.n_frames[i, j] * every,
+    )
+
+
+def _pose(positions: NDArray[np.float64], usual: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Choose the frame in which most markers are seen, and most nearly at their usual distances."""
+    if not positions.size:
+        return np.zeros(positions.shape[1:])
+    counts = np.isfinite(positions[..., 0]).sum(axis=1)
+    fullest = np.flatnonzero(counts == counts.max())
+    fullest = fullest[:: max(1, len(fullest) // 100)]
+    off: list[float] = []
+    for pose in positions[fullest]:
+        distance = np.linalg.norm(pose[:, None] - pose[None], axis=2)
+        off.append(float(np.nan_to_num(np.abs(distance - usual)).sum()))
+    pose = positions[fullest[int(np.argmin(off))]]
+    return pose - np.nanmean(pose, axis=0) if counts.max() else np.full(pose.shape, np.nan)
+
+
+def _largest_clique(friends: list[set[int]]) -> tuple[int, ...] | None:
+    """Find a clique of three or more that cannot grow, the largest of one grown from each pair."""
+    best: tuple[int, ...] | None = None
+    for i in range(len(friends)):
+        for j in sorted(friends[i]):
+            if j < i or (best is not None and len(friends[i]) < len(best)):
+                continue
+            own, common = [i, j], friends[i] & friends[j]
+            while common:  # whoever leaves most to go on with
+                more = max(sorted(common), key=lambda k: len(common & friends[k]))
+                own.append(more)
+                common &= friends[more]
+            if len(own) >= 3 and (best is None or len(own) > len(best)):
+                best = tuple(sorted(own))
+    return best
+
+
+def _from_plain(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Give the fields of `Bonds` from what a file holds."""
+    axes = content.get("axes")
+    if axes not in (2, 3):
+        raise ParameterError("axes", "2 or 3", axes)
+    markers, bonds = _tables(content, "marker"), _tables(content, "bond")
+    names = [str(_get(own, f"marker {n}", "name")) for n, own in enumerate(markers, 1)]
+    number = {name: k for k, name in enumerate(names)}
+    places = np.full((len(names), axes), np.nan)
+    for n, own in enumerate(markers):
+        if "place" in own:
+            places[n] = keep_array(f"place of {names[n]}", own["place"], (axes,))
+    pairs: list[list[int]] = []
+    values: dict[str, list[float]] = {"distance": [], "spread": [], "frames": []}
+    for n, own in enumerate(bonds, 1):
+        between = _get(own, f"bond {n}", "between")
+        if not isinstance(between, list) or len(cast("list[Any]", between)) != 2:
+            raise ParameterError(f"bond {n}", "between = two names", repr(between))
+        ends = [str(name) for name in cast("list[Any]", between)]
+        for name in ends:
+            if name not in number:
+                raise ParameterError(f"bond {n}", "the names of two markers", name)
+        pairs.append(sorted(number[name] for name in ends))
+        for key, all_ in values.items():
+            value = _get(own, f"bond {n}", key)
+            check_number(
+                f"{key} of bond {n}", value, above=0, below=2**53, closed=True,
+                integer=key == "frames",
+            )  # fmt: skip
+            all_.append(value)
+    return {
+        "names": tuple(names),
+        "places": places,
+        "pairs": np.array(pairs, dtype=np.int64).reshape(-1, 2),
+        "distances": np.array(values["distance"], dtype=np.float64),
+        "spreads": np.array(values["spread"], dtype=np.float64),
+        "frames": np.array(values["frames"], dtype=np.int64),
+    }
+
+
+def _tables(content: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
+    value = content.get(name, [])
+    if not isinstance(value, list) or not all(
+        isinstance(own, dict) for own in cast("list[Any]", value)
+    ):
+        raise ParameterError(name, f"tables [[{name}]]", type(value).__name__)
+    return cast("list[dict[str, Any]]", value)
+
+
+def _get(table: Mapping[str, Any], where: str, key: str) -> Any:
+    if key not in table:
+        raise ParameterError(where, f"a {key}", "none")
+    return table[key]
