@@ -110,7 +110,7 @@ clean:
 # One stamp for each set of extras; a newer pyproject.toml or engine installs again. What builds the
 # engine is in the environment: an isolated build would find it in another place each time and
 # compile everything again.
-SOURCES := pyproject.toml CMakeLists.txt $(wildcard engine/*)
+SOURCES := pyproject.toml CMakeLists.txt $(shell find engine -type f)
 INSTALL := $(BIN)/python -m pip install --quiet --no-build-isolation --check-build-dependencies -e
 
 $(VENV)/.python:

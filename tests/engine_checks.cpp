@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "budgets.hpp"
-#include "capture_sweep.hpp"
-#include "chain_stats.hpp"
-#include "neighbours.hpp"
-#include "parallel.hpp"
-#include "trace.hpp"
+#include "mcmc/chain/budgets.hpp"
+#include "mcmc/tracker/capture_sweep.hpp"
+#include "mcmc/chain/chain_stats.hpp"
+#include "rigid/neighbours.hpp"
+#include "base/parallel.hpp"
+#include "mcmc/chain/trace.hpp"
 
 using namespace asterism;
 

@@ -20,8 +20,8 @@ def test_checks_of_the_engine_s_parts_hold(tmp_path):
         [COMPILER, "-std=c++20", "-O1", "-pthread", "-fsanitize=undefined",
          "-fno-sanitize-recover=undefined", "-fsanitize=float-cast-overflow",
          "-D_GLIBCXX_ASSERTIONS", "-I", str(ROOT / "engine"),
-         str(ROOT / "tests" / "engine_checks.cpp"), str(ROOT / "engine" / "kalman.cpp"),
-         str(ROOT / "engine" / "modes.cpp"), "-o", str(program)],
+         str(ROOT / "tests" / "engine_checks.cpp"), str(ROOT / "engine" / "filter" / "kalman.cpp"),
+         str(ROOT / "engine" / "filter" / "imm.cpp"), "-o", str(program)],
         check=True,
     )  # fmt: skip
     done = subprocess.run([program], capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""The typed face of the compiled module; see engine/bindings.cpp."""
+"""The typed face of the compiled module; see engine/python/bindings.cpp."""
 
 from collections.abc import Callable, Sequence
 from typing import Self
@@ -73,11 +73,7 @@ class FrameStats:
     @property
     def n_merged(self) -> int: ...
     @property
-    def chain(self) -> ChainStats: ...
-    @property
     def n_bonds(self) -> int: ...
-    @property
-    def bond_score(self) -> float: ...
     @property
     def n_carried(self) -> int: ...
     @property
@@ -110,6 +106,12 @@ class ChainStats:
     def rhat(self) -> float: ...
     @property
     def ess(self) -> float: ...
+
+class SampledStats(FrameStats):
+    @property
+    def chain(self) -> ChainStats: ...
+    @property
+    def bond_score(self) -> float: ...
 
 class McmcOptions:
     def __init__(

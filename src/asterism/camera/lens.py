@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 __all__ = ["BrownConrady", "Lens", "QuadraticCorrection", "ReportRadial", "ViconRadial"]
 
 LEAST_STRETCH = 1e-2
-"""As kLeastStretch of engine/lens.hpp."""
+"""As kLeastStretch of engine/camera/lens.hpp."""
 
 NO_LENS, RADIAL, QUADRATIC = 0, 1, 2
-"""As Lens::Kind of engine/lens.hpp."""
+"""As Lens::Kind of engine/camera/lens.hpp."""
 
 
 class Lens(ABC):

@@ -313,6 +313,9 @@ class MCMCDA(EngineMethod):
             raise ParameterError("moves", "a number > 0, or labels to start from", "0", hint)
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        from asterism import _engine
+
+        assert isinstance(stats, _engine.SampledStats)
         chain = stats.chain
         drawn, _, taken = chain.moves.T
         about: dict[str, float] = {

@@ -2,8 +2,8 @@
 
 Which tracks keep their distances is learnt while they are seen. One that is hidden is expected
 where its neighbours carry it, and neighbours have a say in who takes which point. The loop is in
-the engine (carried_tracks.hpp, over several open frames window_bodies.hpp); nothing of it is there
-where `bodies` is off.
+the engine (tracks/carried_tracks.hpp, over several open frames trees/window_carrier.hpp); nothing of
+it is there where `bodies` is off.
 """
 
 from __future__ import annotations

@@ -1,0 +1,118 @@
+// Which of many points lie in a ball: a uniform grid over the points of one frame.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "math/point.hpp"
+
+namespace asterism {
+
+class PointGrid {
+ public:
+  // Below so many points a plain scan is faster than any grid.
+  static constexpr std::size_t kScanBelow = 64;
+
+  // `cell` is the wished edge of a cell; cells are never more than a few for each point.
+  void build(std::span<const Point> points, int D, double cell) {
+    points_ = points;
+    D_ = D;
+    r_most_ = 0;
+    for (const Point& p : points) r_most_ = std::max(r_most_, p.r);
+    is_grid_ = points.size() >= kScanBelow;
+    if (!is_grid_) return;
+    Point high{};
+    for (int d = 0; d < D; ++d) {
+      low_[d] = std::numeric_limits<double>::infinity();
+      high[d] = -std::numeric_limits<double>::infinity();
+      for (const Point& p : points) {
+        low_[d] = std::min(low_[d], p[d]);
+        high[d] = std::max(high[d], p[d]);
+      }
+    }
+    const double per_axis = std::pow(2.0 * static_cast<double>(points.size()), 1.0 / D);
+    std::int64_t n_cells = 1;
+    for (int d = 0; d < kMaxAxes; ++d) {
+      size_[d] = 1;
+      inverse_[d] = 0;
+      if (d >= D || !(high[d] > low_[d])) continue;
+      const double fitting = (high[d] - low_[d]) / (2 * per_axis);
+      const double edge = cell > fitting ? cell : fitting;  // also where `cell` is not a number
+      if (!std::isfinite(edge) || !std::isfinite(1 / edge)) continue;
+      inverse_[d] = 1 / edge;
+      size_[d] = static_cast<std::int64_t>((high[d] - low_[d]) * inverse_[d]) + 1;
+      n_cells *= size_[d];
+    }
+    starts_.assign(n_cells + 1, 0);
+    cell_of_.resize(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      cell_of_[i] = cell_index(points[i]);
+      ++starts_[cell_of_[i] + 1];
+    }
+    for (std::int64_t c = 0; c < n_cells; ++c) starts_[c + 1] += starts_[c];
+    fill_.assign(starts_.begin(), starts_.end() - 1);
+    order_.resize(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i)
+      order_[fill_[cell_of_[i]]++] = static_cast<std::int32_t>(i);
+  }
+
+  // The most noise that a point has beyond the sensor's.
+  double r_most() const { return r_most_; }
+
+  // Calls visit(index, squared distance) for every point within `radius` of `center`, each once,
+  // in an order that depends on the points alone.
+  template <typename Visit>
+  void within(const Point& center, double radius, Visit&& visit) const {
+    const double radius2 = radius * radius;
+    if (!is_grid_) {
+      for (std::size_t i = 0; i < points_.size(); ++i) {
+        const double d2 = squared_distance(points_[i], center, D_);
+        if (d2 <= radius2) visit(static_cast<std::int32_t>(i), d2);
+      }
+      return;
+    }
+    std::array<std::int64_t, kMaxAxes> from{}, to{};
+    for (int d = 0; d < D_; ++d) {
+      from[d] = axis_cell(center[d] - radius, d);
+      to[d] = axis_cell(center[d] + radius, d);
+    }
+    for (std::int64_t a = from[0]; a <= to[0]; ++a)
+      for (std::int64_t b = from[1]; b <= to[1]; ++b) {
+        // Cells along the last axis lie side by side.
+        const std::int64_t row = (a * size_[1] + b) * size_[2];
+        for (std::int32_t k = starts_[row + from[2]]; k < starts_[row + to[2] + 1]; ++k) {
+          const std::int32_t i = order_[k];
+          const double d2 = squared_distance(points_[i], center, D_);
+          if (d2 <= radius2) visit(i, d2);
+        }
+      }
+  }
+
+ private:
+  std::int64_t axis_cell(double x, int d) const {
+    const double c = (x - low_[d]) * inverse_[d];
+    if (!(c > 0)) return 0;  // also where c is not a number
+    return static_cast<std::int64_t>(std::min(c, static_cast<double>(size_[d] - 1)));
+  }
+  std::int64_t cell_index(const Point& p) const {
+    std::int64_t c = 0;
+    for (int d = 0; d < kMaxAxes; ++d) c = c * size_[d] + (d < D_ ? axis_cell(p[d], d) : 0);
+    return c;
+  }
+
+  std::span<const Point> points_;
+  int D_ = 0;
+  double r_most_ = 0;
+  bool is_grid_ = false;
+  Point low_{}, inverse_{};
+  std::array<std::int64_t, kMaxAxes> size_{1, 1, 1};
+  std::vector<std::int32_t> starts_, fill_, order_;
+  std::vector<std::int64_t> cell_of_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,324 @@
+// Joint probabilistic data association, with the probability that each track exists (JIPDA,
+// Musicki & Evans 2004). The life of a track is that of tracks/live_tracks.hpp; its score is the log odds
+// that it exists.
+//
+//   r        probability that a track exists, (1 - p_z) times that of the frame before
+//   w_ij     r P_d N(y_j; ŷ_i, S_i) / (λ_f + P_d λ_b)      w_i0 = 1 - r P_d
+//   β_ij     marginals of the joint events (solve/joint_events.hpp)
+//   r⁺       1 - β_i0 + β_i0 r (1 - P_d) / (1 - r P_d)
+//
+// P_d is each track's own: that of a marker seen in the frame before or missed there, weighed by how
+// probable either is (“Markov chain two” of Musicki, Evans & Stankovic 1994).
+//
+// Believed tracks share the detections first; tentative ones take what they leave over, by the
+// likeliest event: they know so little that a mean over what fits would be nowhere.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "filter/pda_update.hpp"
+#include "solve/best_permutations.hpp"
+#include "solve/joint_events.hpp"
+#include "tracks/carried_tracks.hpp"
+#include "tracks/live_tracks.hpp"
+
+namespace asterism {
+
+struct JointOptions {
+  std::int64_t max_states = 1;  // of a layer of the exact sum; a beam of as many beyond
+  bool is_guarded = true;       // against coalescence
+  // A believed track counts as one that exists until its gap is too long: markers hide in bursts,
+  // of which P_d knows nothing. Otherwise its r falls with every miss, and ends it.
+  bool is_sure_until_gap = true;
+  CarryOptions carry;
+};
+
+class JointTracker {
+ public:
+  JointTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
+               const JointOptions& options)
+      : live_(model, score, life), opt_(options), carried_(model, score, options.carry) {}
+
+  // As FrameTracker::step. Every point of the frame gets a label, -1 with the probability that it is
+  // of no track that is believed.
+  template <typename Label>
+  FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
+    FrameStats stats;
+    survive();
+    find_candidates(time, step, points, stats);
+    stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());
+    s_.match.assign(live_.size(), -1);
+    s_.match_probability.assign(live_.size(), 0);
+    s_.missed.assign(live_.size(), 1);
+    s_.free.assign(points.size(), 1);
+    s_.is_taken.assign(points.size(), 0);
+    share_among_believed(points, stats);
+    share_among_tentative(points, stats);
+    for (std::size_t j = 0; j < points.size(); ++j)
+      label(live_.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * (1 - newborn(1)));
+    update_tracks(time, points, stats, label);
+    begin_tracks(time, points);
+    carried_.learn(live_, stats);
+    live_.end_frame(time, points.size(), stats);
+    total_.add(stats);
+    return stats;
+  }
+
+  bool has_confidence() const { return true; }
+  const MotionModel& motion() const { return live_.m; }
+  std::int64_t n_ids() const { return live_.next_id; }
+  const LiveTracks<>& live() const { return live_; }
+  const FrameStats& total() const { return total_; }
+  std::int64_t n_frames() const { return live_.n_frames; }
+  std::int64_t n_seen() const { return live_.n_seen; }
+  double last_time() const { return live_.last_time; }
+
+ private:
+  struct Memory {
+    std::vector<Candidate> candidates, eligible;
+    std::vector<double> gains, marginals, log_miss, all_missed;
+    std::vector<std::int32_t> best, match;       // by track
+    std::vector<double> match_probability, missed;
+    std::vector<double> free;                    // probability that a detection is of no track
+    std::vector<char> is_taken;
+    Assignment assignment;  // of tentative tracks
+    BestPermutations guard;
+    std::vector<double> weights;
+    std::vector<WeightedPoint> mixture;
+  };
+
+  static constexpr double kNegligible = -20.7;  // log of a weight, of a miss of 1, not looked at
+  static constexpr double kMostOdds = 700;
+
+  static double probability(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
+
+  double not_seen(std::size_t i, double score) const {  // 1 - r P_d
+    return probability(-score) + probability(score) * p_miss(i);
+  }
+  // Of a track that exists, in this frame.
+  double p_miss(std::size_t i) const {
+    const double missed = live_.tracks[i].p_missed;
+    return (1 - missed) * std::exp(live_.sm.log_miss) + missed * std::exp(live_.sm.log_remiss);
+  }
+  double p_detect(std::size_t i) const { return 1 - p_miss(i); }
+
+  // The log odds that a track exists, as far as sharing the detections goes.
+  double existence(std::size_t i) const {
+    const LiveTrack<NoMore>& track = live_.tracks[i];
+    const bool is_sure = opt_.is_sure_until_gap && track.is_confirmed();
+    return is_sure ? std::max(track.score, live_.opt.confirm_score) : track.score;
+  }
+
+  // Probability that a detection which is of no track, with probability q, begins one.
+  double newborn(double q) const {
+    const double b = std::exp(live_.birth_gain());
+    return q * b / (1 + b);
+  }
+
+  void survive() {
+    const double log_die = std::log(live_.sm.p_disappear);
+    for (LiveTrack<NoMore>& track : live_.tracks) {
+      const double log_r = -softplus(-track.score), log_none = -softplus(track.score);
+      const double log_died = log_die + log_r;
+      const double most = std::max(log_none, log_died);
+      const double log_gone = most + std::log(std::exp(log_none - most) + std::exp(log_died - most));
+      track.score = live_.sm.log_survive + log_r - log_gone;
+    }
+  }
+
+  void find_candidates(double time, const MotionStep& step, std::span<const Point> points,
+                       FrameStats& stats) {
+    const double common = -live_.sm.log_clutter - live_.leftover_gain();
+    const double least = kNegligible - (carried_.is_on() ? carried_.bond_weight() : 0);
+    const auto offset = [&](std::size_t i) {
+      return common + std::log(p_detect(i)) - softplus(-existence(i)) -
+             std::log(not_seen(i, existence(i)));
+    };
+    const auto least_of = [&](std::size_t i) { return least - offset(i); };
+    const auto gain_of = [&](std::size_t i, double log_likelihood) {
+      return offset(i) + log_likelihood;
+    };
+    if (!carried_.is_on())
+      return live_.candidates(time, step, points, least, least_of, gain_of, s_.candidates);
+    carried_.list(
+        live_, step, points, kNegligible,
+        [&](auto&& is_asked, std::vector<Candidate>& out) {
+          live_.list(time, points, least, is_asked, least_of, gain_of, out);
+        },
+        s_.candidates, stats);
+  }
+
+  // Pairings of the believed tracks, or of the tentative ones with what is left.
+  void find_eligible(bool confirmed) {
+    s_.eligible.clear();
+    s_.gains.clear();
+    for (Candidate c : s_.candidates) {
+      if (live_[c.row].is_confirmed() != confirmed || s_.is_taken[c.column]) continue;
+      c.gain += std::log(s_.free[c.column]);
+      if (!(c.gain > kNegligible)) continue;
+      s_.eligible.push_back(c);
+      s_.gains.push_back(c.gain);
+    }
+  }
+
+  void share_among_believed(std::span<const Point> points, FrameStats& stats) {
+    find_eligible(true);
+    s_.log_miss.assign(live_.size(), 0);
+    s_.all_missed.resize(live_.size());
+    s_.best.resize(live_.size());
+    s_.marginals.resize(s_.eligible.size());
+    JointEvents events(s_.eligible, s_.gains, s_.log_miss,
+                       static_cast<std::int32_t>(points.size()), opt_.max_states);
+    const JointSummary summary = events.solve(s_.marginals, s_.all_missed, s_.best);
+    stats.n_beams += summary.n_beams;
+    stats.n_states = std::max(stats.n_states, summary.n_states);
+    stats.bound = std::max(stats.bound, summary.bound);
+    const Groups& groups = events.groups();
+    stats.n_groups += static_cast<std::int64_t>(groups.size());
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
+      take_group(groups[g], std::span(groups.sources).subspan(groups.starts[g]), points, stats);
+    }
+    for (std::size_t e = 0; e < s_.eligible.size(); ++e) {
+      const Candidate& c = s_.eligible[e];
+      s_.free[c.column] = std::max(s_.free[c.column] - s_.marginals[e], 0.0);
+      if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
+    }
+  }
+
+  // Tentative tracks take what the likeliest event gives them, and each is as sure of it as it can be
+  // if the others have what that event gives to them. Together they fit almost anything: a sum over
+  // all their events would take long and tell little.
+  void share_among_tentative(std::span<const Point> points, FrameStats& stats) {
+    find_eligible(false);
+    const Groups groups =
+        connected_groups(s_.eligible, static_cast<std::int32_t>(live_.size()),
+                         static_cast<std::int32_t>(points.size()));
+    stats.n_groups += static_cast<std::int64_t>(groups.size());
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      s_.assignment.solve(groups[g], s_.match);
+      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
+    }
+    for (const Candidate& c : s_.eligible)
+      if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
+    for (std::size_t first = 0, last; first < s_.eligible.size(); first = last) {
+      const std::int32_t i = s_.eligible[first].row;
+      const auto is_open = [&](const Candidate& c) {
+        return !s_.is_taken[c.column] || s_.match[i] == c.column;
+      };
+      double most = 0, total = 0;
+      for (last = first; last < s_.eligible.size() && s_.eligible[last].row == i; ++last)
+        if (is_open(s_.eligible[last])) most = std::max(most, s_.eligible[last].gain);
+      total = std::exp(-most);
+      for (std::size_t e = first; e < last; ++e)
+        if (is_open(s_.eligible[e])) total += std::exp(s_.eligible[e].gain - most);
+      s_.missed[i] = std::exp(-most) / total;
+      for (std::size_t e = first; e < last; ++e) {
+        const Candidate& c = s_.eligible[e];
+        if (!is_open(c)) continue;
+        const double p = std::exp(c.gain - most) / total;
+        s_.free[c.column] = std::max(s_.free[c.column] - p, 0.0);
+        if (s_.match[i] == c.column) s_.match_probability[i] = p;
+      }
+      if (s_.match[i] >= 0)
+        update(live_.m, live_.prediction(i), points[s_.match[i]], live_[i].state);
+    }
+  }
+
+  // What the joint events of a group say of its tracks: best pairings, misses, and new states.
+  void take_group(std::span<const Candidate> group, std::span<const std::int32_t> sources,
+                  std::span<const Point> points, FrameStats& stats) {
+    for (std::size_t e = 0; e < group.size(); ++e) {
+      const Candidate& c = group[e];
+      s_.missed[c.row] = s_.all_missed[c.row];
+      if (s_.best[c.row] != c.column) continue;
+      s_.match[c.row] = c.column;
+      s_.match_probability[c.row] = s_.marginals[sources[e]];
+    }
+    weigh(group, sources, stats);
+    for (std::size_t first = 0, last; first < group.size(); first = last) {
+      const std::int32_t i = group[first].row;
+      double taken = 0;
+      s_.mixture.clear();
+      for (last = first; last < group.size() && group[last].row == i; ++last) {
+        if (s_.weights[last] > 0) s_.mixture.push_back({points[group[last].column], s_.weights[last]});
+        taken += s_.weights[last];
+      }
+      if (s_.mixture.empty()) continue;
+      // What carries a hidden marker is not its own until it is seen.
+      if (carried_.is_carried(i) && s_.match[i] < 0) continue;
+      if (s_.match[i] >= 0) carried_.take(live_, i, points[s_.match[i]], stats);
+      // Given that the track exists, a miss is less likely than it is in itself.
+      const double seldom = probability(existence(i)) * p_miss(i) / not_seen(i, existence(i));
+      const double missed = std::max(1 - taken, 0.0) * seldom;
+      for (WeightedPoint& point : s_.mixture) point.weight /= taken + missed;
+      update_by_all(live_.m, live_.prediction(i), s_.mixture, missed / (taken + missed),
+                    live_[i].state);
+    }
+  }
+
+  // How far each pairing of a group moves its track: as much as is probable; where events differ by
+  // who is who, only the best of them; beyond the guard's reach, the best event.
+  void weigh(std::span<const Candidate> group, std::span<const std::int32_t> sources,
+             FrameStats& stats) {
+    const bool needs_guard = opt_.is_guarded && group.front().row != group.back().row;
+    if (needs_guard && s_.guard.solve(group, s_.best, s_.weights)) return;
+    stats.n_unguarded += needs_guard;
+    s_.weights.resize(group.size());
+    for (std::size_t e = 0; e < group.size(); ++e)
+      s_.weights[e] = !needs_guard ? s_.marginals[sources[e]] : s_.best[group[e].row] == group[e].column;
+  }
+
+  template <typename Label>
+  void update_tracks(double time, std::span<const Point> points, FrameStats& stats,
+                     Label&& label) {
+    for (std::size_t i = 0; i < live_.size(); ++i) {
+      LiveTrack<NoMore>& track = live_[i];
+      update_existence(i);
+      const std::int32_t j = s_.match[i];
+      if (j < 0) {
+        ++track.gap;
+        carried_.miss(track, i, stats);
+        const bool is_gone = existence(i) < -live_.opt.confirm_score;
+        if (track.is_confirmed() && is_gone) track.gap = live_.sm.max_gap + track.carried;
+        continue;
+      }
+      // Of a tentative track: given that it is a marker at all.
+      const double given = track.is_confirmed() ? 1 : probability(track.score);
+      const double confidence = std::min(s_.match_probability[i] / given, 1.0);
+      live_.take(i, j, points[j], time, confidence, label);
+    }
+    live_.end_tracks();
+  }
+
+  // The odds that a track exists change by the same factor, whatever they are taken to be.
+  void update_existence(std::size_t i) {
+    const double taken_as = existence(i), missed = std::max(s_.missed[i], 1e-300);
+    const double hidden = missed * probability(taken_as) * p_miss(i);
+    const double exists = (1 - missed) * not_seen(i, taken_as) + hidden;
+    const double factor = std::log(exists) - std::log(missed) + softplus(taken_as) - taken_as;
+    double& score = live_[i].score;
+    score = std::clamp(score + factor, -kMostOdds, kMostOdds);
+    live_[i].p_missed = hidden / exists;
+  }
+
+  void begin_tracks(double time, std::span<const Point> points) {
+    for (std::size_t j = 0; j < points.size(); ++j) {
+      const double r = newborn(s_.free[j]);
+      if (s_.is_taken[j] || !(r > 0)) continue;
+      live_.begin(j, points[j], time, std::log(r) - std::log1p(-r));
+    }
+  }
+
+  LiveTracks<> live_;
+  JointOptions opt_;
+  CarriedTracks carried_;
+  FrameStats total_;
+  Fresh<Memory> s_;
+};
+
+}  // namespace asterism

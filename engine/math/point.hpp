@@ -1,0 +1,21 @@
+// A measured point in the plane or in space.
+#pragma once
+
+#include <array>
+
+namespace asterism {
+
+inline constexpr int kMaxAxes = 3;
+
+// A place, and what the variance of its coordinates is beyond the sensor's.
+struct Point : std::array<double, kMaxAxes> {
+  double r = 0;
+};
+
+inline double squared_distance(const Point& a, const Point& b, int D) {
+  double sum = 0;
+  for (int d = 0; d < D; ++d) sum += (a[d] - b[d]) * (a[d] - b[d]);
+  return sum;
+}
+
+}  // namespace asterism

@@ -1,0 +1,206 @@
+// Chains that walk over a part of a partition: for the best of it, and for how probable it is.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "mcmc/chain/budgets.hpp"
+#include "mcmc/chain/chain_stats.hpp"
+#include "mcmc/chain/marginals.hpp"
+#include "mcmc/chain/sampler.hpp"
+#include "mcmc/chain/split.hpp"
+#include "mcmc/chain/trace.hpp"
+
+namespace asterism {
+
+// What a chain found in its two halves.
+struct Halves {
+  static constexpr int kN = 2;
+  std::vector<std::int32_t> detections;      // in the whole
+  std::array<std::vector<double>, kN> shares;  // in which they follow what they follow
+  std::array<double, kN> mean{}, variance{};   // of the log posterior
+  std::array<std::int64_t, kN> n_moves{};
+  double ess = 0;  // NaN of a chain that never moved
+
+  std::int64_t all_moves() const { return std::accumulate(n_moves.begin(), n_moves.end(), std::int64_t{0}); }
+};
+
+template <typename Filter>
+class Walker {
+ public:
+  Walker(Partition<Filter> empty, const ChainOptions& options)
+      : sampler_(std::move(empty), options, 0),
+        marginals_(sampler_.partition()),
+        hot_share_(options.share_at_doubts),
+        is_draw_(options.is_draw) {}
+
+  // Looks for the best; returns what it is better by than the start, and stays there. Or draws: stays
+  // where it ends, which counts as better than anything.
+  double search(const Partition<Filter>& whole, const BondTerm<Filter>& bonds, const Group& group,
+                std::uint64_t seed, const Budget& budget, ChainStats& stats) {
+    sampler_.partition().take_part(whole, group.tracks, group.free);
+    sampler_.weigh_bonds(bonds);
+    sampler_.begin(seed);
+    sampler_.weigh_above(sampler_.kOnlyWhatMayBeTaken);
+    sampler_.begin_best();
+    list_hot(group);
+    const auto look_at_none = [](const Change<Filter>&, bool) {};
+    std::int64_t n = 0;
+    for (; !budget.is_over(n); ++n) step(look_at_none);
+    stats.n_search += n;
+    add_counts(stats);
+    if (is_draw_) return std::numeric_limits<double>::infinity();
+    sampler_.restore_best();
+    return sampler_.most();
+  }
+  const Partition<Filter>& partition() const { return sampler_.partition(); }
+
+  // How probable the partition is that it begins at.
+  void sample(const Partition<Filter>& whole, const BondTerm<Filter>& bonds, const Group& group,
+              std::uint64_t seed, const Budget& budget, Halves& out, ChainStats& stats) {
+    Partition<Filter>& p = sampler_.partition();
+    p.take_part(whole, group.tracks, group.free);
+    sampler_.weigh_bonds(bonds);
+    sampler_.begin(seed);
+    sampler_.begin_best();
+    list_hot(group);
+    sampler_.weigh_above(kLookedAtAbove);
+    marginals_.begin();
+    out.detections.clear();
+    for (std::int32_t i = 0; i < p.window().n_ids(); ++i)
+      if (!p.is_frozen(i)) out.detections.push_back(p.origin(i));
+    // Halves of equal length; where time is short, each has half of it.
+    const auto weigh = [&](const Change<Filter>& change, bool is_taken) {
+      marginals_.weigh(change, is_taken);
+    };
+    Trace trace;
+    const std::int64_t half = std::max<std::int64_t>(budget.moves / Halves::kN, 1);
+    for (int h = 0; h < Halves::kN; ++h) {
+      marginals_.forget();
+      trace.begin(half);
+      const Budget own{half, h + 1 < Halves::kN ? halfway_to(budget.until) : budget.until, budget.watch};
+      std::int64_t n = 0;
+      for (; n == 0 || !own.is_over(n); ++n) {
+        step(weigh);
+        marginals_.count();
+        trace.add(sampler_.gain());
+      }
+      out.n_moves[h] = n;
+      out.mean[h] = trace.mean();
+      out.variance[h] = trace.variance();
+      out.shares[h].clear();
+      for (std::int32_t i = 0; i < p.window().n_ids(); ++i)
+        if (!p.is_frozen(i)) out.shares[h].push_back(marginals_.share(i));
+    }
+    out.ess = trace.ess_of_halves(out.all_moves());
+    stats.n_sampled += out.all_moves();
+    add_counts(stats);
+  }
+
+ private:
+  // Moves less probable than this before the way back is weighed need not be known when refused.
+  static constexpr double kLookedAtAbove = -9;
+
+  struct Hot {
+    Toggle toggle;
+    double upto = 0;
+  };
+
+  template <typename Seen>
+  void step(Seen&& seen) {
+    if (hot_.empty() || sampler_.random().uniform() >= hot_share_) {
+      sampler_.step(seen);
+      return;
+    }
+    const double at = sampler_.random().uniform() * hot_.back().upto;
+    const auto hot = std::upper_bound(hot_.begin(), hot_.end(), at,
+                                      [](double x, const Hot& h) { return x < h.upto; });
+    sampler_.step(hot->toggle, seen);
+  }
+
+  // What may be done about the links in doubt of this part. That a toggle is drawn as often before as
+  // after makes it exact; how often is free.
+  void list_hot(const Group& group) {
+    hot_.clear();
+    if (hot_share_ == 0) return;
+    const Partition<Filter>& p = sampler_.partition();
+    const std::int32_t n = p.window().n_ids();
+    is_listed_.assign(n, false);
+    for (std::int32_t i = 0; i < n; ++i) {
+      if (static_cast<std::int32_t>(local_.size()) <= p.origin(i)) local_.resize(p.origin(i) + 1, -1);
+      local_[p.origin(i)] = i;
+    }
+    const auto local = [&](std::int32_t i) {
+      return i < static_cast<std::int32_t>(local_.size()) ? local_[i] : -1;
+    };
+    for (const auto& [from, to] : group.doubts) {
+      const std::int32_t a = local(from), y = local(to);
+      if (a < 0 || y < 0 || p.is_frozen(y)) continue;  // a settled link is in doubt no more
+      const std::int32_t x = p.track_of(a) < 0 ? -1 : p.after(a);
+      const std::int32_t c = p.track_of(y) < 0 ? -1 : p.before(y);
+      add_skips(a, y);
+      if (p.track_of(a) < 0 || x == y) {
+        add_hot({Toggle::Kind::begin, y, a});
+        continue;
+      }
+      if (c >= 0) {
+        add_hot({Toggle::Kind::relocate, y, a, c});
+        if (x < 0) add_hot({Toggle::Kind::transfer, y, a, c});
+      }
+      if (x < 0 || p.is_frozen(x)) continue;
+      add_hot({Toggle::Kind::swap, y, x});
+      add_hot({Toggle::Kind::trade, y, x});
+    }
+    for (std::int32_t i = 0; i < n; ++i) local_[p.origin(i)] = -1;
+  }
+  // A link that is not there is made, or one that is goes with either of its ends.
+  void add_skips(std::int32_t a, std::int32_t y) {
+    const Partition<Filter>& p = sampler_.partition();
+    if (p.track_of(a) < 0) return;
+    const std::int32_t next = p.after(a);
+    if (next == y) {
+      add_skip_of(y);
+      add_skip_of(a);
+    } else if (p.is_free(y)) {
+      add_hot({Toggle::Kind::skip, y, a, next});
+    }
+  }
+  void add_skip_of(std::int32_t y) {
+    const Partition<Filter>& p = sampler_.partition();
+    if (is_listed_[y] || p.is_frozen(y) || p.before(y) < 0) return;
+    is_listed_[y] = true;
+    add_hot({Toggle::Kind::skip, y, p.before(y), p.after(y)});
+  }
+  void add_hot(const Toggle& toggle) {
+    const double gain = sampler_.gain_of(toggle);
+    if (gain < -kHotWithin) return;
+    const double before = hot_.empty() ? 0 : hot_.back().upto;
+    hot_.push_back({toggle, before + std::exp(std::min(gain, 0.0) / 4)});
+  }
+  static constexpr double kHotWithin = 12;
+
+  void add_counts(ChainStats& stats) const {
+    for (int k = 0; k < kMoves; ++k) {
+      stats.moves[k].n_drawn += sampler_.counts()[k].n_drawn;
+      stats.moves[k].n_possible += sampler_.counts()[k].n_possible;
+      stats.moves[k].n_taken += sampler_.counts()[k].n_taken;
+    }
+  }
+
+  Sampler<Filter> sampler_;
+  Marginals<Filter> marginals_;
+  double hot_share_;
+  bool is_draw_;
+  std::vector<Hot> hot_;
+  std::vector<std::int32_t> local_;
+  std::vector<char> is_listed_;  // detections that may be skipped by a toggle of their own
+};
+
+}  // namespace asterism

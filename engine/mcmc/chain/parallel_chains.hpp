@@ -1,0 +1,138 @@
+// Chains beside each other in every group of a partition: the best that they find, and how probable
+// they find it.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/parallel.hpp"
+#include "base/scratch.hpp"
+#include "mcmc/chain/budgets.hpp"
+#include "mcmc/chain/chain_runner.hpp"
+#include "mcmc/chain/chain_stats.hpp"
+#include "mcmc/chain/split.hpp"
+
+namespace asterism {
+
+template <typename Filter>
+class Walks {
+ public:
+  Walks(const ChainOptions& chain, std::int32_t n_chains, std::int32_t n_threads)
+      : chain_(chain), n_chains_(n_chains), n_threads_(n_threads) {}
+
+  // Each group as the best of its chains has it.
+  void search(Partition<Filter>& whole, const BondTerm<Filter>& bonds,
+              std::span<const Group> groups, const Budgets& budgets, std::uint64_t seed,
+              ChainStats& stats) {
+    struct Found {
+      double gain = 0;
+      ChainStats stats;
+      std::optional<Partition<Filter>> part;
+    };
+    std::vector<Found> found(groups.size() * n_chains_);
+    each_walk(whole, found.size(), [&](Walker<Filter>& walker, std::size_t task) {
+      const std::size_t g = task / n_chains_;
+      Found& own = found[task];
+      own.gain =
+          walker.search(whole, bonds, groups[g], seed_of(seed, task), budgets.of(g), own.stats);
+      if (own.gain > 0) own.part = walker.partition();
+    });
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const auto first = found.begin() + static_cast<std::ptrdiff_t>(g) * n_chains_;
+      const auto last = first + n_chains_;
+      for (auto one = first; one != last; ++one) stats.add(one->stats);
+      const auto best = std::max_element(
+          first, last, [](const Found& a, const Found& b) { return a.gain < b.gain; });
+      if (best->gain > 0) whole.take_over(*best->part, groups[g].tracks);
+    }
+  }
+
+  // By detection of the whole: in which share of the walks it follows what it follows; 1 where nothing
+  // is walked over.
+  std::vector<double> sample(const Partition<Filter>& whole, const BondTerm<Filter>& bonds,
+                             std::span<const Group> groups, const Budgets& budgets,
+                             std::uint64_t seed, ChainStats& stats) {
+    std::vector<Halves> found(groups.size() * n_chains_);
+    std::vector<ChainStats> counts(found.size());
+    each_walk(whole, found.size(), [&](Walker<Filter>& walker, std::size_t task) {
+      const std::size_t g = task / n_chains_;
+      walker.sample(whole, bonds, groups[g], seed_of(seed, task), budgets.of(g), found[task],
+                    counts[task]);
+    });
+    for (const ChainStats& one : counts) stats.add(one);
+    std::vector<double> shares(whole.window().n_ids(), 1.0);
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      judge(std::span<const Halves>(found).subspan(g * n_chains_, n_chains_), shares, stats);
+    return shares;
+  }
+
+ private:
+  // Differences of a share from half to half that are told as doubtful.
+  static constexpr double kDoubtful = 0.1;
+
+  // A number that is the same for the same task, whoever carries it out.
+  static std::uint64_t seed_of(std::uint64_t seed, std::size_t task) {
+    return Random(seed ^ static_cast<std::uint64_t>(task)).next();
+  }
+
+  template <typename Walk>
+  void each_walk(const Partition<Filter>& whole, std::size_t n, Walk&& walk) {
+    auto& walkers = s_.walkers;
+    while (static_cast<std::int32_t>(walkers.size()) < n_threads_)
+      walkers.push_back(std::make_unique<Walker<Filter>>(whole.empty(), chain_));
+    in_parallel(static_cast<std::int64_t>(n), n_threads_, [&](std::int32_t w, std::int64_t task) {
+      walk(*walkers[w], static_cast<std::size_t>(task));
+    });
+  }
+
+  // Split R̂ (Gelman et al. 2013) of the log posterior over the halves of all chains, which are long;
+  // and the mean of their shares, each weighed by its moves. Chains that never moved have no variance
+  // to compare: of these neither R̂ nor the effective sample size is known.
+  static void judge(std::span<const Halves> chains, std::vector<double>& shares, ChainStats& stats) {
+    const auto n_halves = static_cast<double>(chains.size() * Halves::kN);
+    double mean = 0, within = 0, between = 0, moves = 0;
+    double ess = std::numeric_limits<double>::quiet_NaN();  // of those chains for which it is known
+    for (const Halves& chain : chains) {
+      if (!std::isnan(chain.ess)) ess = std::isnan(ess) ? chain.ess : ess + chain.ess;
+      moves += static_cast<double>(chain.all_moves());
+      for (int h = 0; h < Halves::kN; ++h) {
+        mean += chain.mean[h] / n_halves;
+        within += chain.variance[h] / n_halves;
+      }
+    }
+    for (const Halves& chain : chains)
+      for (int h = 0; h < Halves::kN; ++h)
+        between += (chain.mean[h] - mean) * (chain.mean[h] - mean) / (n_halves - 1);
+    if (within > 0)
+      stats.add_mixing(std::sqrt(1 + between / within), ess);
+    else
+      ++stats.n_unmoved;
+    for (std::size_t n = 0; n < chains[0].detections.size(); ++n) {
+      double sum = 0, least = 1, most = 0;
+      for (const Halves& chain : chains)
+        for (int h = 0; h < Halves::kN; ++h) {
+          const double share = chain.shares[h][n];
+          sum += share * (n_halves * static_cast<double>(chain.n_moves[h]) / moves) / n_halves;
+          least = std::min(least, share);
+          most = std::max(most, share);
+        }
+      shares[chains[0].detections[n]] = std::clamp(sum, 0.0, 1.0);
+      stats.n_doubtful += most - least > kDoubtful;
+    }
+  }
+
+  struct Memory {
+    std::vector<std::unique_ptr<Walker<Filter>>> walkers;
+  };
+  ChainOptions chain_;
+  std::int32_t n_chains_, n_threads_;
+  Fresh<Memory> s_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,259 @@
+// The Metropolis–Hastings chain over partitions: draws a move, weighs it, takes it or stays.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "math/random.hpp"
+#include "mcmc/model/bond_term.hpp"
+#include "mcmc/model/partition.hpp"
+#include "mcmc/moves/involutive_moves.hpp"
+#include "mcmc/moves/moves.hpp"
+
+namespace asterism {
+
+struct ChainOptions {
+  GrowthOptions growth;
+  std::array<double, kMoves> weights{};  // ξ, up to a factor
+  // The report's rules: nothing but births while there is no track, no merge and no switch while
+  // there is one. The shares of the kinds of moves then depend on K.
+  bool has_first_rules = false;
+  // The report's chain: ω' is drawn from the best partition so far and weighed against the last one
+  // that was taken. That climbs; it does not sample the posterior.
+  bool is_ascent = false;
+  // So often a move is drawn at a link in doubt, where there is any (mcmc/chain/chain_runner.hpp).
+  double share_at_doubts = 0;
+  // What is kept of a walk is where it ends, a draw from the posterior, and not the best it met.
+  bool is_draw = false;
+};
+
+template <typename Filter>
+class Sampler {
+ public:
+  using Motion = Filter;
+
+  Sampler(const MotionModel& m, const ScoreModel& sm, const ChainOptions& options,
+          std::uint64_t seed)
+      : Sampler(Partition<Filter>(m, sm), options, seed) {}
+  Sampler(Partition<Filter> partition, const ChainOptions& options, std::uint64_t seed)
+      : partition_(std::move(partition)), opt_(options), random_(seed) {
+    for (int K = 0; K < 3; ++K) shares_[K] = shares(K);
+  }
+  Sampler(const Sampler&) = delete;  // the moves look at the partition beside them
+  Sampler& operator=(const Sampler&) = delete;
+
+  Partition<Filter>& partition() { return partition_; }
+  const Partition<Filter>& partition() const { return partition_; }
+  const std::array<MoveCounts, kMoves>& counts() const { return counts_; }
+
+  // Begins anew, with other random numbers.
+  void begin(std::uint64_t seed) {
+    random_ = Random(seed);
+    counts_ = {};
+    best_gain_ = last_gain_ = 0;
+  }
+
+  // From here on what bonds say is part of the posterior: of this partition, or of the whole that it
+  // is a part of.
+  void weigh_bonds(const BondTerm<Filter>& bonds) { bonds_ = bonds; }
+  const BondTerm<Filter>& bonds() const { return bonds_; }
+
+  // One move; true where the partition changes. `seen(change, is taken)` is called for what was
+  // weighed to the end, before it is carried out.
+  template <typename Seen>
+  bool step(Seen&& seen) {
+    const Shares& now = shares_[std::min(partition_.tracks().size(), 2)];
+    const double at = random_.uniform();
+    int kind = 0;
+    while (kind + 1 < kMoves && at >= now.upto[kind]) ++kind;
+    MoveCounts& count = counts_[kind];
+    ++count.n_drawn;
+    if (!moves_.propose(static_cast<Move>(kind), random_, change_)) return false;
+    ++count.n_possible;
+    const Shares& then = shares_[std::min(n_tracks_after(), 2)];
+    const int back = static_cast<int>(inverse(change_.move));
+    const double log_u = std::log(random_.uniform());
+    // A probability is at most 1, and bonds say so much and no more: what is too little before they and
+    // the way back are weighed stays so.
+    change_.log_ratio = change_.gain + (best_gain_ - last_gain_) + then.log[back] -
+                        now.log[kind] - change_.log_forward;
+    const double least = std::min(log_u, weighed_above_);
+    if (!(change_.log_ratio + bonds_.look_at(partition_, change_.all()) > least)) return false;
+    const double said = bonds_.gain();
+    change_.gain += said;
+    change_.log_ratio += said;
+    const bool is_weighed = change_.log_ratio > weighed_above_;
+    if (!(change_.log_ratio > log_u) && !is_weighed) return false;
+    change_.log_reverse = moves_.log_reverse(change_);
+    change_.log_ratio += change_.log_reverse;
+    const bool is_taken = take(log_u, is_weighed, seen);
+    count.n_taken += is_taken;
+    return is_taken;
+  }
+  bool step() {
+    return step([](const Change<Filter>&, bool) {});
+  }
+
+  // One move of a list; see mcmc/moves/involutive_moves.hpp.
+  template <typename Seen>
+  bool step(const Toggle& toggle, Seen&& seen) {
+    if (!propose(toggle)) return false;
+    change_.log_ratio = change_.gain;
+    return take(std::log(random_.uniform()), true, seen);
+  }
+  // What it would gain; -inf where it is impossible.
+  double gain_of(const Toggle& toggle) {
+    return propose(toggle) ? change_.gain : -std::numeric_limits<double>::infinity();
+  }
+  Random& random() { return random_; }
+
+  // Since `begin_best`, what the partition has won, and the most of it.
+  double gain() const { return gain_; }
+  double most() const { return most_; }
+
+  // From here on the best partition is kept in mind; then the chain is put there.
+  void begin_best() {
+    gain_ = most_ = 0;
+    is_best_ = true;
+  }
+  void restore_best() {
+    if (is_best_ || gain_ >= most_ - kBetter) return;
+    edits_.clear();
+    std::map<std::int32_t, std::size_t> now;  // tracks by first detection
+    for (const std::int32_t k : partition_.tracks().items())
+      now[partition_.track(k).nodes.front()] = static_cast<std::size_t>(k);
+    for (std::size_t s = 0; s + 1 < first_saved_.size(); ++s) {
+      const std::span<const std::int32_t> nodes(saved_.data() + first_saved_[s],
+                                                saved_.data() + first_saved_[s + 1]);
+      Edit<Filter>& edit = edits_.emplace_back();
+      const auto at = now.find(nodes.front());
+      if (at != now.end()) {
+        edit.track = static_cast<std::int32_t>(at->second);
+        const auto& own = partition_.track(edit.track).nodes;
+        while (edit.keep < static_cast<std::int32_t>(std::min(own.size(), nodes.size())) &&
+               own[edit.keep] == nodes[edit.keep])
+          ++edit.keep;
+        now.erase(at);
+      }
+      for (std::size_t n = edit.keep; n < nodes.size(); ++n) partition_.append(edit, nodes[n]);
+    }
+    for (const auto& [first, k] : now) edits_.emplace_back().track = static_cast<std::int32_t>(k);
+    bonds_.look_at(partition_, edits_);
+    bonds_.change();
+    partition_.apply(edits_);
+    is_best_ = true;
+    gain_ = most_;
+  }
+
+  // What has more than this log probability before the way back is weighed, is weighed to the end
+  // whether it will be taken or not, for whoever looks on.
+  void weigh_above(double log_p) { weighed_above_ = log_p; }
+  static constexpr double kOnlyWhatMayBeTaken = std::numeric_limits<double>::infinity();
+
+ private:
+  bool propose(const Toggle& toggle) {
+    if (!toggles_.propose(toggle, change_)) return false;
+    bonds_.look_at(partition_, change_.all());
+    change_.gain += bonds_.gain();
+    return true;
+  }
+
+  template <typename Seen>
+  bool take(double log_u, bool is_weighed, Seen&& seen) {
+    const bool is_taken = change_.log_ratio > log_u;
+    change_.p_taken = !is_weighed             ? is_taken
+                      : change_.log_ratio >= 0 ? 1
+                                               : std::exp(change_.log_ratio);
+    seen(std::as_const(change_), is_taken);
+    if (!is_taken) return false;
+    if (opt_.is_ascent) {
+      last_gain_ = best_gain_ + change_.gain;
+      if (!(change_.gain > 0)) return false;
+      best_gain_ = last_gain_;
+    }
+    if (is_best_ && change_.gain < 0) {
+      save();
+      is_best_ = false;
+    }
+    bonds_.change();
+    partition_.apply(change_.all());
+    gain_ += change_.gain;
+    is_best_ = is_best_ || gain_ > most_ + kBetter;
+    most_ = std::max(most_, gain_);
+    return true;
+  }
+
+  struct Shares {
+    std::array<double, kMoves> upto{}, log{};
+  };
+
+  Shares shares(int K) const {
+    std::array<double, kMoves> w = opt_.weights;
+    if (opt_.has_first_rules && K == 0) {
+      w.fill(0);
+      w[0] = 1;
+    }
+    if (opt_.has_first_rules && K == 1)
+      w[static_cast<int>(Move::merge)] = w[static_cast<int>(Move::switch_tails)] = 0;
+    double sum = 0;
+    for (const double x : w) sum += x;
+    Shares out;
+    double upto = 0;
+    for (int k = 0; k < kMoves; ++k) {
+      out.upto[k] = (upto += w[k] / sum);
+      out.log[k] = std::log(w[k] / sum);
+    }
+    return out;
+  }
+
+  void save() {
+    saved_.clear();
+    first_saved_.assign(1, 0);
+    for (const std::int32_t k : partition_.tracks().items()) {
+      const auto& nodes = partition_.track(k).nodes;
+      saved_.insert(saved_.end(), nodes.begin(), nodes.end());
+      first_saved_.push_back(static_cast<std::int32_t>(saved_.size()));
+    }
+  }
+
+  std::int32_t n_tracks_after() const {
+    std::int32_t n = partition_.tracks().size();
+    switch (change_.move) {
+      case Move::birth:
+      case Move::split: return n + 1;
+      case Move::death:
+      case Move::merge: return n - 1;
+      default: return n;
+    }
+  }
+
+  Partition<Filter> partition_;
+  ChainOptions opt_;
+  Random random_;
+  Moves<Filter> moves_{partition_, opt_.growth};
+  Toggles<Filter> toggles_{partition_};
+  BondTerm<Filter> bonds_;
+  Change<Filter> change_;
+  std::array<Shares, 3> shares_{};
+  std::array<MoveCounts, kMoves> counts_{};
+  // Ascent: log posterior of the best partition and of the last one taken, less that at the start.
+  double best_gain_ = 0, last_gain_ = 0;
+  double weighed_above_ = kOnlyWhatMayBeTaken;
+
+  // Since `begin_best`: what was won, the most of it, whether it is as good here as it ever was; and
+  // the tracks where it was best, if that is elsewhere.
+  static constexpr double kBetter = 1e-9;
+  double gain_ = 0, most_ = 0;
+  bool is_best_ = false;
+  std::vector<std::int32_t> saved_, first_saved_;
+  std::vector<Edit<Filter>> edits_;
+};
+
+}  // namespace asterism

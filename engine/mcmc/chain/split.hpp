@@ -1,0 +1,165 @@
+// A partition taken apart into groups of tracks and free detections, over each of which a chain can
+// walk alone.
+//
+//   whole       one group
+//   likelihood  joined by links in doubt: what no plausible link joins has nothing to decide
+//   cells       by cells of space (§4.2 of the report), which are shifted by half in every other frame
+//               so that no border stays
+//   clusters    joined where they are nearer to each other than some distance (ibid.)
+//
+// A track is in the group, or cell, of its last detection: none is cut.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "filter/gating.hpp"
+#include "math/union_find.hpp"
+#include "mcmc/chain/ambiguous_links.hpp"
+#include "mcmc/model/partition.hpp"
+
+namespace asterism {
+
+enum class SplitBy : std::int32_t { whole, likelihood, cells, clusters };
+
+struct SplitOptions {
+  SplitBy by = SplitBy::likelihood;
+  double doubt = 10;     // nats: links that are less probable than others by more are no doubt
+  double distance = 0;   // edge of a cell, or of what is in one cluster
+};
+
+struct Group {
+  std::vector<std::int32_t> tracks, free;
+  std::vector<Doubts::Link> doubts;
+  std::int64_t n_new = 0;   // tracks and free detections that are seen in the newest frame
+  std::int64_t n_open = 0;  // detections that are not settled
+};
+
+struct Split {
+  std::vector<Group> groups;  // those in which something may change
+  std::int64_t n_all = 0;
+  std::int64_t n_cut = 0;  // links in doubt between groups
+};
+
+template <typename Filter>
+class Splitter {
+ public:
+  Splitter(const Partition<Filter>& partition, const SplitOptions& options)
+      : p_(partition), opt_(options) {}
+
+  // Tracks that are `sure` are left out.
+  Split split(const Doubts& doubts, const std::vector<char>& is_sure) {
+    list(is_sure);
+    UnionFind sets(items_.size());
+    switch (opt_.by) {
+      case SplitBy::whole:
+        for (std::size_t n = 1; n < items_.size(); ++n) sets.join(0, static_cast<std::int32_t>(n));
+        break;
+      case SplitBy::likelihood:
+        doubts.each([&](std::int32_t i, std::int32_t j) { join(sets, i, j); });
+        break;
+      case SplitBy::cells: join_cells(sets); break;
+      case SplitBy::clusters: join_clusters(sets); break;
+    }
+    return collect(sets, doubts);
+  }
+
+ private:
+  struct Item {
+    std::int32_t track = -1, detection = -1;  // the last of the track, or a free one
+  };
+
+  void list(const std::vector<char>& is_sure) {
+    const DetectionWindow& window = p_.window();
+    items_.clear();
+    item_of_.assign(window.n_ids(), -1);
+    item_of_track_.clear();
+    for (const std::int32_t k : p_.tracks().items()) {
+      if (static_cast<std::int32_t>(item_of_track_.size()) <= k) item_of_track_.resize(k + 1, -1);
+      if (k < static_cast<std::int32_t>(is_sure.size()) && is_sure[k]) continue;
+      item_of_track_[k] = static_cast<std::int32_t>(items_.size());
+      items_.push_back({k, p_.last(k)});
+    }
+    for (const std::int32_t i : p_.free().items()) {
+      item_of_[i] = static_cast<std::int32_t>(items_.size());
+      items_.push_back({-1, i});
+    }
+  }
+  // The item that a detection belongs to; -1 of what is settled as clutter, or sure.
+  std::int32_t item(std::int32_t i) const {
+    const std::int32_t k = p_.track_of(i);
+    return k >= 0 ? item_of_track_[k] : k == kFree ? item_of_[i] : -1;
+  }
+  void join(UnionFind& sets, std::int32_t i, std::int32_t j) const {
+    const std::int32_t a = item(i), b = item(j);
+    if (a >= 0 && b >= 0) sets.join(a, b);
+  }
+
+  void join_cells(UnionFind& sets) const {
+    const double shift = p_.window().now() % 2 == 0 ? 0 : 0.5;
+    std::map<std::array<double, kMaxAxes>, std::int32_t> first;
+    for (std::int32_t n = 0; n < static_cast<std::int32_t>(items_.size()); ++n) {
+      std::array<double, kMaxAxes> cell{};
+      const Point& y = p_.window()[items_[n].detection].y;
+      for (int d = 0; d < p_.motion().axis.D; ++d)
+        cell[d] = std::floor(y[d] / opt_.distance + shift);
+      sets.join(first.try_emplace(cell, n).first->second, n);
+    }
+  }
+  void join_clusters(UnionFind& sets) const {
+    std::vector<Point> places;
+    for (const Item& item : items_) places.push_back(p_.window()[item.detection].y);
+    PointGrid grid;
+    grid.build(places, p_.motion().axis.D, opt_.distance);
+    for (std::int32_t n = 0; n < static_cast<std::int32_t>(items_.size()); ++n)
+      grid.within(places[n], opt_.distance, [&](std::int32_t other, double) { sets.join(n, other); });
+  }
+
+  Split collect(UnionFind& sets, const Doubts& doubts) const {
+    Split out;
+    std::vector<char> is_open(items_.size(), opt_.by != SplitBy::likelihood);
+    doubts.each([&](std::int32_t, std::int32_t j) {
+      if (item(j) >= 0) is_open[sets.find(item(j))] = true;
+    });
+    std::vector<std::int32_t> group_of(items_.size(), -1);
+    for (std::int32_t n = 0; n < static_cast<std::int32_t>(items_.size()); ++n) {
+      const std::int32_t root = sets.find(n);
+      out.n_all += root == n;
+      if (!is_open[root]) continue;
+      if (group_of[root] < 0) {
+        group_of[root] = static_cast<std::int32_t>(out.groups.size());
+        out.groups.emplace_back();
+      }
+      Group& group = out.groups[group_of[root]];
+      const Item& item = items_[n];
+      if (item.track >= 0) {
+        group.tracks.push_back(item.track);
+        group.n_open += p_.track(item.track).size() - p_.track(item.track).n_frozen;
+      } else {
+        group.free.push_back(item.detection);
+        ++group.n_open;
+      }
+      group.n_new += p_.window()[item.detection].frame == p_.window().now();
+    }
+    doubts.each([&](std::int32_t i, std::int32_t j) {
+      const std::int32_t a = item(i), b = item(j);
+      if (a < 0 || b < 0) return;
+      if (sets.find(a) == sets.find(b))
+        out.groups[group_of[sets.find(a)]].doubts.push_back({i, j});
+      else
+        ++out.n_cut;
+    });
+    return out;
+  }
+
+  const Partition<Filter>& p_;
+  SplitOptions opt_;
+  std::vector<Item> items_;
+  std::vector<std::int32_t> item_of_, item_of_track_;
+};
+
+}  // namespace asterism

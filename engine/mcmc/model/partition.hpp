@@ -1,0 +1,453 @@
+// A partition of a window's detections into tracks and clutter, and its log posterior.
+//
+// Every detection in a track keeps the track's state right after it and the score up to it. A
+// detection is in one track at most, so that this is all there is to know of every prefix: to end a
+// track earlier costs nothing, to lengthen it only what is new.
+//
+// Frames up to `frozen` are settled: their detections stay where they are.
+//
+// A partition may be of a block of frames in a longer capture. The tracks that go on after the block
+// then end in a *continuation*: the next detection of the track, with those after it, by which the
+// track is weighed as a whole. It may follow other tracks, and has to stay in one.
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "math/index_set.hpp"
+#include "mcmc/model/detection_window.hpp"
+#include "mcmc/model/path_filter.hpp"
+
+namespace asterism {
+
+inline constexpr std::int32_t kFree = -1;     // in no track
+inline constexpr std::int32_t kClutter = -2;  // in none, and settled
+
+// What follows in a track after some of its detections are kept.
+template <typename Filter>
+struct Tail {
+  std::vector<std::int32_t> nodes;
+  std::vector<typename Filter::State> states;
+  std::vector<double> scores;
+
+  void clear() {
+    nodes.clear();
+    states.clear();
+    scores.clear();
+  }
+};
+
+// A track that keeps its first detections and goes on with a tail; a new one has no number.
+template <typename Filter>
+struct Edit {
+  std::int32_t track = -1;
+  std::int32_t keep = 0;
+  Tail<Filter> tail;
+};
+
+// What a track does after its continuation: detections that follow it whatever is before it.
+struct LaterPoint {
+  std::int64_t frame = 0;
+  Point y{};
+};
+using LaterPoints = std::shared_ptr<const std::vector<LaterPoint>>;
+
+template <typename Filter>
+class Partition {
+ public:
+  using State = typename Filter::State;
+  struct Track {
+    std::vector<std::int32_t> nodes;
+    std::int32_t n_frozen = 0;
+    std::int32_t n_gone = 0;  // detections before the first, which have left the window
+    std::int64_t id = -1;     // by which the outside knows it, once something of it is settled
+
+    std::int32_t size() const { return static_cast<std::int32_t>(nodes.size()); }
+    std::int32_t whole_size() const { return n_gone + size(); }
+    // Place of the last that is settled, from which the rest goes on; 0 where nothing is.
+    std::int32_t first_open() const { return std::max(n_frozen - 1, 0); }
+  };
+
+  Partition(const MotionModel& m, const ScoreModel& sm)
+      : Partition(m, sm, std::make_shared<const std::vector<double>>(log_end_table(sm, kEndTable))) {}
+
+  // One of the same model, with nothing in it.
+  Partition empty() const { return Partition(m_, sm_, log_end_); }
+
+  const DetectionWindow& window() const { return window_; }
+  Filter& filter() const { return filter_; }  // it only remembers what it would give anyway
+  const MotionModel& motion() const { return m_; }
+  const ScoreModel& model() const { return sm_; }
+
+  // The number of a track is its own until a change removes it; then it is another's.
+  const Track& track(std::int32_t k) const {
+    assert(all_.has(k));
+    return tracks_[k];
+  }
+  void set_id(std::int32_t k, std::int64_t id) {
+    assert(all_.has(k));
+    tracks_[k].id = id;
+  }
+  std::int32_t track_of(std::int32_t i) const { return track_of_[i]; }
+  std::int32_t place_of(std::int32_t i) const { return place_[i]; }
+  bool is_free(std::int32_t i) const { return track_of_[i] == kFree; }
+  bool is_frozen(std::int32_t i) const { return window_[i].frame <= frozen_; }
+  bool is_continuation(std::int32_t i) const { return window_[i].frame > window_.last_open(); }
+  const State& state(std::int32_t i) const { return state_[i]; }
+  double score(std::int32_t i) const { return score_[i]; }
+
+  // Detections that are in no track, in one, and in one with another before them; all not frozen.
+  const IndexSet& free() const { return free_; }
+  const IndexSet& taken() const { return taken_; }
+  const IndexSet& linked() const { return linked_; }
+  // Of these, the ones before which their track was missed in some frame.
+  const IndexSet& leapt() const { return leapt_; }
+  // Tracks, and those of which nothing is frozen.
+  const IndexSet& tracks() const { return all_; }
+  const IndexSet& young() const { return young_; }
+
+  std::int32_t last(std::int32_t k) const { return track(k).nodes.back(); }
+  // The detection before or after in the track, -1 where there is none.
+  std::int32_t before(std::int32_t i) const {
+    return place_[i] > 0 ? track(track_of_[i]).nodes[place_[i] - 1] : -1;
+  }
+  std::int32_t after(std::int32_t i) const {
+    const Track& t = track(track_of_[i]);
+    return place_[i] + 1 < t.size() ? t.nodes[place_[i] + 1] : -1;
+  }
+
+  double begin_score() const { return sm_.log_birth + sm_.log_detect - sm_.log_clutter; }
+  double gap_score(int gap) const {
+    return sm_.log_misses(0, gap - 1) + sm_.log_seen(gap - 1) - sm_.log_clutter + gap * sm_.log_survive;
+  }
+  double end_score(std::int32_t i) const {
+    if (is_continuation(i)) return 0;  // how the track ends is as it is
+    const std::int64_t left = window_.now() + n_after_ - window_[i].frame;
+    return (*log_end_)[std::min(left, kEndTable)];
+  }
+  double score_of(std::int32_t k) const {
+    const std::int32_t i = last(k);
+    return score_[i] + end_score(i);
+  }
+  double score_of(const Edit<Filter>& edit) const {
+    if (!edit.tail.nodes.empty()) return edit.tail.scores.back() + end_score(edit.tail.nodes.back());
+    if (edit.keep == 0) return 0;
+    const std::int32_t i = tracks_[edit.track].nodes[edit.keep - 1];
+    return score_[i] + end_score(i);
+  }
+  double log_posterior() const {
+    double sum = 0;
+    for (const std::int32_t k : all_.items()) sum += score_of(k);
+    return sum;
+  }
+
+  // Adds a detection to the tail of an edit, with all that follows from it.
+  void append(Edit<Filter>& edit, std::int32_t j) const {
+    Tail<Filter>& tail = edit.tail;
+    State& state = tail.states.emplace_back();
+    if (edit.keep == 0 && tail.nodes.empty()) {
+      state = filter_.begin(m_, window_[j].y, window_[j].frame);
+      tail.scores.push_back(begin_score());
+    } else {
+      const bool is_first = tail.nodes.empty();
+      const std::int32_t i =
+          is_first ? tracks_[edit.track].nodes[edit.keep - 1] : tail.nodes.back();
+      const State& from = is_first ? state_[i] : tail.states[tail.states.size() - 2];
+      const int gap = static_cast<int>(window_[j].frame - window_[i].frame);
+      filter_.expect(m_, window_, from, window_[i].frame, gap, expected_);
+      const double gain = gap_score(gap) + filter_.take(m_, expected_, window_[j].y, state);
+      tail.scores.push_back((is_first ? score_[i] : tail.scores.back()) + gain);
+    }
+    tail.nodes.push_back(j);
+    if (is_continuation(j)) tail.scores.back() += go_on(j, state);
+  }
+  // Whether edits leave every continuation in a track.
+  bool keeps_continuations(std::span<const Edit<Filter>> edits) const {
+    for (const Edit<Filter>& edit : edits) {
+      if (edit.track < 0 || edit.keep == track(edit.track).size()) continue;
+      const std::int32_t end = last(edit.track);
+      if (is_continuation(end) && std::ranges::none_of(edits, [&](const Edit<Filter>& other) {
+            return !other.tail.nodes.empty() && other.tail.nodes.back() == end;
+          }))
+        return false;
+    }
+    return true;
+  }
+
+  // The same for the detection that follows in the track now, where the edit changes nothing before.
+  void append_same(Edit<Filter>& edit, std::int32_t j) const {
+    edit.tail.nodes.push_back(j);
+    edit.tail.states.push_back(state_[j]);
+    edit.tail.scores.push_back(score_[j]);
+  }
+
+  // Takes the edits over. A track that keeps nothing is gone, its number free for others.
+  void apply(std::span<Edit<Filter>> edits) {
+    for (Edit<Filter>& edit : edits) {
+      if (edit.track < 0) {
+        edit.track = new_track();
+        continue;
+      }
+      assert(all_.has(edit.track));
+      Track& t = tracks_[edit.track];
+      assert(edit.keep >= t.n_frozen && edit.keep <= t.size());
+      for (std::int32_t p = edit.keep; p < t.size(); ++p) release(t.nodes[p]);
+      t.nodes.resize(edit.keep);
+    }
+    for (const Edit<Filter>& edit : edits) {
+      Track& t = tracks_[edit.track];
+      for (std::size_t n = 0; n < edit.tail.nodes.size(); ++n) {
+        const std::int32_t i = edit.tail.nodes[n];
+        assert(is_free(i));
+        free_.remove(i);
+        put(edit.track, i, edit.tail.states[n], edit.tail.scores[n]);
+      }
+      if (t.nodes.empty()) remove_track(edit.track);
+    }
+  }
+
+  // Settles all frames up to this one.
+  void freeze(std::int64_t frame) {
+    for (std::int64_t t = std::max(frozen_ + 1, window_.first()); t <= frame; ++t)
+      for (const std::int32_t i : window_.frame(t).ids) {
+        free_.remove(i);
+        taken_.remove(i);
+        linked_.remove(i);
+        leapt_.remove(i);
+        const std::int32_t k = track_of_[i];
+        if (k == kFree) track_of_[i] = kClutter;
+        if (k < 0) continue;
+        ++tracks_[k].n_frozen;
+        young_.remove(k);
+      }
+    frozen_ = std::max(frozen_, frame);
+  }
+  std::int64_t frozen() const { return frozen_; }
+
+  // Becomes the part of a partition that has some of its tracks and free detections: everything that
+  // is open of them, and of what is settled the last of each track.
+  void take_part(const Partition& whole, std::span<const std::int32_t> tracks,
+                 std::span<const std::int32_t> free) {
+    frozen_ = whole.frozen_;
+    n_after_ = whole.n_after_;
+    later_.clear();
+    origin_.clear();
+    for (const std::int32_t k : tracks) {
+      const Track& t = whole.tracks_[k];
+      origin_.insert(origin_.end(), t.nodes.begin() + t.first_open(), t.nodes.end());
+    }
+    origin_.insert(origin_.end(), free.begin(), free.end());
+    window_.take_part(whole.window_, origin_);
+    filter_.remember(window_);
+    clear(static_cast<std::int32_t>(origin_.size()));
+    std::int32_t i = 0;
+    for (const std::int32_t k : tracks) {
+      const Track& t = whole.tracks_[k];
+      const std::int32_t own = new_track();
+      tracks_[own].n_frozen = std::min(t.n_frozen, 1);
+      tracks_[own].n_gone = t.n_gone + t.first_open();
+      if (t.n_frozen > 0) young_.remove(own);
+      for (std::int32_t p = t.first_open(); p < t.size(); ++p, ++i)
+        adopt(own, i, whole.state_[t.nodes[p]], whole.score_[t.nodes[p]]);
+      if (is_continuation(i - 1)) later_[i - 1] = whole.later_.at(t.nodes.back());
+    }
+    for (; i < static_cast<std::int32_t>(origin_.size()); ++i) free_.add(i);
+  }
+  // Number of a detection in the whole; its own in what is no part.
+  std::int32_t origin(std::int32_t i) const { return origin_.empty() ? i : origin_[i]; }
+
+  // Takes over what a part, which was taken of these tracks, has come to.
+  void take_over(const Partition& part, std::span<const std::int32_t> tracks) {
+    std::unordered_map<std::int32_t, std::int32_t> by_first;
+    for (const std::int32_t k : tracks)
+      by_first[tracks_[k].nodes[tracks_[k].first_open()]] = k;
+    std::vector<Edit<Filter>> edits;
+    for (const std::int32_t p : part.all_.items()) {
+      const auto& nodes = part.tracks_[p].nodes;
+      Edit<Filter> edit;
+      std::size_t same = 0;
+      if (const auto at = by_first.find(part.origin_[nodes.front()]); at != by_first.end()) {
+        edit.track = at->second;
+        const Track& own = tracks_[edit.track];
+        edit.keep = own.first_open();
+        while (same < nodes.size() && edit.keep < own.size() &&
+               own.nodes[edit.keep] == part.origin_[nodes[same]]) {
+          ++same;
+          ++edit.keep;
+        }
+        by_first.erase(at);
+        if (same == nodes.size() && edit.keep == own.size()) continue;
+      }
+      for (; same < nodes.size(); ++same) {
+        edit.tail.nodes.push_back(part.origin_[nodes[same]]);
+        filter_.adopt(edit.tail.states.emplace_back(part.state_[nodes[same]]));
+        edit.tail.scores.push_back(part.score_[nodes[same]]);
+      }
+      edits.push_back(std::move(edit));
+    }
+    for (const std::int32_t k : tracks)
+      if (by_first.contains(tracks_[k].nodes[tracks_[k].first_open()])) edits.emplace_back().track = k;
+    apply(edits);
+  }
+
+  // A block of a longer capture ends with this frame; so many frames of the capture come after the
+  // last of the window.
+  void close_after(std::int64_t frame, std::int64_t n_after) {
+    window_.close_after(frame);
+    n_after_ = n_after;
+  }
+  // A detection after the block, before it is put into a track, goes on with these.
+  void continue_with(std::int32_t i, LaterPoints later) {
+    free_.remove(i);
+    later_[i] = std::move(later);
+  }
+  // A track that begins with a settled detection, in a state that is known; or goes on with it, where
+  // others were before.
+  std::int32_t add_settled(std::int32_t i, const State& state, bool has_others_before) {
+    const std::int32_t k = new_track();
+    free_.remove(i);
+    adopt(k, i, state, 0);
+    tracks_[k].n_gone = has_others_before;
+    return k;
+  }
+
+  // Forgets the oldest frame, which is settled.
+  void drop_frame() {
+    for (const std::int32_t i : window_.frame(window_.first()).ids) {
+      const std::int32_t k = track_of_[i];
+      if (k < 0) continue;
+      Track& t = tracks_[k];
+      t.nodes.erase(t.nodes.begin());
+      --t.n_frozen;
+      ++t.n_gone;
+      for (const std::int32_t j : t.nodes) --place_[j];
+      if (t.nodes.empty()) remove_track(k);
+    }
+    window_.drop();
+  }
+
+  std::span<const std::int32_t> add_frame(double time, const MotionStep& step,
+                                          std::span<const Point> points, std::int64_t number) {
+    const auto ids = window_.add(time, step, points, number);
+    reserve_up_to(window_.n_ids());
+    for (const std::int32_t i : ids) {
+      track_of_[i] = kFree;
+      free_.add(i);
+    }
+    return ids;
+  }
+
+ private:
+  static constexpr std::int64_t kEndTable = 4096;
+
+  Partition(const MotionModel& m, const ScoreModel& sm,
+            std::shared_ptr<const std::vector<double>> log_end)
+      : m_(m), sm_(sm), window_(m, sm), log_end_(std::move(log_end)) {}
+
+  // The state of a track beyond its continuation, and what that adds to its score but for gaps, which
+  // stay as they are.
+  double go_on(std::int32_t i, State& state) const {
+    double gain = 0;
+    std::int64_t frame = window_[i].frame;
+    for (const LaterPoint& next : *later_.at(i)) {
+      const State from = state;
+      filter_.expect(m_, window_, from, frame, static_cast<int>(next.frame - frame), expected_);
+      gain += filter_.take(m_, expected_, next.y, state);
+      frame = next.frame;
+    }
+    return gain;
+  }
+
+  void reserve_up_to(std::int32_t n) {
+    if (static_cast<std::int32_t>(track_of_.size()) >= n) return;
+    track_of_.resize(n, kFree);
+    place_.resize(n);
+    state_.resize(n);
+    score_.resize(n);
+    for (IndexSet* set : {&free_, &taken_, &linked_, &leapt_}) set->reserve_up_to(n);
+  }
+  // No tracks, and n detections of which nothing is known.
+  void clear(std::int32_t n) {
+    for (IndexSet* set : {&free_, &taken_, &linked_, &leapt_, &all_, &young_}) set->clear();
+    reserve_up_to(n);
+    std::fill_n(track_of_.begin(), n, kFree);
+    unused_.clear();
+    for (std::int32_t k = static_cast<std::int32_t>(tracks_.size()) - 1; k >= 0; --k) {
+      tracks_[k].nodes.clear();
+      unused_.push_back(k);
+    }
+  }
+
+  // A detection at the end of a track.
+  void put(std::int32_t k, std::int32_t i, const State& state, double score) {
+    track_of_[i] = k;
+    place_[i] = tracks_[k].size();
+    state_[i] = state;
+    score_[i] = score;
+    tracks_[k].nodes.push_back(i);
+    if (!is_frozen(i)) list(i);
+  }
+  void adopt(std::int32_t k, std::int32_t i, const State& state, double score) {
+    put(k, i, state, score);
+    filter_.adopt(state_[i]);
+  }
+  // Into the sets of what may change.
+  void list(std::int32_t i) {
+    taken_.add(i);
+    if (place_[i] == 0) return;
+    linked_.add(i);
+    if (window_[i].frame - window_[before(i)].frame > 1) leapt_.add(i);
+  }
+  void release(std::int32_t i) {
+    track_of_[i] = kFree;
+    taken_.remove(i);
+    linked_.remove(i);
+    leapt_.remove(i);
+    free_.add(i);
+  }
+  std::int32_t new_track() {
+    std::int32_t k = static_cast<std::int32_t>(tracks_.size());
+    if (unused_.empty()) {
+      tracks_.emplace_back();
+      all_.reserve_up_to(k + 1);
+      young_.reserve_up_to(k + 1);
+    } else {
+      k = unused_.back();
+      unused_.pop_back();
+    }
+    tracks_[k].n_frozen = tracks_[k].n_gone = 0;
+    tracks_[k].id = -1;
+    all_.add(k);
+    young_.add(k);
+    return k;
+  }
+  void remove_track(std::int32_t k) {
+    all_.remove(k);
+    young_.remove(k);
+    unused_.push_back(k);
+  }
+
+  MotionModel m_;
+  ScoreModel sm_;
+  DetectionWindow window_;
+  std::shared_ptr<const std::vector<double>> log_end_;
+  std::int64_t frozen_ = -1;
+  std::int64_t n_after_ = 0;  // frames of the capture after the window
+  std::unordered_map<std::int32_t, LaterPoints> later_;  // of continuations
+  std::vector<Track> tracks_;
+  std::vector<std::int32_t> unused_;
+  IndexSet free_, taken_, linked_, leapt_, all_, young_;
+  std::vector<std::int32_t> track_of_, place_;
+  std::vector<State> state_;
+  std::vector<double> score_;
+  mutable Filter filter_;
+  mutable typename Filter::Expected expected_{};  // while one is asked for
+  std::vector<std::int32_t> origin_;  // of a part: numbers of its detections in the whole
+};
+
+}  // namespace asterism

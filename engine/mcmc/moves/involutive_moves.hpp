@@ -1,0 +1,148 @@
+// Moves at given detections that are their own inverses: as long as a list of them stays, each is drawn
+// as often in ω as in ω', and the gain alone decides.
+//
+//   trade     x and y, of which one at least is in a track, in each other's place
+//   swap      two tracks change what they have from x and from y on
+//   relocate  y stands after a instead of after c, or back
+//   transfer  all from y on stands after a instead of after c, one of which is a track's last; or back
+//   begin     a is the first of the track that had y as its first, or of a new one of both; or back
+//   skip      y, which stands between a and c, is taken out, or put back; without c, y is the last
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "mcmc/model/partition.hpp"
+#include "mcmc/moves/change.hpp"
+#include "mcmc/moves/track_edits.hpp"
+
+namespace asterism {
+
+struct Toggle {
+  enum class Kind { trade, swap, relocate, transfer, begin, skip };
+  Kind kind = Kind::trade;
+  std::int32_t y = 0, a = 0, c = 0;  // for the first two a stands for x
+};
+
+template <typename Filter>
+class Toggles {
+ public:
+  explicit Toggles(const Partition<Filter>& partition) : p_(partition), splices_(partition) {}
+
+  // False where it leads nowhere.
+  bool propose(const Toggle& t, Change<Filter>& out) const {
+    out.n_edits = 0;
+    out.log_forward = out.log_reverse = 0;
+    if (!draw(t, out) || !p_.keeps_continuations(out.all())) return false;
+    splices_.weigh(out);
+    return true;
+  }
+
+ private:
+  bool draw(const Toggle& t, Change<Filter>& out) const {
+    switch (t.kind) {
+      case Toggle::Kind::trade: return trade(t.a, t.y, out);
+      case Toggle::Kind::swap: return swap(t.a, t.y, out);
+      case Toggle::Kind::relocate: return relocate(t.y, other(t), out);
+      case Toggle::Kind::transfer: return transfer(t.y, other(t), out);
+      case Toggle::Kind::begin: return begin(t.a, t.y, out);
+      case Toggle::Kind::skip: return skip(t.y, t.a, t.c, out);
+    }
+    return false;
+  }
+  bool is_taken(std::int32_t i) const { return p_.taken().has(i); }
+
+  bool trade(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
+    if (is_taken(x) && is_taken(y))
+      return p_.track_of(x) != p_.track_of(y) && splices_.exchange(x, y, q);
+    // One that is settled is neither taken nor free, and stays where it is.
+    if (is_taken(x) && p_.is_free(y)) return splices_.replace(x, y, q);
+    if (is_taken(y) && p_.is_free(x)) return splices_.replace(y, x, q);
+    return false;
+  }
+
+  bool swap(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
+    if (!is_taken(x) || !is_taken(y)) return false;
+    const std::int32_t k = p_.track_of(x), l = p_.track_of(y);
+    if (k == l || !goes_on(y, x) || !goes_on(x, y)) return false;
+    splices_.append(q.edit(k, p_.place_of(x)), l, p_.place_of(y));
+    splices_.append(q.edit(l, p_.place_of(y)), k, p_.place_of(x));
+    return true;
+  }
+  // Whether a track may go on with y in place of x; as its first y must not be its last.
+  bool goes_on(std::int32_t y, std::int32_t x) const {
+    const std::int32_t i = p_.before(x);
+    return i < 0 ? p_.after(y) >= 0 : p_.window().is_linkable(i, y);
+  }
+
+  // After whom y stands if it does not after whom it does now; -1 where that is neither, or in the
+  // same track.
+  std::int32_t other(const Toggle& t) const {
+    if (!is_taken(t.y)) return -1;
+    const std::int32_t now = p_.before(t.y);
+    const std::int32_t to = now == t.c ? t.a : now == t.a ? t.c : -1;
+    if (to < 0 || p_.track_of(to) < 0 || p_.track_of(to) == p_.track_of(t.y)) return -1;
+    return p_.window().is_linkable(to, t.y) ? to : -1;
+  }
+
+  bool relocate(std::int32_t y, std::int32_t to, Change<Filter>& q) const {
+    if (to < 0 || !splices_.may_go(y)) return false;
+    const std::int32_t next = p_.after(to);
+    if (next >= 0 && !p_.window().is_linkable(y, next)) return false;
+    splices_.take_out(y, q);
+    splices_.put_in(y, p_.track_of(to), p_.place_of(to) + 1, q);
+    return true;
+  }
+
+  bool transfer(std::int32_t y, std::int32_t to, Change<Filter>& q) const {
+    const std::int32_t k = p_.track_of(y);
+    if (to < 0 || p_.after(to) >= 0 || p_.track(k).n_gone + p_.place_of(y) < 2) return false;
+    q.edit(k, p_.place_of(y));
+    splices_.append(q.edit(p_.track_of(to), p_.place_of(to) + 1), k, p_.place_of(y));
+    return true;
+  }
+
+  bool begin(std::int32_t a, std::int32_t y, Change<Filter>& q) const {
+    if (p_.is_free(a)) {
+      if (p_.is_free(y)) {
+        Edit<Filter>& e = q.edit(-1, 0);
+        p_.append(e, a);
+        p_.append(e, y);
+        return true;
+      }
+      if (!is_taken(y) || !is_first(y)) return false;
+      Edit<Filter>& e = q.edit(p_.track_of(y), 0);
+      p_.append(e, a);
+      splices_.append(e, e.track, 0);
+      return true;
+    }
+    if (!is_taken(a) || !is_first(a) || p_.after(a) != y) return false;
+    const std::int32_t k = p_.track_of(a);
+    Edit<Filter>& e = q.edit(k, 0);
+    if (p_.track(k).size() > 2) splices_.append(e, k, 1);
+    return true;
+  }
+
+  bool skip(std::int32_t y, std::int32_t a, std::int32_t c, Change<Filter>& q) const {
+    if (is_taken(y)) {
+      if (p_.before(y) != a || p_.after(y) != c || !splices_.may_go(y)) return false;
+      splices_.take_out(y, q);
+      return true;
+    }
+    const std::int32_t k = p_.track_of(a);
+    if (!p_.is_free(y) || k < 0 || p_.after(a) != c || !p_.window().is_linkable(a, y) ||
+        (c >= 0 && !p_.window().is_linkable(y, c)))
+      return false;
+    splices_.put_in(y, k, p_.place_of(a) + 1, q);
+    return true;
+  }
+
+  bool is_first(std::int32_t i) const {
+    return p_.place_of(i) == 0 && p_.track(p_.track_of(i)).n_gone == 0;
+  }
+
+  const Partition<Filter>& p_;
+  Splices<Filter> splices_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,256 @@
+// MCMC data association over a whole capture: chains in overlapping blocks of frames, each given all
+// that is before and after it.
+//
+//   ....ffff|oooooooooooooooo|cccccc....
+//           a              b
+//
+//   o  open: the frames a to b of the block, in which the chains may change everything
+//   f  of each track the last detection before the block, with its filter state
+//   c  of each track that goes on the next detection after the block, by which it is weighed together
+//      with those in the kAfter frames that follow (Partition::continue_with)
+//
+// A filter forgets what was kAfter frames ago, so that a move within a block changes the log posterior
+// of the capture by what it changes that of the block. Blocks overlap by half: each link is well inside
+// one of them. The cost of a move does not depend on the length of the capture.
+//
+// The tracks are kept as links between detections, which have their numbers in order of arrival.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "mcmc/chain/ambiguous_links.hpp"
+#include "mcmc/chain/budgets.hpp"
+#include "mcmc/chain/split.hpp"
+#include "mcmc/model/partition.hpp"
+
+namespace asterism {
+
+template <typename Filter>
+class CaptureSweep {
+ public:
+  using Link = Doubts::Link;
+  // The open frames of a block, and its part of the work.
+  struct Block {
+    std::int64_t first = 0, last = 0, next = 0;  // `next`: where the next block begins
+    bool is_first = true, is_last = true;
+  };
+  // A block as a partition. Its detections have numbers of their own; `numbers` are those of the capture.
+  struct Part {
+    Partition<Filter> partition;
+    Doubts doubts;
+    std::vector<std::int32_t> numbers;
+  };
+
+  // Blocks are `n_frames` long, or longer where tracks leap over many frames.
+  CaptureSweep(std::int64_t n_frames, int max_gap)
+      : n_block_(std::max<std::int64_t>(n_frames, 4 * std::int64_t{max_gap})), max_gap_(max_gap) {}
+
+  void add_frame(double time, const MotionStep& step, std::span<const Point> points) {
+    frames_.push_back({time, step, n_points()});
+    points_.insert(points_.end(), points.begin(), points.end());
+    labels_.resize(points_.size(), -1);
+    doubts_.emplace_back();
+  }
+  // A link in doubt that leads into the newest frame, or a label; of detections by number.
+  void add_doubt(std::int64_t from, std::int64_t to) {
+    doubts_.back().push_back({static_cast<std::int32_t>(from), static_cast<std::int32_t>(to)});
+  }
+  void set_label(std::int64_t detection, std::int64_t label) { labels_[detection] = label; }
+
+  // Begins with the tracks that the labels say.
+  void link_labels() {
+    before_.assign(points_.size(), kNone);
+    after_.assign(points_.size(), kNone);
+    std::unordered_map<std::int64_t, std::int32_t> last;
+    for (std::int32_t i = 0; i < n_points(); ++i) {
+      if (labels_[i] < 0) continue;
+      const auto [at, is_new] = last.try_emplace(labels_[i], i);
+      if (!is_new) link(std::exchange(at->second, i), i);
+    }
+  }
+
+  std::vector<Block> blocks() const {
+    const auto T = static_cast<std::int64_t>(frames_.size());
+    std::vector<Block> out;
+    for (std::int64_t first = 0;;) {
+      Block& block = out.emplace_back();
+      block.first = first;
+      block.last = std::min(first + n_block_, T) - 1;
+      block.is_first = first == 0;
+      block.is_last = block.last == T - 1;
+      block.next = block.is_last ? T : first + n_block_ / 2;
+      if (block.is_last) return out;
+      first = block.next;
+    }
+  }
+  // Open detections of all blocks, of which each may be in two, for one in the capture.
+  double overlap() const {
+    double all = 0;
+    for (const Block& block : blocks()) all += static_cast<double>(n_between(block.first, block.last));
+    return n_points() == 0 ? 1 : all / static_cast<double>(n_points());
+  }
+
+  // The block as it is linked now. Blocks are taken in order: the filter states at the beginning of
+  // each are those of the one before.
+  Part take(const Partition<Filter>& empty, const Block& block) {
+    Part part{empty.empty(), {}, {}};
+    Partition<Filter>& p = part.partition;
+    const auto T = static_cast<std::int64_t>(frames_.size());
+    const std::int64_t from = std::max<std::int64_t>(block.first - max_gap_, 0);
+    const std::int64_t to = std::min(block.last + std::max<std::int64_t>(kAfter, max_gap_), T - 1);
+    p.close_after(block.is_last ? T : block.last - from, T - 1 - to);
+    local_.clear();
+    std::vector<std::int32_t> some;
+    std::vector<Point> places;
+    for (std::int64_t t = from; t <= to; ++t) {
+      some.clear();
+      places.clear();
+      for (std::int32_t i = frames_[t].begin; i < end_of(t); ++i)
+        if (belongs(block, t, i)) {
+          some.push_back(i);
+          places.push_back(points_[i]);
+        }
+      const auto ids = p.add_frame(frames_[t].time, frames_[t].step, places, frames_[t].begin);
+      for (std::size_t n = 0; n < some.size(); ++n) {
+        local_[some[n]] = ids[n];
+        part.numbers.push_back(some[n]);
+      }
+    }
+    add_tracks(block, from, to, part);
+    for (std::int64_t t = block.first; t <= std::min(block.last + max_gap_, T - 1); ++t) {
+      part.doubts.add_frame();
+      for (const Link& doubt : doubts_[t]) {
+        const auto a = local_.find(doubt.from), y = local_.find(doubt.to);
+        if (a != local_.end() && y != local_.end()) part.doubts.add(a->second, y->second);
+      }
+    }
+    return part;
+  }
+
+  // Links the detections of a block as it has them, and keeps the states that the next begins with.
+  void put_back(const Block& block, const Part& part) {
+    const Partition<Filter>& p = part.partition;
+    for (std::int32_t i = 0; i < p.window().n_ids(); ++i) {
+      const std::int32_t own = part.numbers[i];
+      if (!p.is_frozen(i)) before_[own] = kNone;
+      if (!p.is_continuation(i)) after_[own] = kNone;
+    }
+    for (const std::int32_t k : p.tracks().items()) {
+      const auto& nodes = p.track(k).nodes;
+      for (std::size_t n = 1; n < nodes.size(); ++n)
+        link(part.numbers[nodes[n - 1]], part.numbers[nodes[n]]);
+    }
+    keep_states(block, part);
+  }
+  void keep_states(const Block& block, const Part& part) {
+    states_.clear();
+    const Partition<Filter>& p = part.partition;
+    const std::int64_t next = block.next - (block.first - std::min<std::int64_t>(block.first, max_gap_));
+    for (const std::int32_t k : p.tracks().items())
+      for (const std::int32_t i : p.track(k).nodes)
+        if (p.window()[i].frame < next && p.window()[i].frame >= next - max_gap_)
+          states_.insert_or_assign(part.numbers[i], p.state(i));
+  }
+
+  // Labels the tracks as they are linked, in order of their first detections; returns how many they are.
+  std::int64_t read_labels() {
+    std::int64_t n = 0;
+    found_.resize(points_.size());
+    for (std::int32_t i = 0; i < n_points(); ++i)
+      found_[i] = before_[i] != kNone ? found_[before_[i]] : after_[i] != kNone ? n++ : -1;
+    return n;
+  }
+  // As they were read last.
+  std::span<const std::int64_t> labels() const { return found_; }
+  std::int32_t before(std::int64_t i) const { return before_[i]; }
+  std::int32_t after(std::int64_t i) const { return after_[i]; }
+  std::int64_t frame_of(std::int64_t i) const {
+    const auto at = std::ranges::upper_bound(frames_, i, {}, &Frame::begin);
+    return at - frames_.begin() - 1;
+  }
+
+ private:
+  static constexpr std::int32_t kNone = -1;
+  static constexpr std::int64_t kAfter = 50;  // frames
+
+  struct Frame {
+    double time = 0;
+    MotionStep step;
+    std::int32_t begin = 0;  // number of its first detection
+  };
+
+  std::int32_t n_points() const { return static_cast<std::int32_t>(points_.size()); }
+  std::int32_t end_of(std::int64_t t) const {
+    return t + 1 < static_cast<std::int64_t>(frames_.size()) ? frames_[t + 1].begin : n_points();
+  }
+  std::int64_t n_between(std::int64_t first, std::int64_t last) const {
+    return end_of(last) - frames_[first].begin;
+  }
+  void link(std::int32_t i, std::int32_t j) {
+    after_[i] = j;
+    before_[j] = i;
+  }
+  // All detections of the open frames; of those before and after, what tracks were and go on with.
+  bool belongs(const Block& block, std::int64_t t, std::int32_t i) const {
+    if (t < block.first)
+      return states_.contains(i) && (after_[i] == kNone || after_[i] >= frames_[block.first].begin);
+    if (t <= block.last) return true;
+    return before_[i] != kNone && before_[i] < end_of(block.last);
+  }
+  void add_tracks(const Block& block, std::int64_t from, std::int64_t to, Part& part) {
+    Partition<Filter>& p = part.partition;
+    std::vector<Edit<Filter>> edits;
+    const auto follow = [&](Edit<Filter>& edit, std::int32_t i) {
+      for (; i != kNone && local_.contains(i); i = after_[i]) {
+        if (i >= end_of(block.last)) p.continue_with(local_.at(i), later_points(i, from, to));
+        p.append(edit, local_.at(i));
+      }
+    };
+    // In order of their first detections.
+    for (std::int32_t i = frames_[from].begin; i < frames_[block.first].begin; ++i) {
+      const auto at = local_.find(i);
+      if (at == local_.end()) continue;
+      const std::int32_t k = p.add_settled(at->second, states_.at(i), before_[i] != kNone);
+      p.set_id(k, labels_[i]);
+    }
+    p.freeze(block.first - 1 - from);
+    for (const std::int32_t k : p.tracks().items()) {
+      Edit<Filter>& edit = edits.emplace_back();
+      edit.track = k;
+      edit.keep = 1;
+      follow(edit, after_[part.numbers[p.last(k)]]);
+    }
+    const std::size_t n_settled = edits.size();
+    for (std::int32_t i = frames_[block.first].begin; i < end_of(block.last); ++i)
+      if (before_[i] == kNone && after_[i] != kNone) follow(edits.emplace_back(), i);
+    p.apply(edits);
+    for (std::size_t e = n_settled; e < edits.size(); ++e)
+      p.set_id(edits[e].track, labels_[part.numbers[edits[e].tail.nodes.front()]]);
+  }
+  // What follows a continuation until the filter has forgotten the block.
+  LaterPoints later_points(std::int32_t i, std::int64_t from, std::int64_t to) const {
+    auto later = std::make_shared<std::vector<LaterPoint>>();
+    for (i = after_[i]; i != kNone && i < end_of(to); i = after_[i])
+      later->push_back({frame_of(i) - from, points_[i]});
+    return later;
+  }
+
+  std::int64_t n_block_;
+  int max_gap_;
+  std::vector<Frame> frames_;
+  std::vector<Point> points_;
+  std::vector<std::int64_t> labels_, found_;  // to begin with, and in the end
+  std::vector<std::vector<Link>> doubts_;  // by the frame they lead into
+  std::vector<std::int32_t> before_, after_;
+  std::unordered_map<std::int32_t, typename Filter::State> states_;  // where the next block begins
+  std::unordered_map<std::int32_t, std::int32_t> local_;  // numbers in the block, while it is taken
+};
+
+}  // namespace asterism

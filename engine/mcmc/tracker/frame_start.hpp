@@ -1,0 +1,216 @@
+// Where a walk begins in a new frame: the exact assignment of its detections to what the tracks expect,
+// or links that are given; and which links are in doubt.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "base/scratch.hpp"
+#include "mcmc/chain/ambiguous_links.hpp"
+#include "mcmc/chain/chain_stats.hpp"
+#include "mcmc/model/partition.hpp"
+#include "solve/assignment.hpp"
+#include "solve/connected_components.hpp"
+
+namespace asterism {
+
+// Labels of detections by number of arrival, from `first` on, -1 for none.
+struct GivenLabels {
+  std::int64_t first = 0;
+  std::vector<std::int64_t> labels;
+
+  std::int64_t of(std::int64_t number) const {
+    const std::int64_t at = number - first;
+    return at >= 0 && at < static_cast<std::int64_t>(labels.size()) ? labels[at] : -1;
+  }
+};
+
+template <typename Filter>
+class FrameStart {
+ public:
+  // A link is in doubt where it is less plausible than another by fewer nats than `doubt`.
+  FrameStart(bool has_assignment, double doubt) : has_assignment_(has_assignment), doubt_(doubt) {}
+
+  void give(GivenLabels labels) {
+    given_ = std::make_shared<const GivenLabels>(std::move(labels));
+    last_.clear();
+  }
+
+  // Takes the newest frame's detections into the partition; frames up to `settled` are.
+  void begin(Partition<Filter>& p, Doubts& doubts, ChainStats& stats, std::int64_t& n_candidates) {
+    doubts.add_frame();
+    list_ends(p);
+    give_links(p, stats);
+    list_candidates(p);
+    n_candidates = static_cast<std::int64_t>(s_.candidates.size());
+    const auto n_rows = static_cast<std::int32_t>(s_.rows.size());
+    const auto n_columns = static_cast<std::int32_t>(s_.row_given.size());
+    const Groups groups = connected_groups(s_.candidates, n_rows, n_columns);
+    s_.match.assign(n_rows, -1);
+    for (std::size_t g = 0; g < groups.size(); ++g) s_.assignment.solve(groups[g], s_.match);
+    for (std::int32_t j = 0; j < n_columns; ++j)
+      if (s_.row_given[j] >= 0) s_.match[s_.row_given[j]] = j;
+    const auto& ids = p.window().frame(p.window().now()).ids;
+    for (const auto* list : {&s_.candidates, &s_.others})
+      for (const Candidate& c : *list)
+        if (s_.match[c.row] != c.column || c.gain < doubt_)
+          doubts.add(p.last(s_.rows[c.row]), ids[c.column]);
+    for (std::int32_t r = 0; r < n_rows; ++r) {
+      const std::int32_t j = s_.match[r];
+      if (j < 0 || (!has_assignment_ && s_.row_given[j] != r)) continue;
+      Edit<Filter>& edit = s_.edits.emplace_back();
+      edit.track = s_.rows[r];
+      edit.keep = p.track(edit.track).size();
+      p.append(edit, ids[j]);
+    }
+    s_.unseen.clear();
+    for (std::int32_t r = 0; r < n_rows; ++r)
+      if (s_.match[r] < 0) s_.unseen.push_back(p.last(s_.rows[r]));
+    p.apply(s_.edits);  // from here on the numbers of tracks may be others'
+    doubt_births(p, doubts);
+    for (const std::int32_t last : s_.unseen) doubt_last(p, last, doubts);
+  }
+
+ private:
+  static constexpr std::int32_t kNone = -1, kNewTrack = -2;
+  struct Last {
+    std::int32_t detection = -1;
+    std::int64_t number = -1;
+  };
+
+  // Tracks that the frame may go on with.
+  void list_ends(const Partition<Filter>& p) {
+    const DetectionWindow& window = p.window();
+    s_.rows.clear();
+    s_.row_of.clear();
+    for (const std::int32_t k : p.tracks().items()) {
+      const std::int64_t gap = window.now() - window[p.last(k)].frame;
+      if (gap < 1 || gap > window.max_gap()) continue;
+      s_.row_of[k] = static_cast<std::int32_t>(s_.rows.size());
+      s_.rows.push_back(k);
+    }
+  }
+
+  // The links that are given, of each detection by column: the row that it goes on with.
+  void give_links(const Partition<Filter>& p, ChainStats& stats) {
+    const DetectionWindow& window = p.window();
+    const auto& ids = window.frame(window.now()).ids;
+    s_.row_given.assign(ids.size(), kNone);
+    s_.edits.clear();
+    if (!given_) return;
+    for (std::size_t c = 0; c < ids.size(); ++c) {
+      const std::int32_t j = ids[c];
+      const std::int64_t label = given_->of(window[j].number);
+      if (label < 0) continue;
+      const auto [at, is_new] = last_.try_emplace(label);
+      const std::int32_t i = at->second.detection;
+      if (!is_new) ++stats.n_given;
+      // A number may have gone to another detection since.
+      const bool is_here = !is_new && window[i].number == at->second.number && window.is_linkable(i, j);
+      if (is_here && p.track_of(i) >= 0 && p.last(p.track_of(i)) == i) {
+        s_.row_given[c] = s_.row_of.at(p.track_of(i));
+      } else if (is_here && p.is_free(i)) {
+        s_.row_given[c] = kNewTrack;
+        Edit<Filter>& edit = s_.edits.emplace_back();
+        p.append(edit, i);
+        p.append(edit, j);
+      } else if (!is_new) {
+        ++stats.n_refused;
+      }
+      at->second = {j, window[j].number};
+    }
+  }
+
+  // Pairs that gain by being linked; and others that are plausible, or given.
+  void list_candidates(const Partition<Filter>& p) {
+    const DetectionWindow& window = p.window();
+    const auto& ids = window.frame(window.now()).ids;
+    const DetectionWindow::Places& places = *window.frame(window.now()).places;
+    s_.candidates.clear();
+    s_.others.clear();
+    s_.is_given.assign(s_.rows.size(), false);
+    for (const std::int32_t row : s_.row_given)
+      if (row >= 0) s_.is_given[row] = true;
+    for (std::int32_t r = 0; r < static_cast<std::int32_t>(s_.rows.size()); ++r) {
+      const std::int32_t i = p.last(s_.rows[r]);
+      const auto gap = static_cast<int>(window.now() - window[i].frame);
+      p.filter().expect(p.motion(), window, p.state(i), window[i].frame, gap, s_.expected);
+      const double base = p.gap_score(gap) - p.end_score(i);
+      const double radius = Filter::radius(s_.expected, -base - doubt_, places.grid.r_most());
+      if (radius < 0) continue;
+      places.grid.within(Filter::center(s_.expected), radius, [&](std::int32_t j, double) {
+        const double gain = base + Filter::log_likelihood(p.motion(), s_.expected, places.points[j]);
+        if (gain < -doubt_ || !window.is_linkable(i, ids[j])) return;
+        const bool is_open = gain > 0 && !s_.is_given[r] && s_.row_given[j] == kNone;
+        (is_open ? s_.candidates : s_.others).push_back({r, j, gain, 0});
+      });
+    }
+  }
+
+  // Free detections from which a track may have begun that goes on with one of the newest frame.
+  void doubt_births(const Partition<Filter>& p, Doubts& doubts) {
+    const DetectionWindow& window = p.window();
+    for (int gap = 1; gap <= window.max_gap(); ++gap) {
+      const std::int64_t t = window.now() - gap;
+      if (t < std::max(p.frozen() + 1, window.first())) break;
+      const DetectionWindow::Frame& before = window.frame(t);
+      if (before.ids.empty()) continue;
+      Point begin{};
+      begin.r = before.places->grid.r_most();
+      const auto begun = p.filter().begin(p.motion(), begin, t);
+      p.filter().expect(p.motion(), window, begun, t, gap, s_.expected);
+      const double radius =
+          Filter::radius(s_.expected, -p.begin_score() - p.gap_score(gap) - doubt_,
+                         window.frame(window.now()).places->grid.r_most());
+      if (radius < 0) continue;
+      for (const std::int32_t j : window.frame(window.now()).ids)
+        if (p.is_free(j))
+          before.places->grid.within(window[j].y, radius, [&](std::int32_t n, double) {
+            if (p.is_free(before.ids[n]) && window.is_linkable(before.ids[n], j))
+              doubts.add(before.ids[n], j);
+          });
+    }
+  }
+
+  // Hindsight: where a track is not seen, what it would expect had its last detection not been its own.
+  void doubt_last(const Partition<Filter>& p, std::int32_t last, Doubts& doubts) {
+    const DetectionWindow& window = p.window();
+    const std::int32_t k = p.track_of(last), i = p.before(last);
+    if (i < 0 || p.is_frozen(last) || window.now() - window[i].frame > window.max_gap()) return;
+    const DetectionWindow::Frame& frame = window.frame(window.now());
+    if (frame.ids.empty()) return;
+    const auto gap = static_cast<int>(window.now() - window[i].frame);
+    p.filter().expect(p.motion(), window, p.state(i), window[i].frame, gap, s_.expected);
+    const double base = p.score(i) + p.gap_score(gap) - p.score_of(k);
+    const double radius =
+        Filter::radius(s_.expected, -base - doubt_, frame.places->grid.r_most());
+    if (radius < 0) return;
+    frame.places->grid.within(Filter::center(s_.expected), radius, [&](std::int32_t n, double) {
+      const std::int32_t j = frame.ids[n];
+      if (p.is_free(j) && window.is_linkable(i, j) &&
+          base + Filter::log_likelihood(p.motion(), s_.expected, frame.places->points[n]) > -doubt_)
+        doubts.add(i, j);
+    });
+  }
+
+  struct Memory {
+    std::vector<std::int32_t> rows, row_given, match, unseen;
+    std::unordered_map<std::int32_t, std::int32_t> row_of;
+    std::vector<char> is_given;
+    std::vector<Candidate> candidates, others;
+    std::vector<Edit<Filter>> edits;
+    Assignment assignment;
+    typename Filter::Expected expected;
+  };
+
+  bool has_assignment_;
+  double doubt_;
+  std::shared_ptr<const GivenLabels> given_;
+  std::unordered_map<std::int64_t, Last> last_;  // detection of each given label
+  Fresh<Memory> s_;
+};
+
+}  // namespace asterism

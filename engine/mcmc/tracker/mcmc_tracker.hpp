@@ -1,0 +1,395 @@
+// MCMC data association on a stream: a window of frames in which the chain may still change its mind,
+// and behind it what is settled.
+//
+// Per frame: the exact assignment of its detections to what the tracks expect, as a start; the chain;
+// the best partition met; and the frame that leaves the window is settled by it. Of what is settled only
+// the filter states are needed, so that frames older than the longest gap are forgotten.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "mcmc/chain/ambiguous_links.hpp"
+#include "mcmc/chain/budgets.hpp"
+#include "mcmc/chain/parallel_chains.hpp"
+#include "mcmc/chain/split.hpp"
+#include "mcmc/model/rigid_cliques.hpp"
+#include "mcmc/tracker/capture_sweep.hpp"
+#include "mcmc/tracker/frame_start.hpp"
+#include "mcmc/tracker/settled_bonds.hpp"
+#include "tracks/live_tracks.hpp"
+
+namespace asterism {
+
+struct McmcOptions {
+  std::int32_t window = 1;     // frames until one is settled
+  bool is_whole = false;       // in the end the chains go over all frames again, block by block
+  std::int32_t block = 1;      // frames of a block
+  double moves = 0;            // in each frame, for each of its detections or for each track
+  double deadline = 0;         // seconds from the frame's arrival; 0: none
+  bool has_assignment = true;  // start from the exact assignment; else from no change
+  double confidence = 0;       // moves for confidence, as above; 0: none
+  std::int32_t n_chains = 1, n_threads = 1;
+  SplitOptions split;
+  BondOptions bonds;
+  double bond_weight = 0;  // nats by which bonds may speak for a marker in a frame, or against it
+};
+
+template <typename Filter>
+class McmcTracker {
+ public:
+  McmcTracker(const MotionModel& m, const ScoreModel& sm, const ChainOptions& chain,
+              const McmcOptions& options, std::uint64_t seed)
+      : partition_(m, sm),
+        opt_(options),
+        seed_(seed),
+        start_(options.has_assignment, options.split.doubt),
+        walks_(chain, options.n_chains, options.n_threads),
+        settled_bonds_(m, options.bond_weight),
+        sweep_(options.block, sm.max_gap) {}
+
+  template <typename Label>
+  SampledStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
+    const SampledStats stats = add(time, step, points);
+    name_new();
+    tell(label);
+    settle();
+    return stats;
+  }
+
+  // Many frames whose labels are asked for at the end alone.
+  template <typename Label>
+  SampledStats pass(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
+    const SampledStats stats = add(time, step, points);
+    name_new();
+    if (oldest_open() <= partition().window().now() - opt_.window) tell(label, oldest_open());
+    settle();
+    return stats;
+  }
+  template <typename Label>
+  void end_pass(Label&& label) {
+    name_new();
+    tell(label);
+  }
+
+  // Goes over all frames so far again, block by block: first for the best partition, then for how
+  // probable it is. `goes_on(share of the work that is done)` is asked now and then.
+  template <typename Label>
+  void finish(Label&& label, const std::function<bool(double)>& goes_on) {
+    if (n_seen_ == 0) return;
+    SampledStats stats;
+    total_.bond_score = 0;
+    sweep_.link_labels();
+    std::vector<double> sure(has_confidence() ? n_seen_ : 0, 1.0);
+    const auto blocks = sweep_.blocks();
+    const double overlap = sweep_.overlap();
+    const std::size_t n_sweeps = has_confidence() ? 2 : 1;
+    bool is_stopped = false;
+    for (std::size_t s = 0; s < n_sweeps && !is_stopped; ++s)
+      for (std::size_t b = 0; b < blocks.size() && !is_stopped; ++b) {
+        const double n_done = static_cast<double>(s * blocks.size() + b);
+        const double n_all = static_cast<double>(n_sweeps * blocks.size());
+        const auto go_on = [&](double share) { return goes_on((n_done + share) / n_all); };
+        auto part = sweep_.take(partition_, blocks[b]);
+        const double moves = (s == 0 ? opt_.moves : opt_.confidence) / overlap;
+        const Split split = split_up(part.partition, part.doubts, {}, stats);
+        const auto weights = weights_of(split.groups, [](const Group& g) { return g.n_open; });
+        double all = 0;
+        for (const double weight : weights) all += weight;
+        Watch watch(all * moves * opt_.n_chains, go_on);
+        const Budgets budgets(weights, moves, &watch);
+        BondTerm<Filter> bonds = settled_bonds_.term(part.partition);
+        const std::uint64_t seed = seed_of(2 + n_sweeps * b + s);
+        if (s == 0) {
+          walks_.search(part.partition, bonds, split.groups, budgets, seed, stats.chain);
+          bonds.read(part.partition);
+          const std::int64_t first = part.partition.frozen() + 1;
+          tell_bonds(bonds, first, first + blocks[b].next - blocks[b].first, stats);
+          sweep_.put_back(blocks[b], part);
+        } else {
+          const auto shares =
+              walks_.sample(part.partition, bonds, split.groups, budgets, seed, stats.chain);
+          sweep_.keep_states(blocks[b], part);
+          take_shares(blocks[b], part, shares, sure);
+        }
+        is_stopped = watch.is_stopped();
+      }
+    stats.n_confirmed = sweep_.read_labels();
+    total_.add(stats);
+    for (std::int64_t i = 0; i < n_seen_; ++i) {
+      // Of the first of a track, that the next follows it.
+      const bool is_first = sweep_.before(i) < 0 && sweep_.after(i) >= 0;
+      label(i, sweep_.labels()[i], has_confidence() ? sure[is_first ? sweep_.after(i) : i] : 0);
+    }
+  }
+
+  // Links to begin the frames to come with, where the model allows them.
+  void start_from(std::vector<std::int64_t> labels) { start_.give({n_seen_, std::move(labels)}); }
+
+  bool has_confidence() const { return opt_.confidence > 0; }
+  std::int64_t n_frames() const { return n_frames_; }
+  std::int64_t n_seen() const { return n_seen_; }
+  double last_time() const { return last_time_; }
+  SampledStats total() const { return total_; }
+  const Partition<Filter>& partition() const { return partition_; }
+
+  const MotionModel& motion() const { return partition().motion(); }
+  std::int64_t n_ids() const { return is_finished() ? total_.n_confirmed : next_id_ + n_named_; }
+  // The tracks as they would be settled now.
+  LiveTracks<> live() const {
+    const Partition<Filter>& p = partition();
+    LiveTracks<> live(p.motion(), p.model(), {});
+    live.next_id = n_ids();
+    for (const std::int32_t k : p.tracks().items()) {
+      const std::int32_t i = p.last(k);
+      const std::int64_t number = p.window()[i].number;
+      if (is_finished() && sweep_.after(number) >= 0) continue;  // it goes on as another
+      LiveTrack<NoMore>& track = live.tracks.emplace_back();
+      track.id = is_finished() ? sweep_.labels()[number] : id_of(k);
+      track.gap = static_cast<std::int32_t>(p.window().now() - p.window()[i].frame);
+      track.score = p.score(i);
+      track.state = state_now(i);
+    }
+    std::sort(live.tracks.begin(), live.tracks.end(),
+              [](const auto& a, const auto& b) { return a.id < b.id; });
+    return live;
+  }
+
+ private:
+  // Whether the labels are those of the chains over all frames so far.
+  bool is_finished() const {
+    return opt_.is_whole && static_cast<std::int64_t>(sweep_.labels().size()) == n_seen_;
+  }
+
+  SampledStats add(double time, const MotionStep& step, std::span<const Point> points) {
+    const auto arrival = Clock::now();
+    Partition<Filter>& p = partition_;
+    p.add_frame(time, step, points, n_seen_);
+    n_seen_ += static_cast<std::int64_t>(points.size());
+    last_time_ = time;
+    ++n_frames_;
+    SampledStats stats;
+    start_.begin(p, doubts_, stats.chain, stats.n_candidates);
+    if (opt_.is_whole) {
+      sweep_.add_frame(time, step, points);
+      doubts_.each_new([&](std::int32_t from, std::int32_t to) {
+        sweep_.add_doubt(p.window()[from].number, p.window()[to].number);
+      });
+    }
+    const Bonds sure = BondFinder<Filter>(p, opt_.bonds).find();
+    stats.chain.n_sure = sure.n_sure;
+    BondTerm<Filter> bonds = settled_bonds_.term(p);
+    const auto allowed = [&](std::span<const Group> groups, double moves, double share) {
+      return budgets(groups, moves, arrival, share);
+    };
+    walk(sure.is_sure, bonds, allowed, 0, stats,
+         [&] { return has_confidence() && !opt_.is_whole; });
+    tell_bonds(bonds, oldest_open(), p.window().now() + 1 - opt_.window, stats);
+    stats.n_confirmed = p.tracks().size();
+    stats.n_pending = p.free().size() + p.taken().size();
+    total_.add(stats);
+    return stats;
+  }
+
+  // Looks for the best partition, and then for how probable it is, if it `is_asked`. `allowed(groups,
+  // moves, share of the time)` is how long.
+  template <typename Allowed, typename IsAsked>
+  void walk(const std::vector<char>& is_sure, BondTerm<Filter>& bonds, Allowed&& allowed,
+            std::uint64_t phase, SampledStats& stats, IsAsked&& is_asked) {
+    const Split split = split_up(partition_, doubts_, is_sure, stats);
+    walks_.search(partition_, bonds, split.groups,
+                  allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1), seed_of(phase),
+                  stats.chain);
+    bonds.read(partition_);
+    if (!is_asked()) return;
+    // The search may have made other tracks.
+    const Split now = Splitter<Filter>(partition_, opt_.split).split(doubts_, is_sure);
+    keep_shares(walks_.sample(partition_, bonds, now.groups, allowed(now.groups, opt_.confidence, 1),
+                              seed_of(phase + 1), stats.chain));
+  }
+
+  // What bonds say of the open frames from one on, before another.
+  static void tell_bonds(const BondTerm<Filter>& bonds, std::int64_t first, std::int64_t end,
+                         SampledStats& stats) {
+    if (!bonds.is_on()) return;
+    stats.n_bonds = bonds.graph().n_pairs();
+    for (std::int64_t t = first; t < end; ++t) stats.bond_score += bonds.total(t);
+  }
+
+  // Shares of a block for those frames that are as far inside it as in any other.
+  void take_shares(const typename CaptureSweep<Filter>::Block& block,
+                   const typename CaptureSweep<Filter>::Part& part, const std::vector<double>& shares,
+                   std::vector<double>& sure) const {
+    const std::int64_t margin = (block.last + 1 - block.next) / 2;
+    const Partition<Filter>& p = part.partition;
+    for (std::int32_t i = 0; i < p.window().n_ids(); ++i) {
+      const std::int64_t t = sweep_.frame_of(part.numbers[i]);
+      if (t >= (block.is_first ? 0 : block.first + margin) && (block.is_last || t < block.next + margin))
+        sure[part.numbers[i]] = shares[i];
+    }
+  }
+
+  Split split_up(const Partition<Filter>& p, const Doubts& doubts, const std::vector<char>& is_sure,
+                 SampledStats& stats) const {
+    Split split = Splitter<Filter>(p, opt_.split).split(doubts, is_sure);
+    stats.n_groups += split.n_all;
+    for (const Group& group : split.groups)
+      stats.largest_group = std::max<std::int64_t>(
+          stats.largest_group, static_cast<std::int64_t>(group.tracks.size() + group.free.size()));
+    stats.chain.n_walked += static_cast<std::int64_t>(split.groups.size());
+    stats.chain.n_cut += split.n_cut;
+    return split;
+  }
+
+  template <typename Weight>
+  static std::vector<double> weights_of(std::span<const Group> groups, Weight&& weight) {
+    std::vector<double> weights;
+    for (const Group& group : groups) weights.push_back(static_cast<double>(weight(group)));
+    return weights;
+  }
+  // Of a frame, whose time is up after a share of what is allowed.
+  Budgets budgets(std::span<const Group> groups, double moves, Clock::time_point arrival,
+                  double share) const {
+    const auto weights = weights_of(groups, [](const Group& group) {
+      return std::max<std::int64_t>(group.n_new, static_cast<std::int64_t>(group.tracks.size()));
+    });
+    Budgets out(weights, moves);
+    if (opt_.deadline > 0) {
+      out.end_at(after(arrival, opt_.deadline * share), weights, opt_.n_chains, opt_.n_threads);
+    }
+    return out;
+  }
+  std::uint64_t seed_of(std::uint64_t phase) const {
+    return Random(Random(seed_ ^ static_cast<std::uint64_t>(n_frames_)).next() ^ phase).next();
+  }
+
+  // The mean over the frames since the link was made. Walks are short, and each begins at what is
+  // best; and once the detection before is settled, whether that is right is no longer asked.
+  void keep_shares(const std::vector<double>& now) {
+    const Partition<Filter>& p = partition_;
+    const DetectionWindow& window = p.window();
+    shares_.resize(window.n_ids());
+    for (std::int64_t t = oldest_open(); t <= window.now(); ++t)
+      for (const std::int32_t i : window.frame(t).ids) {
+        const std::int32_t before = p.track_of(i) < 0 ? -2 : p.before(i);
+        Share& kept = shares_[i];
+        if (before >= 0 && p.is_frozen(before) && kept.before == before) continue;
+        if (kept.before != before) kept = {0, 0, before};
+        kept.sum += now[i];
+        ++kept.n;
+      }
+  }
+
+  std::int64_t oldest_open() const { return partition().frozen() + 1; }
+
+  // Tracks of which nothing is settled get the numbers that they would be settled with.
+  void name_new() {
+    Partition<Filter>& p = partition_;
+    std::vector<std::pair<std::int64_t, std::int32_t>> unnamed;  // first detection, track
+    for (const std::int32_t k : p.young().items())
+      unnamed.emplace_back(p.window()[p.track(k).nodes.front()].number, k);
+    std::sort(unnamed.begin(), unnamed.end());
+    n_named_ = static_cast<std::int64_t>(unnamed.size());
+    for (std::int64_t n = 0; n < n_named_; ++n) p.set_id(unnamed[n].second, next_id_ + n);
+  }
+  std::int64_t id_of(std::int32_t track) const { return partition().track(track).id; }
+
+  // Tells the labels of the open frames that are not what was told.
+  template <typename Label>
+  void tell(Label&& label, std::int64_t last = std::numeric_limits<std::int64_t>::max()) {
+    const Partition<Filter>& p = partition();
+    const DetectionWindow& window = p.window();
+    if (static_cast<std::int32_t>(said_.size()) < window.n_ids()) said_.resize(window.n_ids());
+    for (std::int64_t t = oldest_open(); t <= std::min(last, window.now()); ++t)
+      for (const std::int32_t i : window.frame(t).ids) {
+        const std::int32_t k = p.track_of(i);
+        const Said now{k < 0 ? -1 : id_of(k), confidence_of(i)};
+        if (now == said_[i]) continue;
+        said_[i] = now;
+        if (opt_.is_whole) sweep_.set_label(window[i].number, now.id);
+        label(window[i].number, now.id, now.confidence);
+      }
+  }
+  // That the link to the detection before is right; of the first the one after, of clutter that it is
+  // in no track.
+  double confidence_of(std::int32_t i) const {
+    if (shares_.empty()) return 0;  // not asked for, or not yet
+    const Partition<Filter>& p = partition();
+    const bool is_first = p.track_of(i) >= 0 && p.place_of(i) == 0 && p.track(p.track_of(i)).n_gone == 0;
+    const Share& all = shares_[is_first ? p.after(i) : i];
+    return all.sum / all.n;
+  }
+
+  // Settles what is older than the window, and forgets what nothing can follow any more.
+  void settle() {
+    Partition<Filter>& p = partition_;
+    const DetectionWindow& window = p.window();
+    const std::int64_t settled = window.now() - opt_.window;
+    if (settled < oldest_open()) return;
+    const std::int64_t first = oldest_open();
+    p.freeze(settled);
+    // Numbers of tracks that are settled now are theirs.
+    for (const std::int32_t k : p.tracks().items())
+      if (p.track(k).n_frozen > 0) next_id_ = std::max(next_id_, id_of(k) + 1);
+    for (std::int64_t t = first; t <= settled; ++t) settled_bonds_.learn(p, t);
+    doubts_.keep(static_cast<std::size_t>(window.now() - settled));
+    while (window.first() + window.max_gap() <= settled) {
+      for (const std::int32_t i : window.frame(window.first()).ids) {
+        if (i < static_cast<std::int32_t>(said_.size())) said_[i] = {};
+        if (i < static_cast<std::int32_t>(shares_.size())) shares_[i] = {};
+        if (const std::int32_t k = p.track_of(i); k >= 0 && p.track(k).size() == 1 && !opt_.is_whole)
+          settled_bonds_.forget(id_of(k));
+      }
+      p.drop_frame();
+    }
+  }
+
+  MotionState state_now(std::int32_t i) const {
+    const Partition<Filter>& p = partition();
+    const DetectionWindow& window = p.window();
+    const int gap = static_cast<int>(window.now() - window[i].frame);
+    MotionState out{};
+    if constexpr (std::is_same_v<Filter, OneMotion>) {
+      out.mode[0] = p.state(i);
+      out.w[0] = 1;
+    } else {
+      out = p.state(i);
+    }
+    for (int d = 1; d <= gap; ++d) predict(p.motion(), window.frame(window[i].frame + d).steps->step, out);
+    return out;
+  }
+
+  Partition<Filter> partition_;
+  McmcOptions opt_;
+  std::uint64_t seed_;
+  FrameStart<Filter> start_;
+  Walks<Filter> walks_;
+  SettledBonds<Filter> settled_bonds_;
+  Doubts doubts_;
+  // By detection of the window: how probable it is that it follows what it follows; and what was told.
+  struct Share {
+    double sum = 0;
+    std::int32_t n = 0, before = -3;
+  };
+  std::vector<Share> shares_;
+  struct Said {
+    std::int64_t id = -1;
+    double confidence = -1;
+    bool operator==(const Said&) const = default;
+  };
+  std::vector<Said> said_;
+  CaptureSweep<Filter> sweep_;
+  std::int64_t next_id_ = 0, n_named_ = 0;
+  SampledStats total_;
+  std::int64_t n_frames_ = 0, n_seen_ = 0;
+  double last_time_ = -std::numeric_limits<double>::infinity();
+};
+
+}  // namespace asterism

@@ -1,0 +1,77 @@
+// What every branch of every tree may do in a new frame.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "trees/hypothesis_window.hpp"
+
+namespace asterism {
+
+// Of branch b, from first[b] to first[b + 1], the miss last.
+struct Ways {
+  std::vector<Branch> branches;
+  std::vector<std::int32_t> first;
+  std::vector<double> worth;  // of each way; 0 of a single detection
+
+  std::int32_t miss(std::int32_t branch) const { return first[branch + 1] - 1; }
+};
+
+// A tree is something to explain from its second detection on.
+inline bool is_lone(const Branch& b, bool is_seed) { return is_seed && b.n_taken < 2; }
+
+class FrameWays {
+ public:
+  Ways& operator[](std::size_t tree) { return ways_[tree]; }
+  const Ways& operator[](std::size_t tree) const { return ways_[tree]; }
+
+  // The place of a tree in the window by its key, which rises with it.
+  bool has(std::int64_t key) const {
+    return std::binary_search(keys_.begin(), keys_.end(), key);
+  }
+  std::size_t index_of(std::int64_t key) const {
+    return std::lower_bound(keys_.begin(), keys_.end(), key) - keys_.begin();
+  }
+  void list_keys(const HypothesisWindow& open) {
+    keys_.clear();
+    for (std::size_t i = 0; i < open.n_all(); ++i) keys_.push_back(open.tree(i).more.key);
+  }
+
+  // Splits all branches over the newest frame of the window, whose detections begin trees as well.
+  void grow(HypothesisWindow& open, FrameStats& stats) {
+    const BranchGrower grower(open.live, open.branches);
+    ways_.assign(open.n_all(), {});
+    for (std::size_t i = 0; i < open.n_all(); ++i) {
+      LiveTrack<Tree>& tree = open.tree(i);
+      Ways& ways = ways_[i];
+      ways.first.push_back(0);
+      for (Branch& parent : tree.more.branches) {
+        grower.split(*open.frames.back(), tree, std::move(parent), ways.branches, stats);
+        ways.first.push_back(static_cast<std::int32_t>(ways.branches.size()));
+      }
+      for (const Branch& b : ways.branches)
+        ways.worth.push_back(is_lone(b, open.is_seed(i)) ? 0 : grower.worth(b));
+    }
+    open.sow();
+    for (std::size_t i = ways_.size(); i < open.n_all(); ++i)
+      ways_.push_back({open.tree(i).more.branches, {0, 1}, {0}});
+    list_keys(open);
+  }
+
+  // Calls visit(way, gain over the miss) for what a branch may take.
+  template <typename Visit>
+  void each_hit(std::size_t tree, std::int32_t branch, Visit&& visit) const {
+    const Ways& ways = ways_[tree];
+    const std::int32_t miss = ways.miss(branch);
+    for (std::int32_t w = ways.first[branch]; w < miss; ++w)
+      visit(w, ways.worth[w] - ways.worth[miss]);
+  }
+
+ private:
+  std::vector<std::int64_t> keys_;
+  std::vector<Ways> ways_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,311 @@
+// Reid's multiple hypotheses (1979): whole hypotheses carried from frame to frame, by cluster.
+//
+//   CLUSTER  which clusters may have one and the same detection; these become one (a super-cluster)
+//   HYPGEN   the best hypotheses about the new frame, of all that follow from those so far
+//   REDUCE   few, likely and different ones are kept; what is older than the window is decided by the
+//            best (N-scan); what shares no detection any more goes into clusters of its own
+//   MASH     detections of which all hypotheses say the same leave the matrix: their targets have them
+//            for good, and tentative targets are confirmed by them
+//
+// A detection that is nobody's begins a tree at once, worth nothing as long as it has no other
+// detection: “clutter so far” and “may be the first of a marker” are one hypothesis, not two.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "base/scratch.hpp"
+#include "math/log_sums.hpp"
+#include "math/union_find.hpp"
+#include "mht/clustering.hpp"
+#include "mht/clusters.hpp"
+#include "mht/hypothesis_generation.hpp"
+#include "trees/hypothesis_window.hpp"
+
+namespace asterism {
+
+class HypothesisMatrix {
+ public:
+  HypothesisMatrix(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
+                   const BranchOptions& branches, const CarryOptions& carry, double new_track_claim,
+                   const MatrixOptions& options)
+      : open_{{{model, score, life}, branches, {}, {model, score, life, carry}}, new_track_claim, {}},
+        opt_(options) {}
+
+  template <typename Label>
+  void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
+    frame->claimed.assign(frame->points.size(), 0);
+    open_.advise(*frame, stats);
+    open_.claim(*frame);
+    open_.frames.push_back(frame);
+    s_.ways.grow(open_, stats);
+    std::vector<Cluster> clusters;
+    Clustering clustering(s_.ways, opt_);
+    const HypothesisGeneration generation(open_, s_.ways, opt_);
+    for (SuperCluster& super :
+         clustering.join(std::move(clusters_), *frame, open_.n_all(), stats)) {
+      generation.explain(*frame, super, stats);
+      merge_similar(super.cluster, stats);
+      clusters.push_back(std::move(super.cluster));
+    }
+    clusters_ = std::move(clusters);
+    for (std::size_t i = 0; i < open_.n_all(); ++i)
+      open_.tree(i).more.branches = std::move(s_.ways[i].branches);
+    keep_used_branches();
+    for (std::size_t i = 0; i < open_.n_all(); ++i)
+      stats.most_branches = std::max<std::int64_t>(
+          stats.most_branches, static_cast<std::int64_t>(open_.tree(i).more.branches.size()));
+    if (open_.is_full()) {
+      weigh(1);
+      prune_by_oldest();
+      mash(stats, label);
+      open_.learn(stats);
+    }
+    split();
+  }
+
+  // Decides all frames that are left by the best hypothesis of every cluster; all probabilities are
+  // those over the hypotheses as they are now.
+  template <typename Label>
+  void decide_all(FrameStats& stats, Label&& label) {
+    s_.ways.list_keys(open_);
+    weigh(open_.frames.size());
+    while (open_.n_open() > 0) mash(stats, label);
+  }
+
+  bool has_confidence() const { return true; }
+  const LiveTracks<Tree>& live() const { return open_.live; }
+  const HypothesisWindow& window() const { return open_; }
+  const std::vector<Cluster>& clusters() const { return clusters_; }
+  void count(FrameStats& stats) const { open_.count(stats); }
+
+ private:
+  struct Memory {
+    FrameWays ways;
+    // By open frame and tree: what the best hypothesis says, and the probability of each detection
+    // to be nobody's.
+    std::vector<std::map<std::int64_t, Fate>> fates;
+    std::vector<std::vector<double>> free;
+  };
+
+  // REDUCE, the similar: a hypothesis of the same targets, each nearly where a likelier one has it,
+  // is part of that one from now on.
+  void merge_similar(Cluster& cluster, FrameStats& stats) const {
+    if (!(opt_.merged_within > 0)) return;
+    std::vector<Hypothesis> kept;
+    for (Hypothesis& h : cluster.hypotheses) {
+      const auto same = std::find_if(kept.begin(), kept.end(), [&](const Hypothesis& likelier) {
+        return is_similar(cluster, likelier, h);
+      });
+      if (same == kept.end()) {
+        kept.push_back(std::move(h));
+        continue;
+      }
+      same->merged += softplus(h.log_weight() - same->log_weight());
+      ++stats.n_merged;
+    }
+    sort_by_weight(kept);
+    cluster.hypotheses = std::move(kept);
+  }
+
+  bool is_similar(const Cluster& cluster, const Hypothesis& a, const Hypothesis& b) const {
+    for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
+      if (a.branches[k] == b.branches[k]) continue;
+      const std::size_t i = s_.ways.index_of(cluster.keys[k]);
+      const auto branch_of = [&](const Hypothesis& h) -> const Branch* {
+        if (h.branches[k] < 0) return nullptr;
+        const Branch& branch = s_.ways[i].branches[h.branches[k]];
+        return is_lone(branch, open_.is_seed(i)) ? nullptr : &branch;
+      };
+      const Branch *one = branch_of(a), *other = branch_of(b);
+      if (!one && !other) continue;
+      if (!one || !other || one->gap != other->gap || !is_near(*one, *other)) return false;
+    }
+    return true;
+  }
+
+  // Means within so many standard deviations of the first, and deviations as much alike.
+  bool is_near(const Branch& a, const Branch& b) const {
+    const AxisState one = collapse(open_.live.m, a.state), other = collapse(open_.live.m, b.state);
+    const int n = open_.live.m.axis.n;
+    for (int s = 0; s < n; ++s) {
+      const double sigma = std::sqrt(one.P[s * n + s]);
+      const double bound = opt_.merged_within * sigma;
+      if (!(std::abs(std::sqrt(other.P[s * n + s]) - sigma) <= bound)) return false;
+      for (int d = 0; d < open_.live.m.axis.D; ++d)
+        if (!(std::abs(other.x[d][s] - one.x[d][s]) <= bound)) return false;
+    }
+    return true;
+  }
+
+  // Every tree keeps the branches that some hypothesis takes, those of the likeliest first.
+  void keep_used_branches() {
+    for (Cluster& cluster : clusters_)
+      for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
+        std::vector<Branch>& all = open_.tree(s_.ways.index_of(cluster.keys[k])).more.branches;
+        std::vector<std::int32_t> place(all.size(), -1);
+        std::vector<Branch> kept;
+        for (Hypothesis& h : cluster.hypotheses) {
+          std::int32_t& b = h.branches[k];
+          if (b < 0) continue;
+          if (place[b] < 0) {
+            place[b] = static_cast<std::int32_t>(kept.size());
+            kept.push_back(std::move(all[b]));
+          }
+          b = place[b];
+        }
+        all = std::move(kept);
+      }
+  }
+
+  // What the hypotheses say of the first open frames.
+  void weigh(std::size_t n_frames) {
+    s_.fates.assign(n_frames, {});
+    s_.free.assign(n_frames, {});
+    for (std::size_t f = 0; f < n_frames; ++f) {
+      const WindowFrame& frame = *open_.frames[f];
+      s_.free[f].assign(frame.points.size(), 1);
+      for (const Cluster& cluster : clusters_) {
+        const std::vector<double> p = probabilities(cluster);
+        for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
+          const std::size_t i = s_.ways.index_of(cluster.keys[k]);
+          Fate fate = fate_of(i, cluster.hypotheses.front().branches[k], frame);
+          for (std::size_t h = 0; h < p.size(); ++h) {
+            const Fate other = fate_of(i, cluster.hypotheses[h].branches[k], frame);
+            if (!other.exists) continue;
+            if (fate.column == other.column) fate.probability += p[h];
+            if (other.column >= 0) s_.free[f][other.column] -= p[h];
+          }
+          fate.probability = std::min(fate.probability, 1.0);
+          s_.fates[f].emplace(cluster.keys[k], fate);
+        }
+      }
+    }
+  }
+
+  Fate fate_of(std::size_t tree, std::int32_t branch, const WindowFrame& frame) const {
+    if (branch < 0) return {};
+    const Branch& b = open_.tree(tree).more.branches[branch];
+    if (is_lone(b, open_.is_seed(tree)) || frame.number < open_.first_frame(tree)) return {};
+    return {true, b.taken(frame.number), 0};
+  }
+
+  // REDUCE, N-scan: who says otherwise of the oldest frame than the likeliest is given up.
+  void prune_by_oldest() {
+    const WindowFrame& frame = *open_.frames.front();
+    for (Cluster& cluster : clusters_)
+      std::erase_if(cluster.hypotheses, [&](const Hypothesis& h) {
+        for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
+          const std::size_t i = s_.ways.index_of(cluster.keys[k]);
+          const Fate best = s_.fates[0].at(cluster.keys[k]);
+          const Fate own = fate_of(i, h.branches[k], frame);
+          if (own.column != best.column) return true;
+        }
+        return false;
+      });
+    keep_used_branches();
+  }
+
+  // MASH
+  template <typename Label>
+  void mash(FrameStats& stats, Label&& label) {
+    std::vector<Fate> fates;
+    for (std::size_t i = 0; i < open_.n_all(); ++i) {
+      const auto at = s_.fates.front().find(open_.tree(i).more.key);
+      fates.push_back(at == s_.fates.front().end() ? Fate{} : at->second);
+    }
+    open_.carry_out(fates, s_.free.front(), stats, label);
+    s_.fates.erase(s_.fates.begin());
+    s_.free.erase(s_.free.begin());
+    s_.ways.list_keys(open_);
+  }
+
+  // REDUCE, apart: trees that share no detection in any hypothesis are clusters of their own.
+  void split() {
+    const BranchGrower grower(open_.live, open_.branches);
+    std::vector<Cluster> clusters;
+    for (const Cluster& cluster : clusters_) {
+      std::vector<std::size_t> alive;  // places of the trees that are left
+      for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
+        const std::size_t i = s_.ways.index_of(cluster.keys[k]);
+        if (s_.ways.has(cluster.keys[k]) && !open_.tree(i).more.branches.empty())
+          alive.push_back(k);
+      }
+      UnionFind sets(alive.size());
+      std::map<std::pair<std::int64_t, std::int32_t>, std::int32_t> owner;
+      for (std::size_t a = 0; a < alive.size(); ++a) {
+        const std::size_t i = s_.ways.index_of(cluster.keys[alive[a]]);
+        for (const Branch& b : open_.tree(i).more.branches)
+          for (const auto& frame : open_.frames) {
+            const std::int32_t j = b.taken(frame->number);
+            if (frame->number < open_.first_frame(i) || j < 0) continue;
+            const auto own = static_cast<std::int32_t>(a);
+            sets.join(owner.try_emplace({frame->number, j}, own).first->second, own);
+          }
+      }
+      std::map<std::int32_t, std::vector<std::size_t>> parts;
+      for (std::size_t a = 0; a < alive.size(); ++a)
+        parts[sets.find(static_cast<std::int32_t>(a))].push_back(alive[a]);
+      for (const auto& [root, places] : parts) clusters.push_back(part_of(cluster, places, grower));
+    }
+    clusters_ = std::move(clusters);
+    // Whose detections are all others' in every hypothesis that is left has no branch.
+    std::erase_if(open_.seeds, [](const LiveTrack<Tree>& s) { return s.more.branches.empty(); });
+    s_.ways.list_keys(open_);
+  }
+
+  // The hypotheses as far as some of the trees go.
+  Cluster part_of(const Cluster& cluster, const std::vector<std::size_t>& places,
+                  const BranchGrower& grower) const {
+    Cluster part;
+    for (const std::size_t k : places) part.keys.push_back(cluster.keys[k]);
+    struct Sums {
+      std::size_t place = 0;
+      double with = 0, without = 0;  // weights with and without what was merged
+    } all;
+    std::map<std::vector<std::int32_t>, Sums> seen;
+    const double most = cluster.hypotheses.front().log_weight();
+    for (const Hypothesis& h : cluster.hypotheses) {
+      std::vector<std::int32_t> branches;
+      for (const std::size_t k : places) branches.push_back(h.branches[k]);
+      const auto [at, is_new] = seen.try_emplace(branches, Sums{part.hypotheses.size(), 0, 0});
+      for (Sums* sums : {&at->second, &all}) {
+        sums->with += std::exp(h.log_weight() - most);
+        sums->without += std::exp(h.worth - most);
+      }
+      if (is_new) part.hypotheses.push_back({worth_of(part, branches, grower), 0, branches});
+    }
+    // How much more probable the part is by what was merged; in each part just its own share.
+    for (const auto& [branches, sums] : seen)
+      part.hypotheses[sums.place].merged =
+          sums.with == sums.without && all.with == all.without
+              ? 0
+              : std::log(sums.with / all.with) - std::log(sums.without / all.without);
+    sort_by_weight(part.hypotheses);
+    return part;
+  }
+
+  double worth_of(const Cluster& cluster, const std::vector<std::int32_t>& branches,
+                  const BranchGrower& grower) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < branches.size(); ++k) {
+      if (branches[k] < 0) continue;
+      const std::size_t i = s_.ways.index_of(cluster.keys[k]);
+      const Branch& b = open_.tree(i).more.branches[branches[k]];
+      if (!is_lone(b, open_.is_seed(i))) sum += grower.worth(b);
+    }
+    return sum;
+  }
+
+  HypothesisWindow open_;
+  MatrixOptions opt_;
+  std::vector<Cluster> clusters_;
+  Fresh<Memory> s_;
+};
+
+}  // namespace asterism

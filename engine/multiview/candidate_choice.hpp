@@ -1,0 +1,165 @@
+// The compatible candidates of the greatest total score: no image point twice. Weighted set packing.
+//
+// A greedy choice first. Each chosen candidate pays its score in equal parts as the price of its
+// points. By these prices no choice is worth more than
+//     Σ prices + Σ_candidates max(0, score - prices of its points),
+// which proves the greedy choice best where every candidate's points cost at least its score: almost
+// always, as a point pays the more for each view the more of them it has. A candidate whose points
+// cost more than its score by over what the bound leaves open is in no best choice. The connected
+// parts of what is left over are solved each by `SetPacking`.
+#pragma once
+
+#include "math/union_find.hpp"
+#include "multiview/point_candidates.hpp"
+#include "solve/set_packing.hpp"
+
+namespace asterism {
+
+struct ChoiceSummary {
+  std::int64_t n_packed = 0;      // parts that had to be searched
+  std::int64_t n_inexact = 0;     // those of them whose search was cut
+  double gap = 0;                 // the best choice is worth at most so much more
+};
+
+class CandidateChoice {
+ public:
+  // `uses`: the numbers of the image points of each candidate, below n_points.
+  CandidateChoice(std::span<const std::vector<std::int32_t>> uses, std::span<const double> scores,
+                  std::size_t n_points)
+      : uses_(uses), scores_(scores), n_points_(n_points) {}
+
+  // Numbers of the chosen candidates, rising.
+  std::vector<std::int32_t> solve(std::int64_t max_nodes, ChoiceSummary& summary) {
+    std::vector<std::int32_t> all(scores_.size());
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::int32_t>(i);
+    std::vector<std::int32_t> chosen;
+    for (const std::vector<std::int32_t>& part : parts(all)) solve_part(part, max_nodes, summary, chosen);
+    std::sort(chosen.begin(), chosen.end());
+    return chosen;
+  }
+
+ private:
+  using Numbers = std::vector<std::int32_t>;
+
+  std::vector<Numbers> parts(const Numbers& members) const {
+    UnionFind sets(members.size());
+    Numbers owner(n_points_, -1);
+    for (std::size_t i = 0; i < members.size(); ++i)
+      for (const std::int32_t p : uses_[members[i]]) {
+        if (owner[p] >= 0) sets.join(owner[p], static_cast<std::int32_t>(i));
+        owner[p] = static_cast<std::int32_t>(i);
+      }
+    std::vector<Numbers> out;
+    Numbers place(members.size(), -1);
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      const std::int32_t root = sets.find(static_cast<std::int32_t>(i));
+      if (place[root] < 0) {
+        place[root] = static_cast<std::int32_t>(out.size());
+        out.emplace_back();
+      }
+      out[place[root]].push_back(members[i]);
+    }
+    return out;
+  }
+
+  void solve_part(const Numbers& part, std::int64_t max_nodes, ChoiceSummary& summary, Numbers& chosen) {
+    if (part.size() == 1) {
+      chosen.push_back(part[0]);
+      return;
+    }
+    const Numbers greedy = greedy_choice(part);
+    std::unordered_map<std::int32_t, double> price;
+    for (const std::int32_t c : greedy)
+      for (const std::int32_t p : uses_[c])
+        price[p] = scores_[c] / static_cast<double>(uses_[c].size());
+    std::vector<double> left(part.size());  // what its points cost beyond its score
+    double open = 0;
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      left[i] = -scores_[part[i]];
+      for (const std::int32_t p : uses_[part[i]])
+        if (const auto at = price.find(p); at != price.end()) left[i] += at->second;
+      open += std::max(-left[i], 0.0);
+    }
+    if (open <= 1e-9) {
+      chosen.insert(chosen.end(), greedy.begin(), greedy.end());
+      return;
+    }
+    Numbers kept;
+    for (std::size_t i = 0; i < part.size(); ++i)
+      if (left[i] <= open + 1e-9) kept.push_back(part[i]);
+    if (kept.size() < part.size()) {
+      for (const Numbers& smaller : parts(kept)) solve_part(smaller, max_nodes, summary, chosen);
+      return;
+    }
+    pack(part, max_nodes, summary, chosen);
+  }
+
+  Numbers greedy_choice(const Numbers& part) const {
+    Numbers order = part, out;
+    std::stable_sort(order.begin(), order.end(),
+                     [this](std::int32_t a, std::int32_t b) { return scores_[a] > scores_[b]; });
+    std::unordered_map<std::int32_t, bool> is_used;
+    for (const std::int32_t c : order) {
+      if (std::any_of(uses_[c].begin(), uses_[c].end(),
+                      [&](std::int32_t p) { return is_used.count(p) > 0; }))
+        continue;
+      for (const std::int32_t p : uses_[c]) is_used[p] = true;
+      out.push_back(c);
+    }
+    return out;
+  }
+
+  // Candidates that share a point exclude each other: a tree each, the largest such sets first.
+  void pack(const Numbers& part, std::int64_t max_nodes, ChoiceSummary& summary, Numbers& chosen) const {
+    std::unordered_map<std::int32_t, Numbers> holders;
+    Numbers resources;
+    for (const std::int32_t c : part)
+      for (const std::int32_t p : uses_[c]) {
+        if (holders.find(p) == holders.end()) resources.push_back(p);
+        holders[p].push_back(c);
+      }
+    std::stable_sort(resources.begin(), resources.end(), [&](std::int32_t a, std::int32_t b) {
+      return holders[a].size() > holders[b].size();
+    });
+    std::unordered_map<std::int32_t, std::int32_t> number;
+    for (const std::int32_t p : resources) number.emplace(p, static_cast<std::int32_t>(number.size()));
+    std::unordered_map<std::int32_t, bool> is_placed;
+    std::vector<std::vector<PackingOption>> trees;
+    std::vector<Numbers> members;
+    for (const std::int32_t p : resources) {
+      std::vector<PackingOption> tree;
+      Numbers own;
+      for (const std::int32_t c : holders[p]) {
+        if (!is_placed.emplace(c, true).second) continue;
+        PackingOption option{scores_[c], {}};
+        for (const std::int32_t q : uses_[c]) option.uses.push_back(number[q]);
+        tree.push_back(std::move(option));
+        own.push_back(c);
+      }
+      if (tree.empty()) continue;
+      tree.push_back({0, {}});
+      own.push_back(-1);
+      trees.push_back(std::move(tree));
+      members.push_back(std::move(own));
+    }
+    ++summary.n_packed;
+    double worth = 0;
+    const PackingSummary found = SetPacking(trees).solve(
+        1, std::numeric_limits<double>::infinity(), max_nodes,
+        [&](std::span<const std::int32_t> options, double total) {
+          worth = total;
+          for (std::size_t i = 0; i < options.size(); ++i)
+            if (const std::int32_t c = members[i][options[i]]; c >= 0) chosen.push_back(c);
+        });
+    if (!found.is_exact) {
+      ++summary.n_inexact;
+      summary.gap += std::max(found.bound - worth, 0.0);
+    }
+  }
+
+  std::span<const Numbers> uses_;
+  std::span<const double> scores_;
+  std::size_t n_points_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,266 @@
+// The chain of MCMC data association, as Python sees it.
+#include <nanobind/stl/tuple.h>
+
+#include <memory>
+#include <variant>
+
+#include "mcmc/chain/sampler.hpp"
+#include "mcmc/chain/tally.hpp"
+#include "python/bindings.hpp"
+#include "python/motion_arrays.hpp"
+
+using namespace nb::literals;
+using namespace asterism;
+
+namespace {
+
+class Chain {
+  template <typename F>
+  decltype(auto) visit(F&& f) {
+    return std::visit([&](auto& s) -> decltype(auto) { return f(*s); }, sampler_);
+  }
+  template <typename F>
+  decltype(auto) visit(F&& f) const {
+    return std::visit([&](const auto& s) -> decltype(auto) { return f(std::as_const(*s)); },
+                      sampler_);
+  }
+
+ public:
+  Chain(const MotionModel& m, const ScoreModel& sm, const ChainOptions& options, std::uint64_t seed)
+      : m_(m) {
+    if (m.M == 1)
+      sampler_ = std::make_unique<Sampler<OneMotion>>(m, sm, options, seed);
+    else
+      sampler_ = std::make_unique<Sampler<SeveralMotions>>(m, sm, options, seed);
+  }
+
+  void add_frame(double time, const In<double>& F, const In<double>& Q, const In<double>& points) {
+    const std::size_t size = static_cast<std::size_t>(m_.M) * m_.axis.n * m_.axis.n;
+    require(F.size() == size && Q.size() == size, "F and Q: shape (modes, n, n)");
+    const std::vector<Point> frame = to_points(points, m_.axis.D);
+    visit([&](auto& s) {
+      s.partition().add_frame(time, motion_step(m_, F.data(), Q.data()), frame, n_seen_);
+    });
+    n_seen_ += static_cast<std::int64_t>(frame.size());
+    visit([](auto& s) { s.weigh_bonds({}); });  // they are of the detections so far
+  }
+
+  void freeze(std::int64_t frame) {
+    visit([&](auto& s) {
+      require(frame <= s.partition().window().now(), "frame: one that was added");
+      s.partition().freeze(frame);
+    });
+    read_bonds();
+  }
+
+  // Tracks as in `labels`, in place of what is there; nothing may be settled yet.
+  void assign(const In<std::int64_t>& labels) {
+    require(static_cast<std::int64_t>(labels.size()) == n_seen_, "labels: one for each detection");
+    visit([&](auto& s) { assign_to(s, labels.data()); });
+    read_bonds();
+  }
+
+  Out<std::int64_t> labels() const {
+    return visit([&](const auto& s) {
+      const std::vector<std::int64_t> all = labels_of(s.partition());
+      Owned<std::int64_t> out(all.size());
+      std::copy(all.begin(), all.end(), out.data.get());
+      return out.give({all.size()});
+    });
+  }
+  double log_posterior() const {
+    return visit([](const auto& s) { return s.partition().log_posterior() + s.bonds().total(); });
+  }
+
+  // Bonds of markers: pairs a < b, of each (μ, s), and by detection the marker that it is known for.
+  void bond(const In<std::int64_t>& pairs, const In<double>& lengths, double weight,
+            const In<std::int64_t>& known) {
+    const std::size_t n = lengths.size() / 2;
+    require(pairs.size() == 2 * n && lengths.size() == 2 * n, "pairs and lengths: shape (n, 2)");
+    require(static_cast<std::int64_t>(known.size()) == n_seen_, "known: one for each detection");
+    std::vector<char> is_known;
+    for (std::size_t i = 0; i < known.size(); ++i) {
+      if (known.data()[i] < 0) continue;
+      const auto marker = static_cast<std::size_t>(known.data()[i]);
+      require(marker < known.size(), "known: markers 0, 1 and so on");
+      if (is_known.size() <= marker) is_known.resize(marker + 1, false);
+      require(!is_known[marker], "known: one detection for each marker");
+      is_known[marker] = true;
+    }
+    const auto n_markers = static_cast<std::int32_t>(is_known.size());
+    std::vector<BondGraph::Pair> all(n);
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::int64_t a = pairs.data()[2 * k], b = pairs.data()[2 * k + 1];
+      require(0 <= a && a < b && b < n_markers, "pairs: a < b, known markers");
+      require(lengths.data()[2 * k + 1] > 0, "lengths: spreads above 0");
+      all[k] = {static_cast<std::int32_t>(a), static_cast<std::int32_t>(b), lengths.data()[2 * k],
+                lengths.data()[2 * k + 1]};
+    }
+    visit([&](auto& s) {
+      using Filter = typename std::remove_reference_t<decltype(s)>::Motion;
+      std::vector<std::int32_t> by_id(s.partition().window().n_ids(), -1);
+      for (std::size_t i = 0; i < by_id.size(); ++i)
+        by_id[i] = static_cast<std::int32_t>(
+            known.data()[s.partition().window()[static_cast<std::int32_t>(i)].number]);
+      s.weigh_bonds(BondTerm<Filter>(BondGraph(n_markers, all, weight), std::move(by_id)));
+    });
+    read_bonds();
+  }
+  // What bonds say: as it was kept move by move, and read anew from the tracks.
+  nb::tuple bond_term() const {
+    return visit([](const auto& s) {
+      auto anew = s.bonds();
+      anew.read(s.partition());
+      return nb::make_tuple(s.bonds().total(), anew.total());
+    });
+  }
+
+  void run(std::int64_t n_moves) {
+    nb::gil_scoped_release release;
+    visit([&](auto& s) {
+      for (std::int64_t n = 0; n < n_moves; ++n) s.step();
+    });
+  }
+
+  // (drawn, possible, taken) of each kind of move.
+  Out<std::int64_t> counts() const {
+    Owned<std::int64_t> out(kMoves * 3);
+    visit([&](const auto& s) {
+      for (int k = 0; k < kMoves; ++k) {
+        const MoveCounts& c = s.counts()[k];
+        out.data[3 * k] = c.n_drawn;
+        out.data[3 * k + 1] = c.n_possible;
+        out.data[3 * k + 2] = c.n_taken;
+      }
+    });
+    return out.give({kMoves, 3});
+  }
+
+  // (labels of each partition, moves after which the chain was in it).
+  nb::tuple visits(std::int64_t n_moves) {
+    std::unordered_map<std::uint64_t, Visited> visited;
+    {
+      nb::gil_scoped_release release;
+      visited = visit([&](auto& s) { return tally(s, n_moves); });
+    }
+    const auto n = static_cast<std::size_t>(n_seen_), V = visited.size();
+    Owned<std::int64_t> labels(V * n), counts(V);
+    std::size_t v = 0;
+    for (const auto& [key, one] : visited) {
+      std::copy(one.labels.begin(), one.labels.end(), labels.data.get() + v * n);
+      counts.data[v++] = one.count;
+    }
+    return nb::make_tuple(labels.give({V, n}), counts.give({V}));
+  }
+
+  // Moves that are weighed to the end, one by one: (kind, what was drawn on the way, labels before
+  // and after, log q forward and back, gain, whether it was taken).
+  nb::list trace(std::int64_t n_moves) {
+    nb::list out;
+    visit([&](auto& s) {
+      s.weigh_above(-std::numeric_limits<double>::infinity());
+      for (std::int64_t n = 0; n < n_moves; ++n) trace_one(s, out);
+      s.weigh_above(Sampler<OneMotion>::kOnlyWhatMayBeTaken);
+    });
+    return out;
+  }
+
+ private:
+  void read_bonds() {
+    visit([](auto& s) {
+      auto bonds = s.bonds();
+      bonds.read(s.partition());
+      s.weigh_bonds(bonds);
+    });
+  }
+
+  template <typename Filter>
+  static void assign_to(Sampler<Filter>& s, const std::int64_t* labels) {
+    Partition<Filter>& p = s.partition();
+    std::vector<Edit<Filter>> edits;
+    for (const std::int32_t k : p.tracks().items()) {
+      require(p.track(k).n_frozen == 0, "labels: before anything is settled");
+      edits.emplace_back().track = k;
+    }
+    p.apply(edits);
+    edits.clear();
+    std::unordered_map<std::int64_t, std::size_t> place;
+    const DetectionWindow& window = p.window();
+    for (std::int64_t t = window.first(); t <= window.now(); ++t)
+      for (const std::int32_t i : window.frame(t).ids) {
+        const std::int64_t label = labels[window[i].number];
+        if (label < 0) continue;
+        const auto [at, is_new] = place.try_emplace(label, edits.size());
+        if (is_new) edits.emplace_back();
+        Edit<Filter>& edit = edits[at->second];
+        require(is_new || window.is_linkable(edit.tail.nodes.back(), i), "labels: tracks of the model");
+        p.append(edit, i);
+      }
+    for (const Edit<Filter>& edit : edits)
+      require(edit.tail.nodes.size() > 1, "labels: at least two detections of each track");
+    p.apply(edits);
+  }
+
+  template <typename Filter>
+  void trace_one(Sampler<Filter>& s, nb::list& out) {
+    const std::vector<std::int64_t> before = labels_of(s.partition());
+    const double value = s.partition().log_posterior() + s.bonds().total();
+    struct Seen {
+      std::int64_t move = 0, with = -1;
+      double log_forward = 0, log_reverse = 0, gain = 0;
+      bool is_taken = false, is_any = false;
+      std::vector<std::int64_t> after;
+    } seen;
+    s.step([&](const Change<Filter>& q, bool is_taken) {
+      seen.move = static_cast<std::int64_t>(q.move);
+      seen.with = q.with;
+      if (q.with >= 0 && q.move != Move::update) seen.with = s.partition().window()[q.with].number;
+      seen.log_forward = q.log_forward;
+      seen.log_reverse = q.log_reverse;
+      seen.gain = q.gain;
+      seen.is_taken = is_taken;
+      seen.is_any = true;
+      Partition<Filter> copy(s.partition());
+      std::vector<Edit<Filter>> edits(q.edits.begin(), q.edits.begin() + q.n_edits);
+      copy.apply(edits);
+      seen.after = labels_of(copy);
+    });
+    if (!seen.is_any) return;
+    const auto give = [](const std::vector<std::int64_t>& all) {
+      Owned<std::int64_t> array(all.size());
+      std::copy(all.begin(), all.end(), array.data.get());
+      return array.give({all.size()});
+    };
+    out.append(nb::make_tuple(seen.move, seen.with, give(before), give(seen.after),
+                              seen.log_forward, seen.log_reverse, seen.gain, seen.is_taken, value));
+  }
+
+  MotionModel m_;
+  std::variant<std::unique_ptr<Sampler<OneMotion>>, std::unique_ptr<Sampler<SeveralMotions>>>
+      sampler_;
+  std::int64_t n_seen_ = 0;
+};
+
+}  // namespace
+
+void bind_chain(nb::module_& module) {
+  nb::class_<Chain>(module, "Chain")
+      .def(
+          "__init__",
+          [](Chain* self, const MotionModel& model, const ScoreModel& score,
+             const ChainOptions& options, std::uint64_t seed) {
+            new (self) Chain(model, score, options, seed);
+          },
+          "model"_a, "score"_a, "options"_a, "seed"_a)
+      .def("add_frame", &Chain::add_frame, "time"_a, "F"_a, "Q"_a, "points"_a)
+      .def("freeze", &Chain::freeze, "frame"_a)
+      .def("assign", &Chain::assign, "labels"_a)
+      .def("labels", &Chain::labels)
+      .def("log_posterior", &Chain::log_posterior)
+      .def("run", &Chain::run, "n_moves"_a)
+      .def("bond", &Chain::bond, "pairs"_a, "lengths"_a, "weight"_a, "known"_a)
+      .def("bond_term", &Chain::bond_term)
+      .def("counts", &Chain::counts)
+      .def("visits", &Chain::visits, "n_moves"_a)
+      .def("trace", &Chain::trace, "n_moves"_a);
+}

@@ -1,0 +1,203 @@
+// The solvers on plain arrays, as Python sees them.
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
+
+#include "python/arrays.hpp"
+#include "python/bindings.hpp"
+#include "solve/assignment.hpp"
+#include "solve/connected_components.hpp"
+#include "solve/deferred_acceptance.hpp"
+#include "solve/joint_events.hpp"
+#include "solve/k_best.hpp"
+#include "solve/set_packing.hpp"
+
+using namespace nb::literals;
+using namespace asterism;
+
+namespace {
+
+// (marginals with the miss last, log of the total weight, best event, bound, most states).
+nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_miss,
+                          std::int64_t max_states) {
+  require(log_weights.ndim() == 2 && log_miss.ndim() == 1 &&
+              log_weights.shape(0) == log_miss.shape(0),
+          "log_weights: shape (n, m), log_miss: shape (n,)");
+  constexpr std::size_t most = std::size_t{1} << 30;
+  require(log_weights.shape(0) < most && log_weights.shape(1) < most, "sizes below 2^30");
+  require(max_states >= 1 && max_states <= std::int64_t{1} << 30, "max_states: 1 to 2^30");
+  const std::size_t n = log_weights.shape(0), m = log_weights.shape(1);
+  Owned<double> marginals(n * (m + 1));
+  Owned<std::int32_t> best(n);
+  JointSummary summary;
+  {
+    nb::gil_scoped_release release;
+    std::vector<Candidate> pairings;
+    std::vector<double> weights;
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t j = 0; j < m; ++j) {
+        const double w = log_weights.data()[i * m + j];
+        if (!(w > -std::numeric_limits<double>::infinity())) continue;
+        pairings.push_back({static_cast<std::int32_t>(i), static_cast<std::int32_t>(j),
+                            w - log_miss.data()[i], 0});
+        weights.push_back(w);
+      }
+    std::vector<double> paired(pairings.size()), missed(n);
+    summary = JointEvents(pairings, weights, {log_miss.data(), n}, static_cast<std::int32_t>(m),
+                          max_states)
+                  .solve(paired, missed, {best.data.get(), n});
+    for (std::size_t e = 0; e < pairings.size(); ++e)
+      marginals.data[pairings[e].row * (m + 1) + pairings[e].column] = paired[e];
+    for (std::size_t i = 0; i < n; ++i) marginals.data[i * (m + 1) + m] = missed[i];
+  }
+  return nb::make_tuple(marginals.give({n, m + 1}), summary.log_total, best.give({n}),
+                        summary.bound, summary.n_states);
+}
+
+// Rows and columns of a sparse gain list, ordered by row, paired for the greatest sum of gains.
+Out<std::int32_t> assign(std::int32_t n_rows, std::int32_t n_columns, const In<std::int32_t>& rows,
+                         const In<std::int32_t>& columns, const In<double>& gains) {
+  require(rows.size() == gains.size() && columns.size() == gains.size(), "one gain a pair");
+  require(n_rows >= 0 && n_columns >= 0, "sizes ≥ 0");
+  std::vector<Candidate> candidates;
+  for (std::size_t e = 0; e < gains.size(); ++e) {
+    const std::int32_t i = rows.data()[e], j = columns.data()[e];
+    require(i >= 0 && i < n_rows && j >= 0 && j < n_columns, "indices within the sizes");
+    require(e == 0 || i >= rows.data()[e - 1], "pairs ordered by row");
+    candidates.push_back({i, j, gains.data()[e], 0});
+  }
+  Owned<std::int32_t> match(n_rows);
+  std::fill_n(match.data.get(), n_rows, -1);
+  {
+    nb::gil_scoped_release release;
+    const Groups groups = connected_groups(candidates, n_rows, n_columns);
+    Assignment solver;
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      solver.solve(groups[g], {match.data.get(), static_cast<std::size_t>(n_rows)});
+  }
+  return match.give({static_cast<std::size_t>(n_rows)});
+}
+
+std::pair<Out<std::int32_t>, std::int64_t> marry(const In<std::int64_t>& first,
+                                                 const In<std::int32_t>& receivers,
+                                                 const In<double>& costs,
+                                                 std::int32_t n_receivers) {
+  require(first.ndim() == 1 && first.size() >= 1, "first: shape (P + 1,)");
+  require(receivers.size() == costs.size(), "a cost for every wish");
+  const std::size_t P = first.size() - 1;
+  require(first.data()[0] == 0 && first.data()[P] == static_cast<std::int64_t>(costs.size()),
+          "first: from 0 to the number of wishes");
+  for (std::size_t p = 0; p < P; ++p) require(first.data()[p] <= first.data()[p + 1], "first: rising");
+  std::vector<Proposal> lists;
+  for (std::size_t e = 0; e < costs.size(); ++e) {
+    const std::int32_t r = receivers.data()[e];
+    require(r >= 0 && r < n_receivers, "receivers within their number");
+    lists.push_back({r, costs.data()[e]});
+  }
+  Owned<std::int32_t> partner(P);
+  const std::int64_t n = deferred_acceptance(lists, {first.data(), first.size()}, n_receivers,
+                                             {partner.data.get(), P});
+  return {partner.give({P}), n};
+}
+
+// The first k assignments of n rows to N columns by cost, N ≥ n; further rows fill up at no cost.
+Out<std::int32_t> k_best(const In<double>& cost, std::int64_t k) {
+  require(cost.ndim() == 2 && cost.shape(1) >= cost.shape(0), "cost: shape (n, N), N ≥ n");
+  require(cost.shape(1) < std::size_t{1} << 15, "N below 2^15");
+  const std::size_t n = cost.shape(0), N = cost.shape(1);
+  std::vector<std::int32_t> all;
+  std::size_t n_found = 0;
+  {
+    nb::gil_scoped_release release;
+    KBest best({cost.data(), n * N}, static_cast<std::int32_t>(n), static_cast<std::int32_t>(N));
+    for (; static_cast<std::int64_t>(n_found) < k && best.next(); ++n_found)
+      all.insert(all.end(), best.columns().begin(), best.columns().end());
+  }
+  Owned<std::int32_t> out(all.size());
+  std::copy(all.begin(), all.end(), out.data.get());
+  return out.give({n_found, n});
+}
+
+// Options are listed by tree; option o uses uses[first_use[o]:first_use[o + 1]]. Each tree needs one
+// that uses nothing.
+std::vector<std::vector<PackingOption>> packing_trees(const In<std::int64_t>& first_option,
+                                                      const In<double>& worths,
+                                                      const In<std::int64_t>& first_use,
+                                                      const In<std::int32_t>& uses) {
+  require(first_option.size() >= 1 && first_use.size() == worths.size() + 1, "one list of uses an option");
+  const std::size_t n = first_option.size() - 1;
+  require(first_option.data()[n] == static_cast<std::int64_t>(worths.size()) &&
+              first_use.data()[worths.size()] == static_cast<std::int64_t>(uses.size()),
+          "lists to the end");
+  std::vector<std::vector<PackingOption>> trees(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    bool has_free = false;
+    require(first_option.data()[i] >= 0 && first_option.data()[i] <= first_option.data()[i + 1],
+            "first_option: rising");
+    for (std::int64_t o = first_option.data()[i]; o < first_option.data()[i + 1]; ++o) {
+      const std::int64_t a = first_use.data()[o], b = first_use.data()[o + 1];
+      require(a >= 0 && a <= b, "first_use: rising");
+      for (std::int64_t u = a; u < b; ++u) require(uses.data()[u] >= 0, "resources from 0");
+      trees[i].push_back({worths.data()[o], {uses.data() + a, uses.data() + b}});
+      has_free = has_free || a == b;
+    }
+    require(has_free, "an option that uses nothing in every tree");
+  }
+  return trees;
+}
+
+// (what no packing is worth more than; by option, in the order given, what is lost with it).
+nb::tuple packing_losses(const In<std::int64_t>& first_option, const In<double>& worths,
+                           const In<std::int64_t>& first_use, const In<std::int32_t>& uses) {
+  const auto trees = packing_trees(first_option, worths, first_use, uses);
+  Owned<double> out(worths.size());
+  std::size_t o = 0;
+  const SetPacking::Losses losses = SetPacking(trees).losses();
+  for (const std::vector<double>& tree : losses.of)
+    for (const double loss : tree) out.data[o++] = loss;
+  return nb::make_tuple(losses.bound, out.give({worths.size()}));
+}
+
+// The k best ways for every tree to take one option, no resource twice.
+nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& worths,
+               const In<std::int64_t>& first_use, const In<std::int32_t>& uses, std::int64_t k,
+               double drop, std::int64_t max_nodes) {
+  const auto trees = packing_trees(first_option, worths, first_use, uses);
+  const std::size_t n = trees.size();
+  std::vector<std::int32_t> all;
+  std::vector<double> totals;
+  PackingSummary summary;
+  {
+    nb::gil_scoped_release release;
+    summary = SetPacking(trees).solve(
+        k, drop, max_nodes, [&](std::span<const std::int32_t> options, double worth) {
+          all.insert(all.end(), options.begin(), options.end());
+          totals.push_back(worth);
+        });
+  }
+  Owned<std::int32_t> out(all.size());
+  std::copy(all.begin(), all.end(), out.data.get());
+  Owned<double> worth(totals.size());
+  std::copy(totals.begin(), totals.end(), worth.data.get());
+  return nb::make_tuple(out.give({totals.size(), n}), worth.give({totals.size()}), summary.is_exact,
+                        summary.bound, summary.n_nodes);
+}
+
+}  // namespace
+
+void bind_solvers(nb::module_& module) {
+  module.def("assign", &assign, "n_rows"_a, "n_columns"_a, "rows"_a, "columns"_a, "gains"_a);
+  module.def("marry", &marry, "first"_a, "receivers"_a, "costs"_a, "n_receivers"_a);
+  module.def("k_best", &k_best, "cost"_a, "k"_a);
+  module.def("pack", &pack, "first_option"_a, "worths"_a, "first_use"_a, "uses"_a, "k"_a, "drop"_a,
+             "max_nodes"_a);
+  module.def("packing_losses", &packing_losses, "first_option"_a, "worths"_a, "first_use"_a, "uses"_a);
+  module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a);
+
+  nb::register_exception_translator([](const std::exception_ptr& p, void*) {
+    try {
+      std::rethrow_exception(p);
+    } catch (const FrontierLimit& limit) {
+      PyErr_SetString(PyExc_OverflowError, limit.what());
+    }
+  });
+}

@@ -1,0 +1,167 @@
+// Models, filters and scores, as Python sees them.
+#include "filter/track_filter.hpp"
+#include "python/arrays.hpp"
+#include "python/bindings.hpp"
+#include "python/motion_arrays.hpp"
+
+using namespace nb::literals;
+using namespace asterism;
+
+namespace {
+
+MotionModel motion_model(int n_axes, const In<double>& H, const In<double>& P0, double noise_sigma,
+                         const In<double>& T) {
+  require(H.ndim() == 1 && H.shape(0) >= 1 && H.shape(0) <= kMaxStates, "H: 1 to 3 states");
+  require(n_axes >= 1 && n_axes <= kMaxAxes, "n_axes: 1 to 3");
+  const auto n = static_cast<int>(H.shape(0));
+  require(P0.ndim() == 2 && P0.shape(0) == H.shape(0) && P0.shape(1) == H.shape(0),
+          "P0: shape (n, n)");
+  require(T.ndim() == 2 && T.shape(0) == T.shape(1) && T.shape(0) >= 1 && T.shape(0) <= kMaxModes,
+          "T: shape (modes, modes), 1 to 3 modes");
+  MotionModel m;
+  m.M = static_cast<int>(T.shape(0));
+  std::copy_n(T.data(), m.M * m.M, m.T.begin());
+  m.w0 = stationary(m.T, m.M);
+  m.axis.n = n;
+  m.axis.D = n_axes;
+  std::copy_n(H.data(), n, m.axis.H.begin());
+  std::copy_n(P0.data(), n * n, m.axis.P0.begin());
+  m.axis.r = noise_sigma * noise_sigma;
+  return m;
+}
+
+// The points of many tracks, one track after the other, and where each begins.
+struct TrackPoints {
+  std::vector<Point> points;
+  std::span<const std::int64_t> frames, offsets;
+
+  TrackPoints(const In<double>& p, const In<std::int64_t>& f, const In<std::int64_t>& o, int D,
+              std::size_t n_frames)
+      : points(to_points(p, D)), frames(f.data(), f.size()), offsets(o.data(), o.size()) {
+    require(f.ndim() == 1 && frames.size() == points.size(), "frames: shape (N,)");
+    require(o.ndim() == 1 && !offsets.empty() && offsets.front() == 0 &&
+                offsets.back() == static_cast<std::int64_t>(points.size()),
+            "offsets: from 0 to N");
+    for (std::size_t k = 0; k + 1 < offsets.size(); ++k) {
+      require(offsets[k] <= offsets[k + 1], "offsets: rising");
+      for (std::int64_t i = offsets[k]; i < offsets[k + 1]; ++i)
+        require(frames[i] >= 0 && frames[i] < static_cast<std::int64_t>(n_frames) &&
+                    (i == offsets[k] || frames[i] > frames[i - 1]),
+                "frames: rising within a track");
+    }
+  }
+  std::size_t n_tracks() const { return offsets.size() - 1; }
+  std::span<const Point> points_of(std::size_t k) const {
+    return std::span(points).subspan(offsets[k], offsets[k + 1] - offsets[k]);
+  }
+  std::span<const std::int64_t> frames_of(std::size_t k) const {
+    return frames.subspan(offsets[k], offsets[k + 1] - offsets[k]);
+  }
+};
+
+Out<double> score_tracks(const MotionModel& m, const ScoreModel& sm, const In<double>& points,
+                         const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
+                         const In<double>& times, const In<std::int32_t>& kind,
+                         const In<double>& F, const In<double>& Q) {
+  const Timeline line = timeline(m, times, kind, F, Q);
+  const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
+  Owned<double> scores(tracks.n_tracks());
+  {
+    nb::gil_scoped_release release;
+    const auto log_end = log_end_table(sm, static_cast<std::int64_t>(line.times.size()));
+    for (std::size_t k = 0; k < tracks.n_tracks(); ++k)
+      scores.data[k] =
+          score_track(m, sm, line, tracks.points_of(k), tracks.frames_of(k), log_end);
+  }
+  return scores.give({tracks.n_tracks()});
+}
+
+Out<double> foresee_tracks(const MotionModel& m, const In<double>& points,
+                           const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
+                           const In<double>& times, const In<std::int32_t>& kind,
+                           const In<double>& F, const In<double>& Q) {
+  const Timeline line = timeline(m, times, kind, F, Q);
+  const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
+  Owned<double> log_densities(tracks.points.size());
+  {
+    nb::gil_scoped_release release;
+    for (std::size_t k = 0; k < tracks.n_tracks(); ++k)
+      if (const auto f = tracks.frames_of(k); !f.empty())
+        foresee_track(m, line, tracks.points_of(k), f,
+                      {log_densities.data.get() + tracks.offsets[k], f.size()});
+  }
+  return log_densities.give({tracks.points.size()});
+}
+
+nb::tuple filter_tracks(const MotionModel& m, const In<double>& points,
+                        const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
+                        const In<double>& times, const In<std::int32_t>& kind, const In<double>& F,
+                        const In<double>& Q, bool smooth) {
+  const Timeline line = timeline(m, times, kind, F, Q);
+  const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
+  const std::size_t K = tracks.n_tracks();
+  Owned<std::int64_t> starts(K + 1);
+  for (std::size_t k = 0; k < K; ++k) {
+    const auto f = tracks.frames_of(k);
+    starts.data[k + 1] = starts.data[k] + (f.empty() ? 0 : f.back() - f.front() + 1);
+  }
+  const auto total = static_cast<std::size_t>(starts.data[K]);
+  const std::size_t D = m.axis.D, n = m.axis.n;
+  Owned<double> means(total * D * n), covariances(total * n * n), log_densities(tracks.points.size());
+  {
+    nb::gil_scoped_release release;
+    std::vector<AxisState> states, predicted;
+    for (std::size_t k = 0; k < K; ++k) {
+      const auto f = tracks.frames_of(k);
+      if (f.empty()) continue;
+      states.resize(starts.data[k + 1] - starts.data[k]);
+      predicted.resize(states.size());
+      filter_track(m, line, tracks.points_of(k), f, states, predicted,
+                   {log_densities.data.get() + tracks.offsets[k], f.size()});
+      if (smooth) smooth_track(m, line, f.front(), predicted, states);
+      for (std::size_t i = 0; i < states.size(); ++i) {
+        const std::size_t at = starts.data[k] + i;
+        for (std::size_t d = 0; d < D; ++d)
+          std::copy_n(states[i].x[d].begin(), n, means.data.get() + (at * D + d) * n);
+        std::copy_n(states[i].P.begin(), n * n, covariances.data.get() + at * n * n);
+      }
+    }
+  }
+  return nb::make_tuple(means.give({total, D, n}), covariances.give({total, n, n}),
+                        starts.give({K + 1}), log_densities.give({tracks.points.size()}));
+}
+
+}  // namespace
+
+void bind_tracking(nb::module_& module) {
+  nb::class_<MotionModel>(module, "MotionModel")
+      .def_static("make", &motion_model, "n_axes"_a, "H"_a, "P0"_a, "noise_sigma"_a, "T"_a)
+      .def_prop_ro("n_axes", [](const MotionModel& m) { return m.axis.D; });
+
+  nb::class_<ScoreModel>(module, "ScoreModel")
+      .def(
+          "__init__",
+          [](ScoreModel* self, double birth_density, double clutter_density, double p_detection,
+             double p_redetection, double p_disappear, double max_speed, double speed_margin,
+             int max_gap, bool last_termination) {
+            new (self) ScoreModel{std::log(birth_density),
+                                  std::log(clutter_density),
+                                  std::log1p(-p_disappear),
+                                  p_disappear,
+                                  p_detection,
+                                  p_redetection,
+                                  max_speed,
+                                  speed_margin,
+                                  max_gap,
+                                  last_termination};
+          },
+          nb::kw_only(), "birth_density"_a, "clutter_density"_a, "p_detection"_a, "p_redetection"_a,
+          "p_disappear"_a, "max_speed"_a, "speed_margin"_a, "max_gap"_a, "last_termination"_a);
+
+  module.def("score_tracks", &score_tracks, "model"_a, "score"_a, "points"_a, "frames"_a,
+             "offsets"_a, "times"_a, "kind"_a, "F"_a, "Q"_a);
+  module.def("foresee_tracks", &foresee_tracks, "model"_a, "points"_a, "frames"_a, "offsets"_a,
+             "times"_a, "kind"_a, "F"_a, "Q"_a);
+  module.def("filter_tracks", &filter_tracks, "model"_a, "points"_a, "frames"_a, "offsets"_a,
+             "times"_a, "kind"_a, "F"_a, "Q"_a, "smooth"_a);
+}

@@ -1,0 +1,158 @@
+// Which markers keep their distances: for each marker a few others, how far they are, and how steady
+// that is.
+//
+// What was long ago is forgotten: a mean over the last frames has no less than 1/kMemory of each.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "base/scratch.hpp"
+#include "filter/kalman.hpp"
+
+namespace asterism {
+
+// A marker in a frame.
+struct Seen {
+  std::int32_t marker = 0;
+  Point at{};
+};
+
+// Where the markers of a frame are, by number: an open hash table, so that time and memory depend on
+// how many there are and not on how large their numbers have become.
+class Places {
+ public:
+  void clear() {
+    std::fill(slots_.begin(), slots_.end(), Seen{kNobody, {}});
+    n_ = 0;
+  }
+  void set(std::int32_t marker, const Point& at) {
+    if (2 * (n_ + 1) > slots_.size()) grow();
+    Seen& slot = slots_[place(marker)];
+    n_ += slot.marker == kNobody;
+    slot = {marker, at};
+  }
+  const Point* find(std::int32_t marker) const {
+    if (slots_.empty()) return nullptr;
+    const Seen& slot = slots_[place(marker)];
+    return slot.marker == marker ? &slot.at : nullptr;
+  }
+  std::size_t capacity() const { return slots_.size(); }
+
+ private:
+  static constexpr std::int32_t kNobody = -1;
+
+  // Of a marker, or where it would stand.
+  std::size_t place(std::int32_t marker) const {
+    const std::size_t last = slots_.size() - 1;  // a power of two, less one
+    std::size_t at = static_cast<std::uint32_t>(marker) * 0x9e3779b1u & last;
+    while (slots_[at].marker != kNobody && slots_[at].marker != marker) at = (at + 1) & last;
+    return at;
+  }
+  void grow() {
+    const std::vector<Seen> old = std::move(slots_);
+    slots_.assign(std::max<std::size_t>(2 * old.size(), 32), Seen{kNobody, {}});
+    for (const Seen& one : old)
+      if (one.marker != kNobody) slots_[place(one.marker)] = one;
+  }
+
+  std::vector<Seen> slots_;
+  std::size_t n_ = 0;
+};
+
+struct Bond {
+  std::int32_t other = 0;
+  std::int64_t n = 0;  // frames in which both were seen
+  double mean = 0, variance = 0;
+};
+
+class Neighbours {
+ public:
+  static constexpr std::int64_t kMemory = 400;
+
+  // `noise`: of a detection, along an axis.
+  Neighbours(int D, double noise) : D_(D), noise_(noise) {}
+
+  // The markers that are seen in a frame.
+  void add(std::span<const Seen> seen) {
+    ++n_frames_;
+    places_.clear();
+    for (const Seen& one : seen) places_.set(one.marker, one.at);
+    for (const Seen& one : seen) {
+      std::vector<Bond>& bonds = bonds_[one.marker];
+      if (bonds.empty() || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one, bonds);
+      for (Bond& bond : bonds)
+        if (const Point* other = places_.find(bond.other)) measure(one.at, *other, bond);
+    }
+  }
+
+  // A marker that will not be asked for again.
+  void forget(std::int32_t marker) { bonds_.erase(marker); }
+  // And that the others are not asked about either.
+  void forget_everywhere(std::int32_t marker) {
+    forget(marker);
+    for (auto& [own, bonds] : bonds_)
+      std::erase_if(bonds, [&](const Bond& bond) { return bond.other == marker; });
+  }
+
+  std::span<const Bond> of(std::int32_t marker) const {
+    const auto at = bonds_.find(marker);
+    if (at == bonds_.end()) return {};
+    return at->second;
+  }
+  // How far the other may be off after a while, roughly: what was seen of it, and what was not yet.
+  double unsteadiness(const Bond& bond) const {
+    return std::sqrt(bond.variance) + 4 * noise_ +
+           bond.mean * (0.02 + 1 / static_cast<double>(std::max<std::int64_t>(bond.n, 1)));
+  }
+
+ private:
+  static constexpr std::int64_t kLookEvery = 32;  // frames
+  static constexpr std::size_t kMost = 24, kNearest = 12;
+  static constexpr std::int64_t kTrial = 60;  // frames until one may be given up for another
+
+  void measure(const Point& a, const Point& b, Bond& bond) const {
+    const double distance = std::sqrt(squared_distance(a, b, D_));
+    const double share = 1 / static_cast<double>(std::min(++bond.n, kMemory));
+    const double off = distance - bond.mean;
+    bond.mean += share * off;
+    bond.variance += share * (off * (distance - bond.mean) - bond.variance);
+  }
+
+  // The nearest others are tried; where there is no room, instead of the least steady.
+  void look_around(std::span<const Seen> seen, const Seen& one, std::vector<Bond>& bonds) {
+    near_.clear();
+    for (const Seen& other : seen)
+      if (other.marker != one.marker)
+        near_.push_back({squared_distance(one.at, other.at, D_), other.marker});
+    const std::size_t n = std::min(bonds.empty() ? kMost : kNearest, near_.size());
+    std::partial_sort(near_.begin(), near_.begin() + static_cast<std::ptrdiff_t>(n), near_.end());
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::int32_t other = near_[k].second;
+      if (std::any_of(bonds.begin(), bonds.end(), [&](const Bond& b) { return b.other == other; }))
+        continue;
+      if (bonds.size() < kMost) {
+        bonds.push_back({other});
+        continue;
+      }
+      const auto worst = std::max_element(bonds.begin(), bonds.end(), [&](const Bond& a, const Bond& b) {
+        return unsteadiness(a) < unsteadiness(b);
+      });
+      if (worst->n >= kTrial && worst->mean * worst->mean > near_[k].first) *worst = {other};
+    }
+  }
+
+  int D_;
+  double noise_;
+  std::int64_t n_frames_ = 0;
+  std::map<std::int32_t, std::vector<Bond>> bonds_;
+  Fresh<Places> places_;
+  std::vector<std::pair<double, std::int32_t>> near_;
+};
+
+}  // namespace asterism

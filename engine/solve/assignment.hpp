@@ -1,0 +1,163 @@
+// Exact sparse assignment: the pairing with the greatest sum of gains; anyone may stay alone.
+//
+// Successive shortest augmenting paths (Jonker & Volgenant 1987) on the candidates alone. Every
+// row owns a dummy column of cost 0, its right to stay alone, so a perfect matching of the rows
+// always exists and costs that are no better than 0 are never taken.
+//
+//   c_ij = -gain   u_i, v_j  potentials with c_ij - u_i - v_j ≥ 0, = 0 on matched pairs
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <queue>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "solve/connected_components.hpp"
+
+namespace asterism {
+
+class Assignment {
+ public:
+  // match[row] becomes the column of each row of `group`, which is ordered by row; rows that stay
+  // alone are left untouched.
+  void solve(std::span<const Candidate> group, std::span<std::int32_t> match) {
+    if (group.size() == 1) {
+      if (group[0].gain > 0) match[group[0].row] = group[0].column;
+      return;
+    }
+    compress(group);
+    const auto n_rows = static_cast<std::int32_t>(rows_.size());
+    const auto n_columns = static_cast<std::int32_t>(columns_.size());
+    u_.assign(n_rows, 0);
+    v_.assign(n_columns, 0);
+    column_of_.assign(n_rows, kAlone);
+    row_of_.assign(n_columns, -1);
+    for (std::int32_t i = 0; i < n_rows; ++i)
+      for (std::int32_t e = first_[i]; e < first_[i + 1]; ++e)
+        u_[i] = std::min(u_[i], -edges_[e].gain);
+    for (std::int32_t i = 0; i < n_rows; ++i) augment(i);
+    for (std::int32_t i = 0; i < n_rows; ++i)
+      if (column_of_[i] != kAlone) match[rows_[i]] = columns_[column_of_[i]];
+  }
+
+  // Also writes what each column of the group is worth to whoever has it: no pairing has a greater
+  // sum of gains than Σ price_j + Σ_i max(0, max_j gain_ij - price_j), and the best has just that.
+  void solve(std::span<const Candidate> group, std::span<std::int32_t> match,
+             std::span<double> price) {
+    solve(group, match);
+    if (group.size() == 1) {
+      price[group[0].column] = 0;
+      return;
+    }
+    for (std::size_t j = 0; j < columns_.size(); ++j) price[columns_[j]] = -v_[j];
+  }
+
+ private:
+  static constexpr std::int32_t kAlone = -1;
+
+  struct Edge {
+    std::int32_t column;
+    double gain;
+  };
+
+  // Give the group's rows and columns small consecutive numbers.
+  void compress(std::span<const Candidate> group) {
+    rows_.clear();
+    first_.clear();
+    edges_.clear();
+    columns_.clear();
+    for (const Candidate& c : group) columns_.push_back(c.column);
+    std::sort(columns_.begin(), columns_.end());
+    columns_.erase(std::unique(columns_.begin(), columns_.end()), columns_.end());
+    for (const Candidate& c : group) {
+      if (rows_.empty() || rows_.back() != c.row) {
+        rows_.push_back(c.row);
+        first_.push_back(static_cast<std::int32_t>(edges_.size()));
+      }
+      const auto at = std::lower_bound(columns_.begin(), columns_.end(), c.column);
+      edges_.push_back({static_cast<std::int32_t>(at - columns_.begin()), c.gain});
+    }
+    first_.push_back(static_cast<std::int32_t>(edges_.size()));
+  }
+
+  void augment(std::int32_t start) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    distance_.assign(columns_.size(), infinity);
+    from_.assign(columns_.size(), -1);
+    is_done_.assign(columns_.size(), 0);
+    scanned_.clear();
+    while (!heap_.empty()) heap_.pop();
+
+    double best_end = infinity;  // length of the shortest path to any end found so far
+    std::int32_t end_row = -1, end_column = kAlone;
+    std::int32_t row = start;
+    double length = 0;
+    for (;;) {
+      scanned_.push_back({row, length});
+      if (length - u_[row] < best_end) {  // end at the row's own dummy
+        best_end = length - u_[row];
+        end_row = row;
+        end_column = kAlone;
+      }
+      for (std::int32_t e = first_[row]; e < first_[row + 1]; ++e) {
+        const std::int32_t j = edges_[e].column;
+        if (is_done_[j]) continue;
+        const double d = length - edges_[e].gain - u_[row] - v_[j];
+        if (d < distance_[j]) {
+          distance_[j] = d;
+          from_[j] = row;
+          heap_.push({d, j});
+        }
+      }
+      std::int32_t j = -1;
+      while (!heap_.empty()) {
+        const auto [d, k] = heap_.top();
+        heap_.pop();
+        if (!is_done_[k] && d == distance_[k]) {
+          j = k;
+          break;
+        }
+      }
+      if (j < 0 || distance_[j] >= best_end) break;
+      is_done_[j] = 1;
+      if (row_of_[j] < 0) {
+        best_end = distance_[j];
+        end_row = from_[j];
+        end_column = j;
+        break;
+      }
+      row = row_of_[j];
+      length = distance_[j];
+    }
+    for (const auto& [r, d] : scanned_) {
+      if (d >= best_end) continue;
+      u_[r] += best_end - d;
+    }
+    for (std::size_t j = 0; j < columns_.size(); ++j)
+      if (is_done_[j] && distance_[j] < best_end) v_[j] -= best_end - distance_[j];
+    // Flip the path: each row on it takes the column that it reached, and frees its old one.
+    std::int32_t column = end_column;
+    row = end_row;
+    for (;;) {
+      const std::int32_t old = column_of_[row];
+      column_of_[row] = column;
+      if (column != kAlone) row_of_[column] = row;
+      if (row == start) break;
+      column = old;
+      row = from_[column];
+    }
+  }
+
+  using HeapItem = std::pair<double, std::int32_t>;
+  std::vector<std::int32_t> rows_, columns_, first_, column_of_, row_of_, from_;
+  std::vector<Edge> edges_;
+  std::vector<double> u_, v_, distance_;
+  std::vector<char> is_done_;
+  std::vector<std::pair<std::int32_t, double>> scanned_;
+  std::priority_queue<HeapItem, std::vector<HeapItem>, std::greater<>> heap_;
+};
+
+}  // namespace asterism

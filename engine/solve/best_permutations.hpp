@@ -1,0 +1,121 @@
+// Of all joint events of a group that share out the same detections among the same tracks, only the
+// likeliest: a guard against coalescence (JPDA*, Blom & Bloem 2000).
+//
+// The mean over events that differ by who is who pulls tracks that run side by side together, until
+// they are one. Pruned to the best permutation of each kind, the events that are left still tell
+// which detections are clutter and which tracks were missed, and pull nobody.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "solve/connected_components.hpp"
+
+namespace asterism {
+
+class BestPermutations {
+ public:
+  static constexpr std::size_t kMostEvents = 20'000;
+  static constexpr double kNegligible = 25;  // nats below the best event: not worth a thought
+
+  // Weights of the group's pairings after pruning; false where the group has too many events.
+  // `match` is the best event.
+  bool solve(std::span<const Candidate> group, std::span<const std::int32_t> match,
+             std::vector<double>& weights) {
+    group_ = group;
+    if (!number()) return false;
+    best_ = 0;
+    for (const Candidate& c : group)
+      if (match[c.row] == c.column) best_ += c.gain;
+    events_.clear();
+    choices_.clear();
+    chosen_.assign(rows_.size() - 1, -1);
+    n_visits_ = 0;
+    if (!visit(0, 0, 0, 0)) return false;
+    std::sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) {
+      return std::tuple(a.tracks, a.columns, -a.gain, a.first) <
+             std::tuple(b.tracks, b.columns, -b.gain, b.first);
+    });
+    weights.assign(group.size(), 0);
+    double total = 0;
+    for (std::size_t k = 0; k < events_.size(); ++k) {
+      const Event& event = events_[k];
+      if (k > 0 && event.tracks == events_[k - 1].tracks &&
+          event.columns == events_[k - 1].columns)
+        continue;
+      const double weight = std::exp(event.gain - best_);
+      total += weight;
+      for (std::size_t r = 0; r < chosen_.size(); ++r)
+        if (choices_[event.first + r] >= 0) weights[choices_[event.first + r]] += weight;
+    }
+    for (double& weight : weights) weight /= total;
+    return true;
+  }
+
+ private:
+  struct Event {
+    std::uint64_t tracks, columns;
+    double gain;
+    std::size_t first;  // of its choices
+  };
+
+  // Where the rows of the group begin, its columns numbered from 0, and the most that the rows from
+  // each on could win.
+  bool number() {
+    rows_.clear();
+    columns_.clear();
+    for (const Candidate& c : group_) columns_.push_back(c.column);
+    std::sort(columns_.begin(), columns_.end());
+    columns_.erase(std::unique(columns_.begin(), columns_.end()), columns_.end());
+    column_of_.resize(group_.size());
+    for (std::size_t e = 0; e < group_.size(); ++e) {
+      if (e == 0 || group_[e].row != group_[e - 1].row) rows_.push_back(e);
+      const auto at = std::lower_bound(columns_.begin(), columns_.end(), group_[e].column);
+      column_of_[e] = static_cast<std::int32_t>(at - columns_.begin());
+    }
+    rows_.push_back(group_.size());
+    const std::size_t n = rows_.size() - 1;
+    if (n > 64 || columns_.size() > 64) return false;
+    most_.assign(n + 1, 0);
+    for (std::size_t r = n; r-- > 0;) {
+      double most = 0;
+      for (std::size_t e = rows_[r]; e < rows_[r + 1]; ++e) most = std::max(most, group_[e].gain);
+      most_[r] = most_[r + 1] + most;
+    }
+    return true;
+  }
+
+  bool visit(std::size_t r, std::uint64_t tracks, std::uint64_t columns, double gain) {
+    if (gain + most_[r] < best_ - kNegligible) return true;
+    if (++n_visits_ > 4 * kMostEvents || events_.size() > kMostEvents) return false;
+    if (r == chosen_.size()) {
+      events_.push_back({tracks, columns, gain, choices_.size()});
+      choices_.insert(choices_.end(), chosen_.begin(), chosen_.end());
+      return true;
+    }
+    chosen_[r] = -1;
+    if (!visit(r + 1, tracks, columns, gain)) return false;
+    for (std::size_t e = rows_[r]; e < rows_[r + 1]; ++e) {
+      const std::uint64_t bit = std::uint64_t{1} << column_of_[e];
+      if (columns & bit) continue;
+      chosen_[r] = static_cast<std::int32_t>(e);
+      if (!visit(r + 1, tracks | std::uint64_t{1} << r, columns | bit, gain + group_[e].gain))
+        return false;
+    }
+    return true;
+  }
+
+  std::span<const Candidate> group_;
+  std::vector<std::size_t> rows_;
+  std::vector<std::int32_t> columns_, column_of_, chosen_, choices_;
+  std::vector<double> most_;
+  std::vector<Event> events_;
+  std::size_t n_visits_ = 0;
+  double best_ = 0;
+};
+
+}  // namespace asterism

@@ -1,0 +1,61 @@
+// Connected components of a bipartite graph: what shares no candidate can be solved apart.
+#pragma once
+
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "math/union_find.hpp"
+
+namespace asterism {
+
+// One possible pairing of a track (row) with a detection (column).
+struct Candidate {
+  std::int32_t row = 0, column = 0;
+  double gain = 0;       // nats won by the pairing over leaving both alone
+  double distance2 = 0;  // squared distance of prediction and detection
+};
+
+// Candidates ordered by group, groups by their first row: group g is order[starts[g]:starts[g+1]],
+// and sources are the places of its candidates in the list that was grouped.
+struct Groups {
+  std::vector<Candidate> order;
+  std::vector<std::int32_t> sources, starts;
+
+  std::size_t size() const { return starts.size() - 1; }
+  std::span<const Candidate> operator[](std::size_t g) const {
+    return {order.data() + starts[g], order.data() + starts[g + 1]};
+  }
+};
+
+// `candidates` must be ordered by row.
+inline Groups connected_groups(std::span<const Candidate> candidates, std::int32_t n_rows,
+                               std::int32_t n_columns) {
+  UnionFind sets(n_rows + n_columns);
+  for (const Candidate& c : candidates) sets.join(c.row, n_rows + c.column);
+  // The root of a component is its smallest row, so counting by root also orders the groups.
+  std::vector<std::int32_t> group_of(n_rows, -1), counts;
+  for (const Candidate& c : candidates) {
+    std::int32_t& g = group_of[sets.find(c.row)];
+    if (g < 0) {
+      g = static_cast<std::int32_t>(counts.size());
+      counts.push_back(0);
+    }
+    ++counts[g];
+  }
+  Groups groups;
+  groups.starts.assign(counts.size() + 1, 0);
+  std::partial_sum(counts.begin(), counts.end(), groups.starts.begin() + 1);
+  std::vector<std::int32_t> fill(groups.starts.begin(), groups.starts.end() - 1);
+  groups.order.resize(candidates.size());
+  groups.sources.resize(candidates.size());
+  for (std::size_t e = 0; e < candidates.size(); ++e) {
+    const std::int32_t at = fill[group_of[sets.find(candidates[e].row)]]++;
+    groups.order[at] = candidates[e];
+    groups.sources[at] = static_cast<std::int32_t>(e);
+  }
+  return groups;
+}
+
+}  // namespace asterism

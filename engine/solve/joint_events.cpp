@@ -1,0 +1,184 @@
+// Group by group: alone where nobody competes, exactly where few states do, by a beam beyond.
+#include "solve/joint_events.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "solve/elimination.hpp"
+#include "solve/joint_beam.hpp"
+#include "solve/joint_exact.hpp"
+
+namespace asterism {
+
+namespace {
+
+// Prices on a grid: sums of two are exact, and so is their difference to a weight near them.
+double snap(double x) {
+  constexpr double grid = 1 << 20;
+  return std::abs(x) < grid * grid ? std::nearbyint(x * grid) / grid : x;
+}
+
+bool is_finite(const MatchingMarginals& result) {
+  const auto finite = [](double x) { return std::isfinite(x); };
+  return std::isfinite(result.log_total) &&
+         std::all_of(result.edge.begin(), result.edge.end(), finite) &&
+         std::all_of(result.alone.begin(), result.alone.end(), finite);
+}
+
+// Where the range of doubles does not do after all, which takes hundreds of tracks in one group:
+// the best event alone, which weighs 1. It is nobody's approximation, and the bound says so.
+MatchingMarginals only_best(const MatchingGraph& graph, std::int32_t n,
+                            std::span<const std::int32_t> partner) {
+  MatchingMarginals out;
+  out.edge.assign(graph.weight.size(), 0);
+  out.alone.assign(graph.size(), 0);
+  for (std::int32_t v = 0; v < graph.size(); ++v) {
+    out.alone[v] = partner[v] < 0;
+    if (v < n)
+      for (const Link& l : graph.links[v]) out.edge[l.edge] = l.to == partner[v];
+  }
+  out.bound = 1;
+  return out;
+}
+
+// Small consecutive numbers for the rows and columns of a group.
+void number(std::span<const Candidate> group, std::vector<std::int32_t>& rows,
+            std::vector<std::int32_t>& columns, std::span<std::int32_t> row_of,
+            std::span<std::int32_t> column_of) {
+  for (const Candidate& c : group) columns.push_back(c.column);
+  std::sort(columns.begin(), columns.end());
+  columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
+  for (std::size_t e = 0; e < group.size(); ++e) {
+    if (rows.empty() || rows.back() != group[e].row) rows.push_back(group[e].row);
+    row_of[e] = static_cast<std::int32_t>(rows.size()) - 1;
+    const auto at = std::lower_bound(columns.begin(), columns.end(), group[e].column);
+    column_of[e] = static_cast<std::int32_t>(at - columns.begin());
+  }
+}
+
+// The least prices p ≥ 0 at which everyone is content with the best event, and what is then left
+// to each track. They rise from 0 and, as the event is the best, come to rest.
+void price(std::span<const Candidate> group, std::span<const std::int32_t> row_of,
+           std::span<const std::int32_t> column_of, std::span<const std::int32_t> partner,
+           std::span<double> left, std::span<double> p) {
+  const auto n = static_cast<std::int32_t>(left.size());
+  std::vector<std::size_t> own(n, 0);
+  for (std::size_t e = 0; e < group.size(); ++e)
+    if (partner[row_of[e]] == n + column_of[e]) own[row_of[e]] = e;
+  const auto content = [&](std::int32_t i) {
+    left[i] = partner[i] < 0 ? 0 : group[own[i]].gain - p[partner[i] - n];
+  };
+  for (std::int32_t i = 0; i < n; ++i) content(i);
+  // Rounding may keep ties rising by nothing at all: any prices do, so the rounds are counted.
+  bool is_rising = true;
+  for (std::int32_t round = 0; round <= n && is_rising; ++round) {
+    is_rising = false;
+    for (std::size_t e = 0; e < group.size(); ++e) {
+      const std::int32_t i = row_of[e], j = column_of[e], holder = partner[n + j];
+      if (holder < 0 || holder == i || group[e].gain - left[i] <= p[j]) continue;
+      p[j] = group[e].gain - left[i];
+      content(holder);
+      is_rising = true;
+    }
+  }
+}
+
+}  // namespace
+
+JointSummary JointEvents::solve(std::span<double> marginals, std::span<double> missed,
+                                std::span<std::int32_t> best) {
+  marginals_ = marginals;
+  missed_ = missed;
+  best_ = best;
+  std::fill(missed.begin(), missed.end(), 1.0);
+  std::fill(best.begin(), best.end(), -1);
+  std::vector<char> has_any(n_, 0);
+  for (const Candidate& c : groups_.order) has_any[c.row] = 1;
+  for (std::int32_t i = 0; i < n_; ++i)
+    if (!has_any[i]) summary_.log_total += log_miss_[i];
+  double log_exact = 0;  // of the share of events that were summed
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    assignment_.solve(groups_[g], best_);
+    const double bound = is_single(g) ? solve_single(g) : solve_group(g);
+    summary_.n_beams += bound > 0;
+    log_exact += std::log1p(-bound);
+  }
+  if (log_exact < 0) summary_.bound = -std::expm1(log_exact);
+  return summary_;
+}
+
+double JointEvents::solve_single(std::size_t g) {
+  const std::int32_t i = groups_[g].front().row;
+  const std::size_t n = groups_[g].size();
+  double most = log_miss_[i], total = 0;
+  for (std::size_t e = 0; e < n; ++e) most = std::max(most, log_weight(g, e));
+  for (std::size_t e = 0; e < n; ++e) total += marginal(g, e) = std::exp(log_weight(g, e) - most);
+  total += missed_[i] = std::exp(log_miss_[i] - most);
+  for (std::size_t e = 0; e < n; ++e) marginal(g, e) /= total;
+  missed_[i] /= total;
+  summary_.log_total += most + std::log(total);
+  return 0;
+}
+
+double JointEvents::solve_group(std::size_t g) {
+  const std::span<const Candidate> group = groups_[g];
+  std::vector<std::int32_t> rows, columns, row_of(group.size()), column_of(group.size());
+  number(group, rows, columns, row_of, column_of);
+  const auto n = static_cast<std::int32_t>(rows.size());
+  const auto m = static_cast<std::int32_t>(columns.size());
+  std::vector<std::int32_t> partner(n + m, -1);
+  for (std::size_t e = 0; e < group.size(); ++e)
+    if (best_[group[e].row] == group[e].column) {
+      partner[row_of[e]] = n + column_of[e];
+      partner[n + column_of[e]] = row_of[e];
+    }
+  std::vector<double> u(n), p(m);
+  price(group, row_of, column_of, partner, u, p);
+
+  MatchingGraph graph;
+  graph.links.resize(n + m);
+  graph.alone.resize(n + m);
+  graph.weight.resize(group.size());
+  double log_scale = 0;
+  for (std::int32_t i = 0; i < n; ++i) {
+    u[i] = snap(log_miss_[rows[i]] + u[i]);
+    graph.alone[i] = std::exp(log_miss_[rows[i]] - u[i]);
+    log_scale += u[i];
+  }
+  for (std::int32_t j = 0; j < m; ++j) {
+    p[j] = snap(p[j]);
+    graph.alone[n + j] = std::exp(-p[j]);
+    log_scale += p[j];
+  }
+  for (std::size_t e = 0; e < group.size(); ++e) {
+    const std::int32_t i = row_of[e], j = column_of[e];
+    const auto edge = static_cast<std::int32_t>(e);
+    graph.weight[e] = std::exp(log_weight(g, e) - (u[i] + p[j]));
+    graph.links[i].push_back({n + j, edge});
+    graph.links[n + j].push_back({i, edge});
+  }
+
+  MatchingMarginals result = sum(graph, n, partner);
+  if (!is_finite(result)) result = only_best(graph, n, partner);
+  for (std::size_t e = 0; e < group.size(); ++e) marginal(g, e) = result.edge[e];
+  for (std::int32_t i = 0; i < n; ++i) missed_[rows[i]] = result.alone[i];
+  summary_.log_total += result.log_total + log_scale;
+  summary_.n_states = std::max(summary_.n_states, result.n_states);
+  return result.bound;
+}
+
+MatchingMarginals JointEvents::sum(const MatchingGraph& graph, std::int32_t n,
+                                   std::span<const std::int32_t> partner) const {
+  const Elimination elimination = EliminationOrder(graph).best();
+  if (elimination.peak < 62 && std::int64_t{1} << elimination.peak <= max_states_)
+    return JointExact(graph, elimination).solve();
+  if (elimination.peak <= 64)
+    return JointBeam<1>(graph, elimination, n, partner, max_states_).solve();
+  if (elimination.peak <= 1024)
+    return JointBeam<16>(graph, elimination, n, partner, max_states_).solve();
+  throw FrontierLimit("more than 1024 tracks or detections compete at once");
+}
+
+}  // namespace asterism

@@ -1,0 +1,63 @@
+// How probable a place is for what is no marker come back: a new one anywhere, or a ghost beside one.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "rigid/tracklets.hpp"
+
+namespace asterism {
+
+class Elsewhere {
+ public:
+  Elsewhere(int D, double noise, double ghost_radius)
+      : D_(D),
+        noise_(noise),
+        radius2_(ghost_radius * ghost_radius),
+        peak_(std::pow(2 * std::numbers::pi * radius2_, -0.5 * D)) {}
+
+  // Anywhere is where anything was seen so far.
+  void add(const Point& y) {
+    if (!has_box_) low_ = high_ = y;
+    has_box_ = true;
+    volume_ = 1;
+    for (int d = 0; d < D_; ++d) {
+      low_[d] = std::min(low_[d], y[d]);
+      high_[d] = std::max(high_[d], y[d]);
+      volume_ *= std::max(high_[d] - low_[d], 100 * noise_);
+    }
+  }
+  double log_density(const Point& y, const Frame& at, std::int32_t own) const {
+    double beside = 0;
+    for (const auto& one : at.seen) {
+      const double far = squared_distance(one.at, y, D_) / radius2_;
+      if (one.fragment != own && far < 40) beside += std::exp(-0.5 * far);
+    }
+    const double n = std::max<double>(static_cast<double>(at.seen.size()), 1);
+    return std::log(1 / volume_ + beside / n * peak_);
+  }
+  // Whether a ghost of another may be there.
+  bool is_beside(const Point& y, const Frame& at, std::int32_t own) const {
+    return std::any_of(at.seen.begin(), at.seen.end(), [&](const Frame::One& other) {
+      return other.fragment != own && squared_distance(other.at, y, D_) < 9 * radius2_;
+    });
+  }
+
+ private:
+  int D_;
+  double noise_, radius2_, peak_;
+  bool has_box_ = false;
+  Point low_{}, high_{};
+  double volume_ = 1;
+};
+
+// What has been seen, as far as it is remembered.
+struct Sightings {
+  Fragments fragments;
+  RecentFrames frames;
+  Elsewhere elsewhere;
+};
+
+}  // namespace asterism

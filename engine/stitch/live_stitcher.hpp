@@ -1,0 +1,133 @@
+// The markers of a stream: what is known of a frame now, and what of earlier frames changes.
+//
+// A tracker may change its mind about the last frames, so that those wait until their labels are
+// settled. Meanwhile their detections have the marker of the fragment that they would go on with.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "base/shared_copy.hpp"
+#include "stitch/stitcher.hpp"
+
+namespace asterism {
+
+class LiveStitcher {
+ public:
+  // A frame waits until `lag` more have come.
+  LiveStitcher(const MotionModel& m, const StitchOptions& options, std::int64_t lag)
+      : stitcher_(m, options),
+        n_waiting_(static_cast<std::size_t>(lag)),
+        // A fragment is decided upon before its first frame is forgotten.
+        n_kept_(static_cast<std::size_t>(options.confirm + options.max_gap + 2)) {}
+
+  const Stitcher& stitcher() const { return stitcher_; }
+  const MotionModel& motion() const { return stitcher_.motion(); }
+  std::int64_t n_seen() const { return n_seen_; }
+  std::int64_t n_joins() const { return n_joins_; }
+  std::int64_t n_ghosts() const { return n_ghosts_; }
+
+  // `labels` are the tracker's of this frame, `revised` those that it changes of earlier ones, as
+  // pairs of a detection and its label. Calls tell(detection, marker) for all that is new or changes.
+  template <typename Tell>
+  void step(const MotionStep& step, std::span<const Point> points,
+            std::span<const std::int64_t> labels,
+            std::span<const std::pair<std::int64_t, std::int64_t>> revised, Tell&& tell) {
+    for (const auto& [detection, label] : revised) revise(detection, label);
+    Recent& now = recent_.emplace_back(Recent{}).own();
+    now.step = step;
+    now.first = n_seen_;
+    now.points.assign(points.begin(), points.end());
+    now.labels.assign(labels.begin(), labels.end());
+    now.known.resize(points.size());
+    n_seen_ += static_cast<std::int64_t>(points.size());
+    if (recent_.size() > n_waiting_) take(recent_[recent_.size() - 1 - n_waiting_].own());
+    stitcher_.guess();
+    for (SharedCopy<Recent>& frame : recent_)
+      if (!frame->is_taken)
+        tell_of_waiting(frame.own(), tell);
+      else if (!frame->open.empty())
+        tell_of_taken(frame.own(), tell);
+    if (recent_.size() > n_waiting_ + n_kept_) recent_.pop_front();
+  }
+
+ private:
+  struct Known {
+    std::int32_t fragment = -1, told = -2;
+  };
+  struct Recent {
+    std::int64_t first = 0;  // of its detections
+    bool is_taken = false;
+    std::vector<Known> known;
+    std::vector<std::int32_t> open;  // detections whose marker may change, once it is taken
+    // While it waits.
+    MotionStep step;
+    std::vector<Point> points;
+    std::vector<std::int64_t> labels;
+  };
+
+  // What has been taken is settled.
+  void revise(std::int64_t detection, std::int64_t label) {
+    for (auto frame = recent_.rbegin(); frame != recent_.rend() && !(*frame)->is_taken; ++frame) {
+      if (detection < (*frame)->first) continue;
+      frame->own().labels[static_cast<std::size_t>(detection - (*frame)->first)] = label;
+      return;
+    }
+  }
+  void take(Recent& frame) {
+    fragments_.assign(frame.points.size(), -1);
+    stitcher_.step(frame.step, frame.points, frame.labels, fragments_, [&](const Decision& d) {
+      n_joins_ += d.marker >= 0 && d.after >= 0;
+      n_ghosts_ += d.marker == Decision::kGhost;
+    });
+    for (std::size_t i = 0; i < frame.known.size(); ++i) {
+      frame.known[i].fragment = fragments_[i];
+      frame.open.push_back(static_cast<std::int32_t>(i));
+    }
+    frame.is_taken = true;
+    std::vector<Point>().swap(frame.points);
+    std::vector<std::int64_t>().swap(frame.labels);
+  }
+  template <typename Tell>
+  void tell_of_taken(Recent& frame, Tell&& tell) {
+    std::erase_if(frame.open, [&](std::int32_t i) {
+      const std::int32_t f = frame.known[i].fragment;
+      tell_of(frame, i, f < 0 ? -1 : stitcher_.marker_of(f), tell);
+      return f < 0 || !stitcher_.is_open(f);
+    });
+  }
+  // A guess gives way to what is known.
+  template <typename Tell>
+  void tell_of_waiting(Recent& frame, Tell&& tell) {
+    fragments_.clear();
+    markers_.clear();
+    for (const std::int64_t label : frame.labels) {
+      const std::int32_t f = label < 0 ? -1 : stitcher_.fragment_with(label);
+      fragments_.push_back(f);
+      markers_.push_back(f < 0 ? -1 : stitcher_.marker_of(f));
+    }
+    for (std::size_t i = 0; i < markers_.size(); ++i)
+      if (fragments_[i] >= 0 && stitcher_.is_open(fragments_[i]) &&
+          std::count(markers_.begin(), markers_.end(), markers_[i]) > 1)
+        markers_[i] = -1;
+    for (std::size_t i = 0; i < markers_.size(); ++i) tell_of(frame, i, markers_[i], tell);
+  }
+  template <typename Tell>
+  void tell_of(Recent& frame, std::size_t i, std::int32_t marker, Tell&& tell) {
+    std::int32_t& told = frame.known[i].told;
+    marker = std::max(marker, -1);
+    if (told != marker) tell(frame.first + static_cast<std::int64_t>(i), told = marker);
+  }
+
+  Stitcher stitcher_;
+  std::size_t n_waiting_, n_kept_;
+  std::int64_t n_seen_ = 0, n_joins_ = 0, n_ghosts_ = 0;
+  std::deque<SharedCopy<Recent>> recent_;
+  std::vector<std::int32_t> fragments_, markers_;  // while a frame is worked on
+};
+
+}  // namespace asterism

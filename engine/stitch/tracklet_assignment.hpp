@@ -1,0 +1,155 @@
+// Which hidden marker a fragment is: what speaks for each, who takes whom, and how probably.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "base/scratch.hpp"
+#include "math/log_sums.hpp"
+#include "rigid/tracklets.hpp"
+#include "solve/assignment.hpp"
+#include "stitch/background_density.hpp"
+#include "stitch/rigid_neighbours.hpp"
+
+namespace asterism {
+
+// The label of the marker that a fragment is thought to go on with, and how much that is worth: log
+// odds for that marker, half of it against all others.
+struct JoinAdvice {
+  std::int64_t goes_on_with = 0;
+  double weight = 0;
+};
+
+class Claims {
+ public:
+  static constexpr double kWorth = 0.25;  // of the log odds, in a probability
+
+  // What is thought already of fragments that begin with a label.
+  void advise(std::int64_t label, const JoinAdvice& advice) { advice_[label] = advice; }
+
+  // The marker that a fragment is, kOpen if it is none of those that are hidden; and how probably.
+  // `is_short` tells of fragments that were over before they were decided upon.
+  template <typename IsShort>
+  std::pair<std::int32_t, double> best(const Sightings& s, const Markers& markers, Bodies& bodies,
+                                       std::int32_t id, IsShort&& is_short) {
+    const Fragment& f = s.fragments.at(id);
+    double most = kNever;
+    w_.scored.clear();
+    for (const auto& [k, marker] : markers) {
+      const double gain = score(s, bodies, id, k, marker, is_short(f));
+      most = std::max(most, gain);
+      if (gain > 0) w_.scored.emplace_back(k, gain);
+    }
+    const auto n = static_cast<std::int32_t>(w_.scored.size());
+    const std::pair none(Decision::kOpen, 1 / (1 + odds(most)));
+    if (n == 0) return none;
+    w_.candidates.clear();
+    w_.rivals.assign(n, 1);  // Σ of the odds of all that may be this marker, and of none
+    double all = 1;
+    for (std::int32_t c = 0; c < n; ++c) {
+      w_.candidates.push_back({0, c, w_.scored[c].second, 0});
+      all += odds(w_.scored[c].second);
+    }
+    std::int32_t row = 0;
+    for (const auto& [other, g] : s.fragments) {
+      if (other == id || g.marker != Decision::kOpen || g.n == 0) continue;
+      if (g.last < f.first || g.first > f.last) continue;  // both may be the same marker
+      ++row;
+      for (std::int32_t c = 0; c < n; ++c) {
+        const std::int32_t k = w_.scored[c].first;
+        const double gain = score(s, bodies, other, k, markers.at(k), is_short(g));
+        if (!(gain > 0)) continue;
+        w_.candidates.push_back({row, c, gain, 0});
+        w_.rivals[c] += odds(gain);
+      }
+    }
+    w_.match.assign(row + 1, -1);
+    w_.assignment.solve(w_.candidates, w_.match);
+    const std::int32_t own = w_.match[0];
+    if (own < 0) return none;
+    const auto& [marker, gain] = w_.scored[own];
+    return {marker, odds(gain) / (all + w_.rivals[own] - 1)};
+  }
+
+  // What the fragments that are open may be, if nothing were to come any more. They are compared anew
+  // when twice as much has been seen of them.
+  template <typename IsShort>
+  void guess(Sightings& s, const Markers& markers, Bodies& bodies, IsShort&& is_short) {
+    w_.open.clear();
+    w_.candidates.clear();
+    for (auto& [id, f] : s.fragments) {
+      f.guess = -1;
+      if (f.marker != Decision::kOpen || f.n == 0) continue;
+      if (std::has_single_bit(static_cast<std::uint32_t>(f.n)) && f.last == s.frames.now()) {
+        f.guesses.clear();
+        for (const auto& [k, marker] : markers)
+          if (const double gain = score(s, bodies, id, k, marker, is_short(f)); gain > 0)
+            f.guesses.emplace_back(k, gain);
+      }
+      const auto row = static_cast<std::int32_t>(w_.open.size());
+      w_.open.push_back(id);
+      for (const auto& [k, gain] : f.guesses)
+        if (const auto at = markers.find(k); at != markers.end() && at->second.is_hidden)
+          w_.candidates.push_back({row, k, gain, 0});
+    }
+    if (w_.candidates.empty()) return;
+    w_.match.assign(w_.open.size(), -1);
+    w_.assignment.solve(w_.candidates, w_.match);
+    for (std::size_t row = 0; row < w_.open.size(); ++row)
+      s.fragments.at(w_.open[row]).guess = w_.match[row];
+  }
+
+ private:
+  static constexpr double kNever = -std::numeric_limits<double>::infinity();
+  // Log odds that a fragment is a marker come back, before anything is compared: of short ones, and of
+  // others.
+  static constexpr double kShort = -8, kLong = 2;
+  static constexpr double kLeastMotion = 0.005;  // weight of the motion where the body is trusted
+
+  // Neighbours bend together, and the looks at a fragment see the same bend: what they say is worth
+  // less than their sum. How much less was measured on captures whose truth is known.
+  static double odds(double gain) { return std::exp(std::min(kWorth * gain, 500.0)); }
+
+  // Log odds that a fragment is a hidden marker come back.
+  double score(const Sightings& s, Bodies& bodies, std::int32_t id, std::int32_t k,
+               const Marker& marker, bool is_short) const {
+    const Fragment& f = s.fragments.at(id);
+    if (!marker.is_hidden || marker.last >= f.first) return kNever;
+    const double body = bodies.log_odds(s, f, id, marker), motion = by_motion(s, f, id, k);
+    const double at_rest = std::clamp(1 / (1 + std::exp(marker.trust)), kLeastMotion, 0.5);
+    const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
+    const double both = log_sum(a, b);
+    return both == kNever ? kNever : both + (is_short ? kShort : kLong) + advised(f, marker);
+  }
+  static double by_motion(const Sightings& s, const Fragment& f, std::int32_t id, std::int32_t k) {
+    for (const Continuation& c : f.continuations)
+      if (c.marker == k)
+        if (const Frame* at = s.frames.find(f.first); at != nullptr)
+          return c.log_likelihood - f.alone - s.elsewhere.log_density(f.sights.front().at, *at, id);
+    return kNever;
+  }
+  double advised(const Fragment& f, const Marker& marker) const {
+    const auto at = advice_.find(f.label);
+    if (at == advice_.end()) return 0;
+    return marker.label == at->second.goes_on_with ? at->second.weight : -0.5 * at->second.weight;
+  }
+
+  struct Memory {
+    std::vector<std::int32_t> open, match;
+    std::vector<std::pair<std::int32_t, double>> scored;
+    std::vector<double> rivals;
+    std::vector<Candidate> candidates;
+    Assignment assignment;
+  };
+
+  std::unordered_map<std::int64_t, JoinAdvice> advice_;
+  Fresh<Memory> w_;  // while a fragment is compared
+};
+
+}  // namespace asterism

@@ -1,0 +1,306 @@
+// Bodies between prediction and pairing: believed tracks that are not seen are expected where their
+// neighbours carry them, and neighbours have a say in who takes which point.
+//
+//   1  tracks that were seen in the last frame list their candidates; two that like each other best
+//      tell where the marker is for now
+//   2  by these the hidden ones are placed. The carried place is fused with the track's own prediction
+//      as a measurement of it would be; its own state goes on untouched until the marker is seen, for
+//      places that are carried frame after frame err alike
+//   3  the hidden ones list their candidates, by the fused place or by their own where that is
+//      likelier, and bonds say what they think of those in doubt
+//
+// A point that comes up for a hidden marker may be a ghost beside it, as well as it: anywhere within
+// half the distance to its nearest neighbour, about. A point that is more like that than like the
+// marker is not taken.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/scratch.hpp"
+#include "rigid/bond_graph.hpp"
+#include "rigid/carried_state.hpp"
+#include "rigid/carrier.hpp"
+#include "tracks/live_tracks.hpp"
+
+namespace asterism {
+
+struct CarryOptions {
+  bool is_on = false;
+  std::int32_t max_carried = 0;  // frames
+  double bond_weight = 0;        // all that bonds say of a pairing is within ± so many nats
+};
+
+class CarriedTracks {
+ public:
+  CarriedTracks(const MotionModel& m, const ScoreModel& score, const CarryOptions& options)
+      : opt_(options), max_gap_(score.max_gap), carrier_(m.axis.D, m.axis.r) {}
+
+  bool is_on() const { return opt_.is_on; }
+  // A pairing may become better by so much.
+  double bond_weight() const { return opt_.bond_weight; }
+
+  // Lists the candidates of a frame. `list(asked, out)` adds those of the tracks for which asked(i)
+  // holds, by their predictions, with gains down to bond_weight() below `least_gain`. `n_open`: frames
+  // before this one of which nothing was learnt yet.
+  template <typename List>
+  void list(LiveTracks<>& live, const MotionStep& step, std::span<const Point> points,
+            double least_gain, List&& list, std::vector<Candidate>& out, FrameStats& stats,
+            std::int64_t n_open = 0) {
+    live.predict_all(step);
+    out.clear();
+    list([&](std::size_t i) { return live[i].gap == 0; }, out);
+    place_seen(live, points, out);
+    place_hidden(live, n_open);
+    s_.alone.clear();
+    list([&](std::size_t i) { return s_.is_carried[i] != 0; }, s_.alone);
+    s_.own.resize(live.size());
+    for (std::size_t i = 0; i < live.size(); ++i)
+      if (s_.is_carried[i]) {
+        s_.own[i] = live.prediction(i);
+        live.expect(i, Prediction(live.m, s_.fused[i]));
+      }
+    list([&](std::size_t i) { return live[i].gap > 0; }, out);
+    std::ranges::stable_sort(out, {}, &Candidate::row);
+    add_alone(out);
+    weigh(live, points, least_gain, out, stats);
+    count_refused(least_gain, out, stats);
+  }
+
+  // Track i takes a detection at y, or none.
+  void take(LiveTracks<>& live, std::size_t i, const Point& y, FrameStats& stats) const {
+    if (!is_carried(i)) return;
+    ++stats.n_returned;
+    std::array<double, kMaxModes> each{};
+    if (s_.own[i].log_likelihood(y, each) > live.prediction(i).log_likelihood(y, each))
+      live.expect(i, s_.own[i]);
+    else
+      live[i].state = s_.fused[i];
+  }
+  void miss(LiveTrack<>& track, std::size_t i, FrameStats& stats) const {
+    if (opt_.is_on && s_.heir[i] >= 0) track.gap = max_gap_ + track.carried;
+    if (!is_carried(i) || s_.is_doubtful[i] || track.gap > opt_.max_carried) return;
+    ++track.carried;
+    ++stats.n_carried;
+  }
+  bool is_carried(std::size_t i) const { return opt_.is_on && s_.is_carried[i]; }
+
+  // What was found by `list`, of track i: where it is carried, and whether that is known well enough to
+  // live by; the hidden one that it is and gives way to, or -1; what bonds say of its pairings in doubt.
+  struct Told {
+    std::int32_t row = 0, column = 0;
+    double nats = 0;
+  };
+  const CarriedPlace& place(std::size_t i) const { return s_.place[i]; }
+  bool is_doubtful(std::size_t i) const { return s_.is_doubtful[i] != 0; }
+  std::int32_t heir(std::size_t i) const { return s_.heir[i]; }
+  std::span<const Told> told() const { return s_.told; }
+
+  // After a frame.
+  template <typename More>
+  void learn(const LiveTracks<More>& live, FrameStats& stats) {
+    if (!opt_.is_on) return;
+    s_.seen.clear();
+    s_.known.clear();
+    for (const LiveTrack<More>& track : live.tracks) {
+      if (!track.is_confirmed()) continue;
+      s_.known.push_back(number(track));
+      if (track.gap == 0) s_.seen.push_back({number(track), track.last});
+    }
+    std::sort(s_.known.begin(), s_.known.end());
+    std::sort(s_.seen.begin(), s_.seen.end(),
+              [](const Seen& a, const Seen& b) { return a.marker < b.marker; });
+    for (const std::int32_t marker : known_)
+      if (!std::binary_search(s_.known.begin(), s_.known.end(), marker)) carrier_.forget(marker);
+    known_.assign(s_.known.begin(), s_.known.end());
+    carrier_.see(s_.seen);
+    for (const std::int32_t marker : known_) stats.n_bonds += carrier_.n_bonds(marker);
+  }
+
+ private:
+  static constexpr double kNever = -std::numeric_limits<double>::infinity();
+  // A place is doubtful that is not known to this share of the distance to the nearest neighbour.
+  static constexpr double kDoubtful = 0.25;
+
+  template <typename More>
+  static std::int32_t number(const LiveTrack<More>& track) {
+    return static_cast<std::int32_t>(track.id);
+  }
+
+  // A track and a point that like each other best.
+  void place_seen(const LiveTracks<>& live, std::span<const Point> points,
+                  std::span<const Candidate> candidates) {
+    s_.best_row.assign(points.size(), -1);
+    s_.best_column.assign(live.size(), -1);
+    const auto better = [&](std::int32_t e, std::int32_t than) {
+      return than < 0 || candidates[e].gain > candidates[than].gain;
+    };
+    for (std::int32_t e = 0; e < static_cast<std::int32_t>(candidates.size()); ++e) {
+      const Candidate& c = candidates[e];
+      if (!live[c.row].is_confirmed()) continue;
+      if (better(e, s_.best_row[c.column])) s_.best_row[c.column] = e;
+      if (better(e, s_.best_column[c.row])) s_.best_column[c.row] = e;
+    }
+    s_.places.clear();
+    s_.owner.assign(points.size(), -1);
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      const std::int32_t e = s_.best_column[i];
+      if (e < 0 || s_.best_row[candidates[e].column] != e) continue;
+      s_.places.set(number(live[i]), points[candidates[e].column]);
+      s_.owner[candidates[e].column] = static_cast<std::int32_t>(i);
+    }
+  }
+
+  void place_hidden(const LiveTracks<>& live, std::int64_t n_open) {
+    s_.is_carried.assign(live.size(), 0);
+    s_.is_doubtful.assign(live.size(), 0);
+    s_.place.resize(live.size());
+    s_.fused.resize(live.size());
+    s_.ghosts.assign(live.size(), 0);
+    Carriage found;
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      const LiveTrack<>& track = live[i];
+      if (track.gap == 0 || !track.is_confirmed()) continue;
+      if (!carrier_.carry(number(track), s_.places, found, n_open)) continue;
+      const std::optional<MotionState> fused =
+          fuse(live.m, track.state, live.prediction(i), found.place);
+      if (!fused) continue;
+      s_.fused[i] = *fused;
+      s_.place[i] = found.place;
+      const double doubtful = kDoubtful * found.nearest;
+      s_.is_doubtful[i] = !(found.place.variance < doubtful * doubtful);
+      s_.is_carried[i] = 1;
+      // As likely as the marker itself, and clutter all the same.
+      const int D = live.m.axis.D;
+      const double radius = 0.5 * found.nearest;
+      s_.ghosts[i] = softplus(-0.5 * D * std::log(2 * std::numbers::pi * radius * radius) -
+                              live.sm.log_clutter);
+    }
+  }
+
+  // The place of the same pairing among candidates in order of their rows, or how many there are.
+  static std::size_t find_same(std::span<const Candidate> all, const Candidate& one) {
+    const auto row = std::ranges::equal_range(all, one.row, {}, &Candidate::row);
+    const auto at = std::ranges::find(row, one.column, &Candidate::column);
+    return at == row.end() ? all.size() : static_cast<std::size_t>(&*at - all.data());
+  }
+  // A hidden track may be right by itself where its neighbours are not.
+  void add_alone(std::vector<Candidate>& out) {
+    s_.added.clear();
+    for (const Candidate& own : s_.alone) {
+      if (!(own.gain + opt_.bond_weight > s_.ghosts[own.row])) continue;
+      const std::size_t same = find_same(out, own);
+      if (same == out.size())
+        s_.added.push_back(own);
+      else if (own.gain > out[same].gain)
+        out[same] = own;
+    }
+    out.insert(out.end(), s_.added.begin(), s_.added.end());
+    std::ranges::stable_sort(out, {}, &Candidate::row);
+  }
+  // What ghosts and bonds make of the candidates.
+  void weigh(const LiveTracks<>& live, std::span<const Point> points, double least_gain,
+             std::vector<Candidate>& out, FrameStats& stats) {
+    s_.n_rows.assign(points.size(), 0);
+    s_.n_columns.assign(live.size(), 0);
+    for (const Candidate& c : out) {
+      ++s_.n_rows[c.column];
+      ++s_.n_columns[c.row];
+    }
+    const auto is_in_doubt = [&](const Candidate& c) {
+      return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 ||
+             c.gain - opt_.bond_weight <= least_gain;
+    };
+    s_.told.clear();
+    std::int32_t row = -1;
+    for (Candidate& c : out) {
+      if (!live[c.row].is_confirmed()) continue;
+      const bool was_listed = c.gain > least_gain;
+      if (opt_.bond_weight > 0 && is_in_doubt(c)) {
+        if (row != c.row) list_bonds(live[row = c.row]);
+        s_.told.push_back({c.row, c.column, says(points, c)});
+        c.gain += s_.told.back().nats;
+      }
+      if (is_carried(c.row) && (!(c.gain > s_.ghosts[c.row]) || !may_take(live, c))) c.gain = kNever;
+      // A hidden one's are counted against what it would take by itself.
+      stats.n_refused += was_listed && !is_carried(c.row) && !(c.gain > least_gain);
+    }
+    succeed(live, out);
+    std::erase_if(out, [&](const Candidate& c) { return !(c.gain > least_gain); });
+  }
+  bool may_take(const LiveTracks<>& live, const Candidate& c) const {
+    const std::int32_t owner = s_.owner[c.column];
+    return owner < 0 || live[owner].first_time > live[c.row].last_time;
+  }
+  // Tracks that are hidden ones come back give way to them.
+  void succeed(const LiveTracks<>& live, std::vector<Candidate>& out) {
+    s_.heir.assign(live.size(), -1);
+    for (std::int32_t e = 0; e < static_cast<std::int32_t>(out.size()); ++e) {
+      const Candidate& c = out[e];
+      if (!is_carried(c.row) || c.gain == kNever || s_.owner[c.column] < 0) continue;
+      std::int32_t& heir = s_.heir[s_.owner[c.column]];
+      if (heir < 0 || c.gain > out[heir].gain) heir = e;
+    }
+    for (std::int32_t& heir : s_.heir)
+      if (heir >= 0) heir = out[heir].row;
+    for (Candidate& c : out)
+      if (s_.heir[c.row] >= 0) c.gain = kNever;
+  }
+
+  void list_bonds(const LiveTrack<>& track) {
+    s_.bonds.clear();
+    const double r = carrier_.noise();
+    for (const Bond& bond : carrier_.bonds(number(track))) {
+      if (s_.places.find(bond.other) == nullptr) continue;
+      s_.bonds.push_back({bond.other, bond.mean, spread(bond, r), 0});
+      if (s_.bonds.size() == kSteadiest) break;
+    }
+    const auto n = std::max(BondGraph::kFew, static_cast<std::int32_t>(s_.bonds.size()));
+    for (BondGraph::Bond& bond : s_.bonds) bond.weight = opt_.bond_weight / n;
+  }
+  double says(std::span<const Point> points, const Candidate& c) const {
+    double sum = 0;
+    for (const BondGraph::Bond& bond : s_.bonds) {
+      const Point& other = *s_.places.find(bond.other);
+      const double distance2 = squared_distance(points[c.column], other, carrier_.n_axes());
+      if (distance2 > 0) sum += bond.says(std::sqrt(distance2));  // no marker is where another is
+    }
+    return sum;
+  }
+
+  // Points that a hidden track would have taken by itself.
+  void count_refused(double least_gain, std::span<const Candidate> out, FrameStats& stats) const {
+    for (const Candidate& own : s_.alone)
+      if (own.gain > least_gain) stats.n_refused += find_same(out, own) == out.size();
+  }
+
+  struct Memory {
+    std::vector<char> is_carried, is_doubtful;
+    std::vector<CarriedPlace> place;
+    std::vector<Told> told;
+    std::vector<MotionState> fused;
+    std::vector<Prediction> own;
+    std::vector<double> ghosts;  // log (1 + their density / clutter's), by track
+    std::vector<std::int32_t> best_row, best_column, owner, heir, n_rows, n_columns;
+    std::vector<Candidate> alone, added;
+    std::vector<BondGraph::Bond> bonds;
+    std::vector<Seen> seen;
+    std::vector<std::int32_t> known;
+    Places places;
+  };
+
+  CarryOptions opt_;
+  std::int32_t max_gap_;
+  BodyCarrier carrier_;
+  std::vector<std::int32_t> known_;
+  Fresh<Memory> s_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,328 @@
+// A track split into branches: one for each detection in the gate and one for a miss, frame after
+// frame, over a window of frames that are not decided yet.
+//
+//   λ(k) = ρ λ(k-1) + e²    e² = νᵀ S⁻¹ ν of the k-th detection, ρ what is left of the past (1: all)
+//   δ(k)                    a branch is kept while λ(k) ≤ δ(k); P[λ(k) > δ(k)] = α for a true track
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "filter/nis.hpp"
+#include "rigid/carried_state.hpp"
+#include "tracks/live_tracks.hpp"
+
+namespace asterism {
+
+inline constexpr int kMaxWindow = 16;
+
+struct BranchOptions {
+  std::int32_t window = 1;        // frames until one is decided
+  std::int32_t max_branches = 1;  // of a track
+  std::int32_t merge_last = 1;    // branches that share their last so many frames become one
+  double prune_drop = 0;          // a branch ends so many nats below its tree's best
+  double fading = 1;              // ρ
+  std::vector<double> delta;      // δ(1), δ(2), …; empty: no test
+  double z = 0;                   // normal quantile of α, for δ beyond those where ρ is 1
+  // Tracks are weighed jointly: a branch is worth its part of the log posterior, and what others
+  // expect is for the joint choice to settle.
+  bool is_joint = false;
+  std::vector<double> log_end;  // then: log of the probability of nothing more in so many frames
+  std::int32_t max_carried = 0;  // frames that neighbours may carry a hidden track
+};
+
+// How much a believed track expects a detection: w_j / (w_0 + Σ_{l≠j} w_l), where
+// w_j = P_d N(y_j; ŷ, S) / λ_f and w_0 = 1 - P_d, with P_r for P_d after a miss. Who else takes it
+// lowers the likelihood of the frame by the factor 1 + this.
+struct Claim {
+  std::int64_t track = 0;  // its key
+  std::int32_t column = 0;
+  double value = 0;
+};
+
+// A frame that is not decided yet; never changed, so that copies of a tracker share it.
+struct WindowFrame {
+  std::int64_t number = 0, first = 0;  // of the frame; of its first detection
+  double time = 0;
+  MotionStep step;
+  std::vector<Point> points;
+  PointGrid grid;
+  std::vector<Claim> claims;    // by track
+  std::vector<double> claimed;  // by all tracks, of each detection
+  std::vector<NeighbourAdvice> advice;   // by track, to those who get any
+
+  // What a detection loses for a track by what the others expect, until the frame is decided and
+  // shared out: exact for two tracks, for more each is as if it were the only other one (linear
+  // multitarget, Musicki & La Scala 2008).
+  double crowding(std::int64_t track, std::int32_t column) const {
+    double others = claimed[column];
+    auto at = std::lower_bound(claims.begin(), claims.end(), track,
+                               [](const Claim& c, std::int64_t key) { return c.track < key; });
+    for (; at != claims.end() && at->track == track; ++at)
+      if (at->column == column) others -= at->value;
+    return std::log1p(std::max(others, 0.0));
+  }
+
+  const NeighbourAdvice* advice_to(std::int64_t track) const {
+    const auto at = std::ranges::lower_bound(advice, track, {}, &NeighbourAdvice::track);
+    return at != advice.end() && at->track == track ? &*at : nullptr;
+  }
+  double says(std::int64_t track, std::int32_t column) const {
+    const NeighbourAdvice* own = advice_to(track);
+    return own == nullptr ? 0 : own->of(column);
+  }
+};
+
+struct Branch {
+  MotionState state;
+  double score = 0;  // as a track's
+  double lambda = 0;
+  std::int64_t n_updates = 0;
+  double last_time = 0;
+  Point last{};
+  std::int32_t gap = 0, carried = 0;  // as a track's
+  std::int32_t n_taken = 0;           // detections within the window
+  bool has_ended = false;
+  bool is_chosen = false;  // by the last joint choice
+  // Detection in each frame of the window, -1 for a miss, and its squared distance from what was
+  // expected: by frame number, modulo the longest window.
+  std::array<std::int32_t, kMaxWindow> path{};
+  std::array<double, kMaxWindow> distance2{};
+
+  std::int32_t taken(std::int64_t frame) const { return path[frame % kMaxWindow]; }
+  std::int32_t untold() const { return gap - carried; }
+};
+
+// What a track keeps beside what is decided of it: λ up to there, and the branches from there on.
+struct Tree {
+  std::int64_t key = 0;    // its number in order of birth
+  std::int64_t first = 0;  // frame that it begins in, as far as that is not decided
+  double lambda = 0;
+  std::int64_t n_updates = 0;
+  std::vector<Branch> branches;
+
+  // By what all trees do together where that was asked, else by itself.
+  const Branch& best() const {
+    const auto chosen = std::ranges::find(branches, true, &Branch::is_chosen);
+    return chosen == branches.end() ? branches.front() : *chosen;
+  }
+};
+
+class BranchGrower {
+ public:
+  BranchGrower(const LiveTracks<Tree>& live, const BranchOptions& options)
+      : live_(live), opt_(options) {}
+
+  // What a branch is worth among those of its tree, as long as the track lives: its score, less what
+  // the detections it takes would be worth if left over.
+  double rank(const Branch& b) const { return b.score - b.n_taken * live_.leftover_gain(); }
+
+  // What a branch is worth. Jointly, its part of the posterior: no less for misses after which the
+  // track may have ended.
+  double worth(const Branch& b) const {
+    if (opt_.is_joint) return b.score - live_.misses_gain(0, b.untold()) + opt_.log_end[b.untold()];
+    return rank(b);
+  }
+
+  // The decided part of a track, as the only branch.
+  Branch root(const LiveTrack<Tree>& track) const {
+    Branch b;
+    b.state = track.state;
+    b.score = track.score;
+    b.lambda = track.more.lambda;
+    b.n_updates = track.more.n_updates;
+    b.last_time = track.last_time;
+    b.last = track.last;
+    b.gap = track.gap;
+    b.carried = track.carried;
+    return b;
+  }
+
+  // Splits every branch over a further frame, the n_open-th that is not decided, and prunes them to
+  // at most `max_branches`, or not at all with kAll.
+  static constexpr std::int32_t kAll = std::numeric_limits<std::int32_t>::max();
+  void grow(const WindowFrame& frame, LiveTrack<Tree>& track, std::int32_t n_open,
+            std::int32_t max_branches, FrameStats& stats) {
+    grown_.clear();
+    for (Branch& parent : track.more.branches)
+      split(frame, track, std::move(parent), grown_, stats);
+    prune(frame.number, n_open, max_branches, stats);
+    track.more.branches.assign(grown_.begin(), grown_.end());
+  }
+
+  // What a track that was hidden for `gap` frames expects of a frame, its state predicted to it.
+  Expected expected(const MotionState& state, std::int32_t gap, const NeighbourAdvice* advice) const {
+    const bool is_told = advice != nullptr && advice->is_carried && gap > 0;
+    return Expected(live_.m, state, is_told ? &advice->place : nullptr);
+  }
+  // Whether a track that was hidden for `gap` frames and is not seen in this one either lives by what
+  // its neighbours tell. Who is carried is hidden from view: such a frame says nothing of whether the
+  // marker is still there.
+  bool lives_on(const Expected& expected, std::int32_t gap, const NeighbourAdvice* advice) const {
+    return expected.is_carried() && !advice->is_doubtful && gap < opt_.max_carried;
+  }
+
+  // Adds a branch's ways over a further frame: one for each detection in its gate, then the miss.
+  void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch parent,
+             std::vector<Branch>& out, FrameStats& stats) const {
+    const std::int64_t slot = frame.number % kMaxWindow;
+    parent.path[slot] = -1;
+    parent.distance2[slot] = 0;
+    if (parent.has_ended) {
+      if (opt_.is_joint) {  // one more frame in which it was not seen
+        parent.score += live_.miss_gain(parent.untold());
+        ++parent.gap;
+      }
+      out.push_back(std::move(parent));
+      return;
+    }
+    predict(live_.m, frame.step, parent.state);
+    const NeighbourAdvice* advice = frame.advice_to(track.more.key);
+    const Expected all = expected(parent.state, parent.gap, advice);
+    const double hit = live_.hit_gain(parent.gap), miss = live_.miss_gain(parent.gap);
+    const double least =
+        track.is_confirmed() ? miss + live_.leftover_gain() - hit - opt_.prune_drop
+                    : -std::numeric_limits<double>::infinity();
+    const auto child_with = [&](std::int32_t j, double d2) {
+      const Point& y = frame.points[j];
+      ++stats.n_candidates;
+      const Prediction& prediction = all.of(y);
+      const double lambda = opt_.fading * parent.lambda + surprise(prediction, y);
+      if (!passes(lambda, parent.n_updates + 1)) {
+        ++stats.n_cut;
+        return;
+      }
+      Branch child = parent;
+      all.choose(y, child.state);
+      const double won = hit + update(live_.m, prediction, y, child.state);
+      if (!std::isfinite(won)) return;
+      child.score += opt_.is_joint ? won : won - frame.crowding(track.more.key, j);
+      if (advice != nullptr) child.score += advice->of(j);
+      child.lambda = lambda;
+      ++child.n_updates;
+      ++child.n_taken;
+      child.last = y;
+      child.last_time = frame.time;
+      child.gap = child.carried = 0;
+      child.path[slot] = j;
+      child.distance2[slot] = d2;
+      out.push_back(std::move(child));
+    };
+    const bool gives_way = advice != nullptr && advice->gives_way;
+    if (all.is_carried()) {
+      for (const std::int32_t j : advice->may_take)
+        child_with(j, squared_distance(frame.points[j], all.of(frame.points[j]).center,
+                                       live_.m.axis.D));
+    } else if (!gives_way) {
+      const Prediction& own = all.prediction();
+      live_.within_gate(frame.grid, frame.points, own,
+                        own.radius(live_.opt.gate, least, frame.grid.r_most()), parent.last,
+                        frame.time - parent.last_time, child_with);
+    }
+    if (static_cast<std::int64_t>(out.size()) > live_.opt.max_candidates) throw CandidateLimit{};
+    if (lives_on(all, parent.gap, advice))
+      ++parent.carried;
+    else
+      parent.score += miss;
+    ++parent.gap;
+    parent.has_ended = gives_way || parent.untold() >= live_.sm.max_gap;
+    out.push_back(std::move(parent));
+  }
+
+  // What a track's best branch expects of a frame that comes next.
+  void claim(const LiveTrack<Tree>& track, WindowFrame& frame) {
+    const Branch& best = track.more.branches.front();
+    if (best.has_ended) return;
+    const NeighbourAdvice* advice = frame.advice_to(track.more.key);
+    if (advice != nullptr && advice->gives_way) return;
+    MotionState state = best.state;
+    predict(live_.m, frame.step, state);
+    const Expected all = expected(state, best.gap, advice);
+    const Prediction& prediction = all.prediction();
+    const double log_seen = live_.sm.log_seen(best.gap) - live_.sm.log_clutter;
+    // Less is nothing beside the clutter.
+    const double radius = prediction.radius(live_.opt.gate, kNoClaim - log_seen,
+                                             frame.grid.r_most());
+    if (radius < 0 && !all.is_carried()) return;
+    std::array<double, kMaxModes> each{};
+    const std::size_t first = frame.claims.size();
+    const auto weigh = [&](std::int32_t j, double) {
+      const Point& y = frame.points[j];
+      const double log_w = log_seen + all.of(y).log_likelihood(y, each);
+      if (log_w > kNoClaim && log_w < 700) frame.claims.push_back({track.more.key, j, std::exp(log_w)});
+    };
+    if (all.is_carried())
+      for (const std::int32_t j : advice->may_take) weigh(j, 0);
+    else
+      frame.grid.within(prediction.center, radius, weigh);
+    weights_.clear();
+    for (std::size_t c = first; c < frame.claims.size(); ++c)
+      weights_.push_back(frame.claims[c].value);
+    for (std::size_t c = 0; c < weights_.size(); ++c) {
+      double others = std::exp(live_.sm.log_missed(best.gap));
+      for (std::size_t l = 0; l < weights_.size(); ++l)
+        if (l != c) others += weights_[l];
+      Claim& claim = frame.claims[first + c];
+      claim.value = weights_[c] / others;
+      frame.claimed[claim.column] += claim.value;
+    }
+  }
+
+  bool passes(double lambda, std::int64_t n_updates) const {
+    if (opt_.delta.empty()) return true;
+    const auto k = static_cast<std::size_t>(n_updates);
+    if (k <= opt_.delta.size()) return lambda <= opt_.delta[k - 1];
+    if (opt_.fading < 1) return lambda <= opt_.delta.back();
+    // Wilson & Hilferty 1931; with thousands of degrees of freedom right to seven digits.
+    const double v = 2.0 / (9.0 * static_cast<double>(k) * live_.m.axis.D);
+    const double root = 1 - v + opt_.z * std::sqrt(v);
+    return lambda <= 2.0 / (9.0 * v) * root * root * root;
+  }
+
+ private:
+  static constexpr double kNoClaim = -7;  // log of w
+
+  void prune(std::int64_t frame, std::int32_t n_open, std::int32_t max_branches, FrameStats& stats) {
+    std::stable_sort(grown_.begin(), grown_.end(),
+                     [&](const Branch& a, const Branch& b) { return rank(a) > rank(b); });
+    const double least = max_branches == kAll ? -std::numeric_limits<double>::infinity()
+                                              : rank(grown_.front()) - opt_.prune_drop;
+    std::size_t kept = 0;
+    for (std::size_t b = 0; b < grown_.size(); ++b) {
+      if (rank(grown_[b]) < least) break;
+      if (n_open > opt_.merge_last && is_merged(grown_[b], frame, kept)) continue;
+      if (kept == static_cast<std::size_t>(max_branches)) {
+        ++stats.n_limited;
+        continue;
+      }
+      if (kept != b) grown_[kept] = std::move(grown_[b]);
+      ++kept;
+    }
+    grown_.resize(kept);
+    stats.most_branches = std::max<std::int64_t>(stats.most_branches, static_cast<std::int64_t>(kept));
+  }
+
+  // Whether a likelier branch shares the last frames.
+  bool is_merged(const Branch& branch, std::int64_t frame, std::size_t kept) const {
+    for (std::size_t a = 0; a < kept; ++a) {
+      bool is_same = true;
+      for (std::int32_t k = 0; k < opt_.merge_last && is_same; ++k)
+        is_same = grown_[a].taken(frame - k) == branch.taken(frame - k);
+      if (is_same) return true;
+    }
+    return false;
+  }
+
+  const LiveTracks<Tree>& live_;
+  const BranchOptions& opt_;
+  std::vector<Branch> grown_;
+  std::vector<double> weights_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,117 @@
+// An open window in which any detection may begin a tree, and all detections are explained at once.
+//
+// A hypothesis is one branch of every tree, or none of a tree whose detections are clutter, no
+// detection in two. It is worth the sum of their parts of the log posterior, s(τ) up to now; a
+// detection in none is clutter and worth nothing. A tree is worth something from its second detection
+// on. Which hypothesis decides the oldest frame is for others to say; here it is carried out.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "trees/open_window.hpp"
+
+namespace asterism {
+
+// What becomes of a tree in the frame that is decided.
+struct Fate {
+  bool exists = false;       // its detections are a marker's
+  std::int32_t column = -1;  // its detection in that frame, -1 for a miss
+  double probability = 0;    // of just that
+};
+
+struct HypothesisWindow : OpenWindow {
+  double new_track_claim = 0;  // a detection that is expected by more begins no tree
+  std::vector<LiveTrack<Tree>> seeds;  // begin in a frame that is not decided
+
+  std::size_t n_all() const { return live.size() + seeds.size(); }
+  bool is_seed(std::size_t i) const { return i >= live.size(); }
+  LiveTrack<Tree>& tree(std::size_t i) { return is_seed(i) ? seeds[i - live.size()] : live[i]; }
+  const LiveTrack<Tree>& tree(std::size_t i) const {
+    return is_seed(i) ? seeds[i - live.size()] : live[i];
+  }
+  // The first frame in which a tree may have a branch of its own.
+  std::int64_t first_frame(std::size_t i) const {
+    return is_seed(i) ? tree(i).more.first : frames.front()->number;
+  }
+
+  // What may begin in an open frame is tentative as well.
+  void count(FrameStats& stats) const {
+    OpenWindow::count(stats);
+    stats.n_tentative += static_cast<std::int64_t>(seeds.size());
+    stats.n_pending += static_cast<std::int64_t>(seeds.size());
+  }
+
+  // Trees that begin at the detections of the newest frame.
+  void sow() {
+    const WindowFrame& frame = *frames.back();
+    for (std::size_t j = 0; j < frame.points.size(); ++j) {
+      if (frame.claimed[j] > new_track_claim) continue;
+      LiveTrack<Tree> seed;
+      seed.score = seed.best_score = live.birth_gain();
+      seed.last = frame.points[j];
+      seed.last_time = frame.time;
+      seed.state = begin_state(live.m, seed.last);
+      seed.more.key = n_trees++;
+      seed.more.first = frame.number;
+      Branch b = BranchGrower(live, branches).root(seed);
+      b.path[frame.number % kMaxWindow] = static_cast<std::int32_t>(j);
+      b.n_taken = 1;
+      seed.more.branches.push_back(std::move(b));
+      seeds.push_back(std::move(seed));
+    }
+  }
+
+  // Decides the oldest frame: the fate of every tree, and the probability of each detection to be
+  // nobody's.
+  template <typename Label>
+  void carry_out(std::span<const Fate> fates, std::span<const double> free, FrameStats& stats,
+                 Label&& label) {
+    const std::shared_ptr<const WindowFrame> frame = pop();
+    for (std::size_t j = 0; j < frame->points.size(); ++j)
+      label(frame->first + static_cast<std::int64_t>(j), -1, std::clamp(free[j], 0.0, 1.0));
+    const std::size_t n_live = live.size();
+    for (std::size_t i = 0; i < n_live; ++i) {
+      const Fate& fate = fates[i];
+      const std::int32_t own = fate.exists ? fate.column : -1;
+      carry(*frame, i, own, stats);
+      if (own >= 0) {
+        const Point last = live[i].last;
+        live.take(i, own, last, frame->time, fate.probability, label);
+      } else if (fate.exists) {
+        miss(*frame, i);
+      } else {
+        end(i);
+      }
+      keep(*frame, i, fate.column, stats);
+    }
+    for (std::size_t k = 0; k < seeds.size(); ++k)
+      if (seeds[k].more.first == frame->number && fates[n_live + k].exists)
+        begin(*frame, seeds[k], fates[n_live + k].probability, stats);
+    std::erase_if(seeds, [&](const LiveTrack<Tree>& s) { return s.more.first == frame->number; });
+    live.end_tracks();
+    FrameStats ignored;
+    live.end_frame(frame->time, frame->points.size(), ignored);
+  }
+
+ private:
+  // A seed becomes a track, with those of its branches that have a second detection.
+  void begin(const WindowFrame& frame, LiveTrack<Tree>& seed, double probability,
+             FrameStats& stats) {
+    const std::int32_t j = seed.more.branches.front().taken(frame.number);
+    LiveTrack<Tree>& track = live.begin(j, frame.points[j], frame.time, live.birth_gain());
+    track.pending.back().confidence = probability;
+    track.more.key = seed.more.key;
+    track.more.branches = std::move(seed.more.branches);
+    if (n_open() == 0)
+      regrow(track, stats);
+    else
+      settle(frame, j, track);
+  }
+};
+
+}  // namespace asterism

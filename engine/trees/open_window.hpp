@@ -1,0 +1,133 @@
+// The frames that are not decided yet, and the branches of every track over them.
+//
+// What is decided of a track lives in tracks/live_tracks.hpp; its branches (trees/branches.hpp) are what may
+// follow. Who has which point of the oldest frame is for others to decide; here it is carried out.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "tracks/live_tracks.hpp"
+#include "trees/branches.hpp"
+#include "trees/window_carrier.hpp"
+
+namespace asterism {
+
+struct OpenWindow {
+  LiveTracks<Tree> live;
+  BranchOptions branches;
+  std::vector<std::shared_ptr<const WindowFrame>> frames;
+  WindowBodies bodies;
+  std::int64_t n_trees = 0;
+  // Branches that a track may have right after a further frame: all, where they are limited jointly.
+  std::int32_t max_grown = branches.is_joint ? BranchGrower::kAll
+                                             : branches.max_branches;
+
+  std::int32_t n_open() const { return static_cast<std::int32_t>(frames.size()); }
+  bool is_full() const { return n_open() == branches.window; }
+
+  void count(FrameStats& stats) const {
+    for (const LiveTrack<Tree>& track : live.tracks) {
+      ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
+      stats.n_pending += static_cast<std::int64_t>(track.pending.size());
+      stats.n_branches += static_cast<std::int64_t>(track.more.branches.size());
+    }
+  }
+
+  // What neighbours say of a frame that comes.
+  void advise(WindowFrame& frame, FrameStats& stats) {
+    if (bodies.is_on()) bodies.advise(live, n_open(), frame, stats);
+  }
+  // What the believed tracks expect of it.
+  void claim(WindowFrame& frame) const {
+    BranchGrower grower(live, branches);
+    for (const LiveTrack<Tree>& track : live.tracks)
+      if (track.is_confirmed()) grower.claim(track, frame);
+  }
+
+  void push(std::shared_ptr<const WindowFrame> frame, FrameStats& stats) {
+    frames.push_back(std::move(frame));
+    BranchGrower grower(live, branches);
+    for (LiveTrack<Tree>& track : live.tracks)
+      grower.grow(*frames.back(), track, n_open(), max_grown, stats);
+  }
+
+  std::shared_ptr<const WindowFrame> pop() {
+    std::shared_ptr<const WindowFrame> oldest = frames.front();
+    frames.erase(frames.begin());
+    return oldest;
+  }
+
+  // After a decision.
+  void learn(FrameStats& stats) {
+    if (bodies.is_on()) bodies.learn(live, stats);
+  }
+
+  // Carries what is decided of track i over the frame just popped, with detection `own` or, at -1,
+  // none; its gap is the caller's.
+  void carry(const WindowFrame& frame, std::size_t i, std::int32_t own, FrameStats& stats) {
+    LiveTrack<Tree>& track = live[i];
+    const BranchGrower grower(live, branches);
+    predict(live.m, frame.step, track.state);
+    const NeighbourAdvice* advice = frame.advice_to(track.more.key);
+    const Expected expected = grower.expected(track.state, track.gap, advice);
+    if (own >= 0) {
+      const Point& y = frame.points[own];
+      const Prediction& prediction = expected.of(y);
+      expected.choose(y, track.state);
+      stats.n_returned += expected.is_carried();
+      track.more.lambda = branches.fading * track.more.lambda + surprise(prediction, y);
+      ++track.more.n_updates;
+      track.score += live.hit_gain(track.gap) + update(live.m, prediction, y, track.state);
+      track.last = y;
+      track.last_time = frame.time;
+    } else if (grower.lives_on(expected, track.gap, advice)) {
+      ++track.carried;
+      ++stats.n_carried;
+    } else {
+      track.score += live.miss_gain(track.gap);
+    }
+  }
+
+  // Track i was not seen in that frame.
+  void miss(const WindowFrame& frame, std::size_t i) {
+    const NeighbourAdvice* advice = frame.advice_to(live[i].more.key);
+    if (advice != nullptr && advice->gives_way)
+      end(i);
+    else
+      ++live[i].gap;
+  }
+  void end(std::size_t i) { live[i].gap = live.sm.max_gap + live[i].carried; }
+
+  // Keeps the branches that agree with what was carried; grows new ones where none do.
+  void keep(const WindowFrame& frame, std::size_t i, std::int32_t own, FrameStats& stats) {
+    LiveTrack<Tree>& track = live[i];
+    std::erase_if(track.more.branches,
+                  [&](const Branch& b) { return b.taken(frame.number) != own; });
+    if (track.more.branches.empty() || frames.empty())
+      regrow(track, stats);
+    else if (own >= 0)
+      settle(frame, own, track);
+  }
+
+  // The branches of a track have `own` behind them.
+  void settle(const WindowFrame& frame, std::int32_t own, LiveTrack<Tree>& track) const {
+    for (Branch& b : track.more.branches) {
+      --b.n_taken;
+      b.distance2[frame.number % kMaxWindow] = 0;
+      if (!branches.is_joint) b.score += frame.crowding(track.more.key, own);
+      b.score -= frame.says(track.more.key, own);
+    }
+  }
+
+  void regrow(LiveTrack<Tree>& track, FrameStats& stats) {
+    BranchGrower grower(live, branches);
+    track.more.branches.assign(1, grower.root(track));
+    std::int32_t n = 0;
+    for (const auto& frame : frames) grower.grow(*frame, track, ++n, branches.max_branches, stats);
+  }
+};
+
+}  // namespace asterism

@@ -1,0 +1,290 @@
+// Track-oriented multiple hypotheses: trees of track hypotheses over a window of frames, of which the
+// best compatible set explains all detections at once; the oldest frame is decided by it (N-scan).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "math/union_find.hpp"
+#include "solve/set_packing.hpp"
+#include "trees/hypothesis_window.hpp"
+
+namespace asterism {
+
+// Chooses an option of each tree, no resource twice: given the options of all trees and the first
+// resource of every open frame. Adds to the stats by how much its choice may be below the best.
+using Packer = std::function<std::vector<std::int32_t>(
+    std::span<const std::vector<PackingOption>>, std::span<const std::int32_t>, FrameStats&)>;
+
+struct HypothesisOptions {
+  std::int64_t max_hypotheses = 1;  // of a cluster, for the probabilities
+  std::int64_t max_nodes = 1;       // of the search for them
+  double least_new_worth = 0;       // a branch of a new tree that is worth less is no option
+  double drop = 0;                  // a hypothesis so many nats below the best does not count
+  Packer packer;                    // who chooses in place of the search below, where there is one
+};
+
+class HypothesisForest {
+ public:
+  HypothesisForest(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
+                   const BranchOptions& branches, const CarryOptions& carry, double new_track_claim,
+                   const HypothesisOptions& options)
+      : open_{{{model, score, life}, branches, {}, {model, score, life, carry}}, new_track_claim, {}},
+        opt_(options) {}
+
+  template <typename Label>
+  void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
+    frame->claimed.assign(frame->points.size(), 0);
+    open_.advise(*frame, stats);
+    open_.claim(*frame);
+    open_.push(frame, stats);
+    BranchGrower grower(open_.live, open_.branches);
+    for (LiveTrack<Tree>& seed : open_.seeds) grower.grow(*frame, seed, open_.n_open(), open_.max_grown, stats);
+    open_.sow();
+    limit(stats);
+    if (!open_.is_full()) return;
+    decide(stats, label);
+    open_.learn(stats);
+  }
+
+  template <typename Label>
+  void decide_all(FrameStats& stats, Label&& label) {
+    while (open_.n_open() > 0) decide(stats, label);
+  }
+
+  bool has_confidence() const { return !opt_.packer; }
+  const LiveTracks<Tree>& live() const { return open_.live; }
+  void count(FrameStats& stats) const { open_.count(stats); }
+
+ private:
+  // What a tree does in a hypothesis.
+  struct Choice {
+    std::int32_t branch = kNothing;
+    std::int32_t column = -1;  // its detection in the frame that is decided
+  };
+  static constexpr std::int32_t kNothing = -1;  // there is no such marker
+  static constexpr std::int32_t kLost = -2;     // missed in all open frames, and no branch says so
+
+  // A branch, and what the best hypothesis of its cluster loses with it.
+  struct Ranked {
+    double loss = 0;
+    std::int32_t tree = 0, branch = 0;
+  };
+  struct TreeOptions {
+    std::vector<PackingOption> options;
+    std::vector<Choice> choices;
+  };
+
+  template <typename Label>
+  void decide(FrameStats& stats, Label&& label) {
+    list_options();
+    choose(stats);
+    open_.carry_out(s_.fates, s_.free, stats, label);
+  }
+
+  // Every tree's branches as options, over the detections of all open frames as resources.
+  void list_options() {
+    const BranchGrower grower(open_.live, open_.branches);
+    s_.n_resources = 0;
+    s_.first_resource.clear();
+    for (const auto& frame : open_.frames) {
+      s_.first_resource.push_back(s_.n_resources);
+      s_.n_resources += static_cast<std::int32_t>(frame->points.size());
+    }
+    s_.trees.assign(open_.n_all(), {});
+    s_.fates.assign(open_.n_all(), {});
+    for (std::size_t i = 0; i < s_.trees.size(); ++i) {
+      const bool is_seed = open_.is_seed(i);
+      const LiveTrack<Tree>& track = open_.tree(i);
+      TreeOptions& tree = s_.trees[i];
+      const std::int64_t first = open_.first_frame(i);
+      bool has_free = false;
+      for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
+        const Branch& b = track.more.branches[k];
+        if (is_seed && (b.n_taken < 2 || grower.worth(b) < opt_.least_new_worth)) continue;
+        PackingOption option{grower.worth(b), {}};
+        for (std::size_t f = 0; f < open_.frames.size(); ++f) {
+          const std::int64_t number = open_.frames[f]->number;
+          if (number >= first && b.taken(number) >= 0)
+            option.uses.push_back(s_.first_resource[f] + b.taken(number));
+        }
+        has_free = has_free || option.uses.empty();
+        const std::int32_t column = is_seed && first != open_.frames.front()->number
+                                        ? -1
+                                        : b.taken(open_.frames.front()->number);
+        tree.options.push_back(std::move(option));
+        tree.choices.push_back({static_cast<std::int32_t>(k), column});
+      }
+      if (!track.is_confirmed()) {
+        tree.options.push_back({0, {}});
+        tree.choices.push_back({kNothing, -1});
+      } else if (!has_free) {
+        const double lost = track.score - open_.live.misses_gain(0, track.untold()) +
+                            open_.branches.log_end[track.untold() + open_.n_open()];
+        tree.options.push_back({lost, {}});
+        tree.choices.push_back({kLost, -1});
+      }
+    }
+  }
+
+  // Trees that share detections.
+  std::vector<std::vector<std::int32_t>> clusters() const {
+    std::vector<std::int32_t> owner(s_.n_resources, -1);
+    UnionFind sets(s_.trees.size());
+    for (std::size_t i = 0; i < s_.trees.size(); ++i)
+      for (const PackingOption& option : s_.trees[i].options)
+        for (const std::int32_t r : option.uses) {
+          const auto own = static_cast<std::int32_t>(i);
+          if (owner[r] < 0) owner[r] = own;
+          sets.join(owner[r], own);
+        }
+    std::vector<std::vector<std::int32_t>> clusters(s_.trees.size());
+    for (std::size_t i = 0; i < s_.trees.size(); ++i)
+      clusters[sets.find(static_cast<std::int32_t>(i))].push_back(static_cast<std::int32_t>(i));
+    std::erase_if(clusters, [](const auto& cluster) { return cluster.empty(); });
+    return clusters;
+  }
+
+  // Drops the branches that no probable hypothesis needs. What a tree would like best may be another's,
+  // the more so the longer the window: so a branch is judged by what the best hypothesis of the whole
+  // cluster loses with it, and the branches of a cluster compete for its room together.
+  void limit(FrameStats& stats) {
+    list_options();
+    for (const std::vector<std::int32_t>& cluster : clusters()) limit(cluster, stats);
+    for (std::size_t i = 0; i < open_.n_all(); ++i)
+      stats.most_branches = std::max<std::int64_t>(stats.most_branches, branches(i).size());
+  }
+  void limit(const std::vector<std::int32_t>& cluster, FrameStats& stats) {
+    s_.ranked.clear();
+    rank(cluster);
+    std::ranges::stable_sort(s_.ranked, {}, &Ranked::loss);
+    const auto probable = std::ranges::upper_bound(s_.ranked, open_.branches.prune_drop, {}, &Ranked::loss);
+    const std::ptrdiff_t n_probable = probable - s_.ranked.begin();
+    const auto n_most = static_cast<std::ptrdiff_t>(open_.branches.max_branches * cluster.size());
+    stats.n_limited += std::max<std::ptrdiff_t>(n_probable - n_most, 0);
+    s_.ranked.resize(std::min(n_probable, n_most));
+    std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::pair(r.tree, r.branch); });
+    auto next = s_.ranked.begin();
+    for (const std::int32_t i : cluster) {
+      std::vector<Branch> kept;
+      for (; next != s_.ranked.end() && next->tree == i; ++next)
+        kept.push_back(std::move(branches(i)[next->branch]));
+      branches(i) = std::move(kept);
+    }
+  }
+  void rank(const std::vector<std::int32_t>& cluster) {
+    const BranchGrower grower(open_.live, open_.branches);
+    std::vector<std::vector<PackingOption>> options;
+    for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
+    const std::vector<std::vector<double>> losses = SetPacking(options).losses().of;
+    for (std::size_t c = 0; c < cluster.size(); ++c) {
+      const std::size_t first = s_.ranked.size();
+      // What is no option yet, such as the beginning of a track, is compared with no track.
+      for (std::size_t b = 0; b < branches(cluster[c]).size(); ++b) {
+        const Branch& branch = branches(cluster[c])[b];
+        const double loss = branch.n_taken < 2 ? 0 : std::max(-grower.worth(branch), 0.0);
+        s_.ranked.push_back({loss, cluster[c], static_cast<std::int32_t>(b)});
+      }
+      const TreeOptions& tree = s_.trees[cluster[c]];
+      for (std::size_t o = 0; o < tree.choices.size(); ++o)
+        if (tree.choices[o].branch >= 0) s_.ranked[first + tree.choices[o].branch].loss = losses[c][o];
+      // A tree keeps one branch at least.
+      std::min_element(s_.ranked.begin() + static_cast<std::ptrdiff_t>(first), s_.ranked.end(),
+                       [](const Ranked& x, const Ranked& y) { return x.loss < y.loss; })
+          ->loss = 0;
+    }
+  }
+  std::vector<Branch>& branches(std::size_t tree) { return open_.tree(tree).more.branches; }
+
+  // The best hypothesis of every cluster of trees, and the probabilities over its best ones.
+  void choose(FrameStats& stats) {
+    s_.free.assign(open_.frames.front()->points.size(), 1);
+    std::vector<std::int32_t> entangled;
+    for (const std::vector<std::int32_t>& cluster : clusters()) {
+      if (opt_.packer && cluster.size() > 1)
+        entangled.insert(entangled.end(), cluster.begin(), cluster.end());
+      else
+        choose_in(cluster, stats);
+    }
+    if (!entangled.empty()) choose_by_packer(entangled, stats);
+  }
+
+  void mark(std::int32_t i, const Choice& best) {
+    std::vector<Branch>& branches = open_.tree(i).more.branches;
+    for (Branch& b : branches) b.is_chosen = false;
+    if (best.branch >= 0) branches[best.branch].is_chosen = true;
+  }
+
+  void choose_by_packer(const std::vector<std::int32_t>& entangled, FrameStats& stats) {
+    std::vector<std::vector<PackingOption>> options;
+    for (const std::int32_t i : entangled) options.push_back(std::move(s_.trees[i].options));
+    const std::vector<std::int32_t> own = opt_.packer(options, s_.first_resource, stats);
+    ++stats.n_groups;
+    stats.largest_group = std::max<std::int64_t>(stats.largest_group, entangled.size());
+    for (std::size_t c = 0; c < entangled.size(); ++c) {
+      const Choice& best = s_.trees[entangled[c]].choices[own[c]];
+      mark(entangled[c], best);
+      s_.fates[entangled[c]] = {best.branch != kNothing, best.column, 0};
+    }
+  }
+
+  void choose_in(const std::vector<std::int32_t>& cluster, FrameStats& stats) {
+    std::vector<std::vector<PackingOption>> options;
+    for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
+    std::vector<std::int32_t> chosen;
+    std::vector<double> totals;
+    const PackingSummary summary = SetPacking(options).solve(
+        opt_.max_hypotheses, opt_.drop, opt_.max_nodes,
+        [&](std::span<const std::int32_t> own, double worth) {
+          chosen.insert(chosen.end(), own.begin(), own.end());
+          totals.push_back(worth);
+        });
+    ++stats.n_groups;
+    stats.largest_group = std::max<std::int64_t>(stats.largest_group, cluster.size());
+    stats.n_hypotheses = std::max<std::int64_t>(stats.n_hypotheses, totals.size());
+    stats.n_nodes += summary.n_nodes;
+    if (!summary.is_exact && totals.size() == 1) {
+      ++stats.n_beams;
+      stats.gap = std::max(stats.gap, summary.bound - totals.front());
+    }
+    double sum = 0;
+    for (const double total : totals) sum += std::exp(total - totals.front());
+    for (std::size_t c = 0; c < cluster.size(); ++c) {
+      const TreeOptions& tree = s_.trees[cluster[c]];
+      const Choice& best = tree.choices[chosen[c]];
+      mark(cluster[c], best);
+      double own = 0;
+      for (std::size_t h = 0; h < totals.size(); ++h) {
+        const double p = std::exp(totals[h] - totals.front()) / sum;
+        const Choice& choice = tree.choices[chosen[h * cluster.size() + c]];
+        if (choice.branch == kNothing) continue;
+        if (choice.column == best.column) own += p;
+        if (choice.column >= 0) s_.free[choice.column] -= p;
+      }
+      s_.fates[cluster[c]] = {best.branch != kNothing, best.column, std::min(own, 1.0)};
+    }
+  }
+
+  // Of one decision: live tracks first, then seeds.
+  struct Memory {
+    std::vector<TreeOptions> trees;
+    std::vector<Ranked> ranked;
+    std::vector<Fate> fates;
+    std::vector<std::int32_t> first_resource;
+    std::int32_t n_resources = 0;
+    std::vector<double> free;
+  };
+
+  HypothesisWindow open_;
+  HypothesisOptions opt_;
+  Fresh<Memory> s_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,289 @@
+// The trees of all tracks over a window of frames, of which the oldest is decided when the window is
+// full: who has which of its points, by what the branches of every track have met since.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "frame/marriage_market.hpp"
+#include "math/log_sums.hpp"
+#include "solve/assignment.hpp"
+#include "solve/joint_events.hpp"
+#include "trees/open_window.hpp"
+
+namespace asterism {
+
+enum class Resolver : std::int32_t {
+  assignment = 0,          // most likely joint pairing
+  marriage_by_tracks = 1,  // stable; tracks rank by the window's likelihood, points by its distances
+  marriage_by_points = 2,
+};
+
+struct ForestOptions {
+  Resolver resolver = Resolver::assignment;
+  // Trees keep what they like best though another has it: only the labels are shared out.
+  bool is_independent = false;
+};
+
+class Forest {
+ public:
+  Forest(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
+         const BranchOptions& branches, const CarryOptions& carry, const ForestOptions& options)
+      : open_{{model, score, life}, branches, {}, {model, score, life, carry}}, opt_(options) {}
+
+  // Takes a frame; decides the oldest one if the window is full with it.
+  template <typename Label>
+  void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
+    frame->claimed.assign(frame->points.size(), 0);
+    open_.advise(*frame, stats);
+    if (!opt_.is_independent) open_.claim(*frame);
+    open_.push(std::move(frame), stats);
+    if (!open_.is_full()) return;
+    decide(stats, label);
+    open_.learn(stats);
+  }
+
+  // Decides all frames that are left, with what is known of them.
+  template <typename Label>
+  void decide_all(FrameStats& stats, Label&& label) {
+    while (open_.n_open() > 0) decide(stats, label);
+  }
+
+  bool has_confidence() const { return opt_.resolver == Resolver::assignment; }
+  const LiveTracks<Tree>& live() const { return open_.live; }
+  void count(FrameStats& stats) const { open_.count(stats); }
+
+ private:
+  // The best branch of a tree through one detection of the frame that is decided, or through none.
+  struct Way {
+    std::int32_t column = -1;  // -1: missed
+    double worth = 0, crowding = 0;
+    double newborn = -std::numeric_limits<double>::infinity();  // what it is worth to someone new
+    double log_weight = 0;   // of all its branches
+    double probability = 0;  // that this way is right, over all ways of sharing out the frame
+    std::int32_t branch = -1;  // -1: no branch is left that misses
+  };
+
+  // Of one decision.
+  struct Memory {
+    std::vector<std::int32_t> match, claims;
+    std::vector<std::vector<Way>> ways;
+    std::vector<char> is_taken;
+    std::vector<double> free;
+    std::vector<Candidate> candidates, pairings;
+    std::vector<double> gains, marginals, missed, log_miss;
+    std::vector<std::int32_t> best;
+    std::vector<Pair> extras;
+    Assignment assignment;
+  };
+
+  template <typename Label>
+  void decide(FrameStats& stats, Label&& label) {
+    const std::shared_ptr<const WindowFrame> frame = open_.pop();
+    s_.match.assign(open_.live.size(), -1);
+    s_.ways.resize(open_.live.size());
+    s_.is_taken.assign(frame->points.size(), 0);
+    count_shared(*frame, stats);
+    for (std::size_t i = 0; i < open_.live.size(); ++i) list_ways(*frame, i);
+    for (const bool confirmed : {true, false}) {
+      if (opt_.resolver == Resolver::assignment) weigh_ways(*frame, confirmed, stats);
+      match_all(*frame, confirmed, stats);
+    }
+    say_free(*frame, label);
+    for (std::size_t i = 0; i < open_.live.size(); ++i) follow(*frame, i, stats, label);
+    open_.live.end_tracks();
+    for (std::size_t j = 0; j < frame->points.size(); ++j) {
+      if (s_.is_taken[j]) continue;
+      LiveTrack<Tree>& track = open_.live.begin(j, frame->points[j], frame->time, open_.live.birth_gain());
+      track.more.key = open_.n_trees++;
+      open_.regrow(track, stats);
+    }
+    FrameStats ignored;
+    open_.live.end_frame(frame->time, frame->points.size(), ignored);
+  }
+
+  void list_ways(const WindowFrame& frame, std::size_t i) {
+    const BranchGrower grower(open_.live, open_.branches);
+    const LiveTrack<Tree>& track = open_.live[i];
+    std::vector<Way>& ways = s_.ways[i];
+    const double most = grower.worth(track.more.branches.front());  // the best comes first
+    // Where every branch that misses was pruned, it would have been worth no more than this.
+    const double pruned = most - open_.branches.prune_drop;
+    ways.assign(1, Way{.worth = pruned, .log_weight = std::exp(pruned - most)});
+    for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
+      const Branch& b = track.more.branches[k];
+      const std::int32_t column = b.taken(frame.number);
+      const double worth = grower.worth(b);
+      auto way = std::find_if(ways.begin(), ways.end(), [&](const Way& w) { return w.column == column; });
+      if (way == ways.end()) way = ways.insert(ways.end(), Way{.column = column});
+      if (way->branch < 0) {
+        // The frame is shared out now: what others expect of it counts by their own ways.
+        way->branch = static_cast<std::int32_t>(k);
+        way->crowding = column < 0 ? 0 : frame.crowding(track.more.key, column);
+        way->worth = worth + way->crowding;
+        way->log_weight = 0;
+      }
+      way->log_weight += std::exp(worth - most);
+    }
+    for (Way& way : ways) way.log_weight = most + std::log(way.log_weight) + way.crowding;
+    if (track.is_confirmed() && ways.size() > 1) weigh_newborn(frame, track, ways);
+    std::sort(ways.begin() + 1, ways.end(),
+              [](const Way& a, const Way& b) { return a.column < b.column; });
+  }
+
+  // A believed track that takes a detection and all that follows may be mistaken: it may be gone,
+  // and these be the first of a new marker. That a single detection is one counts where it is left
+  // over; what the window adds is its future.
+  void weigh_newborn(const WindowFrame& frame, const LiveTrack<Tree>& track,
+                     std::vector<Way>& ways) const {
+    MotionState state = track.state;
+    predict(open_.live.m, frame.step, state);
+    const BranchGrower grower(open_.live, open_.branches);
+    const NeighbourAdvice* advice = frame.advice_to(track.more.key);
+    const Expected expected = grower.expected(state, track.gap, advice);
+    const std::int32_t n_missed = std::min(open_.n_open() + 1, open_.live.sm.max_gap - track.untold());
+    const double gone = track.score + open_.live.misses_gain(track.gap, n_missed);
+    const double over = open_.live.leftover_gain();
+    std::array<double, kMaxModes> each{};
+    for (std::size_t k = 1; k < ways.size(); ++k) {
+      const Branch& b = track.more.branches[ways[k].branch];
+      const Point& y = frame.points[ways[k].column];
+      double hit = open_.live.hit_gain(track.gap) + expected.of(y).log_likelihood(y, each);
+      if (advice != nullptr) hit += advice->of(ways[k].column);
+      const double future = b.score + ways[k].crowding - track.score - hit - over * (b.n_taken - 1);
+      if (future > 0)
+        ways[k].newborn = gone + open_.live.birth_gain() - over + future + std::log1p(-std::exp(-future));
+    }
+  }
+
+  // The probability of every way of the believed tracks, or of the tentative ones given that they
+  // are markers: marginals over all that the frame may be, each way with the weight of its branches.
+  void weigh_ways(const WindowFrame& frame, bool confirmed, FrameStats& stats) {
+    s_.pairings.clear();
+    s_.gains.clear();
+    for (std::size_t i = 0; i < open_.live.size(); ++i) {
+      if (open_.live[i].is_confirmed() != confirmed) continue;
+      for (std::size_t k = 1; k < s_.ways[i].size(); ++k) {
+        const Way& way = s_.ways[i][k];
+        const double gain = way.log_weight - log_sum(s_.ways[i][0].log_weight, way.newborn);
+        if (s_.is_taken[way.column] || !(gain > kNegligible) || !std::isfinite(gain)) continue;
+        s_.pairings.push_back({static_cast<std::int32_t>(i), way.column, gain, 0});
+        s_.gains.push_back(gain);
+      }
+    }
+    s_.marginals.resize(s_.pairings.size());
+    s_.missed.resize(open_.live.size());
+    s_.best.resize(open_.live.size());
+    s_.log_miss.assign(open_.live.size(), 0);
+    JointEvents events(s_.pairings, s_.gains, s_.log_miss,
+                       static_cast<std::int32_t>(frame.points.size()), kMaxStates);
+    const JointSummary summary = events.solve(s_.marginals, s_.missed, s_.best);
+    stats.n_beams += summary.n_beams;
+    stats.bound = std::max(stats.bound, summary.bound);
+    for (std::size_t e = 0; e < s_.pairings.size(); ++e)
+      for (Way& way : s_.ways[s_.pairings[e].row])
+        if (way.column == s_.pairings[e].column) way.probability = s_.marginals[e];
+  }
+
+  // For a tentative track, weighed with the odds that it is a marker at all.
+  double odds(const LiveTrack<Tree>& track, const Way& way) const {
+    if (track.is_confirmed()) return way.worth;
+    if (way.branch < 0) return softplus(way.worth);
+    const Branch& b = track.more.branches[way.branch];
+    return softplus(b.score + way.crowding) - b.n_taken * open_.live.leftover_gain();
+  }
+
+  // Pairs the believed tracks, or the tentative ones, with points that are still free.
+  void match_all(const WindowFrame& frame, bool confirmed, FrameStats& stats) {
+    s_.candidates.clear();
+    for (std::size_t i = 0; i < open_.live.size(); ++i) {
+      const LiveTrack<Tree>& track = open_.live[i];
+      if (track.is_confirmed() != confirmed) continue;
+      const double missed = odds(track, s_.ways[i][0]);
+      for (std::size_t k = 1; k < s_.ways[i].size(); ++k) {
+        const Way& way = s_.ways[i][k];
+        const double gain = odds(track, way) - log_sum(missed, way.newborn);
+        if (s_.is_taken[way.column] || !(gain > 0) || !std::isfinite(gain)) continue;
+        s_.candidates.push_back({static_cast<std::int32_t>(i), way.column, gain,
+                               mean_distance2(track.more.branches[way.branch])});
+      }
+    }
+    const Groups groups = connected_groups(s_.candidates, static_cast<std::int32_t>(open_.live.size()),
+                                           static_cast<std::int32_t>(frame.points.size()));
+    const MarriageMarket market{opt_.resolver == Resolver::marriage_by_points, 1, 0};
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (opt_.resolver == Resolver::assignment || groups[g].size() == 1)
+        s_.assignment.solve(groups[g], s_.match);
+      else
+        market.marry(groups[g], frame.points, open_.live.m.axis.D, s_.match, s_.extras);
+      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
+    }
+    stats.n_groups += static_cast<std::int64_t>(groups.size());
+    for (const Candidate& c : s_.candidates)
+      if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
+  }
+
+  // Mean squared distance of a branch's detections in the window from what was expected of each.
+  static double mean_distance2(const Branch& b) {
+    double sum = 0;
+    for (const double d2 : b.distance2) sum += d2;
+    return sum / b.n_taken;
+  }
+
+  void count_shared(const WindowFrame& frame, FrameStats& stats) {
+    s_.claims.assign(frame.points.size(), 0);
+    for (const LiveTrack<Tree>& track : open_.live.tracks) {
+      const std::int32_t j = track.more.branches.front().taken(frame.number);
+      if (j >= 0 && track.is_confirmed() && ++s_.claims[j] == 2) ++stats.n_shared;
+    }
+  }
+
+  const Way* way_to(std::size_t i, std::int32_t column) const {
+    for (const Way& way : s_.ways[i])
+      if (way.column == column) return &way;
+    return nullptr;
+  }
+
+  // What no track takes gets no label, with the probability that none of the believed has it.
+  template <typename Label>
+  void say_free(const WindowFrame& frame, Label&& label) {
+    s_.free.assign(frame.points.size(), 1);
+    for (std::size_t i = 0; i < open_.live.size(); ++i)
+      for (const Way& way : s_.ways[i])
+        if (way.column >= 0 && open_.live[i].is_confirmed()) s_.free[way.column] -= way.probability;
+    for (std::size_t j = 0; j < frame.points.size(); ++j)
+      label(frame.first + static_cast<std::int64_t>(j), -1, std::clamp(s_.free[j], 0.0, 1.0));
+  }
+
+  // Carries what is decided of a track over the frame, and keeps the branches that agree with it.
+  template <typename Label>
+  void follow(const WindowFrame& frame, std::size_t i, FrameStats& stats, Label&& label) {
+    LiveTrack<Tree>& track = open_.live[i];
+    const std::int32_t j = s_.match[i];
+    const std::int32_t own = opt_.is_independent ? track.more.branches.front().taken(frame.number) : j;
+    open_.carry(frame, i, own, stats);
+    if (own >= 0) s_.is_taken[own] = 1;
+    if (j >= 0) {
+      const Point last = track.last;
+      open_.live.take(i, j, last, frame.time, way_to(i, j)->probability, label);
+    } else {
+      open_.miss(frame, i);
+    }
+    open_.keep(frame, i, own, stats);
+  }
+
+  static constexpr double kNegligible = -20.7;  // log of a weight, of a miss of 1, not looked at
+  static constexpr std::int64_t kMaxStates = 4096;  // of the sum over what a frame may be
+
+  OpenWindow open_;
+  ForestOptions opt_;
+
+  Fresh<Memory> s_;
+};
+
+}  // namespace asterism

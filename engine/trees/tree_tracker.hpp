@@ -1,0 +1,148 @@
+// Decisions that wait for a window of frames, and what can be said before they are made.
+//
+// The forest decides a frame when the window has passed over it. Until then its points have labels
+// for the time being: those that the forest would decide on now, were there no more frames. They may
+// change with every frame; what is decided never does.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "tracks/live_tracks.hpp"
+#include "trees/branches.hpp"
+
+namespace asterism {
+
+template <typename Forest>
+class TreeTracker {
+ public:
+  explicit TreeTracker(const Forest& forest)
+      : forest_(forest), present_(forest.live()), has_confidence_(forest.has_confidence()) {}
+
+  // As FrameTracker::step; also calls label for earlier detections whose label changes.
+  template <typename Label>
+  FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
+    FrameStats stats;
+    std::map<std::int64_t, Said> decided;
+    add(time, step, points, stats, decided);
+    forest_.count(stats);
+    total_.add(stats);
+    look_ahead(decided, label);
+    stats.add_work(ahead_);  // what is told of the open frames now is told of this step too
+    return stats;
+  }
+
+  // Many frames whose labels are asked for at the end alone: step without the looks ahead.
+  template <typename Label>
+  FrameStats pass(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
+    FrameStats stats;
+    std::map<std::int64_t, Said> decided;
+    add(time, step, points, stats, decided);
+    forest_.count(stats);
+    total_.add(stats);
+    for (const auto& [detection, said] : decided) {
+      said_.erase(detection);
+      label(detection, said.id, said.confidence);
+    }
+    return stats;
+  }
+  template <typename Label>
+  void end_pass(Label&& label) {
+    look_ahead({}, label);
+  }
+
+  bool has_confidence() const { return has_confidence_; }
+  const Forest& forest() const { return forest_; }
+  // The tracks as they would be decided on now.
+  const LiveTracks<Tree>& live() const { return present_; }
+  const MotionModel& motion() const { return present_.m; }
+  std::int64_t n_ids() const { return present_.next_id; }
+  // Of what is decided, and of what would be decided now.
+  FrameStats total() const {
+    FrameStats all = total_;
+    all.add_work(ahead_);
+    return all;
+  }
+  std::int64_t n_frames() const { return n_frames_; }
+  std::int64_t n_seen() const { return n_seen_; }
+  double last_time() const { return last_time_; }
+
+ private:
+  struct Said {
+    std::int64_t id = -1;
+    double confidence = 0;
+    bool operator==(const Said&) const = default;
+  };
+
+  void add(double time, const MotionStep& step, std::span<const Point> points, FrameStats& stats,
+           std::map<std::int64_t, Said>& decided) {
+    auto frame = std::make_shared<WindowFrame>();
+    frame->number = n_frames_;
+    frame->first = n_seen_;
+    frame->time = time;
+    frame->step = step;
+    frame->points.assign(points.begin(), points.end());
+    // Cells as wide as a track may move in the frame, were it as fast as can be.
+    const LiveTracks<Tree>& live = forest_.live();
+    const double dt = n_frames_ == 0 ? 0 : time - last_time_;
+    frame->grid.build(frame->points, live.m.axis.D, live.sm.max_speed * dt + live.sm.speed_margin);
+    forest_.add(std::move(frame), stats, [&](std::int64_t detection, std::int64_t id, double p) {
+      decided[detection] = {id, has_confidence_ ? p : 0};
+    });
+    forget_old(decided);
+    n_seen_ += static_cast<std::int64_t>(points.size());
+    last_time_ = time;
+    ++n_frames_;
+  }
+
+  // What was decided to have no label may still get one, as long as a tentative track holds it; and
+  // if that was said for the time being, it may have to be taken back.
+  void forget_old(const std::map<std::int64_t, Said>& decided) {
+    for (const auto& [detection, said] : decided)
+      if (said.id < 0) unlabelled_[detection] = said.confidence;
+    std::int64_t oldest = said_.empty() ? n_seen_ : said_.begin()->first;
+    for (const LiveTrack<Tree>& track : forest_.live().tracks)
+      if (!track.pending.empty()) oldest = std::min(oldest, track.pending.front().detection);
+    unlabelled_.erase(unlabelled_.begin(), unlabelled_.lower_bound(oldest));
+  }
+
+  // Labels all that is open as if there were no more frames, and tells what has changed since.
+  template <typename Label>
+  void look_ahead(const std::map<std::int64_t, Said>& decided, Label&& label) {
+    Forest ahead(forest_);
+    ahead_ = {};
+    std::map<std::int64_t, Said> now;
+    ahead.decide_all(ahead_, [&](std::int64_t detection, std::int64_t id, double p) {
+      now[detection] = {id, has_confidence_ ? p : 0};
+    });
+    // Said before of what is neither decided nor open to a label any more: taken back.
+    for (const auto& [detection, said] : said_)
+      if (!now.contains(detection) && !decided.contains(detection))
+        label(detection, -1, unlabelled_.at(detection));
+    for (const auto* news : {&decided, &std::as_const(now)})
+      for (const auto& [detection, said] : *news) {
+        if (news == &decided && now.contains(detection)) continue;
+        const auto before = said_.find(detection);
+        if (before == said_.end() || !(before->second == said))
+          label(detection, said.id, said.confidence);
+      }
+    said_ = std::move(now);
+    present_ = ahead.live();
+  }
+
+  Forest forest_;
+  LiveTracks<Tree> present_;
+  bool has_confidence_;
+  std::map<std::int64_t, Said> said_;  // of what is not decided
+  std::map<std::int64_t, double> unlabelled_;
+  FrameStats total_, ahead_;
+  std::int64_t n_frames_ = 0, n_seen_ = 0;
+  double last_time_ = -std::numeric_limits<double>::infinity();
+};
+
+}  // namespace asterism

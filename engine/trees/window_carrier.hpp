@@ -1,0 +1,123 @@
+// Bodies over frames that are not decided yet: what neighbours say of a frame that comes, found by the
+// best branches of all believed tracks (tracks/carried_tracks.hpp) and told to every branch of theirs.
+//
+// What bodies are is learnt from decided frames alone. What is said of a frame is said once, when it
+// comes, and kept with it: whoever is split over the frame later hears the same.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "base/scratch.hpp"
+#include "base/shared_copy.hpp"
+#include "tracks/carried_tracks.hpp"
+#include "tracks/live_tracks.hpp"
+#include "trees/branches.hpp"
+
+namespace asterism {
+
+class WindowBodies {
+ public:
+  WindowBodies(const MotionModel& m, const ScoreModel& score, const LifeOptions& life,
+               const CarryOptions& carry) {
+    if (carry.is_on) all_ = SharedCopy(All{{m, score, life}, {m, score, carry}});
+  }
+
+  bool is_on() const { return all_.has_value(); }
+
+  // Of the frame after `n_open` that are not decided.
+  void advise(const LiveTracks<Tree>& live, std::int64_t n_open, WindowFrame& frame,
+              FrameStats& stats) {
+    auto& [rows, carried] = all_.own();
+    list_rows(live, rows);
+    carried.list(
+        rows, frame.step, frame.points, 0.0,
+        [&](auto&& is_asked, std::vector<Candidate>& out) {
+          list_candidates(rows, frame, carried.bond_weight(), is_asked, out);
+        },
+        s_.candidates, stats, n_open);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      NeighbourAdvice& own = s_.advice[s_.place[i]];
+      const std::int32_t heir = carried.heir(i);
+      own.gives_way = own.gives_way || (heir >= 0 && is_best(heir));
+      if (!carried.is_carried(i)) continue;
+      own.is_carried = true;
+      own.is_doubtful = carried.is_doubtful(i);
+      own.place = carried.place(i);
+    }
+    for (const Candidate& c : s_.candidates)
+      if (carried.is_carried(c.row)) s_.advice[s_.place[c.row]].may_take.push_back(c.column);
+    for (const CarriedTracks::Told& told : carried.told())
+      s_.advice[s_.place[told.row]].says.emplace_back(told.column, told.nats);
+    for (NeighbourAdvice& own : s_.advice)
+      if (own.is_carried || own.gives_way || !own.says.empty())
+        frame.advice.push_back(std::move(own));
+  }
+
+  // After a decision.
+  void learn(const LiveTracks<Tree>& live, FrameStats& stats) { all_.own().carried.learn(live, stats); }
+
+ private:
+  struct All {
+    LiveTracks<> rows;
+    CarriedTracks carried;
+  };
+  struct Memory {
+    std::vector<std::size_t> place;  // of each row's track among the advised
+    std::vector<NeighbourAdvice> advice;
+    std::vector<Candidate> candidates;
+  };
+
+  // The best branch of every believed track, and where that was seen last, its best hidden one: had it
+  // no place, what the best one took would never be found to be a ghost.
+  void list_rows(const LiveTracks<Tree>& live, LiveTracks<>& rows) {
+    rows.tracks.clear();
+    s_.place.clear();
+    s_.advice.clear();
+    for (const LiveTrack<Tree>& track : live.tracks) {
+      const Branch& best = track.more.best();
+      if (!track.is_confirmed() || best.has_ended) continue;
+      s_.advice.emplace_back().track = track.more.key;
+      add_row(track, best, rows);
+      if (best.gap > 0) continue;
+      const auto hidden = std::ranges::find_if(
+          track.more.branches, [](const Branch& b) { return b.gap > 0 && !b.has_ended; });
+      if (hidden != track.more.branches.end()) add_row(track, *hidden, rows);
+    }
+  }
+  void add_row(const LiveTrack<Tree>& track, const Branch& b, LiveTracks<>& rows) {
+    LiveTrack<>& row = rows.tracks.emplace_back();
+    row.id = track.id;
+    row.gap = b.gap;
+    row.carried = b.carried;
+    row.first_time = track.first_time;
+    row.last_time = b.last_time;
+    row.last = b.last;
+    row.state = b.state;
+    s_.place.push_back(s_.advice.size() - 1);
+  }
+  bool is_best(std::size_t row) const { return row == 0 || s_.place[row] != s_.place[row - 1]; }
+
+  // What a believed track wins by a detection over missing it and leaving that over.
+  template <typename Asked>
+  static void list_candidates(LiveTracks<>& rows, const WindowFrame& frame, double spare,
+                              Asked&& is_asked, std::vector<Candidate>& out) {
+    const double over = rows.leftover_gain();
+    const auto base = [&](std::size_t i) {
+      return rows.hit_gain(rows[i].gap) - rows.miss_gain(rows[i].gap) - over;
+    };
+    rows.list(
+        frame.time, frame.points, -spare, is_asked,
+        [&](std::size_t i) { return -base(i) - spare; },
+        [&](std::size_t i, double log_likelihood) { return base(i) + log_likelihood; }, out);
+  }
+
+  SharedCopy<All> all_;
+  Fresh<Memory> s_;
+};
+
+}  // namespace asterism
