@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 
 import numpy as np
 import pytest
@@ -222,3 +223,64 @@ def test_errors_survive_a_process_boundary():
     ):
         again = pickle.loads(pickle.dumps(error))
         assert (type(again), str(again)) == (type(error), str(error))
+
+
+def _named_tracks():
+    at = [[[0, 0, 1], [1, 1, 1]], [[np.nan] * 3, [1, 1, 2]], [[0, 0, 3], [1, 1, 3]]]
+    return am.Tracks.from_dense([0, 0.01, 0.02], at, ["LKNE", None])
+
+
+def test_tracks_are_a_sequence_of_positions_by_number_and_by_name():
+    tracks = _named_tracks()
+    assert len(tracks) == tracks.n_tracks == 2
+    np.testing.assert_array_equal(tracks["LKNE"], tracks.positions()[:, 0])
+    np.testing.assert_array_equal(tracks[-1], tracks.positions()[:, 1])
+    for k, positions in enumerate(tracks):
+        np.testing.assert_array_equal(positions, tracks.positions()[:, k])
+    assert tracks.display_names == ("LKNE", "track 1")
+    with pytest.raises(KeyError, match="no track named 'RKNE': LKNE, track 1"):
+        tracks["RKNE"]
+    with pytest.raises(IndexError):
+        tracks[2]
+
+
+def test_gaps_are_between_detections_of_a_track():
+    assert _named_tracks().gaps() == (am.model.Gap(track=0, first=1, last=1, seconds=0.02),)
+    rng = np.random.default_rng(3)
+    seen = rng.random((200, 7)) < 0.6
+    at = np.where(seen[..., None], rng.normal(size=(200, 7, 3)), np.nan)
+    tracks = am.Tracks.from_dense(np.arange(200) / 100, at)
+    missed = {(gap.track, t) for gap in tracks.gaps() for t in range(gap.first, gap.last + 1)}
+    wanted = set()
+    for k in range(7):
+        there = np.flatnonzero(seen[:, k])
+        wanted |= {(k, t) for t in range(there[0], there[-1]) if not seen[t, k]}
+    assert missed == wanted
+
+
+def test_tracks_become_tables():
+    tracks = dataclasses.replace(_named_tracks(), confidence=[0.5, 1, 1, 1, 1])
+    frame = pytest.importorskip("pandas", reason="the extra [tables] is not installed")
+    table = tracks.to_pandas()
+    assert isinstance(table, frame.DataFrame)
+    assert table[table.name == "LKNE"].z_m.tolist() == [1, 3]
+    assert table.confidence.tolist() == [0.5, 1, 1, 1, 1]
+    assert table.time_s.tolist() == [0, 0, 0.01, 0.02, 0.02]
+    array = tracks.to_xarray()
+    assert array.sel(marker="LKNE", axis="z").values.tolist()[::2] == [1, 3]
+    assert array.dims == ("time", "marker", "axis")
+    clutter = dataclasses.replace(tracks, labels=[-1] * 5).to_pandas()
+    assert set(clutter.track) == {-1}
+    assert set(clutter.name) == {""}
+
+
+def test_a_missing_library_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(am.ParameterError, match=r"pip install 'asterism\[tables\]'"):
+        _named_tracks().to_pandas()
+
+
+def test_a_notebook_shows_tracks_as_a_table():
+    shown = dataclasses.replace(_named_tracks(), names=("<b>", None))._repr_html_()
+    assert "&lt;b&gt;" in shown
+    assert "<td>2</td><td>1</td><td>0</td><td>2</td>" in shown

@@ -70,7 +70,7 @@ def instances():
     space = am.multiview.triangulation_map(rig, (-1, -1, 0), (1, 1, 1))
     made = am.reconstruct(film.observations, rig)
     polygon = am.camera.Polygon(corners=[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], name=LONG)
-    gap = am.tracking.Gap(
+    gap = am.tracking.FilledGap(
         track=3, first=10, last=20, seconds=1 / 3, weights={"smoother": 1 / 3, "body": 2 / 3},
         rms={"smoother": 1 / 300, "body": 1 / 300}, n_windows=7, std=1 / 300, n_neighbours=5,
         reason="",

@@ -1,4 +1,4 @@
-"""The errors of the library, and the checks that raise them.
+"""The errors of the library.
 
 Every message says what was expected, what was got and, where there is one, what to do about it.
 Nothing here knows about tracking.
@@ -6,31 +6,17 @@ Nothing here knows about tracking.
 
 from __future__ import annotations
 
-import math
-import os
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from numpy.typing import ArrayLike, NDArray
+    from pathlib import Path
 
 __all__ = [
     "AsterismError",
     "FormatError",
     "ParameterError",
     "SolverLimit",
-    "check_array",
-    "check_fields",
-    "check_file",
-    "check_kind",
-    "check_number",
-    "check_path",
     "clipped",
-    "keep_array",
     "not_read",
     "not_written",
 ]
@@ -152,168 +138,6 @@ class SolverLimit(AsterismError, RuntimeError):
         return type(self), (self.what, self.size, self.limit, self.hint)
 
 
-def check_number(
-    name: str,
-    value: object,
-    *,
-    above: float = -math.inf,
-    below: float = math.inf,
-    closed: bool = False,
-    integer: bool = False,
-    hint: str = "",
-) -> None:
-    """Raise unless `value` is a finite number in an interval.
-
-    Parameters
-    ----------
-    name : str
-        How the caller knows the value.
-    value : object
-        The value.
-    above, below : float
-        Ends of the interval: open, or closed with ``closed=True``.
-    closed, integer : bool
-        Whether the ends belong to it; whether the number must be whole.
-    hint : str
-        Added to the message.
-
-    Raises
-    ------
-    ParameterError
-        If it is not.
-
-    Examples
-    --------
-    >>> check_number("p_detection", 1.5, above=0, below=1)
-    Traceback (most recent call last):
-    ...
-    asterism.errors.ParameterError: p_detection: expected a number in (0, 1), found 1.5
-    """
-    kind = "a whole number" if integer else "a number"
-    left, right = ("[", "]") if closed else ("(", ")")
-    if math.isinf(above) and math.isinf(below):
-        expected = f"a finite {kind[2:]}"
-    elif math.isinf(below):
-        expected = f"{kind} {'≥' if closed else '>'} {above:g}"
-    elif math.isinf(above):
-        expected = f"{kind} {'≤' if closed else '<'} {below:g}"
-    else:
-        expected = f"{kind} in {left}{above:g}, {below:g}{right}"
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise ParameterError(name, expected, repr(value), hint)
-    # A file may hold a whole number that no float can.
-    number = math.inf if isinstance(value, int) and abs(value) > 1e300 else float(value)
-    if integer and not number.is_integer():
-        raise ParameterError(name, expected, f"{number:g}", hint)
-    inside = above <= number <= below if closed else above < number < below
-    if not (math.isfinite(number) and inside):
-        raise ParameterError(name, expected, f"{number:g}", hint)
-
-
-def check_kind(name: str, value: object, kind: type, hint: str = "") -> None:
-    """Raise unless `value` is of a class.
-
-    Parameters
-    ----------
-    name : str
-        How the caller knows the value.
-    value : object
-        The value.
-    kind : type
-        The class.
-    hint : str
-        What to try instead. Where the value has what is wanted under one of the usual names, as the
-        `Stitching` of `identify` has tracks, that name is the hint.
-
-    Raises
-    ------
-    ParameterError
-        If it is not.
-
-    Examples
-    --------
-    >>> check_kind("radius", "3", float)
-    Traceback (most recent call last):
-    ...
-    asterism.errors.ParameterError: radius: expected a float, found '3'
-    """
-    if isinstance(value, kind):
-        return
-    word = kind.__name__
-    article = "an" if word[0] in "AEIOU" else "a"
-    expected = word if word.endswith("s") else f"{article} {word}"
-    got = f"{type(value).__name__}"
-    if isinstance(value, str):
-        got = repr(value)
-    elif isinstance(value, type):
-        got = f"the class {value.__name__}"
-    for part in ("tracks", "detections", "model", "bonds", "observations"):
-        if isinstance(getattr(value, part, None), kind):
-            hint = f"its .{part}"
-            break
-    raise ParameterError(name, expected, got, f"try {hint}" if hint else "")
-
-
-def check_path(name: str, value: object) -> Path:
-    """Give `value` as a path, or raise.
-
-    Parameters
-    ----------
-    name : str
-        How the caller knows the value.
-    value : object
-        The value.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ParameterError
-        If it is neither text nor a path.
-
-    Examples
-    --------
-    >>> check_path("path", 3)
-    Traceback (most recent call last):
-    ...
-    asterism.errors.ParameterError: path: expected the name of a file, found int
-    """
-    if isinstance(value, (str, os.PathLike)):
-        return Path(cast("str | os.PathLike[str]", value))
-    raise ParameterError(name, "the name of a file", type(value).__name__)
-
-
-def check_file(path: Path, expected: str = "a file") -> None:
-    """Raise unless a path is that of a file.
-
-    Parameters
-    ----------
-    path : Path
-        The path.
-    expected : str
-        What it should be, for the message.
-
-    Raises
-    ------
-    FormatError
-        If there is nothing, a folder, or a device or pipe.
-
-    Examples
-    --------
-    >>> check_file(Path("trial.c3d"))
-    Traceback (most recent call last):
-    ...
-    asterism.errors.FormatError: trial.c3d: no such file
-    """
-    if path.is_file():
-        return
-    if not path.exists():
-        raise FormatError(path, "", "", "no such file")
-    raise FormatError(path, "", expected, "a folder" if path.is_dir() else "a device or pipe")
-
-
 def not_read(path: str | Path, error: OSError) -> FormatError:
     """Give the error for a file that the system does not let be read."""
     if isinstance(error, FileNotFoundError):
@@ -335,119 +159,3 @@ def _reason(error: OSError) -> str:
         return "no such folder"
     text = error.strerror or "the system refuses"
     return text[0].lower() + text[1:]
-
-
-def check_array(
-    name: str,
-    value: ArrayLike,
-    shape: tuple[int | str, ...],
-    *,
-    dtype: type = np.float64,
-    finite: bool = True,
-) -> NDArray[Any]:
-    """Give `value` as a C-contiguous array of a shape and type, or raise.
-
-    Parameters
-    ----------
-    name : str
-        How the caller knows the value.
-    value : array_like
-        The value.
-    shape : tuple of int or str
-        A size per axis, or a letter where any size will do.
-    dtype : type
-        The type of the items.
-    finite : bool
-        Whether NaN and infinities are refused.
-
-    Returns
-    -------
-    ndarray
-        The array; the input itself where it already fits.
-
-    Raises
-    ------
-    ParameterError
-        If it does not fit.
-    """
-    wanted = f"an array of shape ({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind not in ("biuf" if dtype is np.float64 else "biu") and array.size:
-            raise ParameterError(name, f"{wanted} of numbers", f"type {array.dtype}")
-        array = np.ascontiguousarray(array, dtype=dtype)
-    except (TypeError, ValueError) as error:
-        if isinstance(error, ParameterError):
-            raise
-        raise ParameterError(name, f"{wanted} of numbers", str(error)) from error
-    fits = array.ndim == len(shape) and all(
-        isinstance(want, str) or want == have for want, have in zip(shape, array.shape, strict=True)
-    )
-    if not fits:
-        raise ParameterError(name, wanted, f"shape {array.shape}")
-    if finite and array.dtype.kind == "f" and not np.isfinite(array).all():
-        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ParameterError(name, "finite numbers", f"{array[place]} at index {place}")
-    return array
-
-
-def keep_array(
-    name: str, value: ArrayLike, shape: tuple[int | str, ...], *, dtype: type = np.float64
-) -> NDArray[Any]:
-    """Check an array as `check_array` does, for an object that keeps it and must not change.
-
-    Returns
-    -------
-    ndarray
-        Read-only. A copy, unless nobody else can write to the memory.
-
-    Raises
-    ------
-    ParameterError
-        If it does not fit.
-    """
-    array = check_array(name, value, shape, dtype=dtype)
-    if array.flags.writeable and np.may_share_memory(array, np.asarray(value)):
-        array = array.copy()
-    array.flags.writeable = False
-    return array
-
-
-def check_fields(name: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Raise if a name is given that is not known, with the nearest known one as a hint.
-
-    Parameters
-    ----------
-    name : str
-        What the names belong to.
-    given, known : iterable of str
-        The names.
-
-    Raises
-    ------
-    ParameterError
-        At the first unknown name.
-    """
-    known = list(known)
-    for field in given:
-        if field not in known:
-            near = _nearest(str(field), list(map(str, known)))
-            hint = f"did you mean {near!r}?" if near else ""
-            expected = f"one of {', '.join(known)}" if len(known) > 1 else "".join(known)
-            raise ParameterError(name, expected, repr(field), hint)
-
-
-def _nearest(name: str, known: list[str]) -> str:
-    """Give the known name that was probably meant; "" if none comes near.
-
-    A whole name that is near goes before one of whose words one is: gatee means gate_probability.
-    """
-    import difflib
-
-    folded = {k.lower(): k for k in known}
-    words = {word: k for k in reversed(known) for word in k.lower().split("_") if len(word) > 2}
-    for names in (folded, words):
-        near = difflib.get_close_matches(name.lower(), names, n=1)
-        if near:
-            return names[near[0]]
-    return ""

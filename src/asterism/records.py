@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast, dataclass_transform, overl
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_fields, clipped
+from asterism.checks import check_fields
+from asterism.errors import ParameterError, clipped
 
 if TYPE_CHECKING:
     from collections.abc import Callable

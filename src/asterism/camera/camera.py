@@ -16,7 +16,8 @@ from asterism.camera.matrices import checked_intrinsics, checked_pose, decompose
 from asterism.camera.painter import Painting, in_painters_order
 from asterism.camera.project import CLEARANCE, as_coordinates, project_points
 from asterism.camera.surfaces import check_surfaces, compile_surfaces
-from asterism.errors import ParameterError, check_number
+from asterism.checks import check_number
+from asterism.errors import ParameterError
 from asterism.records import record
 
 if TYPE_CHECKING:

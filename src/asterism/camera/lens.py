@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from scipy.optimize import brentq
 
-from asterism.errors import check_array, check_number
+from asterism.checks import check_array, check_number
 from asterism.records import record
 
 if TYPE_CHECKING:

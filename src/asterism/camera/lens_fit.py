@@ -10,7 +10,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from asterism.camera.lens import BrownConrady, QuadraticCorrection, ReportRadial, ViconRadial
-from asterism.errors import ParameterError, check_fields
+from asterism.checks import check_fields
+from asterism.errors import ParameterError
 from asterism.records import record
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import rq
 
-from asterism.errors import ParameterError, check_array, check_number, keep_array
+from asterism.checks import check_array, check_number, keep_array
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

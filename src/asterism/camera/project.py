@@ -9,7 +9,8 @@ import numpy as np
 from asterism import _engine
 from asterism.camera.projection import Projection
 from asterism.camera.surfaces import check_surfaces, compile_surfaces
-from asterism.errors import ParameterError, check_number
+from asterism.checks import check_number
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

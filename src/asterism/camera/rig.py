@@ -10,7 +10,8 @@ import numpy as np
 from asterism.camera.camera import Camera
 from asterism.camera.matrices import intrinsics
 from asterism.camera.project import CLEARANCE, project_points
-from asterism.errors import ParameterError, check_array, check_fields, check_number
+from asterism.checks import check_array, check_fields, check_number
+from asterism.errors import ParameterError
 from asterism.records import record
 
 if TYPE_CHECKING:

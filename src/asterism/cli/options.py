@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, Literal, Union
 
 import typer
 
-from asterism.errors import ParameterError, check_fields
+from asterism.checks import check_fields
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Mapping, Sequence

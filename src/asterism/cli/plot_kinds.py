@@ -207,7 +207,7 @@ def _rig(asked: Request) -> Any:
 
 def _lens(asked: Request) -> Any:
     import asterism as am
-    from asterism.errors import check_fields
+    from asterism.checks import check_fields
 
     rig = am.read_rig(asked.file)
     name = asked.camera or rig.names[0]

@@ -7,7 +7,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from asterism.errors import ParameterError, check_fields
+from asterism.checks import check_fields
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import asterism as am
-from asterism.errors import FormatError, ParameterError, check_fields
+from asterism.checks import check_fields
+from asterism.errors import FormatError, ParameterError
 from asterism.io.atomic import write_text
 from asterism.model import Recipe
 from asterism.model.toml_file import read_toml, write_toml

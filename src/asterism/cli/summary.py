@@ -7,37 +7,15 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 import asterism as am
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-__all__ = ["BridgedGap", "Summary", "stitching_rows", "summarize"]
+__all__ = ["Summary", "stitching_rows", "summarize"]
 
 DOUBTFUL = 0.9
-
-
-@dataclass(frozen=True, kw_only=True)
-class BridgedGap:
-    """Frames in which a track was not seen, between two detections of it.
-
-    Parameters
-    ----------
-    track : int
-        The track.
-    first, last : int
-        First and last frame without it, as the file counts.
-    seconds : float
-        From the detection before to the one after.
-    """
-
-    track: int
-    first: int
-    last: int
-    seconds: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +34,7 @@ class Summary:
         Tracks, detections in them and detections in none.
     n_gaps : int
         Gaps within tracks.
-    longest_gaps : tuple of BridgedGap
+    longest_gaps : tuple of am.model.Gap
         The longest of them, up to three.
     seconds, frames_per_second : float
         Time that the method took, and its pace.
@@ -80,7 +58,7 @@ class Summary:
     n_labelled: int
     n_clutter: int
     n_gaps: int
-    longest_gaps: tuple[BridgedGap, ...]
+    longest_gaps: tuple[am.model.Gap, ...]
     seconds: float
     frames_per_second: float
     log_posterior: float | None
@@ -164,10 +142,8 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
     d = tracks.detections
     assert isinstance(d, am.Capture)
     order, _ = tracks.by_track
-    frame, track = d.frame_of[order], tracks.labels[order]
-    is_gap = (np.diff(track) == 0) & (np.diff(frame) > 1)
-    before = np.flatnonzero(is_gap)
-    length = frame[before + 1] - frame[before]
+    gaps = tracks.gaps()
+    longest = sorted(gaps, key=lambda gap: -gap.length)[:3]
     n_labelled = len(order)
     info = dict(tracks.info)
     log_posterior = info.pop("log_posterior", -math.inf)
@@ -180,15 +156,10 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
         n_tracks=tracks.n_tracks,
         n_labelled=n_labelled,
         n_clutter=d.n_points - n_labelled,
-        n_gaps=len(before),
+        n_gaps=len(gaps),
         longest_gaps=tuple(
-            BridgedGap(
-                track=int(track[i]),
-                first=d.first_frame + int(frame[i]) + 1,
-                last=d.first_frame + int(frame[i + 1]) - 1,
-                seconds=float(d.times[frame[i + 1]] - d.times[frame[i]]),
-            )
-            for i in before[np.argsort(-length, kind="stable")[:3]]
+            dataclasses.replace(gap, first=d.first_frame + gap.first, last=d.first_frame + gap.last)
+            for gap in longest
         ),
         seconds=seconds,
         frames_per_second=d.n_frames / seconds if seconds else 0.0,

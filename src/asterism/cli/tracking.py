@@ -7,10 +7,11 @@ import time
 from typing import TYPE_CHECKING
 
 import asterism as am
+from asterism.checks import check_fields
 from asterism.cli.console import progress, to_json
 from asterism.cli.run_folder import CONFIG, SUMMARY, writing_log
 from asterism.cli.summary import Summary, summarize
-from asterism.errors import ParameterError, check_fields
+from asterism.errors import ParameterError
 from asterism.io.atomic import write_text
 
 if TYPE_CHECKING:

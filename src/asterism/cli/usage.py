@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from asterism.errors import ParameterError, check_fields
+from asterism.checks import check_fields
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     from typer import Typer

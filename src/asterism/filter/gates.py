@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import check_number
+from asterism.checks import check_number
 from asterism.filter.kalman import filter_states
 from asterism.model.compiled import steps_of
 from asterism.records import record

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism import _engine
-from asterism.errors import check_kind
+from asterism.checks import check_kind
 from asterism.model import TrackingModel, Tracks
 from asterism.model.compiled import motion_model, steps_of, with_noise
 from asterism.records import record

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Observations
-from asterism.errors import FormatError, ParameterError, check_number, check_path, not_read
+from asterism.checks import check_number, check_path
+from asterism.errors import FormatError, ParameterError, not_read
 from asterism.io import caliscope_xy
 from asterism.io.atomic import replacing
 from asterism.io.csv_columns import columns_of, quoted, whole

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import check_array
+from asterism.checks import check_array
 from asterism.metrics.counts import check_frames, check_labels, ratio, successions
 from asterism.records import record
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import check_array
+from asterism.checks import check_array
 from asterism.metrics.alignment import align
 from asterism.metrics.association import AssociationScores, association_scores
 from asterism.metrics.clear import ClearScores, clear_scores

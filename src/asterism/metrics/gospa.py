@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import check_array, check_number
+from asterism.checks import check_array, check_number
 from asterism.metrics.counts import check_frames, check_labels, ratio
 from asterism.records import record
 

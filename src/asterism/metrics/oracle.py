@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from asterism.errors import check_kind, check_number
+from asterism.checks import check_kind, check_number
 from asterism.metrics.alignment import marker_labels
 from asterism.metrics.counts import successions
 from asterism.model import Tracks

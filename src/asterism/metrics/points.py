@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from asterism.errors import ParameterError, check_array, check_kind, check_number
+from asterism.checks import check_array, check_kind, check_number
+from asterism.errors import ParameterError
 from asterism.model import Detections, Tracks
 from asterism.records import record
 

@@ -2,6 +2,7 @@
 
 from asterism.model.capture import Capture
 from asterism.model.detections import Detections
+from asterism.model.gap import Gap
 from asterism.model.interacting_motions import InteractingMotions
 from asterism.model.linear_motion import LinearMotion
 from asterism.model.motion import DWNA, DWPA, Motion, RandomWalk, SingleMotion
@@ -17,6 +18,7 @@ __all__ = [
     "DWPA",
     "Capture",
     "Detections",
+    "Gap",
     "InteractingMotions",
     "LinearMotion",
     "Motion",

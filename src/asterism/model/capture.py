@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from asterism.errors import keep_array
+from asterism.checks import keep_array
 from asterism.model.detections import Detections
 from asterism.model.tracks import Tracks
 from asterism.records import record

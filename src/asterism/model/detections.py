@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_array, keep_array
+from asterism.checks import check_array, keep_array
+from asterism.errors import ParameterError
 from asterism.records import record
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
-from asterism.errors import ParameterError, keep_array
+from asterism.checks import keep_array
+from asterism.errors import ParameterError
 from asterism.model.linear_motion import LinearMotion
 from asterism.model.motion import Motion, SingleMotion
 from asterism.records import record

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_number, keep_array
+from asterism.checks import check_number, keep_array
+from asterism.errors import ParameterError
 from asterism.model.motion import SingleMotion
 from asterism.records import record
 

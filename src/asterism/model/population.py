@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from asterism.errors import check_fields, check_number
+from asterism.checks import check_fields, check_number
 from asterism.records import record
 
 __all__ = ["Population"]

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from asterism import _engine
-from asterism.errors import check_kind
+from asterism.checks import check_kind
 from asterism.model.compiled import motion_model, score_model, steps_of, with_noise
 from asterism.model.tracking_model import TrackingModel
 from asterism.model.tracks import Tracks

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_fields, check_number
+from asterism.checks import check_fields, check_number
+from asterism.errors import ParameterError
 from asterism.model.tracking_model import TrackingModel
 from asterism.records import record
 

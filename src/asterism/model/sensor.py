@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from asterism.errors import check_number
+from asterism.checks import check_number
 from asterism.records import record
 
 __all__ = ["Sensor"]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import tomllib
 from typing import TYPE_CHECKING, Any
 
-from asterism.errors import FormatError, check_file, check_path, not_read, not_written
+from asterism.checks import check_file, check_path
+from asterism.errors import FormatError, not_read, not_written
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

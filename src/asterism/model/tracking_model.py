@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError, check_fields
+from asterism.checks import check_fields
+from asterism.errors import FormatError, ParameterError
 from asterism.model.interacting_motions import InteractingMotions
 from asterism.model.linear_motion import LinearMotion
 from asterism.model.motion import DWNA, DWPA, Motion, RandomWalk

@@ -8,16 +8,20 @@ from __future__ import annotations
 
 from dataclasses import field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from html import escape
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_kind, keep_array
+from asterism.checks import check_kind, keep_array
+from asterism.errors import ParameterError
 from asterism.model.detections import Detections
+from asterism.model.gap import Gap
 from asterism.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -27,6 +31,7 @@ __all__ = ["MOST_TRACKS", "Tracks"]
 
 MOST_TRACKS = 10_000_000
 """There is an entry for every track up to the largest number; a larger one is a mistake."""
+_MAX_ROWS = 100
 
 
 @record(eq=False)
@@ -139,6 +144,103 @@ class Tracks:
             names=tuple(names) if names else (None,) * n_markers,
         )
 
+    def __len__(self) -> int:
+        """Return the number of tracks."""
+        return self.n_tracks
+
+    def __iter__(self) -> Iterator[NDArray[np.float64]]:
+        """Iterate over the positions of each track, each of shape (T, D)."""
+        return (self[k] for k in range(self.n_tracks))
+
+    def __getitem__(self, track: int | str) -> NDArray[np.float64]:
+        """Return the positions of one track, shape (T, D), metres, NaN where it has no detection.
+
+        Parameters
+        ----------
+        track : int or str
+            Number of the track, negative ones from the end; or its name.
+
+        Raises
+        ------
+        IndexError, KeyError
+            If there is no track of that number or name.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> tracks = am.Tracks.from_dense([0, 0.01], [[[0, 0, 1]], [[0, 0, 2]]], ["LKNE"])
+        >>> tracks["LKNE"]
+        array([[0., 0., 1.],
+               [0., 0., 2.]])
+        """
+        if isinstance(track, str):
+            if track not in self.names:
+                raise KeyError(f"no track named {track!r}: {', '.join(self.display_names)}")
+            track = self.names.index(track)
+        k = range(self.n_tracks)[track]
+        own = np.flatnonzero(self.labels == k)
+        positions = np.full((self.detections.n_frames, self.detections.n_axes), np.nan)
+        positions[self.detections.frame_of[own]] = self.detections.points[own]
+        return positions
+
+    @property
+    def display_names(self) -> tuple[str, ...]:
+        """Name of every track: its marker, or its number where it has none."""
+        return tuple(name or f"track {k}" for k, name in enumerate(self.names))
+
+    def gaps(self) -> tuple[Gap, ...]:
+        """Return the gaps of all tracks, by track and then by time.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> at = [[[0, 0, 0]], [[np.nan] * 3], [[0, 0, 0]]]
+        >>> am.Tracks.from_dense([0, 0.01, 0.02], at).gaps()
+        (Gap(track=0, first=1, last=1, seconds=0.02),)
+        """
+        order, _ = self.by_track
+        frame, track = self.detections.frame_of[order], self.labels[order]
+        before = np.flatnonzero((np.diff(track) == 0) & (np.diff(frame) > 1))
+        times = self.detections.times
+        return tuple(
+            Gap(
+                track=int(track[i]),
+                first=int(frame[i]) + 1,
+                last=int(frame[i + 1]) - 1,
+                seconds=float(times[frame[i + 1]] - times[frame[i]]),
+            )
+            for i in before
+        )
+
+    def to_pandas(self) -> Any:
+        """Return a pandas ``DataFrame`` of one row a detection (extra ``asterism[tables]``).
+
+        Columns are ``frame``, ``time_s``, ``track`` (-1 for clutter), ``name``, ``x_m``, ``y_m``,
+        ``z_m`` and, where the method states it, ``confidence``.
+
+        Raises
+        ------
+        ParameterError
+            If pandas is not installed.
+        """
+        from asterism.model.tables import to_pandas
+
+        return to_pandas(self)
+
+    def to_xarray(self) -> Any:
+        """Return an xarray ``DataArray`` of time, marker and axis (extra ``asterism[tables]``).
+
+        Positions are metres, NaN where a track has no detection.
+
+        Raises
+        ------
+        ParameterError
+            If xarray is not installed.
+        """
+        from asterism.model.tables import to_xarray
+
+        return to_xarray(self)
+
     def measured(self) -> Self:
         """Leave out what was filled, as `Detections.measured` does; itself where nothing was."""
         d = self.detections.measured()
@@ -180,6 +282,22 @@ class Tracks:
         is_track = self.labels >= 0
         dense[d.frame_of[is_track], self.labels[is_track]] = d.points[is_track]
         return dense
+
+    def _repr_html_(self) -> str:
+        """Show a notebook one row a track: name, detections, gaps, first and last frame."""
+        order, offsets = self.by_track
+        frames = self.detections.frame_of[order]
+        n_gaps = np.bincount([gap.track for gap in self.gaps()], minlength=self.n_tracks)
+        rows = [
+            f"<tr><th>{escape(self.display_names[k])}</th><td>{self.lengths[k]}</td>"
+            f"<td>{n_gaps[k]}</td><td>{frames[a]}</td><td>{frames[b - 1]}</td></tr>"
+            for k, (a, b) in enumerate(pairwise(offsets.tolist()))
+            if b > a
+        ]
+        heads = "".join(f"<th>{h}</th>" for h in ("track", "detections", "gaps", "first", "last"))
+        more = f"<p>… and {len(rows) - _MAX_ROWS} more</p>" * (len(rows) > _MAX_ROWS)
+        body = "".join(rows[:_MAX_ROWS])
+        return f"<p>{escape(repr(self))}</p><table><tr>{heads}</tr>{body}</table>{more}"
 
     def __repr__(self) -> str:
         n_clutter = int((self.labels < 0).sum())

@@ -8,7 +8,8 @@ import numpy as np
 
 from asterism import _engine
 from asterism.camera import Observations, Rig
-from asterism.errors import ParameterError, check_kind, check_number
+from asterism.checks import check_kind, check_number
+from asterism.errors import ParameterError
 from asterism.model import Detections
 from asterism.model.compiled import with_noise
 from asterism.model.detections import FARTHEST

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Observations, Rig
-from asterism.errors import check_number
+from asterism.checks import check_number
 from asterism.multiview.correspondence import match_views, matched_rig
 from asterism.multiview.image_model import ImageModel, widest_base
 

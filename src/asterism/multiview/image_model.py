@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_array, check_number
+from asterism.checks import check_array, check_number
+from asterism.errors import ParameterError
 from asterism.multiview.triangulation import per_camera
 from asterism.records import record
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import ParameterError, keep_array
+from asterism.checks import keep_array
+from asterism.errors import ParameterError
 from asterism.records import record
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import ParameterError, check_array, check_kind
+from asterism.checks import check_array, check_kind
+from asterism.errors import ParameterError
 from asterism.records import record
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_fields, check_kind
+from asterism.checks import check_fields, check_kind
+from asterism.errors import ParameterError
 from asterism.plot.style import CYCLE, GRID, INK, given_axes, new_panels, tidy
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_kind
+from asterism.checks import check_kind
+from asterism.errors import ParameterError
 from asterism.model import Tracks
 from asterism.plot.coverage import draw_bar
 from asterism.plot.rows import axes_for, frame_rows, legend_above, rows_of, strip_above

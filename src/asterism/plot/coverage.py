@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from asterism.camera import Coverage
-from asterism.errors import ParameterError, check_fields, check_kind, check_number
+from asterism.checks import check_fields, check_kind, check_number
+from asterism.errors import ParameterError
 from asterism.plot.style import CLUTTER, GRADIENT, GRID, INK, new_axes, tidy
 
 if TYPE_CHECKING:

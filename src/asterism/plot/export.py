@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING, Any
 
-from asterism.errors import check_fields
+from asterism.checks import check_fields
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

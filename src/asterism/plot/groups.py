@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import check_kind
+from asterism.checks import check_kind
 from asterism.filter import GateGroups
 from asterism.plot.style import GRADIENT, GRID, INK, new_axes, tidy
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.camera import Camera, DepthImage, Polygon, Projection, Reason
-from asterism.errors import ParameterError, check_array, check_kind
+from asterism.checks import check_array, check_kind
+from asterism.errors import ParameterError
 from asterism.plot.coverage import draw_bar
 from asterism.plot.outlines import outlines
 from asterism.plot.style import CLUTTER, CYCLE, GRADIENT, GRID, INK, new_axes

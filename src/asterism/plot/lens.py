@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.camera import Camera
-from asterism.errors import check_kind
+from asterism.checks import check_kind
 from asterism.plot.image import frame_image, image_axes
 from asterism.plot.style import CYCLE, GRID, INK
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_array
+from asterism.checks import check_array
+from asterism.errors import ParameterError
 from asterism.plot.style import CYCLE, GRID, INK, new_axes, tidy
 
 if TYPE_CHECKING:

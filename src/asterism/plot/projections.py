@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.camera import Observations, Rig
-from asterism.errors import ParameterError, check_kind
+from asterism.checks import check_kind
+from asterism.errors import ParameterError
 from asterism.plot.image import frame_image
 from asterism.plot.style import CLUTTER, CYCLE, INK, given_axes, new_panels
 

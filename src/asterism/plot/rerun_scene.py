@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_path, not_written
+from asterism.checks import check_path
+from asterism.errors import ParameterError, not_written
 from asterism.plot.style import CLUTTER, CYCLE
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import ParameterError, check_kind, check_number
+from asterism.checks import check_kind, check_number
+from asterism.errors import ParameterError
 from asterism.plot.coverage import counts_map, draw_bar, whole_ticks
 from asterism.plot.outlines import outlines
 from asterism.plot.space import to_scale

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import check_kind
+from asterism.checks import check_kind
 from asterism.model import Tracks
 from asterism.plot.space import to_scale
 from asterism.plot.style import CLUTTER, CYCLE, INK, new_axes, tidy

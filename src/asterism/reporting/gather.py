@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import ParameterError, check_fields, check_kind, check_path
+from asterism.checks import check_fields, check_kind, check_path
+from asterism.errors import ParameterError
 from asterism.io.atomic import replacing
 from asterism.model import Capture, Tracks
 from asterism.reporting.connections import connections_of

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from asterism.camera import Reason
-from asterism.errors import ParameterError, check_number
+from asterism.checks import check_number
+from asterism.errors import ParameterError
 from asterism.records import record
 from asterism.simulate.corrupted_points import touching
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import check_number
+from asterism.checks import check_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

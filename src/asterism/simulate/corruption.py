@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import ParameterError, check_kind, check_number
+from asterism.checks import check_kind, check_number
+from asterism.errors import ParameterError
 from asterism.model import Capture, Detections, Tracks
 from asterism.simulate.corrupted_points import Points
 from asterism.simulate.episodes import Burst, Ghosts, Visits

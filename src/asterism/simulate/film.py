@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Observations, Rig
-from asterism.errors import ParameterError, check_kind, check_number
+from asterism.checks import check_kind, check_number
+from asterism.errors import ParameterError
 from asterism.model import Tracks
 from asterism.records import record
 from asterism.simulate.centroids import Blobs, Seeing, see

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import check_number
+from asterism.checks import check_number
 from asterism.simulate.clock import clock
 from asterism.simulate.truth import Truth
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from asterism.camera import Capsule, Mesh, Polygon
-from asterism.errors import ParameterError, keep_array
+from asterism.checks import keep_array
+from asterism.errors import ParameterError
 from asterism.model import Tracks
 from asterism.records import record
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from asterism import _engine
-from asterism.errors import ParameterError, SolverLimit, check_array, check_number
+from asterism.checks import check_array, check_number
+from asterism.errors import ParameterError, SolverLimit
 from asterism.records import record
 
 if TYPE_CHECKING:

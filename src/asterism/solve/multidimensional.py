@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from asterism import _engine
-from asterism.errors import ParameterError, check_array, check_fields, check_number
+from asterism.checks import check_array, check_fields, check_number
+from asterism.errors import ParameterError
 from asterism.records import record
 
 if TYPE_CHECKING:

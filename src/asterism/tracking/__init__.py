@@ -2,7 +2,7 @@
 
 from asterism.tracking.choose import AUTO, Choice, choose_method
 from asterism.tracking.estimation import ModelEstimate, estimate_model
-from asterism.tracking.filling import Filling, Gap, fill_gaps
+from asterism.tracking.filling import FilledGap, Filling, fill_gaps
 from asterism.tracking.methods import METHODS, HypothesisCluster, Method, Update, method_by_name
 from asterism.tracking.naming import Naming, name_tracks
 from asterism.tracking.pipeline import track
@@ -22,8 +22,8 @@ __all__ = [
     "METHODS",
     "Bonds",
     "Choice",
+    "FilledGap",
     "Filling",
-    "Gap",
     "HypothesisCluster",
     "Join",
     "Method",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import check_kind
+from asterism.checks import check_kind
 from asterism.model import Detections, RandomWalk, TrackingModel, Tracks
 from asterism.records import record
 from asterism.tracking.methods.gnn import GNN

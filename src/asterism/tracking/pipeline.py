@@ -6,7 +6,8 @@ import dataclasses
 import logging
 from typing import TYPE_CHECKING, Any, Literal
 
-from asterism.errors import ParameterError, check_kind
+from asterism.checks import check_kind
+from asterism.errors import ParameterError
 from asterism.model import Detections, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import sha256_of, versions
 from asterism.tracking.methods import METHODS, method_by_name

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from asterism.errors import ParameterError, check_kind, check_number
+from asterism.checks import check_kind, check_number
+from asterism.errors import ParameterError
 from asterism.model import Detections, Recipe, TrackingModel
 from asterism.model.recipe import sha256_of, versions
 from asterism.records import record

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from asterism.checks import check_fields
 from asterism.cli.calibration_options import (
     CalibrationFile,
     FromFormat,
@@ -17,7 +18,6 @@ from asterism.cli.calibration_options import (
 from asterism.cli.commands.camera_map import map_
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.cli.options import with_option_names
-from asterism.errors import check_fields
 
 if TYPE_CHECKING:
     from asterism.camera.lens_fit import LensFit
@@ -227,7 +227,7 @@ def check(
 
         asterism camera check rig.toml --points wand.csv --max-px 0.5
     """
-    from asterism.errors import check_number
+    from asterism.checks import check_number
     from asterism.multiview.rig_check import check_points, check_rig
 
     check_number("--max-px", max_px, above=0)

@@ -73,9 +73,9 @@ def chain(
         asterism chain two_people --rig ring8 --seeing false=0.5 --seeing noise_px=0.3 -o chain
     """
     import asterism as am
+    from asterism.checks import check_fields
     from asterism.cli.outputs import Folder, check_outputs
     from asterism.cli.recording import made_scene, rig_from, seeing_from
-    from asterism.errors import check_fields
     from asterism.tracking.choose import AUTO
 
     names = method or [AUTO]

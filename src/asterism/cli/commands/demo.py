@@ -43,10 +43,10 @@ def demo(
         asterism demo -o /tmp/demo --seed 7
     """
     import asterism as am
+    from asterism.checks import check_number
     from asterism.cli.outputs import Folder, check_outputs
     from asterism.cli.run_folder import Run
     from asterism.cli.tracking import carry_out
-    from asterism.errors import check_number
     from asterism.io.atomic import write_text
 
     check_number("--seed", seed, above=0, closed=True, integer=True)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from asterism.checks import check_number
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
-from asterism.errors import ParameterError, check_number
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     import asterism as am
@@ -111,7 +112,7 @@ def _figures(found: am.tracking.Filling) -> dict[str, Any]:
     }
 
 
-def _plain(gap: am.tracking.Gap, capture: am.Capture) -> dict[str, Any]:
+def _plain(gap: am.tracking.FilledGap, capture: am.Capture) -> dict[str, Any]:
     """Give a gap as plain values, its frames as the file counts them."""
     return {
         "track": gap.track,

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from asterism.checks import check_number
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
-from asterism.errors import ParameterError, check_number
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     import asterism as am

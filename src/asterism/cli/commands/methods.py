@@ -57,8 +57,8 @@ def scenes(scene: _Scene = None, json: Json = False) -> None:
         asterism scenes person
     """
     import asterism as am
+    from asterism.checks import check_fields
     from asterism.cli.options import scene_options
-    from asterism.errors import check_fields
 
     known = am.simulate.SCENES
     if scene is not None:

@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
+from asterism.checks import check_fields, check_number
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.cli.plot_kinds import KINDS, Kind, Request
-from asterism.errors import ParameterError, check_fields, check_number
+from asterism.errors import ParameterError
 
 _Kind = Annotated[str, typer.Argument(metavar="KIND", help="What to draw, one of the kinds above.")]
 _Files = Annotated[

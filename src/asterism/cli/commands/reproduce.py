@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from asterism.checks import check_fields, check_number
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
-from asterism.errors import check_fields, check_number
 from asterism.reproduction.parts import PARTS
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from asterism.checks import check_number
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
-from asterism.errors import FormatError, ParameterError, check_number
+from asterism.errors import FormatError, ParameterError
 
 if TYPE_CHECKING:
     import asterism as am
@@ -195,8 +196,8 @@ def track(
 def made_method(name: str | None, texts: list[str]) -> am.tracking.Method[Any] | None:
     """Make a method from its name and its ``NAME=VALUE`` options; None for ``auto``."""
     import asterism as am
+    from asterism.checks import check_fields
     from asterism.cli.options import as_options, method_options, parsed
-    from asterism.errors import check_fields
 
     if name in (None, am.tracking.AUTO):
         if texts:

@@ -7,16 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.camera import Rig
-from asterism.errors import (
-    FormatError,
-    ParameterError,
-    check_fields,
-    check_file,
-    check_kind,
-    check_path,
-    not_read,
-    not_written,
-)
+from asterism.checks import check_fields, check_file, check_kind, check_path
+from asterism.errors import FormatError, ParameterError, not_read, not_written
 from asterism.io.atomic import replacing
 from asterism.io.calibrations.formats import CALIBRATION_FORMATS, CalibrationFormat
 from asterism.io.text_table import as_utf8

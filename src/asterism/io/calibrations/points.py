@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError, check_fields, check_file, not_read
+from asterism.checks import check_fields, check_file
+from asterism.errors import FormatError, ParameterError, not_read
 from asterism.io.calibrations.parts import read_bytes
 from asterism.io.units import PER_METRE, parse_unit
 

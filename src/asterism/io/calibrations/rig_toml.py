@@ -7,7 +7,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from asterism.camera import BrownConrady, Camera, QuadraticCorrection, ReportRadial, ViconRadial
-from asterism.errors import FormatError, ParameterError, check_fields
+from asterism.checks import check_fields
+from asterism.errors import FormatError, ParameterError
 from asterism.io.calibrations.parts import as_array, build_rig, faults_at
 from asterism.io.calibrations.toml_text import load, table
 

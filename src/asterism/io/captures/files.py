@@ -6,19 +6,14 @@ import logging
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from asterism.errors import (
-    FormatError,
-    ParameterError,
-    check_fields,
-    check_file,
-    check_kind,
-    check_path,
-    not_read,
-)
+import numpy as np
+
+from asterism.checks import check_fields, check_file, check_kind, check_path
+from asterism.errors import FormatError, ParameterError, not_read
 from asterism.io.atomic import replacing
 from asterism.io.captures.formats import CAPTURE_FORMATS, CaptureFormat
 from asterism.io.text_table import as_utf8
-from asterism.model import Capture, Tracks
+from asterism.model import Capture, Detections, Tracks
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -97,7 +92,7 @@ def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
 
 
 def write(
-    tracks: Tracks,
+    tracks: Tracks | Detections,
     path: str | Path,
     *,
     format: str | None = None,
@@ -108,7 +103,7 @@ def write(
 
     Parameters
     ----------
-    tracks : Tracks
+    tracks : Tracks or Detections
         What to write: every detection, those that are clutter too.
     path : path
         The file. One that exists is replaced, except the one that the detections came from.
@@ -127,6 +122,8 @@ def write(
     FormatError
         If the file cannot be written, or its source cannot be read again.
     """
+    if isinstance(tracks, Detections):
+        tracks = Tracks(detections=tracks, labels=np.full(tracks.n_points, -1))
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     path = check_path("path", path)
     chosen = format_to_write(path, format)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import check_kind
+from asterism.checks import check_kind
 from asterism.model import Capture
 from asterism.records import record
 

@@ -9,7 +9,6 @@ import numpy as np
 from asterism.model import Capture
 from asterism.plot.style import CLUTTER, CYCLE, MISSED, WRONG
 from asterism.reporting.page.lenses import SIDE, camera_header, lens_table
-from asterism.reporting.page.names import track_names
 from asterism.reporting.page.nearest import usual_distance
 from asterism.reporting.page.packing import grid_over, packed, residuals
 from asterism.reporting.page.runs import runs_of
@@ -105,7 +104,7 @@ def played(contents: Contents, order: NDArray[np.int64]) -> Played:
         "box": _box(points[labelled] if len(labelled) else points),
         "up": contents.up,
         "radius": min(_RADIUS, 0.25 * usual_distance(tracks)),
-        "names": track_names(tracks),
+        "names": tracks.display_names,
         "markers": [] if judged is None else list(judged.names),
         "frame": [_first_frame(full), stride],
         "opens": _opening_frame(d),

@@ -14,7 +14,6 @@ from asterism.reporting.page.data import Played, played
 from asterism.reporting.page.facts import cards, facts_of, in_words
 from asterism.reporting.page.findings import find_troubles
 from asterism.reporting.page.markup import Markup, element, joined
-from asterism.reporting.page.names import track_names
 from asterism.reporting.page.player import HELP, player
 from asterism.reporting.page.thinning import MOST_POINTS
 
@@ -147,7 +146,7 @@ def _list(findings: Sequence[Finding], contents: Contents, stride: int) -> Marku
         text = "Nothing stands out: no long gap, no strange step, no track begun midway"
         text += ", no doubtful label." if sure else "."
         return element("p", text, class_="quiet", id="findings-count")
-    names, times = track_names(contents.tracks), contents.tracks.detections.times
+    names, times = contents.tracks.display_names, contents.tracks.detections.times
     shown = [
         element(
             "li",

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.reporting.page.contents import Verdict
-from asterism.reporting.page.names import track_names
 from asterism.reporting.page.stretches import stretches
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ def _wrong(tracks: Tracks, judgement: Judgement) -> Iterator[Error]:
 
 def _switches(tracks: Tracks, judgement: Judgement) -> Iterator[Error]:
     """Markers that go on under another track, as `Evaluation.switches` counts them."""
-    names, frame = track_names(tracks), tracks.detections.frame_of
+    names, frame = tracks.display_names, tracks.detections.frame_of
     both = np.flatnonzero((tracks.labels >= 0) & (judgement.markers >= 0))
     both = both[np.argsort(judgement.markers[both], kind="stable")]
     before, after = both[:-1], both[1:]

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.reporting.page.errors import errors
-from asterism.reporting.page.names import track_names
 from asterism.reporting.page.runs import gaps_of
 from asterism.reporting.page.strange_steps import StrangeStep, strange_steps
 from asterism.reporting.page.stretches import stretches
@@ -122,7 +121,7 @@ def _ends(tracks: Tracks) -> Iterator[Finding]:
 
 
 def _steps(tracks: Tracks) -> Iterator[Finding]:
-    names, frame = track_names(tracks), tracks.detections.frame_of
+    names, frame = tracks.display_names, tracks.detections.frame_of
     jumps: dict[int, StrangeStep] = {}
     swaps: dict[tuple[int, int], list[StrangeStep]] = {}
     for step in strange_steps(tracks):

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_number
+from asterism.checks import check_number
+from asterism.errors import ParameterError
 from asterism.simulate.clock import clock
 from asterism.simulate.people.activities import Walker
 from asterism.simulate.people.course import Course

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import check_fields, check_number
+from asterism.checks import check_fields, check_number
 from asterism.simulate.clock import clock
 from asterism.simulate.people.activities import run, turn, walk
 from asterism.simulate.people.gait import Style

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_fields, check_kind
+from asterism.checks import check_fields, check_kind
+from asterism.errors import ParameterError
 from asterism.model import (
     DWNA,
     Detections,

@@ -1,5 +1,5 @@
 """Positions of occluded markers in the gaps of tracks, with their uncertainty."""
 
-from asterism.tracking.filling.gaps import Filling, Gap, fill_gaps
+from asterism.tracking.filling.gaps import FilledGap, Filling, fill_gaps
 
-__all__ = ["Filling", "Gap", "fill_gaps"]
+__all__ = ["FilledGap", "Filling", "fill_gaps"]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import check_kind, check_number
+from asterism.checks import check_kind, check_number
 from asterism.model import TrackingModel, Tracks
 from asterism.records import record
 from asterism.tracking.estimation import estimate_model
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 
     from asterism.tracking.filling.estimates import Estimates
 
-__all__ = ["ESTIMATORS", "Filling", "Gap", "fill_gaps"]
+__all__ = ["ESTIMATORS", "FilledGap", "Filling", "fill_gaps"]
 
 ESTIMATORS = ("smoother", "body", "pattern")
 
 
 @record
-class Gap:
+class FilledGap:
     """A gap of a track, and what was made of it.
 
     Parameters
@@ -96,12 +96,12 @@ class Filling:
     tracks : Tracks
         Over what was measured, unchanged, and what was filled: flagged in ``detections.filled``,
         with ``detections.stds``.
-    gaps : tuple of Gap
+    gaps : tuple of FilledGap
         Every gap, by track and time, those that were left too.
     """
 
     tracks: Tracks
-    gaps: tuple[Gap, ...]
+    gaps: tuple[FilledGap, ...]
 
     @property
     def n_filled(self) -> int:
@@ -183,7 +183,7 @@ def fill_gaps(
     if model is None and any(is_short):
         model = estimate_model(d).model
     take = None if model is None else Take(times=d.times, positions=positions, model=model)
-    gaps: list[Gap] = []
+    gaps: list[FilledGap] = []
     fills: list[tuple[Span, Fill]] = []
     for n, (span, length) in enumerate(zip(spans, seconds, strict=True), start=1):
         if take is None or length > longest:
@@ -197,7 +197,7 @@ def fill_gaps(
     return Filling(tracks=_with(tracks, fills), gaps=tuple(gaps))
 
 
-def _gap(span: Span, seconds: float, made: tuple[Estimates, Fill] | None, reason: str) -> Gap:
+def _gap(span: Span, seconds: float, made: tuple[Estimates, Fill] | None, reason: str) -> FilledGap:
     """Say what was made of a gap."""
     weights: dict[str, float] = {}
     rms: dict[str, float] = {}
@@ -206,7 +206,7 @@ def _gap(span: Span, seconds: float, made: tuple[Estimates, Fill] | None, reason
         weights = dict(zip(names, made[1].weights.tolist(), strict=True))
         if made[1].n_windows:
             rms = dict(zip(names, made[1].rms.tolist(), strict=True))
-    return Gap(
+    return FilledGap(
         track=span.track,
         first=span.first,
         last=span.last,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from asterism.errors import ParameterError, check_kind
+from asterism.checks import check_kind
+from asterism.errors import ParameterError
 from asterism.model import Detections, TrackingModel, Tracks
 from asterism.model.posterior import log_posterior
 from asterism.tracking.methods.base import Method

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, run
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_array, check_kind, check_number
+from asterism.checks import check_array, check_kind, check_number
+from asterism.errors import ParameterError
 from asterism.records import record
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError, SolverLimit, check_kind
+from asterism.checks import check_kind
+from asterism.errors import ParameterError, SolverLimit
 from asterism.model import TrackingModel
 from asterism.records import record
 from asterism.tracking.methods.base import (

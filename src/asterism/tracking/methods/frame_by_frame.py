@@ -13,7 +13,7 @@ import math
 from abc import abstractmethod
 from typing import TYPE_CHECKING
 
-from asterism.errors import check_number
+from asterism.checks import check_number
 from asterism.records import record
 from asterism.tracking.methods import engine_method
 from asterism.tracking.methods.engine_method import EngineMethod

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from asterism.errors import ParameterError, check_number
+from asterism.checks import check_number
+from asterism.errors import ParameterError
 from asterism.records import record
 from asterism.tracking.methods.with_bodies import WithBodies
 

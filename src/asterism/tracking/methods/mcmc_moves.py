@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from asterism.errors import ParameterError, check_fields, check_number
+from asterism.checks import check_fields, check_number
+from asterism.errors import ParameterError
 
 __all__ = ["MOVES", "WEIGHTS", "checked_weights"]
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_fields, check_kind, check_number
+from asterism.checks import check_fields, check_kind, check_number
+from asterism.errors import ParameterError
 from asterism.records import record
 from asterism.tracking.methods.engine_method import EngineMethod, EngineState
 from asterism.tracking.methods.mcmc_moves import MOVES, checked_weights

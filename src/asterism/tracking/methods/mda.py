@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from asterism.errors import check_fields, check_number
+from asterism.checks import check_fields, check_number
 from asterism.records import record
 from asterism.solve import assign_multidimensional
 from asterism.tracking.methods.over_window import Hypotheses, branch_options

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_number
+from asterism.checks import check_number
+from asterism.errors import ParameterError
 from asterism.records import record
 from asterism.tracking.methods.over_window import Hypotheses, branch_options
 

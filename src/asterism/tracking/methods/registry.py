@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-from asterism.errors import check_fields
+from asterism.checks import check_fields
 from asterism.records import Registry
 from asterism.tracking.methods.gnn import GNN
 from asterism.tracking.methods.jpda import JPDA

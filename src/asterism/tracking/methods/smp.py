@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_fields, check_number
+from asterism.checks import check_fields, check_number
+from asterism.errors import ParameterError
 from asterism.records import record
 from asterism.tracking.methods.over_window import branch_options, check_window
 from asterism.tracking.methods.with_bodies import WithBodies

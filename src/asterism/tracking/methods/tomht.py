@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from asterism.errors import check_number
+from asterism.checks import check_number
 from asterism.records import record
 from asterism.tracking.methods.over_window import Hypotheses, branch_options
 

@@ -2,7 +2,7 @@
 
 Which tracks keep their distances is learnt while they are seen. One that is hidden is expected
 where its neighbours carry it, and neighbours have a say in who takes which point. The loop is in
-the engine (tracks/carried_tracks.hpp, over several open frames trees/window_carrier.hpp); nothing of
+the engine (tracks/carried_tracks.hpp; over several open frames trees/window_carrier.hpp); none of
 it is there where `bodies` is off.
 """
 
@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from asterism.errors import ParameterError, check_number
+from asterism.checks import check_number
+from asterism.errors import ParameterError
 from asterism.records import record
 from asterism.tracking.methods.frame_by_frame import FrameByFrame
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.errors import ParameterError, check_kind
+from asterism.checks import check_kind
+from asterism.errors import ParameterError
 from asterism.model import Tracks
 from asterism.records import record
 from asterism.tracking.rigidity.bonds import BEND, MOST_FRAMES, Bonds

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError, check_kind, check_number, keep_array
+from asterism.checks import check_kind, check_number, keep_array
+from asterism.errors import FormatError, ParameterError
 from asterism.io.captures.marker_names import is_unlabelled
 from asterism.model import Tracks
 from asterism.model.toml_file import read_toml, write_toml

@@ -6,7 +6,7 @@ from dataclasses import field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from asterism import _engine
-from asterism.errors import check_kind, check_number
+from asterism.checks import check_kind, check_number
 from asterism.model import TrackingModel
 from asterism.model.compiled import motion_model, no_transition, transition
 from asterism.records import record

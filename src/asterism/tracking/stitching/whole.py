@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism import _engine
-from asterism.errors import check_kind, check_number
+from asterism.checks import check_kind, check_number
 from asterism.model import TrackingModel, Tracks
 from asterism.records import record
 from asterism.tracking.rigidity.bonds import Bonds, learn_bonds
