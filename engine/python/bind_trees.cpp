@@ -2,7 +2,9 @@
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/tuple.h>
 
+#include <limits>
 #include <map>
+#include <utility>
 
 #include "mht/reid_mht.hpp"
 #include "python/bindings.hpp"
@@ -110,7 +112,7 @@ void bind_trees(nb::module_& module) {
       .def(
           "__init__",
           [](TreeTracker<HypothesisForest>* self, const MotionModel& model, const ScoreModel& score,
-             const LifeOptions& life, BranchOptions branches, std::int64_t max_hypotheses,
+             LifeOptions life, BranchOptions branches, std::int64_t max_hypotheses,
              std::int64_t max_nodes, double new_track_claim, const CarryOptions& carry,
              nb::object choose) {
             require(max_hypotheses >= 1 && max_nodes >= 1, "limits: at least 1");
@@ -118,6 +120,9 @@ void bind_trees(nb::module_& module) {
             const double drop = std::max(branches.prune_drop, 25.0);
             make_joint(branches, score);
             branches.max_carried = carry.max_carried;
+            // A tentative track is judged by its branches, and not by what is decided of it.
+            const double delete_drop =
+                std::exchange(life.delete_drop, std::numeric_limits<double>::infinity());
             Packer packer;
             if (!choose.is_none())
               packer = [shared = std::make_shared<const PythonPacker>(std::move(choose))](
@@ -126,7 +131,7 @@ void bind_trees(nb::module_& module) {
                            FrameStats& stats) { return (*shared)(trees, first_resource, stats); };
             new (self) TreeTracker<HypothesisForest>(
                 HypothesisForest(model, score, life, branches, carry, new_track_claim,
-                                 {max_hypotheses, max_nodes, least_new_worth, drop,
+                                 {max_hypotheses, max_nodes, least_new_worth, delete_drop, drop,
                                   std::move(packer)}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,

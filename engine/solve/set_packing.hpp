@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace asterism {
@@ -56,11 +57,16 @@ class SetPacking {
   struct Losses {
     double bound = 0;
     std::vector<std::vector<double>> of;
+    std::vector<std::int32_t> best;  // option of each tree in the best packing that is known
   };
   Losses losses() {
     search(1, 0, kUnpriced);
-    if (bound() > known_.worth + kBetter) set_prices();
-    Losses out{bound(), {}};
+    if (bound() > known_.worth + kBetter) {
+      set_prices();
+      sort();
+      search(1, 0, kUnpriced);
+    }
+    Losses out{bound(), {}, known_.own};
     out.of.resize(n_trees());
     for (std::int32_t i = 0; i < n_trees(); ++i) {
       const double most = most_priced(i);
@@ -91,6 +97,7 @@ class SetPacking {
  private:
   static constexpr std::int64_t kUnpriced = 32;  // nodes before prices are worth their while
   static constexpr int kPriceRounds = 300;
+  static constexpr int kDives = 32;
   static constexpr double kBetter = 1e-9;
 
   struct Packing {
@@ -159,6 +166,7 @@ class SetPacking {
     heap_.clear();
     drop_ = drop;
     n_pushed_ = 0;
+    n_left_ = max_nodes + k;
     Node root;
     root.is_banned.assign(options_.size(), 0);
     root.chosen.assign(first_.begin(), first_.end() - 1);
@@ -168,6 +176,7 @@ class SetPacking {
       std::pop_heap(heap_.begin(), heap_.end());
       Node node = std::move(heap_.back());
       heap_.pop_back();
+      --n_left_;
       if (!packings_.empty() && node.bound < packings_.front().worth - drop) break;
       if (packings_.empty()) summary.bound = node.bound;
       if (node.is_packing) {
@@ -178,7 +187,7 @@ class SetPacking {
       if (++summary.n_nodes > max_nodes) {
         summary.is_exact = false;
         if (packings_.empty()) {
-          keep_if_better(repaired(node.chosen));
+          dive(std::move(node));
           packings_.push_back(known_);
         }
         break;
@@ -278,6 +287,39 @@ class SetPacking {
     node.number = n_pushed_++;
     heap_.push_back(std::move(node));
     std::push_heap(heap_.begin(), heap_.end());
+    if (static_cast<std::int64_t>(heap_.size()) / 2 > n_left_) forget_last();
+  }
+
+  // Packings where the search is cut short: from the best nodes that are left, by the best part of each
+  // node down to where nothing is contested, then repaired.
+  void dive(Node node) {
+    std::vector<Node> starts = std::exchange(heap_, {});
+    for (int n = 0; n < kDives; ++n) {
+      while (true) {
+        const std::int32_t contested = node.is_packing ? -1 : conflict(node);
+        if (contested < 0) break;
+        keep_if_better(repaired(node.chosen));
+        split_by_owner(node, contested);
+        if (heap_.empty()) break;
+        node = std::move(*std::max_element(heap_.begin(), heap_.end()));
+        heap_.clear();
+      }
+      keep_if_better(repaired(node.chosen));
+      if (starts.empty()) return;
+      std::pop_heap(starts.begin(), starts.end());
+      node = std::move(starts.back());
+      starts.pop_back();
+    }
+  }
+
+  // Drops the nodes that the search cannot reach any more, as it takes the best first and stops after
+  // `max_nodes` nodes and k packings.
+  void forget_last() {
+    const auto end = heap_.begin() + static_cast<std::ptrdiff_t>(n_left_);
+    std::nth_element(heap_.begin(), end, heap_.end(),
+                     [](const Node& a, const Node& b) { return b < a; });
+    heap_.erase(end, heap_.end());
+    std::make_heap(heap_.begin(), heap_.end());
   }
 
   // Bans an option; false where its tree has none left.
@@ -398,6 +440,7 @@ class SetPacking {
   std::vector<char> is_used_;
   double drop_ = 0;  // of the search
   std::int64_t n_pushed_ = 0;
+  std::int64_t n_left_ = 0;  // nodes that may still be taken
 };
 
 }  // namespace asterism

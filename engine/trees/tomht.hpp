@@ -27,6 +27,7 @@ struct HypothesisOptions {
   std::int64_t max_hypotheses = 1;  // of a cluster, for the probabilities
   std::int64_t max_nodes = 1;       // of the search for them
   double least_new_worth = 0;       // a branch of a new tree that is worth less is no option
+  double delete_drop = 0;           // a tentative track ends when no branch is less far below its best
   double drop = 0;                  // a hypothesis so many nats below the best does not count
   Packer packer;                    // who chooses in place of the search below, where there is one
 };
@@ -109,6 +110,8 @@ class HypothesisForest {
       for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
         const Branch& b = track.more.branches[k];
         if (is_seed && (b.n_taken < 2 || grower.worth(b) < opt_.least_new_worth)) continue;
+        if (!is_seed && !track.is_confirmed() && track.best_score - b.score > opt_.delete_drop)
+          continue;
         PackingOption option{grower.worth(b), {}};
         for (std::size_t f = 0; f < open_.frames.size(); ++f) {
           const std::int64_t number = open_.frames[f]->number;
@@ -163,11 +166,11 @@ class HypothesisForest {
   }
   void limit(const std::vector<std::int32_t>& cluster, FrameStats& stats) {
     s_.ranked.clear();
-    rank(cluster);
+    const std::int64_t n_tracks = rank(cluster);
     std::ranges::stable_sort(s_.ranked, {}, &Ranked::loss);
     const auto probable = std::ranges::upper_bound(s_.ranked, open_.branches.prune_drop, {}, &Ranked::loss);
     const std::ptrdiff_t n_probable = probable - s_.ranked.begin();
-    const auto n_most = static_cast<std::ptrdiff_t>(open_.branches.max_branches * cluster.size());
+    const auto n_most = static_cast<std::ptrdiff_t>(cluster.size()) + open_.branches.max_branches * n_tracks;
     stats.n_limited += std::max<std::ptrdiff_t>(n_probable - n_most, 0);
     s_.ranked.resize(std::min(n_probable, n_most));
     std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::pair(r.tree, r.branch); });
@@ -179,11 +182,13 @@ class HypothesisForest {
       branches(i) = std::move(kept);
     }
   }
-  void rank(const std::vector<std::int32_t>& cluster) {
+  // Returns how many tracks the best hypothesis has, at least one.
+  std::int64_t rank(const std::vector<std::int32_t>& cluster) {
     const BranchGrower grower(open_.live, open_.branches);
     std::vector<std::vector<PackingOption>> options;
     for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
-    const std::vector<std::vector<double>> losses = SetPacking(options).losses().of;
+    const SetPacking::Losses losses = SetPacking(options).losses();
+    std::int64_t n_tracks = 0;
     for (std::size_t c = 0; c < cluster.size(); ++c) {
       const std::size_t first = s_.ranked.size();
       // What is no option yet, such as the beginning of a track, is compared with no track.
@@ -194,12 +199,14 @@ class HypothesisForest {
       }
       const TreeOptions& tree = s_.trees[cluster[c]];
       for (std::size_t o = 0; o < tree.choices.size(); ++o)
-        if (tree.choices[o].branch >= 0) s_.ranked[first + tree.choices[o].branch].loss = losses[c][o];
+        if (tree.choices[o].branch >= 0) s_.ranked[first + tree.choices[o].branch].loss = losses.of[c][o];
       // A tree keeps one branch at least.
       std::min_element(s_.ranked.begin() + static_cast<std::ptrdiff_t>(first), s_.ranked.end(),
                        [](const Ranked& x, const Ranked& y) { return x.loss < y.loss; })
           ->loss = 0;
+      n_tracks += tree.choices[losses.best[c]].branch != kNothing;
     }
+    return std::max<std::int64_t>(n_tracks, 1);
   }
   std::vector<Branch>& branches(std::size_t tree) { return open_.tree(tree).more.branches; }
 

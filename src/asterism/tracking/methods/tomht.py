@@ -31,9 +31,10 @@ class TOMHT(Hypotheses):
     window : int
         Frames until one is decided, 2 to 16.
     max_branches : int
-        Branches of a cluster, for each of its trees: the bound of memory and time. Branches are
-        kept in the order of what the best hypothesis of the whole cluster loses with them;
-        ``info["dropped_branches"]`` counts those that found no room.
+        Branches of a cluster, for each track of its best hypothesis; every tree keeps one besides.
+        This bounds memory and time. Branches are kept in the order of what the best hypothesis of
+        the whole cluster loses with them; ``info["dropped_branches"]`` counts the branches beyond
+        the limit.
     prune_odds : float
         Odds by which a branch may be worse. A branch is dropped when the best hypothesis of its
         cluster that holds it is less probable than the best of all by more than these odds times
@@ -68,7 +69,7 @@ class TOMHT(Hypotheses):
     (8, 0.0)
     """
 
-    max_branches: int = 30
+    max_branches: int = 100
     max_hypotheses: int = 20
     max_nodes: int = 2000
 
