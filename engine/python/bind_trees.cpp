@@ -117,7 +117,7 @@ void bind_trees(nb::module_& module) {
              nb::object choose) {
             require(max_hypotheses >= 1 && max_nodes >= 1, "limits: at least 1");
             const double least_new_worth = -branches.prune_drop;
-            const double drop = std::max(branches.prune_drop, 25.0);
+            const double drop = std::max(branches.prune_drop, 25.0), ambiguous_drop = branches.prune_drop;
             make_joint(branches, score);
             branches.max_carried = carry.max_carried;
             // A tentative track is judged by its branches, and not by what is decided of it.
@@ -132,7 +132,7 @@ void bind_trees(nb::module_& module) {
             new (self) TreeTracker<HypothesisForest>(
                 HypothesisForest(model, score, life, branches, carry, new_track_claim,
                                  {max_hypotheses, max_nodes, least_new_worth, delete_drop, drop,
-                                  std::move(packer)}));
+                                  ambiguous_drop, std::move(packer)}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
           "max_nodes"_a, "new_track_claim"_a, "carry"_a, "choose"_a = nb::none());

@@ -51,28 +51,39 @@ class SetPacking {
     sort();
   }
 
-  // What an option loses, by tree and option, at the prices that bring the bound down: no packing is
-  // worth more than the bound less the loss of each of its options. The options of the best packing
-  // that is known lose nothing.
+  // What is lost with an option, by tree and option: no packing that holds it is worth more than the
+  // bound less that. The options of the best packing that is known lose nothing.
   struct Losses {
     double bound = 0;
     std::vector<std::vector<double>> of;
     std::vector<std::int32_t> best;  // option of each tree in the best packing that is known
   };
   Losses losses() {
-    search(1, 0, kUnpriced);
+    const bool is_best = search(1, 0, kUnpriced).is_exact;
     if (bound() > known_.worth + kBetter) {
-      set_prices();
-      sort();
-      search(1, 0, kUnpriced);
+      set_prices(is_best);
+      if (!is_best) {
+        sort();
+        search(1, 0, kUnpriced);
+      }
     }
+    std::vector<double> loss(options_.size());
+    std::vector<std::int32_t> best(n_trees());
+    for (std::int32_t i = 0; i < n_trees(); ++i) {
+      const double most = most_priced(i);
+      for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
+        loss[o] = most - priced_[o];
+        if (number_[o] == known_.own[i]) best[i] = o;
+      }
+      loss[best[i]] = 0;
+    }
+    const std::vector<double> others = lost_by_others(loss, best);
     Losses out{bound(), {}, known_.own};
     out.of.resize(n_trees());
     for (std::int32_t i = 0; i < n_trees(); ++i) {
-      const double most = most_priced(i);
       out.of[i].resize(first_[i + 1] - first_[i]);
-      for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) out.of[i][number_[o]] = most - priced_[o];
-      out.of[i][known_.own[i]] = 0;
+      for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o)
+        out.of[i][number_[o]] = loss[o] + others[o];
     }
     return out;
   }
@@ -83,7 +94,7 @@ class SetPacking {
   PackingSummary solve(std::int64_t k, double drop, std::int64_t max_nodes, Found&& found) {
     PackingSummary summary = search(k, drop, std::min(max_nodes, kUnpriced));
     if (!summary.is_exact && max_nodes > kUnpriced) {
-      set_prices();
+      set_prices(false);
       sort();
       const std::int64_t n_before = summary.n_nodes;
       summary = search(k, drop, max_nodes - n_before);
@@ -99,6 +110,7 @@ class SetPacking {
   static constexpr int kPriceRounds = 300;
   static constexpr int kDives = 32;
   static constexpr double kBetter = 1e-9;
+  static constexpr double kClosed = 1e-3;  // a gap that is worth no more rounds
 
   struct Packing {
     std::vector<std::int32_t> own;  // option of each tree, as the caller numbers them
@@ -119,6 +131,43 @@ class SetPacking {
 
   double most_priced(std::int32_t tree) const {
     return *std::max_element(priced_.begin() + first_[tree], priced_.begin() + first_[tree + 1]);
+  }
+  // What the other trees lose at the prices where one has an option: those that have to give up its
+  // resources, or, if that is more, a resource that the tree gives up itself, whoever takes it then.
+  std::vector<double> lost_by_others(const std::vector<double>& loss,
+                                     const std::vector<std::int32_t>& best) const {
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    std::vector<std::int32_t> owner(price_.size(), -1);
+    std::vector<double> without(price_.size(), 0), taken(price_);  // by resource, of its owner; of others
+    for (std::int32_t i = 0; i < n_trees(); ++i)
+      for (const std::int32_t r : options_[best[i]]->uses) {
+        owner[r] = i;
+        without[r] = kNever;
+        for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o)
+          if (loss[o] < without[r] && !uses(o, r)) without[r] = loss[o];
+      }
+    for (std::int32_t o = 0; o < first_.back(); ++o)
+      for (const std::int32_t r : options_[o]->uses)
+        if (owner[r] != tree_of_[o]) taken[r] = std::min(taken[r], loss[o]);
+    std::vector<double> out(options_.size(), 0);
+    std::vector<std::pair<std::int32_t, double>> losers;
+    for (std::int32_t o = 0; o < first_.back(); ++o) {
+      losers.clear();
+      for (const std::int32_t r : options_[o]->uses) {
+        if (owner[r] < 0 || owner[r] == tree_of_[o]) continue;
+        const auto at = std::ranges::find(losers, owner[r], &std::pair<std::int32_t, double>::first);
+        if (at == losers.end())
+          losers.emplace_back(owner[r], without[r]);
+        else
+          at->second = std::max(at->second, without[r]);
+      }
+      double given_up = 0;
+      for (const auto& [tree, least] : losers) given_up += least;
+      for (const std::int32_t r : options_[best[tree_of_[o]]]->uses)
+        if (taken[r] > out[o] && !uses(o, r)) out[o] = taken[r];
+      out[o] = std::max(out[o], given_up);
+    }
+    return out;
   }
   // What no packing is worth more than, at the prices.
   double bound() const {
@@ -208,8 +257,8 @@ class SetPacking {
   // Lowers the bound by a descent on the prices: a resource that several options use becomes dearer,
   // one that none uses cheaper. The direction is a deflected subgradient (Camerini, Fratta & Maffioli
   // 1975), the length of a step follows the best known packing (Polyak 1969). The options chosen in a
-  // round are repaired into a packing, which may become the best known one.
-  void set_prices() {
+  // round are repaired into a packing, which may become the best known one unless that is the best.
+  void set_prices(bool is_best) {
     double least = std::numeric_limits<double>::infinity(), step = 1;
     std::vector<double> price(price_.size(), 0), used(price_.size()), way(price_.size(), 0);
     std::vector<std::int32_t> chosen(n_trees());
@@ -240,8 +289,8 @@ class SetPacking {
         std::fill(way.begin(), way.end(), 0);
         continue;
       }
-      keep_if_better(repaired(chosen));
-      if (!(least > known_.worth + kBetter)) break;
+      if (!is_best) keep_if_better(repaired(chosen));
+      if (!(least > known_.worth + kClosed)) break;
       double along = 0, own = 0;
       for (std::size_t r = 0; r < price.size(); ++r) {
         if (used[r] < 1 && price[r] <= 0) used[r] = 1;  // an unused resource is free already

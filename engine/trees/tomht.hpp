@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -29,6 +30,7 @@ struct HypothesisOptions {
   double least_new_worth = 0;       // a branch of a new tree that is worth less is no option
   double delete_drop = 0;           // a tentative track ends when no branch is less far below its best
   double drop = 0;                  // a hypothesis so many nats below the best does not count
+  double ambiguous_drop = 0;        // an option that loses more is enumerated with no other
   Packer packer;                    // who chooses in place of the search below, where there is one
 };
 
@@ -38,7 +40,7 @@ class HypothesisForest {
                    const BranchOptions& branches, const CarryOptions& carry, double new_track_claim,
                    const HypothesisOptions& options)
       : open_{{{model, score, life}, branches, {}, {model, score, life, carry}}, new_track_claim, {}},
-        opt_(options) {}
+        opt_(options) { if (const char* e = std::getenv("TH_T")) opt_.ambiguous_drop = std::atof(e); }
 
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
@@ -57,7 +59,10 @@ class HypothesisForest {
 
   template <typename Label>
   void decide_all(FrameStats& stats, Label&& label) {
-    while (open_.n_open() > 0) decide(stats, label);
+    while (open_.n_open() > 0) {
+      limit(stats);
+      decide(stats, label);
+    }
   }
 
   bool has_confidence() const { return !opt_.packer; }
@@ -69,6 +74,7 @@ class HypothesisForest {
   struct Choice {
     std::int32_t branch = kNothing;
     std::int32_t column = -1;  // its detection in the frame that is decided
+    double loss = 0;           // at least, of the best hypothesis of the cluster with this choice
   };
   static constexpr std::int32_t kNothing = -1;  // there is no such marker
   static constexpr std::int32_t kLost = -2;     // missed in all open frames, and no branch says so
@@ -81,11 +87,13 @@ class HypothesisForest {
   struct TreeOptions {
     std::vector<PackingOption> options;
     std::vector<Choice> choices;
+    std::vector<Choice> improbable;  // are no options any more
   };
 
+  // Of the options that `limit` left and weighed.
   template <typename Label>
   void decide(FrameStats& stats, Label&& label) {
-    list_options();
+    leave_out_improbable();
     choose(stats);
     open_.carry_out(s_.fates, s_.free, stats, label);
   }
@@ -123,16 +131,16 @@ class HypothesisForest {
                                         ? -1
                                         : b.taken(open_.frames.front()->number);
         tree.options.push_back(std::move(option));
-        tree.choices.push_back({static_cast<std::int32_t>(k), column});
+        tree.choices.push_back({static_cast<std::int32_t>(k), column, 0});
       }
       if (!track.is_confirmed()) {
         tree.options.push_back({0, {}});
-        tree.choices.push_back({kNothing, -1});
+        tree.choices.push_back({kNothing, -1, 0});
       } else if (!has_free) {
         const double lost = track.score - open_.live.misses_gain(0, track.untold()) +
                             open_.branches.log_end[track.untold() + open_.n_open()];
         tree.options.push_back({lost, {}});
-        tree.choices.push_back({kLost, -1});
+        tree.choices.push_back({kLost, -1, 0});
       }
     }
   }
@@ -165,54 +173,117 @@ class HypothesisForest {
       stats.most_branches = std::max<std::int64_t>(stats.most_branches, branches(i).size());
   }
   void limit(const std::vector<std::int32_t>& cluster, FrameStats& stats) {
-    s_.ranked.clear();
-    const std::int64_t n_tracks = rank(cluster);
+    const std::int64_t n_tracks = weigh(cluster);
+    rank(cluster);
     std::ranges::stable_sort(s_.ranked, {}, &Ranked::loss);
     const auto probable = std::ranges::upper_bound(s_.ranked, open_.branches.prune_drop, {}, &Ranked::loss);
     const std::ptrdiff_t n_probable = probable - s_.ranked.begin();
     const auto n_most = static_cast<std::ptrdiff_t>(cluster.size()) + open_.branches.max_branches * n_tracks;
     stats.n_limited += std::max<std::ptrdiff_t>(n_probable - n_most, 0);
+    if (std::min(n_probable, n_most) == std::ssize(s_.ranked)) return;
     s_.ranked.resize(std::min(n_probable, n_most));
     std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::pair(r.tree, r.branch); });
     auto next = s_.ranked.begin();
     for (const std::int32_t i : cluster) {
-      std::vector<Branch> kept;
-      for (; next != s_.ranked.end() && next->tree == i; ++next)
-        kept.push_back(std::move(branches(i)[next->branch]));
-      branches(i) = std::move(kept);
+      std::vector<std::int32_t> now(branches(i).size(), kNothing);  // number of a branch that is kept
+      std::int32_t n_kept = 0;
+      for (; next != s_.ranked.end() && next->tree == i; ++next) {
+        now[next->branch] = n_kept;
+        if (next->branch != n_kept) branches(i)[n_kept] = std::move(branches(i)[next->branch]);
+        ++n_kept;
+      }
+      branches(i).resize(n_kept);
+      keep_options(s_.trees[i], [&](const PackingOption& option, Choice& choice) {
+        if (choice.branch < 0) return true;
+        const bool is_kept = now[choice.branch] != kNothing;
+        choice.branch = is_kept ? now[choice.branch] : kLost;
+        return is_kept || option.uses.empty();
+      });
     }
   }
-  // Returns how many tracks the best hypothesis has, at least one.
-  std::int64_t rank(const std::vector<std::int32_t>& cluster) {
-    const BranchGrower grower(open_.live, open_.branches);
+  template <typename Keep>
+  static void keep_options(TreeOptions& tree, Keep&& keep) {
+    std::size_t n = 0;
+    for (std::size_t o = 0; o < tree.choices.size(); ++o) {
+      if (!keep(tree.options[o], tree.choices[o])) {
+        tree.improbable.push_back(tree.choices[o]);
+        continue;
+      }
+      if (n != o) {
+        tree.choices[n] = tree.choices[o];
+        tree.options[n] = std::move(tree.options[o]);
+      }
+      ++n;
+    }
+    tree.choices.resize(n);
+    tree.options.resize(n);
+  }
+  // What every option of a cluster loses. Returns how many tracks the best hypothesis has, at least one.
+  std::int64_t weigh(const std::vector<std::int32_t>& cluster) {
     std::vector<std::vector<PackingOption>> options;
     for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
     const SetPacking::Losses losses = SetPacking(options).losses();
     std::int64_t n_tracks = 0;
     for (std::size_t c = 0; c < cluster.size(); ++c) {
+      TreeOptions& tree = s_.trees[cluster[c]];
+      tree.options = std::move(options[c]);
+      for (std::size_t o = 0; o < tree.choices.size(); ++o) tree.choices[o].loss = losses.of[c][o];
+      n_tracks += tree.choices[losses.best[c]].branch != kNothing;
+    }
+    return std::max<std::int64_t>(n_tracks, 1);
+  }
+  // The branches of a cluster with what each loses.
+  void rank(const std::vector<std::int32_t>& cluster) {
+    const BranchGrower grower(open_.live, open_.branches);
+    s_.ranked.clear();
+    for (const std::int32_t i : cluster) {
       const std::size_t first = s_.ranked.size();
       // What is no option yet, such as the beginning of a track, is compared with no track.
-      for (std::size_t b = 0; b < branches(cluster[c]).size(); ++b) {
-        const Branch& branch = branches(cluster[c])[b];
+      for (std::size_t b = 0; b < branches(i).size(); ++b) {
+        const Branch& branch = branches(i)[b];
         const double loss = branch.n_taken < 2 ? 0 : std::max(-grower.worth(branch), 0.0);
-        s_.ranked.push_back({loss, cluster[c], static_cast<std::int32_t>(b)});
+        s_.ranked.push_back({loss, i, static_cast<std::int32_t>(b)});
       }
-      const TreeOptions& tree = s_.trees[cluster[c]];
-      for (std::size_t o = 0; o < tree.choices.size(); ++o)
-        if (tree.choices[o].branch >= 0) s_.ranked[first + tree.choices[o].branch].loss = losses.of[c][o];
+      for (const Choice& choice : s_.trees[i].choices)
+        if (choice.branch >= 0) s_.ranked[first + choice.branch].loss = choice.loss;
       // A tree keeps one branch at least.
       std::min_element(s_.ranked.begin() + static_cast<std::ptrdiff_t>(first), s_.ranked.end(),
                        [](const Ranked& x, const Ranked& y) { return x.loss < y.loss; })
           ->loss = 0;
-      n_tracks += tree.choices[losses.best[c]].branch != kNothing;
     }
-    return std::max<std::int64_t>(n_tracks, 1);
+  }
+
+  // Many ambiguities are independent, and the few best hypotheses of all trees hold little of their
+  // probability. So the trees stand apart again that only improbable options join: those that lose much,
+  // and those that use what a tree with one probable option has.
+  void leave_out_improbable() {
+    std::vector<char> is_owned(s_.n_resources, 0), is_sure(s_.trees.size(), 0);
+    for (bool is_new = true; is_new;) {
+      is_new = false;
+      for (std::size_t i = 0; i < s_.trees.size(); ++i) {
+        if (is_sure[i]) continue;
+        TreeOptions& tree = s_.trees[i];
+        std::int64_t n_probable = 0;
+        keep_options(tree, [&](const PackingOption& option, const Choice& choice) {
+          const bool is_probable =
+              choice.loss <= opt_.ambiguous_drop &&
+              std::ranges::none_of(option.uses, [&](std::int32_t r) { return is_owned[r]; });
+          n_probable += is_probable;
+          return is_probable || option.uses.empty();
+        });
+        if (n_probable > 1) continue;
+        is_sure[i] = is_new = true;
+        keep_options(tree, [&](const PackingOption&, const Choice& choice) { return choice.loss <= 0; });
+        for (const std::int32_t r : tree.options.front().uses) is_owned[r] = 1;
+      }
+    }
   }
   std::vector<Branch>& branches(std::size_t tree) { return open_.tree(tree).more.branches; }
 
   // The best hypothesis of every cluster of trees, and the probabilities over its best ones.
   void choose(FrameStats& stats) {
     s_.free.assign(open_.frames.front()->points.size(), 1);
+    s_.taken.assign(open_.frames.front()->points.size(), 0);
     std::vector<std::int32_t> entangled;
     for (const std::vector<std::int32_t>& cluster : clusters()) {
       if (opt_.packer && cluster.size() > 1)
@@ -221,6 +292,7 @@ class HypothesisForest {
         choose_in(cluster, stats);
     }
     if (!entangled.empty()) choose_by_packer(entangled, stats);
+    if (!std::getenv("TH_N")) for (std::size_t j = 0; j < s_.free.size(); ++j) s_.free[j] /= 1 + s_.taken[j];
   }
 
   void mark(std::int32_t i, const Choice& best) {
@@ -275,7 +347,15 @@ class HypothesisForest {
         if (choice.column == best.column) own += p;
         if (choice.column >= 0) s_.free[choice.column] -= p;
       }
-      s_.fates[cluster[c]] = {best.branch != kNothing, best.column, std::min(own, 1.0)};
+      double left_out = 0;
+      for (const Choice& choice : tree.improbable) {
+        if ((choice.branch == kNothing) != (best.branch == kNothing) || choice.column != best.column)
+          left_out += std::exp(-choice.loss);
+        if (choice.branch != kNothing && choice.column >= 0)
+          s_.taken[choice.column] += std::exp(-choice.loss);
+      }
+      if (std::getenv("TH_N")) left_out = 0;
+      s_.fates[cluster[c]] = {best.branch != kNothing, best.column, std::min(own, 1.0) / (1 + left_out)};
     }
   }
 
@@ -286,7 +366,7 @@ class HypothesisForest {
     std::vector<Fate> fates;
     std::vector<std::int32_t> first_resource;
     std::int32_t n_resources = 0;
-    std::vector<double> free;
+    std::vector<double> free, taken;
   };
 
   HypothesisWindow open_;
