@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -30,7 +29,7 @@ struct HypothesisOptions {
   double least_new_worth = 0;       // a branch of a new tree that is worth less is no option
   double delete_drop = 0;           // a tentative track ends when no branch is less far below its best
   double drop = 0;                  // a hypothesis so many nats below the best does not count
-  double ambiguous_drop = 0;        // an option that loses more is enumerated with no other
+  double ambiguous_drop = 0;        // an option that loses more counts by its loss alone
   Packer packer;                    // who chooses in place of the search below, where there is one
 };
 
@@ -40,7 +39,7 @@ class HypothesisForest {
                    const BranchOptions& branches, const CarryOptions& carry, double new_track_claim,
                    const HypothesisOptions& options)
       : open_{{{model, score, life}, branches, {}, {model, score, life, carry}}, new_track_claim, {}},
-        opt_(options) { if (const char* e = std::getenv("TH_T")) opt_.ambiguous_drop = std::atof(e); }
+        opt_(options) {}
 
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
@@ -87,7 +86,7 @@ class HypothesisForest {
   struct TreeOptions {
     std::vector<PackingOption> options;
     std::vector<Choice> choices;
-    std::vector<Choice> improbable;  // are no options any more
+    std::vector<Choice> improbable;  // no options any more
   };
 
   // Of the options that `limit` left and weighed.
@@ -173,6 +172,7 @@ class HypothesisForest {
       stats.most_branches = std::max<std::int64_t>(stats.most_branches, branches(i).size());
   }
   void limit(const std::vector<std::int32_t>& cluster, FrameStats& stats) {
+    stats.largest_group = std::max<std::int64_t>(stats.largest_group, cluster.size());
     const std::int64_t n_tracks = weigh(cluster);
     rank(cluster);
     std::ranges::stable_sort(s_.ranked, {}, &Ranked::loss);
@@ -292,7 +292,7 @@ class HypothesisForest {
         choose_in(cluster, stats);
     }
     if (!entangled.empty()) choose_by_packer(entangled, stats);
-    if (!std::getenv("TH_N")) for (std::size_t j = 0; j < s_.free.size(); ++j) s_.free[j] /= 1 + s_.taken[j];
+    for (std::size_t j = 0; j < s_.free.size(); ++j) s_.free[j] /= 1 + s_.taken[j];
   }
 
   void mark(std::int32_t i, const Choice& best) {
@@ -306,7 +306,6 @@ class HypothesisForest {
     for (const std::int32_t i : entangled) options.push_back(std::move(s_.trees[i].options));
     const std::vector<std::int32_t> own = opt_.packer(options, s_.first_resource, stats);
     ++stats.n_groups;
-    stats.largest_group = std::max<std::int64_t>(stats.largest_group, entangled.size());
     for (std::size_t c = 0; c < entangled.size(); ++c) {
       const Choice& best = s_.trees[entangled[c]].choices[own[c]];
       mark(entangled[c], best);
@@ -326,7 +325,6 @@ class HypothesisForest {
           totals.push_back(worth);
         });
     ++stats.n_groups;
-    stats.largest_group = std::max<std::int64_t>(stats.largest_group, cluster.size());
     stats.n_hypotheses = std::max<std::int64_t>(stats.n_hypotheses, totals.size());
     stats.n_nodes += summary.n_nodes;
     if (!summary.is_exact && totals.size() == 1) {
@@ -347,6 +345,7 @@ class HypothesisForest {
         if (choice.column == best.column) own += p;
         if (choice.column >= 0) s_.free[choice.column] -= p;
       }
+      // What no hypothesis holds is as probable as the best hypothesis that may hold it.
       double left_out = 0;
       for (const Choice& choice : tree.improbable) {
         if ((choice.branch == kNothing) != (best.branch == kNothing) || choice.column != best.column)
@@ -354,7 +353,6 @@ class HypothesisForest {
         if (choice.branch != kNothing && choice.column >= 0)
           s_.taken[choice.column] += std::exp(-choice.loss);
       }
-      if (std::getenv("TH_N")) left_out = 0;
       s_.fates[cluster[c]] = {best.branch != kNothing, best.column, std::min(own, 1.0) / (1 + left_out)};
     }
   }

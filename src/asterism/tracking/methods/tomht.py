@@ -24,7 +24,11 @@ class TOMHT(Hypotheses):
     share detections the best one is found by exact set packing, and the oldest frame is decided by
     it (N-scan pruning). Until then labels are what would be decided now, and may change.
 
-    The confidence of a label is its probability over the best hypotheses of its cluster.
+    The confidence of a label is its probability. Options of a tree that the best hypothesis of its
+    cluster takes at odds worse than `prune_odds` count by a bound on that hypothesis alone. The
+    trees that the other options join are enumerated: `max_hypotheses` hypotheses of each such set,
+    so that independent ambiguities multiply. The confidence is exact where no option is left out
+    and no set has more hypotheses; elsewhere it is an approximation.
 
     Parameters
     ----------
@@ -40,8 +44,8 @@ class TOMHT(Hypotheses):
         cluster that holds it is less probable than the best of all by more than these odds times
         the odds of ending the track and beginning another.
     max_hypotheses : int
-        Most hypotheses of a cluster, for the confidence; of the best only those count that are not
-        e^25 times less likely.
+        Most hypotheses of a set of trees that probable options join, for the confidence; of these
+        only those count that are not e^25 times less likely than the best.
     max_nodes : int
         Most nodes of the search in a cluster; where it is cut short, a compatible set is made of
         what was found, and ``info`` says by how many nats it may be below the best.
