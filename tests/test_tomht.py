@@ -98,7 +98,7 @@ def test_confidence_is_calibrated_where_the_model_is_right():
 
 
 def crossing_pairs(only: int | None = None):
-    """Twelve pairs of targets that cross, and between neighbours a false alarm that both may have."""
+    """Twelve pairs of targets that cross; between neighbours a false alarm that both may have."""
     rng = np.random.default_rng(0)
     noise, speed = rng.normal(size=(12, 2, 9, 2)), rng.uniform(0.5, 1.5, 12)
     frames = []

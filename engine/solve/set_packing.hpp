@@ -72,7 +72,7 @@ class SetPacking {
     for (std::int32_t i = 0; i < n_trees(); ++i) {
       const double most = most_priced(i);
       for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
-        loss[o] = most - priced_[o];
+        loss[o] = std::max(0.0, most - priced_[o]);  // 0 where both are infinite
         if (number_[o] == known_.own[i]) best[i] = o;
       }
       loss[best[i]] = 0;

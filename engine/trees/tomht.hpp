@@ -74,7 +74,9 @@ class HypothesisForest {
     std::int32_t branch = kNothing;
     std::int32_t column = -1;  // its detection in the frame that is decided
     double loss = 0;           // at least, of the best hypothesis of the cluster with this choice
+                               // (kBest: the best of all has it)
   };
+  static constexpr double kBest = -1;  // before what loses nothing either
   static constexpr std::int32_t kNothing = -1;  // there is no such marker
   static constexpr std::int32_t kLost = -2;     // missed in all open frames, and no branch says so
 
@@ -228,7 +230,9 @@ class HypothesisForest {
       TreeOptions& tree = s_.trees[cluster[c]];
       tree.options = std::move(options[c]);
       for (std::size_t o = 0; o < tree.choices.size(); ++o) tree.choices[o].loss = losses.of[c][o];
-      n_tracks += tree.choices[losses.best[c]].branch != kNothing;
+      Choice& best = tree.choices[losses.best[c]];
+      best.loss = kBest;
+      n_tracks += best.branch != kNothing;
     }
     return std::max<std::int64_t>(n_tracks, 1);
   }
@@ -241,7 +245,7 @@ class HypothesisForest {
       // What is no option yet, such as the beginning of a track, is compared with no track.
       for (std::size_t b = 0; b < branches(i).size(); ++b) {
         const Branch& branch = branches(i)[b];
-        const double loss = branch.n_taken < 2 ? 0 : std::max(-grower.worth(branch), 0.0);
+        const double loss = branch.n_taken < 2 ? 0 : std::max(0.0, -grower.worth(branch));
         s_.ranked.push_back({loss, i, static_cast<std::int32_t>(b)});
       }
       for (const Choice& choice : s_.trees[i].choices)
@@ -249,7 +253,7 @@ class HypothesisForest {
       // A tree keeps one branch at least.
       std::min_element(s_.ranked.begin() + static_cast<std::ptrdiff_t>(first), s_.ranked.end(),
                        [](const Ranked& x, const Ranked& y) { return x.loss < y.loss; })
-          ->loss = 0;
+          ->loss = kBest;
     }
   }
 
@@ -273,7 +277,7 @@ class HypothesisForest {
         });
         if (n_probable > 1) continue;
         is_sure[i] = is_new = true;
-        keep_options(tree, [&](const PackingOption&, const Choice& choice) { return choice.loss <= 0; });
+        keep_options(tree, [&](const PackingOption&, const Choice& choice) { return choice.loss == kBest; });
         for (const std::int32_t r : tree.options.front().uses) is_owned[r] = 1;
       }
     }

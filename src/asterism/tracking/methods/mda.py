@@ -36,8 +36,8 @@ class MDA(Hypotheses):
         By HiGHS, or by Lagrangian relaxation; ``info["gap"]`` says by how many nats the choice of
         a window may be below the best.
     max_branches : int
-        Tuples of a group of tracks that compete, for each track of the best choice; every track, and
-        every detection that may begin one, keeps one besides. They are kept in the order of what
+        Tuples of a group of tracks that compete, for each track of the best choice; every track and
+        every detection that may begin one keeps one besides. They are kept in the order of what
         the best choice of the whole group loses with them.
     prune_odds : float
         Odds by which a tuple may be worse. A tuple is left out when the best choice that holds it
