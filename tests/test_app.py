@@ -157,8 +157,8 @@ def test_a_run_is_only_repeated_with_its_input(scene, capsys):
     assert "Say where it is now" in refused("track --from first/run.toml", capsys)
     run("track moved.csv --from first/run.toml -o again.csv", capsys)
     assert (scene / "again.csv").read_bytes() == (scene / "first/in.tracked.csv").read_bytes()
-    with (scene / "moved.csv").open("a") as file:
-        file.write("\n")
+    text = (scene / "moved.csv").read_text()
+    (scene / "moved.csv").write_text(text[: text.rstrip().rindex("\n") + 1])  # a point less
     assert "SHA-256" in refused("track moved.csv --from first/run.toml", capsys)
     assert "--method" in refused("track moved.csv --from first/run.toml --method gnn", capsys)
     assert "--seed" in refused("track moved.csv --from first/run.toml --seed 0", capsys)
@@ -532,9 +532,9 @@ def test_a_model_that_fits_nothing_is_told_of(scene, capsys):
     sharp = dataclasses.replace(model.sensor, noise_sigma=1e-9)
     dataclasses.replace(model, population=slow, sensor=sharp).to_toml("other.toml")
     assert main(["track", "in.csv", "-o", "out.csv", "--model", "other.toml"]) == 0
-    assert "no track was believed" in capsys.readouterr().err
+    assert "no track was confirmed" in capsys.readouterr().err
     assert main(["track", "in.csv", "-o", "better.csv", "--model", "model.toml"]) == 0
-    assert "no track was believed" not in capsys.readouterr().err
+    assert "no track was confirmed" not in capsys.readouterr().err
 
 
 def hidden_person(folder):

@@ -53,14 +53,15 @@ DEFAULTS = {
     "plot presence truth.csv": "truth.presence.pdf",
 }
 WORK = {
-    "asterism": ("read", "read_tracks", "read_rig", "read_observations", "track", "estimate_model"),
+    "asterism": ("read", "read_rig", "track", "estimate_model"),
+    "asterism.io": ("read_tracks", "read_observations"),
+    "asterism.tracking": ("plan_tracking",),
     "asterism.cli.outputs": ("read_labels", "read_model"),
     "asterism.cli.recording": ("made_scene", "rig_from"),
     "asterism.cli.plot_inputs": ("tracks_of", "summary_of"),
     "asterism.cli.plot_kinds": ("tracks_of", "summary_of"),
     "asterism.cli.commands.camera": ("read_calibration",),
     "asterism.cli.commands.camera_map": ("read_calibration",),
-    "asterism.cli.run_folder": ("sha256_of",),
     "asterism.cli.commands.demo": ("_experiment",),
     "asterism.reproduction.parts": ("load",),
     "asterism.io.calibrations.files": ("read_rig",),

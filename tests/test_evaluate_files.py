@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from asterism.io import read, write
-from asterism.metrics import evaluate, floor
+from asterism.metrics import evaluate, oracle_tracks
 from asterism.simulate import Burst, Ghosts, corrupt
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
@@ -33,7 +33,7 @@ def test_truth_survives_its_file(name, kind, stride, tmp_path):
     write(truth, tmp_path / f"truth.{kind}")
     back = read(tmp_path / f"truth.{kind}").tracks
     assert evaluate(truth, back).idf1 == 1  # clutter came back as tracks without a name, or none
-    result = floor(truth, 4)
+    result = oracle_tracks(truth, 4)
     found = evaluate(result, back)
     assert found.to_dict() == evaluate(result, truth).to_dict()
     assert 0.1 < found.idf1 < 1

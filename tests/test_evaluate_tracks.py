@@ -1,4 +1,4 @@
-"""Tracks against truth: finding the same detections, the rules for names, the floor."""
+"""Tracks against truth: finding the same detections, the rules for names, the oracle."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asterism.errors import ParameterError
-from asterism.metrics import align, evaluate, floor
+from asterism.metrics import align, evaluate, oracle_tracks
 from asterism.metrics.matching import same_detections
 from asterism.model import Detections, Tracks
 from asterism.simulate import Burst, corrupt, cube, smooth
@@ -26,7 +26,7 @@ def _truth(seed=0, **switches):
 def _result(truth, seed=0):
     """Give labels that are wrong in every way: broken, swapped, on clutter and missing."""
     rng = np.random.default_rng(seed)
-    labels = floor(truth, 2).labels.copy()
+    labels = oracle_tracks(truth, 2).labels.copy()
     frame_of = truth.detections.frame_of
     a, b = (np.flatnonzero((labels == k) & (frame_of > 30)) for k in labels[frame_of == 30][:2])
     labels[a], labels[b] = labels[b[:1]], labels[a[:1]]
@@ -205,7 +205,9 @@ def test_unnamed_truth_is_clutter_beside_names_only():
     assert named.clutter_labelled_percent == 100
     unnamed = evaluate(result, Tracks(detections=d, labels=[0, 1, 0, 1]))
     assert (unnamed.n_true, unnamed.false_labels, unnamed.idf1) == (4, 0, 1)
-    assert floor(Tracks(detections=d, labels=[0, 1, 0, 1], names=("A", None)), 1).n_tracks == 1
+    assert (
+        oracle_tracks(Tracks(detections=d, labels=[0, 1, 0, 1], names=("A", None)), 1).n_tracks == 1
+    )
 
 
 def test_names_of_the_result_do_not_matter():
@@ -282,7 +284,7 @@ def test_package_may_be_called():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def _slow_floor(truth, max_gap):
+def _slow_oracle(truth, max_gap):
     """Give the pieces as a set of tuples of detections."""
     pieces = set()
     frame_of = truth.detections.frame_of
@@ -299,11 +301,11 @@ def _slow_floor(truth, max_gap):
 
 @pytest.mark.parametrize("max_gap", [1, 2, 3, 8])
 @pytest.mark.parametrize("seed", range(3))
-def test_floor_equals_breaking_track_by_track(seed, max_gap):
+def test_the_oracle_equals_breaking_track_by_track(seed, max_gap):
     truth = _truth(seed, missing=0.4, burst=Burst(n=3))
-    found = floor(truth, max_gap)
+    found = oracle_tracks(truth, max_gap)
     pieces = {tuple(np.flatnonzero(found.labels == k).tolist()) for k in range(found.n_tracks)}
-    assert pieces == _slow_floor(truth, max_gap)
+    assert pieces == _slow_oracle(truth, max_gap)
     assert len(pieces) == found.n_tracks
     assert found.detections is truth.detections
 
@@ -315,7 +317,7 @@ def test_floor_of_the_reference_scene():
         found = []
         for seed in range(40):
             truth = corrupt(cube(seed=seed), missing=0.1, clutter=0.1, noise=0.005, seed=seed)
-            scores = evaluate(floor(truth, max_gap), truth)
+            scores = evaluate(oracle_tracks(truth, max_gap), truth)
             found.append([100 * (1 - scores.idp), scores.n_tracks])
         return np.mean(found, axis=0)
 
@@ -328,4 +330,4 @@ def test_floor_of_the_reference_scene():
 
 def test_floor_refuses_no_gap():
     with pytest.raises(ParameterError, match="max_gap"):
-        floor(_truth(), 0)
+        oracle_tracks(_truth(), 0)

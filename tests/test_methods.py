@@ -305,7 +305,7 @@ def test_what_is_no_capture_is_refused():
     with pytest.raises(am.ParameterError, match="detections"):
         am.track(truth, am.GNN(), model=small_model())
     with pytest.raises(am.ParameterError, match="method"):
-        am.track(truth.detections, "gnn", model=small_model())
+        am.track(truth.detections, "gn", model=small_model())
 
 
 def test_points_too_dense_for_the_model_are_a_clear_limit(monkeypatch):

@@ -34,7 +34,7 @@ MISTAKES = {
         "detections: expected Detections, found Truth. Try its .detections.",
     ),
     "points for tracks": (
-        lambda: am.write(D, "x.csv"),
+        lambda: am.evaluate(D, TRUTH),
         "tracks: expected Tracks, found Detections. Try am.track(detections).",
     ),
     "a stitching for its tracks": (
@@ -258,7 +258,7 @@ WRONG = (
         "Did you mean 'noise_sigma'?",
     ),
     ("track in.csv --model folder", "folder: expected a model file", "found a folder"),
-    ("track --from folder", "folder: expected a file", "found a folder"),
+    ("track --from folder", "folder: expected a run.toml", "found a folder"),
     (
         "track --from bad.toml",
         "bad.toml: the file: expected TOML",

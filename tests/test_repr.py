@@ -107,6 +107,8 @@ def instances():
         am.camera.ReportRadial(1 / 3, 1 / 3), am.camera.ViconRadial(1 / 3, 1 / 3, 1 / 3),
         am.camera.QuadraticCorrection(ex=(1 / 3,) * 5, ey=(1 / 3,) * 5),
         am.tracking.choose_method(d, plain), am.stitch(tracks, plain), am.fill_gaps(tracks), gap,
+        tracks.recipe, am.tracking.plan_tracking(d, model=plain),
+        am.model.Gap(track=3, first=10, last=20, seconds=1 / 3),
         am.learn_bonds(truth), am.name_tracks(tracks, am.learn_bonds(truth)),
         am.tracking.Join(marker=3, last=5, first=17, probability=1 / 3),
         am.tracking.HypothesisCluster(
