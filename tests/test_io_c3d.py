@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from pathlib import Path
 
 import ezc3d
 import numpy as np
@@ -13,6 +14,7 @@ from asterism.io import read, write
 from asterism.io.captures.c3d_layout import read_c3d
 from asterism.io.captures.marker_names import find_modelled, is_unlabelled
 from asterism.model import Capture, Detections, Tracks
+from asterism.model.side_data import Event
 from c3d_bytes import DEC, INTEL, SGI, integers, make_c3d, reals, text
 
 
@@ -330,6 +332,62 @@ def test_what_is_complete_of_a_truncated_file_is_read(tmp_path, caplog):
     assert read(path).truncated == ""
     write(read(path).tracks, tmp_path / "b.c3d")
     assert b"TRUNCATED" not in (tmp_path / "b.c3d").read_bytes()
+
+
+CORNERS = [0, 0, 0, 600, 0, 0, 600, 400, 0, 0, 400, 0]  # millimetres
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+def side_data():
+    return [
+        ("ANALOG", "USED", 2, (), integers([2])),
+        ("ANALOG", "LABELS", *text(["Fz1", "EMG"])),
+        ("ANALOG", "UNITS", *text(["N", "V"])),
+        ("ANALOG", "RATE", 4, (), reals([200])),
+        ("ANALOG", "OFFSET", 2, (2,), integers([10, 65_526])),  # -10 as a signed integer
+        ("EVENT", "TIMES", 4, (2, 2), reals([0, 1.27, 1, 0.5])),
+        ("EVENT", "LABELS", *text(["Foot Off", "Foot Strike"])),
+        ("EVENT", "CONTEXTS", *text(["Left", "Right"])),
+        ("FORCE_PLATFORM", "USED", 2, (), integers([1])),
+        ("FORCE_PLATFORM", "TYPE", 2, (1,), integers([2])),
+        ("FORCE_PLATFORM", "CORNERS", 4, (3, 4, 1), reals(CORNERS)),
+        ("FORCE_PLATFORM", "ORIGIN", 4, (3, 1), reals([0, 0, -40])),
+        ("FORCE_PLATFORM", "CHANNEL", 2, (2, 1), integers([2, 1])),
+    ]  # fmt: skip
+
+
+def test_analog_channels_events_and_force_plates(load):
+    stored = np.arange(16).reshape(4, 4)
+    capture = load(grid(), analog=stored, n_samples=2, more=side_data(), first=126)
+    assert capture.analog.names == ("Fz1", "EMG")
+    assert capture.analog.units == ("N", "V")
+    np.testing.assert_array_equal(capture.analog.times, np.arange(8) / 200)
+    scale = capture.analog.scale
+    np.testing.assert_allclose(capture.analog["Fz1"], (stored.ravel()[::2] - 10) * scale[0])
+    np.testing.assert_allclose(capture.analog["EMG"], (stored.ravel()[1::2] + 10) * scale[1])
+    with pytest.raises(KeyError, match="no analog channel 'Fz2': Fz1, EMG"):
+        capture.analog["Fz2"]
+    off, strike = capture.events  # 125 frames of 0.01 s before the first
+    assert off == Event(time=pytest.approx(0.02), label="Foot Off", context="Left")
+    assert strike.time == pytest.approx(59.25)
+    (plate,) = capture.plates
+    np.testing.assert_allclose(plate.corners[2], [0.6, 0.4, 0])
+    np.testing.assert_allclose(plate.origin, [0, 0, -0.04])
+    assert plate.channels == ("EMG", "Fz1")
+    assert "0.6 × 0.4 m" in repr(plate)
+    assert load(grid()).analog is None
+
+
+@pytest.mark.parametrize("name", ["HC030A22", "JA1Gait35", "Running_0002"])
+def test_analog_channels_are_those_of_ezc3d(name):
+    for path in DATA.rglob(f"{name}.c3d"):
+        mine, theirs = read(path).analog, ezc3d.c3d(str(path))
+        assert list(mine.names) == theirs["parameters"]["ANALOG"]["LABELS"]["value"]
+        for k, label in enumerate(mine.names):
+            wanted = theirs["data"]["analogs"][0][k]
+            np.testing.assert_allclose(mine[label], wanted, rtol=1e-6, atol=1e-6)
+        return
+    pytest.skip(f"no {name}.c3d in {DATA}")
 
 
 def test_hostile_parameters(load):

@@ -108,6 +108,14 @@ def instances():
         am.camera.QuadraticCorrection(ex=(1 / 3,) * 5, ey=(1 / 3,) * 5),
         am.tracking.choose_method(d, plain), am.stitch(tracks, plain), am.fill_gaps(tracks), gap,
         tracks.recipe, am.tracking.plan_tracking(d, model=plain),
+        am.model.Analog(
+            names=(LONG, "b"), units=("V", ""), rate=1 / 3, stored=np.zeros((900, 2), np.float32),
+            offset=np.zeros(2), scale=np.ones(2),
+        ),
+        am.model.Event(time=1 / 3, label=LONG, context=LONG),
+        am.model.ForcePlate(
+            kind=2, corners=rng.normal(size=(4, 3)), origin=rng.normal(size=3), channels=(LONG,) * 6
+        ),
         am.model.Gap(track=3, first=10, last=20, seconds=1 / 3),
         am.learn_bonds(truth), am.name_tracks(tracks, am.learn_bonds(truth)),
         am.tracking.Join(marker=3, last=5, first=17, probability=1 / 3),

@@ -10,14 +10,18 @@ from asterism.model.population import Population
 from asterism.model.posterior import log_posterior, track_scores
 from asterism.model.recipe import Recipe
 from asterism.model.sensor import Sensor
+from asterism.model.side_data import Analog, Event, ForcePlate
 from asterism.model.tracking_model import TrackingModel
 from asterism.model.tracks import Tracks
 
 __all__ = [
     "DWNA",
     "DWPA",
+    "Analog",
     "Capture",
     "Detections",
+    "Event",
+    "ForcePlate",
     "Gap",
     "InteractingMotions",
     "LinearMotion",

@@ -16,6 +16,8 @@ from asterism.records import record
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from asterism.model.side_data import Analog, Event, ForcePlate
+
 __all__ = ["Capture"]
 
 
@@ -55,6 +57,12 @@ class Capture(Detections):
         Name of each identity, None where it has none.
     modelled : tuple of str
         Names of computed points (joint centres, angles, forces) that were left out.
+    analog : Analog, optional
+        Analog channels of a C3D file, None where there are none.
+    events : tuple of Event
+        Moments that a C3D file marks, by time.
+    plates : tuple of ForcePlate
+        Force plates of a C3D file.
     warnings : tuple of str
         What was odd about the file and how it was taken.
     truncated : str
@@ -82,6 +90,9 @@ class Capture(Detections):
     labels: NDArray[np.int64] = field(default_factory=_unknown)
     names: tuple[str | None, ...] = ()
     modelled: tuple[str, ...] = ()
+    analog: Analog | None = None
+    events: tuple[Event, ...] = ()
+    plates: tuple[ForcePlate, ...] = ()
     warnings: tuple[str, ...] = ()
     truncated: str = ""
 

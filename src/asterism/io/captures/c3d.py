@@ -8,6 +8,7 @@ import numpy as np
 
 from asterism.io.captures.c3d_layout import C3DFile, read_c3d
 from asterism.io.captures.c3d_parameters import BLOCK, DEC, INTEL, SGI
+from asterism.io.captures.c3d_side_data import analog_of, events_of, plates_of
 from asterism.io.captures.channels import identities
 from asterism.io.captures.marker_names import find_modelled
 from asterism.io.units import PER_METRE, check_size, judge_unit, parse_unit
@@ -106,6 +107,9 @@ def read(path: Path) -> Capture:
         filled=filled,
         labels=labels,
         names=identity_names,
+        analog=analog_of(file),
+        events=events_of(file),
+        plates=plates_of(file, unit),
         modelled=tuple(name for name, gone in zip(names, modelled, strict=True) if gone),
         warnings=tuple(warnings),
         truncated=file.truncated or " ".join(ours.strings("TRUNCATED")[:1]),
