@@ -51,13 +51,10 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/field.py --markdown docs/tables --figure docs/images/field_growth.svg
 	$(BIN)/python benchmarks/fills.py --markdown docs/tables/fills.md
 	$(BIN)/python benchmarks/recognition.py --markdown docs/tables/recognition.md
-	$(BIN)/python benchmarks/bond_term.py --markdown docs/tables/bond_term.md
 	$(BIN)/python benchmarks/bodies.py --markdown docs/tables/bodies.md
 	$(BIN)/python benchmarks/reconstruction.py --markdown docs/tables/reconstruction.md
-	$(BIN)/python benchmarks/prior.py --markdown docs/tables/prior.md
 	$(BIN)/python benchmarks/estimation.py --markdown docs/tables/estimation.md
 	$(BIN)/python benchmarks/tuned.py --markdown docs/tables/tuned.md
-	$(BIN)/python benchmarks/regions.py --markdown docs/tables/regions.md
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
 # beside the package, never installed.
