@@ -111,7 +111,7 @@ def test_compare_takes_the_time_from_the_run(work, capsys, monkeypatch):
         taken.update(scores=scores, milliseconds=milliseconds)
         return before(scores, milliseconds=milliseconds)
 
-    monkeypatch.setattr(am, "plot_compare", plot_compare)
+    monkeypatch.setattr(am.plot, "plot_compare", plot_compare)
     run("compare run truth.csv --truth truth.csv -o a.png", capsys)
     summary = json.loads((work / "run/summary.json").read_text())
     assert taken["milliseconds"] == {"run": pytest.approx(1e3 / summary["frames_per_second"])}
@@ -122,7 +122,7 @@ def test_errors_are_those_of_the_file(work, capsys, monkeypatch):
     """The truth is found detection by detection, though a file has an order of its own."""
     seen = []
     before = am.plot.plot_errors
-    monkeypatch.setattr(am, "plot_errors", lambda *a: seen.append(before(*a)) or seen[-1])
+    monkeypatch.setattr(am.plot, "plot_errors", lambda *a: seen.append(before(*a)) or seen[-1])
     run("errors truth.csv --truth truth.csv -o a.png", capsys)
     (above,) = seen[0].child_axes
     assert above.get_xlabel() == "0 % of the labels wrong"
@@ -131,7 +131,7 @@ def test_errors_are_those_of_the_file(work, capsys, monkeypatch):
 def test_observations_of_a_film_are_drawn_as_they_are(work, capsys, monkeypatch):
     seen = []
     before = am.plot.plot_projections
-    monkeypatch.setattr(am, "plot_projections", lambda *a: seen.extend(a) or before(*a))
+    monkeypatch.setattr(am.plot, "plot_projections", lambda *a: seen.extend(a) or before(*a))
     run("projections film.csv --rig rig.toml -o a.png", capsys)
     np.testing.assert_array_equal(seen[0].pixels, am.io.read_observations("film.csv").pixels)
     line = "projections film.csv --rig no.toml -o a.png"
