@@ -132,8 +132,8 @@ class SetPacking {
   double most_priced(std::int32_t tree) const {
     return *std::max_element(priced_.begin() + first_[tree], priced_.begin() + first_[tree + 1]);
   }
-  // What the other trees lose at the prices where one has an option: those that have to give up its
-  // resources, or, if that is more, a resource that the tree gives up itself, whoever takes it then.
+  // Loss of the other trees, at the prices, where a tree takes an option: the larger of what the trees
+  // lose that must release its resources, and the least loss of a tree that takes a released resource.
   std::vector<double> lost_by_others(const std::vector<double>& loss,
                                      const std::vector<std::int32_t>& best) const {
     constexpr double kNever = std::numeric_limits<double>::infinity();

@@ -1,6 +1,6 @@
 """Places from their images in cameras: linear start, Gauss-Newton on pixels, covariance.
 
-Who is whom is known here; `asterism.multiview.correspondence` finds it out.
+The matches are given here; `asterism.multiview.correspondence` finds them.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from asterism.errors import ParameterError
 from asterism.model import Capture, Detections, Tracks
 from asterism.simulate.corrupted_points import Points
 from asterism.simulate.episodes import Burst, Ghosts, Visits
-from asterism.simulate.false_points import anywhere, beside, haunting
+from asterism.simulate.false_points import anywhere, beside, ghost_points
 from asterism.simulate.missed_points import come_and_go, in_runs, merge, seen_by_rig, shadowed
 from asterism.simulate.sampling import kept_frames, shaken
 from asterism.simulate.truth import Truth
@@ -190,7 +190,7 @@ def corrupt(
     if clutter and (whole.markers >= 0).any():
         parts.append(anywhere(rng_clutter, clutter, margin, clean, n_frames))
     if ghosts is not None and n_markers:
-        parts += haunting(rng_ghosts, ghosts, clean, n_frames, n_markers)
+        parts += ghost_points(rng_ghosts, ghosts, clean, n_frames, n_markers)
     if nearby:
         parts.append(beside(rng_nearby, nearby, 0.0, nearby_within, noisy, is_kept))
     if doubled:

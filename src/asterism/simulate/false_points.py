@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from asterism.simulate.episodes import Ghosts
 
-__all__ = ["anywhere", "beside", "haunting"]
+__all__ = ["anywhere", "beside", "ghost_points"]
 
 
 def anywhere(
@@ -52,7 +52,7 @@ def beside(
     return false_points(points.frames[kept], places[kept])
 
 
-def haunting(
+def ghost_points(
     rng: np.random.Generator, ghosts: Ghosts, whole: Points, n_frames: int, n_markers: int
 ) -> list[Points]:
     """Draw false points that go along with a marker for a while."""

@@ -91,7 +91,7 @@ def corrupt(
         format_to_write(truth, None)
     check_outputs({"--out": out, "--truth": truth}, [source], overwrite=overwrite)
     hiding = None if burst is None else episode("--burst", Burst, burst)
-    haunting = None if ghosts is None else episode("--ghosts", Ghosts, ghosts)
+    ghost_episodes = None if ghosts is None else episode("--ghosts", Ghosts, ghosts)
     more = switches_from(corruption or [])
     known = am.io.read_tracks(source)
     if not known.n_tracks:
@@ -102,7 +102,7 @@ def corrupt(
         "clutter": clutter,
         "noise": noise,
         "burst": hiding,
-        "ghosts": haunting,
+        "ghosts": ghost_episodes,
         "stride": stride,
     }
     extent = float(np.ptp(known.detections.points, axis=0).max(initial=0.0))

@@ -108,7 +108,7 @@ def write(
     path : path
         The file. One that exists is replaced, except the one that the detections came from.
     format : str, optional
-        Key of `CAPTURE_FORMATS`; by default it is told by the ending of the name.
+        Key of `CAPTURE_FORMATS`; by default it follows from the suffix.
     overwrite_input : bool
         Allow `path` to be the file that the detections were read from.
     unflagged : bool
