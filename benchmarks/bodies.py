@@ -20,22 +20,23 @@ import numpy as np
 
 import asterism as am
 from asterism.simulate import Burst, Ghosts
+from asterism.tracking import Rigidity
 from captures import captures
 from report import conditions, publish, table
 
 Found = dict[tuple[str, ...], list[tuple[float, ...]]]
-Make = Callable[[bool], am.tracking.Method[Any]]
+Make = Callable[[Rigidity | None], am.tracking.Method[Any]]
 
 CAPTURES = ("JA1Gait35", "tennis", "mocap36", "runway_13", "testdata")
 SCENES = ("walk", "wander", "swarm", "attracted", "juggler")
 METHODS: dict[str, Make] = {
-    "gnn": lambda bodies: am.GNN(bodies=bodies),
-    "smp": lambda bodies: am.SMP(bodies=bodies),
-    "jpda": lambda bodies: am.JPDA(bodies=bodies),
-    "smp3": lambda bodies: am.SMP(window=3, bodies=bodies),
-    "splitting": lambda bodies: am.TrackSplitting(bodies=bodies),
-    "tomht": lambda bodies: am.TOMHT(bodies=bodies),
-    "mht": lambda bodies: am.MHT(bodies=bodies),
+    "gnn": lambda rigid: am.GNN(rigid=rigid),
+    "smp": lambda rigid: am.SMP(rigid=rigid),
+    "jpda": lambda rigid: am.JPDA(rigid=rigid),
+    "smp3": lambda rigid: am.SMP(window=3, rigid=rigid),
+    "splitting": lambda rigid: am.TrackSplitting(rigid=rigid),
+    "tomht": lambda rigid: am.TOMHT(rigid=rigid),
+    "mht": lambda rigid: am.MHT(rigid=rigid),
 }
 WAYS = ("off", "on", "stitched", "on, stitched")
 HEAD = ("IDF1", "switches a 1000", "ghosts and clutter labelled, %", "ms a frame")
@@ -54,7 +55,7 @@ CONDITIONS = {"bursts": bursts, "10 %/10 %": missing}
 
 def figures(truth: am.Tracks, model: am.TrackingModel, make: Make, way: str) -> tuple[float, ...]:
     """Track in one way: IDF1, switches, ghosts, ms a frame."""
-    d, method = truth.detections, make(way.startswith("on"))
+    d, method = truth.detections, make(Rigidity() if way.startswith("on") else None)
     start = time.process_time()
     if way.endswith("stitched"):
         tracks = am.track(d, method, model=model, seed=0, stitch=True)

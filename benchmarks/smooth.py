@@ -24,7 +24,9 @@ METHODS: dict[str, am.tracking.Method[Any]] = {
     "mcmcda, without confidence": am.MCMCDA(end_odds=1, confidence=0),
     "mcmcda": am.MCMCDA(end_odds=1),
     "mcmcda, 2 threads": am.MCMCDA(end_odds=1, threads=2),
-    "mcmcda, groups=whole": am.MCMCDA(end_odds=1, groups="whole", confidence=0),
+    "mcmcda, groups=whole": am.MCMCDA(
+        end_odds=1, chain=am.tracking.ChainOptions(groups="whole"), confidence=0
+    ),
     "gnn": am.GNN(),
     "jpda": am.JPDA(),
     "mht": am.MHT(),

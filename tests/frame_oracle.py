@@ -87,7 +87,7 @@ class OneTrack:
 def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) -> np.ndarray:
     """Labels of every detection, by the slow tracker."""
     s, p = model.sensor, model.population
-    gate = chi2.isf(method.gate_probability, detections.n_axes)
+    gate = chi2.isf(method.gate.probability, detections.n_axes)
     survive = math.log1p(-p.p_disappear)
 
     def hit(gap: int) -> float:
@@ -97,7 +97,8 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
         return survive + math.log1p(-chance_seen(model, gap))
 
     leftover = math.log1p(p.birth_density * s.p_detection / s.clutter_density)
-    confirm = math.log(method.confirm_probability / (1 - method.confirm_probability))
+    life = method.lifecycle
+    confirm = math.log(life.confirm_probability / (1 - life.confirm_probability))
     labels = np.full(detections.n_points, -1)
     tracks: list[OneTrack] = []
     next_id = 0
@@ -149,7 +150,7 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
             track
             for track in tracks
             if track.gap < p.max_gap
-            and (track.id >= 0 or track.best - track.score <= math.log(method.delete_odds))
+            and (track.id >= 0 or track.best - track.score <= math.log(life.delete_odds))
         ]
         taken = {j for several in match.values() for j in several}
         for j, y in enumerate(points):

@@ -141,10 +141,11 @@ def sigmoid(x: float) -> float:
 def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingModel):
     """Labels and confidence of every detection, by the slow tracker."""
     s, p = model.sensor, model.population
-    gate = chi2.isf(method.gate_probability, detections.n_axes)
+    gate = chi2.isf(method.gate.probability, detections.n_axes)
     P_d, p_z = s.p_detection, p.p_disappear
     density = s.clutter_density + P_d * p.birth_density
-    confirm = math.log(method.confirm_probability / (1 - method.confirm_probability))
+    life = method.lifecycle
+    confirm = math.log(life.confirm_probability / (1 - life.confirm_probability))
     labels = np.full(detections.n_points, -1)
     confidence = np.zeros(detections.n_points)
     tracks: list[SoftTrack] = []
@@ -230,7 +231,7 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
             track
             for track in tracks
             if track.gap < p.max_gap
-            and (track.id >= 0 or track.best - track.score <= math.log(method.delete_odds))
+            and (track.id >= 0 or track.best - track.score <= math.log(life.delete_odds))
         ]
         for j, y in enumerate(points):
             if taken[j] or free[j] <= 0:

@@ -127,7 +127,7 @@ def test_summary_as_json(scene, capsys):
 
 
 def test_a_run_is_repeated_bit_for_bit(scene, capsys):
-    run("track in.csv --run first --method smp --option delete_odds=100 --seed 5", capsys)
+    run("track in.csv --run first --method smp --option lifecycle.delete_odds=100 --seed 5", capsys)
     names = sorted(path.name for path in (scene / "first").iterdir())
     assert names == ["in.tracked.csv", "log.txt", "run.toml", "summary.json"]
     run("track --from first/run.toml -o again.csv", capsys)
@@ -139,7 +139,7 @@ def test_a_run_is_repeated_bit_for_bit(scene, capsys):
         tomllib.loads((scene / name / "run.toml").read_text()) for name in ("first", "second")
     )
     assert first == second
-    assert first["method"]["options"]["delete_odds"] == 100
+    assert first["method"]["options"]["lifecycle"]["delete_odds"] == 100
     assert first["method"]["seed"] == 5
     assert {"asterism", "python", "numpy", "scipy", "platform"} <= set(first["versions"])
     assert "tracking in.csv" in (scene / "first/log.txt").read_text()
@@ -213,18 +213,18 @@ def test_no_input_is_written_to(scene, capsys):
         ("track", "IN: expected a capture"),
         ("track in.csv --method gn", "Did you mean 'gnn'?"),
         (
-            "track in.csv --method gnn --option gate_probabilty=1e-6",
-            "Did you mean 'gate_probability'?",
+            "track in.csv --method gnn --option gate.probabil=1e-6",
+            "Did you mean 'gate.probability'?",
         ),
         ("track in.csv --method gnn --option proposers=tracks", "method gnn"),
-        ("track in.csv --method gnn --option delete_odds", "NAME=VALUE"),
+        ("track in.csv --method gnn --option lifecycle.delete_odds", "NAME=VALUE"),
         (
-            "track in.csv --method gnn --option delete_odds=many",
-            "delete_odds: expected a number, found 'many'",
+            "track in.csv --method gnn --option lifecycle.delete_odds=many",
+            "lifecycle.delete_odds: expected a number, found 'many'",
         ),
         (
-            "track in.csv --method gnn --option delete_odds=0.5",
-            "delete_odds: expected a number > 1",
+            "track in.csv --method gnn --option lifecycle.delete_odds=0.5",
+            "lifecycle.delete_odds: expected a number > 1",
         ),
         (
             "track in.csv --method mcmcda --option bond_weight=-2",
@@ -239,7 +239,7 @@ def test_no_input_is_written_to(scene, capsys):
         ("track in.csv --model in.csv", "in.csv: the file: expected TOML"),
         ("track --from nowhere.toml", "nowhere.toml"),
         ("track --from in.csv", "expected TOML"),
-        ("track in.csv --option delete_odds=5", "Name the method"),
+        ("track in.csv --option lifecycle.delete_odds=5", "Name the method"),
         ("track in.csv --methd gnn", "Did you mean '--method'?"),
         ("trak in.csv", "Did you mean 'track'?"),
         ("corrupt in.csv -o a.csv --truth t.csv", "has no labels"),
@@ -323,14 +323,19 @@ def test_methods_and_scenes_are_those_of_the_library(capsys):
     assert list(listed) == ["auto", *am.tracking.METHODS]
     options = listed["smp"]["options"]
     made = am.SMP()
-    assert {name: option["default"] for name, option in options.items()} == {
-        field.name: getattr(made, field.name) for field in dataclasses.fields(made)
-    }
-    assert {"gate_probability", "proposers", "strict", "capacity"} < options.keys()
+    for name, option in options.items():
+        table, _, key = name.partition(".")
+        value = getattr(made, table)
+        if table == "rigid":
+            value = getattr(am.tracking.Rigidity(), key) if key else False
+        elif key:
+            value = getattr(value, key)
+        assert option["default"] == value
+    assert {"gate.probability", "proposers", "strict", "capacity", "rigid"} < options.keys()
     assert all(option["about"] for option in options.values())
     text = run("methods", capsys)
     assert "tracks|detections" in text
-    assert "ends when its odds fall" in text
+    assert "deleted when its odds fall" in text
     assert list(json.loads(run("scenes --json", capsys))) == list(am.simulate.SCENES)
 
 

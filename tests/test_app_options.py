@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import pytest
 
 import asterism as am
-from asterism.cli.options import method_options, parsed, scene_options
+from asterism.cli.options import flat, nested, parsed, record_options, scene_options
 from asterism.errors import ParameterError
 
 
@@ -54,7 +54,7 @@ class Derived(Base):
 
 
 def test_fields_types_defaults_and_texts():
-    options = method_options(Derived)
+    options = record_options(Derived)
     assert list(options) == ["first", "second", "third", "fourth", "fifth", "sixth"]
     assert options["second"].about == "Two numbers, on two lines."
     assert options["third"].about == "A choice."
@@ -80,7 +80,7 @@ def test_fields_types_defaults_and_texts():
     ],
 )
 def test_values(text, value):
-    (found,) = parsed("--option", "it", [text], method_options(Derived)).values()
+    (found,) = parsed("--option", "it", [text], record_options(Derived)).values()
     assert found == value
     assert type(found) is type(value)
 
@@ -90,31 +90,40 @@ def test_values(text, value):
 )
 def test_refused_values(text):
     with pytest.raises(ParameterError):
-        parsed("--option", "it", [text], method_options(Derived))
+        parsed("--option", "it", [text], record_options(Derived))
 
 
 def test_the_last_of_one_name_counts_and_dashes_will_do():
-    options = method_options(am.tracking.METHODS["gnn"])
-    assert parsed("--option", "gnn", ["delete-odds=5", "delete_odds=7"], options) == {
-        "delete_odds": 7.0
-    }
+    options = record_options(am.tracking.METHODS["gnn"])
+    assert parsed(
+        "--option", "gnn", ["lifecycle.delete-odds=5", "lifecycle.delete_odds=7"], options
+    ) == {"lifecycle.delete_odds": 7.0}
 
 
-def test_bodies_are_options_of_the_methods_that_have_them():
+def test_rigid_bodies_are_options_of_the_methods_that_have_them():
     having = {
-        name
-        for name in am.tracking.METHODS
-        if "bodies" in method_options(am.tracking.METHODS[name])
+        name for name in am.tracking.METHODS if "rigid" in record_options(am.tracking.METHODS[name])
     }
     assert having == set(am.tracking.METHODS) - {"mcmcda"}
-    options = method_options(am.tracking.METHODS["gnn"])
-    given = parsed("--option", "gnn", ["bodies=yes", "max-carried=30", "bond-weight=0"], options)
-    assert am.GNN(**given) == am.GNN(bodies=True, max_carried=30, bond_weight=0.0)
+    options = record_options(am.tracking.METHODS["gnn"])
+
+    def made(*texts):
+        given = parsed("--option", "gnn", texts, options)
+        return am.tracking.method_by_name("gnn", **nested(given, options))
+
+    rigid = am.tracking.Rigidity(max_gap=30, bond_weight=0.0)
+    assert made("rigid=yes") == am.GNN(rigid=am.tracking.Rigidity())
+    assert made("rigid=no") == made() == am.GNN()
+    assert made("rigid.max-gap=30", "rigid.bond_weight=0") == am.GNN(rigid=rigid)
+    assert made("rigid=yes", "rigid.max-gap=30", "rigid.bond_weight=0") == am.GNN(rigid=rigid)
+    with pytest.raises(ParameterError, match=r"rigid: expected true, as rigid.max_gap is given"):
+        made("rigid=no", "rigid.max_gap=30")
+    assert flat(nested({"rigid.max_gap": 3, "a": 1}, options)) == {"rigid.max_gap": 3, "a": 1}
 
 
 @pytest.mark.parametrize("name", am.tracking.METHODS)
 def test_every_method_explains_every_option(name):
-    for option in method_options(am.tracking.METHODS[name]).values():
+    for option in record_options(am.tracking.METHODS[name]).values():
         assert option.about
         assert not option.about.startswith("See ")
         text = "none" if option.default is None else str(option.default)

@@ -10,6 +10,7 @@ import pytest
 import asterism as am
 from asterism import _engine
 from asterism.simulate import Burst, Ghosts
+from asterism.tracking import Rigidity
 from body_oracle import BodyByHand
 
 SIGMA = 1e-3
@@ -164,7 +165,7 @@ def test_neighbours_tell_a_marker_from_a_ghost_that_moves_likelier(make):
     d = am.Detections.from_frames(0.01 * np.arange(91), frames)
     found = {}
     for weight in (0.0, 5.0):
-        tracks = am.track(d, make(bodies=True, bond_weight=weight), model=walk_model())
+        tracks = am.track(d, make(rigid=Rigidity(bond_weight=weight)), model=walk_model())
         found[weight] = int(np.flatnonzero(tracks.labels[d.offsets[90] :] == tracks.labels[0])[0])
     assert found == {0.0: 0, 5.0: 1}
 
@@ -185,7 +186,7 @@ def test_a_hidden_marker_is_known_when_it_comes_back(make):
         frames.append(others if hidden else points)
     d = am.Detections.from_frames(0.01 * np.arange(160), frames)
     model = walk_model()
-    off, on = (am.track(d, make(bodies=b), model=model).labels for b in (False, True))
+    off, on = (am.track(d, make(rigid=r), model=model).labels for r in (None, Rigidity()))
     first, back, ghosts = 0, d.offsets[140], d.offsets[begins:140]
     assert (off[ghosts] == off[first]).any()
     assert on[first] == on[back] == on[-7]
@@ -205,7 +206,7 @@ def test_hidden_markers_of_a_person_come_back_as_themselves(make, seed):
     if make is am.MDA:
         pytest.skip("slow, and the same forest as TOMHT's")
     truth, model = hidden_person(seed)
-    off, on = (am.track(truth.detections, make(bodies=b), model=model) for b in (False, True))
+    off, on = (am.track(truth.detections, make(rigid=r), model=model) for r in (None, Rigidity()))
     before, after = am.evaluate(off, truth), am.evaluate(on, truth)
     assert after.idf1 > before.idf1 + 0.03
     # Nearly all switches of splitting are between frames in a row: of markers that are seen.
@@ -234,8 +235,8 @@ def test_no_harm_where_there_are_no_bodies(make, scene):
         pytest.skip("slow, and the same forest as TOMHT's")
     truth, model = spoilt(scene)
     off, on = (
-        am.evaluate(am.track(truth.detections, make(bodies=b), model=model), truth).idf1
-        for b in (False, True)
+        am.evaluate(am.track(truth.detections, make(rigid=r), model=model), truth).idf1
+        for r in (None, Rigidity())
     )
     assert on > off - 1e-3
 
@@ -244,7 +245,7 @@ def test_no_harm_where_there_are_no_bodies(make, scene):
 def test_a_stream_is_the_whole_take_and_a_state_is_a_value(make):
     truth, model = hidden_person(1)
     d = truth.detections.part(0, 140)
-    method = make(bodies=True)
+    method = make(rigid=Rigidity())
     whole = am.track(d, method, model=model)
     state, labels, kept = method.init(model), np.full(d.n_points, -1), None
     for t, (time, points) in enumerate(d):
@@ -275,7 +276,7 @@ def test_a_window_beyond_the_longest_gap_carries_too(make):
     _, seen = turning(rng, 150, 3, speed=0.3)
     frames = [points[1:] if 100 <= t < 130 else points for t, points in enumerate(seen)]
     d = am.Detections.from_frames(0.01 * np.arange(150), frames)
-    labels = am.track(d, make(window=8, bodies=True), model=walk_model(max_gap=4)).labels
+    labels = am.track(d, make(window=8, rigid=Rigidity()), model=walk_model(max_gap=4)).labels
     assert labels[0] == labels[d.offsets[130]] == labels[-7] >= 0
 
 
@@ -284,7 +285,7 @@ def test_carrying_ends_in_time(make):
     truth, model = hidden_person(1)
     longest = {}
     for limit in (1, 30, 60):
-        method = make(bodies=True, max_carried=limit)
+        method = make(rigid=Rigidity(max_gap=limit))
         state, gaps = method.init(model), [0]
         for time, points in truth.detections:
             state, _ = method.step(state, time, points)
@@ -299,14 +300,13 @@ def test_carrying_ends_in_time(make):
 @pytest.mark.parametrize(
     ("make", "options", "name"),
     [
-        (am.GNN, {"bodies": "yes"}, "bodies"),
-        (am.JPDA, {"max_carried": 0}, "max_carried"),
-        (am.SMP, {"bond_weight": -1}, "bond_weight"),
-        (am.TOMHT, {"bodies": "yes"}, "bodies"),
-        (am.MHT, {"max_carried": 30}, "max_carried"),
-        (am.TrackSplitting, {"bodies": True, "bond_weight": 101}, "bond_weight"),
-        (am.TrackSplitting, {"bodies": True, "independent": True}, "bodies"),
-        (am.SMP, {"bodies": True, "strict": True}, "bodies"),
+        (am.GNN, {"rigid": "yes"}, "rigid: expected a Rigidity"),
+        (am.TOMHT, {"rigid": True}, "rigid: expected a Rigidity"),
+        (Rigidity, {"max_gap": 0}, "rigid.max_gap"),
+        (Rigidity, {"bond_weight": -1}, "rigid.bond_weight"),
+        (Rigidity, {"bond_weight": 101}, "rigid.bond_weight"),
+        (am.TrackSplitting, {"rigid": Rigidity(), "independent": True}, "rigid"),
+        (am.SMP, {"rigid": Rigidity(), "strict": True}, "rigid"),
     ],
 )
 def test_options_out_of_range_are_refused(make, options, name):

@@ -12,22 +12,23 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.tracking import ChainOptions, Rigidity
 from scenes import crowd, interacting, sized, small_model
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 METHODS = {
     "gnn": am.GNN(),
-    "gnn with bodies": am.GNN(bodies=True),
+    "gnn with bodies": am.GNN(rigid=Rigidity()),
     "smp": am.SMP(),
     "smp, three frames": am.SMP(window=3),
     "jpda": am.JPDA(),
-    "jpda with bodies": am.JPDA(bodies=True),
+    "jpda with bodies": am.JPDA(rigid=Rigidity()),
     "splitting": am.TrackSplitting(),
     "mht": am.MHT(),
     "mht, five frames": am.MHT(window=5),
     "tomht": am.TOMHT(),
     "tomht, eight frames, few branches": am.TOMHT(window=8, max_branches=4),
-    "tomht with bodies": am.TOMHT(bodies=True),
+    "tomht with bodies": am.TOMHT(rigid=Rigidity()),
     "mda": am.MDA(),
     "mda, relaxed": am.MDA(window=2, solver="relaxed"),
     "mcmcda": am.MCMCDA(moves=10, confidence=10),
@@ -35,14 +36,15 @@ METHODS = {
     "mcmcda, whole": am.MCMCDA(window=None, moves=10, confidence=10),
     "mcmcda, whole, bonds": am.MCMCDA(window=None, moves=5, confidence=5, bond_weight=2),
     "mcmcda, chains": am.MCMCDA(moves=5, confidence=5, chains=3, threads=2),
-    "mcmcda, cells": am.MCMCDA(moves=5, groups="cells", distance=0.5),
-    "mcmcda, clusters": am.MCMCDA(moves=5, groups="clusters", distance=0.5),
-    "mcmcda, sure tracks": am.MCMCDA(moves=5, bonds=3),
-    "mcmcda, a draw": am.MCMCDA(moves=5, keep="draw", end_odds=1),
-    "mcmcda, the report's": am.MCMCDA(
-        moves=10, confidence=0, proposal="uniform", move_weights="report", at_doubts=0,
-        chain="ascent", first_rules=True, assignment=False, groups="whole",
+    "mcmcda, cells": am.MCMCDA(
+        moves=5, chain=ChainOptions(groups="cells", distance=0.5)
     ),
+    "mcmcda, clusters": am.MCMCDA(
+        moves=5, chain=ChainOptions(groups="clusters", distance=0.5)
+    ),
+    "mcmcda, sure tracks": am.MCMCDA(moves=5, chain=ChainOptions(bonds=3)),
+    "mcmcda, a draw": am.MCMCDA(moves=5, keep="draw", end_odds=1),
+    "mcmcda, the report's": am.MCMCDA.report_2010(moves=10),
 }  # fmt: skip
 CAPTURES = {"racing": ("kinematics_racing_full.c3d", 2), "fingers": ("recording.tsv", 1)}
 

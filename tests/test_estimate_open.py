@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.tracking import ChainOptions
 from asterism.tracking.estimation.rates import Counts, Rates, count
 from chain_oracle import as_partition
 from partition_oracle import every_partition, problem_of_size
@@ -23,8 +24,8 @@ def test_a_kept_draw_is_of_the_posterior():
     p /= p.sum()
     # Assignment, groups and doubts left out: the whole walk in one piece.
     draw = am.MCMCDA(
-        window=d.n_frames, moves=300.0, confidence=0.0, end_odds=1.0, at_doubts=0.0,
-        groups="whole", keep="draw",
+        window=d.n_frames, moves=300.0, confidence=0.0, end_odds=1.0, keep="draw",
+        chain=ChainOptions(ambiguous_share=0, groups="whole"),
     )  # fmt: skip
     n = 3000
     seen = Counter(
@@ -158,8 +159,9 @@ def test_who_walks_has_no_velocity():
 
 
 def test_draws_need_the_chain_that_samples():
+    ascent = ChainOptions(acceptance="ascent", ambiguous_share=0)
     with pytest.raises(am.ParameterError, match="keep"):
-        am.MCMCDA(keep="draw", chain="ascent", confidence=0.0, at_doubts=0.0)
+        am.MCMCDA(keep="draw", chain=ascent, confidence=0.0)
     with pytest.raises(am.ParameterError, match="one of best, draw"):
         am.MCMCDA(keep="last")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import signal
 import time
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.tracking import ChainOptions
 from chain_oracle import MOVES as MOVE_NAMES
 from partition_oracle import every_partition, every_track, tiny_model, tiny_problem
 from scenes import (
@@ -72,13 +74,17 @@ def test_where_nothing_is_in_doubt_the_truth_is_found(seed):
     assert am.evaluate(tracks, truth).idf1 > 0.98
 
 
+ASCENT = ChainOptions(acceptance="ascent", ambiguous_share=0)
+
+
 def test_more_moves_and_the_assignment_come_nearer():
     d = crowd(2, spread=0.1, n_frames=sized(60, 15)).detections
     model = crowd_model()
 
-    def value(**options):
+    def value(moves, **chain):
+        method = am.MCMCDA(moves=moves, chain=ChainOptions(**chain))
         values = [
-            am.track(d, am.MCMCDA(**options), model=model, seed=seed).info["log_posterior"]
+            am.track(d, method, model=model, seed=seed).info["log_posterior"]
             for seed in range(sized(4, 1))
         ]
         return np.mean(values)
@@ -144,7 +150,11 @@ def test_confidence_is_the_share_of_the_posterior_in_which_a_detection_follows_t
         p /= p.sum()
         groups = ("whole", "likelihood")[seed // 2 % 2]
         method = am.MCMCDA(
-            window=5, moves=1000, confidence=50_000, groups=groups, doubt=20, end_odds=1
+            window=5,
+            moves=1000,
+            confidence=50_000,
+            end_odds=1,
+            chain=ChainOptions(groups=groups, ambiguous_within=20),
         )
         tracks = am.track(d, method, model=model, seed=seed)
         before = predecessors(tracks.labels)
@@ -268,7 +278,7 @@ def test_groups_that_nothing_joins_are_walked_apart():
         ("clusters", 1.5),
         ("cells", 2.5),
     ):
-        method = am.MCMCDA(moves=200, groups=groups, distance=distance)
+        method = am.MCMCDA(moves=200, chain=ChainOptions(groups=groups, distance=distance))
         info[groups] = am.track(d, method, model=model, seed=1).info
     best = max(one["log_posterior"] for one in info.values())
     assert all(one["log_posterior"] > best - 12 for one in info.values())
@@ -277,7 +287,8 @@ def test_groups_that_nothing_joins_are_walked_apart():
     assert info["whole"]["largest_group"] > info["clusters"]["largest_group"]
     # The clusters are further apart than any link; cells cut some in two.
     assert info["likelihood"]["cut_links"] == info["clusters"]["cut_links"] == 0
-    cut = am.track(d, am.MCMCDA(groups="cells", distance=0.2), model=model, seed=1).info
+    cells = am.MCMCDA(chain=ChainOptions(groups="cells", distance=0.2))
+    cut = am.track(d, cells, model=model, seed=1).info
     assert cut["cut_links"] > 0
 
 
@@ -287,12 +298,14 @@ def test_tracks_that_keep_their_distances_are_sure():
     rigid = am.estimate_model(truth.detections).model
     moves = {}
     for bonds in (0, 2, 3, 4):
-        tracks = am.track(truth.detections, am.MCMCDA(bonds=bonds), model=rigid)
+        method = am.MCMCDA(chain=ChainOptions(bonds=bonds))
+        tracks = am.track(truth.detections, method, model=rigid)
         assert am.evaluate(tracks, truth).idf1 == 1
         moves[bonds] = tracks.info.get("sure_tracks", 0)
     # All eight from the frame on with which the window is full.
     assert moves == {0: 0, 2: 8 * 51, 3: 8 * 51, 4: 8 * 51}
-    alone = am.track(loose.detections, am.MCMCDA(bonds=3), model=small_model())
+    method = am.MCMCDA(chain=ChainOptions(bonds=3))
+    alone = am.track(loose.detections, method, model=small_model())
     assert alone.info["sure_tracks"] == 0
 
 
@@ -357,10 +370,25 @@ def test_without_a_move_and_a_start_nothing_could_begin(window):
         am.track(truth.detections, method, model=small_model())
 
 
-def test_a_stream_without_a_move_is_refused_at_its_first_frame():
-    method = am.MCMCDA(moves=0)
+def test_a_stream_without_a_move_is_refused():
     with pytest.raises(am.ParameterError, match="moves"):
-        method.step(method.init(small_model()), 0.0, np.zeros((1, 3)))
+        am.MCMCDA(moves=0).init(small_model())
+
+
+def test_a_stream_may_start_from_labels():
+    truth = wanderers(np.random.default_rng(6), n_frames=20, missing=0, clutter=0)
+    method = am.MCMCDA(moves=0, confidence=0)
+    state = method.init(small_model(), start=truth.labels)
+    labels = np.full(truth.detections.n_points, -1)
+    for t, (at, points) in enumerate(truth.detections):
+        state, update = method.step(state, at, points)
+        labels[truth.detections.offsets[t] : truth.detections.offsets[t + 1]] = update.labels
+        labels[update.revised] = update.revised_labels
+    whole = am.track(truth.detections, method, model=small_model(), start=truth)
+    assert (labels == whole.labels).all()
+    assert state.info["given_links"] > 50
+    with pytest.raises(am.ParameterError, match="start"):
+        method.init(small_model(), start=["a"])
 
 
 def test_a_start_is_for_those_who_can():
@@ -425,13 +453,13 @@ def test_the_report_s_own_makes_no_moves_but_its_own():
     # Births and deaths alone can never undo half a track; moves at doubts would.
     d, model = crowd(7, n_frames=30).detections, crowd_model()
     few = {"birth": 1, "death": 1}
-    own = am.MCMCDA(move_weights=few, at_doubts=0, assignment=False, groups="whole")
+    chain = ChainOptions(move_weights=few, ambiguous_share=0, assignment=False, groups="whole")
+    own = am.MCMCDA(chain=chain)
     info = am.track(d, own, model=model, seed=1).info
     taken = [name for name, share in info.items() if name.startswith("accepted_") and share > 0]
     assert set(taken) <= {"accepted_birth", "accepted_death"}
-    more = am.track(
-        d, am.MCMCDA(move_weights=few, groups="whole", assignment=False), model=model, seed=1
-    )
+    ambiguous = dataclasses.replace(chain, ambiguous_share=0.5)
+    more = am.track(d, am.MCMCDA(chain=ambiguous), model=model, seed=1)
     assert more.info["log_posterior"] > info["log_posterior"]
 
 
@@ -439,39 +467,55 @@ def test_weights_of_moves_by_name():
     d, model = crowd(7, n_frames=30).detections, crowd_model()
     shares = dict.fromkeys(MOVE_NAMES, 1.0)
     assert (
-        am.track(d, am.MCMCDA(move_weights=shares), model=model).labels
+        am.track(d, am.MCMCDA(chain=ChainOptions(move_weights=shares)), model=model).labels
         == am.track(d, am.MCMCDA(), model=model).labels
     ).all()
-    few = am.MCMCDA(move_weights={"birth": 1, "death": 1, "extension": 2, "reduction": 2})
-    assert am.track(d, few, model=model).n_tracks > 0
+    few = {"birth": 1, "death": 1, "extension": 2, "reduction": 2}
+    method = am.MCMCDA(chain=ChainOptions(move_weights=few))
+    assert am.track(d, method, model=model).n_tracks > 0
 
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
         ({"confidence": -1}, "confidence"), ({"chains": 0}, "chains"), ({"threads": 0}, "threads"),
-        ({"groups": "mine"}, "likelihood"), ({"groups": "cells"}, "distance"),
-        ({"distance": 1.0}, "distance"), ({"groups": "clusters", "distance": -1}, "distance"),
-        ({"doubt": -1}, "doubt"), ({"end_odds": 0.5}, "end_odds"),
-        ({"end_odds": 1e300}, "end_odds"),
-        ({"bonds": 1}, "bonds"), ({"bonds": True}, "bonds"),
-        ({"bonds": 2, "bond_tolerance": 0}, "bond_tolerance"),
-        ({"at_doubts": 1}, "at_doubts"), ({"chain": "ascent"}, "confidence"),
-        ({"chain": "ascent", "confidence": 0}, "at_doubts"),
+        ({"end_odds": 0.5}, "end_odds"), ({"end_odds": 1e300}, "end_odds"),
         ({"window": None, "deadline": 1.0}, "deadline"),
         ({"window": 0}, "window"), ({"window": 10**9}, "window"), ({"moves": 1e300}, "moves"),
         ({"moves": -1}, "moves"), ({"moves": None}, "deadline"),
-        ({"deadline": 0}, "deadline"), ({"proposal": "clever"}, "one of informed, uniform"),
-        ({"chain": "descent"}, "one of metropolis, ascent"), ({"first_rules": 1}, "first_rules"),
-        ({"assignment": "yes"}, "assignment"), ({"move_weights": "mine"}, "move_weights"),
-        ({"move_weights": {"brith": 1}}, "birth"), ({"move_weights": {"update": 1}}, "births"),
-        ({"move_weights": {"birth": 1, "death": 1, "split": 1}}, "split and merge"),
-        ({"move_weights": {"birth": 1, "death": -1}}, "death"),
+        ({"deadline": 0}, "deadline"), ({"chain": "ascent"}, "chain: expected a ChainOptions"),
+        ({"chain": ASCENT}, "confidence: expected 0 with the ascent"),
+        ({"chain": ASCENT, "confidence": 0, "keep": "draw"}, "keep"),
     ],
 )  # fmt: skip
 def test_options_are_checked(wrong, message):
     with pytest.raises(am.ParameterError, match=message):
         am.MCMCDA(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"groups": "mine"}, "likelihood"), ({"groups": "cells"}, "distance"),
+        ({"distance": 1.0}, "distance"), ({"groups": "clusters", "distance": -1}, "distance"),
+        ({"ambiguous_within": -1}, "ambiguous_within"),
+        ({"bonds": 1}, "bonds"), ({"bonds": True}, "bonds"),
+        ({"bonds": 2, "bond_tolerance": 0}, "bond_tolerance"),
+        ({"ambiguous_share": 1}, "ambiguous_share"),
+        ({"ambiguous_share": 0.5}, "0 with the ascent"),
+        ({"proposal": "clever"}, "one of informed, uniform"),
+        ({"acceptance": "descent"}, "one of metropolis, ascent"),
+        ({"first_rules": 1}, "first_rules"),
+        ({"assignment": "yes"}, "assignment"), ({"move_weights": "mine"}, "move_weights"),
+        ({"move_weights": {"brith": 1}}, "birth"), ({"move_weights": {"update": 1}}, "births"),
+        ({"move_weights": {"birth": 1, "death": 1, "split": 1}}, "split and merge"),
+        ({"move_weights": {"birth": 1, "death": -1}}, "death"),
+        ({"grops": "whole"}, "Did you mean 'groups'"),
+    ],
+)  # fmt: skip
+def test_options_of_the_chain_are_checked(wrong, message):
+    with pytest.raises(am.ParameterError, match=message):
+        am.MCMCDA.report_2010(**wrong)
 
 
 def test_a_seed_is_a_number():

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.tracking import Gate, Lifecycle
 from partition_oracle import every_partition, tiny_model, tiny_problem
 from scenes import crowd, small_model, wanderers
 
 WHOLE = am.MDA(
-    window=16, max_branches=10**6, prune_odds=1e30, new_track_odds=1e300, gate_probability=1e-300,
-    confirm_probability=0.5 + 1e-12, delete_odds=1e300,
+    window=16, max_branches=10**6, prune_odds=1e30, new_track_odds=1e300,
+    gate=Gate(probability=1e-300),
+    lifecycle=Lifecycle(confirm_probability=0.5 + 1e-12, delete_odds=1e300),
 )  # fmt: skip
 
 

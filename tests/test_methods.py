@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.tracking import Gate, Lifecycle, Rigidity
 from frame_oracle import track_by_hand
 from jpda_oracle import jpda_by_hand
 from scenes import interacting, small_model, wanderers
@@ -27,8 +28,8 @@ METHODS = {
     "mht": am.MHT(),
     "mcmcda": am.MCMCDA(),
     "mda": am.MDA(),
-    "tomht with bodies": am.TOMHT(bodies=True),
-    "mht with bodies": am.MHT(bodies=True),
+    "tomht with bodies": am.TOMHT(rigid=Rigidity()),
+    "mht with bodies": am.MHT(rigid=Rigidity()),
 }
 each_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 # The others are held to every partition of small problems instead.
@@ -149,9 +150,11 @@ def test_tight_bounds_are_those_of_the_blackboard(method, bound, seed):
     model = small_model(motion=interacting())
     free = am.track(truth.detections, method, model=model).labels
     if bound == "gate":
-        method = dataclasses.replace(method, gate_probability=0.97)
+        method = dataclasses.replace(method, gate=Gate(probability=0.97))
     elif bound == "odds":  # believed late, doubted soon: what a track once scored decides
-        method = dataclasses.replace(method, confirm_probability=1 - 1e-12, delete_odds=1.5)
+        method = dataclasses.replace(
+            method, lifecycle=Lifecycle(confirm_probability=1 - 1e-12, delete_odds=1.5)
+        )
     else:
         model = small_model(motion=interacting(), max_speed=0.6)
     labels = am.track(truth.detections, method, model=model).labels
@@ -286,13 +289,20 @@ def test_a_bad_frame_is_refused_and_the_state_lives_on(method, time, points, mes
 
 
 def test_options_are_checked():
-    for wrong in ({"gate_probability": 0}, {"confirm_probability": 1.0}, {"delete_odds": 0.5}):
-        with pytest.raises(am.ParameterError, match=next(iter(wrong))):
-            am.GNN(**wrong)
+    for wrong in (
+        {"gate": {"probability": 0}},
+        {"lifecycle": {"confirm_probability": 1.0}},
+        {"lifecycle": {"delete_odds": 0.5}},
+    ):
+        ((table, options),) = wrong.items()
+        with pytest.raises(am.ParameterError, match=f"{table}.{next(iter(options))}"):
+            am.tracking.method_by_name("gnn", **wrong)
+    with pytest.raises(am.ParameterError, match="gate: expected a Gate"):
+        am.GNN(gate=3)
     with pytest.raises(am.ParameterError, match="proposers"):
         am.SMP(proposers="nobody")
-    with pytest.raises(am.ParameterError, match="Did you mean 'gate_probability'"):
-        am.tracking.method_by_name("gnn", gate_probabilty=0.1)
+    with pytest.raises(am.ParameterError, match="Did you mean 'probability'"):
+        am.tracking.method_by_name("gnn", gate={"probabil": 0.1})
     with pytest.raises(am.ParameterError, match="Did you mean 'gnn'"):
         am.tracking.method_by_name("gn")
     assert am.tracking.method_by_name("smp", proposers="detections") == am.SMP(
@@ -309,7 +319,7 @@ def test_what_is_no_capture_is_refused():
 
 
 def test_points_too_dense_for_the_model_are_a_clear_limit(monkeypatch):
-    monkeypatch.setattr("asterism.tracking.methods.engine_method.MAX_CANDIDATES", 1000)
+    monkeypatch.setattr("asterism.tracking.methods.options.MAX_CANDIDATES", 1000)
     rng = np.random.default_rng(1)
     d = am.Detections.from_frames([0.0, 0.1], [rng.normal(0, 0.01, (200, 3)) for _ in range(2)])
     with pytest.raises(am.SolverLimit, match="at most 1000"):

@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.tracking import Gate, Lifecycle
 from partition_oracle import every_partition, tiny_model, tiny_problem
 from scenes import calibration_in_crowds, crowd, small_model, wanderers
 
 # Nothing is dropped, and what is more likely than not is believed.
 WHOLE = am.MHT(
     window=16, max_hypotheses=10**6, prune_odds=1e300, new_track_odds=1e300,
-    gate_probability=1e-300, confirm_probability=0.5 + 1e-12, delete_odds=1e300,
+    gate=Gate(probability=1e-300),
+    lifecycle=Lifecycle(confirm_probability=0.5 + 1e-12, delete_odds=1e300),
 )  # fmt: skip
 
 

@@ -148,9 +148,9 @@ MISTAKES = {
     "a page that is no page": (
         lambda: am.report(TRUTH, "x.pdf"), "path: expected a name ending in .html, found 'x.pdf'",
     ),
-    "an option without effect": (
-        lambda: am.GNN(max_carried=5),
-        "max_carried: expected bodies=True beside it, found 5 alone. It has no effect",
+    "a switch for options": (
+        lambda: am.GNN(rigid=True),
+        "rigid: expected a Rigidity, found bool. Try am.tracking.Rigidity(), or None",
     ),
 }  # fmt: skip
 
@@ -224,7 +224,7 @@ WRONG = (
     (
         "track in.csv --method gnn --option gat=3",
         "--option (method gnn): expected",
-        "Did you mean 'gate_probability'?",
+        "Did you mean 'gate.probability'?",
     ),
     (
         "track in.csv --method smp --option proposers=trakcs",
@@ -232,14 +232,14 @@ WRONG = (
         "Did you mean 'tracks'?",
     ),
     (
-        "track in.csv --method gnn --option delete_odds=0",
-        "--option delete_odds: expected a number > 1",
+        "track in.csv --method gnn --option lifecycle.delete_odds=0",
+        "--option lifecycle.delete_odds: expected a number > 1",
         "found 0",
     ),
     (
-        "track in.csv --method gnn --option delete_odds",
+        "track in.csv --method gnn --option lifecycle.delete_odds",
         "--option: expected NAME=VALUE for method gnn",
-        "found 'delete_odds'",
+        "found 'lifecycle.delete_odds'",
     ),
     ("track in.csv --format c33", "--format: expected", "Did you mean 'c3d'?"),
     (

@@ -76,8 +76,10 @@ def instances():
         reason="",
     )  # fmt: skip
     changed = {
-        "gate_probability": 1.23456789e-7, "confirm_probability": 0.987654, "delete_odds": 1e5 / 3,
-        "bodies": True, "max_carried": 12345, "bond_weight": 10 / 3, "window": 5, "max_states": 777,
+        "gate": am.tracking.Gate(probability=1.23456789e-7),
+        "lifecycle": am.tracking.Lifecycle(confirm_probability=0.987654, delete_odds=1e5 / 3),
+        "rigid": am.tracking.Rigidity(max_gap=12345, bond_weight=10 / 3),
+        "window": 5, "max_states": 777,
         "prune_odds": 1e5 / 3, "new_track_odds": 1e5 / 3, "max_hypotheses": 77,
         "merged_within": 1 / 30, "guard": False,
     }  # fmt: skip
@@ -86,10 +88,13 @@ def instances():
         known = {f.name for f in dataclasses.fields(kind)}
         methods += [kind(), kind(**{k: v for k, v in changed.items() if k in known - {"capacity"}})]
     return [
-        *methods, am.tracking.Stitched(), am.tracking.Stitched().init(plain), state, update,
+        *methods, changed["gate"], changed["lifecycle"], changed["rigid"],
+        am.tracking.ChainOptions(groups="cells", distance=1 / 3),
+        am.tracking.Stitched(), am.tracking.Stitched().init(plain), state, update,
         am.MCMCDA(window=50, moves=12.345, deadline=1 / 3, confidence=12.345, end_odds=123.4,
-                  chains=4, threads=2, doubt=3.21, bonds=3, bond_weight=1 / 3, at_doubts=0.25,
-                  proposal="uniform", move_weights="report"),
+                  chains=4, threads=2, bond_weight=1 / 3, chain=am.tracking.ChainOptions(
+                      ambiguous_within=3.21, bonds=3, ambiguous_share=0.25,
+                      proposal="uniform", move_weights="report")),
         plain.motion, several, am.RandomWalk(walk_sigma=1 / 3),
         am.DWPA(increment_sigma=1 / 3, acceleration_prior_sigma=20 / 3),
         am.model.LinearMotion(F=np.eye(3), Q=np.eye(3), H=np.eye(3)[0], step=0.01,
@@ -180,7 +185,9 @@ def test_the_key_numbers_are_in_it():
     film = am.simulate.film(truth, am.Rig.ring(4, radius=4, height=1))
     n = film.observations.n_points
     said = {
-        "GNN(delete_odds=50)": am.GNN(delete_odds=50),
+        "GNN(lifecycle=Lifecycle(delete_odds=50))": am.GNN(
+            lifecycle=am.tracking.Lifecycle(delete_odds=50)
+        ),
         "GNN()": am.GNN(),
         "TrackingModel(noise 0.3 mm, P_d 0.95, clutter 0.1/m^D, gaps ≤ 10 frames, "
         "speeds ≤ 8 m/s, DWNA(acceleration_sigma=20))": model,
@@ -210,13 +217,14 @@ class Record:
         (lambda: Record(first=1, lngth=1), "Did you mean 'second_length'?"),
         (lambda: Record(), "Record.first: expected a value, found nothing"),
         (lambda: Record(1), "expected options by name, found 1 without one. Write Record(first=…)"),
-        (lambda: am.GNN(gatee=3), "Did you mean 'gate_probability'?"),
+        (lambda: am.GNN(gatee=3), "Did you mean 'gate'?"),
         (
             lambda: am.camera.BrownConrady(1, 2, 3, 4, 5, 6),
             "expected 5 values without a name, found 6",
         ),
         (lambda: am.camera.BrownConrady(1, k1=2), "BrownConrady.k1: expected one value, found two"),
-        (lambda: dataclasses.replace(am.GNN(), delete_ods=5), "Did you mean 'delete_odds'?"),
+        (lambda: dataclasses.replace(am.tracking.Lifecycle(), delete_ods=5),
+         "Did you mean 'delete_odds'?"),
     ],
 )  # fmt: skip
 def test_a_misspelt_argument_is_named(make, says):

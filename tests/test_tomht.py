@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.tracking import Gate, Lifecycle
 from partition_oracle import every_partition, every_track, tiny_model, tiny_problem
 from scenes import calibration_in_crowds, crowd, small_model, wanderers
 
@@ -16,8 +17,8 @@ REPRO = Path(__file__).resolve().parents[1].parent / "shared" / "repro"
 # Nothing is pruned, nothing is left out, and what is more likely than not is believed.
 WHOLE = am.TOMHT(
     window=16, max_branches=10**6, prune_odds=1e30, max_hypotheses=10**6, max_nodes=10**6,
-    new_track_odds=1e300, gate_probability=1e-300, confirm_probability=0.5 + 1e-12,
-    delete_odds=1e300,
+    new_track_odds=1e300, gate=Gate(probability=1e-300),
+    lifecycle=Lifecycle(confirm_probability=0.5 + 1e-12, delete_odds=1e300),
 )  # fmt: skip
 
 
@@ -238,7 +239,8 @@ def test_the_most_probable_partition_is_found_where_no_option_excludes_it():
         _, totals = every_partition(d, model)
         exact = am.MDA(
             window=16, max_branches=10**6, prune_odds=1e30, new_track_odds=1e300,
-            gate_probability=1e-300, confirm_probability=0.5 + 1e-12, delete_odds=1e300,
+            gate=Gate(probability=1e-300),
+    lifecycle=Lifecycle(confirm_probability=0.5 + 1e-12, delete_odds=1e300),
         )  # fmt: skip
         for method in (WHOLE, exact):
             tracks = am.track(d, method, model=model)

@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 import asterism as am
+from asterism.tracking import Gate, Lifecycle
 from asterism.tracking.methods.track_splitting import chi2_limits
 from scenes import calibration_in_crowds, crowd, interacting, small_model, wanderers
 from tree_oracle import trees_by_hand
@@ -142,7 +143,12 @@ def share_above(fading: float, alpha: float, n_axes: int, at: list[int], n_runs:
     """In how many runs λ(k) of the right branch exceeds δ(k), by the engine's own λ."""
     model = true_model()
     limits = chi2_limits(alpha, n_axes, fading)
-    method = am.TrackSplitting(alpha=NO_TEST, fading=fading, window=1, confirm_probability=0.6)
+    method = am.TrackSplitting(
+        alpha=NO_TEST,
+        fading=fading,
+        window=1,
+        lifecycle=Lifecycle(confirm_probability=0.6),
+    )
     rng = np.random.default_rng(int(1000 * fading) + n_axes)
     above = np.zeros(len(at))
     for _ in range(n_runs):
@@ -174,7 +180,9 @@ def test_with_fading_alpha_is_kept():
 def test_a_branch_beyond_the_limit_is_cut(alpha):
     # The first link of a track is the first test: as many first links are lost as alpha says.
     model, n_runs = true_model(), 1200
-    method = am.TrackSplitting(alpha=alpha, fading=1.0, window=1, confirm_probability=0.6)
+    method = am.TrackSplitting(
+        alpha=alpha, fading=1.0, window=1, lifecycle=Lifecycle(confirm_probability=0.6)
+    )
     rng = np.random.default_rng(5)
     lost = 0
     for _ in range(n_runs):
@@ -241,7 +249,10 @@ def test_the_surprise_of_a_mixture_is_chi2(n_axes):
         max_speed=1e3,
     )  # fmt: skip
     method = am.TrackSplitting(
-        alpha=NO_TEST, window=1, confirm_probability=0.51, gate_probability=1e-15
+        alpha=NO_TEST,
+        window=1,
+        lifecycle=Lifecycle(confirm_probability=0.51),
+        gate=Gate(probability=1e-15),
     )
     rng = np.random.default_rng(7)
     modes, r = model.motion.modes, model.sensor.noise_sigma**2

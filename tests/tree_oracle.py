@@ -61,10 +61,11 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
     """Labels of every detection and, of trees with an assignment, their confidence."""
     s, p = model.sensor, model.population
     o = Options(method, detections.n_axes)
-    gate = chi2.isf(method.gate_probability, detections.n_axes)
+    gate = chi2.isf(method.gate.probability, detections.n_axes)
     survive = math.log1p(-p.p_disappear)
     over = math.log1p(p.birth_density * s.p_detection / s.clutter_density)
-    confirm = math.log(method.confirm_probability / (1 - method.confirm_probability))
+    life = method.lifecycle
+    confirm = math.log(life.confirm_probability / (1 - life.confirm_probability))
     labels = np.full(detections.n_points, -1)
     confidence = np.zeros(detections.n_points)
     tracks: list[Branch] = []
@@ -271,7 +272,7 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
             track
             for track in tracks
             if track.gap < p.max_gap
-            and (track.id >= 0 or track.best - track.score <= math.log(method.delete_odds))
+            and (track.id >= 0 or track.best - track.score <= math.log(life.delete_odds))
         ]
         for j, y in enumerate(points):
             if j in taken:

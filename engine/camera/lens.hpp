@@ -44,7 +44,7 @@ struct Jacobian2 {
 
 class Lens {
  public:
-  enum class Kind : std::int32_t { none, radial, quadratic };
+  enum class Kind { none, radial, quadratic };
 
   Lens() = default;
   // `r_end`: radius of the domain of a radial map; `q_table`: squared radius of the image in the

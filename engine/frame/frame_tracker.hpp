@@ -1,6 +1,6 @@
 // One decision a frame: predict, gate, group, pair, update (tracks/live_tracks.hpp has a track's life).
 //
-// What differs between the methods is how the candidates of a frame are paired (`Matcher`).
+// What differs between the methods is how the candidates of a frame are paired (`Pairing`).
 #pragma once
 
 #include <cmath>
@@ -16,14 +16,8 @@
 
 namespace asterism {
 
-enum class Matcher : std::int32_t {
-  assignment = 0,           // most likely joint pairing
-  marriage_by_tracks = 1,   // stable; best for the tracks
-  marriage_by_points = 2,   // stable; best for the detections
-};
-
 struct FrameOptions {
-  Matcher matcher = Matcher::assignment;
+  Pairing pairing = Pairing::assignment;
   // The 2010 report's own method: the points of the first frame are the tracks, every pair is a
   // candidate, and no track begins, coasts or ends. Every frame has as many points as the first.
   bool is_strict = false;
@@ -140,11 +134,11 @@ class FrameTracker {
     const Groups groups =
         connected_groups(s_.eligible, static_cast<std::int32_t>(live_.size()),
                          static_cast<std::int32_t>(points.size()));
-    const MarriageMarket market{opt_.matcher == Matcher::marriage_by_points, opt_.capacity,
+    const MarriageMarket market{opt_.pairing == Pairing::detections_propose, opt_.capacity,
                                 opt_.merged_within};
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const bool is_alone = groups[g].size() == 1 && !opt_.is_strict;
-      if (is_alone || opt_.matcher == Matcher::assignment)
+      if (is_alone || opt_.pairing == Pairing::assignment)
         s_.assignment.solve(groups[g], s_.match);
       else
         market.marry(groups[g], points, live_.m.axis.D, s_.match, s_.extras);

@@ -37,6 +37,21 @@ struct JointOptions {
   CarryOptions carry;
 };
 
+struct JointStats : FrameStats {
+  // Groups that were not summed exactly, how far off they may be, most states held; groups too large
+  // for the guard against coalescence.
+  std::int64_t n_beams = 0, n_states = 0, n_unguarded = 0;
+  double bound = 0;
+
+  void add(const JointStats& next) {
+    FrameStats::add(next);
+    n_beams += next.n_beams;
+    n_states = std::max(n_states, next.n_states);
+    n_unguarded += next.n_unguarded;
+    bound = std::max(bound, next.bound);
+  }
+};
+
 class JointTracker {
  public:
   JointTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
@@ -46,8 +61,8 @@ class JointTracker {
   // As FrameTracker::step. Every point of the frame gets a label, -1 with the probability that it is
   // of no track that is believed.
   template <typename Label>
-  FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
-    FrameStats stats;
+  JointStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
+    JointStats stats;
     survive();
     find_candidates(time, step, points, stats);
     stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());
@@ -72,7 +87,7 @@ class JointTracker {
   const MotionModel& motion() const { return live_.m; }
   std::int64_t n_ids() const { return live_.next_id; }
   const LiveTracks<>& live() const { return live_; }
-  const FrameStats& total() const { return total_; }
+  const JointStats& total() const { return total_; }
   std::int64_t n_frames() const { return live_.n_frames; }
   std::int64_t n_seen() const { return live_.n_seen; }
   double last_time() const { return live_.last_time; }
@@ -131,7 +146,7 @@ class JointTracker {
   }
 
   void find_candidates(double time, const MotionStep& step, std::span<const Point> points,
-                       FrameStats& stats) {
+                       JointStats& stats) {
     const double common = -live_.sm.log_clutter - live_.leftover_gain();
     const double least = kNegligible - (carried_.is_on() ? carried_.bond_weight() : 0);
     const auto offset = [&](std::size_t i) {
@@ -165,7 +180,7 @@ class JointTracker {
     }
   }
 
-  void share_among_believed(std::span<const Point> points, FrameStats& stats) {
+  void share_among_believed(std::span<const Point> points, JointStats& stats) {
     find_eligible(true);
     s_.log_miss.assign(live_.size(), 0);
     s_.all_missed.resize(live_.size());
@@ -193,7 +208,7 @@ class JointTracker {
   // Tentative tracks take what the likeliest event gives them, and each is as sure of it as it can be
   // if the others have what that event gives to them. Together they fit almost anything: a sum over
   // all their events would take long and tell little.
-  void share_among_tentative(std::span<const Point> points, FrameStats& stats) {
+  void share_among_tentative(std::span<const Point> points, JointStats& stats) {
     find_eligible(false);
     const Groups groups =
         connected_groups(s_.eligible, static_cast<std::int32_t>(live_.size()),
@@ -231,7 +246,7 @@ class JointTracker {
 
   // What the joint events of a group say of its tracks: best pairings, misses, and new states.
   void take_group(std::span<const Candidate> group, std::span<const std::int32_t> sources,
-                  std::span<const Point> points, FrameStats& stats) {
+                  std::span<const Point> points, JointStats& stats) {
     for (std::size_t e = 0; e < group.size(); ++e) {
       const Candidate& c = group[e];
       s_.missed[c.row] = s_.all_missed[c.row];
@@ -264,7 +279,7 @@ class JointTracker {
   // How far each pairing of a group moves its track: as much as is probable; where events differ by
   // who is who, only the best of them; beyond the guard's reach, the best event.
   void weigh(std::span<const Candidate> group, std::span<const std::int32_t> sources,
-             FrameStats& stats) {
+             JointStats& stats) {
     const bool needs_guard = opt_.is_guarded && group.front().row != group.back().row;
     if (needs_guard && s_.guard.solve(group, s_.best, s_.weights)) return;
     stats.n_unguarded += needs_guard;
@@ -274,7 +289,7 @@ class JointTracker {
   }
 
   template <typename Label>
-  void update_tracks(double time, std::span<const Point> points, FrameStats& stats,
+  void update_tracks(double time, std::span<const Point> points, JointStats& stats,
                      Label&& label) {
     for (std::size_t i = 0; i < live_.size(); ++i) {
       LiveTrack<NoMore>& track = live_[i];
@@ -317,7 +332,7 @@ class JointTracker {
   LiveTracks<> live_;
   JointOptions opt_;
   CarriedTracks carried_;
-  FrameStats total_;
+  JointStats total_;
   Fresh<Memory> s_;
 };
 

@@ -20,6 +20,13 @@ namespace asterism {
 
 using Pair = std::pair<std::int32_t, std::int32_t>;  // track, detection
 
+// How the candidates of a frame are paired.
+enum class Pairing {
+  assignment,           // the most likely joint pairing
+  tracks_propose,       // stable, best for the tracks
+  detections_propose,   // stable, best for the detections
+};
+
 struct MarriageMarket {
   bool points_propose = false;
   std::int32_t capacity = 1;  // so many detections may marry one track

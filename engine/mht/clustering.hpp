@@ -25,7 +25,7 @@ class Clustering {
 
   // Which clusters may have one and the same detection; these become one.
   std::vector<SuperCluster> join(std::vector<Cluster> clusters, const WindowFrame& frame,
-                                 std::size_t n_trees, FrameStats& stats) {
+                                 std::size_t n_trees, TreeStats& stats) {
     const auto n_clusters = static_cast<std::int32_t>(clusters.size());
     const auto n_points = static_cast<std::int32_t>(frame.points.size());
     likeliest_.assign(n_trees, -1);

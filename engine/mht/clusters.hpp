@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "tracks/live_tracks.hpp"
+#include "trees/branches.hpp"
 
 namespace asterism {
 
@@ -56,7 +56,7 @@ inline std::vector<double> probabilities(const Cluster& cluster) {
 
 // Whether enough hypotheses were found, the next of which would have this weight.
 inline bool is_enough(const std::vector<Hypothesis>& found, double next, const MatrixOptions& options,
-                      FrameStats& stats) {
+                      TreeStats& stats) {
   if (found.empty()) return false;
   if (next < found.front().log_weight() - options.drop) return true;
   if (static_cast<std::int64_t>(found.size()) < options.max_hypotheses) return false;
@@ -67,7 +67,7 @@ inline bool is_enough(const std::vector<Hypothesis>& found, double next, const M
 
 // The best of all pairs of hypotheses of two clusters.
 inline Cluster combined(const Cluster& a, const Cluster& b, const MatrixOptions& options,
-                        FrameStats& stats) {
+                        TreeStats& stats) {
   Cluster out;
   std::vector<std::pair<std::int64_t, std::int32_t>> order;  // key, place in a then b
   for (const auto* part : {&a, &b})

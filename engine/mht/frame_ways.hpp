@@ -40,7 +40,7 @@ class FrameWays {
   }
 
   // Splits all branches over the newest frame of the window, whose detections begin trees as well.
-  void grow(HypothesisWindow& open, FrameStats& stats) {
+  void grow(HypothesisWindow& open, TreeStats& stats) {
     const BranchGrower grower(open.live, open.branches);
     ways_.assign(open.n_all(), {});
     for (std::size_t i = 0; i < open.n_all(); ++i) {

@@ -22,7 +22,7 @@ class HypothesisGeneration {
       : open_(open), ways_(ways), opt_(options) {}
 
   // Replaces the hypotheses of a cluster by the best that follow from them.
-  void explain(const WindowFrame& frame, SuperCluster& super, FrameStats& stats) const {
+  void explain(const WindowFrame& frame, SuperCluster& super, TreeStats& stats) const {
     Cluster& cluster = super.cluster;
     const std::size_t n_old = cluster.keys.size(), n_points = super.columns.size();
     const Cluster before = std::move(cluster);

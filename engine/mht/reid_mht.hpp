@@ -38,7 +38,7 @@ class HypothesisMatrix {
         opt_(options) {}
 
   template <typename Label>
-  void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
+  void add(std::shared_ptr<WindowFrame> frame, TreeStats& stats, Label&& label) {
     frame->claimed.assign(frame->points.size(), 0);
     open_.advise(*frame, stats);
     open_.claim(*frame);
@@ -72,7 +72,7 @@ class HypothesisMatrix {
   // Decides all frames that are left by the best hypothesis of every cluster; all probabilities are
   // those over the hypotheses as they are now.
   template <typename Label>
-  void decide_all(FrameStats& stats, Label&& label) {
+  void decide_all(TreeStats& stats, Label&& label) {
     s_.ways.list_keys(open_);
     weigh(open_.frames.size());
     while (open_.n_open() > 0) mash(stats, label);
@@ -82,7 +82,7 @@ class HypothesisMatrix {
   const LiveTracks<Tree>& live() const { return open_.live; }
   const HypothesisWindow& window() const { return open_; }
   const std::vector<Cluster>& clusters() const { return clusters_; }
-  void count(FrameStats& stats) const { open_.count(stats); }
+  void count(TreeStats& stats) const { open_.count(stats); }
 
  private:
   struct Memory {
@@ -95,7 +95,7 @@ class HypothesisMatrix {
 
   // REDUCE, the similar: a hypothesis of the same targets, each nearly where a likelier one has it,
   // is part of that one from now on.
-  void merge_similar(Cluster& cluster, FrameStats& stats) const {
+  void merge_similar(Cluster& cluster, TreeStats& stats) const {
     if (!(opt_.merged_within > 0)) return;
     std::vector<Hypothesis> kept;
     for (Hypothesis& h : cluster.hypotheses) {
@@ -213,7 +213,7 @@ class HypothesisMatrix {
 
   // MASH
   template <typename Label>
-  void mash(FrameStats& stats, Label&& label) {
+  void mash(TreeStats& stats, Label&& label) {
     std::vector<Fate> fates;
     for (std::size_t i = 0; i < open_.n_all(); ++i) {
       const auto at = s_.fates.front().find(open_.tree(i).more.key);

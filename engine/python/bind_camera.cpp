@@ -170,20 +170,23 @@ Out<double> jacobian(const Camera& camera, const Rows& points) {
 }  // namespace
 
 void bind_camera(nb::module_& module) {
+  nb::enum_<Lens::Kind>(module, "LensKind")
+      .value("none", Lens::Kind::none)
+      .value("radial", Lens::Kind::radial)
+      .value("quadratic", Lens::Kind::quadratic);
   nb::class_<Camera>(module, "Camera")
       .def(
           "__init__",
           [](Camera* self, const Rows& R, const In<double>& t, const Rows& A, const Rows& B,
-             std::int32_t lens_kind, bool is_backward, const In<double>& coefficients, double r_end,
+             Lens::Kind lens_kind, bool is_backward, const In<double>& coefficients, double r_end,
              double q_table, std::array<double, 2> start, double near, double far,
              std::int32_t width, std::int32_t height) {
             require(rows(R, 3, "R: shape (3, 3)") == 3 && t.size() == 3, "R: (3, 3), t: (3,)");
-            require(lens_kind >= 0 && lens_kind <= 2, "lens_kind: 0, 1 or 2");
             const std::size_t needed[] = {0, 5, 10};
-            require(coefficients.size() == needed[lens_kind], "coefficients: as the kind needs");
+            require(coefficients.size() == needed[static_cast<int>(lens_kind)], "coefficients: as the kind needs");
             require(width > 0 && height > 0, "a size above 0");
             new (self) Camera({R.data(), 9}, {t.data(), 3}, affine(A), affine(B),
-                              Lens(static_cast<Lens::Kind>(lens_kind), is_backward,
+                              Lens(lens_kind, is_backward,
                                    {coefficients.data(), coefficients.size()}, r_end, q_table,
                                    Plane{start[0], start[1]}),
                               near, far, width, height);

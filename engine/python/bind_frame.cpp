@@ -78,17 +78,22 @@ void bind_frame(nb::module_& module) {
       .def(
           "__init__",
           [](FrameTracker* self, const MotionModel& model, const ScoreModel& score,
-             const LifeOptions& life, std::int32_t matcher, bool is_strict, std::int32_t capacity,
+             const LifeOptions& life, Pairing pairing, bool is_strict, std::int32_t capacity,
              double merged_within, const CarryOptions& carry) {
             require(capacity >= 1 && capacity <= 64, "capacity: 1 to 64");
-            require(matcher >= 0 && matcher <= 2, "matcher: 0, 1 or 2");
             require(!(is_strict && carry.is_on), "carry: not where is_strict");
             new (self) FrameTracker(
                 model, score, life,
-                {static_cast<Matcher>(matcher), is_strict, capacity, merged_within, carry});
+                {pairing, is_strict, capacity, merged_within, carry});
           },
-          "model"_a, "score"_a, "life"_a, nb::kw_only(), "matcher"_a, "is_strict"_a, "capacity"_a,
+          "model"_a, "score"_a, "life"_a, nb::kw_only(), "pairing"_a, "is_strict"_a, "capacity"_a,
           "merged_within"_a, "carry"_a);
+
+  nb::class_<JointStats, FrameStats>(module, "JointStats")
+      .def_ro("n_beams", &JointStats::n_beams)
+      .def_ro("n_states", &JointStats::n_states)
+      .def_ro("n_unguarded", &JointStats::n_unguarded)
+      .def_ro("bound", &JointStats::bound);
 
   bind_tracker<JointTracker>(module, "JointTracker")
       .def(

@@ -94,21 +94,26 @@ void bind_mcmc(nb::module_& module) {
       .def_ro("chain", &SampledStats::chain)
       .def_ro("bond_score", &SampledStats::bond_score);
 
+  nb::enum_<SplitBy>(module, "SplitBy")
+      .value("whole", SplitBy::whole)
+      .value("likelihood", SplitBy::likelihood)
+      .value("cells", SplitBy::cells)
+      .value("clusters", SplitBy::clusters);
+
   nb::class_<McmcOptions>(module, "McmcOptions")
       .def(
           "__init__",
           [](McmcOptions* self, std::int32_t window, bool is_whole, std::int32_t block, double moves, double deadline,
              bool has_assignment, double confidence, std::int32_t chains, std::int32_t threads,
-             std::int32_t split_by, double doubt, double distance, std::int32_t bonds,
+             SplitBy split_by, double doubt, double distance, std::int32_t bonds,
              double tolerance, double bond_weight) {
             require(window >= 1 && block >= 1, "window and block: at least 1");
             require(chains >= 1 && threads >= 1, "chains and threads: at least 1");
-            require(split_by >= 0 && split_by <= 3, "split_by: 0 to 3");
             require(bond_weight >= 0, "bond_weight: at least 0");
             require(bonds == 0 || (bonds >= 2 && bonds <= 4), "bonds: 0, 2, 3 or 4");
             new (self) McmcOptions{
                 window,     is_whole, block,   moves,   deadline, has_assignment,
-                confidence, chains,   threads, {static_cast<SplitBy>(split_by), doubt, distance},
+                confidence, chains,   threads, {split_by, doubt, distance},
                 {bonds, window, tolerance}, bond_weight};
           },
           nb::kw_only(), "window"_a, "is_whole"_a, "block"_a, "moves"_a, "deadline"_a, "has_assignment"_a,

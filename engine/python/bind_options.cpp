@@ -2,7 +2,9 @@
 #include <algorithm>
 
 #include "python/bindings.hpp"
+#include "frame/marriage_market.hpp"
 #include "python/motion_arrays.hpp"
+#include "python/tracker_face.hpp"
 #include "tracks/carried_tracks.hpp"
 #include "tracks/live_tracks.hpp"
 #include "trees/branches.hpp"
@@ -18,19 +20,6 @@ void bind_options(nb::module_& module) {
       .def_ro("n_confirmed", &FrameStats::n_confirmed)
       .def_ro("n_tentative", &FrameStats::n_tentative)
       .def_ro("n_pending", &FrameStats::n_pending)
-      .def_ro("n_beams", &FrameStats::n_beams)
-      .def_ro("n_states", &FrameStats::n_states)
-      .def_ro("n_unguarded", &FrameStats::n_unguarded)
-      .def_ro("bound", &FrameStats::bound)
-      .def_ro("n_branches", &FrameStats::n_branches)
-      .def_ro("most_branches", &FrameStats::most_branches)
-      .def_ro("n_cut", &FrameStats::n_cut)
-      .def_ro("n_limited", &FrameStats::n_limited)
-      .def_ro("n_shared", &FrameStats::n_shared)
-      .def_ro("n_hypotheses", &FrameStats::n_hypotheses)
-      .def_ro("n_nodes", &FrameStats::n_nodes)
-      .def_ro("gap", &FrameStats::gap)
-      .def_ro("n_merged", &FrameStats::n_merged)
       .def_ro("n_bonds", &FrameStats::n_bonds)
       .def_ro("n_carried", &FrameStats::n_carried)
       .def_ro("n_returned", &FrameStats::n_returned)
@@ -68,11 +57,19 @@ void bind_options(nb::module_& module) {
           },
           nb::kw_only(), "is_on"_a = false, "max_carried"_a = 0, "bond_weight"_a = 0.0);
 
-  nb::register_exception_translator([](const std::exception_ptr& p, void*) {
-    try {
-      std::rethrow_exception(p);
-    } catch (const CandidateLimit&) {
-      PyErr_SetString(PyExc_OverflowError, "too many candidates in a frame");
-    }
-  });
+  nb::enum_<Pairing>(module, "Pairing")
+      .value("assignment", Pairing::assignment)
+      .value("tracks_propose", Pairing::tracks_propose)
+      .value("detections_propose", Pairing::detections_propose);
+
+  nb::class_<StepResult>(module, "StepResult")
+      .def_ro("tracker", &StepResult::tracker)
+      .def_ro("labels", &StepResult::labels)
+      .def_ro("confidence", &StepResult::confidence)
+      .def_ro("revised", &StepResult::revised)
+      .def_ro("revised_labels", &StepResult::revised_labels)
+      .def_ro("revised_confidence", &StepResult::revised_confidence)
+      .def_ro("stats", &StepResult::stats);
+
+  nb::exception<CandidateLimit>(module, "CandidateLimit");
 }

@@ -193,11 +193,5 @@ void bind_solvers(nb::module_& module) {
   module.def("packing_losses", &packing_losses, "first_option"_a, "worths"_a, "first_use"_a, "uses"_a);
   module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a);
 
-  nb::register_exception_translator([](const std::exception_ptr& p, void*) {
-    try {
-      std::rethrow_exception(p);
-    } catch (const FrontierLimit& limit) {
-      PyErr_SetString(PyExc_OverflowError, limit.what());
-    }
-  });
+  nb::exception<FrontierLimit>(module, "FrontierLimit");
 }

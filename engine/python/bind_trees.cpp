@@ -21,7 +21,7 @@ using namespace asterism;
 namespace {
 
 // λ of the believed tracks and the number of detections in it, in the order of `tracks`.
-nb::tuple chi2(const TreeTracker<Forest>& tracker) {
+nb::dict chi2(const TreeTracker<Forest>& tracker) {
   std::size_t K = 0;
   for (const auto& t : tracker.live().tracks) K += t.is_confirmed();
   Owned<double> lambda(K);
@@ -32,7 +32,10 @@ nb::tuple chi2(const TreeTracker<Forest>& tracker) {
     lambda.data[k] = t.more.lambda;
     n_updates.data[k++] = t.more.n_updates;
   }
-  return nb::make_tuple(lambda.give({K}), n_updates.give({K}));
+  nb::dict out;
+  out["chi2"] = lambda.give({K});
+  out["updates"] = n_updates.give({K});
+  return out;
 }
 
 // Branches that are worth their part of the log posterior.
@@ -91,21 +94,33 @@ nb::list clusters(const TreeTracker<HypothesisMatrix>& tracker) {
 }  // namespace
 
 void bind_trees(nb::module_& module) {
+  nb::class_<TreeStats, FrameStats>(module, "TreeStats")
+      .def_ro("n_branches", &TreeStats::n_branches)
+      .def_ro("most_branches", &TreeStats::most_branches)
+      .def_ro("n_cut", &TreeStats::n_cut)
+      .def_ro("n_limited", &TreeStats::n_limited)
+      .def_ro("n_shared", &TreeStats::n_shared)
+      .def_ro("n_beams", &TreeStats::n_beams)
+      .def_ro("bound", &TreeStats::bound)
+      .def_ro("gap", &TreeStats::gap)
+      .def_ro("n_hypotheses", &TreeStats::n_hypotheses)
+      .def_ro("n_merged", &TreeStats::n_merged)
+      .def_ro("n_nodes", &TreeStats::n_nodes);
+
   bind_tracker<TreeTracker<Forest>>(module, "TreeTracker")
       .def("chi2", &chi2)
       .def(
           "__init__",
           [](TreeTracker<Forest>* self, const MotionModel& model, const ScoreModel& score,
-             const LifeOptions& life, BranchOptions branches, std::int32_t resolver,
+             const LifeOptions& life, BranchOptions branches, Pairing pairing,
              bool is_independent, const CarryOptions& carry) {
-            require(resolver >= 0 && resolver <= 2, "resolver: 0, 1 or 2");
             require(!(is_independent && carry.is_on), "carry: not where is_independent");
             branches.max_carried = carry.max_carried;
             new (self) TreeTracker<Forest>(
                 Forest(model, score, life, branches, carry,
-                       {static_cast<Resolver>(resolver), is_independent}));
+                       {pairing, is_independent}));
           },
-          "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "resolver"_a,
+          "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "pairing"_a,
           "is_independent"_a, "carry"_a);
 
   bind_tracker<TreeTracker<HypothesisForest>>(module, "HypothesisTracker")
@@ -128,7 +143,7 @@ void bind_trees(nb::module_& module) {
               packer = [shared = std::make_shared<const PythonPacker>(std::move(choose))](
                            std::span<const std::vector<PackingOption>> trees,
                            std::span<const std::int32_t> first_resource,
-                           FrameStats& stats) { return (*shared)(trees, first_resource, stats); };
+                           TreeStats& stats) { return (*shared)(trees, first_resource, stats); };
             new (self) TreeTracker<HypothesisForest>(
                 HypothesisForest(model, score, life, branches, carry, new_track_claim,
                                  {max_hypotheses, max_nodes, least_new_worth, delete_drop, drop,

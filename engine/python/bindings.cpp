@@ -9,9 +9,9 @@ NB_MODULE(_engine, module) {
   nb::set_leak_warnings(false);  // what is alive at exit is nobody's loss
   bind_tracking(module);
   bind_options(module);
+  bind_frame(module);
   bind_trees(module);
   bind_mcmc(module);
-  bind_frame(module);
   bind_camera(module);
   bind_solvers(module);
   bind_chain(module);

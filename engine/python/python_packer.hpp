@@ -29,7 +29,7 @@ class PythonPacker {
 
   std::vector<std::int32_t> operator()(std::span<const std::vector<PackingOption>> trees,
                                        std::span<const std::int32_t> first_resource,
-                                       FrameStats& stats) const {
+                                       TreeStats& stats) const {
     std::size_t n_options = 0, n_uses = 0;
     for (const auto& options : trees)
       for (const PackingOption& option : options) {

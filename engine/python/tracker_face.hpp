@@ -1,8 +1,6 @@
 // The face that every tracker shows to Python: one frame on a copy, many frames in place, the tracks.
 #pragma once
 
-#include <nanobind/stl/tuple.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -25,10 +23,16 @@ using Confidence = nb::ndarray<double, nb::numpy, nb::c_contig, nb::device::cpu>
 // tracker is compiled once.
 using Labeller = std::function<void(std::int64_t, std::int64_t, double)>;
 
-// One frame on a copy of the state: (new state, labels, their confidence, earlier detections whose
-// label changes, their labels, their confidence, stats). Without confidence its arrays are empty.
+// What one frame, taken on a copy of the tracker, decided. Without confidence its arrays are empty.
+struct StepResult {
+  nb::object tracker;  // the copy, after the frame
+  nb::object labels, confidence;
+  nb::object revised, revised_labels, revised_confidence;  // earlier detections whose label changes
+  nb::object stats;
+};
+
 template <typename Tracker>
-nb::tuple step(const Tracker& before, double time, const In<double>& F, const In<double>& Q,
+StepResult step(const Tracker& before, double time, const In<double>& F, const In<double>& Q,
                const In<double>& points) {
   const MotionModel& m = before.motion();
   const std::size_t size = static_cast<std::size_t>(m.M) * m.axis.n * m.axis.n;
@@ -67,8 +71,9 @@ nb::tuple step(const Tracker& before, double time, const In<double>& F, const In
     ids.data[i] = revised[i].id;
     if (r_sure > 0) sure.data[i] = revised[i].confidence;
   }
-  return nb::make_tuple(std::move(after), labels.give({n}), confidence.give({n_sure}),
-                        which.give({r}), ids.give({r}), sure.give({r_sure}), stats);
+  return {nb::cast(std::move(after)), nb::cast(labels.give({n})),
+          nb::cast(confidence.give({n_sure})), nb::cast(which.give({r})),
+          nb::cast(ids.give({r})), nb::cast(sure.give({r_sure})), nb::cast(std::move(stats))};
 }
 
 // So often a run asks whether it is to end.
@@ -118,10 +123,9 @@ void run(Tracker& tracker, const In<double>& times, const In<std::int32_t>& kind
   if constexpr (requires { tracker.end_pass(label); }) tracker.end_pass(label);
 }
 
-// What a live display needs of the believed tracks: (ids, gaps, log odds that they exist, means and
-// covariances of the state).
+// What a live display needs of the confirmed tracks.
 template <typename Tracker>
-nb::tuple tracks(const Tracker& tracker) {
+nb::dict tracks(const Tracker& tracker) {
   const MotionModel& m = tracker.motion();
   const auto& live = tracker.live();
   std::size_t K = 0;
@@ -141,8 +145,13 @@ nb::tuple tracks(const Tracker& tracker) {
     std::copy_n(state.P.begin(), n * n, covariances.data.get() + k * n * n);
     ++k;
   }
-  return nb::make_tuple(ids.give({K}), gaps.give({K}), scores.give({K}), means.give({K, D, n}),
-                        covariances.give({K, n, n}));
+  nb::dict out;
+  out["ids"] = ids.give({K});
+  out["gaps"] = gaps.give({K});
+  out["log_odds"] = scores.give({K});
+  out["means"] = means.give({K, D, n});
+  out["covariances"] = covariances.give({K, n, n});
+  return out;
 }
 
 template <typename Tracker>

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -58,25 +59,15 @@ struct LiveTrack {
   std::int32_t untold() const { return gap - carried; }  // frames in which nobody told where it is
 };
 
-// Of one frame, or of many: sums of what is counted, the worst of what is a size or a bound.
+// Of one frame, or of many: sums of what is counted, the greatest of what is a size. Trackers that
+// count more derive from it.
 struct FrameStats {
   std::int64_t n_candidates = 0, n_groups = 0, largest_group = 0;
   std::int64_t n_confirmed = 0, n_tentative = 0;  // at the end
   std::int64_t n_pending = 0;  // detections that tentative tracks hold at the end
-  // Joint marginals: groups that were not summed exactly, how far off they may be, states held;
-  // groups too large for the guard against coalescence.
-  std::int64_t n_beams = 0, n_states = 0, n_unguarded = 0;
-  double bound = 0;
-  // Trees: branches at the end, most in a tree, cut by the χ² test, dropped by the limit on their
-  // number; detections that several trees like best.
-  std::int64_t n_branches = 0, most_branches = 0, n_cut = 0, n_limited = 0, n_shared = 0;
-  // Joint hypotheses: most of a cluster, nodes of the search, how far the chosen one may be below the
-  // best where the search was cut short.
-  std::int64_t n_hypotheses = 0, n_nodes = 0;
-  double gap = 0;
-  std::int64_t n_merged = 0;  // hypotheses that became part of a similar one
-  std::int64_t n_bonds = 0;  // of markers, at the end
-  // Hidden tracks that were carried, by frames; those that came back; points that neighbours refused.
+  std::int64_t n_bonds = 0;    // of markers, at the end
+  // Occluded tracks that were carried, by frames; those that were seen again; points that neighbours
+  // refused.
   std::int64_t n_carried = 0, n_returned = 0, n_refused = 0;
 
   void add(const FrameStats& next) {
@@ -84,7 +75,6 @@ struct FrameStats {
     n_confirmed = next.n_confirmed;
     n_tentative = next.n_tentative;
     n_pending = next.n_pending;
-    n_branches = next.n_branches;
     n_bonds = next.n_bonds;
   }
 
@@ -93,25 +83,16 @@ struct FrameStats {
     n_candidates += next.n_candidates;
     n_groups += next.n_groups;
     largest_group = std::max(largest_group, next.largest_group);
-    n_beams += next.n_beams;
-    n_states = std::max(n_states, next.n_states);
-    n_unguarded += next.n_unguarded;
-    bound = std::max(bound, next.bound);
-    most_branches = std::max(most_branches, next.most_branches);
-    n_cut += next.n_cut;
-    n_limited += next.n_limited;
-    n_shared += next.n_shared;
-    n_hypotheses = std::max(n_hypotheses, next.n_hypotheses);
-    n_nodes += next.n_nodes;
-    gap = std::max(gap, next.gap);
-    n_merged += next.n_merged;
     n_carried += next.n_carried;
     n_returned += next.n_returned;
     n_refused += next.n_refused;
   }
 };
 
-class CandidateLimit {};  // thrown when a frame has more candidates than allowed
+// Thrown when a frame has more candidates than allowed.
+struct CandidateLimit : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 // Working memory of one step.
 struct GateMemory {
@@ -192,7 +173,7 @@ class LiveTracks {
       };
       within_gate(s_.grid, points, prediction, s_.radii[a], tracks[i].last,
                   time - tracks[i].last_time, add);
-      if (static_cast<std::int64_t>(out.size()) > opt.max_candidates) throw CandidateLimit{};
+      if (static_cast<std::int64_t>(out.size()) > opt.max_candidates) throw CandidateLimit("too many candidates in a frame");
     }
   }
   // Track i is expected elsewhere than by its own state.

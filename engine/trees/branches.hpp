@@ -22,6 +22,41 @@ namespace asterism {
 
 inline constexpr int kMaxWindow = 16;
 
+// What trackers count whose tracks are trees of branches.
+struct TreeStats : FrameStats {
+  // Branches at the end; most of a tree; ended by the χ² test; dropped by the limit on their number.
+  std::int64_t n_branches = 0, most_branches = 0, n_cut = 0, n_limited = 0;
+  std::int64_t n_shared = 0;  // detections that several trees like best
+  std::int64_t n_beams = 0;   // groups that were not solved exactly
+  double bound = 0, gap = 0;  // how far off their marginals may be, and their log posterior
+  // Joint hypotheses: most of a cluster, merged into a similar one, nodes of the search.
+  std::int64_t n_hypotheses = 0, n_merged = 0, n_nodes = 0;
+
+  void add(const TreeStats& next) {
+    FrameStats::add(next);
+    add_tree_work(next);
+    n_branches = next.n_branches;
+  }
+  void add_work(const TreeStats& next) {
+    FrameStats::add_work(next);
+    add_tree_work(next);
+  }
+
+ private:
+  void add_tree_work(const TreeStats& next) {
+    most_branches = std::max(most_branches, next.most_branches);
+    n_cut += next.n_cut;
+    n_limited += next.n_limited;
+    n_shared += next.n_shared;
+    n_beams += next.n_beams;
+    bound = std::max(bound, next.bound);
+    gap = std::max(gap, next.gap);
+    n_hypotheses = std::max(n_hypotheses, next.n_hypotheses);
+    n_merged += next.n_merged;
+    n_nodes += next.n_nodes;
+  }
+};
+
 struct BranchOptions {
   std::int32_t window = 1;        // frames until one is decided
   std::int32_t max_branches = 1;  // of a track
@@ -148,7 +183,7 @@ class BranchGrower {
   // at most `max_branches`, or not at all with kAll.
   static constexpr std::int32_t kAll = std::numeric_limits<std::int32_t>::max();
   void grow(const WindowFrame& frame, LiveTrack<Tree>& track, std::int32_t n_open,
-            std::int32_t max_branches, FrameStats& stats) {
+            std::int32_t max_branches, TreeStats& stats) {
     grown_.clear();
     for (Branch& parent : track.more.branches)
       split(frame, track, std::move(parent), grown_, stats);
@@ -170,7 +205,7 @@ class BranchGrower {
 
   // Adds a branch's ways over a further frame: one for each detection in its gate, then the miss.
   void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch parent,
-             std::vector<Branch>& out, FrameStats& stats) const {
+             std::vector<Branch>& out, TreeStats& stats) const {
     const std::int64_t slot = frame.number % kMaxWindow;
     parent.path[slot] = -1;
     parent.distance2[slot] = 0;
@@ -225,7 +260,7 @@ class BranchGrower {
                         own.radius(live_.opt.gate, least, frame.grid.r_most()), parent.last,
                         frame.time - parent.last_time, child_with);
     }
-    if (static_cast<std::int64_t>(out.size()) > live_.opt.max_candidates) throw CandidateLimit{};
+    if (static_cast<std::int64_t>(out.size()) > live_.opt.max_candidates) throw CandidateLimit("too many candidates in a frame");
     if (lives_on(all, parent.gap, advice))
       ++parent.carried;
     else
@@ -288,7 +323,7 @@ class BranchGrower {
  private:
   static constexpr double kNoClaim = -7;  // log of w
 
-  void prune(std::int64_t frame, std::int32_t n_open, std::int32_t max_branches, FrameStats& stats) {
+  void prune(std::int64_t frame, std::int32_t n_open, std::int32_t max_branches, TreeStats& stats) {
     std::stable_sort(grown_.begin(), grown_.end(),
                      [&](const Branch& a, const Branch& b) { return rank(a) > rank(b); });
     const double least = max_branches == kAll ? -std::numeric_limits<double>::infinity()

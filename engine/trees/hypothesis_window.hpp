@@ -40,7 +40,7 @@ struct HypothesisWindow : OpenWindow {
   }
 
   // What may begin in an open frame is tentative as well.
-  void count(FrameStats& stats) const {
+  void count(TreeStats& stats) const {
     OpenWindow::count(stats);
     stats.n_tentative += static_cast<std::int64_t>(seeds.size());
     stats.n_pending += static_cast<std::int64_t>(seeds.size());
@@ -69,7 +69,7 @@ struct HypothesisWindow : OpenWindow {
   // Decides the oldest frame: the fate of every tree, and the probability of each detection to be
   // nobody's.
   template <typename Label>
-  void carry_out(std::span<const Fate> fates, std::span<const double> free, FrameStats& stats,
+  void carry_out(std::span<const Fate> fates, std::span<const double> free, TreeStats& stats,
                  Label&& label) {
     const std::shared_ptr<const WindowFrame> frame = pop();
     for (std::size_t j = 0; j < frame->points.size(); ++j)
@@ -94,14 +94,14 @@ struct HypothesisWindow : OpenWindow {
         begin(*frame, seeds[k], fates[n_live + k].probability, stats);
     std::erase_if(seeds, [&](const LiveTrack<Tree>& s) { return s.more.first == frame->number; });
     live.end_tracks();
-    FrameStats ignored;
+    TreeStats ignored;
     live.end_frame(frame->time, frame->points.size(), ignored);
   }
 
  private:
   // A seed becomes a track, with those of its branches that have a second detection.
   void begin(const WindowFrame& frame, LiveTrack<Tree>& seed, double probability,
-             FrameStats& stats) {
+             TreeStats& stats) {
     const std::int32_t j = seed.more.branches.front().taken(frame.number);
     LiveTrack<Tree>& track = live.begin(j, frame.points[j], frame.time, live.birth_gain());
     track.pending.back().confidence = probability;

@@ -28,7 +28,7 @@ struct OpenWindow {
   std::int32_t n_open() const { return static_cast<std::int32_t>(frames.size()); }
   bool is_full() const { return n_open() == branches.window; }
 
-  void count(FrameStats& stats) const {
+  void count(TreeStats& stats) const {
     for (const LiveTrack<Tree>& track : live.tracks) {
       ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
       stats.n_pending += static_cast<std::int64_t>(track.pending.size());
@@ -37,7 +37,7 @@ struct OpenWindow {
   }
 
   // What neighbours say of a frame that comes.
-  void advise(WindowFrame& frame, FrameStats& stats) {
+  void advise(WindowFrame& frame, TreeStats& stats) {
     if (bodies.is_on()) bodies.advise(live, n_open(), frame, stats);
   }
   // What the believed tracks expect of it.
@@ -47,7 +47,7 @@ struct OpenWindow {
       if (track.is_confirmed()) grower.claim(track, frame);
   }
 
-  void push(std::shared_ptr<const WindowFrame> frame, FrameStats& stats) {
+  void push(std::shared_ptr<const WindowFrame> frame, TreeStats& stats) {
     frames.push_back(std::move(frame));
     BranchGrower grower(live, branches);
     for (LiveTrack<Tree>& track : live.tracks)
@@ -61,13 +61,13 @@ struct OpenWindow {
   }
 
   // After a decision.
-  void learn(FrameStats& stats) {
+  void learn(TreeStats& stats) {
     if (bodies.is_on()) bodies.learn(live, stats);
   }
 
   // Carries what is decided of track i over the frame just popped, with detection `own` or, at -1,
   // none; its gap is the caller's.
-  void carry(const WindowFrame& frame, std::size_t i, std::int32_t own, FrameStats& stats) {
+  void carry(const WindowFrame& frame, std::size_t i, std::int32_t own, TreeStats& stats) {
     LiveTrack<Tree>& track = live[i];
     const BranchGrower grower(live, branches);
     predict(live.m, frame.step, track.state);
@@ -102,7 +102,7 @@ struct OpenWindow {
   void end(std::size_t i) { live[i].gap = live.sm.max_gap + live[i].carried; }
 
   // Keeps the branches that agree with what was carried; grows new ones where none do.
-  void keep(const WindowFrame& frame, std::size_t i, std::int32_t own, FrameStats& stats) {
+  void keep(const WindowFrame& frame, std::size_t i, std::int32_t own, TreeStats& stats) {
     LiveTrack<Tree>& track = live[i];
     std::erase_if(track.more.branches,
                   [&](const Branch& b) { return b.taken(frame.number) != own; });
@@ -122,7 +122,7 @@ struct OpenWindow {
     }
   }
 
-  void regrow(LiveTrack<Tree>& track, FrameStats& stats) {
+  void regrow(LiveTrack<Tree>& track, TreeStats& stats) {
     BranchGrower grower(live, branches);
     track.more.branches.assign(1, grower.root(track));
     std::int32_t n = 0;

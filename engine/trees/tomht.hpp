@@ -21,7 +21,7 @@ namespace asterism {
 // Chooses an option of each tree, no resource twice: given the options of all trees and the first
 // resource of every open frame. Adds to the stats by how much its choice may be below the best.
 using Packer = std::function<std::vector<std::int32_t>(
-    std::span<const std::vector<PackingOption>>, std::span<const std::int32_t>, FrameStats&)>;
+    std::span<const std::vector<PackingOption>>, std::span<const std::int32_t>, TreeStats&)>;
 
 struct HypothesisOptions {
   std::int64_t max_hypotheses = 1;  // of a cluster, for the probabilities
@@ -42,7 +42,7 @@ class HypothesisForest {
         opt_(options) {}
 
   template <typename Label>
-  void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
+  void add(std::shared_ptr<WindowFrame> frame, TreeStats& stats, Label&& label) {
     frame->claimed.assign(frame->points.size(), 0);
     open_.advise(*frame, stats);
     open_.claim(*frame);
@@ -57,7 +57,7 @@ class HypothesisForest {
   }
 
   template <typename Label>
-  void decide_all(FrameStats& stats, Label&& label) {
+  void decide_all(TreeStats& stats, Label&& label) {
     while (open_.n_open() > 0) {
       limit(stats);
       decide(stats, label);
@@ -66,7 +66,7 @@ class HypothesisForest {
 
   bool has_confidence() const { return !opt_.packer; }
   const LiveTracks<Tree>& live() const { return open_.live; }
-  void count(FrameStats& stats) const { open_.count(stats); }
+  void count(TreeStats& stats) const { open_.count(stats); }
 
  private:
   // What a tree does in a hypothesis.
@@ -93,7 +93,7 @@ class HypothesisForest {
 
   // Of the options that `limit` left and weighed.
   template <typename Label>
-  void decide(FrameStats& stats, Label&& label) {
+  void decide(TreeStats& stats, Label&& label) {
     leave_out_improbable();
     choose(stats);
     open_.carry_out(s_.fates, s_.free, stats, label);
@@ -167,13 +167,13 @@ class HypothesisForest {
   // Drops the branches that no probable hypothesis needs. What a tree would like best may be another's,
   // the more so the longer the window: so a branch is judged by what the best hypothesis of the whole
   // cluster loses with it, and the branches of a cluster compete for its room together.
-  void limit(FrameStats& stats) {
+  void limit(TreeStats& stats) {
     list_options();
     for (const std::vector<std::int32_t>& cluster : clusters()) limit(cluster, stats);
     for (std::size_t i = 0; i < open_.n_all(); ++i)
       stats.most_branches = std::max<std::int64_t>(stats.most_branches, branches(i).size());
   }
-  void limit(const std::vector<std::int32_t>& cluster, FrameStats& stats) {
+  void limit(const std::vector<std::int32_t>& cluster, TreeStats& stats) {
     stats.largest_group = std::max<std::int64_t>(stats.largest_group, cluster.size());
     const std::int64_t n_tracks = weigh(cluster);
     rank(cluster);
@@ -285,7 +285,7 @@ class HypothesisForest {
   std::vector<Branch>& branches(std::size_t tree) { return open_.tree(tree).more.branches; }
 
   // The best hypothesis of every cluster of trees, and the probabilities over its best ones.
-  void choose(FrameStats& stats) {
+  void choose(TreeStats& stats) {
     s_.free.assign(open_.frames.front()->points.size(), 1);
     s_.taken.assign(open_.frames.front()->points.size(), 0);
     std::vector<std::int32_t> entangled;
@@ -305,7 +305,7 @@ class HypothesisForest {
     if (best.branch >= 0) branches[best.branch].is_chosen = true;
   }
 
-  void choose_by_packer(const std::vector<std::int32_t>& entangled, FrameStats& stats) {
+  void choose_by_packer(const std::vector<std::int32_t>& entangled, TreeStats& stats) {
     std::vector<std::vector<PackingOption>> options;
     for (const std::int32_t i : entangled) options.push_back(std::move(s_.trees[i].options));
     const std::vector<std::int32_t> own = opt_.packer(options, s_.first_resource, stats);
@@ -317,7 +317,7 @@ class HypothesisForest {
     }
   }
 
-  void choose_in(const std::vector<std::int32_t>& cluster, FrameStats& stats) {
+  void choose_in(const std::vector<std::int32_t>& cluster, TreeStats& stats) {
     std::vector<std::vector<PackingOption>> options;
     for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
     std::vector<std::int32_t> chosen;

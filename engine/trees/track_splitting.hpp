@@ -18,14 +18,9 @@
 
 namespace asterism {
 
-enum class Resolver : std::int32_t {
-  assignment = 0,          // most likely joint pairing
-  marriage_by_tracks = 1,  // stable; tracks rank by the window's likelihood, points by its distances
-  marriage_by_points = 2,
-};
-
 struct ForestOptions {
-  Resolver resolver = Resolver::assignment;
+  // Where it is stable, tracks rank by the likelihood of the window and points by its distances.
+  Pairing pairing = Pairing::assignment;
   // Trees keep what they like best though another has it: only the labels are shared out.
   bool is_independent = false;
 };
@@ -38,7 +33,7 @@ class Forest {
 
   // Takes a frame; decides the oldest one if the window is full with it.
   template <typename Label>
-  void add(std::shared_ptr<WindowFrame> frame, FrameStats& stats, Label&& label) {
+  void add(std::shared_ptr<WindowFrame> frame, TreeStats& stats, Label&& label) {
     frame->claimed.assign(frame->points.size(), 0);
     open_.advise(*frame, stats);
     if (!opt_.is_independent) open_.claim(*frame);
@@ -50,13 +45,13 @@ class Forest {
 
   // Decides all frames that are left, with what is known of them.
   template <typename Label>
-  void decide_all(FrameStats& stats, Label&& label) {
+  void decide_all(TreeStats& stats, Label&& label) {
     while (open_.n_open() > 0) decide(stats, label);
   }
 
-  bool has_confidence() const { return opt_.resolver == Resolver::assignment; }
+  bool has_confidence() const { return opt_.pairing == Pairing::assignment; }
   const LiveTracks<Tree>& live() const { return open_.live; }
-  void count(FrameStats& stats) const { open_.count(stats); }
+  void count(TreeStats& stats) const { open_.count(stats); }
 
  private:
   // The best branch of a tree through one detection of the frame that is decided, or through none.
@@ -83,7 +78,7 @@ class Forest {
   };
 
   template <typename Label>
-  void decide(FrameStats& stats, Label&& label) {
+  void decide(TreeStats& stats, Label&& label) {
     const std::shared_ptr<const WindowFrame> frame = open_.pop();
     s_.match.assign(open_.live.size(), -1);
     s_.ways.resize(open_.live.size());
@@ -91,7 +86,7 @@ class Forest {
     count_shared(*frame, stats);
     for (std::size_t i = 0; i < open_.live.size(); ++i) list_ways(*frame, i);
     for (const bool confirmed : {true, false}) {
-      if (opt_.resolver == Resolver::assignment) weigh_ways(*frame, confirmed, stats);
+      if (opt_.pairing == Pairing::assignment) weigh_ways(*frame, confirmed, stats);
       match_all(*frame, confirmed, stats);
     }
     say_free(*frame, label);
@@ -103,7 +98,7 @@ class Forest {
       track.more.key = open_.n_trees++;
       open_.regrow(track, stats);
     }
-    FrameStats ignored;
+    TreeStats ignored;
     open_.live.end_frame(frame->time, frame->points.size(), ignored);
   }
 
@@ -163,7 +158,7 @@ class Forest {
 
   // The probability of every way of the believed tracks, or of the tentative ones given that they
   // are markers: marginals over all that the frame may be, each way with the weight of its branches.
-  void weigh_ways(const WindowFrame& frame, bool confirmed, FrameStats& stats) {
+  void weigh_ways(const WindowFrame& frame, bool confirmed, TreeStats& stats) {
     s_.pairings.clear();
     s_.gains.clear();
     for (std::size_t i = 0; i < open_.live.size(); ++i) {
@@ -199,7 +194,7 @@ class Forest {
   }
 
   // Pairs the believed tracks, or the tentative ones, with points that are still free.
-  void match_all(const WindowFrame& frame, bool confirmed, FrameStats& stats) {
+  void match_all(const WindowFrame& frame, bool confirmed, TreeStats& stats) {
     s_.candidates.clear();
     for (std::size_t i = 0; i < open_.live.size(); ++i) {
       const LiveTrack<Tree>& track = open_.live[i];
@@ -215,9 +210,9 @@ class Forest {
     }
     const Groups groups = connected_groups(s_.candidates, static_cast<std::int32_t>(open_.live.size()),
                                            static_cast<std::int32_t>(frame.points.size()));
-    const MarriageMarket market{opt_.resolver == Resolver::marriage_by_points, 1, 0};
+    const MarriageMarket market{opt_.pairing == Pairing::detections_propose, 1, 0};
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      if (opt_.resolver == Resolver::assignment || groups[g].size() == 1)
+      if (opt_.pairing == Pairing::assignment || groups[g].size() == 1)
         s_.assignment.solve(groups[g], s_.match);
       else
         market.marry(groups[g], frame.points, open_.live.m.axis.D, s_.match, s_.extras);
@@ -235,7 +230,7 @@ class Forest {
     return sum / b.n_taken;
   }
 
-  void count_shared(const WindowFrame& frame, FrameStats& stats) {
+  void count_shared(const WindowFrame& frame, TreeStats& stats) {
     s_.claims.assign(frame.points.size(), 0);
     for (const LiveTrack<Tree>& track : open_.live.tracks) {
       const std::int32_t j = track.more.branches.front().taken(frame.number);
@@ -262,7 +257,7 @@ class Forest {
 
   // Carries what is decided of a track over the frame, and keeps the branches that agree with it.
   template <typename Label>
-  void follow(const WindowFrame& frame, std::size_t i, FrameStats& stats, Label&& label) {
+  void follow(const WindowFrame& frame, std::size_t i, TreeStats& stats, Label&& label) {
     LiveTrack<Tree>& track = open_.live[i];
     const std::int32_t j = s_.match[i];
     const std::int32_t own = opt_.is_independent ? track.more.branches.front().taken(frame.number) : j;

@@ -26,8 +26,8 @@ class TreeTracker {
 
   // As FrameTracker::step; also calls label for earlier detections whose label changes.
   template <typename Label>
-  FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
-    FrameStats stats;
+  TreeStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
+    TreeStats stats;
     std::map<std::int64_t, Said> decided;
     add(time, step, points, stats, decided);
     forest_.count(stats);
@@ -39,8 +39,8 @@ class TreeTracker {
 
   // Many frames whose labels are asked for at the end alone: step without the looks ahead.
   template <typename Label>
-  FrameStats pass(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
-    FrameStats stats;
+  TreeStats pass(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
+    TreeStats stats;
     std::map<std::int64_t, Said> decided;
     add(time, step, points, stats, decided);
     forest_.count(stats);
@@ -63,8 +63,8 @@ class TreeTracker {
   const MotionModel& motion() const { return present_.m; }
   std::int64_t n_ids() const { return present_.next_id; }
   // Of what is decided, and of what would be decided now.
-  FrameStats total() const {
-    FrameStats all = total_;
+  TreeStats total() const {
+    TreeStats all = total_;
     all.add_work(ahead_);
     return all;
   }
@@ -79,7 +79,7 @@ class TreeTracker {
     bool operator==(const Said&) const = default;
   };
 
-  void add(double time, const MotionStep& step, std::span<const Point> points, FrameStats& stats,
+  void add(double time, const MotionStep& step, std::span<const Point> points, TreeStats& stats,
            std::map<std::int64_t, Said>& decided) {
     auto frame = std::make_shared<WindowFrame>();
     frame->number = n_frames_;
@@ -140,7 +140,7 @@ class TreeTracker {
   bool has_confidence_;
   std::map<std::int64_t, Said> said_;  // of what is not decided
   std::map<std::int64_t, double> unlabelled_;
-  FrameStats total_, ahead_;
+  TreeStats total_, ahead_;
   std::int64_t n_frames_ = 0, n_seen_ = 0;
   double last_time_ = -std::numeric_limits<double>::infinity();
 };

@@ -1,7 +1,8 @@
 """The typed face of the compiled module; see engine/python/bindings.cpp."""
 
 from collections.abc import Callable, Sequence
-from typing import Self
+from enum import Enum
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,25 @@ class ScoreModel:
         last_termination: bool,
     ) -> None: ...
 
+class CandidateLimit(Exception): ...
+class FrontierLimit(Exception): ...
+
+class Pairing(Enum):
+    assignment = ...
+    tracks_propose = ...
+    detections_propose = ...
+
+class SplitBy(Enum):
+    whole = ...
+    likelihood = ...
+    cells = ...
+    clusters = ...
+
+class LensKind(Enum):
+    none = ...
+    radial = ...
+    quadratic = ...
+
 class FrameStats:
     @property
     def n_candidates(self) -> int: ...
@@ -47,6 +67,16 @@ class FrameStats:
     @property
     def n_pending(self) -> int: ...
     @property
+    def n_bonds(self) -> int: ...
+    @property
+    def n_carried(self) -> int: ...
+    @property
+    def n_returned(self) -> int: ...
+    @property
+    def n_refused(self) -> int: ...
+
+class JointStats(FrameStats):
+    @property
     def n_beams(self) -> int: ...
     @property
     def n_states(self) -> int: ...
@@ -54,6 +84,8 @@ class FrameStats:
     def n_unguarded(self) -> int: ...
     @property
     def bound(self) -> float: ...
+
+class TreeStats(FrameStats):
     @property
     def n_branches(self) -> int: ...
     @property
@@ -65,21 +97,17 @@ class FrameStats:
     @property
     def n_shared(self) -> int: ...
     @property
+    def n_beams(self) -> int: ...
+    @property
     def n_hypotheses(self) -> int: ...
-    @property
-    def n_nodes(self) -> int: ...
-    @property
-    def gap(self) -> float: ...
     @property
     def n_merged(self) -> int: ...
     @property
-    def n_bonds(self) -> int: ...
+    def n_nodes(self) -> int: ...
     @property
-    def n_carried(self) -> int: ...
+    def bound(self) -> float: ...
     @property
-    def n_returned(self) -> int: ...
-    @property
-    def n_refused(self) -> int: ...
+    def gap(self) -> float: ...
 
 class ChainStats:
     @property
@@ -126,7 +154,7 @@ class McmcOptions:
         confidence: float,
         chains: int,
         threads: int,
-        split_by: int,
+        split_by: SplitBy,
         doubt: float,
         distance: float,
         bonds: int,
@@ -139,6 +167,24 @@ class LifeOptions:
         self, *, gate: float, confirm_score: float, delete_drop: float, max_candidates: int
     ) -> None: ...
 
+_T = TypeVar("_T")
+
+class StepResult(Generic[_T]):
+    @property
+    def tracker(self) -> _T: ...
+    @property
+    def labels(self) -> NDArray[np.int64]: ...
+    @property
+    def confidence(self) -> NDArray[np.float64]: ...
+    @property
+    def revised(self) -> NDArray[np.int64]: ...
+    @property
+    def revised_labels(self) -> NDArray[np.int64]: ...
+    @property
+    def revised_confidence(self) -> NDArray[np.float64]: ...
+    @property
+    def stats(self) -> FrameStats: ...
+
 # What all trackers have; there is no such class in the module.
 class _Tracker:
     def step(
@@ -147,15 +193,7 @@ class _Tracker:
         F: NDArray[np.float64],
         Q: NDArray[np.float64],
         points: NDArray[np.float64],
-    ) -> tuple[
-        Self,
-        NDArray[np.int64],
-        NDArray[np.float64],
-        NDArray[np.int64],
-        NDArray[np.int64],
-        NDArray[np.float64],
-        FrameStats,
-    ]: ...
+    ) -> StepResult[Self]: ...
     def run(
         self,
         times: NDArray[np.float64],
@@ -168,15 +206,7 @@ class _Tracker:
         confidence: NDArray[np.float64],
     ) -> None: ...
     def copy(self) -> Self: ...
-    def tracks(
-        self,
-    ) -> tuple[
-        NDArray[np.int64],
-        NDArray[np.int64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-    ]: ...
+    def tracks(self) -> dict[str, NDArray[Any]]: ...
     @property
     def has_confidence(self) -> bool: ...
     @property
@@ -211,7 +241,7 @@ class FrameTracker(_Tracker):
         score: ScoreModel,
         life: LifeOptions,
         *,
-        matcher: int,
+        pairing: Pairing,
         is_strict: bool,
         capacity: int,
         merged_within: float,
@@ -252,11 +282,11 @@ class TreeTracker(_Tracker):
         life: LifeOptions,
         branches: BranchOptions,
         *,
-        resolver: int,
+        pairing: Pairing,
         is_independent: bool,
         carry: CarryOptions,
     ) -> None: ...
-    def chi2(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]: ...
+    def chi2(self) -> dict[str, NDArray[Any]]: ...
 
 _Choose = Callable[
     [
@@ -376,7 +406,7 @@ class Camera:
         t: NDArray[np.float64],
         A: NDArray[np.float64],
         B: NDArray[np.float64],
-        lens_kind: int,
+        lens_kind: LensKind,
         is_backward: bool,
         coefficients: NDArray[np.float64],
         r_end: float,

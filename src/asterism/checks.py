@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -290,14 +291,16 @@ def check_fields(name: str, given: Iterable[str], known: Iterable[str]) -> None:
 
 
 def _nearest(name: str, known: list[str]) -> str:
-    """Give the known name that was probably meant; "" if none comes near.
+    """Return the known name that was probably meant; "" if none comes near.
 
-    A whole name that is near goes before one of whose words one is: gatee means gate_probability.
+    A whole name that is near goes before one of whose words one is: gat means gate.probability.
     """
     import difflib
 
     folded = {k.lower(): k for k in known}
-    words = {word: k for k in reversed(known) for word in k.lower().split("_") if len(word) > 2}
+    words = {
+        word: k for k in reversed(known) for word in re.split(r"[_.]", k.lower()) if len(word) > 2
+    }
     for names in (folded, words):
         near = difflib.get_close_matches(name.lower(), names, n=1)
         if near:

@@ -140,6 +140,8 @@ def _fields_text(value: Any) -> str:
 def _is_default(field: dataclasses.Field[Any], value: Any) -> bool:
     default = field.default
     plain = (bool, int, float, str, type(None))
+    if dataclasses.is_dataclass(default):
+        return bool(default == value)
     if isinstance(default, plain) and isinstance(value, plain):
         return type(default) is type(value) and default == value
     if field.default_factory is dataclasses.MISSING:

@@ -24,7 +24,7 @@
 
 namespace asterism {
 
-enum class SplitBy : std::int32_t { whole, likelihood, cells, clusters };
+enum class SplitBy { whole, likelihood, cells, clusters };
 
 struct SplitOptions {
   SplitBy by = SplitBy::likelihood;

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism import _engine
-from asterism.camera.lens import NO_LENS, QUADRATIC
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,14 +29,14 @@ def compile_camera(
     """Make the engine's camera from the fields of a `Camera`."""
     B = lens_matrix if lens is not None else K
     A = np.eye(3) if B is K else np.asarray(np.linalg.solve(B, K), np.float64)
-    is_quadratic = lens is not None and lens.kind == QUADRATIC
+    is_quadratic = lens is not None and lens.kind == "quadratic"
     start = middle_of_image(lens_matrix, size_px) if is_quadratic else np.zeros(2)
     return _engine.Camera(
         R=np.ascontiguousarray(T_camera_world[:3, :3]),
         t=np.ascontiguousarray(T_camera_world[:3, 3]),
         A=np.ascontiguousarray(A[:2]),
         B=np.ascontiguousarray(B[:2]),
-        lens_kind=NO_LENS if lens is None else lens.kind,
+        lens_kind=getattr(_engine.LensKind, "none" if lens is None else lens.kind),
         is_backward=lens is not None and lens.is_backward,
         coefficients=np.empty(0) if lens is None else lens.coefficients,
         r_end=float("inf") if lens is None else lens.radius,
@@ -63,7 +62,7 @@ def _table_extent(
     lens: Lens | None, lens_matrix: NDArray[np.float64], size_px: tuple[int, int]
 ) -> float:
     """Squared radius of the image in the coordinates from which a radial lens is solved."""
-    if lens is None or lens.kind == QUADRATIC:
+    if lens is None or lens.kind == "quadratic":
         return 0.0
     w, h = size_px
     corners = np.array([[u, v, 1.0] for u in (-0.5, w - 0.5) for v in (-0.5, h - 0.5)])

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import fields
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from scipy.optimize import brentq
@@ -28,9 +28,6 @@ __all__ = ["BrownConrady", "Lens", "QuadraticCorrection", "ReportRadial", "Vicon
 LEAST_STRETCH = 1e-2
 """As kLeastStretch of engine/camera/lens.hpp."""
 
-NO_LENS, RADIAL, QUADRATIC = 0, 1, 2
-"""As Lens::Kind of engine/camera/lens.hpp."""
-
 
 class Lens(ABC):
     """A lens model: `BrownConrady`, `ReportRadial`, `ViconRadial` or `QuadraticCorrection`."""
@@ -39,7 +36,8 @@ class Lens(ABC):
     """Whether the model maps distorted to undistorted coordinates."""
     in_pixels: ClassVar[bool] = False
     """Whether it works in pixels about the principal point, not in normalised coordinates."""
-    kind: ClassVar[int] = RADIAL
+    kind: ClassVar[Literal["radial", "quadratic"]] = "radial"
+    """As Lens::Kind of engine/camera/lens.hpp."""
 
     @property
     @abstractmethod
@@ -162,7 +160,7 @@ class QuadraticCorrection(Lens):
         Coefficients of each axis.
     """
 
-    kind: ClassVar[int] = QUADRATIC
+    kind: ClassVar[Literal["radial", "quadratic"]] = "quadratic"
     ex: tuple[float, float, float, float, float]
     ey: tuple[float, float, float, float, float]
 

@@ -8,9 +8,10 @@ import inspect
 import re
 import types
 import typing
+from collections.abc import Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Union
+from typing import TYPE_CHECKING, Any, Literal, Union, cast
 
 import typer
 
@@ -18,15 +19,15 @@ from asterism.checks import check_fields
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Mapping, Sequence
-
-    from asterism.tracking.methods import Method
+    from collections.abc import Callable, Generator, Sequence
 
 __all__ = [
     "Option",
     "as_options",
-    "method_options",
+    "flat",
+    "nested",
     "parsed",
+    "record_options",
     "scene_options",
     "with_option_names",
 ]
@@ -69,21 +70,66 @@ class Option:
         return _parse(self.name, self.kind, text)
 
 
-def method_options(method: type[Method[Any]]) -> dict[str, Option]:
-    """Give the options of a method by name: the fields of its dataclass."""
-    if not dataclasses.is_dataclass(method):
+def record_options(kind: type) -> dict[str, Option]:
+    """Return the options of a method, or of another record, by name.
+
+    Those of a record among the options follow with its name and a dot; one that may be None is
+    itself an option, true or false.
+    """
+    from asterism.tracking.methods.registry import record_in
+
+    if not dataclasses.is_dataclass(kind):
         return {}
-    kinds = typing.get_type_hints(method)
+    kinds = typing.get_type_hints(kind)
     about: dict[str, str] = {}
-    for kind in method.__mro__:  # a subclass often only says where its base explains the option
-        about |= _about_parameters(kind)
-    return {
-        f.name: Option(
-            name=f.name, kind=kinds[f.name], default=f.default, about=about.get(f.name, "")
-        )
-        for f in dataclasses.fields(method)
-        if f.init
-    }
+    for base in kind.__mro__:  # a subclass often only says where its base explains the option
+        about |= _about_parameters(base)
+    options: dict[str, Option] = {}
+    for f in dataclasses.fields(kind):
+        inner = record_in(kinds[f.name])
+        text = about.get(f.name, "")
+        if inner is None:
+            options[f.name] = Option(name=f.name, kind=kinds[f.name], default=f.default, about=text)
+            continue
+        if f.default is None:
+            options[f.name] = Option(name=f.name, kind=bool, default=False, about=text)
+        for option in record_options(inner).values():
+            name = f"{f.name}.{option.name}"
+            options[name] = dataclasses.replace(option, name=name)
+    return options
+
+
+def nested(values: Mapping[str, Any], known: Mapping[str, Option]) -> dict[str, Any]:
+    """Return options with dotted names as tables, as `asterism.tracking.method_by_name` takes them.
+
+    Raises
+    ------
+    ParameterError
+        If a record is switched off and its options are given.
+    """
+    switches = {n for n in values if any(other.startswith(f"{n}.") for other in known)}
+    made = {n: v for n, v in values.items() if "." not in n and n not in switches}
+    made |= {n: {} if values[n] else None for n in switches}
+    for name, value in values.items():
+        table, dot, key = name.partition(".")
+        if not dot:
+            continue
+        if made.setdefault(table, {}) is None:
+            raise ParameterError(table, f"true, as {name} is given", "false")
+        made[table][key] = value
+    return made
+
+
+def flat(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options with tables as dotted names; the inverse of `nested`."""
+    made: dict[str, Any] = {}
+    for name, value in options.items():
+        if isinstance(value, Mapping):
+            inner = flat(cast("Mapping[str, Any]", value))
+            made |= {f"{name}.{key}": each for key, each in inner.items()}
+        else:
+            made[name] = value
+    return made
 
 
 def scene_options(scene: Callable[..., Any]) -> dict[str, Option]:

@@ -133,10 +133,10 @@ def switches_from(texts: Sequence[str]) -> dict[str, Any]:
 
 def seeing_from(texts: Sequence[str]) -> am.simulate.Seeing | None:
     """Read ``NAME=VALUE`` fields of `asterism.simulate.Seeing`; None without any."""
-    from asterism.cli.options import as_options, method_options, parsed
+    from asterism.cli.options import as_options, parsed, record_options
     from asterism.simulate import Seeing
 
-    values = parsed("--seeing", "what cameras see", texts, method_options(Seeing))  # pyright: ignore[reportArgumentType]
+    values = parsed("--seeing", "what cameras see", texts, record_options(Seeing))
     with as_options({name: f"--seeing {name}" for name in values}):
         return Seeing(**values) if texts else None
 

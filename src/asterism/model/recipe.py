@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from typing import TYPE_CHECKING, Any, Self
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
@@ -14,8 +15,6 @@ from asterism.model.tracking_model import TrackingModel
 from asterism.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     from asterism.model.detections import Detections
@@ -81,7 +80,7 @@ class Recipe:
                 "stitch": self.stitch,
                 **({"reason": self.reason} if self.reason else {}),
                 # TOML has no null.
-                "options": {k: NONE if v is None else v for k, v in self.options.items()},
+                "options": _replaced(self.options, None, NONE),
             },
             "model": self.model.to_dict(),
             "versions": self.versions,
@@ -104,9 +103,7 @@ class Recipe:
             check_number("method.seed", seed, above=0, closed=True, integer=True)
         return cls(
             method=_value(method, "method.name", str),
-            options={
-                str(k): None if v == NONE else v for k, v in _table(method, "options").items()
-            },
+            options=_replaced(_table(method, "options"), NONE, None),
             model=TrackingModel.from_dict(_table(values, "model")),
             stitch=_value(method, "method.stitch", bool),
             seed=seed,
@@ -141,6 +138,18 @@ def versions() -> dict[str, str]:
         "numpy": np.__version__,
         "scipy": scipy.__version__,
         "platform": platform.platform(),
+    }
+
+
+def _replaced(options: Mapping[str, Any], old: object, new: object) -> dict[str, Any]:
+    """Return options, and tables among them, with one value in the place of another."""
+    return {
+        str(name): _replaced(cast("Mapping[str, Any]", value), old, new)
+        if isinstance(value, Mapping)
+        else new
+        if type(value) is type(old) and value == old
+        else value
+        for name, value in options.items()
     }
 
 

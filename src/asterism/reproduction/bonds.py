@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,9 +11,11 @@ import asterism as am
 from asterism.plot.style import CLUTTER, CYCLE, GRID, INK, new_panels, tidy
 from asterism.reproduction.part import Claim, Outcome, Part, Picture, Table
 from asterism.reproduction.rules import differs, exact, spread
-from asterism.reproduction.walks import HEAD, MODEL, NOISE, REPORT, Scores, clips, row, walked
+from asterism.reproduction.walks import HEAD, NOISE, Scores, clips, our_chain, row, walked
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -21,9 +24,9 @@ if TYPE_CHECKING:
 COUNT, PER, MAX_GAP = 80, 8.8, 4
 BONDS = (0, 2, 3, 4)
 DATA = {"nothing missing": 0.0, "10 % missing": 0.1}
-CHAINS: dict[str, dict[str, Any]] = {
-    "the report's chain": {**REPORT, "chain": "ascent"},
-    "Asterism": {**MODEL, "groups": "whole", "confidence": 0},
+CHAINS: dict[str, Callable[..., am.MCMCDA]] = {
+    "the report's chain": am.MCMCDA.report_2010,
+    "Asterism": partial(our_chain, groups="whole"),
 }
 WINDOW = 10
 TOLERANCE = 6 * np.sqrt(2) * NOISE
@@ -36,9 +39,9 @@ def run(effort: Effort, tell: Tell) -> Outcome:
     n_all = len(DATA) * len(CHAINS) * len(BONDS)
     for about, missing in DATA.items():
         some = clips(effort.seeds, max_gap=MAX_GAP, missing=missing)
-        for chain, options in CHAINS.items():
+        for chain, made in CHAINS.items():
             for bonds in BONDS:
-                method = am.MCMCDA(moves=COUNT / PER, bonds=bonds, **options)
+                method = made(moves=COUNT / PER, bonds=bonds)
                 found[about, chain, bonds] = walked(some, method)
                 told = f"{bonds} bonds" if bonds else "no bonds"
                 rows.append(row(f"{about}, {chain}, {told}", found[about, chain, bonds]))

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 import asterism as am
 from asterism.reproduction.part import Claim, Outcome, Part, Picture, Table
 from asterism.reproduction.paths import draw_paths
 from asterism.reproduction.rules import differs, spread, within
-from asterism.reproduction.walks import HEAD, MODEL, REPORT, Scores, clips, row, walked
+from asterism.reproduction.walks import HEAD, Scores, clips, our_chain, row, walked
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from asterism.reproduction.part import Effort, Tell
 
 COUNTS = (30, 80, 300, 1000)
-WAYS: dict[str, dict[str, Any]] = {
-    "the original: from the partition taken last": REPORT,
-    "the report's fix: from the best so far": {**REPORT, "chain": "ascent"},
-    "Asterism": {**MODEL, "confidence": 0},
+WAYS: dict[str, Callable[..., am.MCMCDA]] = {
+    "the original: from the partition taken last": partial(
+        am.MCMCDA.report_2010, acceptance="metropolis"
+    ),
+    "the report's fix: from the best so far": am.MCMCDA.report_2010,
+    "Asterism": our_chain,
 }
 ORIGINAL, FIXED, OURS = WAYS
 MAX_GAP, N_MARKERS = 2, 8
@@ -29,7 +34,7 @@ def run(effort: Effort, tell: Tell) -> Outcome:
     found: dict[tuple[str, int], Scores] = {}
     for i, name in enumerate(WAYS):
         for j, count in enumerate(COUNTS):
-            method = am.MCMCDA(moves=count / N_MARKERS, **WAYS[name])
+            method = WAYS[name](moves=count / N_MARKERS)
             found[name, count] = walked(some, method)
             tell((i * len(COUNTS) + j + 1) / (len(WAYS) * len(COUNTS)))
     first = COUNTS[0]
@@ -63,8 +68,8 @@ def run(effort: Effort, tell: Tell) -> Outcome:
     shown: dict[str, am.Tracks] = {}
     under: list[str] = []
     clip = some[min(1, len(some) - 1)]
-    for name, options in WAYS.items():
-        method = am.MCMCDA(moves=first / N_MARKERS, **options)
+    for name, chain in WAYS.items():
+        method = chain(moves=first / N_MARKERS)
         tracks = am.track(clip.truth.detections, method, model=clip.model, seed=clip.seed)
         e = am.evaluate(tracks, clip.truth)
         shown[name] = tracks

@@ -9,9 +9,11 @@ from asterism.plot import plot_groups
 from asterism.plot.style import INK
 from asterism.reproduction.part import Claim, Outcome, Part, Picture, Table
 from asterism.reproduction.rules import differs, spread
-from asterism.reproduction.walks import HEAD, MODEL, REPORT, Scores, clips, row, walked
+from asterism.reproduction.walks import HEAD, Scores, clips, our_chain, row, walked
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from matplotlib.figure import Figure
 
     from asterism.reproduction.part import Effort, Tell
@@ -25,9 +27,9 @@ SPLITS: dict[str, dict[str, Any]] = {
     "what plausible links join": {"groups": "likelihood"},
 }
 OFF, CELLS, CLUSTERS, LINKS = SPLITS
-CHAINS: dict[str, dict[str, Any]] = {
-    "the report's chain": {**REPORT, "chain": "ascent"},
-    "Asterism": {**MODEL, "confidence": 0},
+CHAINS: dict[str, Callable[..., am.MCMCDA]] = {
+    "the report's chain": am.MCMCDA.report_2010,
+    "Asterism": our_chain,
 }
 
 
@@ -36,9 +38,9 @@ def run(effort: Effort, tell: Tell) -> Outcome:
     some = clips(effort.seeds, max_gap=MAX_GAP)
     found: dict[tuple[str, str], Scores] = {}
     rows = [row("floor", walked(some, None))]
-    for chain, options in CHAINS.items():
+    for chain, made in CHAINS.items():
         for split, groups in SPLITS.items():
-            method = am.MCMCDA(moves=COUNT / PER, **{**options, **groups})
+            method = made(moves=COUNT / PER, **groups)
             found[chain, split] = walked(some, method)
             rows.append(row(f"{chain}, {split}", found[chain, split]))
             tell(len(found) / (len(CHAINS) * len(SPLITS)))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,17 +14,18 @@ from asterism.reproduction.rules import spread, within
 from asterism.reproduction.walks import (
     FRAMES,
     HEAD,
-    REPORT,
-    WHOLE,
     Clip,
     Scores,
     clips,
     floors,
+    our_chain,
     row,
     walked,
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from asterism.reproduction.part import Effort, Tell
 
 
@@ -42,12 +44,12 @@ TABLE = {
     80: _Theirs(12, 9, 6, 102.30, 1),
     1000: _Theirs(0.1, 8, 0.1, 364.75, 0.1),
 }
-ASCENT: dict[str, Any] = {**REPORT, "chain": "ascent"}
-WAYS: dict[str, dict[str, Any]] = {
-    "the report's chain": ASCENT,
-    "… but true Metropolis": REPORT,
-    "informed growth, all moves": {**WHOLE, "assignment": False},
-    "… from the exact assignment": WHOLE,
+OURS = partial(our_chain, groups="whole")
+WAYS: dict[str, Callable[..., am.MCMCDA]] = {
+    "the report's chain": am.MCMCDA.report_2010,
+    "… but true Metropolis": partial(am.MCMCDA.report_2010, acceptance="metropolis"),
+    "informed growth, all moves": partial(OURS, assignment=False),
+    "… from the exact assignment": OURS,
 }
 GAPS = (2, 4)
 PER = 8.8  # moves are counted for each detection or track, whichever are more
@@ -66,9 +68,9 @@ def run(effort: Effort, tell: Tell) -> Outcome:
         some = clips(effort.seeds, max_gap=max_gap)
         floor = floor_of[max_gap] = walked(some, None)
         rows = [row("floor", floor)]
-        for name, options in WAYS.items():
+        for name, chain in WAYS.items():
             for count, theirs in TABLE.items():
-                found = walked(some, am.MCMCDA(moves=count / PER, **options))
+                found = walked(some, chain(moves=count / PER))
                 rows.append(row(f"{name}, N_mc = {count}", found))
                 seconds = float(np.median(found.seconds))
                 if name == next(iter(WAYS)):
@@ -77,7 +79,7 @@ def run(effort: Effort, tell: Tell) -> Outcome:
                         claims += _claims(f", N_mc = {count}{other}", theirs, found, floor)
                     about = f"{FRAMES} frames, N_mc = {count}, d̄ = {max_gap}, the report's chain"
                     timings.append(Timing(about, f"{theirs.minutes:.2f} minutes", seconds))
-                elif options is WHOLE:
+                elif chain is OURS:
                     ours[max_gap, count] = found
                     about = f"{FRAMES} frames, N_mc = {count}, d̄ = {max_gap}, as Asterism walks"
                     timings.append(Timing(about, "–", seconds))
@@ -130,7 +132,7 @@ def _examples(clip: Clip) -> dict[str, am.Tracks]:
     """Track one clip with every count, the truth first."""
     shown = {"the true paths, broken at gaps beyond d̄": floors([clip])[0]}
     for count in TABLE:
-        method = am.MCMCDA(moves=count / PER, **ASCENT)
+        method = am.MCMCDA.report_2010(moves=count / PER)
         tracks = am.track(clip.truth.detections, method, model=clip.model, seed=clip.seed)
         shown[f"N_mc = {count}"] = tracks
     return shown

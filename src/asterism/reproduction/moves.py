@@ -10,7 +10,7 @@ import asterism as am
 from asterism.plot.style import CLUTTER, CYCLE, INK, new_panels
 from asterism.reproduction.part import Claim, Outcome, Part, Picture, Table
 from asterism.reproduction.rules import exact, spread
-from asterism.reproduction.walks import REPORT, clips
+from asterism.reproduction.walks import clips
 from asterism.tracking.methods.mcmc_moves import MOVES, WEIGHTS
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def run(effort: Effort, tell: Tell) -> Outcome:
     total = sum(share for _, _, share in EQUATION)
     taken: dict[str, list[float]] = {name: [] for _, name, _ in EQUATION}
     some = clips(effort.seeds, max_gap=2)
-    method = am.MCMCDA(moves=COUNT / PER, **REPORT)
+    method = am.MCMCDA.report_2010(moves=COUNT / PER, acceptance="metropolis")
     for i, clip in enumerate(some):
         tracks = am.track(clip.truth.detections, method, model=clip.model, seed=clip.seed)
         for name, shares in taken.items():

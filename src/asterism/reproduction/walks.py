@@ -17,22 +17,18 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["HEAD", "MODEL", "REPORT", "WHOLE", "Clip", "Scores", "clips", "floors", "row", "walked"]
+__all__ = ["HEAD", "Clip", "Scores", "clips", "floors", "our_chain", "row", "walked"]
 
 FRAMES, NOISE, MAX_SPEED = 100, 0.005, 0.15
-MODEL: dict[str, Any] = {"end_odds": 1}
-"""The posterior as the model has it."""
-WHOLE: dict[str, Any] = {**MODEL, "groups": "whole", "confidence": 0}
-"""One walk over everything."""
-REPORT: dict[str, Any] = {
-    "proposal": "uniform", "move_weights": "report", "first_rules": True, "assignment": False,
-    "at_doubts": 0, **WHOLE,
-}  # fmt: skip
-"""The report's own chain, but for what it draws from."""
-
 HEAD = ("", "moves a frame", "% wrong, report's sense", "% wrong", "tracks", "% missing", "IDF1",
         "nats above the floor")  # fmt: skip
 """Of the tables of scores."""
+
+
+def our_chain(*, moves: float, **chain: Any) -> am.MCMCDA:
+    """Make Asterism's chain over the model's own posterior, with some options of the chain."""
+    options = am.tracking.ChainOptions(**chain)
+    return am.MCMCDA(moves=moves, confidence=0, end_odds=1, chain=options)
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,7 @@ def joint_marginals(
         marginals, log_total, best, bound, n_states = _engine.joint_marginals(
             weights, miss, int(max_states)
         )
-    except OverflowError as error:
+    except _engine.FrontierLimit as error:
         raise SolverLimit(
             "tracks and detections that compete at once", max(weights.shape), 1024,
             "gate more narrowly",

@@ -3,7 +3,17 @@
 from asterism.tracking.choose import AUTO, Choice, choose_method
 from asterism.tracking.estimation import ModelEstimate, estimate_model
 from asterism.tracking.filling import FilledGap, Filling, fill_gaps
-from asterism.tracking.methods import METHODS, HypothesisCluster, Method, Update, method_by_name
+from asterism.tracking.methods import (
+    METHODS,
+    ChainOptions,
+    Gate,
+    HypothesisCluster,
+    Lifecycle,
+    Method,
+    Rigidity,
+    Update,
+    method_by_name,
+)
 from asterism.tracking.naming import Naming, name_tracks
 from asterism.tracking.pipeline import track
 from asterism.tracking.plan import Plan, plan_tracking
@@ -21,15 +31,19 @@ __all__ = [
     "AUTO",
     "METHODS",
     "Bonds",
+    "ChainOptions",
     "Choice",
     "FilledGap",
     "Filling",
+    "Gate",
     "HypothesisCluster",
     "Join",
+    "Lifecycle",
     "Method",
     "ModelEstimate",
     "Naming",
     "Plan",
+    "Rigidity",
     "Stitched",
     "StitchedState",
     "Stitching",

@@ -32,13 +32,13 @@ def methods(json: Json = False) -> None:
         asterism methods --json
     """
     import asterism as am
-    from asterism.cli.options import method_options
+    from asterism.cli.options import record_options
     from asterism.tracking.choose import AUTO
 
     _show(
         {AUTO: ("The clip chooses one of these, and whether to stitch, and says why.", {})}
         | {
-            name: (_first_line(method), method_options(method))
+            name: (_first_line(method), record_options(method))
             for name, method in am.tracking.METHODS.items()
         },
         json,

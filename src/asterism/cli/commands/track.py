@@ -197,7 +197,7 @@ def made_method(name: str | None, texts: list[str]) -> am.tracking.Method[Any] |
     """Make a method from its name and its ``NAME=VALUE`` options; None for ``auto``."""
     import asterism as am
     from asterism.checks import check_fields
-    from asterism.cli.options import as_options, method_options, parsed
+    from asterism.cli.options import as_options, nested, parsed, record_options
 
     if name in (None, am.tracking.AUTO):
         if texts:
@@ -206,10 +206,10 @@ def made_method(name: str | None, texts: list[str]) -> am.tracking.Method[Any] |
             raise ParameterError("--option", expected, f"--method {am.tracking.AUTO}", hint)
         return None
     check_fields("--method", [name], am.tracking.METHODS)
-    known = method_options(am.tracking.METHODS[name])
+    known = record_options(am.tracking.METHODS[name])
     given = parsed("--option", f"method {name}", texts, known)
     with as_options({option: f"--option {option}" for option in given}):
-        return am.tracking.method_by_name(name, **given)
+        return am.tracking.method_by_name(name, **nested(given, known))
 
 
 def _run_of(path: Path, source: Path | None, settings: list[str]) -> Run:
@@ -249,9 +249,10 @@ def _write_report(
 ) -> None:
     """Write the page, with the method, its figures and the model."""
     import asterism as am
+    from asterism.cli.options import flat
 
     stitched = ", then stitched" if recipe.stitch else ""
-    options = ", ".join(f"{name}={value}" for name, value in recipe.options.items())
+    options = ", ".join(f"{name}={value}" for name, value in flat(recipe.options).items())
     told = [("method", recipe.method + stitched)]
     told += [("chosen by the capture", recipe.chosen)] if recipe.chosen else []
     told += [("options", options)] if options else []

@@ -1,11 +1,13 @@
 """Methods of association: one file a method, and what methods share."""
 
 from asterism.tracking.methods.base import Method, Update
+from asterism.tracking.methods.chain_options import ChainOptions
 from asterism.tracking.methods.gnn import GNN
 from asterism.tracking.methods.jpda import JPDA
 from asterism.tracking.methods.mcmcda import MCMCDA
 from asterism.tracking.methods.mda import MDA
 from asterism.tracking.methods.mht import MHT, HypothesisCluster
+from asterism.tracking.methods.options import Gate, Lifecycle, Rigidity
 from asterism.tracking.methods.registry import METHODS, method_by_name, options_of
 from asterism.tracking.methods.smp import SMP
 from asterism.tracking.methods.tomht import TOMHT
@@ -20,8 +22,12 @@ __all__ = [
     "MHT",
     "SMP",
     "TOMHT",
+    "ChainOptions",
+    "Gate",
     "HypothesisCluster",
+    "Lifecycle",
     "Method",
+    "Rigidity",
     "TrackSplitting",
     "Update",
     "method_by_name",

@@ -9,6 +9,7 @@ from asterism.errors import ParameterError
 from asterism.model import Detections, TrackingModel, Tracks
 from asterism.model.posterior import log_posterior
 from asterism.tracking.methods.base import Method
+from asterism.tracking.methods.mcmcda import MCMCDA
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,7 +42,7 @@ def associate(
     seed : int, optional
         For the methods that draw.
     start : Tracks, optional
-        Tracks of the same detections to begin with.
+        Tracks of the same detections that `MCMCDA` begins with.
     progress : callable, optional
         Called now and then with the number of frames done.
 
@@ -63,8 +64,13 @@ def associate(
     else:
         labels = None
     detections = detections.measured()
-    state = method.init(model, n_axes=detections.n_axes, seed=seed)
-    state, labels, confidence = method.run(state, detections, progress=progress, start=labels)
+    if labels is None:
+        state = method.init(model, n_axes=detections.n_axes, seed=seed)
+    elif isinstance(method, MCMCDA):
+        state = method.init(model, n_axes=detections.n_axes, seed=seed, start=labels)
+    else:
+        raise ParameterError("start", "none", "tracks", "only mcmcda begins with given tracks")
+    state, labels, confidence = method.run(state, detections, progress=progress)
     info = dict(state.info)
     if detections.covariances is not None:
         info["isotropic_noise"] = True  # tracks have one variance for all axes

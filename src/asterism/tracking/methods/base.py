@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections, TrackingModel
 
-__all__ = ["Method", "MethodState", "Update", "checked_frame", "refuse_start"]
+__all__ = ["Method", "MethodState", "Update", "checked_covariances", "checked_frame"]
 
 
 @runtime_checkable
@@ -144,7 +144,6 @@ class Method(ABC, Generic[State]):
         detections: Detections,
         *,
         progress: Callable[[int], Any] | None = None,
-        start: NDArray[np.int64] | None = None,
     ) -> tuple[State, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames of `detections`: the loop over `step`, with its revisions applied.
 
@@ -156,8 +155,6 @@ class Method(ABC, Generic[State]):
             The frames.
         progress : callable, optional
             Called now and then with the number of frames done.
-        start : ndarray of int, shape (N,), optional
-            Labels to start from, -1 for none; for methods that improve on what they are given.
 
         Returns
         -------
@@ -165,7 +162,6 @@ class Method(ABC, Generic[State]):
             The last state, the label of every detection (N,), and the confidences if the method
             has any.
         """
-        refuse_start(start)
         check_kind("state", state, MethodState, "method.init(model)")
         first = state.n_seen
         labels = np.full(first + detections.n_points, -1, dtype=np.int64)
@@ -187,12 +183,6 @@ class Method(ABC, Generic[State]):
             if progress is not None:
                 progress(t + 1)
         return state, labels[first:], None if confidence is None else confidence[first:]
-
-
-def refuse_start(start: object) -> None:
-    """Raise `ParameterError` where there is something to start from."""
-    if start is not None:
-        raise ParameterError("start", "none", "labels", "only mcmcda begins with what it is given")
 
 
 def checked_frame(

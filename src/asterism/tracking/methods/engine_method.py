@@ -12,13 +12,8 @@ from asterism.checks import check_kind
 from asterism.errors import ParameterError, SolverLimit
 from asterism.model import TrackingModel
 from asterism.records import record
-from asterism.tracking.methods.base import (
-    Method,
-    Update,
-    checked_covariances,
-    checked_frame,
-    refuse_start,
-)
+from asterism.tracking.methods import options
+from asterism.tracking.methods.base import Method, Update, checked_covariances, checked_frame
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,10 +33,7 @@ if TYPE_CHECKING:
         | _engine.SeveralMotionsTracker
     )
 
-__all__ = ["MAX_CANDIDATES", "EngineMethod", "EngineState"]
-
-MAX_CANDIDATES = 50_000_000
-"""Pairs of track and detection within the gates of one frame (1.2 GB of them)."""
+__all__ = ["EngineMethod", "EngineState"]
 
 FRAMES_A_CALL = 1000
 """The engine takes so many frames at a time: few enough to show progress and to be stopped."""
@@ -90,7 +82,7 @@ class EngineState:
         return self.about(self.tracker.total)
 
     def live(self) -> dict[str, NDArray[Any]]:
-        """Give the believed tracks as they are now, for a display say.
+        """Return the confirmed tracks as they are now, for a display.
 
         Returns
         -------
@@ -101,10 +93,9 @@ class EngineState:
         """
         from asterism import _engine
 
-        names = ("ids", "gaps", "log_odds", "means", "covariances")
-        live: dict[str, NDArray[Any]] = dict(zip(names, self.tracker.tracks(), strict=True))
+        live = self.tracker.tracks()
         if isinstance(self.tracker, _engine.TreeTracker):
-            live |= zip(("chi2", "updates"), self.tracker.chi2(), strict=True)
+            live |= self.tracker.chi2()
         return live
 
 
@@ -139,6 +130,7 @@ class EngineMethod(Method[EngineState]):
         covariances: ArrayLike | None = None,
     ) -> tuple[EngineState, Update]:
         """Take the next frame; see `Method.step`."""
+        from asterism import _engine
         from asterism.model.compiled import no_transition, transition, with_noise
 
         check_kind("state", state, EngineState, "method.init(model)")
@@ -151,20 +143,19 @@ class EngineMethod(Method[EngineState]):
         motion = state.model.motion
         F, Q = transition(motion, dt) if dt else no_transition(motion)
         try:
-            after, labels, sure, revised, revised_labels, revised_sure, stats = before.step(
-                time, F, Q, frame
-            )
-        except OverflowError as error:
+            found = before.step(time, F, Q, frame)
+        except (_engine.CandidateLimit, _engine.FrontierLimit) as error:
             raise _too_many(error) from error
+        knows = before.has_confidence
         update = Update(
-            labels=labels,
-            revised=revised,
-            revised_labels=revised_labels,
-            confidence=sure if before.has_confidence else None,
-            revised_confidence=revised_sure if before.has_confidence else None,
-            info=self._about(stats),
+            labels=found.labels,
+            revised=found.revised,
+            revised_labels=found.revised_labels,
+            confidence=found.confidence if knows else None,
+            revised_confidence=found.revised_confidence if knows else None,
+            info=self._about(found.stats),
         )
-        return replace(state, tracker=after), update
+        return replace(state, tracker=found.tracker), update
 
     def run(
         self,
@@ -172,13 +163,12 @@ class EngineMethod(Method[EngineState]):
         detections: Detections,
         *,
         progress: Callable[[int], Any] | None = None,
-        start: NDArray[np.int64] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; the same labels as the loop over `step`."""
+        from asterism import _engine
         from asterism.model.compiled import steps_of, with_noise
 
         check_kind("state", state, EngineState, "method.init(model)")
-        refuse_start(start)
         points = with_noise(detections.points, detections.covariances)
         tracker = state.tracker.copy()
         times, offsets = detections.times, detections.offsets
@@ -198,7 +188,7 @@ class EngineMethod(Method[EngineState]):
             kinds = kind[n_before + t : n_before + end]
             try:
                 tracker.run(times[t:end], kinds, F, Q, starts, some, labels, sure)
-            except OverflowError as error:
+            except (_engine.CandidateLimit, _engine.FrontierLimit) as error:
                 raise _too_many(error) from error
             if progress is not None:
                 progress(end)
@@ -206,12 +196,12 @@ class EngineMethod(Method[EngineState]):
         return replace(state, tracker=tracker), labels[first:], confidence
 
 
-def _too_many(error: OverflowError) -> SolverLimit:
-    if "compete" in str(error):
+def _too_many(error: Exception) -> SolverLimit:
+    from asterism import _engine
+
+    if isinstance(error, _engine.FrontierLimit):
         return SolverLimit("tracks that compete at once", 1025, 1024, "gate more narrowly")
-    return SolverLimit(
-        "pairs of track and detection within the gates of one frame",
-        MAX_CANDIDATES + 1,
-        MAX_CANDIDATES,
-        "the model's maximal speed or noise is too large for points so dense",
-    )
+    limit = options.MAX_CANDIDATES
+    what = "pairs of track and detection within the gates of one frame"
+    hint = "the model's maximal speed or noise is too large for points so dense"
+    return SolverLimit(what, limit + 1, limit, hint)

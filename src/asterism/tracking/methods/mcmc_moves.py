@@ -50,7 +50,7 @@ PAIRS = (
 
 
 def checked_weights(weights: str | Mapping[str, float]) -> Mapping[str, float]:
-    """Give the weight of each kind of move.
+    """Return the weight of each kind of move.
 
     Parameters
     ----------
@@ -63,19 +63,21 @@ def checked_weights(weights: str | Mapping[str, float]) -> Mapping[str, float]:
         If a kind is unknown, a weight is no number ≥ 0, or moves could not be taken back.
     """
     if isinstance(weights, str):
-        check_fields("move_weights", [weights], WEIGHTS)
+        check_fields("chain.move_weights", [weights], WEIGHTS)
         return WEIGHTS[weights]
     if not isinstance(weights, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise ParameterError("move_weights", "'uniform', 'report' or a mapping", repr(weights))
-    check_fields("move_weights", weights, MOVES)
+        raise ParameterError(
+            "chain.move_weights", "'uniform', 'report' or a mapping", repr(weights)
+        )
+    check_fields("chain.move_weights", weights, MOVES)
     for move, weight in weights.items():
-        check_number(f"move_weights[{move}]", weight, above=0, closed=True)
+        check_number(f"chain.move_weights[{move}]", weight, above=0, closed=True)
     if not weights.get("birth"):
-        raise ParameterError("move_weights", "births among the moves", dict(weights))
+        raise ParameterError("chain.move_weights", "births among the moves", dict(weights))
     for one, other in PAIRS:
         if bool(weights.get(one)) != bool(weights.get(other)):
             raise ParameterError(
-                "move_weights", f"{one} and {other} both or neither", dict(weights),
+                "chain.move_weights", f"{one} and {other} both or neither", dict(weights),
                 "a move that cannot be taken back is never taken",
             )  # fmt: skip
     return weights

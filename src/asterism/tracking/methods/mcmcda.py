@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping  # noqa: TC003 - options are read off the annotations
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from asterism.checks import check_fields, check_kind, check_number
+from asterism.checks import check_array, check_fields, check_kind, check_number
 from asterism.errors import ParameterError
 from asterism.records import record
+from asterism.tracking.methods.chain_options import ChainOptions
 from asterism.tracking.methods.engine_method import EngineMethod, EngineState
 from asterism.tracking.methods.mcmc_moves import MOVES, checked_weights
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["MCMCDA"]
 
-SPLITS = ("whole", "likelihood", "cells", "clusters")
 MOST = 1_000_000
 """Of moves for a marker in a frame, which are then some seconds, and of frames in a window."""
 FIRST_PASS = 10
@@ -77,44 +76,15 @@ class MCMCDA(EngineMethod):
         agreement tells whether they found the same confidence.
     threads : int
         Walks at the same time. The result does not depend on it.
-    groups : {"likelihood", "clusters", "cells", "whole"}
-        What is walked over apart: tracks and detections that no plausible link joins; that are
-        further than `distance` from each other; that are in different cells of space with that
-        edge, which are shifted by half a cell in every other frame; or nothing.
-    doubt : float
-        Nats. A link that is less plausible by more is not in doubt.
-    distance : float or None
-        Metres; for "clusters" and "cells" alone.
-    bonds : {0, 2, 3, 4}
-        Tracks that were seen in every frame of the window, so many of which kept their distances
-        two by two, are sure: the walk leaves them as they are. 0 for none.
-    bond_tolerance : float or None
-        Metres by which a distance that is kept may vary; by default 6√2 times the noise.
     bond_weight : float
         Nats by which distances to other markers may speak for a detection, or against it; 0 for
         none. What the walk samples is then the posterior with a term more (see Notes).
-    proposal : {"informed", "uniform"}
-        How moves lengthen a track: detections drawn by what they add to the score, or all alike
-        with a fixed probability to stop, as in the report.
-    move_weights : {"uniform", "report"} or mapping
-        How often each kind of move is drawn: all alike, by equation 4.7 of the report (whose eight
-        these are), or weights by kind.
-    at_doubts : float
-        Share of the moves that are drawn at the links in doubt, where two tracks change what they
-        have; 0 for none, as in the report.
-    chain : {"metropolis", "ascent"}
-        The report draws from the best partition so far and weighs against the last one taken
-        ("ascent"): that climbs and does not sample.
     keep : {"best", "draw"}
         What is kept of a walk: the best partition that it met, or the one where it ends, which is
         drawn from the posterior of the open frames given the settled ones. Draws with different
         seeds show what the data leave open; a model is estimated from them.
-    first_rules : bool
-        The report's: nothing but births while there is no track, and neither merge nor switch while
-        there is one.
-    assignment : bool
-        Whether the walk begins at the exact assignment of a new frame; otherwise its detections are
-        nobody's at first, as in the report.
+    chain : ChainOptions
+        How a walk draws and weighs its moves, and what is walked over apart.
 
     Notes
     -----
@@ -151,19 +121,9 @@ class MCMCDA(EngineMethod):
     end_odds: float = 1000.0
     chains: int = 1
     threads: int = 1
-    groups: Literal["likelihood", "clusters", "cells", "whole"] = "likelihood"
-    doubt: float = 10.0
-    distance: float | None = None
-    bonds: Literal[0, 2, 3, 4] = 0
-    bond_tolerance: float | None = None
     bond_weight: float = 0.0
-    proposal: Literal["informed", "uniform"] = "informed"
-    move_weights: Literal["uniform", "report"] | Mapping[str, float] = "uniform"
-    at_doubts: float = 0.5
-    chain: Literal["metropolis", "ascent"] = "metropolis"
     keep: Literal["best", "draw"] = "best"
-    first_rules: bool = False
-    assignment: bool = True
+    chain: ChainOptions = ChainOptions()
 
     name: ClassVar[str] = "mcmcda"
 
@@ -182,53 +142,63 @@ class MCMCDA(EngineMethod):
         check_number("end_odds", self.end_odds, above=1, below=1e12, closed=True)
         check_number("chains", self.chains, above=1, below=1024, closed=True, integer=True)
         check_number("threads", self.threads, above=1, below=1024, closed=True, integer=True)
-        check_number("at_doubts", self.at_doubts, above=0, below=0.99, closed=True)
-        check_number("doubt", self.doubt, above=0, closed=True)
         check_number("bond_weight", self.bond_weight, above=0, below=100, closed=True)
-        if self.bond_tolerance is not None:
-            check_number("bond_tolerance", self.bond_tolerance, above=0)
-        if repr(self.bonds) not in ("0", "2", "3", "4"):
-            raise ParameterError("bonds", "0, 2, 3 or 4", repr(self.bonds))
-        for name, choices in (
-            ("proposal", ("informed", "uniform")),
-            ("chain", ("metropolis", "ascent")),
-            ("keep", ("best", "draw")),
-            ("groups", SPLITS),
-        ):
-            check_fields(name, [getattr(self, name)], choices)
-        for name in ("first_rules", "assignment"):
-            if not isinstance(getattr(self, name), bool):
-                raise ParameterError(name, "True or False", repr(getattr(self, name)))
-        is_by_distance = self.groups in ("clusters", "cells")
-        if self.distance is not None:
-            check_number("distance", self.distance, above=0)
-        if is_by_distance != (self.distance is not None):
-            wanted = "a length in metres" if is_by_distance else "none, or groups by distance"
-            raise ParameterError("distance", wanted, repr(self.distance))
-        if self.keep == "draw" and self.chain == "ascent":
+        check_fields("keep", [self.keep], ("best", "draw"))
+        check_kind("chain", self.chain, ChainOptions, "am.tracking.ChainOptions()")
+        if self.chain.acceptance == "ascent":
             hint = "only the metropolis chain samples"
-            raise ParameterError("keep", "'best' with the ascent", "'draw'", hint)
-        for name in ("confidence", "at_doubts"):
-            if self.chain == "ascent" and getattr(self, name) > 0:
-                raise ParameterError(
-                    name, "0 with the ascent", repr(getattr(self, name)),
-                    "only the metropolis chain samples",
-                )  # fmt: skip
-        checked_weights(self.move_weights)
+            if self.keep == "draw":
+                raise ParameterError("keep", "'best' with the ascent", "'draw'", hint)
+            if self.confidence > 0:
+                raise ParameterError("confidence", "0 with the ascent", self.confidence, hint)
+
+    @classmethod
+    def report_2010(cls, *, window: int = 10, moves: float = 25.0, **changes: Any) -> Self:
+        """Make the chain of the 2010 report.
+
+        Parameters
+        ----------
+        window, moves
+            As for the class.
+        **changes
+            Fields of `ChainOptions` that differ from the report's.
+
+        Returns
+        -------
+        MCMCDA
+
+        Raises
+        ------
+        ParameterError
+            At an unknown or impossible option.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.MCMCDA.report_2010(groups="cells", distance=0.5).chain.acceptance
+        'ascent'
+        """
+        report: dict[str, Any] = {
+            "proposal": "uniform", "move_weights": "report", "acceptance": "ascent",
+            "first_rules": True, "assignment": False, "ambiguous_share": 0.0, "groups": "whole",
+        }  # fmt: skip
+        chain = ChainOptions(**report | changes)
+        return cls(window=window, moves=moves, confidence=0.0, end_odds=1.0, chain=chain)
 
     def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> Tracker:
         from asterism import _engine
         from asterism.model.compiled import motion_model, score_model
 
-        weights = checked_weights(self.move_weights)
+        rules = self.chain
+        weights = checked_weights(rules.move_weights)
         chain = _engine.ChainOptions(
             weights=np.array([weights.get(move, 0.0) for move in MOVES]),
-            is_informed=self.proposal == "informed",
+            is_informed=rules.proposal == "informed",
             stop=model.population.p_disappear,
             floor=FLOOR,
-            has_first_rules=self.first_rules,
-            is_ascent=self.chain == "ascent",
-            share_at_doubts=self.at_doubts,
+            has_first_rules=rules.first_rules,
+            is_ascent=rules.acceptance == "ascent",
+            share_at_doubts=rules.ambiguous_share,
             is_draw=self.keep == "draw",
         )
         options = _engine.McmcOptions(
@@ -237,15 +207,15 @@ class MCMCDA(EngineMethod):
             block=BLOCK,
             moves=math.inf if self.moves is None else self.moves,
             deadline=self.deadline or 0.0,
-            has_assignment=self.assignment,
+            has_assignment=rules.assignment,
             confidence=self.confidence,
             chains=int(self.chains),
             threads=int(self.threads),
-            split_by=SPLITS.index(self.groups),
-            doubt=self.doubt,
-            distance=self.distance or 0.0,
-            bonds=self.bonds,
-            tolerance=self.bond_tolerance or 6 * math.sqrt(2) * model.sensor.noise_sigma,
+            split_by=getattr(_engine.SplitBy, rules.groups),
+            doubt=rules.ambiguous_within,
+            distance=rules.distance or 0.0,
+            bonds=rules.bonds,
+            tolerance=rules.bond_tolerance or 6 * math.sqrt(2) * model.sensor.noise_sigma,
             bond_weight=self.bond_weight,
         )
         is_one = len(model.motion.modes) == 1
@@ -254,6 +224,37 @@ class MCMCDA(EngineMethod):
         rare = replace(population, p_disappear=population.p_disappear / self.end_odds)
         score = score_model(replace(model, population=rare))
         return make(motion_model(model, n_axes), score, chain, options, _checked_seed(seed))
+
+    def init(
+        self,
+        model: TrackingModel,
+        *,
+        n_axes: int = 3,
+        seed: int | None = None,
+        start: ArrayLike | None = None,
+    ) -> EngineState:
+        """Make the state before the first frame; see `Method.init`.
+
+        Parameters
+        ----------
+        model, n_axes, seed
+            As there.
+        start : array_like of int, shape (N,), optional
+            Labels of the detections to come, -1 for none, from which the walk begins.
+
+        Raises
+        ------
+        ParameterError
+            Where no track could ever begin, neither by a move nor with a label.
+        """
+        if self.moves == 0 and start is None:
+            hint = "tracks begin by moves alone; gnn pairs frame by frame without any"
+            raise ParameterError("moves", "a number > 0, or labels to start from", "0", hint)
+        state = super().init(model, n_axes=n_axes, seed=seed)
+        if start is not None:
+            labels = check_array("start", start, ("N",), dtype=np.int64)
+            _own(state).start_from(labels)
+        return state
 
     def step(
         self,
@@ -266,7 +267,6 @@ class MCMCDA(EngineMethod):
         """Take the next frame; see `Method.step`."""
         if self.window is None:
             raise ParameterError("window", "a number of frames", "None", "a stream has no end")
-        self._refuse_to_stand(state, None)
         return super().step(state, time, points, covariances=covariances)
 
     def run(
@@ -275,14 +275,9 @@ class MCMCDA(EngineMethod):
         detections: Detections,
         *,
         progress: Callable[[int], Any] | None = None,
-        start: NDArray[np.int64] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; see `Method.run`."""
-        self._refuse_to_stand(state, start)
-        tracker = _own_copy(state)
-        if start is not None:
-            tracker.start_from(np.ascontiguousarray(start, dtype=np.int64))
-        state = replace(state, tracker=tracker)
+        check_kind("state", state, EngineState, "method.init(model)")
         if self.window is not None:
             return super().run(state, detections, progress=progress)
         T = detections.n_frames
@@ -300,18 +295,11 @@ class MCMCDA(EngineMethod):
         )
         labels = np.concatenate([np.full(n_before, -1, dtype=np.int64), labels])
         confidence = np.zeros(len(labels) if sure is not None else 0)
-        tracker = _own_copy(state)
+        tracker = _own(state).copy()
         tracker.finish(labels, confidence, lambda share: tell(part + (1 - part) * share))
         tell(1.0)
         state = replace(state, tracker=tracker)
         return state, labels[n_before:], None if sure is None else confidence[n_before:]
-
-    def _refuse_to_stand(self, state: EngineState, start: object) -> None:
-        """Raise where no track could ever begin, neither by a move nor with a label."""
-        check_kind("state", state, EngineState, "method.init(model)")
-        if self.moves == 0 and start is None and state.n_seen == 0:
-            hint = "tracks begin by moves alone; gnn pairs frame by frame without any"
-            raise ParameterError("moves", "a number > 0, or labels to start from", "0", hint)
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
         from asterism import _engine
@@ -335,7 +323,7 @@ class MCMCDA(EngineMethod):
         }
         if chain.n_given:
             about |= {"given_links": chain.n_given, "refused_links": chain.n_refused}
-        if self.bonds:
+        if self.chain.bonds:
             about["sure_tracks"] = chain.n_sure
         if self.bond_weight > 0:
             about |= {"bonds": stats.n_bonds, "bond_score": stats.bond_score}
@@ -350,12 +338,11 @@ class MCMCDA(EngineMethod):
         return about
 
 
-def _own_copy(state: EngineState) -> _engine.OneMotionTracker | _engine.SeveralMotionsTracker:
+def _own(state: EngineState) -> _engine.OneMotionTracker | _engine.SeveralMotionsTracker:
     from asterism import _engine
 
-    tracker = state.tracker.copy()
-    assert isinstance(tracker, (_engine.OneMotionTracker, _engine.SeveralMotionsTracker))
-    return tracker
+    assert isinstance(state.tracker, (_engine.OneMotionTracker, _engine.SeveralMotionsTracker))
+    return state.tracker
 
 
 def _checked_seed(seed: int | None) -> int:

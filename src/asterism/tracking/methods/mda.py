@@ -9,18 +9,28 @@ import numpy as np
 from asterism.checks import check_fields, check_number
 from asterism.records import record
 from asterism.solve import assign_multidimensional
-from asterism.tracking.methods.over_window import Hypotheses, branch_options
+from asterism.tracking.methods.engine_method import EngineMethod
+from asterism.tracking.methods.options import (
+    Gate,
+    Lifecycle,
+    Rigidity,
+    carry_options,
+    engine_model,
+    shared_counts,
+)
+from asterism.tracking.methods.over_window import branch_options, check_hypotheses, tree_counts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism import _engine
+    from asterism.model import TrackingModel
 
 __all__ = ["MDA"]
 
 
 @record
-class MDA(Hypotheses):
+class MDA(EngineMethod):
     """Multidimensional assignment: the best way to share out all detections of a window at once.
 
     A tuple takes a track, or none for a new one, and a detection or none of each frame of the
@@ -44,11 +54,13 @@ class MDA(Hypotheses):
         is less probable than the best of all by more than these odds times the odds of ending the
         track and beginning another.
     new_track_odds : float
-        A detection that a believed track expects by more than these odds begins no track.
-    gate_probability, confirm_probability, delete_odds : float
-        See `FrameByFrame`.
-    bodies, max_carried, bond_weight
-        See `WithBodies`.
+        A detection that a confirmed track expects by more than these odds begins no track.
+    gate : Gate
+        Which detections a track may take.
+    lifecycle : Lifecycle
+        When a tentative track is confirmed or deleted.
+    rigid : Rigidity, optional
+        How neighbours predict occluded markers; None where they do not.
 
     Notes
     -----
@@ -64,18 +76,24 @@ class MDA(Hypotheses):
     (8, 0.0)
     """
 
+    window: int = 3
+    prune_odds: float = 100.0
+    new_track_odds: float = 1000.0
     solver: Literal["exact", "relaxed"] = "exact"
     max_branches: int = 200
+    gate: Gate = Gate()
+    lifecycle: Lifecycle = Lifecycle()
+    rigid: Rigidity | None = None
 
     name: ClassVar[str] = "mda"
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        check_hypotheses(self)
         check_fields("solver", [self.solver], ("exact", "relaxed"))
         check_number("max_branches", self.max_branches, above=1, closed=True, integer=True)
 
-    def _make(
-        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    def _tracker(
+        self, model: TrackingModel, n_axes: int, seed: int | None
     ) -> _engine.HypothesisTracker:
         from asterism import _engine
 
@@ -83,14 +101,12 @@ class MDA(Hypotheses):
             window=self.window, max_branches=self.max_branches, prune_odds=self.prune_odds
         )
         return _engine.HypothesisTracker(
-            motion,
-            score,
-            life,
+            *engine_model(self, model, n_axes),
             branches,
             max_hypotheses=1,
             max_nodes=1000,  # of tracks that share nothing: one suffices
             new_track_claim=self.new_track_odds,
-            carry=self._carry(),
+            carry=carry_options(self.rigid),
             choose=self._choose,
         )
 
@@ -124,8 +140,11 @@ class MDA(Hypotheses):
         return (own - first_option[:-1]).astype(np.int32), found.bound + float(worths[free].sum())
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
-        return super()._about(stats) | {
-            "dropped_branches": stats.n_limited,
-            "windows_with_a_gap": stats.n_beams,
-            "gap": stats.gap,
+        counts = tree_counts(stats)
+        return shared_counts(self, stats) | {
+            "branches": counts.n_branches,
+            "most_branches": counts.most_branches,
+            "dropped_branches": counts.n_limited,
+            "windows_with_a_gap": counts.n_beams,
+            "gap": counts.gap,
         }

@@ -9,12 +9,22 @@ import numpy as np
 from asterism.checks import check_number
 from asterism.errors import ParameterError
 from asterism.records import record
-from asterism.tracking.methods.over_window import Hypotheses, branch_options
+from asterism.tracking.methods.engine_method import EngineMethod
+from asterism.tracking.methods.options import (
+    Gate,
+    Lifecycle,
+    Rigidity,
+    carry_options,
+    engine_model,
+    shared_counts,
+)
+from asterism.tracking.methods.over_window import branch_options, check_hypotheses, tree_counts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism import _engine
+    from asterism.model import TrackingModel
     from asterism.tracking.methods.engine_method import EngineState
 
 __all__ = ["MHT", "HypothesisCluster"]
@@ -46,7 +56,7 @@ class HypothesisCluster:
 
 
 @record
-class MHT(Hypotheses):
+class MHT(EngineMethod):
     """Reid's multiple hypotheses: whole explanations of all detections, from frame to frame.
 
     Targets that compete for detections form a cluster, which keeps its own hypotheses. CLUSTER
@@ -74,11 +84,13 @@ class MHT(Hypotheses):
         Of hypotheses with the same targets, whose estimates differ by less than so many standard
         deviations, the likeliest stands for all; 0 merges none.
     new_track_odds : float
-        A detection that a believed track expects by more than these odds begins no track.
-    gate_probability, confirm_probability, delete_odds : float
-        See `FrameByFrame`.
-    bodies, max_carried, bond_weight
-        See `WithBodies`.
+        A detection that a confirmed track expects by more than these odds begins no track.
+    gate : Gate
+        Which detections a track may take.
+    lifecycle : Lifecycle
+        When a tentative track is confirmed or deleted.
+    rigid : Rigidity, optional
+        How neighbours predict occluded markers; None where they do not.
 
     Examples
     --------
@@ -88,14 +100,19 @@ class MHT(Hypotheses):
     8
     """
 
+    window: int = 3
     prune_odds: float = 1e6
+    new_track_odds: float = 1000.0
     max_hypotheses: int = 100
     merged_within: float = 0.0
+    gate: Gate = Gate()
+    lifecycle: Lifecycle = Lifecycle()
+    rigid: Rigidity | None = None
 
     name: ClassVar[str] = "mht"
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        check_hypotheses(self)
         check_number("max_hypotheses", self.max_hypotheses, above=1, closed=True, integer=True)
         check_number("merged_within", self.merged_within, above=0, closed=True)
 
@@ -136,27 +153,28 @@ class MHT(Hypotheses):
             )
         return found
 
-    def _make(
-        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    def _tracker(
+        self, model: TrackingModel, n_axes: int, seed: int | None
     ) -> _engine.MatrixTracker:
         from asterism import _engine
 
         return _engine.MatrixTracker(
-            motion,
-            score,
-            life,
+            *engine_model(self, model, n_axes),
             # The hypotheses are limited, not the branches of a target.
             branch_options(window=self.window, max_branches=1, prune_odds=self.prune_odds),
             max_hypotheses=int(self.max_hypotheses),
             merged_within=self.merged_within,
             new_track_claim=self.new_track_odds,
-            carry=self._carry(),
+            carry=carry_options(self.rigid),
         )
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
-        return super()._about(stats) | {
-            "most_hypotheses": stats.n_hypotheses,
-            "merged": stats.n_merged,
-            "limited": stats.n_limited,
-            "most_dropped_odds": stats.bound,
+        counts = tree_counts(stats)
+        return shared_counts(self, stats) | {
+            "branches": counts.n_branches,
+            "most_branches": counts.most_branches,
+            "most_hypotheses": counts.n_hypotheses,
+            "merged": counts.n_merged,
+            "limited": counts.n_limited,
+            "most_dropped_odds": counts.bound,
         }

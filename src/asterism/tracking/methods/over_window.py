@@ -1,22 +1,21 @@
-"""What the methods share that keep several ways on for each track, over a window of frames."""
+"""What the methods share that keep several branches of each track over a window of frames."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from asterism.checks import check_number
-from asterism.records import record
-from asterism.tracking.methods.with_bodies import WithBodies
+from asterism.tracking.methods.options import SharedOptions, check_shared
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism import _engine
 
-__all__ = ["Hypotheses", "branch_options", "check_window"]
+__all__ = ["branch_options", "check_hypotheses", "check_window", "tree_counts"]
 
 
 def check_window(window: float, least: int) -> None:
@@ -48,36 +47,28 @@ def branch_options(
     )
 
 
-@record
-class Hypotheses(WithBodies):
-    """Options of every method that explains all detections of a window at once.
+class HypothesisOptions(SharedOptions, Protocol):
+    """What every method has that explains all detections of a window at once."""
 
-    Parameters
-    ----------
-    window : int
-        Frames until one is decided, 2 to 16.
-    prune_odds : float
-        What is so many times less likely than the best is not followed further.
-    new_track_odds : float
-        A detection that a believed track expects by more than these odds begins no track.
-    gate_probability, confirm_probability, delete_odds : float
-        See `FrameByFrame`.
-    bodies, max_carried, bond_weight
-        See `WithBodies`.
-    """
+    @property
+    def window(self) -> int: ...
+    @property
+    def prune_odds(self) -> float: ...
+    @property
+    def new_track_odds(self) -> float: ...
 
-    window: int = 3
-    prune_odds: float = 100.0
-    new_track_odds: float = 1000.0
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_window(self.window, 2)
-        check_number("prune_odds", self.prune_odds, above=1)
-        check_number("new_track_odds", self.new_track_odds, above=0)
+def check_hypotheses(options: HypothesisOptions) -> None:
+    """Raise `ParameterError` where an option of such a method is out of range."""
+    check_shared(options)
+    check_window(options.window, 2)
+    check_number("prune_odds", options.prune_odds, above=1)
+    check_number("new_track_odds", options.new_track_odds, above=0)
 
-    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
-        return super()._about(stats) | {
-            "branches": stats.n_branches,
-            "most_branches": stats.most_branches,
-        }
+
+def tree_counts(stats: _engine.FrameStats) -> _engine.TreeStats:
+    """Narrow the counts to those of a tracker of trees."""
+    from asterism import _engine
+
+    assert isinstance(stats, _engine.TreeStats)
+    return stats

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+import typing
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, cast
 
 from asterism.checks import check_fields
 from asterism.records import Registry
@@ -19,7 +21,7 @@ from asterism.tracking.methods.track_splitting import TrackSplitting
 if TYPE_CHECKING:
     from asterism.tracking.methods.base import Method
 
-__all__ = ["METHODS", "method_by_name", "options_of"]
+__all__ = ["METHODS", "method_by_name", "options_of", "record_in"]
 
 METHODS: dict[str, type[Method[Any]]] = Registry(
     {method.name: method for method in (GNN, SMP, JPDA, TrackSplitting, TOMHT, MDA, MHT, MCMCDA)}
@@ -36,14 +38,36 @@ def method_by_name(name: str, **options: Any) -> Method[Any]:
         At an unknown name or option.
     """
     check_fields("method", [name], METHODS)
-    method = METHODS[name]
-    known = [f.name for f in dataclasses.fields(method)] if dataclasses.is_dataclass(method) else []
-    check_fields(f"method {name}", options, known)
-    return method(**options)
+    kind: type[Any] = METHODS[name]
+    check_fields(f"method {name}", options, [f.name for f in dataclasses.fields(kind)])
+    return _made(kind, options)
 
 
-def options_of(method: Method[Any]) -> dict[str, Any]:
-    """Return all options of a method by name; none of one that is no dataclass."""
+def _made(kind: type[Any], options: Mapping[str, Any]) -> Any:
+    """Make a record, and those that are among its options, which may be given as tables."""
+    kinds = typing.get_type_hints(kind)
+    made = dict(options)
+    for name, value in options.items():
+        inner = record_in(kinds.get(name))
+        if inner is not None and isinstance(value, Mapping):
+            made[name] = _made(inner, cast("Mapping[str, Any]", value))
+    return kind(**made)
+
+
+def record_in(kind: Any) -> type[Any] | None:
+    """Return the record among the types that an option may have, None where there is none."""
+    for inner in (kind, *typing.get_args(kind)):
+        if isinstance(inner, type) and dataclasses.is_dataclass(inner):
+            return inner
+    return None
+
+
+def options_of(method: object) -> dict[str, Any]:
+    """Return all options of a method by name, records as tables; none of one that is no record."""
     if not dataclasses.is_dataclass(method):
         return {}
-    return {field.name: getattr(method, field.name) for field in dataclasses.fields(method)}
+    options = {field.name: getattr(method, field.name) for field in dataclasses.fields(method)}
+    return {
+        name: options_of(value) if dataclasses.is_dataclass(value) else value
+        for name, value in options.items()
+    }

@@ -9,8 +9,18 @@ import numpy as np
 from asterism.checks import check_fields, check_number
 from asterism.errors import ParameterError
 from asterism.records import record
+from asterism.tracking.methods.engine_method import EngineMethod
+from asterism.tracking.methods.options import (
+    Gate,
+    Lifecycle,
+    Rigidity,
+    carry_options,
+    check_flags,
+    check_shared,
+    engine_model,
+    shared_counts,
+)
 from asterism.tracking.methods.over_window import branch_options, check_window
-from asterism.tracking.methods.with_bodies import WithBodies
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from asterism import _engine
-    from asterism.model import Detections
+    from asterism.model import Detections, TrackingModel
     from asterism.tracking.methods.base import Update
     from asterism.tracking.methods.engine_method import EngineState
 
@@ -30,11 +40,11 @@ PRUNE_ODDS = 1e6
 
 
 @record
-class SMP(WithBodies):
+class SMP(EngineMethod):
     """Stable marriage: no track and detection would both rather have each other.
 
     Tracks (the report's men) rank the detections by their predictive density N(ŷ, S); detections
-    rank the tracks by distance, nearest first. Believed tracks marry before tentative ones.
+    rank the tracks by distance, nearest first. Confirmed tracks marry before tentative ones.
     Whoever is outside the gate is unacceptable, so numbers may differ: a track left alone is a
     missed detection, a detection left alone a new track or clutter. Ties go to the lower index.
 
@@ -56,10 +66,12 @@ class SMP(WithBodies):
         `window` frames have come. A track then ranks the frame's detections by the likelihood of
         the best way on from each through the window, a detection ranks tracks by their mean squared
         distance along it. Until then labels are what would be decided now, and may change.
-    gate_probability, confirm_probability, delete_odds : float
-        See `FrameByFrame`.
-    bodies, max_carried, bond_weight
-        See `WithBodies`.
+    gate : Gate
+        Which detections a track may take.
+    lifecycle : Lifecycle
+        When a tentative track is confirmed or deleted.
+    rigid : Rigidity, optional
+        How neighbours predict occluded markers; None where they do not.
     """
 
     proposers: Literal["tracks", "detections"] = "tracks"
@@ -67,15 +79,16 @@ class SMP(WithBodies):
     capacity: int = 1
     merged_within: float = 0.02
     window: int = 1
+    gate: Gate = Gate()
+    lifecycle: Lifecycle = Lifecycle()
+    rigid: Rigidity | None = None
 
     name: ClassVar[str] = "smp"
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        check_shared(self)
         check_fields("proposers", [self.proposers], ("tracks", "detections"))
-
-        if not isinstance(self.strict, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise ParameterError("strict", "True or False", repr(self.strict))
+        check_flags(self, "strict")
         check_number("capacity", self.capacity, above=1, below=64, closed=True, integer=True)
         check_number("merged_within", self.merged_within, above=0)
         check_window(self.window, 1)
@@ -84,36 +97,38 @@ class SMP(WithBodies):
         if self.window > 1 and (self.strict or self.capacity > 1):
             given = "strict=True" if self.strict else f"capacity={self.capacity}"
             raise ParameterError("window", f"1, as {given} is given", self.window)
-        if self.bodies and self.strict:
-            raise ParameterError("bodies", "False, as strict=True is given", self.bodies)
+        if self.rigid is not None and self.strict:
+            raise ParameterError("rigid", "None, as strict=True is given", repr(self.rigid))
 
-    def _make(
-        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    def _tracker(
+        self, model: TrackingModel, n_axes: int, seed: int | None
     ) -> _engine.FrameTracker | _engine.TreeTracker:
         from asterism import _engine
 
-        matcher = 1 if self.proposers == "tracks" else 2
+        is_tracks = self.proposers == "tracks"
+        pairing = (
+            _engine.Pairing.tracks_propose if is_tracks else _engine.Pairing.detections_propose
+        )
         if self.window == 1:
             return _engine.FrameTracker(
-                motion,
-                score,
-                life,
-                matcher=matcher,
+                *engine_model(self, model, n_axes),
+                pairing=pairing,
                 is_strict=self.strict,
                 capacity=int(self.capacity),
                 merged_within=self.merged_within,
-                carry=self._carry(),
+                carry=carry_options(self.rigid),
             )
         ways = branch_options(window=self.window, max_branches=MAX_WAYS, prune_odds=PRUNE_ODDS)
         return _engine.TreeTracker(
-            motion,
-            score,
-            life,
+            *engine_model(self, model, n_axes),
             ways,
-            resolver=matcher,
+            pairing=pairing,
             is_independent=False,
-            carry=self._carry(),
+            carry=carry_options(self.rigid),
         )
+
+    def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
+        return shared_counts(self, stats)
 
     def step(
         self,
@@ -140,14 +155,13 @@ class SMP(WithBodies):
         detections: Detections,
         *,
         progress: Callable[[int], Any] | None = None,
-        start: NDArray[np.int64] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
         """Take all frames in the engine; the same labels as the loop over `step`."""
         if self.strict and detections.n_frames:
             wanted = state.n_ids if state.tracker.n_frames else int(detections.counts[0])
             for t in np.flatnonzero(detections.counts != wanted):
                 _check_number(int(detections.counts[t]), wanted, f"in frame {t}")
-        return super().run(state, detections, progress=progress, start=start)
+        return super().run(state, detections, progress=progress)
 
 
 def _check_number(n: int, wanted: int, where: str) -> None:

@@ -6,16 +6,26 @@ from typing import TYPE_CHECKING, ClassVar
 
 from asterism.checks import check_number
 from asterism.records import record
-from asterism.tracking.methods.over_window import Hypotheses, branch_options
+from asterism.tracking.methods.engine_method import EngineMethod
+from asterism.tracking.methods.options import (
+    Gate,
+    Lifecycle,
+    Rigidity,
+    carry_options,
+    engine_model,
+    shared_counts,
+)
+from asterism.tracking.methods.over_window import branch_options, check_hypotheses, tree_counts
 
 if TYPE_CHECKING:
     from asterism import _engine
+    from asterism.model import TrackingModel
 
 __all__ = ["TOMHT"]
 
 
 @record
-class TOMHT(Hypotheses):
+class TOMHT(EngineMethod):
     """Track-oriented multiple hypotheses: the best compatible set of track hypotheses.
 
     Each track is a tree: a branch for every detection in its gate and one for a miss, over a window
@@ -50,11 +60,13 @@ class TOMHT(Hypotheses):
         Most nodes of the search in a cluster; where it is cut short, a compatible set is made of
         what was found, and ``info`` says by how many nats it may be below the best.
     new_track_odds : float
-        A detection that a believed track expects by more than these odds begins no track.
-    gate_probability, confirm_probability, delete_odds : float
-        See `FrameByFrame`.
-    bodies, max_carried, bond_weight
-        See `WithBodies`.
+        A detection that a confirmed track expects by more than these odds begins no track.
+    gate : Gate
+        Which detections a track may take.
+    lifecycle : Lifecycle
+        When a tentative track is confirmed or deleted.
+    rigid : Rigidity, optional
+        How neighbours predict occluded markers; None where they do not.
 
     Notes
     -----
@@ -73,19 +85,25 @@ class TOMHT(Hypotheses):
     (8, 0.0)
     """
 
+    window: int = 3
+    prune_odds: float = 100.0
+    new_track_odds: float = 1000.0
     max_branches: int = 100
     max_hypotheses: int = 20
     max_nodes: int = 2000
+    gate: Gate = Gate()
+    lifecycle: Lifecycle = Lifecycle()
+    rigid: Rigidity | None = None
 
     name: ClassVar[str] = "tomht"
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        check_hypotheses(self)
         for name in ("max_branches", "max_hypotheses", "max_nodes"):
             check_number(name, getattr(self, name), above=1, closed=True, integer=True)
 
-    def _make(
-        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
+    def _tracker(
+        self, model: TrackingModel, n_axes: int, seed: int | None
     ) -> _engine.HypothesisTracker:
         from asterism import _engine
 
@@ -93,21 +111,22 @@ class TOMHT(Hypotheses):
             window=self.window, max_branches=self.max_branches, prune_odds=self.prune_odds
         )
         return _engine.HypothesisTracker(
-            motion,
-            score,
-            life,
+            *engine_model(self, model, n_axes),
             branches,
             max_hypotheses=int(self.max_hypotheses),
             max_nodes=int(self.max_nodes),
             new_track_claim=self.new_track_odds,
-            carry=self._carry(),
+            carry=carry_options(self.rigid),
         )
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
-        return super()._about(stats) | {
-            "dropped_branches": stats.n_limited,
-            "most_hypotheses": stats.n_hypotheses,
-            "nodes": stats.n_nodes,
-            "clusters_cut_short": stats.n_beams,
-            "gap": stats.gap,
+        counts = tree_counts(stats)
+        return shared_counts(self, stats) | {
+            "branches": counts.n_branches,
+            "most_branches": counts.most_branches,
+            "dropped_branches": counts.n_limited,
+            "most_hypotheses": counts.n_hypotheses,
+            "nodes": counts.n_nodes,
+            "clusters_cut_short": counts.n_beams,
+            "gap": counts.gap,
         }

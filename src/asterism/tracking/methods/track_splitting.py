@@ -11,13 +11,24 @@ import numpy as np
 from asterism.checks import check_number
 from asterism.errors import ParameterError
 from asterism.records import record
-from asterism.tracking.methods.over_window import branch_options, check_window
-from asterism.tracking.methods.with_bodies import WithBodies
+from asterism.tracking.methods.engine_method import EngineMethod
+from asterism.tracking.methods.options import (
+    Gate,
+    Lifecycle,
+    Rigidity,
+    carry_options,
+    check_flags,
+    check_shared,
+    engine_model,
+    shared_counts,
+)
+from asterism.tracking.methods.over_window import branch_options, check_window, tree_counts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism import _engine
+    from asterism.model import TrackingModel
 
 __all__ = ["TrackSplitting", "chi2_limits"]
 
@@ -26,7 +37,7 @@ _EXACT_LIMITS = 4096
 
 
 @record
-class TrackSplitting(WithBodies):
+class TrackSplitting(EngineMethod):
     """Track splitting: a branch for every detection in the gate and one for a miss.
 
     Each track is a tree. Along a branch ``λ(k) = ρ λ(k-1) + νᵀ S⁻¹ ν`` sums how far the detections
@@ -68,11 +79,13 @@ class TrackSplitting(WithBodies):
     independent : bool
         Whether each tree goes on with what it likes best though another has it, as in the report:
         then only the labels are resolved, trees know nothing of each other, and two may follow one
-        marker. Not with `bodies`.
-    gate_probability, confirm_probability, delete_odds : float
-        See `FrameByFrame`.
-    bodies, max_carried, bond_weight
-        See `WithBodies`.
+        marker. Not with `rigid`.
+    gate : Gate
+        Which detections a track may take.
+    lifecycle : Lifecycle
+        When a tentative track is confirmed or deleted.
+    rigid : Rigidity, optional
+        How neighbours predict occluded markers; None where they do not.
 
     Examples
     --------
@@ -89,11 +102,14 @@ class TrackSplitting(WithBodies):
     merge_last: int = 8
     prune_odds: float = 1e6
     independent: bool = False
+    gate: Gate = Gate()
+    lifecycle: Lifecycle = Lifecycle()
+    rigid: Rigidity | None = None
 
     name: ClassVar[str] = "splitting"
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        check_shared(self)
         check_number("alpha", self.alpha, above=0, below=1)
         check_number("fading", self.fading, above=0)
         if not (self.fading <= MOST_FADING or self.fading == 1):
@@ -102,14 +118,11 @@ class TrackSplitting(WithBodies):
         check_number("max_branches", self.max_branches, above=1, closed=True, integer=True)
         check_number("merge_last", self.merge_last, above=1, closed=True, integer=True)
         check_number("prune_odds", self.prune_odds, above=1)
-        if not isinstance(self.independent, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise ParameterError("independent", "True or False", repr(self.independent))
-        if self.bodies and self.independent:
-            raise ParameterError("bodies", "False, as independent=True is given", self.bodies)
+        check_flags(self, "independent")
+        if self.rigid is not None and self.independent:
+            raise ParameterError("rigid", "None, as independent=True is given", repr(self.rigid))
 
-    def _make(
-        self, motion: _engine.MotionModel, score: _engine.ScoreModel, life: _engine.LifeOptions
-    ) -> _engine.TreeTracker:
+    def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> _engine.TreeTracker:
         from scipy.special import ndtri
 
         from asterism import _engine
@@ -120,28 +133,27 @@ class TrackSplitting(WithBodies):
             prune_odds=self.prune_odds,
             merge_last=self.merge_last,
             fading=self.fading,
-            limits=chi2_limits(self.alpha, motion.n_axes, self.fading),
+            limits=chi2_limits(self.alpha, n_axes, self.fading),
             z=float(-ndtri(self.alpha)),
         )
         return _engine.TreeTracker(
-            motion,
-            score,
-            life,
+            *engine_model(self, model, n_axes),
             branches,
-            resolver=0,
+            pairing=_engine.Pairing.assignment,
             is_independent=self.independent,
-            carry=self._carry(),
+            carry=carry_options(self.rigid),
         )
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
-        return super()._about(stats) | {
-            "branches": stats.n_branches,
-            "most_branches": stats.most_branches,
-            "cut_branches": stats.n_cut,
-            "dropped_branches": stats.n_limited,
-            "shared_detections": stats.n_shared,
-            "approximate_groups": stats.n_beams,
-            "bound": stats.bound,
+        counts = tree_counts(stats)
+        return shared_counts(self, stats) | {
+            "branches": counts.n_branches,
+            "most_branches": counts.most_branches,
+            "cut_branches": counts.n_cut,
+            "dropped_branches": counts.n_limited,
+            "shared_detections": counts.n_shared,
+            "approximate_groups": counts.n_beams,
+            "bound": counts.bound,
         }
 
 
