@@ -298,9 +298,9 @@ def _nearest(name: str, known: list[str]) -> str:
     import difflib
 
     folded = {k.lower(): k for k in known}
-    words = {
-        word: k for k in reversed(known) for word in re.split(r"[_.]", k.lower()) if len(word) > 2
-    }
+    words: dict[str, str] = {}
+    for k in reversed(known):
+        words |= {word: k for word in re.split(r"[_.]", k.lower()) if len(word) > 2}
     for names in (folded, words):
         near = difflib.get_close_matches(name.lower(), names, n=1)
         if near:
