@@ -59,7 +59,7 @@ tables: $(VENV)/.bench
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
 # beside the package, never installed.
 sanitize: sanitized $(VENV)/.test
-	$(BIN)/python tests/run_sanitized.py build/sanitize
+	$(BIN)/python tests/tools/run_sanitized.py build/sanitize
 
 sanitized: $(VENV)/.python
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake -S . -B build/sanitize -G Ninja \

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 
-import pytest
 from hypothesis import settings
 
 # People try properties on fresh examples, the checks of a change always on the same.
@@ -16,20 +15,3 @@ if os.environ.get("CI"):
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Their processes tell how wide a line of theirs is; what our commands print goes into a pipe.
 os.environ.pop("COLUMNS", None)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    from browser import Browser
-
-    made = Browser()
-    yield made
-    made.close()
-
-
-@pytest.fixture(scope="module")
-def person(tmp_path_factory):
-    """The report page of a person, and what is on it."""
-    from report_cases import full_page
-
-    return full_page(tmp_path_factory.mktemp("person") / "page.html")

@@ -71,7 +71,7 @@ def run(effort: Effort, tell: Tell) -> Outcome:
         notes=(
             f"Beside the report's eight, Asterism has {', '.join(MOVES[len(EQUATION):])}. That the "
             "chain visits partitions as often as the posterior has them is tested against "
-            "enumeration (`tests/measure_chain.py`).",
+            "enumeration (`tests/tools/measure_chain.py`).",
         ),
     )  # fmt: skip
 

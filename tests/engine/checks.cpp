@@ -1,0 +1,183 @@
+// Parts of the engine that Python does not reach by themselves; see test_checks.py.
+#include <cstdio>
+#include <cstdlib>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "mcmc/chain/budgets.hpp"
+#include "mcmc/tracker/capture_sweep.hpp"
+#include "mcmc/chain/chain_stats.hpp"
+#include "rigid/neighbours.hpp"
+#include "base/parallel.hpp"
+#include "mcmc/chain/trace.hpp"
+
+using namespace asterism;
+
+#define CHECK(what)                                                     \
+  if (!(what)) {                                                        \
+    std::fprintf(stderr, "line %d: not so: %s\n", __LINE__, #what);     \
+    std::exit(1);                                                       \
+  }
+
+// An exception in a task ended the process; now the first one, by number, reaches the caller.
+void exceptions_reach_the_caller() {
+  for (int repeat = 0; repeat < 200; ++repeat) {
+    std::string caught;
+    try {
+      in_parallel(100, 4, [](std::int32_t, std::int64_t k) {
+        if (k >= 3) throw std::runtime_error(std::to_string(k));
+      });
+    } catch (const std::runtime_error& error) {
+      caught = error.what();
+    }
+    CHECK(caught == "3");
+  }
+  std::vector<int> done(1000, 0);
+  in_parallel(1000, 3, [&](std::int32_t, std::int64_t k) { ++done[k]; });
+  for (const int n : done) CHECK(n == 1);
+}
+
+// Moves without limit, weights of nothing and deadlines beyond any clock were cast to integers,
+// which the undefined-behaviour sanitizer reports.
+void budgets_of_nothing_and_of_everything() {
+  const double inf = std::numeric_limits<double>::infinity();
+  const std::vector<double> weights{0, 1, 5};
+  const Budgets endless(weights, inf);
+  CHECK(endless.of(0).moves == 0 && endless.of(1).moves > 1'000'000'000);
+  const std::vector<double> nothing{0, 0};
+  Budgets idle(nothing, inf);
+  idle.end_at(after(Clock::now(), 1e-3), nothing, 1, 1);
+  CHECK(idle.of(0).moves == 0 && idle.of(1).is_over(0));
+  Budgets late(weights, 10);
+  late.end_at(after(Clock::now(), 1e300), weights, 2, 2);
+  CHECK(!late.of(1).is_over(0));
+  bool was_asked = false;
+  Watch watch(0, [&](double share) {
+    was_asked = true;
+    CHECK(share >= 0 && share <= 1);
+    return true;
+  });
+  while (!was_asked) watch.is_stopped_before(0);
+}
+
+// The first half of a chain took all the time there was, and the second was left with 16 moves.
+void each_half_has_half_of_the_time() {
+  const Clock::time_point now = Clock::now(), end = after(now, 10);
+  const double first = std::chrono::duration<double>(halfway_to(end) - now).count();
+  CHECK(first > 4.9 && first < 5.2);
+  CHECK(halfway_to(Clock::time_point::max()) == Clock::time_point::max());
+  CHECK(halfway_to(after(now, -1)) <= Clock::now());
+}
+
+// A chain that never moved was reported with as many effective samples as moves, and R-hat 1.
+void mixing_that_is_not_known() {
+  Trace still;
+  for (int half = 0; half < 2; ++half) {
+    still.begin(50);
+    for (int n = 0; n < 50; ++n) still.add(1.5);
+  }
+  CHECK(std::isnan(still.ess_of_halves(100)));
+  ChainStats known, unknown;
+  CHECK(std::isnan(known.rhat) && std::isnan(known.ess));
+  known.add_mixing(1.2, 30);
+  known.add_mixing(1.1, 20);
+  known.add(unknown);
+  CHECK(known.rhat == 1.2 && known.ess == 20);
+}
+
+// The table was as large as the largest number ever given, and said that marker 0 was somewhere
+// before any marker was.
+void places_by_number() {
+  Places places;
+  CHECK(places.find(0) == nullptr);
+  for (const std::int32_t first : {0, 1'000'000, 2'000'000'000}) {
+    places.clear();
+    for (std::int32_t k = 0; k < 100; ++k) places.set(first + 7 * k, Point{{double(k), 0, 0}});
+    for (std::int32_t k = 0; k < 100; ++k) {
+      CHECK(places.find(first + 7 * k) != nullptr && (*places.find(first + 7 * k))[0] == k);
+      CHECK(places.find(first + 7 * k + 1) == nullptr);
+    }
+    places.set(first, Point{{-1, 0, 0}});
+    CHECK((*places.find(first))[0] == -1);
+  }
+  CHECK(sizeof(Places) < 100 && places.capacity() <= 512);
+}
+
+// What a change of two tracks gains in a block is what it gains in the whole capture: the detections
+// after the block count as well, and so do the frames in which a track that ends is not seen.
+using Swept = CaptureSweep<OneMotion>;
+
+double gain_of_exchange(const Swept::Part& part, std::int64_t from, bool is_cut) {
+  const Partition<OneMotion>& p = part.partition;
+  std::vector<std::int32_t> starts(2, -1);  // by track, its first detection from there on
+  for (std::int32_t i = 0; i < p.window().n_ids(); ++i)
+    if (part.numbers[i] >= 2 * from && part.numbers[i] < 2 * from + 2)
+      starts[part.numbers[i] % 2] = i;
+  std::vector<Edit<OneMotion>> edits(2);
+  for (int k = 0; k < 2; ++k) {
+    edits[k].track = p.track_of(starts[k]);
+    edits[k].keep = p.place_of(starts[k]);
+    const std::int32_t other = starts[1 - k];
+    const auto& nodes = p.track(p.track_of(other)).nodes;
+    if (!is_cut)
+      for (std::size_t n = p.place_of(other); n < nodes.size(); ++n) p.append(edits[k], nodes[n]);
+  }
+  double gain = 0;
+  for (const auto& edit : edits) gain += p.score_of(edit) - p.score_of(edit.track);
+  return gain;
+}
+
+void a_block_gains_what_the_capture_gains() {
+  constexpr std::int64_t T = 160, ended = 70;
+  constexpr double dt = 0.01, noise = 1e-3, acceleration = 5;
+  MotionModel m;
+  m.axis = {2, 2, {1, 0}, {noise * noise, 0, 0, 1}, noise * noise};
+  ScoreModel sm{.log_birth = -2, .log_clutter = -1, .log_survive = std::log(0.999),
+                .p_disappear = 1e-3, .p_detection = 0.9, .p_redetection = 0.05, .max_speed = 100,
+                .speed_margin = 1, .max_gap = 3};
+  MotionStep step;
+  const double q = acceleration * acceleration;
+  step.mode[0].F = {1, dt, 0, 1};
+  step.mode[0].Q = {q * dt * dt * dt * dt / 4, q * dt * dt * dt / 2, q * dt * dt * dt / 2, q * dt * dt};
+  for (const bool is_cut : {false, true}) {
+    // Two markers pass each other; where their ends are compared both are gone after some frames.
+    Swept short_blocks(40, sm.max_gap), one_block(1000, sm.max_gap);
+    for (Swept* sweep : {&short_blocks, &one_block}) {
+      for (std::int64_t t = 0; t < T; ++t) {
+        const double x = 1e-3 * static_cast<double>(t), wave = 2e-3 * std::sin(0.9 * t);
+        std::vector<Point> points;
+        if (!is_cut || t < ended) points = {Point{{x, wave}}, Point{{x + 2e-3, 3e-3 - 0.5 * wave}}};
+        sweep->add_frame(dt * static_cast<double>(t), step, points);
+        for (std::size_t k = 0; k < points.size(); ++k)
+          sweep->set_label(2 * t + static_cast<std::int64_t>(k), static_cast<std::int64_t>(k));
+      }
+      sweep->link_labels();
+    }
+    const Partition<OneMotion> empty(m, sm);
+    const Swept::Part whole = one_block.take(empty, one_block.blocks().front());
+    int n_checked = 0;
+    for (const Swept::Block& block : short_blocks.blocks()) {
+      const Swept::Part part = short_blocks.take(empty, block);
+      for (std::int64_t t = block.first + 2; t <= block.last && t < (is_cut ? ended : T - 2); ++t) {
+        const double own = gain_of_exchange(part, t, is_cut);
+        if (is_cut && block.last < ended) continue;  // goes on after the block, so it may not end in it
+        CHECK(std::abs(own - gain_of_exchange(whole, t, is_cut)) < 1e-6 * (1 + std::abs(own)));
+        ++n_checked;
+      }
+      short_blocks.keep_states(block, part);
+    }
+    CHECK(n_checked > 20);
+  }
+}
+
+int main() {
+  a_block_gains_what_the_capture_gains();
+  exceptions_reach_the_caller();
+  budgets_of_nothing_and_of_everything();
+  each_half_has_half_of_the_time();
+  mixing_that_is_not_known();
+  places_by_number();
+}

@@ -1,0 +1,386 @@
+"""The report page without a browser: what is in it, what is judged, what is refused."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import hashlib
+import html
+import re
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.cli import main
+from asterism.reporting.judgement import judge
+from asterism.reporting.page import find_troubles
+from asterism.reporting.page.lenses import lens_table, pixels_by
+from asterism.reporting.page.packing import residuals
+from asterism.reporting.page.thinning import stride_for
+from tests.reporting.cases import HOSTILE, positions, spoilt_person, unpacked
+
+
+@pytest.fixture(scope="module")
+def person():
+    return spoilt_person()
+
+
+def written(tmp_path, tracks, **options):
+    am.report(tracks, tmp_path / "page.html", **options)
+    return (tmp_path / "page.html").read_bytes()
+
+
+def straight(n_frames=200, n_markers=4, apart=0.2):
+    """Markers that go straight on, side by side, 1 mm a frame; shape (T, K, 3)."""
+    t, k = np.arange(n_frames)[:, None], np.arange(n_markers)[None]
+    rng = np.random.default_rng(5)
+    places = np.stack([0.001 * t + 0 * k, apart * k + 0 * t, 1 + 0 * t * k], axis=-1)
+    return places + rng.normal(0, 1e-4, places.shape)
+
+
+def tracks_of(places, names=(), rate=100.0):
+    return am.Tracks.from_dense(np.arange(len(places)) / rate, places, names)
+
+
+def text_of(page):
+    return html.unescape(re.sub(rb"<[^>]*>", b" ", page).decode())
+
+
+def test_positions_come_back_within_half_a_cell(tmp_path, person):
+    _, tracks = person
+    header, arrays = unpacked(written(tmp_path, tracks))
+    order, starts = tracks.by_track
+    assert np.array_equal(arrays["starts"], starts)
+    found = positions(header, arrays)[: len(order)]
+    off = np.abs(found - tracks.detections.points[order])
+    assert (off <= 0.5001 * np.array(header["grid"][1])).all()
+    assert max(header["grid"][1]) < 0.0005
+    assert np.array_equal(arrays["times"], tracks.detections.times)
+    assert np.abs(arrays["confidence"][: len(order)] / 255 - tracks.confidence[order]).max() < 0.002
+
+
+def test_runs_and_clutter_are_those_of_the_tracks(tmp_path, person):
+    _, tracks = person
+    _, a = unpacked(written(tmp_path, tracks))
+    order, _ = tracks.by_track
+    frames = np.concatenate(
+        [np.arange(f, f + n) for f, n in zip(a["runFirst"], a["runLength"], strict=True)]
+    )
+    assert np.array_equal(frames, tracks.detections.frame_of[order])
+    whose = np.repeat(a["runTrack"], a["runLength"])
+    assert np.array_equal(whose, tracks.labels[order])
+    lost = tracks.detections.frame_of[tracks.labels < 0]
+    assert np.array_equal(a["clutter"], np.bincount(lost, minlength=tracks.detections.n_frames))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_residuals_are_undone_by_summing(order):
+    rng = np.random.default_rng(2)
+    begins = np.array([0, 1, 2, 50, 52])
+    cells = rng.integers(0, 65536, 80)
+    rest = residuals(cells, begins, order).astype(np.int64)
+    left = np.where(rest % 2, -(rest + 1) // 2, rest // 2)
+    for begin, end in zip(begins, [*begins[1:], 80], strict=True):
+        found = np.cumsum(left[begin:end])
+        if order == 2 and end - begin > 1:
+            found = np.cumsum(np.concatenate([[0], np.cumsum(left[begin + 1 : end])])) + left[begin]
+        assert np.array_equal(found % 65536, cells[begin:end])
+
+
+def test_same_tracks_same_bytes(tmp_path, person):
+    truth, tracks = person
+    assert written(tmp_path, tracks, truth=truth) == written(tmp_path, tracks, truth=truth)
+
+
+def test_policy_allows_the_page_itself_and_nothing_else(tmp_path, person):
+    page = written(tmp_path, person[1]).decode()
+    policy = html.unescape(re.search('Content-Security-Policy" content="([^"]*)"', page)[1])
+    rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
+    assert rules["default-src"] == rules["base-uri"] == rules["form-action"] == "'none'"
+    assert "unsafe" not in policy
+    assert "http" not in policy
+    scripts = re.findall("<script>(.*?)</script>", page, re.S)
+    styles = re.findall("<style>(.*?)</style>", page, re.S)
+    assert len(scripts) == len(styles) == 1
+    for rule, text in (("script-src", scripts[0]), ("style-src", styles[0])):
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        assert rules[rule] == f"'sha256-{digest}'"
+    assert not re.search(r"<[^>]+ (style|on\w+)=", page.replace(scripts[0], ""))
+    assert "Permission is hereby granted" in scripts[0]  # three.js's notice
+
+
+def test_names_from_files_stay_text(tmp_path):
+    names = HOSTILE
+    places = straight(n_markers=len(names))
+    places[60:100, :, :] = np.nan  # so that each is in the list of what to look at
+    tracks = tracks_of(places, names)
+    page = written(
+        tmp_path, tracks, truth=tracks, title=HOSTILE[0], summary=[(HOSTILE[1], HOSTILE[2])]
+    ).decode()
+    assert page.count("<script") == page.count("</script>") == 2
+    assert "<img" not in page
+    assert "\u2028" not in page.split("<script>")[1]
+    for name in names:
+        assert f"<bdi>{html.escape(name)}</bdi>" in page
+
+
+def test_damaged_names_do_not_stop_the_page(tmp_path):
+    assert b"?" in written(tmp_path, tracks_of(straight(30), ["\ud800", "b", "b", "\x00"]))
+
+
+def test_figures_are_those_of_the_tracks(tmp_path, person):
+    truth, tracks = person
+    page = written(tmp_path, tracks, truth=truth).decode()
+    facts = dict(re.findall('data-fact="([a-z]+)">([^<]*)<', page))
+    labelled = tracks.labels >= 0
+    assert facts["tracks"] == str(np.count_nonzero(tracks.lengths))
+    assert facts["labelled"] == f"{100 * labelled.mean():.1f} %"
+    assert facts["clutter"] == f"{(~labelled).sum():,}"
+    assert facts["doubtful"] == f"{(tracks.confidence[labelled] < 0.9).sum():,}"
+    seen = [np.flatnonzero(np.isfinite(c)) for c in tracks.positions()[:, :, 0].T]
+    assert facts["gaps"] == f"{sum((np.diff(f) > 1).sum() for f in seen):,}"
+    scores = {html.unescape(k): v for k, v in re.findall('data-score="([^"]+)">([^<]*)<', page)}
+    e = am.evaluate(tracks, truth)
+    assert scores["IDF1"] == f"{e.idf1:.4f}"
+    assert scores["Switches"] == f"{e.switches:,}"
+    assert scores["Wrong labels"] == f"{e.wrong_percent:.3f} %"
+    assert scores["Missed"] == f"{e.missed:,}"
+
+
+def test_judgement_counts_as_the_evaluation_does(person):
+    truth, tracks = person
+    labels = tracks.labels.copy()
+    order, starts = tracks.by_track
+    for t in range(40, 70):  # two markers change their tracks for a while
+        i, j = (order[starts[k] : starts[k + 1]] for k in (3, 8))
+        i, j = (m[tracks.detections.frame_of[m] == t] for m in (i, j))
+        labels[i], labels[j] = 8, 3
+    swapped = dataclasses.replace(tracks, labels=labels)
+    judged, e = judge(swapped, truth), am.evaluate(swapped, truth)
+    n_labelled = (swapped.labels >= 0).sum()
+    assert 100 * (judged.verdicts == 1).sum() / n_labelled == pytest.approx(e.wrong_percent)
+    assert (judged.verdicts == 2).sum() == e.missed
+    assert e.wrong_percent > 0
+    found = [f for f in find_troubles(swapped, judged) if f.kind == "wrong marker"]
+    assert {3, 8} <= {f.track for f in found}
+    n_switches = sum(f.kind == "switch" for f in find_troubles(swapped, judged))
+    assert n_switches == e.switches >= 4
+
+
+def test_detections_that_only_the_truth_has_are_told(tmp_path, person):
+    truth, tracks = person
+    d = tracks.detections
+    kept = np.ones(d.n_points, dtype=bool)
+    kept[np.flatnonzero(truth.labels >= 0)[:7]] = False
+    fewer = am.Detections(
+        times=d.times,
+        offsets=np.concatenate([[0], np.cumsum(kept)])[d.offsets],
+        points=d.points[kept],
+    )
+    page = written(tmp_path, am.Tracks(detections=fewer, labels=tracks.labels[kept]), truth=truth)
+    assert "7 points of markers are in the truth only" in text_of(page)
+
+
+def test_two_tracks_that_change_places_are_found():
+    places = straight(apart=0.05)
+    places[120:, [1, 2]] = places[120:, [2, 1]]
+    found = find_troubles(tracks_of(places, ["a", "b", "c", "d"]))
+    assert [(f.kind, f.track, f.frame) for f in found] == [("likely swap", 2, 120)]
+    assert "where b was heading" in found[0].reason
+
+
+def test_a_pair_that_changes_places_often_is_told_once():
+    places = straight(apart=0.05)
+    for t in (60, 90, 120):
+        places[t:, [1, 2]] = places[t:, [2, 1]]
+    found = find_troubles(tracks_of(places))
+    assert [(f.kind, f.frame) for f in found] == [("likely swap", 60)]
+    assert "3 times in all" in found[0].reason
+
+
+def test_a_jump_is_found_once_and_nothing_else():
+    places = straight()
+    places[77:, 2, 2] += 0.1
+    found = find_troubles(tracks_of(places))
+    assert [(f.kind, f.track, f.frame) for f in found] == [("jump", 2, 77)]
+    assert find_troubles(tracks_of(straight())) == []
+
+
+def test_gaps_ends_and_doubts_are_found_with_their_reasons():
+    places = straight()
+    places[50:80, 0] = np.nan
+    places[:120, 1] = np.nan
+    places[150:, 2] = np.nan
+    places[90:93, 3] = np.nan  # too short to tell
+    tracks = tracks_of(places)
+    confidence = np.ones(tracks.detections.n_points)
+    doubtful = (tracks.labels == 3) & np.isin(tracks.detections.frame_of, [10, 12])
+    confidence[doubtful] = [0.6, 0.5]
+    found = find_troubles(dataclasses.replace(tracks, confidence=confidence))
+    told = {(f.kind, f.track): f for f in found}
+    assert len(told) == len(found) == 4
+    assert told["long gap", 0].frame == 80
+    assert "0.31 s (30 frames)" in told["long gap", 0].reason
+    assert told["begun midway", 1].frame == 120
+    assert told["ends early", 2].frame == 149
+    assert told["low confidence", 3].frame == 12
+    assert "50 %" in told["low confidence", 3].reason
+
+
+def test_connections_are_those_that_keep_their_distance():
+    from asterism.reporting.connections import connections_of
+
+    rng = np.random.default_rng(3)
+    body = rng.normal(0, 0.1, (5, 3))
+    way = np.cumsum(rng.normal(0, 0.01, (300, 1, 3)), axis=0)
+    loose = np.cumsum(rng.normal(0, 0.1, (300, 3, 3)), axis=0) + 1
+    found = connections_of(tracks_of(np.concatenate([body + way, loose], axis=1)))
+    assert len(found.pairs) >= 4
+    assert found.pairs.max() < 5
+    assert str(len(found.pairs)) in found.about
+
+
+def test_lens_tables_are_as_exact_as_they_say():
+    K = am.camera.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
+    for lens in (am.camera.BrownConrady(k1=-0.3, p1=0.002), am.camera.ReportRadial(a1=0.3), None):
+        camera = am.Camera.look_at((3, 1, 2), (0, 0, 1), K=K, size_px=(1280, 1024), lens=lens)
+        table, bounds, error = lens_table(camera)
+        if lens is None:
+            assert table.size == 0
+            continue
+        rng = np.random.default_rng(4)
+        pixels = rng.uniform([0, 0], [1279, 1023], (2000, 2))
+        places = camera.undistort(pixels)
+        places = places[np.isfinite(places).all(axis=1)]
+        off = np.linalg.norm(
+            pixels_by(camera, table, bounds, places) - camera.distort(places), axis=1
+        )
+        # At the very edge of what the lens reaches the table has an end.
+        assert np.isfinite(off).mean() > 0.97
+        assert np.nanmax(off) <= 1.1 * error + 0.01
+        assert error < 1
+
+
+@pytest.mark.parametrize(
+    ("places", "axis"),
+    [([0.0, 0.0, 1.0], "z"), ([0.0, 0.0, -0.7], "y"), ([0.0, 0.5, -0.7], "z")],
+)
+def test_up_is_told_by_where_the_feet_are(tmp_path, places, axis):
+    lowest = np.array(places)
+    tall = np.linspace(0, 1.7, 9)[:, None] * [0.1, 1.0, 0.1]
+    page = written(tmp_path, tracks_of(np.tile(lowest + tall, (20, 1, 1))))
+    if axis == "z" and places[2] == 1.0:
+        axis = "y"  # z = 1 is no ground either
+    assert unpacked(page)[0]["up"] == axis
+    assert f"The {axis} axis is taken to point up" in text_of(page)
+
+
+def test_up_is_told_by_the_cameras_and_by_who_asks(tmp_path, person):
+    _, tracks = person
+    K = am.camera.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
+    cameras = [
+        am.Camera.look_at(p, (0, 1, 0), K=K, size_px=(1280, 1024), up=(0, 1, 0), name=str(n))
+        for n, p in enumerate([(3, 2, 0), (0, 2, 3), (-3, 2, 1)])
+    ]
+    assert unpacked(written(tmp_path, tracks, rig=am.Rig(tuple(cameras))))[0]["up"] == "y"
+    assert unpacked(written(tmp_path, tracks, up="x"))[0]["up"] == "x"
+
+
+def test_long_captures_are_thinned_and_say_so(tmp_path, monkeypatch):
+    monkeypatch.setattr("asterism.reporting.page.thinning.MOST_POINTS", 300)
+    assert stride_for(300) == 1
+    assert stride_for(301) == 2
+    tracks = tracks_of(straight(200))
+    page = written(tmp_path, tracks, truth=tracks)
+    header, arrays = unpacked(page)
+    assert header["frame"] == [0, 3]
+    assert np.allclose(arrays["times"], tracks.detections.times[::3])
+    assert "Every third frame is shown (67 of 200)" in text_of(page)
+    assert 'data-fact="tracks">4<' in page.decode()
+
+
+def test_far_clutter_is_counted_not_drawn(tmp_path):
+    places = straight(50)
+    d = am.Detections.from_frames(
+        np.arange(50) / 100, [*places[:-1], np.append(places[-1], [[1e6, 0, 0]], axis=0)]
+    )
+    tracks = am.Tracks(detections=d, labels=np.append(np.tile(np.arange(4), 50), -1))
+    page = written(tmp_path, tracks)
+    assert max(unpacked(page)[0]["grid"][1]) < 1e-4
+    assert "1 points of clutter are too far" in text_of(page)
+
+
+def test_a_film_of_fifty_three_markers_is_small(tmp_path):
+    scene = am.simulate.person(frames=600, seed=1)
+    truth = am.simulate.corrupt(scene, missing=0.05, clutter=0.05, noise=0.0005, seed=1)
+    K = am.camera.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
+    ring = am.Rig.ring(8, radius=4, height=2.5)
+    rig = am.Rig(
+        tuple(
+            dataclasses.replace(c, K=K, lens=am.camera.BrownConrady(k1=-0.2)) for c in ring.cameras
+        )
+    )
+    tracks = dataclasses.replace(
+        truth, confidence=np.random.default_rng(1).random(len(truth.labels))
+    )
+    assert truth.n_tracks == 53
+    assert len(written(tmp_path, tracks, truth=truth, rig=rig)) <= 1_000_000
+
+
+def test_what_makes_no_sense_is_refused(tmp_path, person):
+    _, tracks = person
+    flat = tracks_of(straight()[:, :, :2])
+    rig = am.Rig.ring(3, radius=4, height=2)
+    for bad, match in (
+        (lambda: am.report(tracks.detections, tmp_path / "a.html"), "tracks"),
+        (lambda: am.report(flat, tmp_path / "a.html", rig=rig), "rig"),
+        (lambda: am.report(tracks, tmp_path / "a.html", up="w"), "up"),
+        (lambda: am.report(tracks, tmp_path / "a.html", truth=flat), "truth|detections"),
+        (lambda: am.report(tracks, tmp_path / "a.html", truth=3), "truth"),
+    ):
+        with pytest.raises(am.ParameterError, match=match):
+            bad()
+    with pytest.raises(am.FormatError):
+        am.report(tracks, tmp_path / "nowhere" / "a.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_commands_write_pages(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    made = "simulate crossing -o in.csv --truth truth.csv -q "
+    made += "--corrupt missing=0.05 --corrupt clutter=0.05"
+    assert main(made.split()) == 0
+    assert (
+        main(["track", "in.csv", "-o", "out.csv", "--method", "jpda", "--report", "first.html"])
+        == 0
+    )
+    printed = capsys.readouterr().out
+    first = text_of((tmp_path / "first.html").read_bytes())
+    for word in ("jpda", "log posterior", "frames/s", "model: "):
+        assert word in first
+    assert "first.html" in printed
+    assert main(["report", "out.csv", "--truth", "truth.csv", "--title", "Mine", "--json"]) == 0
+    assert '"output": "out.html"' in capsys.readouterr().out
+    assert "Against the truth" in text_of((tmp_path / "out.html").read_bytes())
+    for line in (
+        "report out.csv -o out.csv",
+        "report out.csv --truth in.html",
+        "track in.csv -o a.csv --report a.csv",
+    ):
+        assert main(line.split()) == 2
+        assert "Traceback" not in capsys.readouterr().err
+    assert not (tmp_path / "a.csv").exists()
+
+
+def test_the_page_opens_where_the_capture_does(tmp_path):
+    # Usual are five points; a quarter of the frames is empty, then stray points come.
+    counts = [0] * 30 + [1] * 10 + [2] * 10 + [3] + [5] * 60
+    frames = [np.arange(3.0 * n).reshape(n, 3) for n in counts]
+    d = am.Detections.from_frames(np.arange(len(counts)) / 100, frames)
+    labels = np.concatenate([np.arange(n) for n in counts])
+    tracks = am.Tracks(detections=d, labels=labels)
+    assert unpacked(written(tmp_path, tracks))[0]["opens"] == 50
+    nothing = am.Detections.from_frames([0, 0.01], [np.empty((0, 3))] * 2)
+    empty = am.Tracks(detections=nothing, labels=[])
+    assert unpacked(written(tmp_path, empty))[0]["opens"] == 0
