@@ -6,9 +6,8 @@
 // a packing, and the rest of the node is split as Murty does. The parts never overlap, so that every
 // packing comes once.
 //
-// Where that takes more than a few nodes, the resources get prices, by subgradient (a Lagrangian
-// relaxation): an option is worth so much less, whoever has a resource pays for it, and a node is worth
-// at most the sum of all prices and of the best options at these prices.
+// Where that takes more than a few nodes, the resources get prices (solve/priced_options.hpp), and a node
+// is worth at most the sum of all prices and of its best options at these prices.
 #pragma once
 
 #include <algorithm>
@@ -18,13 +17,9 @@
 #include <utility>
 #include <vector>
 
-namespace asterism {
+#include "solve/priced_options.hpp"
 
-// An option of a tree: what it is worth, and the resources that it uses.
-struct PackingOption {
-  double worth = 0;
-  std::vector<std::int32_t> uses;
-};
+namespace asterism {
 
 struct PackingSummary {
   bool is_exact = true;  // all that were asked for were found within the limit on nodes
@@ -32,24 +27,10 @@ struct PackingSummary {
   std::int64_t n_nodes = 0;
 };
 
-class SetPacking {
+class SetPacking : PricedOptions {
  public:
   // Options of each tree; each has one that uses nothing, so that there always is a packing.
-  explicit SetPacking(std::span<const std::vector<PackingOption>> trees) {
-    for (const auto& options : trees) {
-      first_.push_back(static_cast<std::int32_t>(options_.size()));
-      for (const PackingOption& option : options) {
-        options_.push_back(&option);
-        priced_.push_back(option.worth);
-      }
-    }
-    first_.push_back(static_cast<std::int32_t>(options_.size()));
-    std::int32_t n_resources = 0;
-    for (const PackingOption* o : options_)
-      for (const std::int32_t r : o->uses) n_resources = std::max(n_resources, r + 1);
-    price_.assign(n_resources, 0);
-    sort();
-  }
+  explicit SetPacking(std::span<const std::vector<PackingOption>> trees) : PricedOptions(trees) {}
 
   // What is lost with an option, by tree and option: no packing that holds it is worth more than the
   // bound less that. The options of the best packing that is known lose nothing.
@@ -107,15 +88,7 @@ class SetPacking {
 
  private:
   static constexpr std::int64_t kUnpriced = 32;  // nodes before prices are worth their while
-  static constexpr int kPriceRounds = 300;
   static constexpr int kDives = 32;
-  static constexpr double kBetter = 1e-9;
-  static constexpr double kClosed = 1e-3;  // a gap that is worth no more rounds
-
-  struct Packing {
-    std::vector<std::int32_t> own;  // option of each tree, as the caller numbers them
-    double worth = 0;
-  };
 
   struct Node {
     double bound = 0;
@@ -129,9 +102,6 @@ class SetPacking {
     }
   };
 
-  double most_priced(std::int32_t tree) const {
-    return *std::max_element(priced_.begin() + first_[tree], priced_.begin() + first_[tree + 1]);
-  }
   // Loss of the other trees, at the prices, where a tree takes an option: the larger of what the trees
   // lose that must release its resources, and the least loss of a tree that takes a released resource.
   std::vector<double> lost_by_others(const std::vector<double>& loss,
@@ -169,46 +139,6 @@ class SetPacking {
     }
     return out;
   }
-  // What no packing is worth more than, at the prices.
-  double bound() const {
-    double sum = 0;
-    for (const double x : price_) sum += x;
-    for (std::int32_t i = 0; i < n_trees(); ++i) sum += most_priced(i);
-    return sum;
-  }
-  std::int32_t n_trees() const { return static_cast<std::int32_t>(first_.size()) - 1; }
-
-  // Options of every tree by what they are worth at the prices, the best first; who uses what.
-  void sort() {
-    std::vector<std::int32_t> order(options_.size());
-    for (std::size_t o = 0; o < order.size(); ++o) order[o] = static_cast<std::int32_t>(o);
-    for (std::size_t i = 0; i + 1 < first_.size(); ++i)
-      std::stable_sort(order.begin() + first_[i], order.begin() + first_[i + 1],
-                       [&](std::int32_t a, std::int32_t b) { return priced_[a] > priced_[b]; });
-    std::vector<const PackingOption*> options;
-    std::vector<double> priced;
-    std::vector<std::int32_t> number;
-    for (const std::int32_t o : order) {
-      options.push_back(options_[o]);
-      priced.push_back(priced_[o]);
-      number.push_back(number_.empty() ? o - first_[tree_of(o)] : number_[o]);
-    }
-    options_ = std::move(options);
-    priced_ = std::move(priced);
-    number_ = std::move(number);
-    users_.assign(price_.size(), {});
-    tree_of_.resize(options_.size());
-    for (std::size_t i = 0; i + 1 < first_.size(); ++i)
-      for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
-        tree_of_[o] = static_cast<std::int32_t>(i);
-        for (const std::int32_t r : options_[o]->uses) users_[r].push_back(o);
-      }
-  }
-  std::int32_t tree_of(std::int32_t option) const {
-    return static_cast<std::int32_t>(
-        std::upper_bound(first_.begin(), first_.end() - 1, option) - first_.begin() - 1);
-  }
-
   PackingSummary search(std::int64_t k, double drop, std::int64_t max_nodes) {
     PackingSummary summary;
     packings_.clear();
@@ -252,76 +182,6 @@ class SetPacking {
     }
     if (!packings_.empty() && summary.is_exact) summary.bound = packings_.front().worth;
     return summary;
-  }
-
-  // Lowers the bound by a descent on the prices: a resource that several options use becomes dearer,
-  // one that none uses cheaper. The direction is a deflected subgradient (Camerini, Fratta & Maffioli
-  // 1975), the length of a step follows the best known packing (Polyak 1969). The options chosen in a
-  // round are repaired into a packing, which may become the best known one unless that is the best.
-  void set_prices(bool is_best) {
-    double least = std::numeric_limits<double>::infinity(), step = 1;
-    std::vector<double> price(price_.size(), 0), used(price_.size()), way(price_.size(), 0);
-    std::vector<std::int32_t> chosen(n_trees());
-    int n_idle = 0;
-    for (int round = 0; round < kPriceRounds && step > 1e-3; ++round) {
-      double dual = 0, length = 0;
-      for (const double x : price) dual += x;
-      std::fill(used.begin(), used.end(), 0);
-      for (std::int32_t o = 0; o < first_.back(); ++o) {
-        priced_[o] = options_[o]->worth;
-        for (const std::int32_t r : options_[o]->uses) priced_[o] -= price[r];
-      }
-      for (std::int32_t i = 0; i < n_trees(); ++i) {
-        chosen[i] = static_cast<std::int32_t>(
-            std::max_element(priced_.begin() + first_[i], priced_.begin() + first_[i + 1]) -
-            priced_.begin());
-        dual += priced_[chosen[i]];
-        for (const std::int32_t r : options_[chosen[i]]->uses) used[r] += 1;
-      }
-      if (dual < least - kBetter) {
-        least = dual;
-        price_ = price;
-        n_idle = 0;
-      } else if (++n_idle >= 10) {
-        step /= 2;
-        n_idle = 0;
-        price = price_;
-        std::fill(way.begin(), way.end(), 0);
-        continue;
-      }
-      if (!is_best) keep_if_better(repaired(chosen));
-      if (!(least > known_.worth + kClosed)) break;
-      double along = 0, own = 0;
-      for (std::size_t r = 0; r < price.size(); ++r) {
-        if (used[r] < 1 && price[r] <= 0) used[r] = 1;  // an unused resource is free already
-        along += (1 - used[r]) * way[r];
-        own += way[r] * way[r];
-        length += (1 - used[r]) * (1 - used[r]);
-      }
-      if (length == 0) break;  // no conflict is left, so that the bound is met
-      const double memory = along < 0 && own > 0 ? -1.5 * along / own : 0;
-      double size = 0;
-      for (std::size_t r = 0; r < price.size(); ++r) {
-        way[r] = (1 - used[r]) + memory * way[r];
-        size += way[r] * way[r];
-      }
-      if (size == 0) break;
-      for (std::size_t r = 0; r < price.size(); ++r)
-        price[r] = std::max(price[r] - step * (dual - known_.worth) / size * way[r], 0.0);
-    }
-    for (std::size_t o = 0; o < options_.size(); ++o) {
-      priced_[o] = options_[o]->worth;
-      for (const std::int32_t r : options_[o]->uses) priced_[o] -= price_[r];
-    }
-  }
-
-  Packing packing(const std::vector<std::int32_t>& chosen) const {
-    Packing out;
-    for (const std::int32_t o : chosen) {
-      out.own.push_back(number_[o]);
-      out.worth += options_[o]->worth;
-    }
-    return out;
   }
 
   void push(Node node) {
@@ -427,66 +287,8 @@ class SetPacking {
     }
   }
 
-  bool uses(std::int32_t option, std::int32_t resource) const {
-    const std::vector<std::int32_t>& list = options_[option]->uses;
-    return std::find(list.begin(), list.end(), resource) != list.end();
-  }
-
-  // A packing from the options chosen, of which several may want one resource: trees by what these are
-  // worth at the prices, each by its best option that fits; then each by a better one, while there is any.
-  std::vector<std::int32_t> repaired(const std::vector<std::int32_t>& chosen) {
-    std::vector<std::int32_t> order(n_trees()), out(chosen);
-    for (std::int32_t i = 0; i < n_trees(); ++i) order[i] = i;
-    std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-      return priced_[chosen[a]] > priced_[chosen[b]];
-    });
-    is_used_.assign(users_.size(), 0);
-    for (const std::int32_t i : order) {
-      if (!fits(out[i])) out[i] = best_fitting(i, priced_);
-      mark(out[i], 1);
-    }
-    std::vector<double> worth;
-    for (const PackingOption* o : options_) worth.push_back(o->worth);
-    for (bool is_better = true; is_better;) {
-      is_better = false;
-      for (std::int32_t i = 0; i < n_trees(); ++i) {
-        mark(out[i], 0);
-        const std::int32_t best = best_fitting(i, worth);
-        if (worth[best] > worth[out[i]] + kBetter) {
-          out[i] = best;
-          is_better = true;
-        }
-        mark(out[i], 1);
-      }
-    }
-    return out;
-  }
-  bool fits(std::int32_t option) const {
-    return std::ranges::none_of(options_[option]->uses, [&](std::int32_t r) { return is_used_[r]; });
-  }
-  void mark(std::int32_t option, char is_used) {
-    for (const std::int32_t r : options_[option]->uses) is_used_[r] = is_used;
-  }
-  std::int32_t best_fitting(std::int32_t tree, const std::vector<double>& value) const {
-    std::int32_t best = -1;
-    for (std::int32_t o = first_[tree]; o < first_[tree + 1]; ++o)
-      if ((best < 0 || value[o] > value[best]) && fits(o)) best = o;
-    return best;
-  }
-  void keep_if_better(const std::vector<std::int32_t>& chosen) {
-    Packing one = packing(chosen);
-    if (known_.own.empty() || one.worth > known_.worth) known_ = std::move(one);
-  }
-
-  std::vector<const PackingOption*> options_;  // by tree, the best first
-  std::vector<double> priced_, price_;         // of options: worth less prices; of resources
-  std::vector<std::int32_t> number_;           // of an option within its tree, as the caller has it
-  std::vector<std::vector<std::int32_t>> users_;
-  std::vector<std::int32_t> first_, tree_of_;
   std::vector<Packing> packings_;
-  Packing known_;  // the best that was met
   std::vector<Node> heap_;
-  std::vector<char> is_used_;
   double drop_ = 0;  // of the search
   std::int64_t n_pushed_ = 0;
   std::int64_t n_left_ = 0;  // nodes that may still be taken

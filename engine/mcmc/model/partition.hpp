@@ -2,13 +2,12 @@
 //
 // Every detection in a track keeps the track's state right after it and the score up to it. A
 // detection is in one track at most, so that this is all there is to know of every prefix: to end a
-// track earlier costs nothing, to lengthen it only what is new.
-//
-// Frames up to `frozen` are settled: their detections stay where they are.
+// track earlier costs nothing, to lengthen it only what is new. Frames up to `frozen` are settled: their
+// detections stay where they are.
 //
 // A partition may be of a block of frames in a longer capture. The tracks that go on after the block
-// then end in a *continuation*: the next detection of the track, with those after it, by which the
-// track is weighed as a whole. It may follow other tracks, and has to stay in one.
+// then end in a continuation (mcmc/model/continuations.hpp), by which the track is weighed as a whole.
+// It may follow other tracks, and has to stay in one.
 #pragma once
 
 #include <algorithm>
@@ -20,58 +19,18 @@
 #include <vector>
 
 #include "math/index_set.hpp"
+#include "mcmc/model/continuations.hpp"
 #include "mcmc/model/detection_window.hpp"
+#include "mcmc/model/edits.hpp"
 #include "mcmc/model/path_filter.hpp"
 
 namespace asterism {
-
-inline constexpr std::int32_t kFree = -1;     // in no track
-inline constexpr std::int32_t kClutter = -2;  // in none, and settled
-
-// What follows in a track after some of its detections are kept.
-template <typename Filter>
-struct Tail {
-  std::vector<std::int32_t> nodes;
-  std::vector<typename Filter::State> states;
-  std::vector<double> scores;
-
-  void clear() {
-    nodes.clear();
-    states.clear();
-    scores.clear();
-  }
-};
-
-// A track that keeps its first detections and goes on with a tail; a new one has no number.
-template <typename Filter>
-struct Edit {
-  std::int32_t track = -1;
-  std::int32_t keep = 0;
-  Tail<Filter> tail;
-};
-
-// What a track does after its continuation: detections that follow it whatever is before it.
-struct LaterPoint {
-  std::int64_t frame = 0;
-  Point y{};
-};
-using LaterPoints = std::shared_ptr<const std::vector<LaterPoint>>;
 
 template <typename Filter>
 class Partition {
  public:
   using State = typename Filter::State;
-  struct Track {
-    std::vector<std::int32_t> nodes;
-    std::int32_t n_frozen = 0;
-    std::int32_t n_gone = 0;  // detections before the first, which have left the window
-    std::int64_t id = -1;     // by which the outside knows it, once something of it is settled
-
-    std::int32_t size() const { return static_cast<std::int32_t>(nodes.size()); }
-    std::int32_t whole_size() const { return n_gone + size(); }
-    // Place of the last that is settled, from which the rest goes on; 0 where nothing is.
-    std::int32_t first_open() const { return std::max(n_frozen - 1, 0); }
-  };
+  using Track = PartitionTrack;
 
   Partition(const MotionModel& m, const ScoreModel& sm)
       : Partition(m, sm, std::make_shared<const std::vector<double>>(log_end_table(sm, kEndTable))) {}
@@ -164,7 +123,7 @@ class Partition {
       tail.scores.push_back((is_first ? score_[i] : tail.scores.back()) + gain);
     }
     tail.nodes.push_back(j);
-    if (is_continuation(j)) tail.scores.back() += go_on(j, state);
+    if (is_continuation(j)) tail.scores.back() += later_.go_on(m_, window_, filter_, j, state);
   }
   // Whether edits leave every continuation in a track.
   bool keeps_continuations(std::span<const Edit<Filter>> edits) const {
@@ -254,7 +213,7 @@ class Partition {
       if (t.n_frozen > 0) young_.remove(own);
       for (std::int32_t p = t.first_open(); p < t.size(); ++p, ++i)
         adopt(own, i, whole.state_[t.nodes[p]], whole.score_[t.nodes[p]]);
-      if (is_continuation(i - 1)) later_[i - 1] = whole.later_.at(t.nodes.back());
+      if (is_continuation(i - 1)) later_.set(i - 1, whole.later_.of(t.nodes.back()));
     }
     for (; i < static_cast<std::int32_t>(origin_.size()); ++i) free_.add(i);
   }
@@ -304,7 +263,7 @@ class Partition {
   // A detection after the block, before it is put into a track, goes on with these.
   void continue_with(std::int32_t i, LaterPoints later) {
     free_.remove(i);
-    later_[i] = std::move(later);
+    later_.set(i, std::move(later));
   }
   // A track that begins with a settled detection, in a state that is known; or goes on with it, where
   // others were before.
@@ -348,20 +307,6 @@ class Partition {
   Partition(const MotionModel& m, const ScoreModel& sm,
             std::shared_ptr<const std::vector<double>> log_end)
       : m_(m), sm_(sm), window_(m, sm), log_end_(std::move(log_end)) {}
-
-  // The state of a track beyond its continuation, and what that adds to its score but for gaps, which
-  // stay as they are.
-  double go_on(std::int32_t i, State& state) const {
-    double gain = 0;
-    std::int64_t frame = window_[i].frame;
-    for (const LaterPoint& next : *later_.at(i)) {
-      const State from = state;
-      filter_.expect(m_, window_, from, frame, static_cast<int>(next.frame - frame), expected_);
-      gain += filter_.take(m_, expected_, next.y, state);
-      frame = next.frame;
-    }
-    return gain;
-  }
 
   void reserve_up_to(std::int32_t n) {
     if (static_cast<std::int32_t>(track_of_.size()) >= n) return;
@@ -438,7 +383,7 @@ class Partition {
   std::shared_ptr<const std::vector<double>> log_end_;
   std::int64_t frozen_ = -1;
   std::int64_t n_after_ = 0;  // frames of the capture after the window
-  std::unordered_map<std::int32_t, LaterPoints> later_;  // of continuations
+  Continuations<Filter> later_;
   std::vector<Track> tracks_;
   std::vector<std::int32_t> unused_;
   IndexSet free_, taken_, linked_, leapt_, all_, young_;

@@ -1,0 +1,51 @@
+// What the tracks of a block do in the longer capture after it: each goes on from its *continuation*, the
+// first of its detections after the block, with those that follow whatever is before it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "mcmc/model/detection_window.hpp"
+#include "mcmc/model/path_filter.hpp"
+
+namespace asterism {
+
+struct LaterPoint {
+  std::int64_t frame = 0;
+  Point y{};
+};
+using LaterPoints = std::shared_ptr<const std::vector<LaterPoint>>;
+
+template <typename Filter>
+class Continuations {
+ public:
+  using State = typename Filter::State;
+
+  void clear() { later_.clear(); }
+  const LaterPoints& of(std::int32_t i) const { return later_.at(i); }
+  void set(std::int32_t i, LaterPoints later) { later_[i] = std::move(later); }
+
+  // Takes the state at continuation i over all that follows; gives what that adds to the score but for
+  // gaps, which stay as they are.
+  double go_on(const MotionModel& m, const DetectionWindow& window, Filter& filter, std::int32_t i,
+               State& state) const {
+    double gain = 0;
+    std::int64_t frame = window[i].frame;
+    typename Filter::Expected expected{};
+    for (const LaterPoint& next : *of(i)) {
+      const State from = state;
+      filter.expect(m, window, from, frame, static_cast<int>(next.frame - frame), expected);
+      gain += filter.take(m, expected, next.y, state);
+      frame = next.frame;
+    }
+    return gain;
+  }
+
+ private:
+  std::unordered_map<std::int32_t, LaterPoints> later_;  // by continuation
+};
+
+}  // namespace asterism
