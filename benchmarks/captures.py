@@ -87,13 +87,22 @@ def unlabelled_row(path: Path, capture: am.Capture) -> list[str]:
     ]
 
 
-def main() -> None:
+def oracle_idf1(truth: am.Tracks, max_gap: int) -> float:
+    """IDF1 of the true tracks, cut at gaps that no track bridges."""
+    return am.evaluate(am.metrics.oracle_tracks(truth, max_gap), truth).idf1
+
+
+def options_of_the_run() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
     parser.add_argument("--data", type=Path, default=beside)
     parser.add_argument("--only", default="")
     parser.add_argument("--markdown", type=Path)
-    options = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    options = options_of_the_run()
     conditions = {"as captured": named_only, "corrupted": corrupted}
     scores: list[list[str]] = []
     more: list[list[str]] = []
@@ -114,25 +123,15 @@ def main() -> None:
             model = am.estimate_model(truth.detections).model
             seconds = time.process_time() - start
             gap = model.population.max_gap
-            floors = [
-                am.evaluate(am.metrics.oracle_tracks(truth, g), truth).idf1 for g in (10, gap)
-            ]
+            floors = [oracle_idf1(truth, g) for g in (10, gap)]
             found, speed, results = score(truth, model)
             row = [path.name, condition, f"{floors[0]:.3f}", f"{floors[1]:.3f} ({gap})"]
             for name, e in found.items():
                 row.append(f"{e.idf1:.3f} ({e.switches_per_1000:.2f})")
                 idf1.setdefault((condition, name), []).append(e.idf1)
                 switches.setdefault((condition, name), []).append(e.switches_per_1000)
-                more.append(
-                    [
-                        path.name,
-                        condition,
-                        name,
-                        *details(e),
-                        f"{speed[name]:,.0f}",
-                        f"{seconds:.1f}",
-                    ]
-                )
+                rates = f"{speed[name]:,.0f}", f"{seconds:.1f}"
+                more.append([path.name, condition, name, *details(e), *rates])
                 confidence.add(name, results[name], truth)
             scores.append(row)
             print(*row, flush=True)

@@ -100,14 +100,18 @@ class Joins:
         return rows
 
 
-def main() -> None:
+def options_of_the_run() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     beside = Path(__file__).resolve().parents[2] / "shared" / "data"
     parser.add_argument("--data", type=Path, default=beside)
     parser.add_argument("--only", default="")
     parser.add_argument("--methods", nargs="*", default=list(METHODS))
     parser.add_argument("--markdown", type=Path)
-    options = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    options = options_of_the_run()
     found: dict[tuple[str, str, str], Figures] = {}
     floors: dict[tuple[str, int], list[float]] = {}
     joins = Joins()

@@ -27,6 +27,7 @@ def track_in_numpy(detections: am.Detections, model: am.TrackingModel) -> NDArra
     (motion,) = model.motion.modes
     s, p = model.sensor, model.population
     D = detections.n_axes
+    # One long function on purpose: the loop as one would write it by hand, nothing hidden.
     gate = chi2.isf(1e-9, D)
     r = s.noise_sigma**2
     P0 = model.initial_covariance(D)

@@ -67,6 +67,7 @@ void bind_mcmc_tracker(nb::module_& module, const char* name) {
 
 }  // namespace
 
+// Long, because it is a list: what each class shows to Python.
 void bind_mcmc(nb::module_& module) {
   nb::class_<ChainStats>(module, "ChainStats")
       .def_ro("n_search", &ChainStats::n_search)

@@ -93,6 +93,7 @@ nb::list clusters(const TreeTracker<HypothesisMatrix>& tracker) {
 
 }  // namespace
 
+// Long, because it is a list: what each class shows to Python.
 void bind_trees(nb::module_& module) {
   nb::class_<TreeStats, FrameStats>(module, "TreeStats")
       .def_ro("n_branches", &TreeStats::n_branches)

@@ -138,9 +138,11 @@ class Assignment {
     }
     for (std::size_t j = 0; j < columns_.size(); ++j)
       if (is_done_[j] && distance_[j] < best_end) v_[j] -= best_end - distance_[j];
-    // Flip the path: each row on it takes the column that it reached, and frees its old one.
-    std::int32_t column = end_column;
-    row = end_row;
+    flip(start, end_row, end_column);
+  }
+
+  // Each row on the path takes the column that it reached, and frees its old one.
+  void flip(std::int32_t start, std::int32_t row, std::int32_t column) {
     for (;;) {
       const std::int32_t old = column_of_[row];
       column_of_[row] = column;

@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 SIZE, QUICK_SIZE = (1280, 1024), (640, 512)
 N_POINTS, N_POLYGONS = 500, 6
 
+NOTE = (
+    "The z-buffer knows the nearest pixel's centre, the ray knows the point itself: where a pixel "
+    "about the point is hidden in part, at an edge or on a slope, they may differ."
+)
+
 
 def run(effort: Effort, tell: Tell) -> Outcome:
     """Hide points behind polygons in the three ways."""
@@ -73,20 +78,17 @@ def run(effort: Effort, tell: Tell) -> Outcome:
     ]  # fmt: skip
     rows = [["points hidden", f"{spread(shares)} %"], ["of them in all", f"{n_hidden:,}"]]
     about = f"{N_POLYGONS} random triangles before {N_POINTS} points, {effort.seeds} times"
+    size = f"{camera.size_px[0]} × {camera.size_px[1]} px"
     timings = [
-        Timing(f"{N_POINTS} points, {w}, {camera.size_px[0]} × {camera.size_px[1]} px", "–",
-               s / effort.seeds)
-        for w, s in seconds.items()
-    ]  # fmt: skip
+        Timing(f"{N_POINTS} points, {way}, {size}", "–", s / effort.seeds)
+        for way, s in seconds.items()
+    ]
     return Outcome(
         claims=claims,
         tables=[Table(about, ["", ""], rows)],
         pictures=[Picture("report_occlusion", CAPTION, _draw(_camera(QUICK_SIZE)))],
         timings=timings,
-        notes=(
-            "The z-buffer knows the nearest pixel's centre, the ray knows the point itself: where "
-            "a pixel about the point is hidden in part, at an edge or on a slope, they may differ.",
-        ),
+        notes=(NOTE,),
     )
 
 

@@ -150,19 +150,13 @@ def corrupt(
     chosen = kept_frames(rng_dropped, truth.detections.n_frames, stride, dropped)
     whole, origin = _markers(truth, chosen, keep_unnamed)
     n_frames, times = len(chosen), truth.detections.times[chosen]
-    given = truth.surfaces if isinstance(truth, Truth) and n_frames else ()
-    surfaces = [s.during(chosen) for s in given]
+    surfaces = [s.during(chosen) for s in getattr(truth, "surfaces", ()) if n_frames]
     if visits is not None and len(origin):
         whole, again = come_and_go(rng_visits, visits, whole, n_frames, len(origin))
         origin = origin[again]
     n_markers = len(origin)
 
-    if not missing_run:
-        is_kept = (whole.markers < 0) | (rng_missing.random(len(whole.markers)) >= missing)
-    else:
-        is_missed = in_runs(rng_missing, missing, missing_run, n_frames, n_markers)
-        is_missed = np.column_stack([is_missed, np.zeros(n_frames, dtype=bool)])  # [-1] is clutter
-        is_kept = ~is_missed[whole.frames, whole.markers]
+    is_kept = _not_missed(rng_missing, whole, missing, missing_run, n_frames, n_markers)
     if burst is not None and n_markers:
         is_kept &= ~shadowed(rng_burst, burst, whole, n_frames, n_markers)
     by_cameras = None
@@ -177,11 +171,8 @@ def corrupt(
     factor = np.append(np.exp(noise_spread * rng_spread.standard_normal(n_markers)), 1.0)
     noisy = clean
     if noise:
-        places = rng_noise.normal(0.0, noise, clean.places.shape)
-        if noise_spread:
-            places *= factor[clean.markers, None]
-        places += clean.places
-        noisy = clean._replace(places=places)
+        off = rng_noise.normal(0.0, noise, clean.places.shape)
+        noisy = clean._replace(places=clean.places + off * factor[clean.markers, None])
     seen = noisy if is_kept.all() else noisy.where(is_kept)
     if merged:
         seen = merge(seen, merged)
@@ -212,6 +203,22 @@ def corrupt(
         surfaces=tuple(surfaces),
         record=_record(switches),
     )
+
+
+def _not_missed(
+    rng: np.random.Generator,
+    whole: Points,
+    missing: float,
+    run: float,
+    n_frames: int,
+    n_markers: int,
+) -> NDArray[np.bool_]:
+    """Draw which points are detected; `run` is the mean length of missed detections on end."""
+    if not run:
+        return (whole.markers < 0) | (rng.random(len(whole.markers)) >= missing)
+    is_missed = in_runs(rng, missing, run, n_frames, n_markers)
+    is_missed = np.column_stack([is_missed, np.zeros(n_frames, dtype=bool)])  # [-1] is clutter
+    return ~is_missed[whole.frames, whole.markers]
 
 
 def _check(truth: Tracks, switches: dict[str, Any]) -> None:

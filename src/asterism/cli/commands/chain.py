@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from asterism.cli.commands.reconstruct import Prior, about, expected_from, figures, true_tracks
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    import asterism as am
 
 _Scene = Annotated[str, typer.Argument(metavar="SCENE", help="One of `asterism scenes`.")]
 _Rig = Annotated[
@@ -98,24 +101,9 @@ def chain(
     seen = (shot.blob_of >= 0).sum(axis=0)
     scores = am.metrics.point_scores(made.detections, truth, counted=seen >= 2)
     who = true_tracks(made, o)
-    tracks: dict[str, am.Tracks] = {}
-    identity: dict[str, dict[str, Any]] = {}
-    model = am.estimate_model(made.detections).model
-    for name in names:
-        with progress(f"tracking with {name}", o.n_frames) as advance:
-            tracks[name] = am.track(
-                made.detections,
-                None if name == AUTO else am.tracking.method_by_name(name),
-                model=model, seed=seed, progress=advance,
-            )  # fmt: skip
-        identity[name] = am.evaluate(tracks[name], who).to_dict()
-    n_there = max(int((shot.projection.reason[0] != am.camera.Reason.ABSENT).sum()), 1)
-    two_d = {
-        "n_image_points": o.n_points,
-        "n_false": int((o.markers < 0).sum()) if o.markers is not None else 0,
-        "seen_by_one_percent": 100 * float((seen >= 1).sum()) / n_there,
-        "seen_by_two_percent": 100 * float((seen >= 2).sum()) / n_there,
-    }
+    tracks = _tracked(made.detections, names, seed)
+    identity = {name: am.evaluate(found, who).to_dict() for name, found in tracks.items()}
+    two_d = _image_figures(shot)
     if out is not None:
         _write(out, o, cameras, who, tracks)
     if json:
@@ -140,18 +128,42 @@ def chain(
             ("squared error by covariance", f"{scores.nees:.3g} (1 if it is honest)"),
             ("speed", f"{o.n_frames / seconds:.0f} frames/s"),
         ], title="\n3-D")  # fmt: skip
-        print_table(
-            [
-                (name, f"{s['idf1']:.4f}", s["switches"], f"{s['mota']:.4f}", s["n_tracks"])
-                for name, s in identity.items()
-            ],
-            ("method", "IDF1", "switches", "MOTA", "tracks"),
-            title="\nIdentity",
-        )
+        print_table([
+            (name, f"{s['idf1']:.4f}", s["switches"], f"{s['mota']:.4f}", s["n_tracks"])
+            for name, s in identity.items()
+        ], ("method", "IDF1", "switches", "MOTA", "tracks"), title="\nIdentity")  # fmt: skip
         if AUTO in tracks and (recipe := tracks[AUTO].recipe) is not None:
             print_table([("chosen", recipe.chosen)])
         if out is not None:
             print_table([("written", out)])
+
+
+def _tracked(detections: am.Detections, names: list[str], seed: int) -> dict[str, am.Tracks]:
+    """Track with every method, by one model."""
+    import asterism as am
+
+    model = am.estimate_model(detections).model
+    tracks: dict[str, am.Tracks] = {}
+    for name in names:
+        method = None if name == am.tracking.AUTO else name
+        with progress(f"tracking with {name}", detections.n_frames) as advance:
+            tracks[name] = am.track(detections, method, model=model, seed=seed, progress=advance)
+    return tracks
+
+
+def _image_figures(shot: am.simulate.Film) -> dict[str, float]:
+    """Count what the cameras saw of the markers."""
+    import asterism as am
+
+    markers = shot.observations.markers
+    seen = (shot.blob_of >= 0).sum(axis=0)
+    n_there = max(int((shot.projection.reason[0] != am.camera.Reason.ABSENT).sum()), 1)
+    return {
+        "n_image_points": shot.observations.n_points,
+        "n_false": 0 if markers is None else int((markers < 0).sum()),
+        "seen_by_one_percent": 100 * float((seen >= 1).sum()) / n_there,
+        "seen_by_two_percent": 100 * float((seen >= 2).sum()) / n_there,
+    }
 
 
 def _write(out: Path, observations: Any, rig: Any, who: Any, tracks: dict[str, Any]) -> None:

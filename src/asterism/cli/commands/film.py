@@ -16,6 +16,9 @@ from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     import asterism as am
     from asterism.cli.filming import Footage
 
@@ -95,12 +98,6 @@ def film(
         asterism film crossing --rig wall4 -o film --seeing noise_px=0.2 --seeing false=0.5
     """
     from asterism.cli.console import to_json
-    from asterism.cli.film_pictures import (
-        contact_sheet,
-        coverage_picture,
-        rig_picture,
-        save,
-    )
     from asterism.cli.filming import film_all, frames_between
     from asterism.cli.outputs import Folder, check_outputs
     from asterism.cli.recording import rig_from, seeing_from
@@ -118,11 +115,7 @@ def film(
     given = {name: value for name, value in given.items() if value is not None}
     truth, first_frame = _truth(source, given, option or [], is_seeing=bool(seeing))
     points = truth.detections.points[truth.labels >= 0]
-    if not len(points):
-        hint = "run asterism track first: it makes tracks of points without names"
-        raise ParameterError("CAPTURE", "points in tracks", f"{source}, which has none", hint)
-    if points.shape[1] != 3:
-        raise ParameterError("CAPTURE", "points in 3-D", f"{source}, in {points.shape[1]}-D")
+    _check_points(source, points)
     cameras, about = rig_from(rig, points)
 
     out.mkdir(parents=True, exist_ok=True)
@@ -132,25 +125,16 @@ def film(
     write_rig(cameras, out / RIG)
 
     drawn = frames_between(truth.detections.n_frames, pictures)
-    files = [f"{PICTURES}/frame_{first_frame + t:06d}.png" for t in drawn]
-    with progress("drawing", len(drawn) + 2) as advance:
-        if drawn:
-            (out / PICTURES).mkdir(exist_ok=True)
-        for i, (t, file) in enumerate(zip(drawn, files, strict=True)):
-            time = truth.detections.times[t]
-            title = f"{Path(source).name}, frame {first_frame + t}, {time:.3f} s"
-            save(contact_sheet(truth, cameras, t, title), out / file)
-            advance(i + 1)
-        save(rig_picture(truth, cameras), out / RIG_PICTURE)
-        advance(len(drawn) + 1)
-        save(coverage_picture(truth, cameras), out / COVERAGE_PICTURE)
+    files = {t: f"{PICTURES}/frame_{first_frame + t:06d}.png" for t in drawn}
+    times = {t: f"frame {first_frame + t}, {truth.detections.times[t]:.3f} s" for t in drawn}
+    _draw(out, truth, cameras, {t: (files[t], f"{Path(source).name}, {times[t]}") for t in drawn})
 
     options = [f"--{name}={value}" for name, value in given.items()]
     options += [f"--option={text}" for text in option or []]
     options += [f"--seeing={text}" for text in seeing or []]
-    arguments = ["film", source, "--rig", rig, "-o", str(out), f"--pictures={pictures}", *options]
+    command = ["asterism", "film", source, "--rig", rig, "-o", out, f"--pictures={pictures}"]
     summary = {
-        "command": shlex.join(["asterism", *arguments]),
+        "command": shlex.join(map(str, [*command, *options])),
         "capture": source,
         "rig": rig,
         "about_rig": about,
@@ -162,7 +146,7 @@ def film(
         "n_surfaces": len(getattr(truth, "surfaces", ())),
         "n_named": sum(name is not None for name in truth.names),
         **_figures(footage),
-        "pictures": files,
+        "pictures": list(files.values()),
         "versions": versions(),
     }
     write_text(out / SUMMARY, to_json(summary) + "\n")
@@ -175,6 +159,29 @@ def film(
         print_json({"folder": str(out), **summary})
     elif not quiet:
         _print(out, summary)
+
+
+def _check_points(source: str, points: NDArray[np.float64]) -> None:
+    if not len(points):
+        hint = "run asterism track first: it makes tracks of points without names"
+        raise ParameterError("CAPTURE", "points in tracks", f"{source}, which has none", hint)
+    if points.shape[1] != 3:
+        raise ParameterError("CAPTURE", "points in 3-D", f"{source}, in {points.shape[1]}-D")
+
+
+def _draw(out: Path, truth: am.Tracks, cameras: am.Rig, sheets: dict[int, tuple[str, str]]) -> None:
+    """Draw the rig, its coverage, and what each camera sees: by frame a file and its title."""
+    from asterism.cli.film_pictures import contact_sheet, coverage_picture, rig_picture, save
+
+    with progress("drawing", len(sheets) + 2) as advance:
+        if sheets:
+            (out / PICTURES).mkdir(exist_ok=True)
+        for i, (t, (file, title)) in enumerate(sheets.items()):
+            save(contact_sheet(truth, cameras, t, title), out / file)
+            advance(i + 1)
+        save(rig_picture(truth, cameras), out / RIG_PICTURE)
+        advance(len(sheets) + 1)
+        save(coverage_picture(truth, cameras), out / COVERAGE_PICTURE)
 
 
 def _truth(

@@ -15,6 +15,7 @@ from asterism.errors import FormatError, ParameterError
 
 if TYPE_CHECKING:
     import asterism as am
+    from asterism.cli.outputs import Folder
     from asterism.cli.run_folder import Run
     from asterism.cli.summary import Summary
     from asterism.model import Recipe
@@ -123,8 +124,8 @@ def track(
         asterism track --from runs/first/run.toml -o again.c3d
     """
     import asterism as am
-    from asterism.cli.outputs import Folder, check_ending, check_outputs, read_model
-    from asterism.cli.run_folder import FILES, Run
+    from asterism.cli.outputs import check_ending, check_outputs, read_model
+    from asterism.cli.run_folder import Run
     from asterism.cli.tracking import carry_out, default_output, output_format
     from asterism.io.captures.files import format_of
 
@@ -141,11 +142,7 @@ def track(
     if out is None:
         out = default_output(source, chosen_format)
         out = out if run is None else run / out.name
-    outputs: dict[str, Path | Folder | None] = {"--out": out, "--report": report}
-    if run is not None:
-        is_inside = out.resolve().parent == run.resolve()
-        outputs["--run"] = Folder(run, (*FILES, out.name) if is_inside else FILES)
-        outputs["--out"] = None if is_inside else out
+    outputs = _outputs(out, run) | {"--report": report}
     check_outputs(outputs, [source, model, repeat], overwrite=overwrite)
     chosen_method = made_method(method, option or [])
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
@@ -191,6 +188,18 @@ def track(
         }
         told |= {"chosen": recipe.chosen} if recipe.chosen else {}
         print_json(summary.to_dict() | told | page)
+
+
+def _outputs(out: Path, run: Path | None) -> dict[str, Path | Folder | None]:
+    """List what is written, by its option; the tracks may stand in the folder of the run."""
+    from asterism.cli.outputs import Folder
+    from asterism.cli.run_folder import FILES
+
+    if run is None:
+        return {"--out": out}
+    is_inside = out.resolve().parent == run.resolve()
+    folder = Folder(run, (*FILES, out.name) if is_inside else FILES)
+    return {"--run": folder, "--out": None if is_inside else out}
 
 
 def made_method(name: str | None, texts: list[str]) -> am.tracking.Method[Any] | None:

@@ -94,21 +94,7 @@ def read_c3d(path: Path) -> C3DFile:
         got = f"{len(raw)} bytes, beginning with {raw[:4]!r}"
         raise FormatError(path, "header", "a C3D header of 512 bytes, byte 2 = 0x50", got)
     warnings: list[str] = []
-    groups: dict[str, Group] = {}
-    at = (raw[0] - 1) * BLOCK
-    processor = raw[at + 3] if 0 < at <= len(raw) - 4 else 0
-    if processor in (INTEL, DEC, SGI):
-        start = int.from_bytes(raw[16:18], "big" if processor == SGI else "little")
-        end = (start - 1) * BLOCK if (start - 1) * BLOCK > at else len(raw)
-        groups, problem = parse(raw[at + 4 : end], processor)
-        if problem:
-            warnings.append(f"damaged parameter section, read as far as it goes: {problem}")
-    else:
-        processor = INTEL
-        warnings.append("there is no parameter section where the header says")
-    if not groups:
-        warnings.append("without parameters the points have neither names nor a unit")
-
+    processor, groups = _parameters(raw, warnings)
     header = _intel_header(raw[:BLOCK], processor)
     words = [int(w) for w in np.frombuffer(header, "<u2", 10)]
     n_points, n_analog, first, last = words[1:5]
@@ -137,13 +123,7 @@ def read_c3d(path: Path) -> C3DFile:
             f"cut off in frame {first + n_frames}: expected {n_declared} frames, found "
             f"{n_frames} complete, {n_missing} bytes are missing. Copy the file again."
         )
-    n_values = n_frames * n_items
-    if processor == INTEL:  # a view, because the file may be large
-        kind = "<f4" if item == 4 else "<i2"
-        values = np.frombuffer(raw, kind, n_values, offset if n_values else 0)
-    else:
-        values = decode(raw[offset : offset + n_values * item], item, processor)
-    values = values.reshape(n_frames, n_items)
+    values = _values(raw, offset, n_frames * n_items, item, processor).reshape(n_frames, n_items)
     points: NDArray[Any] = values[:, : 4 * n_points].reshape(n_frames, n_points, 4)
     analog: NDArray[Any] = values[:, 4 * n_points :]
     if item == 2:
@@ -164,6 +144,32 @@ def read_c3d(path: Path) -> C3DFile:
         warnings=tuple(warnings),
         truncated=truncated,
     )
+
+
+def _parameters(raw: bytes, warnings: list[str]) -> tuple[int, dict[str, Group]]:
+    """Read the processor and the groups of parameters, as far as they go."""
+    at = (raw[0] - 1) * BLOCK
+    processor = raw[at + 3] if 0 < at <= len(raw) - 4 else 0
+    groups: dict[str, Group] = {}
+    if processor in (INTEL, DEC, SGI):
+        start = int.from_bytes(raw[16:18], "big" if processor == SGI else "little")
+        end = (start - 1) * BLOCK if (start - 1) * BLOCK > at else len(raw)
+        groups, problem = parse(raw[at + 4 : end], processor)
+        if problem:
+            warnings.append(f"damaged parameter section, read as far as it goes: {problem}")
+    else:
+        processor = INTEL
+        warnings.append("there is no parameter section where the header says")
+    if not groups:
+        warnings.append("without parameters the points have neither names nor a unit")
+    return processor, groups
+
+
+def _values(raw: bytes, offset: int, n: int, item: int, processor: int) -> NDArray[Any]:
+    """Decode n numbers of so many bytes each; of Intel's a view, because the file may be large."""
+    if processor != INTEL:
+        return decode(raw[offset : offset + n * item], item, processor)
+    return np.frombuffer(raw, "<f4" if item == 4 else "<i2", n, offset if n else 0)
 
 
 def _intel_header(header: bytes, processor: int) -> bytes:

@@ -85,15 +85,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         unit = d.units
         first_frame = d.first_frame if d.n_frames and 0 <= d.first_frame < 2**31 else 1
     if source is not None:
-        old_names, old_texts = channel_names(source), channel_descriptions(source)
-        text_of = dict(zip(old_names, old_texts, strict=True))
-        text_of = {name: t for name, t in text_of.items() if t not in (UNNAMED, CLUTTER)}
-        descriptions = [
-            text or text_of.get(name, "") for text, name in zip(descriptions, names, strict=True)
-        ]
-        computed = np.flatnonzero(is_modelled(source))
-        names += [old_names[c] for c in computed]
-        descriptions += [old_texts[c] for c in computed]
+        computed = _keep_channels(source, names, descriptions)
         header, groups, analog = source.header, source.groups, source.analog
         scale, n_samples = source.scale, source.n_samples
 
@@ -108,15 +100,9 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     n_blocks = len(build(groups)) // BLOCK
     point = groups["POINT"].parameters  # the number of blocks is known now, and does not change
     point["DATA_START"] = Parameter.of_integers([2 + n_blocks], point["DATA_START"])
-    words = np.frombuffer(header, "<u2").copy()  # keeps the events that old programs put there
-    words[0] = 0x5002  # parameters in block 2, and the mark of a C3D
-    words[1:3] = len(names), analog.shape[1]
-    words[3:5] = np.minimum([first_frame, first_frame + d.n_frames - 1], 0xFFFF)
-    words[6:8] = np.array([-scale], "<f4").view("<u2")
-    words[8:10] = 2 + n_blocks, n_samples
-    words[10:12] = np.array([rate], "<f4").view("<u2")
-    words[147:149] = 0  # a section of labels and ranges, which nobody uses, is not copied
-    file.write(words.tobytes())
+    frames = np.minimum([first_frame, first_frame + d.n_frames - 1], 0xFFFF)
+    counts = (len(names), analog.shape[1], *frames)
+    file.write(_header(header, counts, scale, (2 + n_blocks, n_samples), rate))
     file.write(build(groups))
 
     row = np.zeros((_CHUNK, len(names), 4), dtype="<f4")
@@ -144,6 +130,33 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     # Data fill whole blocks; but where the counts overflow some readers go by the file's length.
     if d.n_frames <= 0xFFFF:
         file.write(bytes(-(d.n_frames * (4 * len(names) + analog.shape[1]) * 4) % BLOCK))
+
+
+def _header(
+    old: bytes, counts: tuple[int, ...], scale: float, data: tuple[int, int], rate: float
+) -> bytes:
+    """Make the first block; of an old one it keeps the events that old programs put there."""
+    words = np.frombuffer(old, "<u2").copy()
+    words[0] = 0x5002  # parameters in block 2, and the mark of a C3D
+    words[1:5] = counts
+    words[6:8] = np.array([-scale], "<f4").view("<u2")
+    words[8:10] = data
+    words[10:12] = np.array([rate], "<f4").view("<u2")
+    words[147:149] = 0  # the section of labels and ranges, which is obsolete, is not copied
+    return words.tobytes()
+
+
+def _keep_channels(source: C3DFile, names: list[str], descriptions: list[str]) -> NDArray[np.int64]:
+    """Add the source's descriptions and its computed points; return the channels of these."""
+    old_names, old_texts = channel_names(source), channel_descriptions(source)
+    text_of = dict(zip(old_names, old_texts, strict=True))
+    text_of = {name: t for name, t in text_of.items() if t not in (UNNAMED, CLUTTER)}
+    own = zip(descriptions, names, strict=True)
+    descriptions[:] = [text or text_of.get(name, "") for text, name in own]
+    computed = np.flatnonzero(is_modelled(source))
+    names += [old_names[c] for c in computed]
+    descriptions += [old_texts[c] for c in computed]
+    return computed
 
 
 def _source(d: Detections) -> C3DFile | None:

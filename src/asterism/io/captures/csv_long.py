@@ -70,16 +70,22 @@ def read_tracks(path: Path) -> Tracks:
     return _load(path)[1]
 
 
-def _load(path: Path) -> tuple[Capture, Tracks]:
-    lines = read_lines(path)
-    while len(lines) > 1 and not lines[-1].strip():
-        lines.pop()
-    header = cells_of(lines[0])
+def _header(path: Path, line: str) -> list[str]:
+    """Read the names of the columns."""
+    header = cells_of(line)
     unknown = [name for name in header if name not in _COLUMNS]
     missing = [name for name in _REQUIRED if name not in header]
     if unknown or missing or len(set(header)) < len(header):
         got = ", ".join(header)[:200]
         raise FormatError(path, "line 1", f"the columns {', '.join(_COLUMNS)}", got)
+    return header
+
+
+def _load(path: Path) -> tuple[Capture, Tracks]:
+    lines = read_lines(path)
+    while len(lines) > 1 and not lines[-1].strip():
+        lines.pop()
+    header = _header(path, lines[0])
     numbers, texts = columns_of(path, lines, header, _TEXTS)
     nothing = np.full(len(lines) - 1, np.nan)
     numbers = dict.fromkeys(("track",), nothing) | numbers

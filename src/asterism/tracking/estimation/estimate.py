@@ -44,7 +44,7 @@ from asterism.tracking.estimation.scales import first_scales
 from asterism.tracking.estimation.stochastic_em import draw_rates
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from asterism.tracking.estimation.scales import Scales
 
@@ -125,6 +125,48 @@ def estimate_model(
     pieces = list(_pieces(detections))
     scales = first_scales(pieces)
     region = Region.of(detections)
+
+    def rates_of(evidence: Evidence) -> Rates:
+        return _counts(evidence).rates(in_runs=in_runs)
+
+    fit, evidence, bounds = _fitted(pieces, scales, region, rates_of)
+    reach, least_noise = scales.spacing / 2, bounds.least_noise
+    counts = (_counts(evidence),)
+    rates = rates_of(evidence)
+    if population == "open":
+
+        def model_of(fit: MotionFit, rates: Rates, tracks: list[Tracks] | None) -> TrackingModel:
+            seen = evidence if tracks is None else Evidence.of(tracks, reach)
+            return _model(fit, rates, seen, scales, region)
+
+        drawn = draw_rates(pieces, fit, rates, bounds, model_of, in_runs=in_runs)
+        fit, rates, counts, evidence = (
+            drawn.fit,
+            drawn.rates,
+            drawn.counts,
+            Evidence.of(drawn.tracks, reach),
+        )
+    fit, sure = polish(evidence.tracks, _model(fit, rates, evidence, scales, region), fit, bounds)
+    model = _model(fit, rates, evidence, scales, region)
+    stds = _stds(counts, region, is_open=population == "open", in_runs=in_runs)
+    stds |= _motion_stds(fit, model, sure, least_noise)
+    mean = sum(counts, Counts()) * (1 / len(counts))
+    reasons = reasons_for(
+        model, stds, n_axes=region.n_axes, n_links=evidence.n_links,
+        n_misses=mean.misses + mean.remisses, in_runs=in_runs, n_clutter=mean.clutter,
+        n_frames=evidence.n_frames, least_noise=least_noise,
+        events=(mean.births, mean.deaths) if population == "open" else None,
+    )  # fmt: skip
+    return ModelEstimate(model=model, reasons=reasons, stds=stds)
+
+
+def _fitted(
+    pieces: list[Detections],
+    scales: Scales,
+    region: Region,
+    rates_of: Callable[[Evidence], Rates],
+) -> tuple[MotionFit, Evidence, FitBounds]:
+    """Fit one motion and three, and choose; with the tracks of the choice and its bounds."""
     reach = scales.spacing / 2
     low, high = scales.acceleration_low, scales.acceleration_high
     bounds = FitBounds(
@@ -134,9 +176,6 @@ def estimate_model(
     fit = bounds.fit(
         math.log(scales.noise), (math.log(low), math.log(low * high) / 2, math.log(high)), 0.95
     )
-
-    def rates_of(evidence: Evidence) -> Rates:
-        return _counts(evidence).rates(in_runs=in_runs)
 
     model = _first_model(fit, scales, region)
     evidence = gather_evidence(pieces, _wider(model), reach)
@@ -172,33 +211,7 @@ def estimate_model(
     is_blind = one[2].n_lost > BLIND * three[2].n_lost + 1
     is_worth = three[0] - one[0] > WORTH * sum(p.n_points for p in pieces)
     _, fit, evidence = three if is_blind or is_worth else one
-    counts = (_counts(evidence),)
-    rates = rates_of(evidence)
-    if population == "open":
-
-        def model_of(fit: MotionFit, rates: Rates, tracks: list[Tracks] | None) -> TrackingModel:
-            seen = evidence if tracks is None else Evidence.of(tracks, reach)
-            return _model(fit, rates, seen, scales, region)
-
-        drawn = draw_rates(pieces, fit, rates, bounds, model_of, in_runs=in_runs)
-        fit, rates, counts, evidence = (
-            drawn.fit,
-            drawn.rates,
-            drawn.counts,
-            Evidence.of(drawn.tracks, reach),
-        )
-    fit, sure = polish(evidence.tracks, _model(fit, rates, evidence, scales, region), fit, bounds)
-    model = _model(fit, rates, evidence, scales, region)
-    stds = _stds(counts, region, is_open=population == "open", in_runs=in_runs)
-    stds |= _motion_stds(fit, model, sure, least_noise)
-    mean = sum(counts, Counts()) * (1 / len(counts))
-    reasons = reasons_for(
-        model, stds, n_axes=region.n_axes, n_links=evidence.n_links,
-        n_misses=mean.misses + mean.remisses, in_runs=in_runs, n_clutter=mean.clutter,
-        n_frames=evidence.n_frames, least_noise=least_noise,
-        events=(mean.births, mean.deaths) if population == "open" else None,
-    )  # fmt: skip
-    return ModelEstimate(model=model, reasons=reasons, stds=stds)
+    return fit, evidence, bounds
 
 
 def _doubt_units(detections: Detections) -> None:

@@ -183,21 +183,12 @@ def estimate(take: Take, span: Span) -> Estimates:
         if is_known.sum() >= LEAST_PATTERN:
             Z = body.to_body(X[rows][:, helpers]).reshape(len(rows), -1)
             pattern = learn_pattern(Z, places, is_known, span.length)
-            # A window is foretold as a whole by what was learnt without its middle.
+            # A window is predicted as a whole by what was learnt without its middle.
             fold = pattern.fold[at[:-1, at.shape[1] // 2]]
-            base = np.concatenate(
-                [pattern.by_fold[fold[:, None], at[:-1]], pattern.by_all[at[-1:]]]
-            )
+            base = [pattern.by_fold[fold[:, None], at[:-1]], pattern.by_all[at[-1:]]]
+            variances = pattern.variances[at[-1, ~is_end]]
             found.append(
-                _carried(
-                    "pattern",
-                    base,
-                    there,
-                    is_end,
-                    ways,
-                    room,
-                    pattern.variances[at[-1, ~is_end]],
-                )
+                _carried("pattern", np.concatenate(base), there, is_end, ways, room, variances)
             )
     return Estimates(
         each=tuple(found),
