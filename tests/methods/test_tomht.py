@@ -233,6 +233,8 @@ def test_the_most_probable_partition_is_found_where_no_option_excludes_it():
     n_below = 0
     for _ in range(12):
         d, model = tiny_problem(rng, 5, 3, 2), tiny_model(rng)
+        if d.n_points > 12:
+            continue  # millions of partitions
         _, totals = every_partition(d, model)
         exact = am.MDA(
             window=16, max_branches=10**6, prune_odds=1e30, new_track_odds=1e300,

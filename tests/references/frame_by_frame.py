@@ -17,70 +17,69 @@ from tests.references.posterior import chance_seen
 
 
 @cache
-def step_of(mode: am.model.Motion, dt: float):
-    """F and Q of one motion over a time; asked for again and again."""
-    return mode.transition(dt)[0], mode.process_noise(dt)[0]
+def step_of(modes: tuple[am.model.Motion, ...], dt: float):
+    """F and Q of each motion over a time; asked for again and again."""
+    F = np.stack([mode.transition(dt)[0] for mode in modes])
+    Q = np.stack([mode.process_noise(dt)[0] for mode in modes])
+    return F, Q
 
 
 class OneTrack:
+    """The life of a track: each motion has a weight w, a state x (axis, order), a covariance P."""
+
     def __init__(self, model: am.TrackingModel, time: float, point, detection: int) -> None:
         s, p = model.sensor, model.population
-        self.modes = model.motion.modes
+        self.modes = tuple(model.motion.modes)
         self.T = np.asarray(model.motion.mode_transitions)
         M = len(self.modes)
         self.w = np.linalg.lstsq(
             np.vstack([self.T.T - np.eye(M), np.ones(M)]), np.eye(M + 1)[M], rcond=None
         )[0]
         self.h, self.r = self.modes[0].observation, s.noise_sigma**2
-        self.x = [np.outer(point, self.h / (self.h @ self.h)) for _ in self.modes]
-        self.P = [model.initial_covariance(len(point)) for _ in self.modes]
+        self.x = np.stack([np.outer(point, self.h / (self.h @ self.h))] * M)
+        self.P = np.stack([model.initial_covariance(len(point))] * M)
         self.score = math.log(p.birth_density * s.p_detection / s.clutter_density)
         self.best = self.score
         self.id, self.gap, self.last, self.last_time = -1, 0, np.array(point), time
         self.pending = [detection]
 
     def predict(self, dt: float) -> None:
-        D = len(self.x[0])
+        M, D, n = self.x.shape
         prior = self.w @ self.T
-        mixed_x, mixed_P = [], []
-        for b, mode in enumerate(self.modes):
-            share = self.w * self.T[:, b] / prior[b]
-            mean = sum(share[a] * self.x[a] for a in range(len(self.modes)))
-            P = sum(
-                share[a] * (self.P[a] + (self.x[a] - mean).T @ (self.x[a] - mean) / D)
-                for a in range(len(self.modes))
-            )
-            F, Q = step_of(mode, dt)
-            mixed_x.append(mean @ F.T)
-            mixed_P.append(F @ P @ F.T + Q)
-        self.x, self.P, self.w = mixed_x, mixed_P, prior
-        self.S = np.array([self.h @ P @ self.h + self.r for P in self.P])
+        share = (self.w[:, None] * self.T / prior).T  # of mode b, what comes of mode a
+        mean = (share @ self.x.reshape(M, -1)).reshape(M, D, n)
+        off = self.x - mean[:, None]
+        spread = self.P + off.swapaxes(-1, -2) @ off / D
+        P = (share[:, :, None, None] * spread).sum(axis=1)
+        F, Q = step_of(self.modes, dt)
+        self.x, self.P, self.w = mean @ F.swapaxes(1, 2), F @ P @ F.swapaxes(1, 2) + Q, prior
+        self.S = self.P @ self.h @ self.h + self.r
 
     def odds(self, gain: float) -> float:
         return gain if self.id >= 0 else np.logaddexp(0, self.score + gain)
 
+    def squares_of(self, y) -> np.ndarray:
+        """Normalised innovation squared, by each motion."""
+        return ((y - self.x @ self.h) ** 2).sum(axis=1) / self.S
+
     def densities(self, y) -> np.ndarray:
-        D = len(y)
-        e2 = np.array([((y - x @ self.h) ** 2).sum() for x in self.x])
-        return self.w * np.exp(-0.5 * e2 / self.S) / (2 * np.pi * self.S) ** (D / 2)
+        likelihood = np.exp(-0.5 * self.squares_of(y)) / (2 * np.pi * self.S) ** (len(y) / 2)
+        return self.w * likelihood
 
     def within(self, y, gate: float) -> bool:
-        e2 = np.array([((y - x @ self.h) ** 2).sum() for x in self.x])
-        return bool((e2 <= gate * self.S).any())
+        return bool((self.squares_of(y) <= gate).any())
 
     def distance(self, y) -> float:
         return float(self.distances(y[None])[0])
 
     def distances(self, points) -> np.ndarray:
-        expected = sum(w * x @ self.h for w, x in zip(self.w, self.x, strict=True))
-        return ((points - expected) ** 2).sum(axis=1)
+        return ((points - self.w @ (self.x @ self.h)) ** 2).sum(axis=1)
 
     def update(self, y) -> None:
         each = self.densities(y)
-        for b in range(len(self.modes)):
-            K = self.P[b] @ self.h / self.S[b]
-            self.x[b] = self.x[b] + np.outer(y - self.x[b] @ self.h, K)
-            self.P[b] = self.P[b] - np.outer(K, K) * self.S[b]
+        K = self.P @ self.h / self.S[:, None]
+        self.x = self.x + (y - self.x @ self.h)[:, :, None] * K[:, None]
+        self.P = self.P - K[:, :, None] * K[:, None] * self.S[:, None, None]
         self.w = each / each.sum()
 
 

@@ -33,11 +33,10 @@ class Branch(OneTrack):
     def fork(self) -> Branch:
         other = copy.copy(self)
         other.path, other.squares = dict(self.path), dict(self.squares)
-        other.x, other.P, other.w = list(self.x), list(self.P), np.array(self.w)
         return other
 
     def surprise(self, y) -> float:
-        squares = np.array([((y - x @ self.h) ** 2).sum() for x in self.x]) / self.S
+        squares = self.squares_of(y)
         if len(squares) == 1:
             return float(squares[0])
         return float(chdtri(len(y), self.w @ chdtrc(len(y), squares)))
