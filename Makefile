@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo install test lint types contracts docs bench tables sanitize sanitized odr wheel web web-check clean
+.PHONY: demo install test lint types contracts docs bench tables sanitize sanitized wheel web web-check clean
 
 demo: $(VENV)/.demo
 	$(BIN)/asterism demo --out demo --overwrite
@@ -57,24 +57,17 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/tuned.py --markdown docs/tables/tuned.md
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
-# beside the package, never installed.
+# beside the package, never installed: all its files as one, which takes less time, and where a type
+# or function that two files define differently is an error.
 sanitize: sanitized $(VENV)/.test
 	$(BIN)/python tests/tools/run_sanitized.py build/sanitize
 
 sanitized: $(VENV)/.python
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake -S . -B build/sanitize -G Ninja \
 	  -DASTERISM_SANITIZE=ON -DASTERISM_WERROR=ON -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
+	  -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=0 \
 	  -Dnanobind_DIR="$$($(BIN)/python -m nanobind --cmake_dir)"
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake --build build/sanitize
-
-# A type or function that two files define differently is an error: the compiler sees all files of
-# the engine at once only when it links. Nothing of this build is used.
-odr: $(VENV)/.python
-	PATH="$(CURDIR)/$(BIN):$$PATH" cmake -S . -B build/odr -G Ninja -DCMAKE_BUILD_TYPE=None \
-	  -DCMAKE_CXX_FLAGS="-O0 -flto -Werror=odr -Werror=lto-type-mismatch" \
-	  -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
-	  -Dnanobind_DIR="$$($(BIN)/python -m nanobind --cmake_dir)"
-	PATH="$(CURDIR)/$(BIN):$$PATH" cmake --build build/odr
 
 # From the tree, where the engine is built already; and what is built from is all in the archive of
 # sources.

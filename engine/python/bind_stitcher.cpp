@@ -22,10 +22,10 @@ struct Decisions {
   }
 };
 
-nb::tuple run(Stitcher& stitcher, const MotionModel& m, const In<double>& times,
-              const In<std::int32_t>& kind, const In<double>& F, const In<double>& Q,
-              const In<std::int64_t>& offsets, const In<double>& points,
-              const In<std::int64_t>& labels) {
+nb::tuple run_stitcher(Stitcher& stitcher, const MotionModel& m, const In<double>& times,
+                       const In<std::int32_t>& kind, const In<double>& F, const In<double>& Q,
+                       const In<std::int64_t>& offsets, const In<double>& points,
+                       const In<std::int64_t>& labels) {
   const Timeline line = timeline(m, times, kind, F, Q);
   const std::vector<Point> all = to_points(points, m.axis.D);
   const std::size_t T = line.times.size(), N = all.size();
@@ -69,9 +69,9 @@ nb::tuple run(Stitcher& stitcher, const MotionModel& m, const In<double>& times,
 
 // One frame of a stream, on a copy: (new state, markers, earlier detections whose marker changes, their
 // markers).
-nb::tuple step(const LiveStitcher& before, const In<double>& F, const In<double>& Q,
-               const In<double>& points, const In<std::int64_t>& labels,
-               const In<std::int64_t>& revised, const In<std::int64_t>& revised_labels) {
+nb::tuple step_stitcher(const LiveStitcher& before, const In<double>& F, const In<double>& Q,
+                        const In<double>& points, const In<std::int64_t>& labels,
+                        const In<std::int64_t>& revised, const In<std::int64_t>& revised_labels) {
   const MotionModel& m = before.motion();
   const std::size_t size = static_cast<std::size_t>(m.M) * m.axis.n * m.axis.n;
   require(F.size() == size && Q.size() == size, "F and Q: shape (modes, n, n)");
@@ -214,8 +214,8 @@ void bind_stitcher(nb::module_& module) {
       .def(nb::init<const MotionModel&, const StitchOptions&>(), "motion"_a, "options"_a)
       // (fragment of each point, and of each fragment its marker, the fragment before, how probably).
       .def_prop_ro_static("WORTH", [](nb::handle) { return Claims::kWorth; })
-      .def("run", &run, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a, "points"_a,
-           "labels"_a)
+      .def("run", &run_stitcher, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a,
+           "points"_a, "labels"_a)
       .def(
           "advise",
           [](Stitcher& self, const In<std::int64_t>& labels, const In<std::int64_t>& before,
@@ -232,7 +232,8 @@ void bind_stitcher(nb::module_& module) {
   nb::class_<LiveStitcher>(module, "LiveStitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&, std::int64_t>(), "motion"_a,
            "options"_a, nb::kw_only(), "lag"_a)
-      .def("step", &step, "F"_a, "Q"_a, "points"_a, "labels"_a, "revised"_a, "revised_labels"_a)
+      .def("step", &step_stitcher, "F"_a, "Q"_a, "points"_a, "labels"_a, "revised"_a,
+           "revised_labels"_a)
       .def_prop_ro("n_seen", &LiveStitcher::n_seen)
       .def_prop_ro("n_joins", &LiveStitcher::n_joins)
       .def_prop_ro("n_ghosts", &LiveStitcher::n_ghosts)
