@@ -542,18 +542,29 @@ def test_a_model_that_fits_nothing_is_told_of(scene, capsys):
     assert "no track was confirmed" not in capsys.readouterr().err
 
 
-def hidden_person(folder):
-    """Record a person of whom markers are hidden for a while, beside ghosts."""
-    line = "simulate person -o person.csv --seed 1 -q"
-    assert main(line.split()) == 0
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A person of whom markers are hidden for a while, beside ghosts; and tracks of gnn alone."""
+    folder = tmp_path_factory.mktemp("recorded")
+    person, p, truth, alone = (
+        str(folder / name) for name in ("person.csv", "p.c3d", "pt.c3d", "alone.c3d")
+    )
     spoil = "--burst 5:5-60 --ghosts 3:1-10 --noise 0.0003 --seed 1 -q"
-    assert main(["corrupt", "person.csv", "-o", "p.c3d", "--truth", "pt.c3d", *spoil.split()]) == 0
+    assert main(["simulate", "person", "-o", person, "--seed=1", "-q"]) == 0
+    assert main(["corrupt", person, "-o", p, "--truth", truth, *spoil.split()]) == 0
+    assert main(["track", p, "--method", "gnn", "-o", alone, "-q"]) == 0
     return folder
 
 
-def test_track_finds_hidden_markers_again(scene, capsys):
-    hidden_person(scene)
-    run("track p.c3d --method gnn -o alone.c3d", capsys)
+@pytest.fixture
+def person(recorded, tmp_path, monkeypatch):
+    """A copy of that folder, to work in."""
+    shutil.copytree(recorded, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_track_finds_hidden_markers_again(person, capsys):
     out = run("track p.c3d --method gnn -o found.c3d --stitch --run r", capsys)
     assert "markers found again" in out
     truth = am.io.read_tracks("pt.c3d")
@@ -567,17 +578,15 @@ def test_track_finds_hidden_markers_again(scene, capsys):
     assert am.evaluate(am.io.read_tracks("found.c3d"), expected).idf1 == 1
 
 
-def test_stitch_says_what_it_joined(scene, capsys):
-    hidden_person(scene)
-    run("track p.c3d --method gnn -o pieces.c3d", capsys)
-    out = run("stitch pieces.c3d -o markers.c3d", capsys)
+def test_stitch_says_what_it_joined(scene, person, capsys):
+    out = run("stitch alone.c3d -o markers.c3d", capsys)
     assert "least sure" in out
-    told = json.loads(run("stitch pieces.c3d -o markers.csv --json", capsys))
+    told = json.loads(run("stitch alone.c3d -o markers.csv --json", capsys))
     assert told["n_joins"] == len(told["joins"]) > 10
     assert told["n_tracks"] < told["n_tracks_before"]
     truth = am.io.read_tracks("pt.c3d")
     before, after = (
-        am.evaluate(am.io.read_tracks(f), truth).idf1 for f in ("pieces.c3d", "markers.c3d")
+        am.evaluate(am.io.read_tracks(f), truth).idf1 for f in ("alone.c3d", "markers.c3d")
     )
     assert after > 0.98 > before
     assert run("stitch truth.csv -o quiet.csv -q", capsys) == ""
@@ -599,8 +608,7 @@ def test_what_stitch_refuses(scene, capsys, line, says):
     assert not Path("out.csv").exists()
 
 
-def test_bonds_of_one_take_name_the_next(scene, capsys):
-    hidden_person(scene)
+def test_bonds_of_one_take_name_the_next(person, capsys):
     out = run("bonds person.csv -o subject.toml", capsys)
     assert "rigid clusters" in out
     told = json.loads(run("bonds person.csv --json", capsys))

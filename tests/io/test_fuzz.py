@@ -43,31 +43,39 @@ def test_a_run_continues_and_survives_what_it_looks_for(tmp_path):
         f"""
 import os, sys
 sys.path.insert(0, {str(ROOT)!r})
-from tests.tools import fuzz_readers as f
+from tests.tools import fuzzing
 
-class Bad(f.Bench):
+class Bad:
+    def __init__(self, name, folder, seed):
+        pass
+
+    def prepare(self):
+        pass
+
     def damaged(self, i):
-        self.i = i
-        return super().damaged(i)
+        return (i,)
 
-    def feed(self, *made):
-        if self.i == 3:
+    def feed(self, i):
+        if i == 3:
             os.kill(os.getpid(), 11)
-        while self.i == 5:
+        while i == 5:
             pass
-        if self.i == 7:
+        if i == 7:
             raise AttributeError("no such thing")
-        if self.i == 9:
+        if i == 9:
             bytearray(2 << 30)
-        return super().feed(*made)
+        return "refused"
 
-f.fuzzing.SECONDS = 0.2
-sys.exit(f.fuzzing.main("", Bad, ["trc"], [{str(script)!r}]))
+    def kept(self, made):
+        return "seed.bin", bytes(made)
+
+fuzzing.SECONDS = 0.2
+sys.exit(fuzzing.main("", Bad, ["bad"], [{str(script)!r}]))
 """
     )
 
     def run(count):
-        command = [sys.executable, str(script), "trc", "--state", str(tmp_path / "state")]
+        command = [sys.executable, str(script), "bad", "--state", str(tmp_path / "state")]
         ended = subprocess.run(
             [*command, "--count", count], capture_output=True, text=True, check=False
         )
@@ -75,14 +83,14 @@ sys.exit(f.fuzzing.main("", Bad, ["trc"], [{str(script)!r}]))
         return ended.stdout
 
     out = run("8")
-    assert "trc: input 3: the process died of signal 11" in out
-    assert "trc: input 5: the process died of signal 27" in out
-    assert "trc: input 7: AttributeError: no such thing" in out
+    assert "bad: input 3: the process died of signal 11" in out
+    assert "bad: input 5: the process died of signal 27" in out
+    assert "bad: input 7: AttributeError: no such thing" in out
     assert "failed 1, died 2" in out
     out = run("40")
     assert "input 7" not in out  # continued, not begun again
-    assert "trc: input 9: MemoryError" in out
-    assert "trc: 40 inputs" in out
+    assert "bad: input 9: MemoryError" in out
+    assert "bad: 40 inputs" in out
     assert "failed 2, died 2" in out
     kept = {path.name for path in (tmp_path / "state").iterdir()}
-    assert kept >= {"trc_0_3_seed.trc", "trc_0_5_seed.trc", "trc_0_7_seed.trc", "trc_0_7.txt"}
+    assert kept >= {"bad_0_3_seed.bin", "bad_0_5_seed.bin", "bad_0_7_seed.bin", "bad_0_7.txt"}

@@ -469,9 +469,9 @@ def test_what_makes_no_person_is_refused(make, wrong):
 
 
 def test_a_thousand_frames_are_made_at_once():
-    start = time.perf_counter()
+    start = time.process_time()
     person(frames=1000, n_markers=60)
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
 
 
 # The parts.

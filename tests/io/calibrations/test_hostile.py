@@ -44,10 +44,10 @@ HOSTILE = {
 def test_hostile_files_are_refused_and_soon(tmp_path, name):
     path = tmp_path / name
     path.write_text(HOSTILE[name])
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(FormatError):
         read_rig(path)
-    assert time.perf_counter() - start < 5
+    assert time.process_time() - start < 5
 
 
 def test_a_file_without_end_is_not_read(tmp_path):
