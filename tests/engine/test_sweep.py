@@ -45,7 +45,11 @@ METHODS = {
     "mcmcda, a draw": am.MCMCDA(moves=5, keep="draw", end_odds=1),
     "mcmcda, the report's": am.MCMCDA.report_2010(moves=10),
 }  # fmt: skip
-CAPTURES = {"racing": ("kinematics_racing_full.c3d", 2), "fingers": ("recording.tsv", 1)}
+CAPTURES = {  # file, and one of how many of its frames
+    "racing": ("kinematics_racing_full.c3d", 2),
+    "fingers": ("recording.tsv", 1),
+    "free-form": ("nick_freeform_001.c3d", 1),
+}
 
 
 @functools.cache
