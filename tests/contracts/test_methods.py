@@ -14,7 +14,7 @@ from tests.contracts.methods import METHODS, each_method
 from tests.references.frame_by_frame import track_by_hand
 from tests.references.hypothesis_trees import trees_by_hand
 from tests.references.jpda import jpda_by_hand
-from tests.scenes import interacting, small_model, wanderers
+from tests.scenes import interacting, sized, small_model, wanderers
 
 # The others are held to every partition of small problems instead.
 ON_A_BLACKBOARD = {
@@ -242,7 +242,7 @@ def test_memory_of_an_endless_stream_is_bounded(method):
     model = small_model(clutter_density=1.0)
     state = method.init(model)
     most = held = 0
-    for t in range(3000):
+    for t in range(sized(3000, 200)):
         points = np.vstack([[[0.0, 0, 0], [1, 0, 0]], rng.uniform(-2, 2, (4, 3))])
         state, update = method.step(state, t * 0.1, points)
         info = update.info

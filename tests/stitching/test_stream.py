@@ -9,7 +9,7 @@ import pytest
 
 import asterism as am
 from asterism.simulate import Burst, Ghosts
-from tests.scenes import stitched
+from tests.scenes import sized, stitched
 
 MODEL = am.TrackingModel(
     motion=am.RandomWalk(walk_sigma=0.05),
@@ -144,11 +144,11 @@ def test_an_endless_run_remembers_what_it_may():
     method = am.tracking.Stitched(max_hidden=50, confirm=3)
     state = method.init(model)
     place = np.zeros(3)
-    for t in range(1500):
+    for t in range(sized(1500, 300)):
         if t % 12 == 0:  # one is gone for good, another comes
             place = rng.uniform(-5, 5, 3)
         state, _ = method.step(state, t / 100, place[None] if t % 12 < 6 else [])
-    assert state.stitcher.n_markers > 100
+    assert state.stitcher.n_markers > sized(100, 20)
     assert state.stitcher.n_remembered <= 6
 
 
