@@ -42,7 +42,6 @@ class Chain {
       s.partition().add_frame(time, motion_step(m_, F.data(), Q.data()), frame, n_seen_);
     });
     n_seen_ += static_cast<std::int64_t>(frame.size());
-    visit([](auto& s) { s.weigh_bonds({}); });  // they are of the detections so far
   }
 
   void freeze(std::int64_t frame) {
@@ -50,14 +49,12 @@ class Chain {
       require(frame <= s.partition().window().now(), "frame: one that was added");
       s.partition().freeze(frame);
     });
-    read_bonds();
   }
 
   // Tracks as in `labels`, in place of what is there; nothing may be settled yet.
   void assign(const In<std::int64_t>& labels) {
     require(static_cast<std::int64_t>(labels.size()) == n_seen_, "labels: one for each detection");
     visit([&](auto& s) { assign_to(s, labels.data()); });
-    read_bonds();
   }
 
   Out<std::int64_t> labels() const {
@@ -69,50 +66,7 @@ class Chain {
     });
   }
   double log_posterior() const {
-    return visit([](const auto& s) { return s.partition().log_posterior() + s.bonds().total(); });
-  }
-
-  // Bonds of markers: pairs a < b, of each (μ, s), and by detection the marker that it is known for.
-  void bond(const In<std::int64_t>& pairs, const In<double>& lengths, double weight,
-            const In<std::int64_t>& known) {
-    const std::size_t n = lengths.size() / 2;
-    require(pairs.size() == 2 * n && lengths.size() == 2 * n, "pairs and lengths: shape (n, 2)");
-    require(static_cast<std::int64_t>(known.size()) == n_seen_, "known: one for each detection");
-    std::vector<char> is_known;
-    for (std::size_t i = 0; i < known.size(); ++i) {
-      if (known.data()[i] < 0) continue;
-      const auto marker = static_cast<std::size_t>(known.data()[i]);
-      require(marker < known.size(), "known: markers 0, 1 and so on");
-      if (is_known.size() <= marker) is_known.resize(marker + 1, false);
-      require(!is_known[marker], "known: one detection for each marker");
-      is_known[marker] = true;
-    }
-    const auto n_markers = static_cast<std::int32_t>(is_known.size());
-    std::vector<BondGraph::Pair> all(n);
-    for (std::size_t k = 0; k < n; ++k) {
-      const std::int64_t a = pairs.data()[2 * k], b = pairs.data()[2 * k + 1];
-      require(0 <= a && a < b && b < n_markers, "pairs: a < b, known markers");
-      require(lengths.data()[2 * k + 1] > 0, "lengths: spreads above 0");
-      all[k] = {static_cast<std::int32_t>(a), static_cast<std::int32_t>(b), lengths.data()[2 * k],
-                lengths.data()[2 * k + 1]};
-    }
-    visit([&](auto& s) {
-      using Filter = typename std::remove_reference_t<decltype(s)>::Motion;
-      std::vector<std::int32_t> by_id(s.partition().window().n_ids(), -1);
-      for (std::size_t i = 0; i < by_id.size(); ++i)
-        by_id[i] = static_cast<std::int32_t>(
-            known.data()[s.partition().window()[static_cast<std::int32_t>(i)].number]);
-      s.weigh_bonds(BondTerm<Filter>(BondGraph(n_markers, all, weight), std::move(by_id)));
-    });
-    read_bonds();
-  }
-  // What bonds say: as it was kept move by move, and read anew from the tracks.
-  nb::tuple bond_term() const {
-    return visit([](const auto& s) {
-      auto anew = s.bonds();
-      anew.read(s.partition());
-      return nb::make_tuple(s.bonds().total(), anew.total());
-    });
+    return visit([](const auto& s) { return s.partition().log_posterior(); });
   }
 
   void run(std::int64_t n_moves) {
@@ -166,14 +120,6 @@ class Chain {
   }
 
  private:
-  void read_bonds() {
-    visit([](auto& s) {
-      auto bonds = s.bonds();
-      bonds.read(s.partition());
-      s.weigh_bonds(bonds);
-    });
-  }
-
   template <typename Filter>
   static void assign_to(Sampler<Filter>& s, const std::int64_t* labels) {
     Partition<Filter>& p = s.partition();
@@ -204,7 +150,7 @@ class Chain {
   template <typename Filter>
   void trace_one(Sampler<Filter>& s, nb::list& out) {
     const std::vector<std::int64_t> before = labels_of(s.partition());
-    const double value = s.partition().log_posterior() + s.bonds().total();
+    const double value = s.partition().log_posterior();
     struct Seen {
       std::int64_t move = 0, with = -1;
       double log_forward = 0, log_reverse = 0, gain = 0;
@@ -258,8 +204,6 @@ void bind_chain(nb::module_& module) {
       .def("labels", &Chain::labels)
       .def("log_posterior", &Chain::log_posterior)
       .def("run", &Chain::run, "n_moves"_a)
-      .def("bond", &Chain::bond, "pairs"_a, "lengths"_a, "weight"_a, "known"_a)
-      .def("bond_term", &Chain::bond_term)
       .def("counts", &Chain::counts)
       .def("visits", &Chain::visits, "n_moves"_a)
       .def("trace", &Chain::trace, "n_moves"_a);

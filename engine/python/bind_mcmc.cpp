@@ -92,8 +92,7 @@ void bind_mcmc(nb::module_& module) {
         return out.give({kMoves, 3});
       }, nb::rv_policy::move);
   nb::class_<SampledStats, FrameStats>(module, "SampledStats")
-      .def_ro("chain", &SampledStats::chain)
-      .def_ro("bond_score", &SampledStats::bond_score);
+      .def_ro("chain", &SampledStats::chain);
 
   nb::enum_<SplitBy>(module, "SplitBy")
       .value("whole", SplitBy::whole)
@@ -107,19 +106,17 @@ void bind_mcmc(nb::module_& module) {
           [](McmcOptions* self, std::int32_t window, bool is_whole, std::int32_t block, double moves, double deadline,
              bool has_assignment, double confidence, std::int32_t chains, std::int32_t threads,
              SplitBy split_by, double doubt, double distance, std::int32_t bonds,
-             double tolerance, double bond_weight) {
+             double tolerance) {
             require(window >= 1 && block >= 1, "window and block: at least 1");
             require(chains >= 1 && threads >= 1, "chains and threads: at least 1");
-            require(bond_weight >= 0, "bond_weight: at least 0");
             require(bonds == 0 || (bonds >= 2 && bonds <= 4), "bonds: 0, 2, 3 or 4");
             new (self) McmcOptions{
                 window,     is_whole, block,   moves,   deadline, has_assignment,
                 confidence, chains,   threads, {split_by, doubt, distance},
-                {bonds, window, tolerance}, bond_weight};
+                {bonds, window, tolerance}};
           },
           nb::kw_only(), "window"_a, "is_whole"_a, "block"_a, "moves"_a, "deadline"_a, "has_assignment"_a,
-          "confidence"_a, "chains"_a, "threads"_a, "split_by"_a, "doubt"_a, "distance"_a, "bonds"_a, "tolerance"_a,
-          "bond_weight"_a);
+          "confidence"_a, "chains"_a, "threads"_a, "split_by"_a, "doubt"_a, "distance"_a, "bonds"_a, "tolerance"_a);
 
   nb::class_<ChainOptions>(module, "ChainOptions")
       .def(

@@ -138,8 +138,6 @@ class ChainStats:
 class SampledStats(FrameStats):
     @property
     def chain(self) -> ChainStats: ...
-    @property
-    def bond_score(self) -> float: ...
 
 class McmcOptions:
     def __init__(
@@ -159,7 +157,6 @@ class McmcOptions:
         distance: float,
         bonds: int,
         tolerance: float,
-        bond_weight: float,
     ) -> None: ...
 
 class LifeOptions:
@@ -543,16 +540,6 @@ class Chain:
     def labels(self) -> NDArray[np.int64]: ...
     def log_posterior(self) -> float: ...
     def run(self, n_moves: int) -> None: ...
-    # Pairs a < b, of each (μ, s), and by detection the marker that it is known for, -1 for none.
-    def bond(
-        self,
-        pairs: NDArray[np.int64],
-        lengths: NDArray[np.float64],
-        weight: float,
-        known: NDArray[np.int64],
-    ) -> None: ...
-    # What bonds say of the partition: kept move by move, and read anew.
-    def bond_term(self) -> tuple[float, float]: ...
     def counts(self) -> NDArray[np.int64]: ...
     def visits(self, n_moves: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]: ...
     def trace(

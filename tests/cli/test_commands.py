@@ -227,8 +227,8 @@ def test_no_input_is_written_to(scene, capsys):
             "lifecycle.delete_odds: expected a number > 1",
         ),
         (
-            "track in.csv --method mcmcda --option bond_weight=-2",
-            "bond_weight: expected a number in [0, 100]",
+            "track in.csv --method mcmcda --option chains=0",
+            "chains: expected an integer in [1, 1024]",
         ),
         ("track in.csv --method smp --option proposers=track", "Did you mean 'tracks'?"),
         ("track in.csv --seed -1", "--seed"),

@@ -92,7 +92,7 @@ def instances():
         am.tracking.ChainOptions(groups="cells", distance=1 / 3),
         am.tracking.Stitched(), am.tracking.Stitched().init(plain), state, update,
         am.MCMCDA(window=50, moves=12.345, deadline=1 / 3, confidence=12.345, end_odds=123.4,
-                  chains=4, threads=2, bond_weight=1 / 3, chain=am.tracking.ChainOptions(
+                  chains=4, threads=2, chain=am.tracking.ChainOptions(
                       ambiguous_within=3.21, bonds=3, ambiguous_share=0.25,
                       proposal="uniform", move_weights="report")),
         plain.motion, several, am.RandomWalk(walk_sigma=1 / 3),

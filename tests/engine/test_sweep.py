@@ -33,7 +33,6 @@ METHODS = {
     "mcmcda": am.MCMCDA(moves=10, confidence=10),
     "mcmcda, one frame": am.MCMCDA(window=1, moves=10, confidence=10),
     "mcmcda, whole": am.MCMCDA(window=None, moves=10, confidence=10),
-    "mcmcda, whole, bonds": am.MCMCDA(window=None, moves=5, confidence=5, bond_weight=2),
     "mcmcda, chains": am.MCMCDA(moves=5, confidence=5, chains=3, threads=2),
     "mcmcda, cells": am.MCMCDA(
         moves=5, chain=ChainOptions(groups="cells", distance=0.5)

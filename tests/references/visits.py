@@ -8,11 +8,9 @@ from tests.references.chain_moves import as_partition
 from tests.references.partitions import every_partition
 
 
-def total_variation(d, model, chain, n, *, settled=None, more=None):
-    """Distance of what a chain visits and the enumerated posterior, with what `more` adds to it."""
+def total_variation(d, model, chain, n, *, settled=None):
+    """Distance of what a chain visits and the enumerated posterior."""
     partitions, totals = every_partition(d, model)
-    if more is not None:
-        totals = totals + [more(tracks) for tracks in partitions]
     p = np.exp(totals - totals.max())
     if settled is not None:
         frozen, labels = settled

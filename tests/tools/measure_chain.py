@@ -1,12 +1,10 @@
 """How far the visits of a chain are from the enumerated posterior.
 
-    python -m tests.tools.measure_chain [MOVES] [--bonds]
+    python -m tests.tools.measure_chain [MOVES]
 
 Five problems of hundreds to thousands of partitions, each with uniform and informed growth, in
 two and three dimensions, with gaps and uneven sampling; the last with a settled zone. With as many
-moves as the docs speak of (30 million, the default) it takes some minutes. With ``--bonds``
-distance bonds are part of the posterior: in the last problem the settled tracks are their markers,
-in the others a few detections anywhere.
+moves as the docs speak of (30 million, the default) it takes some minutes.
 """
 
 # ruff: noqa: T201
@@ -14,17 +12,14 @@ from __future__ import annotations
 
 import sys
 import time
-from functools import partial
 
-from tests.references.bonds import some_bonds
 from tests.references.chain_moves import make_chain
 from tests.references.partitions import every_partition, problem_of_size
 from tests.references.visits import total_variation
 
 
 def main() -> None:
-    arguments = [a for a in sys.argv[1:] if a != "--bonds"]
-    n = int(float(arguments[0])) if arguments else 30_000_000
+    n = int(float(sys.argv[1])) if len(sys.argv) > 1 else 30_000_000
     for case, (least, most, seed, n_axes) in enumerate(
         [(500, 1000, 0, 2), (1000, 3000, 100, 3), (3000, 6000, 200, 2), (6000, 20_000, 300, 3),
          (500, 5000, 40, 2)]
@@ -40,13 +35,8 @@ def main() -> None:
                     chain.run(1000)
                     chain.freeze(1)
                     settled = (1, chain.labels())
-                more = None
-                if "--bonds" in sys.argv:
-                    bonds = some_bonds(d, 1, settled=None if settled is None else settled[0])
-                    bonds.give_to(chain)
-                    more = partial(bonds.total, d)
                 start = time.perf_counter()
-                tv, left = total_variation(d, model, chain, moves, settled=settled, more=more)
+                tv, left = total_variation(d, model, chain, moves, settled=settled)
                 found.append(f"{tv:.4f} ({moves:.0e})")
                 seconds = time.perf_counter() - start
             growth = "informed" if informed else "uniform"

@@ -28,7 +28,6 @@ TESTS = (
     "methods/test_mht.py",
     "methods/test_chain.py",
     "methods/test_mcmcda.py",
-    "methods/test_mcmcda_bonds.py",
     "contracts/test_own_noise.py",
     "methods/test_bodies.py",
     "stitching/test_parts.py",

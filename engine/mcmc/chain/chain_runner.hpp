@@ -43,10 +43,9 @@ class Walker {
 
   // Looks for the best; returns what it is better by than the start, and stays there. Or draws: stays
   // where it ends, which counts as better than anything.
-  double search(const Partition<Filter>& whole, const BondTerm<Filter>& bonds, const Group& group,
+  double search(const Partition<Filter>& whole, const Group& group,
                 std::uint64_t seed, const Budget& budget, ChainStats& stats) {
     sampler_.partition().take_part(whole, group.tracks, group.free);
-    sampler_.weigh_bonds(bonds);
     sampler_.begin(seed);
     sampler_.weigh_above(sampler_.kOnlyWhatMayBeTaken);
     sampler_.begin_best();
@@ -63,11 +62,10 @@ class Walker {
   const Partition<Filter>& partition() const { return sampler_.partition(); }
 
   // How probable the partition is that it begins at.
-  void sample(const Partition<Filter>& whole, const BondTerm<Filter>& bonds, const Group& group,
+  void sample(const Partition<Filter>& whole, const Group& group,
               std::uint64_t seed, const Budget& budget, Halves& out, ChainStats& stats) {
     Partition<Filter>& p = sampler_.partition();
     p.take_part(whole, group.tracks, group.free);
-    sampler_.weigh_bonds(bonds);
     sampler_.begin(seed);
     sampler_.begin_best();
     list_hot(group);

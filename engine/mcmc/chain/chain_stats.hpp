@@ -52,12 +52,10 @@ struct ChainStats {
 // What a frame, or a run of them, took in all.
 struct SampledStats : FrameStats {
   ChainStats chain;
-  double bond_score = 0;  // nats that bonds said of what was settled
 
   void add(const SampledStats& next) {
     FrameStats::add(next);
     chain.add(next.chain);
-    bond_score += next.bond_score;
   }
 };
 

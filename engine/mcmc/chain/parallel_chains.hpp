@@ -27,9 +27,8 @@ class Walks {
       : chain_(chain), n_chains_(n_chains), n_threads_(n_threads) {}
 
   // Each group as the best of its chains has it.
-  void search(Partition<Filter>& whole, const BondTerm<Filter>& bonds,
-              std::span<const Group> groups, const Budgets& budgets, std::uint64_t seed,
-              ChainStats& stats) {
+  void search(Partition<Filter>& whole, std::span<const Group> groups, const Budgets& budgets,
+              std::uint64_t seed, ChainStats& stats) {
     struct Found {
       double gain = 0;
       ChainStats stats;
@@ -39,8 +38,7 @@ class Walks {
     each_walk(whole, found.size(), [&](Walker<Filter>& walker, std::size_t task) {
       const std::size_t g = task / n_chains_;
       Found& own = found[task];
-      own.gain =
-          walker.search(whole, bonds, groups[g], seed_of(seed, task), budgets.of(g), own.stats);
+      own.gain = walker.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.stats);
       if (own.gain > 0) own.part = walker.partition();
     });
     for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -55,15 +53,13 @@ class Walks {
 
   // By detection of the whole: in which share of the walks it follows what it follows; 1 where nothing
   // is walked over.
-  std::vector<double> sample(const Partition<Filter>& whole, const BondTerm<Filter>& bonds,
-                             std::span<const Group> groups, const Budgets& budgets,
-                             std::uint64_t seed, ChainStats& stats) {
+  std::vector<double> sample(const Partition<Filter>& whole, std::span<const Group> groups,
+                             const Budgets& budgets, std::uint64_t seed, ChainStats& stats) {
     std::vector<Halves> found(groups.size() * n_chains_);
     std::vector<ChainStats> counts(found.size());
     each_walk(whole, found.size(), [&](Walker<Filter>& walker, std::size_t task) {
       const std::size_t g = task / n_chains_;
-      walker.sample(whole, bonds, groups[g], seed_of(seed, task), budgets.of(g), found[task],
-                    counts[task]);
+      walker.sample(whole, groups[g], seed_of(seed, task), budgets.of(g), found[task], counts[task]);
     });
     for (const ChainStats& one : counts) stats.add(one);
     std::vector<double> shares(whole.window().n_ids(), 1.0);

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "math/random.hpp"
-#include "mcmc/model/bond_term.hpp"
 #include "mcmc/model/partition.hpp"
 #include "mcmc/moves/involutive_moves.hpp"
 #include "mcmc/moves/moves.hpp"
@@ -60,11 +59,6 @@ class Sampler {
     best_gain_ = last_gain_ = 0;
   }
 
-  // From here on what bonds say is part of the posterior: of this partition, or of the whole that it
-  // is a part of.
-  void weigh_bonds(const BondTerm<Filter>& bonds) { bonds_ = bonds; }
-  const BondTerm<Filter>& bonds() const { return bonds_; }
-
   // One move; true where the partition changes. `seen(change, is taken)` is called for what was
   // weighed to the end, before it is carried out.
   template <typename Seen>
@@ -80,17 +74,12 @@ class Sampler {
     const Shares& then = shares_[std::min(n_tracks_after(), 2)];
     const int back = static_cast<int>(inverse(change_.move));
     const double log_u = std::log(random_.uniform());
-    // A probability is at most 1, and bonds say so much and no more: what is too little before they and
-    // the way back are weighed stays so.
+    // A probability is at most 1: what is too little before the way back is weighed stays so.
     change_.log_ratio = change_.gain + (best_gain_ - last_gain_) + then.log[back] -
                         now.log[kind] - change_.log_forward;
     const double least = std::min(log_u, weighed_above_);
-    if (!(change_.log_ratio + bonds_.look_at(partition_, change_.all()) > least)) return false;
-    const double said = bonds_.gain();
-    change_.gain += said;
-    change_.log_ratio += said;
+    if (!(change_.log_ratio > least)) return false;
     const bool is_weighed = change_.log_ratio > weighed_above_;
-    if (!(change_.log_ratio > log_u) && !is_weighed) return false;
     change_.log_reverse = moves_.log_reverse(change_);
     change_.log_ratio += change_.log_reverse;
     const bool is_taken = take(log_u, is_weighed, seen);
@@ -145,8 +134,6 @@ class Sampler {
       for (std::size_t n = edit.keep; n < nodes.size(); ++n) partition_.append(edit, nodes[n]);
     }
     for (const auto& [first, k] : now) edits_.emplace_back().track = static_cast<std::int32_t>(k);
-    bonds_.look_at(partition_, edits_);
-    bonds_.change();
     partition_.apply(edits_);
     is_best_ = true;
     gain_ = most_;
@@ -159,10 +146,7 @@ class Sampler {
 
  private:
   bool propose(const Toggle& toggle) {
-    if (!toggles_.propose(toggle, change_)) return false;
-    bonds_.look_at(partition_, change_.all());
-    change_.gain += bonds_.gain();
-    return true;
+    return toggles_.propose(toggle, change_);
   }
 
   template <typename Seen>
@@ -182,7 +166,6 @@ class Sampler {
       save();
       is_best_ = false;
     }
-    bonds_.change();
     partition_.apply(change_.all());
     gain_ += change_.gain;
     is_best_ = is_best_ || gain_ > most_ + kBetter;
@@ -239,7 +222,6 @@ class Sampler {
   Random random_;
   Moves<Filter> moves_{partition_, opt_.growth};
   Toggles<Filter> toggles_{partition_};
-  BondTerm<Filter> bonds_;
   Change<Filter> change_;
   std::array<Shares, 3> shares_{};
   std::array<MoveCounts, kMoves> counts_{};

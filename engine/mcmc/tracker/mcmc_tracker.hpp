@@ -23,7 +23,6 @@
 #include "mcmc/model/rigid_cliques.hpp"
 #include "mcmc/tracker/capture_sweep.hpp"
 #include "mcmc/tracker/frame_start.hpp"
-#include "mcmc/tracker/settled_bonds.hpp"
 #include "tracks/live_tracks.hpp"
 
 namespace asterism {
@@ -39,7 +38,6 @@ struct McmcOptions {
   std::int32_t n_chains = 1, n_threads = 1;
   SplitOptions split;
   BondOptions bonds;
-  double bond_weight = 0;  // nats by which bonds may speak for a marker in a frame, or against it
 };
 
 template <typename Filter>
@@ -52,7 +50,6 @@ class McmcTracker {
         seed_(seed),
         start_(options.has_assignment, options.split.doubt),
         walks_(chain, options.n_chains, options.n_threads),
-        settled_bonds_(m, options.bond_weight),
         sweep_(options.block, sm.max_gap) {}
 
   template <typename Label>
@@ -85,7 +82,6 @@ class McmcTracker {
   void finish(Label&& label, const std::function<bool(double)>& goes_on) {
     if (n_seen_ == 0) return;
     SampledStats stats;
-    total_.bond_score = 0;
     sweep_.link_labels();
     std::vector<double> sure(has_confidence() ? n_seen_ : 0, 1.0);
     const auto blocks = sweep_.blocks();
@@ -105,17 +101,13 @@ class McmcTracker {
         for (const double weight : weights) all += weight;
         Watch watch(all * moves * opt_.n_chains, go_on);
         const Budgets budgets(weights, moves, &watch);
-        BondTerm<Filter> bonds = settled_bonds_.term(part.partition);
         const std::uint64_t seed = seed_of(2 + n_sweeps * b + s);
         if (s == 0) {
-          walks_.search(part.partition, bonds, split.groups, budgets, seed, stats.chain);
-          bonds.read(part.partition);
-          const std::int64_t first = part.partition.frozen() + 1;
-          tell_bonds(bonds, first, first + blocks[b].next - blocks[b].first, stats);
+          walks_.search(part.partition, split.groups, budgets, seed, stats.chain);
           sweep_.put_back(blocks[b], part);
         } else {
           const auto shares =
-              walks_.sample(part.partition, bonds, split.groups, budgets, seed, stats.chain);
+              walks_.sample(part.partition, split.groups, budgets, seed, stats.chain);
           sweep_.keep_states(blocks[b], part);
           take_shares(blocks[b], part, shares, sure);
         }
@@ -185,13 +177,10 @@ class McmcTracker {
     }
     const Bonds sure = BondFinder<Filter>(p, opt_.bonds).find();
     stats.chain.n_sure = sure.n_sure;
-    BondTerm<Filter> bonds = settled_bonds_.term(p);
     const auto allowed = [&](std::span<const Group> groups, double moves, double share) {
       return budgets(groups, moves, arrival, share);
     };
-    walk(sure.is_sure, bonds, allowed, 0, stats,
-         [&] { return has_confidence() && !opt_.is_whole; });
-    tell_bonds(bonds, oldest_open(), p.window().now() + 1 - opt_.window, stats);
+    walk(sure.is_sure, allowed, 0, stats, [&] { return has_confidence() && !opt_.is_whole; });
     stats.n_confirmed = p.tracks().size();
     stats.n_pending = p.free().size() + p.taken().size();
     total_.add(stats);
@@ -201,26 +190,17 @@ class McmcTracker {
   // Looks for the best partition, and then for how probable it is, if it `is_asked`. `allowed(groups,
   // moves, share of the time)` is how long.
   template <typename Allowed, typename IsAsked>
-  void walk(const std::vector<char>& is_sure, BondTerm<Filter>& bonds, Allowed&& allowed,
-            std::uint64_t phase, SampledStats& stats, IsAsked&& is_asked) {
+  void walk(const std::vector<char>& is_sure, Allowed&& allowed, std::uint64_t phase,
+            SampledStats& stats, IsAsked&& is_asked) {
     const Split split = split_up(partition_, doubts_, is_sure, stats);
-    walks_.search(partition_, bonds, split.groups,
+    walks_.search(partition_, split.groups,
                   allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1), seed_of(phase),
                   stats.chain);
-    bonds.read(partition_);
     if (!is_asked()) return;
     // The search may have made other tracks.
     const Split now = Splitter<Filter>(partition_, opt_.split).split(doubts_, is_sure);
-    keep_shares(walks_.sample(partition_, bonds, now.groups, allowed(now.groups, opt_.confidence, 1),
+    keep_shares(walks_.sample(partition_, now.groups, allowed(now.groups, opt_.confidence, 1),
                               seed_of(phase + 1), stats.chain));
-  }
-
-  // What bonds say of the open frames from one on, before another.
-  static void tell_bonds(const BondTerm<Filter>& bonds, std::int64_t first, std::int64_t end,
-                         SampledStats& stats) {
-    if (!bonds.is_on()) return;
-    stats.n_bonds = bonds.graph().n_pairs();
-    for (std::int64_t t = first; t < end; ++t) stats.bond_score += bonds.total(t);
   }
 
   // Shares of a block for those frames that are as far inside it as in any other.
@@ -333,19 +313,15 @@ class McmcTracker {
     const DetectionWindow& window = p.window();
     const std::int64_t settled = window.now() - opt_.window;
     if (settled < oldest_open()) return;
-    const std::int64_t first = oldest_open();
     p.freeze(settled);
     // Numbers of tracks that are settled now are theirs.
     for (const std::int32_t k : p.tracks().items())
       if (p.track(k).n_frozen > 0) next_id_ = std::max(next_id_, id_of(k) + 1);
-    for (std::int64_t t = first; t <= settled; ++t) settled_bonds_.learn(p, t);
     doubts_.keep(static_cast<std::size_t>(window.now() - settled));
     while (window.first() + window.max_gap() <= settled) {
       for (const std::int32_t i : window.frame(window.first()).ids) {
         if (i < static_cast<std::int32_t>(said_.size())) said_[i] = {};
         if (i < static_cast<std::int32_t>(shares_.size())) shares_[i] = {};
-        if (const std::int32_t k = p.track_of(i); k >= 0 && p.track(k).size() == 1 && !opt_.is_whole)
-          settled_bonds_.forget(id_of(k));
       }
       p.drop_frame();
     }
@@ -371,7 +347,6 @@ class McmcTracker {
   std::uint64_t seed_;
   FrameStart<Filter> start_;
   Walks<Filter> walks_;
-  SettledBonds<Filter> settled_bonds_;
   Doubts doubts_;
   // By detection of the window: how probable it is that it follows what it follows; and what was told.
   struct Share {

@@ -76,35 +76,12 @@ class MCMCDA(EngineMethod):
         agreement tells whether they found the same confidence.
     threads : int
         Walks at the same time. The result does not depend on it.
-    bond_weight : float
-        Nats by which distances to other markers may speak for a detection, or against it; 0 for
-        none. What the walk samples is then the posterior with a term more (see Notes).
     keep : {"best", "draw"}
         What is kept of a walk: the best partition that it met, or the one where it ends, which is
         drawn from the posterior of the open frames given the settled ones. Draws with different
         seeds show what the data leave open; a model is estimated from them.
     chain : ChainOptions
         How a walk draws and weighs its moves, and what is walked over apart.
-
-    Notes
-    -----
-    With a `bond_weight` w the walk is over log π(ω) + B(ω), with
-
-        B(ω) = Σ_t Σ_AC w/n_AC · (1 − z²)/(1 + z²),    z = (|y_A(t) − y_C(t)| − μ) / s,
-
-    over the open frames t and the bonded markers A, C that both have a detection there. A distance
-    as it should be speaks for both, one that is off by s says nothing, one that is farther off
-    speaks against both; n_AC is the number of bonds of that one which has more (at least 3), so
-    that whatever bonds say of a detection lies within ±w. A track is the marker that it was when it
-    was last settled; tracks of which nothing is settled have no bonds. Bonds are learnt from
-    settled frames: of each marker the six that kept their distance best, over 30 frames or more, μ
-    being the mean, s three times the spread and 2 % of μ. They do not change while a walk lasts.
-    Neighbours in other groups are where they are when it begins.
-
-    The confidence, the best partition and ``info["rhat"]`` are of this posterior;
-    ``info["log_posterior"]`` of `track` stays that of the common model, by which methods are
-    compared. ``info["bonds"]`` are the bonds in the last frame, ``info["bond_score"]`` what they
-    said of all settled frames together, in nats.
 
     Examples
     --------
@@ -121,7 +98,6 @@ class MCMCDA(EngineMethod):
     end_odds: float = 1000.0
     chains: int = 1
     threads: int = 1
-    bond_weight: float = 0.0
     keep: Literal["best", "draw"] = "best"
     chain: ChainOptions = ChainOptions()
 
@@ -142,7 +118,6 @@ class MCMCDA(EngineMethod):
         check_number("end_odds", self.end_odds, above=1, below=1e12, closed=True)
         check_number("chains", self.chains, above=1, below=1024, closed=True, integer=True)
         check_number("threads", self.threads, above=1, below=1024, closed=True, integer=True)
-        check_number("bond_weight", self.bond_weight, above=0, below=100, closed=True)
         check_fields("keep", [self.keep], ("best", "draw"))
         check_kind("chain", self.chain, ChainOptions, "am.tracking.ChainOptions()")
         if self.chain.acceptance == "ascent":
@@ -216,7 +191,6 @@ class MCMCDA(EngineMethod):
             distance=rules.distance or 0.0,
             bonds=rules.bonds,
             tolerance=rules.bond_tolerance or 6 * math.sqrt(2) * model.sensor.noise_sigma,
-            bond_weight=self.bond_weight,
         )
         is_one = len(model.motion.modes) == 1
         make = _engine.OneMotionTracker if is_one else _engine.SeveralMotionsTracker
@@ -325,8 +299,6 @@ class MCMCDA(EngineMethod):
             about |= {"given_links": chain.n_given, "refused_links": chain.n_refused}
         if self.chain.bonds:
             about["sure_tracks"] = chain.n_sure
-        if self.bond_weight > 0:
-            about |= {"bonds": stats.n_bonds, "bond_score": stats.bond_score}
         if self.confidence > 0:
             about |= {
                 "confidence_moves": chain.n_sampled,
