@@ -130,18 +130,18 @@ nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weight
   return nb::make_tuple(R.give({3, 3}), x.give({3}), y.give({3}), found.rms);
 }
 
-// (where they carry what was at `then`, how far it may be off, log densities at some points).
+// (where they carry what was at `then`, its variance beside `r`, log densities at some points).
 nb::tuple carried(const In<double>& a, const In<double>& b, const In<double>& weights,
-                  const In<double>& then, double noise, const In<double>& points) {
+                  const In<double>& then, double r, const In<double>& points) {
   const std::vector<RigidPair> pairs = to_pairs(a, b, weights);
   const auto D = static_cast<int>(a.shape(1));
   const std::vector<Point> was = to_points(then, D), at = to_points(points, D);
   require(was.size() == 1, "then: shape (1, D)");
-  const Carried found = carry(pairs, was[0], D, noise);
+  const Carried found = RigidPrediction(pairs, was[0], D, r).place(r, 1);
   Owned<double> place(kMaxAxes), densities(at.size());
   std::copy(found.at.begin(), found.at.end(), place.data.get());
-  for (std::size_t i = 0; i < at.size(); ++i) densities.data[i] = found.log_density(at[i]);
-  return nb::make_tuple(place.give({kMaxAxes}), found.scale, densities.give({at.size()}));
+  for (std::size_t i = 0; i < at.size(); ++i) densities.data[i] = found.log_density(at[i], D);
+  return nb::make_tuple(place.give({kMaxAxes}), found.variance, densities.give({at.size()}));
 }
 
 // Log density of each of some points of a frame among the others, where some were seen before.
@@ -173,32 +173,51 @@ void add_frame(Neighbours& neighbours, const In<std::int32_t>& markers, const In
   neighbours.add(seen);
 }
 
-// (the others, frames seen together, mean distances, their variances, unsteadiness).
+// (the others, frames seen together, mean distances, their variances, predictive variances).
 nb::tuple bonds_of(const Neighbours& neighbours, std::int32_t marker) {
   const std::span<const Bond> bonds = neighbours.of(marker);
   const std::size_t n = bonds.size();
   Owned<std::int64_t> others(n), frames(n);
-  Owned<double> means(n), variances(n), unsteadiness(n);
+  Owned<double> means(n), variances(n), predictive(n);
   for (std::size_t k = 0; k < n; ++k) {
     others.data[k] = bonds[k].other;
     frames.data[k] = bonds[k].n;
     means.data[k] = bonds[k].mean;
     variances.data[k] = bonds[k].variance;
-    unsteadiness.data[k] = neighbours.unsteadiness(bonds[k]);
+    predictive.data[k] = neighbours.variance(bonds[k]);
   }
   return nb::make_tuple(others.give({n}), frames.give({n}), means.give({n}), variances.give({n}),
-                        unsteadiness.give({n}));
+                        predictive.give({n}));
+}
+
+// (predictive variances, whether each is a bond) of distances without noise of their own.
+nb::tuple judge_distances(const In<double>& means, const In<double>& variances,
+                          const In<std::int64_t>& frames) {
+  const std::size_t n = means.size();
+  require(means.ndim() == 1 && variances.size() == n && frames.size() == n,
+          "means, variances and frames: shape (n,)");
+  Owned<double> predictive(n);
+  Owned<bool> is_one(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const Bond bond{0, frames.data()[k], means.data()[k], variances.data()[k]};
+    predictive.data[k] = predictive_variance(bond, 0);
+    is_one.data[k] = is_bond(bond, 0);
+  }
+  return nb::make_tuple(predictive.give({n}), is_one.give({n}));
 }
 
 }  // namespace
 
 void bind_stitcher(nb::module_& module) {
+  module.attr("BEND") = kBend;
+  module.attr("MIN_TOGETHER") = kMinTogether;
+  module.def("judge_distances", &judge_distances, "means"_a, "variances"_a, "frames"_a);
   module.def("fit_rigid", &fit, "a"_a, "b"_a, "weights"_a);
-  module.def("carried", &carried, "a"_a, "b"_a, "weights"_a, "then"_a, "noise"_a, "points"_a);
+  module.def("carried", &carried, "a"_a, "b"_a, "weights"_a, "then"_a, "r"_a, "points"_a);
   module.def("densities_elsewhere", &densities_elsewhere, "before"_a, "points"_a, nb::kw_only(),
              "noise"_a, "ghost_radius"_a);
   nb::class_<Neighbours>(module, "Neighbours")
-      .def(nb::init<int, double>(), "n_axes"_a, "noise"_a)
+      .def(nb::init<int, double>(), "n_axes"_a, "r"_a)
       .def("add", &add_frame, "markers"_a, "points"_a)
       .def("of", &bonds_of, "marker"_a);
   nb::class_<StitchOptions>(module, "StitchOptions")

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "filter/imm.hpp"
-#include "rigid/carried_place.hpp"
+#include "rigid/carried.hpp"
 
 namespace asterism {
 
@@ -23,7 +23,7 @@ inline constexpr double kAgreed = 4;
 
 // `state` and its prediction `own`, told of a place; none where the track knows better itself.
 inline std::optional<MotionState> fuse(const MotionModel& m, const MotionState& state,
-                                       const Prediction& own, const CarriedPlace& place) {
+                                       const Prediction& own, const Carried& place) {
   const int D = m.axis.D;
   double S = 0;
   for (int b = 0; b < m.M; ++b) S += own.w[b] * own.S[b];
@@ -43,7 +43,7 @@ inline std::optional<MotionState> fuse(const MotionModel& m, const MotionState& 
 // Of a state that was predicted to the frame; `place` where its neighbours tell one.
 class Expected {
  public:
-  Expected(const MotionModel& m, const MotionState& state, const CarriedPlace* place)
+  Expected(const MotionModel& m, const MotionState& state, const Carried* place)
       : own_(m, state) {
     if (place == nullptr) return;
     if (const std::optional<MotionState> fused = fuse(m, state, own_, *place); fused)
@@ -61,7 +61,7 @@ class Expected {
   }
 
  private:
-  struct Carried {
+  struct Fused {
     MotionState state;
     Prediction prediction;
   };
@@ -73,7 +73,7 @@ class Expected {
   }
 
   Prediction own_;
-  std::optional<Carried> carried_;
+  std::optional<Fused> carried_;
 };
 
 // What its neighbours say of a believed track in a frame, by what all expected when it came.
@@ -82,7 +82,7 @@ struct NeighbourAdvice {
   bool is_carried = false;   // where it is hidden it is at `place`, and takes none but one of `may_take`
   bool is_doubtful = false;  // that place is not known well enough to live by
   bool gives_way = false;    // where it was seen it is a hidden one come back: so far it goes, no further
-  CarriedPlace place;
+  Carried place;
   std::vector<std::int32_t> may_take;
   std::vector<std::pair<std::int32_t, double>> says;  // of a detection so many nats
 

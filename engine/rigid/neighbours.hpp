@@ -1,7 +1,7 @@
 // Which markers keep their distances: for each marker a few others, how far they are, and how steady
 // that is.
 //
-// What was long ago is forgotten: a mean over the last frames has no less than 1/kMemory of each.
+// A mean over the last frames has no less than 1/kMemory of each, so that old frames are forgotten.
 #pragma once
 
 #include <algorithm>
@@ -14,6 +14,7 @@
 
 #include "base/scratch.hpp"
 #include "filter/kalman.hpp"
+#include "rigid/bond.hpp"
 
 namespace asterism {
 
@@ -21,6 +22,16 @@ namespace asterism {
 struct Seen {
   std::int32_t marker = 0;
   Point at{};
+};
+
+// The markers of a frame in order of their numbers.
+struct Sighting {
+  std::vector<Seen> seen;
+
+  const Point* find(std::int32_t marker) const {
+    const auto at = std::ranges::lower_bound(seen, marker, {}, &Seen::marker);
+    return at != seen.end() && at->marker == marker ? &at->at : nullptr;
+  }
 };
 
 // Where the markers of a frame are, by number: an open hash table, so that time and memory depend on
@@ -65,18 +76,20 @@ class Places {
   std::size_t n_ = 0;
 };
 
-struct Bond {
-  std::int32_t other = 0;
-  std::int64_t n = 0;  // frames in which both were seen
-  double mean = 0, variance = 0;
-};
+// Inserts into the `most` smallest in order, which for so few is quicker than a heap.
+template <typename T>
+void keep_smallest(std::vector<T>& all, std::size_t most, const T& one) {
+  if (all.size() == most) {
+    if (!(one < all.back())) return;
+    all.pop_back();
+  }
+  all.insert(std::ranges::upper_bound(all, one), one);
+}
 
 class Neighbours {
  public:
-  static constexpr std::int64_t kMemory = 400;
-
-  // `noise`: of a detection, along an axis.
-  Neighbours(int D, double noise) : D_(D), noise_(noise) {}
+  // `r`: variance of a measured coordinate.
+  Neighbours(int D, double r) : D_(D), r_(r) {}
 
   // The markers that are seen in a frame.
   void add(std::span<const Seen> seen) {
@@ -87,15 +100,13 @@ class Neighbours {
       std::vector<Bond>& bonds = bonds_[one.marker];
       if (bonds.empty() || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one, bonds);
       for (Bond& bond : bonds)
-        if (const Point* other = places_.find(bond.other)) measure(one.at, *other, bond);
+        if (const Point* other = places_.find(bond.other)) bond.add(std::sqrt(squared_distance(one.at, *other, D_)));
     }
   }
 
-  // A marker that will not be asked for again.
-  void forget(std::int32_t marker) { bonds_.erase(marker); }
-  // And that the others are not asked about either.
-  void forget_everywhere(std::int32_t marker) {
-    forget(marker);
+  // A marker that will not be seen again.
+  void forget(std::int32_t marker) {
+    bonds_.erase(marker);
     for (auto& [own, bonds] : bonds_)
       std::erase_if(bonds, [&](const Bond& bond) { return bond.other == marker; });
   }
@@ -105,24 +116,12 @@ class Neighbours {
     if (at == bonds_.end()) return {};
     return at->second;
   }
-  // How far the other may be off after a while, roughly: what was seen of it, and what was not yet.
-  double unsteadiness(const Bond& bond) const {
-    return std::sqrt(bond.variance) + 4 * noise_ +
-           bond.mean * (0.02 + 1 / static_cast<double>(std::max<std::int64_t>(bond.n, 1)));
-  }
+  double variance(const Bond& bond) const { return predictive_variance(bond, r_); }
 
  private:
   static constexpr std::int64_t kLookEvery = 32;  // frames
   static constexpr std::size_t kMost = 24, kNearest = 12;
   static constexpr std::int64_t kTrial = 60;  // frames until one may be given up for another
-
-  void measure(const Point& a, const Point& b, Bond& bond) const {
-    const double distance = std::sqrt(squared_distance(a, b, D_));
-    const double share = 1 / static_cast<double>(std::min(++bond.n, kMemory));
-    const double off = distance - bond.mean;
-    bond.mean += share * off;
-    bond.variance += share * (off * (distance - bond.mean) - bond.variance);
-  }
 
   // The nearest others are tried; where there is no room, instead of the least steady.
   void look_around(std::span<const Seen> seen, const Seen& one, std::vector<Bond>& bonds) {
@@ -141,14 +140,14 @@ class Neighbours {
         continue;
       }
       const auto worst = std::max_element(bonds.begin(), bonds.end(), [&](const Bond& a, const Bond& b) {
-        return unsteadiness(a) < unsteadiness(b);
+        return variance(a) < variance(b);
       });
       if (worst->n >= kTrial && worst->mean * worst->mean > near_[k].first) *worst = {other};
     }
   }
 
   int D_;
-  double noise_;
+  double r_;
   std::int64_t n_frames_ = 0;
   std::map<std::int32_t, std::vector<Bond>> bonds_;
   Fresh<Places> places_;

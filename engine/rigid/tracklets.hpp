@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "filter/imm.hpp"
-#include "rigid/neighbours.hpp"
+#include "rigid/carrier.hpp"
 
 namespace asterism {
 
@@ -45,12 +45,6 @@ struct Fragment {
   double known = 0;  // how well its neighbours knew its links, on average
   std::int32_t guess = -1;  // the hidden marker that it may be, while nothing is decided
   std::vector<std::pair<std::int32_t, double>> guesses;  // all that it may be, and what speaks for it
-};
-// Where a marker was before it was hidden, and who was around it, the steadiest first.
-struct Anchor {
-  Point at{};
-  std::vector<Seen> around;
-  std::vector<double> weight;  // of these
 };
 struct Marker {
   std::int32_t fragment = -1;

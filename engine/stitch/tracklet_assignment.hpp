@@ -121,7 +121,7 @@ class Claims {
                const Marker& marker, bool is_short) const {
     const Fragment& f = s.fragments.at(id);
     if (!marker.is_hidden || marker.last >= f.first) return kNever;
-    const double body = bodies.log_odds(s, f, id, marker), motion = by_motion(s, f, id, k);
+    const double body = bodies.log_odds(s, f, id, k, marker), motion = by_motion(s, f, id, k);
     const double at_rest = std::clamp(1 / (1 + std::exp(marker.trust)), kLeastMotion, 0.5);
     const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
     const double both = log_sum(a, b);

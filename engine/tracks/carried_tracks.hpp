@@ -25,7 +25,6 @@
 #include <vector>
 
 #include "base/scratch.hpp"
-#include "rigid/bond_graph.hpp"
 #include "rigid/carried_state.hpp"
 #include "rigid/carrier.hpp"
 #include "tracks/live_tracks.hpp"
@@ -98,7 +97,7 @@ class CarriedTracks {
     std::int32_t row = 0, column = 0;
     double nats = 0;
   };
-  const CarriedPlace& place(std::size_t i) const { return s_.place[i]; }
+  const Carried& place(std::size_t i) const { return s_.place[i]; }
   bool is_doubtful(std::size_t i) const { return s_.is_doubtful[i] != 0; }
   std::int32_t heir(std::size_t i) const { return s_.heir[i]; }
   std::span<const Told> told() const { return s_.told; }
@@ -128,6 +127,7 @@ class CarriedTracks {
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
   // A place is doubtful that is not known to this share of the distance to the nearest neighbour.
   static constexpr double kDoubtful = 0.25;
+  static constexpr std::size_t kFew = 3;  // bonds
 
   template <typename More>
   static std::int32_t number(const LiveTrack<More>& track) {
@@ -256,23 +256,22 @@ class CarriedTracks {
 
   void list_bonds(const LiveTrack<>& track) {
     s_.bonds.clear();
-    const double r = carrier_.noise();
     for (const Bond& bond : carrier_.bonds(number(track))) {
       if (s_.places.find(bond.other) == nullptr) continue;
-      s_.bonds.push_back({bond.other, bond.mean, spread(bond, r), 0});
+      s_.bonds.push_back(bond);
       if (s_.bonds.size() == kSteadiest) break;
     }
-    const auto n = std::max(BondGraph::kFew, static_cast<std::int32_t>(s_.bonds.size()));
-    for (BondGraph::Bond& bond : s_.bonds) bond.weight = opt_.bond_weight / n;
   }
+  // Within ± the weight; few bonds say less than many.
   double says(std::span<const Point> points, const Candidate& c) const {
     double sum = 0;
-    for (const BondGraph::Bond& bond : s_.bonds) {
+    for (const Bond& bond : s_.bonds) {
       const Point& other = *s_.places.find(bond.other);
       const double distance2 = squared_distance(points[c.column], other, carrier_.n_axes());
-      if (distance2 > 0) sum += bond.says(std::sqrt(distance2));  // no marker is where another is
+      if (distance2 > 0)  // no marker is where another is
+        sum += agreement(bond, carrier_.noise(), std::sqrt(distance2));
     }
-    return sum;
+    return sum * opt_.bond_weight / static_cast<double>(std::max(kFew, s_.bonds.size()));
   }
 
   // Points that a hidden track would have taken by itself.
@@ -283,14 +282,14 @@ class CarriedTracks {
 
   struct Memory {
     std::vector<char> is_carried, is_doubtful;
-    std::vector<CarriedPlace> place;
+    std::vector<Carried> place;
     std::vector<Told> told;
     std::vector<MotionState> fused;
     std::vector<Prediction> own;
     std::vector<double> ghosts;  // log (1 + their density / clutter's), by track
     std::vector<std::int32_t> best_row, best_column, owner, heir, n_rows, n_columns;
     std::vector<Candidate> alone, added;
-    std::vector<BondGraph::Bond> bonds;
+    std::vector<Bond> bonds;
     std::vector<Seen> seen;
     std::vector<std::int32_t> known;
     Places places;

@@ -548,18 +548,26 @@ class Chain:
         tuple[int, int, NDArray[np.int64], NDArray[np.int64], float, float, float, bool, float]
     ]: ...
 
+BEND: float
+MIN_TOGETHER: int
+
+# (predictive variances, whether each is a bond)
+def judge_distances(
+    means: NDArray[np.float64], variances: NDArray[np.float64], frames: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]: ...
+
 # (R, from, to, rms): b = R (a - from) + to, in three axes.
 def fit_rigid(
     a: NDArray[np.float64], b: NDArray[np.float64], weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]: ...
 
-# (where they carry what was at `then`, how far it may be off, log densities at some points)
+# (where they carry what was at `then`, its variance beside `r`, log densities at some points)
 def carried(
     a: NDArray[np.float64],
     b: NDArray[np.float64],
     weights: NDArray[np.float64],
     then: NDArray[np.float64],
-    noise: float,
+    r: float,
     points: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]: ...
 
@@ -573,9 +581,9 @@ def densities_elsewhere(
 ) -> NDArray[np.float64]: ...
 
 class Neighbours:
-    def __init__(self, n_axes: int, noise: float) -> None: ...
+    def __init__(self, n_axes: int, r: float) -> None: ...
     def add(self, markers: NDArray[np.int32], points: NDArray[np.float64]) -> None: ...
-    # (the others, frames seen together, mean distances, their variances, unsteadiness)
+    # (the others, frames seen together, mean distances, their variances, predictive variances)
     def of(
         self, marker: int
     ) -> tuple[

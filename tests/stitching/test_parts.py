@@ -15,6 +15,7 @@ from asterism import _engine
 from asterism.model.compiled import motion_model, steps_of, transition
 from asterism.tracking.stitching.passes import Pass, go_through
 from asterism.tracking.stitching.whole import stitch_options
+from body_oracle import BodyByHand
 
 NOISE = 1e-3
 MODEL = am.TrackingModel(
@@ -25,6 +26,7 @@ MODEL = am.TrackingModel(
 BODY = np.random.default_rng(1).uniform(-0.4, 0.4, (8, 3))
 PLACE = np.array([0.05, 0.02, 0.1])  # of the marker that is hidden
 WORTH = 0.25
+BESIDE = 12 * NOISE**2  # variance that stitching adds to that of carried places
 
 
 @dataclasses.dataclass
@@ -73,7 +75,7 @@ def scene(*seen, frames=300, body=BODY):
 def test_distances_are_remembered_for_four_hundred_frames(n_frames):
     rng = np.random.default_rng(n_frames)
     far = 0.3 + rng.normal(scale=0.01, size=n_frames)
-    neighbours = _engine.Neighbours(3, NOISE)
+    neighbours = _engine.Neighbours(3, NOISE**2)
     for x in far:
         neighbours.add(np.array([0, 3], dtype=np.int32), np.array([[0.0, 0, 0], [0, x, 0]]))
     shares = [1 / min(n, 400) for n in range(1, n_frames + 1)]
@@ -85,20 +87,21 @@ def test_distances_are_remembered_for_four_hundred_frames(n_frames):
 
 
 def test_what_varies_is_unsteady():
-    neighbours = _engine.Neighbours(2, NOISE)
+    neighbours = _engine.Neighbours(2, NOISE**2)
     for t in range(200):
         points = [[0.0, 0], [0.2, 0], [-0.2 - 0.01 * (-1) ** t, 0]]
         neighbours.add(np.arange(3, dtype=np.int32), np.array(points))
-    others, _, mean, _, unsteadiness = neighbours.of(0)
+    others, _, mean, _, predictive = neighbours.of(0)
     assert (others.tolist(), mean) == ([1, 2], pytest.approx([0.2, 0.2]))
-    assert unsteadiness[1] - unsteadiness[0] == pytest.approx(0.01)
+    unseen = (0.2 * (0.01 + 1 / 200)) ** 2
+    assert predictive == pytest.approx([2 * NOISE**2 + unseen, 0.01**2 + unseen])
 
 
 def test_a_nearer_neighbour_takes_the_place_of_the_least_steady():
     rng = np.random.default_rng(5)
     middle, around = np.zeros((1, 3)), rng.uniform(0.3, 0.5, (24, 3))
     newcomer = np.full((1, 3), 0.1)
-    neighbours = _engine.Neighbours(3, NOISE)
+    neighbours = _engine.Neighbours(3, NOISE**2)
     for t in range(200):
         loose = around.copy()
         loose[7] *= 2 + 0.2 * np.sin(0.3 * t)
@@ -117,11 +120,12 @@ def test_carried_is_students_t_about_the_place(D):
     turn = Rotation.from_rotvec([0, 0, 0.7]).as_matrix()[:D, :D]
     b = a @ turn.T + 1 + rng.normal(scale=0.01, size=a.shape)
     then, points = rng.normal(size=(1, D)), rng.normal(size=(20, D))
-    R, from_, to, rms = _engine.fit_rigid(a, b, np.ones(7))
-    place, scale, density = _engine.carried(a, b, np.ones(7), then, 0.005, points)
-    np.testing.assert_allclose(place[:D], R[:D, :D] @ (then[0] - from_[:D]) + to[:D])
-    assert scale == pytest.approx(0.005 + 0.8 * rms)
-    t = stats.multivariate_t(place[:D], scale**2 * np.eye(D), df=3)
+    v = rng.uniform(0.5, 2, 7) * 1e-5
+    place, variance, density = _engine.carried(a, b, 1 / v, then, 1e-6, points)
+    at, own = BodyByHand(D, 1e-3).turned(a, b, v, then[0], 1, 1e-6)
+    np.testing.assert_allclose(place[:D], at)
+    assert variance == pytest.approx(1e-6 + own)
+    t = stats.multivariate_t(at, variance * np.eye(D), df=3)
     np.testing.assert_allclose(density, t.logpdf(points))
 
 
@@ -131,29 +135,29 @@ def test_neighbours_in_one_line_do_not_turn_a_marker_about_it():
     a = np.outer(np.linspace(-0.3, 0.3, 5), [1.0, 0, 0]) + rng.normal(0, 1e-4, (5, 3))
     b = a + np.array([0.02, 0, 0]) + rng.normal(0, 1e-4, (5, 3))
     then = np.array([[0.0, 0.2, 0.0]])
-    place, scale, _ = _engine.carried(a, b, np.ones(5), then, 1e-3, then)
+    place, variance, _ = _engine.carried(a, b, np.full(5, 1e8), then, 1e-6, then)
     assert np.linalg.norm(place - [0.02, 0.2, 0]) < 1e-3
-    assert scale > 0.05  # the marker may be anywhere on a circle about the line
+    assert variance > 0.05**2  # the marker may be anywhere on a circle about the line
     beside = np.concatenate([a, [[0, 0, 0.1]]])
     turned = np.concatenate([b, [[0.02, 0, 0.1]]])
-    place, scale, _ = _engine.carried(beside, turned, np.ones(6), then, 1e-3, then)
+    place, variance, _ = _engine.carried(beside, turned, np.full(6, 1e8), then, 1e-6, then)
     assert np.linalg.norm(place - [0.02, 0.2, 0]) < 5e-3
-    assert scale < 0.01
+    assert variance < 0.01**2
 
 
 def test_few_neighbours_are_believed_less():
     a, there = np.eye(3)[[0, 1, 2, 2]] * [[1.0], [1], [1], [-1]], np.zeros((1, 3))
 
-    def scale(n, then=there):
-        place, scale, _ = _engine.carried(a[:n], a[:n] + 1, np.ones(n), then, NOISE, there)
+    def variance(n, then=there):
+        place, variance, _ = _engine.carried(a[:n], a[:n] + 1, np.full(n, 1e4), then, 1e-6, there)
         np.testing.assert_allclose(place, then[0] + 1, atol=1e-12)
-        return scale
+        return variance
 
-    assert scale(4) == pytest.approx(NOISE)
-    assert scale(3) > 3 * scale(4)
+    assert variance(3) > variance(4) > 1e-6 + 1e-4
     for n in (1, 2):
-        assert scale(n, a[:n].mean(axis=0)[None]) == pytest.approx(NOISE)
-        assert scale(n, a[:n].mean(axis=0)[None] + [0, 0, 0.5]) == pytest.approx(NOISE + 0.15)
+        assert variance(n, a[:n].mean(axis=0)[None]) == pytest.approx(1e-6)
+        beside = a[:n].mean(axis=0)[None] + [0, 0, 0.5]
+        assert variance(n, beside) == pytest.approx(1e-6 + 0.15**2)
 
 
 @pytest.mark.parametrize("D", [2, 3])
@@ -195,18 +199,25 @@ def test_points_on_a_line_go_where_they_are(seed):
 # What is decided of a fragment
 
 
+def carried_density(dense, then, now, y):
+    """Log density of y where 8 is carried from a frame, hidden since frame 61."""
+    by_hand = BodyByHand(3, NOISE, learnt_from=15, bonds_only=False)  # since all are known
+    for points in dense[:61]:
+        by_hand.see(range(9), points[:9])
+    at, variance, _ = by_hand.way(8, 61, then, dict(enumerate(now)), 1, BESIDE)
+    return stats.multivariate_t(at, variance * np.eye(3), df=3).logpdf(y)
+
+
 def test_the_probability_is_that_of_body_and_elsewhere():
     # Hidden too long for its motion to be believed: 8 goes away, 9 comes back.
     dense = scene((0, 60, PLACE), (200, 299, PLACE))
     found = one_pass(dense)
     assert (found.marker[9], found.after[9]) == (8, 8)
-    own, body = PLACE[None], BODY
-    near = np.argsort(np.linalg.norm(body - PLACE, axis=1))[:6]
-    *_, carried = _engine.carried(body[near], body[near], np.ones(6), own, 4 * NOISE, own)
-    everything = np.concatenate([body, own])
+    carried = carried_density(dense, 60, BODY, PLACE)
+    everything = np.concatenate([BODY, PLACE[None]])
     else_ = _engine.densities_elsewhere(everything, everything, noise=NOISE, ghost_radius=0.03)
     # Log odds of 2 for a marker come back, and 0.5 % for its own motion.
-    assert found.logit(9) == pytest.approx(WORTH * (carried[0] - else_[8] + 2 + np.log(0.995)))
+    assert found.logit(9) == pytest.approx(WORTH * (carried - else_[8] + 2 + np.log(0.995)))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -216,12 +227,6 @@ def test_the_log_odds_of_a_body_are_those_of_its_steadiest_neighbours(seed):
     dense = scene((0, 60, PLACE), (200, 299, PLACE + 0.003))
     dense[:, :8] = loose
     dense[:, 8:] += rng.normal(scale=0.001, size=(300, 2, 3))
-    neighbours = _engine.Neighbours(3, NOISE)
-    for t in range(15, 61):  # since all are known
-        neighbours.add(np.arange(9, dtype=np.int32), dense[t, :9])
-    others, *_, unsteadiness = neighbours.of(8)
-    order = np.argsort(unsteadiness)[:6]
-    near, weights = others[order], unsteadiness[order] ** -2
     so_far = dense[:215].reshape(-1, 3)
     so_far = so_far[np.isfinite(so_far[:, 0])]
     means: list[float] = []
@@ -229,11 +234,9 @@ def test_the_log_odds_of_a_body_are_those_of_its_steadiest_neighbours(seed):
         looks: list[float] = []
         for t in (200, 205, 210):
             now = dense[t, [*range(8), 9]]
-            *_, carried = _engine.carried(
-                dense[then, near], dense[t, near], weights, dense[then, 8:9], 4 * NOISE, now[8:]
-            )
+            carried = carried_density(dense, then, now[:8], now[8])
             else_ = _engine.densities_elsewhere(so_far, now, noise=NOISE, ghost_radius=0.03)
-            looks.append(carried[0] - else_[8])
+            looks.append(carried - else_[8])
         means.append(np.mean(sorted(looks)[1:]))
     gain = np.log(np.mean(np.exp(means))) + 2 + np.log(0.995)
     found = one_pass(dense, may_cut=False)
@@ -260,11 +263,12 @@ def test_a_short_fragment_is_less_probably_a_marker_come_back():
 
 def test_what_was_seen_last_may_have_been_a_ghost():
     dense = scene((0, 60, PLACE), (200, 299, PLACE))
-    right = one_pass(dense).logit(9)
-    dense[58:61, 8] += [0, 0, 0.06]
-    # One of the three places that are remembered is wrong.
+    right, before = one_pass(dense).logit(9), carried_density(dense, 56, BODY, PLACE)
+    dense[60, 8] += [0, 0, 0.06]
+    # One of the three places that are remembered is wrong, and the bonds are less steady.
     lost = one_pass(dense, may_cut=False).logit(9) - right
-    assert lost == pytest.approx(WORTH * np.log(2 / 3), abs=1e-3)
+    less = carried_density(dense, 56, BODY, PLACE) - before
+    assert lost == pytest.approx(WORTH * (np.log(2 / 3) + less), abs=1e-3)
 
 
 def test_the_worst_of_the_looks_at_a_fragment_does_not_count():
@@ -310,8 +314,8 @@ def test_a_marker_is_seen_again_before_it_is_hidden_again():
 
 
 def test_a_pause_leaves_no_trace():
-    dense = scene((0, 60, PLACE), (200, 299, PLACE))
-    steady = one_pass(dense).logit(9)
+    steady = one_pass(scene((0, 60, PLACE), (200, 299, PLACE))).logit(9)
+    dense = scene((0, 62, PLACE), (200, 299, PLACE))  # seen in as many frames
     dense[30:32, 8] = np.nan
     assert one_pass(dense).logit(9) == pytest.approx(steady)
 

@@ -1,5 +1,8 @@
 // Tracks that distance bonds make sure (§4.2 of the report): over a whole window they were seen in
 // every frame and kept their distances from each other.
+//
+// The threshold is the report's: the range of a distance over the frames of one window. It is not that
+// of rigid/bond.hpp, which needs more frames than a window has.
 #pragma once
 
 #include <algorithm>
