@@ -95,8 +95,9 @@ def test_partners_are_counted_by_distances_alone():
     times = np.arange(60) / 100
     assert partners(am.Tracks.from_dense(times, dense), 1e-4) == (2, 3)
     # Noise must not part a body: a distance can be no steadier than its ends.
-    noisy = np.stack([one, other], axis=1) * 0.01 + rng.normal(0, 0.005, (60, 2, 3))
-    assert partners(am.Tracks.from_dense(times, noisy), 0.005) == (2, 2)
+    little = np.stack([0.01 * one, 0.01 * one + 0.1], axis=1)
+    noisy = little + rng.normal(0, 0.002, (60, 2, 3))
+    assert partners(am.Tracks.from_dense(times, noisy), 0.002) == (2, 2)
     assert partners(am.Tracks.from_dense(times, noisy), 1e-5) == (0, 2)
 
 

@@ -23,8 +23,6 @@ EACH = 2
 """Bonds of a marker that are drawn beside those that hold the body together."""
 FARTHEST = 8.0
 """Longest bond that is drawn, in usual distances from a marker to its nearest bonded one."""
-BEND = 0.1
-"""Share of its length that a bond may vary by, as a standard deviation."""
 _NO_PAIRS = np.empty((0, 2), dtype=np.int64)
 
 
@@ -54,7 +52,7 @@ def connections_of(tracks: Tracks) -> Connections:
         replace(few, labels=number[few.labels], names=(None,) * len(longest), confidence=None)
     )
     order = np.argsort(bonds.distances, kind="stable")
-    steady = order[bonds.spreads[order] <= BEND * bonds.distances[order]]
+    steady = order[bonds.steady[order]]
     nearest = np.full(len(longest), np.inf)
     for side in bonds.pairs[steady].T:
         np.minimum.at(nearest, side, bonds.distances[steady])

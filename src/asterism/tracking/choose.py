@@ -18,6 +18,7 @@ from asterism.records import record
 from asterism.tracking.methods.gnn import GNN
 from asterism.tracking.methods.mcmcda import MCMCDA
 from asterism.tracking.methods.smp import SMP
+from asterism.tracking.rigidity.distances import MIN_TOGETHER, distances_from
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,11 +34,9 @@ SAMPLES = 200
 """Frames, spread over the clip, in which distances are compared."""
 MOST_TRACKS = 150
 """Tracks, the longest, that are compared."""
-COMMON = 20
-"""Samples in which two tracks must be seen both."""
 RIGID = 0.05
-"""Two markers keep their distance if it varies by less than this share of what they move: on bodies
-0.001 to 0.03, of independent markers the steadiest of all pairs 0.1 to 0.5."""
+"""A bond tells of a body if it varies by less than this share of what its markers move. Markers at
+rest keep their distances too, and so does everything in a fraction of a second."""
 NEAREST = 6
 """Partners are looked for among so many that were nearest: of a thousand independent markers over a
 few frames some pair always keeps its distance."""
@@ -147,19 +146,16 @@ def partners(tracks: Tracks, noise_sigma: float) -> tuple[int, int]:
     positions = _sampled(tracks)
     n_rigid = n_compared = 0
     for i in range(positions.shape[1]):
-        away = positions - positions[:, i : i + 1]
-        distance = np.sqrt((away**2).sum(axis=2))  # (S, K), NaN where either is hidden
-        seen = ~np.isnan(distance)
-        n = seen.sum(axis=0)
-        n[i] = 0
-        others = np.flatnonzero(n >= COMMON)
+        found = distances_from(positions[:, i], positions)
+        others = np.flatnonzero(found.n_frames >= MIN_TOGETHER)
+        others = others[others != i]
         if not len(others):
             continue
         n_compared += 1
-        nearest = np.argsort(np.nanmean(distance[:, others], axis=0), kind="stable")[:NEAREST]
+        nearest = others[np.argsort(found.middle[others], kind="stable")[:NEAREST]]
         moved = np.sqrt(np.nanvar(positions[:, i], axis=0).sum())
-        varies = np.nanstd(distance[:, others[nearest]], axis=0)
-        n_rigid += bool(varies.min() < max(RIGID * moved, 3 * noise_sigma))
+        is_rigid = found.is_bond & (found.spread < max(RIGID * moved, 3 * noise_sigma))
+        n_rigid += bool(is_rigid[nearest].any())
     return n_rigid, n_compared
 
 

@@ -20,7 +20,7 @@ from asterism.tracking.filling.ends import CAREFUL, Bridges, bridges, is_steady
 from asterism.tracking.filling.neighbours import Body, fit_body
 from asterism.tracking.filling.patterns import learn_pattern
 from asterism.tracking.filling.spans import NEAREST_ENDS, find_gaps, held_out, usable_ends
-from asterism.tracking.rigidity.distances import distances_from
+from asterism.tracking.rigidity.distances import MIN_TOGETHER, distances_from
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,10 +35,9 @@ MOST_WINDOWS, LEAST_WINDOWS, MOST_HIDDEN = 40, 16, 1200
 MOST_HELPERS = 14
 """Markers that the pattern looks at; the steadiest `MOST_NEIGHBOURS` of them are the body."""
 MOST_NEIGHBOURS = 6
-LEAST_TOGETHER = 20
-"""Frames that a helper must have been seen beside the marker."""
 LEAST_SHARE = 0.5
-"""… and share of the marker's frames: for a helper seen rarely, much else would go unused."""
+"""Share of the marker's frames in which a helper must have been seen beside it: for a helper seen
+rarely, much else would go unused."""
 LEAST_PATTERN = 40
 """Frames from which a pattern may be learnt."""
 MOST_LEARNT = 500
@@ -211,7 +210,7 @@ def _helpers(
     mine = np.flatnonzero(take.seen[:, k])
     n_together = known[mine].sum(axis=0)
     is_there = known[needed].all(axis=0)
-    is_there &= n_together >= max(LEAST_SHARE * len(mine), LEAST_TOGETHER)
+    is_there &= n_together >= max(LEAST_SHARE * len(mine), MIN_TOGETHER)
     is_there[k] = False
     others = np.flatnonzero(is_there)
     compared = mine[:: -(-len(mine) // MOST_COMPARED)]

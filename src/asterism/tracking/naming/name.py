@@ -11,16 +11,14 @@ from asterism.checks import check_kind
 from asterism.errors import ParameterError
 from asterism.model import Tracks
 from asterism.records import record
-from asterism.tracking.rigidity.bonds import BEND, MOST_FRAMES, Bonds
-from asterism.tracking.rigidity.distances import distances_between
+from asterism.tracking.rigidity.bonds import MOST_FRAMES, Bonds
+from asterism.tracking.rigidity.distances import MIN_TOGETHER, distances_between
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["Naming", "name_tracks"]
 
-LEAST_FRAMES = 20
-"""Frames that a track must have, and share with another to be compared."""
 BEAM = 400
 """Ways of naming the tracks that are followed at once."""
 LOOKED_AT = 12
@@ -122,29 +120,31 @@ class _Take:
     positions: NDArray[np.float64]  # (F, n, D)
     middle: NDArray[np.float64]  # (n, n), NaN where two were not seen together for long
     spread: NDArray[np.float64]
+    variance: NDArray[np.float64]  # predictive; infinite where they were not
     seen: NDArray[np.bool_]  # (T, n)
 
     @classmethod
     def of(cls, tracks: Tracks) -> _Take:
         d = tracks.detections
         every = max(1, -(-d.n_frames // MOST_FRAMES))
-        chosen = np.flatnonzero(tracks.lengths >= LEAST_FRAMES)
+        chosen = np.flatnonzero(tracks.lengths >= MIN_TOGETHER)
         dense = tracks.positions()[:, chosen]
         seen = np.isfinite(dense[..., 0])
         between = distances_between(dense[::every])
-        is_known = between.n_frames * every >= LEAST_FRAMES
+        is_known = between.n_frames * every >= MIN_TOGETHER
         np.fill_diagonal(is_known, val=False)
         return cls(
             tracks=chosen,
             positions=dense[::every],
             middle=np.where(is_known, between.middle, np.nan),
             spread=np.where(is_known, between.spread, np.nan),
+            variance=np.where(is_known, between.predictive_variance, np.inf),
             seen=seen,
         )
 
     def order(self) -> list[int]:
         """Give the order of naming: each track as steady as can be beside those before."""
-        cost = np.nan_to_num(self.spread + BEND * self.middle, nan=np.inf)
+        cost = np.sqrt(self.variance)
         n = len(cost)
         if n == 0:
             return []
@@ -162,8 +162,7 @@ class _Take:
     def beside(self, k: int, others: list[int]) -> list[int]:
         """Give those of `others` to which a track keeps its distance best."""
         known = [b for b in others if np.isfinite(self.middle[k, b])]
-        cost = self.spread[k, known] + BEND * self.middle[k, known]
-        return [known[b] for b in np.argsort(cost, kind="stable")[:LOOKED_AT]]
+        return [known[b] for b in np.argsort(self.variance[k, known], kind="stable")[:LOOKED_AT]]
 
     def height(self, k: int, three: list[int]) -> tuple[float, float]:
         """Measure how high a track lies over the plane of three others: median and spread."""

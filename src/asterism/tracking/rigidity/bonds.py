@@ -14,7 +14,12 @@ from asterism.io.captures.marker_names import is_unlabelled
 from asterism.model import Tracks
 from asterism.model.toml_file import read_toml, write_toml
 from asterism.records import record
-from asterism.tracking.rigidity.distances import distances_between
+from asterism.tracking.rigidity.distances import (
+    BEND,
+    MIN_TOGETHER,
+    Distances,
+    distances_between,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,11 +30,9 @@ __all__ = ["Bonds", "learn_bonds"]
 
 MOST_FRAMES = 1000
 """Frames of a take, evenly spread, in which distances are measured."""
-BEND = 0.02
-"""Share of a distance that is held against it: what is far changes more, sooner or later."""
-LOOSE, LOOSE_SHARE = 2.5, 0.01
-"""A pair is rigid that varies no more than so many times what the steadiest pairs do, and this
-share of its distance."""
+LOOSE = 2.5
+"""A pair is rigid that varies no more than so many times what the steadiest pairs of its capture
+do, and the share `BEND` of its distance. Bonds may bend more than a segment does."""
 FORMAT = "asterism bonds"
 
 
@@ -96,6 +99,11 @@ class Bonds:
             object.__setattr__(self, name, array)
 
     @cached_property
+    def steady(self) -> NDArray[np.bool_]:
+        """Pairs that are bonds as the engine has them, shape (M,)."""
+        return Distances(middle=self.distances, spread=self.spreads, n_frames=self.frames).is_bond
+
+    @cached_property
     def rigid(self) -> NDArray[np.bool_]:
         """Pairs that are rigid within what the steadiest pairs of this take vary by, shape (M,)."""
         if not len(self.pairs):
@@ -104,7 +112,7 @@ class Bonds:
         for side in self.pairs.T:
             np.minimum.at(steadiest, side, self.spreads)
         usual = float(np.quantile(steadiest[np.isfinite(steadiest)], 0.25))
-        return self.spreads <= LOOSE * usual + LOOSE_SHARE * self.distances
+        return self.spreads <= LOOSE * usual + BEND * self.distances
 
     @cached_property
     def clusters(self) -> tuple[tuple[int, ...], ...]:
@@ -170,11 +178,11 @@ class Bonds:
         )
 
 
-def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = 20) -> Bonds:
+def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = MIN_TOGETHER) -> Bonds:
     """Learn which markers keep their distances.
 
-    Of each marker the `neighbours` steadiest are kept, judged by what the distance varies by and by
-    a small share of it.
+    Of each marker the `neighbours` steadiest are kept: those whose distance has the least
+    predictive variance.
 
     Parameters
     ----------
@@ -215,7 +223,7 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = 20) -> Bon
     positions = tracks.positions()[::every, named]
     between = distances_between(positions)
     K = len(named)
-    cost = between.spread + BEND * between.middle
+    cost = between.predictive_variance
     cost[(between.n_frames * every < least) | np.eye(K, dtype=bool)] = np.inf
     order = np.argsort(cost, axis=1, kind="stable")[:, :neighbours]
     chosen = np.zeros((K, K), dtype=bool)

@@ -1,4 +1,10 @@
-"""How far markers are from each other over a take, and how steadily."""
+"""Distances between markers over a capture, judged as the engine judges those of a stream.
+
+The engine keeps a running mean and variance of each distance. Here all frames are there at once,
+and the median and the middle 68 % stand in their place: a track that holds another marker for a
+while would spoil a mean, and with means fewer markers are named right. Everything after that is
+the engine's (`engine/rigid/bond.hpp`).
+"""
 
 from __future__ import annotations
 
@@ -6,12 +12,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism import _engine
 from asterism.records import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Distances", "distances_between", "distances_from"]
+__all__ = ["BEND", "MIN_TOGETHER", "Distances", "distances_between", "distances_from"]
+
+BEND = _engine.BEND
+"""Share of a distance by which a body may bend that was not seen to bend."""
+MIN_TOGETHER = _engine.MIN_TOGETHER
+"""Frames in which two markers must have been seen together."""
 
 
 @record(eq=False)
@@ -31,6 +43,22 @@ class Distances:
     middle: NDArray[np.float64]
     spread: NDArray[np.float64]
     n_frames: NDArray[np.int64]
+
+    @property
+    def predictive_variance(self) -> NDArray[np.float64]:
+        """Variance of each distance when it is measured next, m²."""
+        return self._judged()[0]
+
+    @property
+    def is_bond(self) -> NDArray[np.bool_]:
+        """Whether each distance was seen for long enough and is known to a tenth of itself."""
+        return self._judged()[1]
+
+    def _judged(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        variance, is_bond = _engine.judge_distances(
+            self.middle.ravel(), (self.spread**2).ravel(), self.n_frames.ravel()
+        )
+        return variance.reshape(self.middle.shape), is_bond.reshape(self.middle.shape)
 
 
 def distances_from(marker: NDArray[np.float64], others: NDArray[np.float64]) -> Distances:
