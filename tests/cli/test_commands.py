@@ -228,7 +228,7 @@ def test_no_input_is_written_to(scene, capsys):
         ),
         (
             "track in.csv --method mcmcda --option chains=0",
-            "chains: expected an integer in [1, 1024]",
+            "chains: expected a whole number in [1, 1024]",
         ),
         ("track in.csv --method smp --option proposers=track", "Did you mean 'tracks'?"),
         ("track in.csv --seed -1", "--seed"),

@@ -15,7 +15,7 @@ from asterism import _engine
 from asterism.model.compiled import motion_model, steps_of, transition
 from asterism.tracking.stitching.passes import Pass, go_through
 from asterism.tracking.stitching.whole import stitch_options
-from body_oracle import BodyByHand
+from tests.references.rigid_body import BodyByHand
 
 NOISE = 1e-3
 MODEL = am.TrackingModel(
