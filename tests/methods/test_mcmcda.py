@@ -446,8 +446,7 @@ def test_a_walk_over_a_whole_take_can_be_interrupted():
 
     with pytest.raises(KeyboardInterrupt):
         am.track(d, am.MCMCDA(window=None, moves=500), model=model, progress=stop)
-    assert seen[0] < d.n_frames // 2
-    assert seen[-1] == d.n_frames // 2 + 1  # and nothing after it
+    assert max(seen[:-1]) <= d.n_frames // 2 < seen[-1] < d.n_frames  # and nothing after it
 
 
 def test_the_report_s_own_makes_no_moves_but_its_own():
@@ -484,7 +483,7 @@ def test_weights_of_moves_by_name():
         ({"window": None, "deadline": 1.0}, "deadline"),
         ({"window": 0}, "window"), ({"window": 10**9}, "window"), ({"moves": 1e300}, "moves"),
         ({"moves": -1}, "moves"), ({"moves": None}, "deadline"),
-        ({"deadline": 0}, "deadline"), ({"chain": "ascent"}, "chain: expected a ChainOptions"),
+        ({"deadline": 0}, "deadline"), ({"chain": "ascent"}, "chain: expected ChainOptions"),
         ({"chain": ASCENT}, "confidence: expected 0 with the ascent"),
         ({"chain": ASCENT, "confidence": 0, "keep": "draw"}, "keep"),
     ],
