@@ -31,6 +31,8 @@ bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/speed.py --markdown docs/tables/speed.md
 	$(BIN)/python benchmarks/cameras.py --markdown docs/tables/cameras.md
 	$(BIN)/python benchmarks/smooth.py --markdown docs/tables/smooth.md
+	$(BIN)/python benchmarks/smooth.py --lengths 500 1000 2000 4000 8000 \
+	  --markdown docs/tables/whole_captures.md
 	$(BIN)/python benchmarks/stream.py --markdown docs/tables/stream.md
 	$(BIN)/python benchmarks/joint.py --markdown docs/tables/joint.md
 	$(BIN)/python benchmarks/k_best.py --markdown docs/tables/k_best.md

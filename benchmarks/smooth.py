@@ -5,11 +5,15 @@ apart, drifting together; noise of 5 mm, 10 % missing, 10 % false alarms. Everyt
 from Python: neighbours, bookkeeping of identities, and the floor beside what was found.
 
     python benchmarks/smooth.py [--seeds N] [--markdown FILE]
+    python benchmarks/smooth.py --lengths 500 1000 2000 4000 8000 [--markdown FILE]
+
+The second is of whole captures of 50 markers (`window=None`): time and memory by their length.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
 import time
 from pathlib import Path
 from typing import Any
@@ -122,11 +126,33 @@ def latency(rate: float) -> list[list[str]]:
     return rows
 
 
+def whole_captures(lengths: list[int]) -> list[list[str]]:
+    """Processor time of whole captures, and the most memory so far; lengths in rising order."""
+    rows: list[list[str]] = []
+    for frames in sorted(lengths):
+        truth, model = smooth(50, frames, 1)
+        start = time.process_time()
+        tracks = am.track(truth.detections, am.MCMCDA(window=None), model=model, seed=1)
+        seconds = time.process_time() - start
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+        idf1 = am.evaluate(tracks, truth).idf1
+        rows.append([f"{frames}", f"{seconds:.1f}", f"{1e3 * seconds / frames:.2f}",
+                     f"{memory:.0f}", f"{idf1:.4f}"])  # fmt: skip
+        print(*rows[-1], flush=True)
+    return rows
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--lengths", type=int, nargs="+")
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
+    if options.lengths:
+        head = ["frames", "seconds", "ms a frame", "memory, MB", "IDF1"]
+        lines = [*table(head, whole_captures(options.lengths)), "", f"{conditions()}."]
+        publish(lines, options.markdown)
+        return
     head = ["", "frames a second", "IDF1", "floor", "% wrong", "% missing", "scenes, none wrong",
             "log posterior over the truth's", "scenes in which it is no less"]  # fmt: skip
     lines = table(head, throughput(options.seeds))

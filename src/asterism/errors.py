@@ -56,7 +56,7 @@ def _message(place: str, expected: str, got: str, hint: str) -> str:
     text = f"{place}: expected {expected}, found {got}" if expected else f"{place}: {got}"
     if hint:
         first, end = hint.split(" ", 1)[0], "" if hint[-1] in ".?!" else "."
-        # A word of prose gets its capital, code (am.GNN(), bodies=True) stays as it is.
+        # A word of prose gets its capital, code (am.GNN(), window=3) stays as it is.
         text += f". {hint[0].upper() if first.strip(',:').isalpha() else hint[0]}{hint[1:]}{end}"
     return " ".join(text.split())
 

@@ -72,9 +72,9 @@ class TOMHT(EngineMethod):
     -----
     With a window that covers the capture the result is the most probable partition of all
     (`log_posterior`) if no option excludes it: `prune_odds`, `max_branches` and `max_nodes` large
-    enough, `gate_probability` near 0, `new_track_odds` and `delete_odds` large, and
-    `confirm_probability` near 0.5. A track whose odds are below those of `confirm_probability` is
-    left out even where the most probable partition holds it.
+    enough, the probability of the `gate` near 0, `new_track_odds` and the `delete_odds` of the
+    `lifecycle` large, and its `confirm_probability` near 0.5. A track whose odds are below those of
+    `confirm_probability` is left out even where the most probable partition holds it.
 
     Examples
     --------
