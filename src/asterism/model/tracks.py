@@ -18,6 +18,7 @@ from asterism.checks import check_kind, keep_array
 from asterism.errors import ParameterError
 from asterism.model.detections import Detections
 from asterism.model.gap import Gap
+from asterism.model.tables import tables_module
 from asterism.records import record
 
 if TYPE_CHECKING:
@@ -223,9 +224,18 @@ class Tracks:
         ParameterError
             If pandas is not installed.
         """
-        from asterism.model.tables import to_pandas
-
-        return to_pandas(self)
+        d = self.detections
+        names = np.array([*self.display_names, ""], dtype=object)
+        columns = {
+            "frame": d.frame_of,
+            "time_s": d.times[d.frame_of],
+            "track": self.labels,
+            "name": names[self.labels],
+            **{f"{axis}_m": d.points[:, k] for k, axis in enumerate("xyz"[: d.n_axes])},
+        }
+        if self.confidence is not None:
+            columns["confidence"] = self.confidence
+        return tables_module("pandas").DataFrame(columns)
 
     def to_xarray(self) -> Any:
         """Return an xarray ``DataArray`` of time, marker and axis (extra ``asterism[tables]``).
@@ -237,9 +247,14 @@ class Tracks:
         ParameterError
             If xarray is not installed.
         """
-        from asterism.model.tables import to_xarray
-
-        return to_xarray(self)
+        d, axes = self.detections, list("xyz"[: self.detections.n_axes])
+        return tables_module("xarray").DataArray(
+            self.positions(),
+            dims=("time", "marker", "axis"),
+            coords={"time": d.times, "marker": list(self.display_names), "axis": axes},
+            name="position",
+            attrs={"units": "m"},
+        )
 
     def measured(self) -> Self:
         """Leave out what was filled, as `Detections.measured` does; itself where nothing was."""
