@@ -145,17 +145,18 @@ def test_independent_ambiguities_of_one_cluster_have_the_confidence_that_each_ha
 
 
 def test_a_search_cut_short_says_by_how_much_it_may_be_off():
-    d = crowd(3, spread=0.04).detections
     model = small_model(
         motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
         max_speed=1.5, clutter_density=1.0, birth_density=1.0,
     )  # fmt: skip
-    whole = am.track(d, am.TOMHT(max_nodes=10**6), model=model)
-    short = am.track(d, am.TOMHT(max_nodes=2), model=model)
-    assert (whole.info["gap"], whole.info["clusters_cut_short"]) == (0, 0)
-    assert short.info["clusters_cut_short"] > 0
-    assert short.info["gap"] > 0
-    assert am.log_posterior(short, model) <= am.log_posterior(whole, model) + 1e-9
+    for seed in (2, 4, 5, 7):
+        d = crowd(seed, spread=0.04).detections
+        whole = am.track(d, am.TOMHT(max_nodes=10**6), model=model)
+        short = am.track(d, am.TOMHT(max_nodes=1), model=model)
+        assert (whole.info["gap"], whole.info["clusters_cut_short"]) == (0, 0)
+        assert short.info["clusters_cut_short"] > 0
+        assert short.info["gap"] > 0
+        assert am.log_posterior(short, model) < am.log_posterior(whole, model) - 1
 
 
 def test_what_is_only_looked_ahead_at_is_told_as_well():
