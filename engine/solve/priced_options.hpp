@@ -13,7 +13,7 @@
 
 namespace asterism {
 
-// An option of a tree: what it is worth, and the resources that it uses.
+// An option of a tree: its log weight, and the resources that it uses.
 struct PackingOption {
   double worth = 0;
   std::vector<std::int32_t> uses;

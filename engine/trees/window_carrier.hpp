@@ -1,5 +1,5 @@
 // Bodies over frames that are not decided yet: what neighbours say of a frame that comes, found by the
-// best branches of all believed tracks (tracks/carried_tracks.hpp) and passed to each of their branches.
+// best branches of all confirmed tracks (tracks/carried_tracks.hpp) and passed to each of their branches.
 //
 // What bodies are is learnt from decided frames alone. What is said of a frame is said once, when it
 // comes, and kept with it: whoever is split over the frame later hears the same.

@@ -26,7 +26,7 @@ def total_variation(d, model, chain, n, *, settled=None):
 
 
 def agrees(d, tracks, settled, frozen):
-    """Whether a partition says the same of the settled frames: who has what there."""
+    """Whether a partition has the same tracks as `settled` in the settled frames."""
 
     def heads(w):
         cut = {tuple(i for i in t if d.frame_of[i] <= frozen) for t in w}

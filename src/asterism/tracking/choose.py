@@ -35,8 +35,8 @@ SAMPLES = 200
 MOST_TRACKS = 150
 """Tracks, the longest, that are compared."""
 RIGID = 0.05
-"""A bond tells of a body if it varies by less than this share of what its markers move. Markers at
-rest keep their distances too, and so does everything in a fraction of a second."""
+"""Greatest spread of a bond on a rigid segment, as a share of the spread of its markers' positions.
+Markers at rest keep their distances too, and so do all markers in a fraction of a second."""
 NEAREST = 6
 """Partners are looked for among so many that were nearest: of a thousand independent markers over a
 few frames some pair always keeps its distance."""

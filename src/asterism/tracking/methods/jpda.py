@@ -38,8 +38,8 @@ class JPDA(EngineMethod):
 
     Each track has a probability ``r`` to exist (JIPDA; Musicki & Evans 2004): it is missed with
     probability ``1 - r P_d``, and what it is seen or missed with changes it. Tentative tracks take
-    what the confirmed ones leave over by the likeliest event; how sure each is of its part is told
-    as if the others had theirs.
+    what the confirmed ones leave over by the likeliest event; the confidence of each label
+    supposes that those of the other tentative tracks are right.
 
     Labels are those of the most probable joint event; their confidence is the marginal of the
     pairing. Where there is no label, it is the probability that the point is of no track.

@@ -31,8 +31,8 @@ __all__ = ["Bonds", "learn_bonds"]
 MOST_FRAMES = 1000
 """Frames of a take, evenly spread, in which distances are measured."""
 LOOSE = 2.5
-"""A pair is rigid that varies no more than so many times what the steadiest pairs of its capture
-do, and the share `BEND` of its distance. Bonds may bend more than a segment does."""
+"""Greatest spread of a rigid pair, as a multiple of that of the steadiest pairs of the capture; the
+share `BEND` of its distance is the other bound. Bonds may bend more than a segment does."""
 FORMAT = "asterism bonds"
 
 

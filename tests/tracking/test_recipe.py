@@ -1,0 +1,51 @@
+"""A recipe repeats a tracking bit for bit, after it was written to TOML and read again too."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.model import Recipe
+from asterism.model.toml_file import write_toml
+from asterism.tracking import ChainOptions, Gate, Lifecycle, Rigidity, method_by_name
+from tests.contracts.methods import METHODS
+from tests.scenes import small_model, wanderers
+
+DETECTIONS = wanderers(np.random.default_rng(4), n_frames=25).detections
+CASES = METHODS | {
+    "records": am.GNN(
+        gate=Gate(probability=1e-6), lifecycle=Lifecycle(delete_odds=50), rigid=Rigidity(max_gap=9)
+    ),
+    "cells": am.MCMCDA(moves=5, chain=ChainOptions(groups="cells", distance=0.5)),
+    "weights": am.MCMCDA(
+        window=None, moves=5, chain=ChainOptions(move_weights={"birth": 1, "death": 1})
+    ),
+    "report": am.MCMCDA.report_2010(moves=5),
+}
+
+
+@pytest.mark.parametrize("method", CASES.values(), ids=CASES)
+def test_a_recipe_in_toml_repeats_the_tracking(method):
+    tracks = am.track(DETECTIONS, method, model=small_model(), seed=3)
+    written = write_toml(tracks.recipe.to_dict(), None)
+    recipe = Recipe.from_dict(tomllib.loads(written))
+    assert recipe == tracks.recipe
+    assert method_by_name(recipe.method, **recipe.options) == method
+    again = am.track(DETECTIONS, recipe=recipe)
+    assert again.labels.tobytes() == tracks.labels.tobytes()
+    if tracks.confidence is not None:
+        assert again.confidence.tobytes() == tracks.confidence.tobytes()
+
+
+def test_a_recipe_stands_alone_and_is_of_one_input():
+    recipe = am.track(DETECTIONS, "gnn", model=small_model()).recipe
+    with pytest.raises(am.ParameterError, match="recipe: expected nothing that it decides itself"):
+        am.track(DETECTIONS, "gnn", recipe=recipe)
+    with pytest.raises(am.ParameterError, match="detections: expected SHA-256"):
+        am.track(DETECTIONS.part(0, 20), recipe=recipe)
+    start = am.Tracks(detections=DETECTIONS, labels=np.full(DETECTIONS.n_points, -1))
+    with pytest.raises(am.ParameterError, match="start: expected none"):
+        am.track(DETECTIONS, recipe=recipe, start=start)
