@@ -246,10 +246,17 @@ def test_same_bytes_in_every_process(tmp_path):
     assert results[0] == results[1]
 
 
-def test_help_loads_nothing_heavy():
-    script = (
-        "import sys\nfrom asterism.cli import main\nmain(['--help'])\n"
-        "heavy = ('scipy', 'ezc3d', 'matplotlib', 'pandas', 'asterism._engine')\n"
+@pytest.mark.parametrize(
+    ("script", "heavy"),
+    [
+        ("from asterism.cli import main\nmain(['--help'])\n", ("scipy", "asterism._engine")),
+        ("import asterism\nfor name in asterism.__all__:\n  getattr(asterism, name)\n", ("scipy",)),
+    ],
+    ids=["help", "every public name"],
+)  # fmt: skip
+def test_nothing_heavy_is_imported(script, heavy):
+    script += (
+        f"import sys\nheavy = {(*heavy, 'ezc3d', 'matplotlib', 'pandas')}\n"
         "sys.exit(','.join(name for name in heavy if name in sys.modules) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)

@@ -13,7 +13,6 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from scipy.optimize import brentq
 
 from asterism.checks import check_array, check_number
 from asterism.records import record
@@ -228,6 +227,8 @@ def _end_of_disc(k: NDArray[np.float64], p: float) -> float:
 def _zero(
     function: Callable[[NDArray[np.float64]], NDArray[np.float64]], low: float, high: float
 ) -> float:
+    from scipy.optimize import brentq
+
     def of_one(r: float) -> float:
         return float(function(np.array(r)))
 

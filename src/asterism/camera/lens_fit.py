@@ -6,8 +6,6 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.spatial.transform import Rotation
 
 from asterism.camera.lens import BrownConrady, QuadraticCorrection, ReportRadial, ViconRadial
 from asterism.checks import check_fields
@@ -87,6 +85,8 @@ def fit_lens(
     ParameterError
         If the kind is another, or the old lens reaches next to nothing of the image.
     """
+    from scipy.optimize import least_squares
+
     if kind not in (BrownConrady, ReportRadial, ViconRadial, QuadraticCorrection, None):
         expected = "BrownConrady, ReportRadial, ViconRadial, QuadraticCorrection or None"
         raise ParameterError("kind", expected, kind)
@@ -219,6 +219,8 @@ class _Free:
         return np.concatenate([solved, np.zeros(self.n_camera)]).astype(np.float64)
 
     def camera(self, x: NDArray[np.float64]) -> Camera:
+        from scipy.spatial.transform import Rotation
+
         n = len(self.names)
         values = (float(v) for v in x[:n] * self.scale)
         coefficients: dict[str, Any] = dict(zip(self.names, values, strict=True))

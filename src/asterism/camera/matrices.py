@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import rq
 
 from asterism.checks import check_array, check_number, keep_array
 from asterism.errors import ParameterError
@@ -115,6 +114,8 @@ def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> NDArray
 
 def decomposed(P: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Take a projection matrix apart into K and world to camera; see `Camera.from_matrix`."""
+    from scipy.linalg import rq
+
     matrix = check_array("P", P, (3, 4))
     if np.linalg.matrix_rank(matrix[:, :3]) < 3:
         raise ParameterError("P", "a regular left 3 × 3 part", "a singular one")

@@ -10,8 +10,6 @@ import heapq
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from asterism.camera.depth_image import DepthImage
 from asterism.camera.surfaces import Mesh, Polygon
@@ -96,6 +94,9 @@ def in_painters_order(
     SolverLimit
         If there are more than 2000 faces.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     faces = _faces(surfaces, moment, T_camera_world)
     n = len(faces.names)
     if n > MOST_FACES:

@@ -6,7 +6,6 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from asterism.checks import check_array, check_kind, check_number
 from asterism.errors import ParameterError
@@ -100,6 +99,8 @@ def point_scores(
     The pairing is that of CLEAR-MOT: K. Bernardin, R. Stiefelhagen, EURASIP Journal on Image and
     Video Processing (2008).
     """
+    from scipy.optimize import linear_sum_assignment
+
     check_number("radius", radius, above=0)
     check_kind("points", points, Detections)
     check_kind("truth", truth, Tracks)

@@ -9,7 +9,6 @@ import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from asterism.camera import BrownConrady
 from asterism.errors import FormatError
@@ -126,6 +125,8 @@ def _flat(value: Any) -> Any:
 
 def _rotation(path: Path, place: str, value: Any) -> NDArray[np.float64]:
     """Read a rotation, a Rodrigues vector or a matrix."""
+    from scipy.spatial.transform import Rotation
+
     value = _flat(value)
     if isinstance(value, list) and any(isinstance(row, list) for row in value):
         return nearest_rotation(path, place, as_array(path, place, value, (3, 3)))
@@ -145,6 +146,8 @@ def write(rig: Rig) -> bytes:
     bytes
         The content of the file.
     """
+    from scipy.spatial.transform import Rotation
+
     text = ""
     for i, (camera, name) in enumerate(zip(rig, names_of(rig), strict=True)):
         no_skew(camera, "anipose")

@@ -10,8 +10,6 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from scipy.spatial.transform import Rotation
-
 from asterism.io.calibrations import anipose
 from asterism.io.calibrations.limits import brown_coefficients, names_of, no_skew
 from asterism.io.calibrations.toml_text import table
@@ -62,6 +60,8 @@ def write(rig: Rig) -> bytes:
     bytes
         The content of the file.
     """
+    from scipy.spatial.transform import Rotation
+
     names = names_of(rig)
     matches = [re.fullmatch(r"cam_(0|[1-9]\d{0,5})", name) for name in names]
     numbers = [int(match[1]) if match and all(matches) else i for i, match in enumerate(matches)]

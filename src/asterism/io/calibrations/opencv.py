@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import yaml
-from scipy.spatial.transform import Rotation
 
 from asterism.camera import BrownConrady
 from asterism.errors import FormatError
@@ -211,6 +210,8 @@ def _camera(path: Path, key: str, entry: dict[str, Any], warnings: list[str]) ->
 
 
 def _rotation(path: Path, place: str, value: NDArray[np.float64]) -> NDArray[np.float64]:
+    from scipy.spatial.transform import Rotation
+
     if value.size == 3:
         return Rotation.from_rotvec(value.ravel()).as_matrix()
     if value.size != 9:

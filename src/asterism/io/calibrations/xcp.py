@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from asterism.camera import ViconRadial
 from asterism.errors import FormatError
@@ -74,6 +73,8 @@ def read(path: Path, units: str | None) -> Rig:
 
 
 def _camera(path: Path, place: str, name: str, element: Element, frame: Element) -> Camera:
+    from scipy.spatial.transform import Rotation
+
     def numbers(source: Element, key: str, count: int, otherwise: str | None = None) -> list[float]:
         return split_numbers(path, f"{place}, {key}", source.get(key, otherwise), count)
 
@@ -128,6 +129,8 @@ def write(rig: Rig) -> bytes:
     bytes
         The content of the file.
     """
+    from scipy.spatial.transform import Rotation
+
     root = Element("Cameras", {"VERSION": "1.0"})
     for i, (camera, name) in enumerate(zip(rig, names_of(rig), strict=True)):
         no_skew(camera, "xcp")

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import xlogy
 
 from asterism.records import record
 
@@ -139,6 +138,8 @@ def _share(hits: float, misses: float) -> float:
 
 def _log_likelihood(hits: float, misses: float) -> float:
     """Of a run of chances at the share that fits it best."""
+    from scipy.special import xlogy
+
     n = hits + misses
     return float(xlogy(hits, hits / n) + xlogy(misses, misses / n)) if n else 0.0
 
