@@ -17,27 +17,8 @@ from asterism.cli.filming import film_all, frames_between, names_apart
 from asterism.io.calibrations import read_rig, write_rig
 from asterism.io.observations import read_observations
 from asterism.simulate.rig_presets import is_preset, place_preset
+from tests.cli.runs import refused, run
 from tests.paths import DATA
-
-
-def run(line, capsys):
-    """Run a command that must succeed; give what it printed."""
-    capsys.readouterr()
-    code = main(shlex.split(line))
-    out, err = capsys.readouterr()
-    assert code == 0, err
-    return out
-
-
-def refused(line, capsys):
-    """Run a command that the user can mend; give the line that says how."""
-    capsys.readouterr()
-    code = main(shlex.split(line))
-    out, err = capsys.readouterr()
-    assert code == 2, err
-    assert out == ""
-    assert "Traceback" not in err
-    return err
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import pytest
 import asterism as am
 from asterism.cli import main
 from asterism.cli.plot_kinds import KINDS
+from tests.cli.runs import refused, run
 
 # Of each kind what follows its name, in the folder below.
 LINES = {
@@ -56,49 +57,31 @@ def work(made, tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(line, capsys):
-    capsys.readouterr()
-    code = main(["plot", *line.split()])
-    out, err = capsys.readouterr()
-    assert code == 0, err
-    return out
-
-
-def refused(line, capsys):
-    capsys.readouterr()
-    code = main(["plot", *line.split()])
-    out, err = capsys.readouterr()
-    assert code == 2
-    assert out == ""
-    assert "Traceback" not in err
-    return err
-
-
 def test_every_kind_is_tried():
     assert set(LINES) == set(KINDS)
 
 
 @pytest.mark.parametrize("kind", LINES)
 def test_each_kind_is_drawn_the_same_twice(work, capsys, kind):
-    assert run(f"{kind} {LINES[kind]} -o a.svg", capsys) == "written  a.svg\n"
+    assert run(f"plot {kind} {LINES[kind]} -o a.svg", capsys) == "written  a.svg\n"
     first = (work / "a.svg").read_bytes()
     assert first.startswith(b"<?xml")
-    assert run(f"{kind} {LINES[kind]} -o a.svg --overwrite -q", capsys) == ""
+    assert run(f"plot {kind} {LINES[kind]} -o a.svg --overwrite -q", capsys) == ""
     assert (work / "a.svg").read_bytes() == first
 
 
 @pytest.mark.parametrize("ending", ["pdf", "png", "svg"])
 def test_the_ending_decides(work, capsys, ending):
-    run(f"presence truth.csv -o a.{ending}", capsys)
+    run(f"plot presence truth.csv -o a.{ending}", capsys)
     start = {"pdf": b"%PDF", "png": b"\x89PNG", "svg": b"<?xml"}[ending]
     assert (work / f"a.{ending}").read_bytes().startswith(start)
     assert not list(work.glob(".*"))
 
 
 def test_the_picture_lies_beside_what_it_shows(work, capsys):
-    run("presence truth.csv", capsys)
+    run("plot presence truth.csv", capsys)
     assert (work / "truth.presence.pdf").is_file()
-    made = json.loads(run("presence run --json", capsys))
+    made = json.loads(run("plot presence run --json", capsys))
     assert made["kind"] == "presence"
     assert (work / "run.presence.pdf").is_file()
 
@@ -112,7 +95,7 @@ def test_compare_takes_the_time_from_the_run(work, capsys, monkeypatch):
         return before(scores, milliseconds=milliseconds)
 
     monkeypatch.setattr(am.plot, "plot_compare", plot_compare)
-    run("compare run truth.csv --truth truth.csv -o a.png", capsys)
+    run("plot compare run truth.csv --truth truth.csv -o a.png", capsys)
     summary = json.loads((work / "run/summary.json").read_text())
     assert taken["milliseconds"] == {"run": pytest.approx(1e3 / summary["frames_per_second"])}
     assert taken["scores"]["truth"].idf1 == 1
@@ -123,7 +106,7 @@ def test_errors_are_those_of_the_file(work, capsys, monkeypatch):
     seen = []
     before = am.plot.plot_errors
     monkeypatch.setattr(am.plot, "plot_errors", lambda *a: seen.append(before(*a)) or seen[-1])
-    run("errors truth.csv --truth truth.csv -o a.png", capsys)
+    run("plot errors truth.csv --truth truth.csv -o a.png", capsys)
     (above,) = seen[0].child_axes
     assert above.get_xlabel() == "0 % of the labels wrong"
 
@@ -132,15 +115,15 @@ def test_observations_of_a_film_are_drawn_as_they_are(work, capsys, monkeypatch)
     seen = []
     before = am.plot.plot_projections
     monkeypatch.setattr(am.plot, "plot_projections", lambda *a: seen.extend(a) or before(*a))
-    run("projections film.csv --rig rig.toml -o a.png", capsys)
+    run("plot projections film.csv --rig rig.toml -o a.png", capsys)
     np.testing.assert_array_equal(seen[0].pixels, am.io.read_observations("film.csv").pixels)
     line = "projections film.csv --rig no.toml -o a.png"
-    assert "no.toml: no such file" in refused(line.replace("a.png", "b.png"), capsys)
+    assert "no.toml: no such file" in refused("plot " + line.replace("a.png", "b.png"), capsys)
 
 
 def test_help_lists_every_kind(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
-    text = run("--help", capsys)
+    text = run("plot --help", capsys)
     for name, kind in KINDS.items():
         assert f"{name}  {kind.about[:40]}" in text
     assert "[bold" not in text
@@ -175,7 +158,7 @@ def test_help_lists_every_kind(capsys, monkeypatch):
 )
 def test_what_plot_refuses(work, capsys, line, message):
     before = {path: path.read_bytes() for path in work.rglob("*") if path.is_file()}
-    err = refused(line, capsys)
+    err = refused(f"plot {line}", capsys)
     assert message in err
     assert err.strip().count("\n") == 0
     assert {p: p.read_bytes() for p in work.rglob("*") if p.is_file()} == before
@@ -183,11 +166,13 @@ def test_what_plot_refuses(work, capsys, line, message):
 
 def test_a_folder_that_is_no_run(work, capsys):
     (work / "run/summary.json").write_text("{}")
-    assert "expected a finished run, found no word of its output" in refused("presence run", capsys)
+    assert "expected a finished run, found no word of its output" in refused(
+        "plot presence run", capsys
+    )
 
 
 def test_an_input_is_not_overwritten(work, capsys):
     (work / "truth.csv").rename(work / "truth.pdf")
     shutil.copy(work / "run/in.tracked.csv", work / "a.csv")
-    err = refused("errors a.csv --truth truth.pdf -o truth.pdf", capsys)
+    err = refused("plot errors a.csv --truth truth.pdf -o truth.pdf", capsys)
     assert "the input truth.pdf" in err

@@ -8,32 +8,13 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.cli import main
+from tests.cli.runs import printed, refused
 from tests.io.c3d_bytes import make_c3d
 
 
 @pytest.fixture(autouse=True)
 def _here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-
-
-def run(line, capsys):
-    """Run a command that must succeed; give what it printed and what it reported."""
-    capsys.readouterr()
-    code = main(line.split())
-    out, err = capsys.readouterr()
-    assert code == 0, err
-    return out, err
-
-
-def refused(line, capsys):
-    """Run a command that the user can mend; give the line that says how."""
-    capsys.readouterr()
-    assert main(line.split()) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert "Traceback" not in err
-    return err
 
 
 def walk(n_frames=60, n_points=5, seed=0):
@@ -51,10 +32,10 @@ def write_c3d(path, points, **options):
 def test_bonds_leave_out_channels_without_a_name(tmp_path, capsys):
     labels = ["LASI", "RASI", "SACR", "*12", "Unlabeled 7"]
     write_c3d(tmp_path / "a.c3d", walk(), labels=labels)
-    out, _ = run("bonds a.c3d -o a.toml", capsys)
+    out, _ = printed("bonds a.c3d -o a.toml", capsys)
     assert "2 tracks without a name" in out
     assert "T00" not in (tmp_path / "a.toml").read_text()
-    told = json.loads(run("bonds a.c3d --json", capsys)[0])
+    told = json.loads(printed("bonds a.c3d --json", capsys)[0])
     assert (told["n_markers"], told["n_left_out"], told["n_bonds"]) == (3, 2, 3)
     write_c3d(tmp_path / "b.c3d", walk(), labels=["*0", "*1", "", "U_4", "New 0001"])
     err = refused("bonds b.c3d -o b.toml", capsys)
@@ -68,16 +49,16 @@ def test_a_truncated_capture_is_tracked_and_the_result_says_so(tmp_path, capsys)
     begin = 512 * (int.from_bytes(raw[16:18], "little") - 1)  # of 60 frames of 80 bytes
     (tmp_path / "cut.c3d").write_bytes(raw[: begin + 40 * 80 + 7])
     said = "cut off in frame 41: expected 60 frames, found 40 complete, 1593 bytes are missing"
-    out, err = run("info cut.c3d", capsys)
+    out, err = printed("info cut.c3d", capsys)
     assert said in out
     assert said in err
-    assert said in json.loads(run("info cut.c3d --json", capsys)[0])["truncated"]
-    out, err = run("track cut.c3d -o out.c3d --run runs/a", capsys)
+    assert said in json.loads(printed("info cut.c3d --json", capsys)[0])["truncated"]
+    out, err = printed("track cut.c3d -o out.c3d --run runs/a", capsys)
     assert said in out
     assert f"cut.c3d: {said}" in err
     assert said in json.loads((tmp_path / "runs/a/summary.json").read_text())["truncated"]
-    assert said in run("info out.c3d", capsys)[0]
-    _, err = run("bonds cut.c3d -o a.toml", capsys)
+    assert said in printed("info out.c3d", capsys)[0]
+    _, err = printed("bonds cut.c3d -o a.toml", capsys)
     assert f"cut.c3d: {said}" in err
     (tmp_path / "none.c3d").write_bytes(raw[: begin + 79])
     assert "the first is complete" in refused("info none.c3d", capsys)
@@ -86,7 +67,7 @@ def test_a_truncated_capture_is_tracked_and_the_result_says_so(tmp_path, capsys)
 def test_info_says_what_can_be_said_of_points_without_names(tmp_path, capsys):
     points = walk(30, 4)
     write_c3d(tmp_path / "unlabelled.c3d", points, labels=["*0", "*1", "", "U_7"])
-    out, _ = run("info unlabelled.c3d", capsys)
+    out, _ = printed("info unlabelled.c3d", capsys)
     lines = {line[:17].strip(): line[17:].strip() for line in out.splitlines()}
     assert lines["without a name"] == "4 channels in 4 pieces"
     assert lines["step"].startswith("median ")
@@ -94,11 +75,11 @@ def test_info_says_what_can_be_said_of_points_without_names(tmp_path, capsys):
     assert "another piece of a trajectory" in lines["difficulty"]
     assert "absent" not in lines
     assert "gaps" not in lines
-    run("corrupt unlabelled.c3d -o c.csv --truth t.csv", capsys)
+    printed("corrupt unlabelled.c3d -o c.csv --truth t.csv", capsys)
     for name in ("c.csv", "c.log"):
         if name == "c.log":
             am.write(am.read("c.csv").tracks, name)
-        out, _ = run(f"info {name}", capsys)
+        out, _ = printed(f"info {name}", capsys)
         lines = {line[:17].strip(): line[17:].strip() for line in out.splitlines()}
         assert lines["without a name"] == "120 of 120 points belong to no track"
         assert lines["points a frame"] == "4 to 4, 4 on average"
@@ -107,8 +88,8 @@ def test_info_says_what_can_be_said_of_points_without_names(tmp_path, capsys):
         assert "inf" not in out
         assert "–" not in out
     (tmp_path / "one.csv").write_text("frame,time_s,x_m,y_m,z_m\n1,0,1,2,3\n2,0.01,1,2,3\n")
-    out, _ = run("info one.csv", capsys)
+    out, _ = printed("info one.csv", capsys)
     assert "none: a frame has one at most" in out
     assert "–" not in out
-    told = json.loads(run("info one.csv --json", capsys)[0])
+    told = json.loads(printed("info one.csv --json", capsys)[0])
     assert (told["n_points"], told["nearest_step_99"], told["spacing_50"]) == (2, 0, None)

@@ -12,6 +12,9 @@ LENSES = {
     "report": am.camera.ReportRadial(a1=0.15, a2=0.02),
     "vicon": am.camera.ViconRadial(k1=4e-8, k2=1e-14),
 }
+MODEL = am.multiview.ImageModel(
+    sigma_px=0.3, p_detection=0.9, clutter=0.5, density=5.0, volume=((-2, -2, -2), (2, 2, 2))
+)
 
 
 def random_rig(rng, n: int, lens=None, *, size_px=(1280, 1024)) -> am.Rig:

@@ -176,7 +176,7 @@ def estimate(take: Take, span: Span) -> Estimates:
         there = places[at]
         there[~own[every] & ~is_end] = np.nan  # what is bridged is no truth to choose a way by
         found.append(
-            _carried("body", np.zeros((*every.shape, X.shape[2])), there, is_end, ways,
+            carried_estimate("body", np.zeros((*every.shape, X.shape[2])), there, is_end, ways,
                      room, rigid)
         )  # fmt: skip
         if is_known.sum() >= LEAST_PATTERN:
@@ -187,7 +187,9 @@ def estimate(take: Take, span: Span) -> Estimates:
             base = [pattern.by_fold[fold[:, None], at[:-1]], pattern.by_all[at[-1:]]]
             variances = pattern.variances[at[-1, ~is_end]]
             found.append(
-                _carried("pattern", np.concatenate(base), there, is_end, ways, room, variances)
+                carried_estimate(
+                    "pattern", np.concatenate(base), there, is_end, ways, room, variances
+                )
             )
     return Estimates(
         each=tuple(found),
@@ -278,7 +280,7 @@ class _Room:
         return self.body.to_room(flat + self.mean).reshape(places.shape)
 
 
-def _carried(
+def carried_estimate(
     name: str,
     base: NDArray[np.float64],
     places: NDArray[np.float64],

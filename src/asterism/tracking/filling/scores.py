@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from asterism.tracking.filling.estimates import Estimates
 
-__all__ = ["Fill", "settle"]
+__all__ = ["Fill", "disagreement_factor", "error_profile", "minimum_variance_weights", "settle"]
 
 LEAST_WINDOWS, LEAST_APART = 8, 2
 """Windows that are needed, and so many of them may hide nothing that another hides."""
@@ -67,14 +67,15 @@ def settle(found: Estimates) -> Fill:
     if H < LEAST_WINDOWS or n < LEAST_APART:
         return _at_their_word(values[:, -1], own)
     errors = values[:, :-1] - found.truth
-    weights = _weights(errors)
+    weights = minimum_variance_weights(errors)
     mixed = np.einsum("j,jhld->hld", weights, values)
     off = np.einsum("j,jhld->hld", weights, errors)
-    held_out = _smoothed(_profile(off))
+    held_out = _smoothed(error_profile(off))
     variances = (n * held_out + OWN_WINDOWS * (weights @ own)) / (n + OWN_WINDOWS)
     return Fill(
         points=mixed[-1],
-        stds=np.sqrt(variances) * _doubt(values - mixed, off / np.sqrt(held_out + TINY)[:, None]),
+        stds=np.sqrt(variances)
+        * disagreement_factor(values - mixed, off / np.sqrt(held_out + TINY)[:, None]),
         weights=weights,
         rms=np.sqrt(np.nanmean((errors**2).sum(axis=3), axis=(1, 2))),
         n_windows=n,
@@ -100,7 +101,7 @@ def _at_their_word(values: NDArray[np.float64], own: NDArray[np.float64]) -> Fil
     )
 
 
-def _weights(errors: NDArray[np.float64]) -> NDArray[np.float64]:
+def minimum_variance_weights(errors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Weights ≥ 0 summing to 1 whose mean has the least variance: ``C⁻¹1 / 1ᵀC⁻¹1``.
 
     Of up to three estimators every subset is tried, and the best taken that needs none below 0.
@@ -123,7 +124,7 @@ def _weights(errors: NDArray[np.float64]) -> NDArray[np.float64]:
     return best
 
 
-def _profile(off: NDArray[np.float64]) -> NDArray[np.float64]:
+def error_profile(off: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean square error of a coordinate in each hidden frame, shape (L,).
 
     Where no window knows the truth, by the frames around it.
@@ -143,7 +144,7 @@ def _smoothed(profile: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.maximum((total[2 * k + 1 :] - total[: -2 * k - 1]) / (2 * k + 1), 0)
 
 
-def _doubt(apart: NDArray[np.float64], z: NDArray[np.float64]) -> float:
+def disagreement_factor(apart: NDArray[np.float64], z: NDArray[np.float64]) -> float:
     """How much farther off this fill may be than the windows: as the estimators disagree more.
 
     The log of a window's error is regressed on the log of how far the estimators are apart; before

@@ -1,0 +1,126 @@
+"""Stitching, bonds and names on the command line."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.cli import main
+from tests.cli.runs import refused, run
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A person of whom markers are hidden for a while, beside ghosts; and tracks of gnn alone."""
+    folder = tmp_path_factory.mktemp("recorded")
+    person, p, truth, alone = (
+        str(folder / name) for name in ("person.csv", "p.c3d", "pt.c3d", "alone.c3d")
+    )
+    spoil = "--burst 5:5-60 --ghosts 3:1-10 --noise 0.0003 --seed 1 -q"
+    assert main(["simulate", "person", "-o", person, "--seed=1", "-q"]) == 0
+    assert main(["corrupt", person, "-o", p, "--truth", truth, *spoil.split()]) == 0
+    assert main(["track", p, "--method", "gnn", "-o", alone, "-q"]) == 0
+    return folder
+
+
+@pytest.fixture
+def person(recorded, tmp_path, monkeypatch):
+    """A copy of that folder, to work in."""
+    shutil.copytree(recorded, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_track_finds_hidden_markers_again(person, capsys):
+    out = run("track p.c3d --method gnn -o found.c3d --stitch --run r", capsys)
+    assert "markers found again" in out
+    truth = am.io.read_tracks("pt.c3d")
+    alone, found = (am.evaluate(am.io.read_tracks(f), truth) for f in ("alone.c3d", "found.c3d"))
+    assert found.idf1 > 0.985 > alone.idf1
+    # The run repeats it, and says what the library says.
+    run("track --from r/run.toml -o again.c3d", capsys)
+    assert Path("again.c3d").read_bytes() == Path("found.c3d").read_bytes()
+    model = am.tracking.tracklet_model(am.estimate_model(am.read("p.c3d")).model)
+    expected = am.track(am.read("p.c3d"), am.GNN(), model=model, stitch=True)
+    assert am.evaluate(am.io.read_tracks("found.c3d"), expected).idf1 == 1
+
+
+def test_stitch_says_what_it_joined(scene, person, capsys):
+    out = run("stitch alone.c3d -o markers.c3d", capsys)
+    assert "least sure" in out
+    told = json.loads(run("stitch alone.c3d -o markers.csv --json", capsys))
+    assert told["n_joins"] == len(told["joins"]) > 10
+    assert told["n_tracks"] < told["n_tracks_before"]
+    truth = am.io.read_tracks("pt.c3d")
+    before, after = (
+        am.evaluate(am.io.read_tracks(f), truth).idf1 for f in ("alone.c3d", "markers.c3d")
+    )
+    assert after > 0.98 > before
+    assert run("stitch truth.csv -o quiet.csv -q", capsys) == ""
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("stitch in.csv -o out.csv", "asterism track --stitch"),
+        ("stitch truth.csv -o truth.csv", "a place of its own"),
+        ("stitch truth.csv -o out.csv --confirm 1", "confirm"),
+        ("stitch truth.csv -o out.csv --ghost-radius 0", "--ghost-radius"),
+        ("stitch truth.csv -o out.csv --model none.toml", "none.toml"),
+        ("stitch nothing.csv -o out.csv", "nothing.csv"),
+    ],
+)
+def test_what_stitch_refuses(scene, capsys, line, says):
+    assert says in refused(line, capsys)
+    assert not Path("out.csv").exists()
+
+
+def test_bonds_of_one_take_name_the_next(person, capsys):
+    out = run("bonds person.csv -o subject.toml", capsys)
+    assert "rigid clusters" in out
+    told = json.loads(run("bonds person.csv --json", capsys))
+    assert told["n_bonds"] > told["n_rigid"] > 50
+    assert len(told["clusters"]) > 5
+    run("track p.c3d --stitch -o tracked.c3d", capsys)
+    out = run("name tracked.c3d --bonds subject.toml -o named.c3d", capsys)
+    assert "markers not found" in out
+    truth, named = am.io.read_tracks("person.csv"), am.read("named.c3d")
+    names = [name for name in named.names if name]
+    assert set(names) <= set(truth.names)
+    assert len(names) > 0.95 * truth.n_tracks
+    told = json.loads(run("name tracked.c3d --bonds subject.toml -o n.csv --json", capsys))
+    assert told["n_named"] == len(told["names"]) >= len(names)
+    assert {one["name"] for one in told["names"]} == set(names)
+    # The names are right: each point that has one lies where that marker was.
+    places = truth.positions()
+    number = {name: k for k, name in enumerate(truth.names)}
+    off = [
+        np.linalg.norm(point - places[frame, number[named.names[label]]])
+        for point, frame, label in zip(named.points, named.frame_of, named.labels, strict=True)
+        if label >= 0 and named.names[label]
+    ]
+    assert np.quantile(off, 0.99) < 0.002
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("bonds in.csv", "asterism track"),
+        ("bonds truth.csv -o truth.csv", "a name ending in .toml"),
+        ("bonds truth.csv --neighbours 0", "neighbours"),
+        ("name in.csv --bonds b.toml -o out.csv", "asterism track --stitch"),
+        ("name truth.csv --bonds none.toml -o out.csv", "none.toml"),
+        ("name truth.csv --bonds truth.csv -o out.csv", "TOML"),
+        ("name truth.csv --bonds b.toml -o b.toml", "a name ending in .c3d"),
+        ("name truth.csv -o out.csv", "--bonds"),
+    ],
+)
+def test_what_bonds_and_recognize_refuse(scene, capsys, line, says):
+    if "b.toml" in line:
+        am.learn_bonds(am.io.read_tracks("truth.csv")).to_toml("b.toml")
+    assert says in refused(line, capsys)
