@@ -15,10 +15,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from asterism.filter import predictive_log_densities
 from asterism.model import (
     DWNA,
-    Detections,
     InteractingMotions,
     Motion,
     RandomWalk,
@@ -26,6 +24,7 @@ from asterism.model import (
     Tracks,
 )
 from asterism.records import record
+from asterism.tracking.estimation.likelihood import TrackLikelihood
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,9 +35,6 @@ __all__ = ["WORTH", "FitBounds", "MotionFit", "fit_motion", "fit_one_motion", "p
 
 Kind = Literal["dwna", "random_walk"]
 KINDS: tuple[Kind, ...] = ("dwna", "random_walk")
-FIT_POINTS = 4000
-"""Detections, in whole tracks' pieces spread over the clip, on which the likelihood is computed."""
-PIECE_POINTS = 60
 WORTH = 0.05
 """Nats a detection that a motion must win over a simpler one. The few wrong links that tracks
 contain are jolts to the fit; where there are no others they win less than this."""
@@ -72,6 +68,20 @@ class MotionFit:
     stay: float = 1.0
     kind: Kind = "dwna"
 
+    @property
+    def transitions(self) -> NDArray[np.float64]:
+        """Probability of changing from motion (row) to motion (column) in a step."""
+        if len(self.levels) == 1:
+            return np.ones((1, 1))
+        leave = 1 - self.stay
+        return np.array(
+            [
+                [self.stay, (1 - JOLT) * leave, JOLT * leave],
+                [(1 - JOLT) * leave, self.stay, JOLT * leave],
+                [0.25, 0.25, 0.5],
+            ]
+        )
+
     def motion(self, velocity_sigma: float) -> Motion:
         """Make the motion model; `velocity_sigma` is the prior of a velocity coordinate, m/s."""
         if self.kind == "random_walk":
@@ -81,7 +91,7 @@ class MotionFit:
         )
         if len(models) == 1:
             return models[0]
-        return InteractingMotions(models=models, transitions=_transitions(self.stay))
+        return InteractingMotions(models=models, transitions=self.transitions)
 
 
 @record
@@ -107,17 +117,6 @@ class FitBounds:
             levels=tuple(min(math.exp(x), self.most_acceleration) for x in log_levels),
             stay=stay,
         )
-
-
-def _transitions(stay: float) -> NDArray[np.float64]:
-    leave = 1 - stay
-    return np.array(
-        [
-            [stay, (1 - JOLT) * leave, JOLT * leave],
-            [(1 - JOLT) * leave, stay, JOLT * leave],
-            [0.25, 0.25, 0.5],
-        ]
-    )
 
 
 def fit_motion(
@@ -200,8 +199,7 @@ def polish(
         Standard deviations of the logarithms of the noise and of each level, from the inverse of
         the observed information; None where the likelihood has no summit.
     """
-    sample = _sample(tracks)
-    n = int((sample.lengths - 1).sum())
+    likelihood = TrackLikelihood(tracks, model.velocity_sigma(tracks[0].detections.n_axes))
     first = np.log([fit.noise, *fit.levels])
 
     def at(x: NDArray[np.float64]) -> MotionFit:
@@ -209,11 +207,11 @@ def polish(
         return replace(fit, noise=noise, levels=tuple(levels))
 
     def cost(x: NDArray[np.float64]) -> float:
-        return len(sample.labels) * _cost(sample, model, at(x))
+        return -likelihood.n_points * likelihood.mean(at(x))
 
     # About a standard deviation. Of several motions the likelihood is rough at that scale: a link
     # that none of them foresees is taken by one or by another.
-    h = 1 / math.sqrt(n) if len(fit.levels) == 1 else ROUGH
+    h = 1 / math.sqrt(likelihood.n_links) if len(fit.levels) == 1 else ROUGH
     steps = h * np.eye(len(first))
     middle = cost(first)
     up, down = (np.array([cost(first + sign * e) for e in steps]) for sign in (1, -1))
@@ -250,10 +248,10 @@ def _search(
 ) -> tuple[MotionFit, float]:
     from scipy.optimize import minimize
 
-    sample = _sample(tracks)
+    likelihood = TrackLikelihood(tracks, model.velocity_sigma(tracks[0].detections.n_axes))
 
     def cost(x: NDArray[np.float64]) -> float:
-        return _cost(sample, model, unpack(x))
+        return -likelihood.mean(unpack(x))
 
     found = minimize(
         cost,
@@ -267,54 +265,3 @@ def _search(
         },
     )
     return unpack(found.x), float(found.fun)
-
-
-def _cost(sample: Tracks, model: TrackingModel, fit: MotionFit) -> float:
-    """Minus the mean log density of a detection given the earlier ones of its track."""
-    trial = replace(
-        model,
-        motion=fit.motion(model.velocity_sigma(sample.detections.n_axes)),
-        sensor=replace(model.sensor, noise_sigma=fit.noise),
-    )
-    return -float(predictive_log_densities(sample, trial).mean())
-
-
-def _sample(tracks: list[Tracks]) -> Tracks:
-    """Cut the tracks into pieces of `PIECE_POINTS` and give evenly spread ones, as one capture.
-
-    The runs of frames are laid one after the other; no piece of a track reaches from one to the
-    next, so what lies between them does not matter.
-    """
-    total = sum(int(found.lengths.sum()) for found in tracks)
-    stride = max(1, round(total / FIT_POINTS))
-    times: list[NDArray[np.float64]] = []
-    points: list[NDArray[np.float64]] = []
-    counts: list[NDArray[np.int64]] = []
-    labels: list[NDArray[np.int64]] = []
-    noise: list[NDArray[np.float64]] = []
-    n_cut = n_kept = 0
-    start = 0.0
-    for found in tracks:
-        d = found.detections
-        order, offsets = found.by_track
-        rank = np.arange(len(order)) - np.repeat(offsets[:-1], found.lengths)
-        cut = np.cumsum(rank % PIECE_POINTS == 0) - 1 + n_cut
-        n_cut += len(np.unique(cut))
-        piece = np.full(d.n_points, -1, dtype=np.int64)
-        piece[order[cut % stride == 0]] = np.unique(cut[cut % stride == 0], return_inverse=True)[1]
-        is_kept = piece >= 0
-        labels.append(piece[is_kept] + n_kept)
-        n_kept += int(piece.max(initial=-1)) + 1
-        points.append(d.points[is_kept])
-        if d.covariances is not None:
-            noise.append(d.covariances[is_kept])
-        counts.append(np.bincount(d.frame_of[is_kept], minlength=d.n_frames))
-        times.append(d.times - d.times[0] + start)
-        start = float(times[-1][-1]) + max(d.step, 1e-6)
-    detections = Detections(
-        times=np.concatenate(times),
-        offsets=np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64),
-        points=np.concatenate(points),
-        covariances=np.concatenate(noise) if noise else None,
-    )
-    return Tracks(detections=detections, labels=np.concatenate(labels))
