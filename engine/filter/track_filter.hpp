@@ -83,17 +83,6 @@ inline double score_track(const MotionModel& m, const ScoreModel& sm, const Time
   return s + log_end[left];
 }
 
-// The log density of each detection given the earlier ones; 0 of the first.
-inline void foresee_track(const MotionModel& m, const Timeline& line, std::span<const Point> points,
-                          std::span<const std::int64_t> frames, std::span<double> log_densities) {
-  MotionState state = begin_state(m, points[0]);
-  log_densities[0] = 0;
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    for (std::int64_t t = frames[i - 1] + 1; t <= frames[i]; ++t) predict(m, line.step(t), state);
-    log_densities[i] = update(m, Prediction(m, state), points[i], state);
-  }
-}
-
 // States of every frame from the first to the last detection of a track, modes collapsed, and the
 // log density of each detection but the first (which gets 0). `predicted` are the states before
 // each frame's detection, for the way back.

@@ -30,35 +30,6 @@ MotionModel motion_model(int n_axes, const In<double>& H, const In<double>& P0, 
   return m;
 }
 
-// The points of many tracks, one track after the other, and where each begins.
-struct TrackPoints {
-  std::vector<Point> points;
-  std::span<const std::int64_t> frames, offsets;
-
-  TrackPoints(const In<double>& p, const In<std::int64_t>& f, const In<std::int64_t>& o, int D,
-              std::size_t n_frames)
-      : points(to_points(p, D)), frames(f.data(), f.size()), offsets(o.data(), o.size()) {
-    require(f.ndim() == 1 && frames.size() == points.size(), "frames: shape (N,)");
-    require(o.ndim() == 1 && !offsets.empty() && offsets.front() == 0 &&
-                offsets.back() == static_cast<std::int64_t>(points.size()),
-            "offsets: from 0 to N");
-    for (std::size_t k = 0; k + 1 < offsets.size(); ++k) {
-      require(offsets[k] <= offsets[k + 1], "offsets: rising");
-      for (std::int64_t i = offsets[k]; i < offsets[k + 1]; ++i)
-        require(frames[i] >= 0 && frames[i] < static_cast<std::int64_t>(n_frames) &&
-                    (i == offsets[k] || frames[i] > frames[i - 1]),
-                "frames: rising within a track");
-    }
-  }
-  std::size_t n_tracks() const { return offsets.size() - 1; }
-  std::span<const Point> points_of(std::size_t k) const {
-    return std::span(points).subspan(offsets[k], offsets[k + 1] - offsets[k]);
-  }
-  std::span<const std::int64_t> frames_of(std::size_t k) const {
-    return frames.subspan(offsets[k], offsets[k + 1] - offsets[k]);
-  }
-};
-
 Out<double> score_tracks(const MotionModel& m, const ScoreModel& sm, const In<double>& points,
                          const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
                          const In<double>& times, const In<std::int32_t>& kind,
@@ -74,23 +45,6 @@ Out<double> score_tracks(const MotionModel& m, const ScoreModel& sm, const In<do
           score_track(m, sm, line, tracks.points_of(k), tracks.frames_of(k), log_end);
   }
   return scores.give({tracks.n_tracks()});
-}
-
-Out<double> foresee_tracks(const MotionModel& m, const In<double>& points,
-                           const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
-                           const In<double>& times, const In<std::int32_t>& kind,
-                           const In<double>& F, const In<double>& Q) {
-  const Timeline line = timeline(m, times, kind, F, Q);
-  const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
-  Owned<double> log_densities(tracks.points.size());
-  {
-    nb::gil_scoped_release release;
-    for (std::size_t k = 0; k < tracks.n_tracks(); ++k)
-      if (const auto f = tracks.frames_of(k); !f.empty())
-        foresee_track(m, line, tracks.points_of(k), f,
-                      {log_densities.data.get() + tracks.offsets[k], f.size()});
-  }
-  return log_densities.give({tracks.points.size()});
 }
 
 nb::tuple filter_tracks(const MotionModel& m, const In<double>& points,
@@ -160,8 +114,6 @@ void bind_tracking(nb::module_& module) {
 
   module.def("score_tracks", &score_tracks, "model"_a, "score"_a, "points"_a, "frames"_a,
              "offsets"_a, "times"_a, "kind"_a, "F"_a, "Q"_a);
-  module.def("foresee_tracks", &foresee_tracks, "model"_a, "points"_a, "frames"_a, "offsets"_a,
-             "times"_a, "kind"_a, "F"_a, "Q"_a);
   module.def("filter_tracks", &filter_tracks, "model"_a, "points"_a, "frames"_a, "offsets"_a,
              "times"_a, "kind"_a, "F"_a, "Q"_a, "smooth"_a);
 }

@@ -8,6 +8,7 @@ namespace nb = nanobind;
 NB_MODULE(_engine, module) {
   nb::set_leak_warnings(false);  // what is alive at exit is nobody's loss
   bind_tracking(module);
+  bind_likelihood(module);
   bind_options(module);
   bind_frame(module);
   bind_trees(module);

@@ -4,6 +4,7 @@
 #include <nanobind/nanobind.h>
 
 void bind_tracking(nanobind::module_& module);
+void bind_likelihood(nanobind::module_& module);
 void bind_options(nanobind::module_& module);
 void bind_trees(nanobind::module_& module);
 void bind_mcmc(nanobind::module_& module);

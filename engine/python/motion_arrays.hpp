@@ -62,4 +62,33 @@ inline std::vector<Point> to_points(const In<double>& array, int D) {
   return points;
 }
 
+// The points of many tracks, one track after the other, and where each begins.
+struct TrackPoints {
+  std::vector<Point> points;
+  std::span<const std::int64_t> frames, offsets;
+
+  TrackPoints(const In<double>& p, const In<std::int64_t>& f, const In<std::int64_t>& o, int D,
+              std::size_t n_frames)
+      : points(to_points(p, D)), frames(f.data(), f.size()), offsets(o.data(), o.size()) {
+    require(f.ndim() == 1 && frames.size() == points.size(), "frames: shape (N,)");
+    require(o.ndim() == 1 && !offsets.empty() && offsets.front() == 0 &&
+                offsets.back() == static_cast<std::int64_t>(points.size()),
+            "offsets: from 0 to N");
+    for (std::size_t k = 0; k + 1 < offsets.size(); ++k) {
+      require(offsets[k] <= offsets[k + 1], "offsets: rising");
+      for (std::int64_t i = offsets[k]; i < offsets[k + 1]; ++i)
+        require(frames[i] >= 0 && frames[i] < static_cast<std::int64_t>(n_frames) &&
+                    (i == offsets[k] || frames[i] > frames[i - 1]),
+                "frames: rising within a track");
+    }
+  }
+  std::size_t n_tracks() const { return offsets.size() - 1; }
+  std::span<const Point> points_of(std::size_t k) const {
+    return std::span(points).subspan(offsets[k], offsets[k + 1] - offsets[k]);
+  }
+  std::span<const std::int64_t> frames_of(std::size_t k) const {
+    return frames.subspan(offsets[k], offsets[k + 1] - offsets[k]);
+  }
+};
+
 }  // namespace asterism

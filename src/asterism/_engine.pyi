@@ -19,6 +19,26 @@ class MotionModel:
     @property
     def n_axes(self) -> int: ...
 
+class MotionLikelihood:
+    def __init__(
+        self,
+        *,
+        n_axes: int,
+        points: NDArray[np.float64],
+        frames: NDArray[np.int64],
+        offsets: NDArray[np.int64],
+        kind: NDArray[np.int32],
+        steps: NDArray[np.float64],
+    ) -> None: ...
+    def sum(
+        self,
+        *,
+        squares: NDArray[np.float64],
+        transitions: NDArray[np.float64],
+        variance: float,
+        velocity_variance: float,
+    ) -> float: ...
+
 class ScoreModel:
     def __init__(
         self,
@@ -333,16 +353,6 @@ class MatrixTracker(_Tracker):
 def score_tracks(
     model: MotionModel,
     score: ScoreModel,
-    points: NDArray[np.float64],
-    frames: NDArray[np.int64],
-    offsets: NDArray[np.int64],
-    times: NDArray[np.float64],
-    kind: NDArray[np.int32],
-    F: NDArray[np.float64],
-    Q: NDArray[np.float64],
-) -> NDArray[np.float64]: ...
-def foresee_tracks(
-    model: MotionModel,
     points: NDArray[np.float64],
     frames: NDArray[np.int64],
     offsets: NDArray[np.int64],

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.filter import predictive_log_densities
 from tests.references.filters import imm_log_densities, kalman, rts
 from tests.scenes import interacting, small_model, wanderers
 
@@ -55,15 +54,6 @@ def test_interacting_motions_are_weighed_as_by_the_plain_formulas(n_axes):
     for _, frames, points, members in tracks_of(truth):
         expected = imm_log_densities(model, truth.detections.times, frames, points)
         assert np.allclose(states.log_densities[members], expected, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize("motion", [am.RandomWalk(walk_sigma=0.3), interacting()])
-def test_densities_alone_are_those_of_the_filter(motion):
-    truth = wanderers(np.random.default_rng(5), missing=0.2, clutter=1, irregular=True)
-    model = small_model(motion=motion)
-    alone = predictive_log_densities(truth, model)
-    np.testing.assert_array_equal(alone, am.filter.filter_states(truth, model).log_densities)
-    assert (alone != 0).sum() == (truth.lengths - 1).sum()
 
 
 def test_alike_modes_are_one_mode():

@@ -2,7 +2,7 @@
 
 from asterism.filter.expected import expected_positions
 from asterism.filter.gates import GateGroups, gate_groups
-from asterism.filter.kalman import States, filter_states, predictive_log_densities, smooth_states
+from asterism.filter.kalman import States, filter_states, smooth_states
 
 __all__ = [
     "GateGroups",
@@ -10,6 +10,5 @@ __all__ = [
     "expected_positions",
     "filter_states",
     "gate_groups",
-    "predictive_log_densities",
     "smooth_states",
 ]

@@ -18,7 +18,7 @@ from asterism.records import record
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["States", "filter_states", "predictive_log_densities", "smooth_states"]
+__all__ = ["States", "filter_states", "smooth_states"]
 
 
 @record(eq=False)
@@ -92,24 +92,6 @@ def _states(tracks: Tracks, model: TrackingModel, *, smoothed: bool) -> States:
         first_frames=first,
         log_densities=_of_detections(tracks, densities),
     )
-
-
-def predictive_log_densities(tracks: Tracks, model: TrackingModel) -> NDArray[np.float64]:
-    """Log density of each detection given its track's earlier ones, as in `filter_states`.
-
-    Parameters
-    ----------
-    tracks : Tracks
-        The tracks.
-    model : TrackingModel
-        Its motion and its noise are used.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        ``log N(y; ŷ, S)``; 0 at a track's first detection and for clutter.
-    """
-    return _of_detections(tracks, _engine.foresee_tracks(*_for_engine(tracks, model)))
 
 
 def filter_states(tracks: Tracks, model: TrackingModel) -> States:

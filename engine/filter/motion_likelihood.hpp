@@ -1,0 +1,304 @@
+// The likelihood of tracks under motions that differ in the size of their process noise alone, for
+// fits that evaluate it hundreds of times. The same interacting-multiple-model filter as in imm.hpp,
+// written for two states an axis and several tracks abreast.
+//
+//   x, v    position and velocity of a mode       p = [p00 p01; p01 p11] its covariance, of every axis
+//   w       probability of a mode                 q    process noise of a step at level 1
+//   S       innovation variance p00 + r           T    probabilities of changing between modes
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <numbers>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "filter/imm.hpp"
+
+namespace asterism {
+
+// As many tracks are filtered abreast as every 64-bit processor's vectors hold numbers: each line
+// becomes one instruction.
+inline constexpr int kLanes = 2;
+
+struct Lanes {
+  std::array<double, kLanes> at{};
+
+  Lanes() = default;
+  Lanes(double value) { at.fill(value); }  // a number stands for one in every lane
+
+  friend Lanes operator+(Lanes a, const Lanes& b) {
+    for (int i = 0; i < kLanes; ++i) a.at[i] += b.at[i];
+    return a;
+  }
+  friend Lanes operator-(Lanes a, const Lanes& b) {
+    for (int i = 0; i < kLanes; ++i) a.at[i] -= b.at[i];
+    return a;
+  }
+  friend Lanes operator*(Lanes a, const Lanes& b) {
+    for (int i = 0; i < kLanes; ++i) a.at[i] *= b.at[i];
+    return a;
+  }
+  friend Lanes operator/(Lanes a, const Lanes& b) {
+    for (int i = 0; i < kLanes; ++i) a.at[i] /= b.at[i];
+    return a;
+  }
+};
+
+// e to the power of x ≤ 0 to 2e-16 of it, in instructions that the compiler can do abreast, which it
+// cannot with std::exp: 2^k times the Taylor series of the rest, which is at most ½ log 2.
+inline Lanes exp_of_negative(const Lanes& x) {
+  constexpr double kRound = 6755399441055744.0;  // 1.5 · 2^52: adding it rounds to a whole number
+  constexpr double kLn2High = 0x1.62e42fefap-1, kLn2Low = 0x1.cf79abc9e3b39803p-40;
+  Lanes result;
+  for (int i = 0; i < kLanes; ++i) {
+    const double y = x.at[i] < -700 ? -700 : x.at[i];
+    const double rounded = y * std::numbers::log2e + kRound;
+    const double k = rounded - kRound;
+    const double r = (y - k * kLn2High) - k * kLn2Low;
+    double sum = 1.0 / 6227020800;
+    for (const double factorial : {479001600.0, 39916800.0, 3628800.0, 362880.0, 40320.0, 5040.0,
+                                   720.0, 120.0, 24.0, 6.0, 2.0, 1.0, 1.0})
+      sum = sum * r + 1 / factorial;
+    const auto exponent = (std::bit_cast<std::uint64_t>(rounded) + 1023) << 52;
+    result.at[i] = sum * std::bit_cast<double>(exponent);
+  }
+  return result;
+}
+
+// The step between two frames at level 1: F = [1 dt; 0 1] and its process noise. A random walk has
+// dt = 0 and no noise of the velocity.
+struct UnitStep {
+  double dt = 0, q00 = 0, q01 = 0, q11 = 0;
+};
+
+struct LeveledMotion {
+  int M = 1;
+  std::array<double, kMaxModes> squares{};  // of the levels
+  std::array<double, kMaxModes * kMaxModes> T{1.0};  // row stride M
+  std::array<double, kMaxModes> w0{1.0};
+  double r = 0;                  // variance of a measured coordinate
+  double velocity_variance = 0;  // prior
+};
+
+class MotionLikelihood {
+ public:
+  // The points and frames of tracks, one track after the other, and the kind of step that leads to each frame.
+  MotionLikelihood(int D, std::span<const Point> points, std::span<const std::int64_t> frames,
+                   std::span<const std::int64_t> offsets, std::span<const std::int32_t> kind,
+                   std::vector<UnitStep> steps)
+      : D_(D), steps_(std::move(steps)) {
+    const auto length = [&](std::int64_t k) {
+      return offsets[k] < offsets[k + 1] ? frames[offsets[k + 1] - 1] - frames[offsets[k]] : 0;
+    };
+    std::vector<std::int64_t> order(offsets.size() - 1);
+    std::iota(order.begin(), order.end(), 0);
+    // Tracks of one length go abreast, so that few lanes wait for others.
+    std::ranges::stable_sort(order, std::greater<>(), length);
+    for (std::size_t begin = 0; begin < order.size() && length(order[begin]) > 0; begin += kLanes) {
+      const std::size_t end = std::min(order.size(), begin + kLanes);
+      Group group;
+      group.steps.resize(length(order[begin]));
+      for (std::size_t i = begin; i < end; ++i)
+        if (length(order[i]) > 0)
+          fill(group, i - begin, points, frames, kind, offsets[order[i]], offsets[order[i] + 1]);
+      groups_.push_back(std::move(group));
+    }
+  }
+
+  // The sum of the log densities of all detections given the earlier ones of their track.
+  double sum(const LeveledMotion& m) const {
+    double total = 0;
+    for (const Group& group : groups_)
+      total += m.M == 1 ? sum_of<1>(m, group) : m.M == 2 ? sum_of<2>(m, group) : sum_of<3>(m, group);
+    return total;
+  }
+
+ private:
+  struct Observation {
+    std::array<Lanes, kMaxAxes> y{};
+    Lanes r, seen;                          // 1 where there is a detection
+    std::array<std::int32_t, kLanes> kind{};
+  };
+  struct Group {
+    std::array<Lanes, kMaxAxes> first{};
+    Lanes first_r;
+    std::vector<Observation> steps;
+  };
+  template <int M>
+  struct Modes {
+    std::array<Lanes, M> w{}, p00{}, p01{}, p11{};
+    std::array<std::array<Lanes, kMaxAxes>, M> x{}, v{};
+  };
+
+  static void fill(Group& group, std::size_t lane, std::span<const Point> points,
+                   std::span<const std::int64_t> frames, std::span<const std::int32_t> kind,
+                   std::int64_t begin, std::int64_t end) {
+    for (int d = 0; d < kMaxAxes; ++d) group.first[d].at[lane] = points[begin][d];
+    group.first_r.at[lane] = points[begin].r;
+    for (std::int64_t i = begin + 1; i < end; ++i) {
+      Observation& o = group.steps[frames[i] - frames[begin] - 1];
+      for (int d = 0; d < kMaxAxes; ++d) o.y[d].at[lane] = points[i][d];
+      o.r.at[lane] = points[i].r;
+      o.seen.at[lane] = 1;
+    }
+    for (std::int64_t t = frames[begin] + 1; t <= frames[end - 1]; ++t)
+      group.steps[t - frames[begin] - 1].kind[lane] = kind[t];
+  }
+
+  template <int M>
+  double sum_of(const LeveledMotion& m, const Group& group) const {
+    Modes<M> s;
+    for (int b = 0; b < M; ++b) {
+      s.w[b] = m.w0[b];
+      s.x[b] = group.first;
+      s.p00[b] = Lanes(m.r) + group.first_r;
+      s.p11[b] = m.velocity_variance;
+    }
+    Lanes total;
+    for (const Observation& o : group.steps) {
+      if constexpr (M > 1) mix(m, s);
+      predict(m, o, s);
+      total = total + update(m, o, s);
+    }
+    return std::accumulate(total.at.begin(), total.at.end(), 0.0);
+  }
+
+  // Each mode begins a step with the mixture of those that may lead to it. Means and covariances are
+  // summed relative to the first mode, so that little is lost where the modes lie close.
+  template <int M>
+  void mix(const LeveledMotion& m, Modes<M>& s) const {
+    const Modes<M> before = s;
+    Modes<M> e;  // of each mode less the first; covariances with the spread of the means
+    const Lanes axes = 1.0 / D_;
+    const auto spread = [&](const auto& x, const auto& v, Lanes& xx, Lanes& xv, Lanes& vv) {
+      xx = xv = vv = 0.0;
+      for (int d = 0; d < kMaxAxes; ++d) {
+        xx = xx + x[d] * x[d];
+        xv = xv + x[d] * v[d];
+        vv = vv + v[d] * v[d];
+      }
+      xx = xx * axes;
+      xv = xv * axes;
+      vv = vv * axes;
+    };
+    for (int a = 1; a < M; ++a) {
+      for (int d = 0; d < kMaxAxes; ++d) {
+        e.x[a][d] = before.x[a][d] - before.x[0][d];
+        e.v[a][d] = before.v[a][d] - before.v[0][d];
+      }
+      spread(e.x[a], e.v[a], e.p00[a], e.p01[a], e.p11[a]);
+      e.p00[a] = e.p00[a] + before.p00[a];
+      e.p01[a] = e.p01[a] + before.p01[a];
+      e.p11[a] = e.p11[a] + before.p11[a];
+    }
+    for (int b = 0; b < M; ++b) {
+      std::array<Lanes, M> share;
+      Lanes sum;
+      for (int a = 0; a < M; ++a) sum = sum + (share[a] = before.w[a] * m.T[a * M + b]);
+      const Lanes inverse = Lanes(1.0) / sum;
+      s.w[b] = sum;
+      std::array<Lanes, kMaxAxes> dx{}, dv{};
+      const Lanes own = share[0] * inverse;
+      Lanes p00 = own * before.p00[0], p01 = own * before.p01[0], p11 = own * before.p11[0];
+      for (int a = 1; a < M; ++a) {
+        const Lanes part = share[a] * inverse;
+        for (int d = 0; d < kMaxAxes; ++d) {
+          dx[d] = dx[d] + part * e.x[a][d];
+          dv[d] = dv[d] + part * e.v[a][d];
+        }
+        p00 = p00 + part * e.p00[a];
+        p01 = p01 + part * e.p01[a];
+        p11 = p11 + part * e.p11[a];
+      }
+      Lanes xx, xv, vv;
+      spread(dx, dv, xx, xv, vv);
+      for (int d = 0; d < kMaxAxes; ++d) {
+        s.x[b][d] = before.x[0][d] + dx[d];
+        s.v[b][d] = before.v[0][d] + dv[d];
+      }
+      s.p00[b] = p00 - xx;
+      s.p01[b] = p01 - xv;
+      s.p11[b] = p11 - vv;
+    }
+  }
+
+  template <int M>
+  void predict(const LeveledMotion& m, const Observation& o, Modes<M>& s) const {
+    Lanes dt, q00, q01, q11;
+    for (int i = 0; i < kLanes; ++i) {
+      const UnitStep& step = steps_[o.kind[i]];
+      dt.at[i] = step.dt;
+      q00.at[i] = step.q00;
+      q01.at[i] = step.q01;
+      q11.at[i] = step.q11;
+    }
+    for (int b = 0; b < M; ++b) {
+      for (int d = 0; d < kMaxAxes; ++d) s.x[b][d] = s.x[b][d] + dt * s.v[b][d];
+      const Lanes moved = s.p01[b] + dt * s.p11[b];
+      s.p00[b] = s.p00[b] + dt * (s.p01[b] + moved) + q00 * m.squares[b];
+      s.p01[b] = moved + q01 * m.squares[b];
+      s.p11[b] = s.p11[b] + q11 * m.squares[b];
+    }
+  }
+
+  // Takes the detections of a step; returns their log densities, 0 in lanes without one.
+  template <int M>
+  Lanes update(const LeveledMotion& m, const Observation& o, Modes<M>& s) const {
+    const Lanes r = Lanes(m.r) + o.r;
+    std::array<Lanes, M> S, inverse, half;  // half a NIS
+    std::array<std::array<Lanes, kMaxAxes>, M> innovation;
+    for (int b = 0; b < M; ++b) {
+      S[b] = s.p00[b] + r;
+      inverse[b] = Lanes(1.0) / S[b];
+      Lanes square;
+      for (int d = 0; d < kMaxAxes; ++d) {
+        innovation[b][d] = o.y[d] - s.x[b][d];
+        square = square + innovation[b][d] * innovation[b][d];
+      }
+      half[b] = square * inverse[b] * 0.5;
+    }
+    Lanes nearest = half[0], sum;
+    for (int b = 1; b < M; ++b)
+      for (int i = 0; i < kLanes; ++i) nearest.at[i] = std::min(nearest.at[i], half[b].at[i]);
+    std::array<Lanes, M> each;
+    for (int b = 0; b < M; ++b) {
+      each[b] = inverse[b];
+      if (D_ == 3)
+        for (int i = 0; i < kLanes; ++i) each[b].at[i] *= std::sqrt(inverse[b].at[i]);
+      if constexpr (M > 1) each[b] = each[b] * s.w[b] * exp_of_negative(nearest - half[b]);
+      sum = sum + each[b];
+    }
+    Lanes log_density;
+    const double constant = -0.5 * D_ * std::log(2 * std::numbers::pi);
+    for (int i = 0; i < kLanes; ++i)
+      if (o.seen.at[i] > 0) log_density.at[i] = constant + std::log(sum.at[i]) - nearest.at[i];
+    for (int b = 0; b < M; ++b) {
+      if constexpr (M > 1)
+        for (int i = 0; i < kLanes; ++i)
+          if (o.seen.at[i] > 0) s.w[b].at[i] = std::max(each[b].at[i] / sum.at[i], 1e-300);
+      const Lanes gain = inverse[b] * o.seen;
+      const Lanes k0 = s.p00[b] * gain, k1 = s.p01[b] * gain;
+      for (int d = 0; d < kMaxAxes; ++d) {
+        s.x[b][d] = s.x[b][d] + k0 * innovation[b][d];
+        s.v[b][d] = s.v[b][d] + k1 * innovation[b][d];
+      }
+      s.p11[b] = s.p11[b] - k1 * s.p01[b];
+      const Lanes left = Lanes(1.0) - k0;
+      s.p00[b] = s.p00[b] * left;
+      s.p01[b] = s.p01[b] * left;
+    }
+    return log_density;
+  }
+
+  int D_;
+  std::vector<UnitStep> steps_;
+  std::vector<Group> groups_;
+};
+
+}  // namespace asterism
