@@ -63,7 +63,7 @@ WORK = {
     "asterism.cli.commands.camera": ("read_calibration",),
     "asterism.cli.commands.camera_map": ("read_calibration",),
     "asterism.cli.commands.demo": ("_experiment",),
-    "asterism.reproduction.parts": ("load",),
+    "asterism.reproduction": ("load",),
     "asterism.io.calibrations.files": ("read_rig",),
     "asterism.tracking.rigidity.bonds": ("read_toml",),
 }

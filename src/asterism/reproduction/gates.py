@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.plot.style import CYCLE, INK, new_axes
-from asterism.reproduction.part import Claim, Outcome, Part, Picture, Table
+from asterism.reproduction.part import Outcome, Part, Table
 from asterism.reproduction.rules import exact
 from asterism.solve import joint_marginals
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from asterism.reproduction.part import Effort, Tell
-
-P_DETECTION, CLUTTER = 0.9, 0.05  # the latter a unit of area
+P_DETECTION, CLUTTER = 0.9, 0.05  # the latter per unit of area
 GATE = 9.21  # χ² of two degrees of freedom at 1 %
 # Figure 2.1 in kind: predictions, standard deviations along the axes, and measurements.
 TARGETS = np.array([[0.0, 0.0], [2.2, 0.3]])
@@ -28,20 +26,19 @@ LARGEST = 5
 TOLERANCE = 1e-12
 
 
-def run(effort: Effort, tell: Tell) -> Outcome:
-    """Sum over joint events by enumeration and by elimination; show the case of figure 2.1."""
-    error, cases, doubled = 0.0, 0, 0.0
-    for seed in range(effort.seeds):
+def run(seeds: int) -> Outcome:
+    """Sum over joint events by enumeration and by elimination; take the case of figure 2.1."""
+    error = doubled = 0.0
+    cases = list(itertools.product(range(seeds), range(1, LARGEST), range(1, LARGEST + 1)))
+    for seed, same in itertools.groupby(cases, lambda case: case[0]):
         rng = np.random.default_rng(seed)
-        for n, m in itertools.product(range(1, LARGEST), range(1, LARGEST + 1)):
+        for _, n, m in same:
             log_w = rng.normal(0, 2, (n, m))
             log_w[rng.random((n, m)) < 0.3] = -np.inf
             log_miss = rng.normal(-2, 1, n)
             found = joint_marginals(log_w, log_miss).marginals
             error = max(error, float(np.abs(found - _enumerated(log_w, log_miss)).max()))
-            doubled = max(doubled, float(found[:, :-1].sum(axis=0).max()))
-            cases += 1
-        tell((seed + 1) / effort.seeds)
+            doubled = max(doubled, float(found[:, :-1].sum(axis=0).max()) - 1)
     log_w = _log_weights()
     log_miss = np.full(len(TARGETS), np.log(1 - P_DETECTION))
     joint = joint_marginals(log_w, log_miss).marginals
@@ -51,28 +48,20 @@ def run(effort: Effort, tell: Tell) -> Outcome:
         for t in range(len(TARGETS))
         for name, marginals in (("each target alone (PDA)", alone), ("jointly (JPDA)", joint))
     ]
-    common = float(alone[:, 1].sum())
+    common = alone[:, 1].sum()
     claims = [
-        Claim(
-            "marginals are sums over all joint events", "an identity", f"differ by {error:.1e}",
-            exact(error, TOLERANCE, "greatest difference from enumeration", cases),
-        ),
-        Claim(
-            "no measurement is more than once somebody's", "an identity",
-            f"at most {doubled:.3f} targets",
-            exact(max(0.0, doubled - 1), TOLERANCE, "greatest excess over one target", cases),
-        ),
-        Claim(
-            "by itself PDA gives a common measurement away twice", "Fig. 2.1",
-            f"{common:.3f} targets have it",
-            exact(float(common <= 1), 0, "number that do not", 1),
-        ),
+        exact("marginals are sums over all joint events", "an identity", error,
+              "greatest difference from enumeration", len(cases), TOLERANCE),
+        exact("no measurement belongs to more than one target", "an identity", max(0.0, doubled),
+              "greatest excess over one target", len(cases), TOLERANCE),
+        exact(f"PDA for each target assigns a common measurement twice (in all {common:.3f})",
+              "figure 2.1", float(common <= 1), "number of cases without", 1),
     ]  # fmt: skip
     head = ["figure 2.1", "y₁", "y₂, common", "y₃", "none"]
     return Outcome(
         claims=claims,
         tables=[Table("Probability that a measurement is a target's", head, rows)],
-        pictures=[Picture("report_gates", CAPTION, _draw(joint))],
+        figure=_draw(joint),
     )
 
 
@@ -85,7 +74,7 @@ def _log_weights() -> NDArray[np.float64]:
 
 
 def _enumerated(log_w: NDArray[np.float64], log_miss: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the marginals by listing every joint event."""
+    """Return the marginals by listing every joint event."""
     n, m = log_w.shape
     total = np.zeros((n, m + 1))
     weights = np.exp(np.column_stack([log_w, log_miss]))
@@ -96,47 +85,41 @@ def _enumerated(log_w: NDArray[np.float64], log_miss: NDArray[np.float64]) -> ND
     return total / total.sum(axis=1, keepdims=True)
 
 
-def _draw(joint: NDArray[np.float64]) -> Figure:
+def _draw(joint: NDArray[np.float64]) -> Axes:
     from matplotlib.patches import Ellipse
 
     axes: Any = new_axes(height=3.6)
     for t, (place, sigma) in enumerate(zip(TARGETS, SIGMA, strict=True)):
         width, height = 2 * np.sqrt(GATE) * sigma
-        for fill in (True, False):
-            axes.add_patch(
-                Ellipse(tuple(place), width, height, fill=fill, alpha=0.12 if fill else 1.0,
-                        facecolor=CYCLE[t] if fill else "none", edgecolor=CYCLE[t])
-            )  # fmt: skip
-        axes.plot(*place, marker="+", markersize=11, color=CYCLE[t], linestyle="none")
+        colour = CYCLE[t]
+        axes.add_patch(Ellipse(place, width, height, alpha=0.12, facecolor=colour))
+        axes.add_patch(Ellipse(place, width, height, fill=False, edgecolor=colour))
+        axes.plot(*place, marker="+", markersize=11, color=colour, linestyle="none")
         axes.annotate(f"ŷ {'AB'[t]}", place, xytext=(6, -14), textcoords="offset points",
-                      color=CYCLE[t])  # fmt: skip
+                      color=colour)  # fmt: skip
     for j, y in enumerate(MEASUREMENTS):
         axes.plot(*y, marker="o", color=INK, linestyle="none")
-        told = "\n".join(
-            f"{'AB'[t]}: {joint[t, j]:.2f}" for t in range(len(TARGETS)) if joint[t, j] > 0
-        )
-        axes.annotate(f"y{'₁₂₃'[j]}  {told}", y, xytext=(7, 5), textcoords="offset points",
+        shares = "\n".join(f"{'AB'[t]}: {p:.2f}" for t, p in enumerate(joint[:, j]) if p > 0)
+        axes.annotate(f"y{'₁₂₃'[j]}  {shares}", y, xytext=(7, 5), textcoords="offset points",
                       fontsize=9, color=INK)  # fmt: skip
     axes.set_aspect("equal")
     axes.autoscale_view()
     axes.set_axis_off()
-    return axes.figure
+    return axes
 
-
-CAPTION = (
-    "The report's figure 2.1: two targets with their validation regions (1 %) and a common "
-    "measurement y₂; beside each measurement the probability that it is A's or B's, jointly."
-)
 
 PART = Part(
+    name="gates",
     title="JPDA: two targets with a common measurement",
     section="§2.1",
     covers="figure 2.1",
-    did="States the joint association events and that a marginal is the sum over all joint events "
-    "in which it occurs; a measurement in two validation regions disturbs what treats each target "
-    "by itself.",
+    summary="States the joint association events and that a marginal is the sum over all joint "
+    "events in which it occurs; a measurement in two validation regions disturbs a filter that "
+    "treats each target separately.",
     run=run,
-    chosen=(
-        "The places of figure 2.1, which has no scale; P_d = 0.9, clutter 0.05 a unit of area.",
+    caption="The report's figure 2.1: two targets with their validation regions (1 %) and a common "
+    "measurement y₂; beside each measurement the joint probability that it is A's or B's.",
+    assumptions=(
+        "The places of figure 2.1, which has no scale; P_d = 0.9, clutter 0.05 per unit of area.",
     ),
 )

@@ -1,49 +1,29 @@
-"""What a part of the reproduction is, and what it gives."""
+"""What a part of the reproduction states, and what its run returns."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from asterism.reproduction.rules import Verdict
-
-__all__ = ["Claim", "Effort", "Made", "Outcome", "Part", "Picture", "Table", "Tell", "Timing"]
-
-Tell = Callable[[float], object]
-"""To be told which share of a part is done."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Effort:
-    """How much is done.
-
-    Parameters
-    ----------
-    seeds : int
-        Of everything that is drawn, 0 to `seeds` - 1.
-    is_quick : bool
-        Whether sizes other than the number of seeds are small too.
-    """
-
-    seeds: int
-    is_quick: bool
+__all__ = ["Claim", "Outcome", "Part", "Table", "Timing"]
 
 
 class Claim(NamedTuple):
-    """One figure or statement of the report beside ours."""
+    """A figure or statement of the report, the measurement and the verdict of a rule."""
 
     about: str
-    theirs: str
-    ours: str
-    verdict: Verdict
-    floor: str = "–"
-    """The best that is possible with these data, where that is not the perfect answer."""
+    reported: str
+    measured: str
+    oracle: str
+    reproduced: bool
+    rule: str
+    because: str
 
 
 class Table(NamedTuple):
@@ -54,87 +34,58 @@ class Table(NamedTuple):
     rows: Sequence[Sequence[str]]
 
 
-class Picture(NamedTuple):
-    """A figure with the name of its files."""
-
-    name: str
-    caption: str
-    figure: Figure
-
-
 class Timing(NamedTuple):
-    """How long something took; kept apart, as it differs from run to run."""
+    """A duration; kept apart from the tables because it differs from run to run."""
 
     about: str
-    theirs: str
+    reported: str
     seconds: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What a part found.
-
-    Parameters
-    ----------
-    claims : sequence of Claim
-        What the report says, and whether it is so.
-    tables : sequence of Table
-        What the verdicts come from.
-    pictures : sequence of Picture
-        The report's figures, made anew.
-    notes : sequence of str
-        What was found beside that; `code` in backticks.
-    timings : sequence of Timing
-        For the page of times.
-    """
+    """Results of a part: its claims, tables, figure and timings."""
 
     claims: Sequence[Claim]
     tables: Sequence[Table] = ()
-    pictures: Sequence[Picture] = ()
-    notes: Sequence[str] = ()
+    figure: Figure | Axes | Sequence[Axes] | None = None
     timings: Sequence[Timing] = ()
+
+    @property
+    def n_reproduced(self) -> str:
+        """Return how many of the claims were reproduced, as "2 of 3"."""
+        return f"{sum(c.reproduced for c in self.claims)} of {len(self.claims)}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """A piece of the report.
+    """A piece of the report; text in backticks is code.
 
     Parameters
     ----------
-    title : str
-        What it is about.
-    section : str
-        Where it stands in the report, such as "§3.1".
+    name : str
+        Of the module, the files and the anchor.
+    title, section : str
+        Heading, and the place in the report, such as "§3.1".
     covers : str
-        The report's figures, tables and algorithms that are made anew here.
-    did : str
+        The report's figures, tables and algorithms that are reproduced.
+    summary : str
         What the report did.
     run : callable
-        Makes it anew; takes the effort and whom to tell how far it is.
-    slips : tuple of str
-        Where the report is mistaken or contradicts itself.
-    chosen : tuple of str
-        What was decided here because the report does not say it.
+        Takes the number of seeds, which are 0, 1, …
+    caption : str
+        Of the figure, if there is one.
+    notes, mistakes, assumptions : tuple of str
+        Remarks; errors of the report; choices that the report leaves open.
     """
 
+    name: str
     title: str
     section: str
     covers: str
-    did: str
-    run: Callable[[Effort, Tell], Outcome]
-    slips: tuple[str, ...] = ()
-    chosen: tuple[str, ...] = ()
-
-
-class Made(NamedTuple):
-    """A part that is finished."""
-
-    name: str
-    part: Part
-    outcome: Outcome
-
-    @property
-    def counts(self) -> tuple[int, int]:
-        """How many claims were reproduced, and how many there are."""
-        claims = self.outcome.claims
-        return sum(c.verdict.holds for c in claims), len(claims)
+    summary: str
+    run: Callable[[int], Outcome]
+    caption: str = ""
+    notes: tuple[str, ...] = ()
+    mistakes: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()

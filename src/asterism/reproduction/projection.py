@@ -1,4 +1,4 @@
-"""§3.1: the pin-hole, from the world to pixels."""
+"""§3.1: the pin-hole camera, from the world to pixels."""
 
 from __future__ import annotations
 
@@ -9,58 +9,45 @@ import numpy as np
 import asterism as am
 from asterism.plot import plot_image
 from asterism.plot.style import CLUTTER, CYCLE, INK
-from asterism.reproduction.part import Claim, Outcome, Part, Picture, Table
+from asterism.reproduction.drawing import titled
+from asterism.reproduction.part import Outcome, Part
 from asterism.reproduction.rules import exact
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from asterism.reproduction.part import Effort, Tell
-
 N_POINTS = 1000
-TOLERANCE_PX = 1e-6
+TOLERANCE_PX, TOLERANCE_M = 1e-6, 1e-12
 SIZE = (1280, 1024)
 # A lens of 8 mm before pixels of 5 µm.
 FOCAL_M, PIXEL_M = 0.008, 5e-6
 
 
-def run(effort: Effort, tell: Tell) -> Outcome:
+def run(seeds: int) -> Outcome:
     """Project by the report's matrices and by the camera, and compare."""
     worst = similar = turned = 0.0
-    for seed in range(effort.seeds):
-        rng = np.random.default_rng(seed)
-        camera, points = _drawn(rng)
-        theirs = by_matrices(camera, points)
-        ours = camera.project(points).pixels
-        worst = max(worst, float(np.abs(theirs - ours).max()))
+    for seed in range(seeds):
+        camera, points = _draw_case(np.random.default_rng(seed))
+        difference = by_matrices(camera, points) - camera.project(points).pixels
+        worst = max(worst, float(np.abs(difference).max()))
         seen = points @ camera.T_camera_world[:3, :3].T + camera.T_camera_world[:3, 3]
         plane = FOCAL_M * seen[:, :2] / seen[:, 2:]
-        rays = _on_plane(seen, FOCAL_M)
-        similar = max(similar, float(np.abs(plane - rays).max()))
-        turned = max(turned, float(np.abs(plane + _on_plane(seen, -FOCAL_M)).max()))
-        tell((seed + 1) / effort.seeds)
-    cases = effort.seeds * N_POINTS
-    right, wrong = (k * FOCAL_M * 1.0 / 4.0 for k in (1 / PIXEL_M, PIXEL_M))
+        # The line through a point and the centre meets the planes before and behind the centre.
+        front, back = (((z / seen[:, 2:]) * seen)[:, :2] for z in (FOCAL_M, -FOCAL_M))
+        similar = max(similar, float(np.abs(plane - front).max()))
+        turned = max(turned, float(np.abs(plane + back).max()))
+    cases = seeds * N_POINTS
+    metres = "greatest difference in metres"
     claims = [
-        Claim("K F [R T] P is what the camera gives", "an identity", f"differ by {worst:.1e} px",
-              exact(worst, TOLERANCE_PX, "greatest difference in pixels", cases)),
-        Claim("similar triangles: x = f X / Z (figure 3.1)", "an identity",
-              f"differ by {similar:.1e} m",
-              exact(similar, 1e-12, "greatest difference in metres", cases)),
-        Claim("the image behind the centre is upside-down (figure 3.2)", "an identity",
-              f"differ by {turned:.1e} m",
-              exact(turned, 1e-12, "greatest difference in metres", cases)),
+        exact("K F [R T] P is what the camera gives", "an identity", worst,
+              "greatest difference in pixels", cases, TOLERANCE_PX),
+        exact("similar triangles: x = f X / Z (figure 3.1)", "an identity", similar, metres, cases,
+              TOLERANCE_M),
+        exact("the image behind the centre is upside-down (figure 3.2)", "an identity", turned,
+              metres, cases, TOLERANCE_M),
     ]  # fmt: skip
-    rows = [["K_u = 1 / pixel width (pixels a metre)", f"{1 / PIXEL_M:g}", f"{right:g} px"],
-            ["K_u = pixel width (as the report says)", f"{PIXEL_M:g}",
-             f"{wrong:g} px"]]  # fmt: skip
-    about = "A point 1 m beside the axis, 4 m away, f = 8 mm, pixels of 5 µm"
-    return Outcome(
-        claims=claims,
-        tables=[Table(about, ["", "K_u", "beside the principal point"], rows)],
-        pictures=[Picture("report_projection", CAPTION, _draw())],
-    )
+    return Outcome(claims=claims, figure=_draw())
 
 
 def by_matrices(camera: am.Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -86,13 +73,7 @@ def by_matrices(camera: am.Camera, points: NDArray[np.float64]) -> NDArray[np.fl
     return np.stack([su / s, sv / s], axis=1)
 
 
-def _on_plane(seen: NDArray[np.float64], z: float) -> NDArray[np.float64]:
-    """Cut the line through each point and the centre with the plane at z, shape (K, 2)."""
-    share = z / seen[:, 2]
-    return (share[:, None] * seen)[:, :2]
-
-
-def _drawn(rng: np.random.Generator) -> tuple[am.Camera, NDArray[np.float64]]:
+def _draw_case(rng: np.random.Generator) -> tuple[am.Camera, NDArray[np.float64]]:
     """Draw a camera and points before it."""
     f_px = FOCAL_M / PIXEL_M * rng.uniform(0.5, 2)
     K = am.camera.intrinsics(focal_length=f_px, principal_point=tuple(rng.uniform(400, 600, 2)))
@@ -112,18 +93,18 @@ def _draw() -> Figure:
     points = scene.positions()[0] - scene.positions()[0].mean(axis=0)
     K = am.camera.intrinsics(focal_length=FOCAL_M / PIXEL_M, principal_point=(639.5, 511.5))
     camera = am.Camera.look_at((2.2, -2.6, 1.2), (0, 0, 0), K=K, size_px=SIZE)
+    w, h = SIZE
+    corners = np.array([[0, 0], [w, 0], [w, h], [0, h], [0, 0]]) - 0.5
+    # The image plane is drawn a metre before the centre: at its true place it would be invisible.
+    on_plane, frame = (
+        camera.center + rays / (rays @ camera.axis)[:, None]
+        for rays in (camera.rays(camera.project(points).pixels), camera.rays(corners))
+    )
     figure = Figure(figsize=(11, 4.4), dpi=110)
     axes: Any = figure.add_axes((0.0, -0.1, 0.56, 1.2), projection="3d")
-    # The image plane is drawn a metre before the centre, or nothing would be seen of it.
-    rays = camera.rays(camera.project(points).pixels)
-    on_plane = camera.center + rays / (rays @ camera.axis)[:, None]
-    w, h = SIZE
-    corners = camera.rays(np.array([[0, 0], [w, 0], [w, h], [0, h], [0, 0]]) - 0.5)
-    frame = camera.center + corners / (corners @ camera.axis)[:, None]
-    lines = np.argwhere(np.triu(scene.connections))
     for cloud, colour in ((points, CYCLE[0]), (on_plane, CYCLE[5])):
-        for i, j in lines:
-            axes.plot(*cloud[[i, j]].T, color=colour, linewidth=1.0)
+        for pair in np.argwhere(np.triu(scene.connections)):
+            axes.plot(*cloud[pair].T, color=colour, linewidth=1.0)
         axes.scatter(*cloud.T, color=colour, s=10, depthshade=False)
     for p in points:
         axes.plot(*np.array([camera.center, p]).T, color=CLUTTER, linewidth=0.5)
@@ -136,27 +117,25 @@ def _draw() -> Figure:
     axes.set_box_aspect(high - low, zoom=0.95)
     axes.view_init(elev=18, azim=-95)
     axes.set_axis_off()
-    flat = figure.add_axes((0.6, 0.13, 0.38, 0.76))
+    flat = titled(figure.add_axes((0.6, 0.13, 0.38, 0.76)), "the image: origin top left")
     plot_image(camera, camera.project(points), connections=scene.connections,
                colours=CYCLE[0], ax=flat)  # fmt: skip
-    flat.set_title("the image: origin top left", fontsize=10, color=INK, loc="left")
     return figure
 
 
-CAPTION = (
-    "The report's figures 3.1, 3.3 and 3.4: points, their rays through the image plane into the "
-    "optical centre, and the image in pixels."
-)
-
 PART = Part(
+    name="projection",
     title="The camera: the pin-hole",
     section="§3.1",
     covers="figures 3.1, 3.2, 3.3 and 3.4, and the projection equations",
-    did="Derives the projection from similar triangles and writes it as the product of intrinsic "
-    "matrix, focal matrix, rototranslation and homogeneous points.",
+    summary="Derives the projection from similar triangles and writes it as the product of "
+    "intrinsic matrix, focal matrix, rototranslation and homogeneous points.",
     run=run,
-    slips=(
+    caption="The report's figures 3.1, 3.3 and 3.4: points, their rays through the image plane "
+    "into the optical centre, and the image in pixels.",
+    mistakes=(
         "K_u and K_v are called “the pixel width and height”; the equations need the reciprocal, "
-        "pixels a metre (table).",
+        "pixels a metre. A point 1 m beside the axis and 4 m away, with f = 8 mm and pixels of "
+        "5 µm, lies 400 px beside the principal point; the report's words put it 1e-8 px beside.",
     ),
 )

@@ -1,108 +1,124 @@
-"""When something counts as reproduced: four rules, each decided by numbers alone."""
+"""Four rules, each decided by numbers alone, that turn measurements into claims with a verdict."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from asterism.reproduction.part import Claim
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["RULES", "Verdict", "alike", "differs", "exact", "spread", "within"]
+__all__ = ["RULES", "alike", "exact", "fewer", "spread", "within"]
 
 RULES = {
     "spread": "a figure of the report is that of one run. It is reproduced if it lies between the "
-    "2.5 % and the 97.5 % quantile of ours over the seeds, give or take half a unit of the last "
-    "digit printed if it was rounded; “all correct” was not.",
-    "exact": "a statement of mathematics is reproduced if it fails in none of the cases tried, or "
-    "if the greatest error stays below the one named.",
-    "order": "that one thing does better than another is reproduced if their difference, seed by "
-    "seed, is on that side of 0 by more than two standard errors of its mean.",
-    "shape": "a distribution is reproduced if it is no farther, in total variation, from the mean "
-    "of ours than 95 % of our own runs are.",
+    "2.5 % and the 97.5 % quantile of the measured values over the seeds, with a tolerance of half "
+    "a unit of the last digit printed if it was rounded; “all correct” was not rounded.",
+    "exact": "a mathematical statement is reproduced if it fails in none of the cases tried, or "
+    "if the greatest error stays below the tolerance.",
+    "order": "an improvement is reproduced if the difference, seed by seed, has that sign and its "
+    "mean exceeds two standard errors.",
+    "shape": "a distribution is reproduced if its distance from the mean measured one, in total "
+    "variation, is at most that of 95 % of the single runs.",
 }
 """The rules, as the page states them."""
 
-_ALMOST_ALL = (0.025, 0.975)
-
-
-class Verdict(NamedTuple):
-    """Whether something was reproduced, by which rule, and why."""
-
-    holds: bool
-    rule: str
-    because: str
-
-    def __str__(self) -> str:
-        return f"{'reproduced' if self.holds else 'not reproduced'}, because {self.because}"
+_QUANTILES = (0.025, 0.975)
 
 
 def spread(values: ArrayLike, digits: int = 2) -> str:
-    """Give mean and standard deviation over the seeds as people read them."""
+    """Return mean and standard deviation over the seeds as text."""
     found = np.asarray(values, dtype=np.float64)
     return f"{_plain(found.mean(), digits)} ± {_plain(found.std(), digits)}"
 
 
-def within(theirs: float, ours: ArrayLike, *, step: float, digits: int = 2) -> Verdict:
-    """Judge a figure of the report by the spread of ours.
+def within(
+    about: str,
+    reported: float,
+    measured: ArrayLike,
+    *,
+    step: float,
+    sign: str = "",
+    unit: str = "",
+    digits: int = 2,
+    oracle: ArrayLike | None = None,
+) -> Claim:
+    """Judge a figure of the report by the spread of the measured values.
 
     Parameters
     ----------
-    theirs : float
+    about : str
+        What the figure is.
+    reported : float
         As printed.
-    ours : array_like, shape (seeds,)
-        Ours, one a seed.
+    measured, oracle : array_like, shape (seeds,)
+        One value a seed; the oracle's values are the best that the data allow.
     step : float
         One unit of the last digit printed; 0 for a figure that was not rounded.
+    sign : str
+        Printed before the report's figure, such as "~".
+    unit : str
+        Printed after each figure.
     digits : int
-        After the point, in the words.
+        Decimals in the text.
     """
-    low, high = np.quantile(np.asarray(ours, dtype=np.float64), _ALMOST_ALL)
-    told = f"{_plain(low, digits)} to {_plain(high, digits)}"
-    # A hair more than half a unit: 0.05 is not a binary number.
+    low, high = np.quantile(np.asarray(measured, dtype=np.float64), _QUANTILES)
+    # Slightly more than half a unit: 0.05 is not a binary number.
     slack = 0.5 * step * (1 + 1e-9)
-    if low - slack <= theirs <= high + slack:
-        return Verdict(True, "spread", f"{theirs:g} lies within ours ({told})")
-    side = "above" if theirs > high else "below"
-    return Verdict(False, "spread", f"{theirs:g} lies {side} ours ({told})")
+    is_within = bool(low - slack <= reported <= high + slack)
+    side = "within" if is_within else "above" if reported > high else "below"
+    because = f"{reported:g} lies {side} {_plain(low, digits)} to {_plain(high, digits)}"
+    best = "–" if oracle is None else spread(oracle, digits) + unit
+    return Claim(about, f"{sign}{reported:g}{unit}", spread(measured, digits) + unit, best,
+                 is_within, "spread", because)  # fmt: skip
 
 
-def exact(error: float, limit: float, what: str, cases: int) -> Verdict:
+def exact(
+    about: str, reported: str, error: float, what: str, cases: int, limit: float = 0.0
+) -> Claim:
     """Judge a statement by its greatest error; a count of failures has the limit 0."""
-    holds = error <= limit
-    noun = "case" if cases == 1 else "cases"
     size = f"{error:.2g}" if limit else f"{error:g}"
-    return Verdict(holds, "exact", f"the {what} is {size} in {cases:,} {noun}")
+    because = f"the {what} is {size} in {cases:,} {'case' if cases == 1 else 'cases'}"
+    return Claim(about, reported, size, "–", bool(error <= limit), "exact", because)
 
 
-def differs(better: ArrayLike, worse: ArrayLike, what: str, digits: int = 2) -> Verdict:
-    """Judge that one thing has less of something than another does, seed by seed."""
-    gain = np.asarray(worse, dtype=np.float64) - np.asarray(better, dtype=np.float64)
-    error = gain.std(ddof=1) / np.sqrt(len(gain))
-    mean = gain.mean()
-    sign = "fewer" if mean >= 0 else "more"
-    told = f"there are {_plain(abs(mean), digits)} {sign} {what}"
-    told += f" (standard error {_plain(error, digits)})"
-    return Verdict(bool(mean > 2 * error and mean > 0), "order", told)
+def fewer(
+    about: str, reported: str, few: ArrayLike, many: ArrayLike, what: str, digits: int = 2
+) -> Claim:
+    """Judge that one variant has less of something than another, seed by seed."""
+    change = np.asarray(few, dtype=np.float64) - np.asarray(many, dtype=np.float64)
+    mean, error = change.mean(), change.std(ddof=1) / np.sqrt(len(change))
+    measured = f"{spread(few, digits)} instead of {spread(many, digits)} {what}"
+    because = f"the mean difference is {_plain(mean, digits)} "
+    because += f"(standard error {_plain(error, digits)})"
+    return Claim(about, reported, measured, "–", bool(mean < -2 * error and mean < 0), "order",
+                 because.replace(" -", " −"))  # fmt: skip
 
 
-def alike(theirs: ArrayLike, runs: ArrayLike) -> Verdict:
-    """Judge a distribution by how far single runs of ours are from their mean.
+def alike(about: str, reported: ArrayLike, runs: ArrayLike) -> Claim:
+    """Judge a distribution by the distance of single runs from their mean.
 
     Parameters
     ----------
-    theirs : array_like, shape (n,)
+    about : str
+        What is distributed.
+    reported : array_like, shape (n,)
         Shares that add up to 1.
     runs : array_like, shape (seeds, n)
-        Ours, each row likewise.
+        Measured ones, each row likewise.
     """
-    found = np.asarray(runs, dtype=np.float64)
+    printed, found = np.asarray(reported), np.asarray(runs, dtype=np.float64)
     mean = found.mean(axis=0)
-    own = float(np.quantile(0.5 * np.abs(found - mean).sum(axis=1), 0.95))
-    distance = float(0.5 * np.abs(np.asarray(theirs) - mean).sum())
-    told = f"it is {100 * distance:.1f} % from our mean, and 95 % of our runs are within "
-    return Verdict(distance <= own, "shape", told + f"{100 * own:.1f} %")
+    limit = float(np.quantile(0.5 * np.abs(found - mean).sum(axis=1), 0.95))
+    distance = float(0.5 * np.abs(printed - mean).sum())
+    because = f"the distance is {100 * distance:.1f} %, that of 95 % of the runs at most "
+    because += f"{100 * limit:.1f} %"
+    before = ", ".join(f"{100 * x:g}" for x in printed) + " %"
+    measured = ", ".join(f"{100 * x:.1f}" for x in mean) + " %"
+    return Claim(about, before, measured, "–", distance <= limit, "shape", because)
 
 
 def _plain(value: float, digits: int) -> str:

@@ -1,4 +1,4 @@
-"""``asterism reproduce``: the report's tables and figures made anew, theirs beside ours."""
+"""``asterism reproduce``: the report's tables and figures, reported and measured side by side."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ import typer
 
 from asterism.checks import check_fields, check_number
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
-from asterism.reproduction.parts import PARTS
+from asterism.reproduction import PARTS
 
 if TYPE_CHECKING:
-    from asterism.reproduction.part import Made
+    from asterism.reproduction.part import Outcome, Part
 
 __all__ = ["reproduce"]
 
 log = logging.getLogger(__name__)
 
-_Quick = Annotated[bool, typer.Option("--quick", help="Few seeds and small sizes: two minutes.")]
 _Only = Annotated[
     list[str] | None,
     typer.Option(
@@ -29,87 +28,59 @@ _Only = Annotated[
         show_default="all",
     ),
 ]
-_Seeds = Annotated[
-    int | None, typer.Option(help="Seeds of all that is drawn.", show_default="50, quick 5")
-]
+_Seeds = Annotated[int, typer.Option(help="Seeds of all random draws; 5 take a minute.")]
 _Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the files.")]
 
-SEEDS, QUICK_SEEDS = 50, 5
-MOST_SEEDS = 1000
-STEPS = 1000  # of the bar of a part
+MAX_SEEDS = 1000
 
 
 def reproduce(
-    quick: _Quick = False,
     only: _Only = None,
-    seeds: _Seeds = None,
+    seeds: _Seeds = 50,
     out: _Out = Path("reproduction"),
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Make every table and figure of the 2010 report anew, and say what could be reproduced.
+    """Reproduce every table and figure of the 2010 report, with a verdict for each claim.
 
-    Writes one page as Markdown and as HTML that needs nothing beside it, and the figures as SVG
-    and PDF. The same seeds give the same bytes; times are in a file of their own. If it is
-    stopped, the parts that are finished are written.
+    Writes one page as Markdown, and the figures as SVG. The same seeds give the same bytes; times
+    are in a file of their own. If the command is stopped, the finished parts are written.
 
     For example:
 
-        asterism reproduce --quick
+        asterism reproduce --seeds 5
 
         asterism reproduce --only mcmcda --only smp --seeds 20 -o tables
     """
     from asterism.cli.outputs import Folder, check_outputs
-    from asterism.reproduction.pages import write_pages, write_part
-    from asterism.reproduction.part import Effort, Made
-    from asterism.reproduction.parts import load
+    from asterism.reproduction import load
+    from asterism.reproduction.pages import PAGE, TIMES, write_page, write_part
 
     check_fields("--only", only or [], PARTS)
-    n_seeds = (QUICK_SEEDS if quick else SEEDS) if seeds is None else seeds
-    check_number("--seeds", n_seeds, above=2, below=MOST_SEEDS, closed=True, integer=True)
+    check_number("--seeds", seeds, above=2, below=MAX_SEEDS, closed=True, integer=True)
     check_outputs({"--out": Folder(out)}, [], overwrite=overwrite)
     out.mkdir(parents=True, exist_ok=True)
-    effort = Effort(seeds=n_seeds, is_quick=quick)
     names = [name for name in PARTS if not only or name in only]
-    done: list[Made] = []
+    done: dict[Part, Outcome] = {}
     try:
         for i, name in enumerate(names):
-            with progress(f"{name} ({i + 1} of {len(names)})", STEPS) as advance:
+            with progress(f"{name} ({i + 1} of {len(names)})"):
                 part = load(name)
-                outcome = part.run(effort, lambda share: advance(round(STEPS * share)))
-                made = Made(name, part, outcome)
-                write_part(made, out)
-            done.append(made)
+                outcome = part.run(seeds)
+                write_part(part, outcome, out)
+            done[part] = outcome
     finally:
-        # Also on the way out after a signal: what is finished is worth reading.
+        # Also on the way out after a signal: the finished parts are worth reading.
         missing = names[len(done) :]
         if done:
-            write_pages(done, missing, effort, out)
+            write_page(done, missing, seeds, out)
         if missing:
-            where = f"what is finished is in {out}" if done else "nothing is finished"
+            where = f"the finished parts are in {out}" if done else "no part is finished"
             log.warning("not made: %s; %s", ", ".join(missing), where)
-    _tell(done, out, quiet=quiet, json=json)
-
-
-def _tell(done: list[Made], out: Path, *, quiet: bool, json: bool) -> None:
-    """Print the verdicts."""
-    from asterism.reproduction.pages import HTML, MARKDOWN, TIMES
-
-    counts = {made.name: made.counts for made in done}
     if json:
-        print_json({
-            "folder": str(out),
-            "parts": {
-                made.name: [
-                    {"about": c.about, "theirs": c.theirs, "ours": c.ours, "floor": c.floor,
-                     "reproduced": c.verdict.holds, "rule": c.verdict.rule,
-                     "because": c.verdict.because}
-                    for c in made.outcome.claims
-                ]
-                for made in done
-            },
-        })  # fmt: skip
+        claims = {part.name: [c._asdict() for c in o.claims] for part, o in done.items()}
+        print_json({"folder": str(out), "parts": claims})
     elif not quiet:
-        rows = [(name, f"{n} of {of} reproduced") for name, (n, of) in counts.items()]
-        print_table([*rows, ("written", out / HTML), ("", out / MARKDOWN), ("", out / TIMES)])
+        rows = [(part.name, f"{o.n_reproduced} reproduced") for part, o in done.items()]
+        print_table([*rows, ("written", out / PAGE), ("", out / TIMES)])
