@@ -7,19 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.io.atomic import replacing
 from asterism.model import Detections, Tracks
 from asterism.simulate import Truth
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from asterism.camera import Rig, Surface
 
-__all__ = ["contact_sheet", "coverage_picture", "rig_picture", "save"]
+__all__ = ["contact_sheet", "coverage_picture", "rig_picture"]
 
 _MOST_FRAMES = 400  # of the paths in a picture
 _DOT = 9  # square points
@@ -171,12 +168,6 @@ def coverage_picture(truth: Tracks, rig: Rig) -> Figure:
             frameon=False, labelcolor=INK,
         )  # fmt: skip
     return figure
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a picture as a whole or not at all; the same picture is the same file."""
-    with replacing(path) as file:
-        figure.savefig(file, format="png", metadata={"Software": None}, bbox_inches="tight")
 
 
 def _thinned(truth: Tracks) -> Tracks:

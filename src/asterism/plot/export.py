@@ -6,14 +6,16 @@ import io
 from typing import TYPE_CHECKING, Any
 
 from asterism.checks import check_fields
+from asterism.io.atomic import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["ENDINGS", "figure_bytes"]
+__all__ = ["ENDINGS", "figure_bytes", "write_figure"]
 
 ENDINGS = ("pdf", "png", "svg")
 """What a picture can be written as."""
@@ -64,3 +66,10 @@ def figure_bytes(picture: Figure | Axes | Sequence[Axes], ending: str) -> bytes:
     with matplotlib.rc_context(_OPTIONS):
         figure.savefig(file, format=ending, metadata=_METADATA[ending])
     return file.getvalue()
+
+
+def write_figure(picture: Figure | Axes | Sequence[Axes], path: Path) -> None:
+    """Write a picture, as a whole or not at all, in the format of the path's ending."""
+    content = figure_bytes(picture, path.suffix.lower().removeprefix("."))
+    with replacing(path) as file:
+        file.write(content)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from asterism.io.atomic import replacing, write_text
-from asterism.plot import figure_bytes
+from asterism.io.atomic import write_text
+from asterism.plot.export import write_figure
 from asterism.reproduction.rules import RULES
 
 if TYPE_CHECKING:
@@ -25,8 +25,7 @@ def write_part(part: Part, outcome: Outcome, out: Path) -> None:
     for folder in (PARTS, IMAGES):
         (out / folder).mkdir(exist_ok=True)
     if outcome.figure is not None:
-        with replacing(out / IMAGES / f"report_{part.name}.svg") as file:
-            file.write(figure_bytes(outcome.figure, "svg"))
+        write_figure(outcome.figure, out / IMAGES / f"report_{part.name}.svg")
     write_text(out / PARTS / f"{part.name}.md", _part_text(part, outcome))
 
 

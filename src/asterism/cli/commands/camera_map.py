@@ -91,9 +91,9 @@ def map_(
             rig, *corners, spacing=spacing, sigma_px=sigma, n_suggestions=suggest
         )
     if out is not None:
-        from asterism.cli.film_pictures import save
+        from asterism.plot.export import write_figure
 
-        save(_map_picture(found, rig), out)
+        write_figure(_map_picture(found, rig), out)
     error = found.coverage.error
     known = 1e3 * error[np.isfinite(error)]
     median, high_error = np.percentile(known, [50, 95]) if known.size else (np.nan, np.nan)

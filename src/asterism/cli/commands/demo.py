@@ -101,6 +101,7 @@ def _experiment(out: Path, seed: int) -> am.Tracks:
 def _draw(tracks: am.Tracks, truth: am.Tracks, folder: Path) -> None:
     from asterism.cli.outputs import truth_of_each
     from asterism.plot import plot_errors, plot_presence, plot_trajectories
+    from asterism.plot.export import write_figure
 
     same = truth_of_each(tracks, truth)
     for name, axes in (
@@ -108,15 +109,7 @@ def _draw(tracks: am.Tracks, truth: am.Tracks, folder: Path) -> None:
         ("presence", plot_presence(tracks)),
         ("errors", plot_errors(tracks, same)),
     ):
-        _save(axes, folder / f"{name}.png")
-
-
-def _save(axes: Any, path: Path) -> None:
-    from asterism.io.atomic import replacing
-
-    with replacing(path) as file:
-        # Without the version of matplotlib the same picture is the same file.
-        axes.figure.savefig(file, format="png", metadata={"Software": None})
+        write_figure(axes, folder / f"{name}.png")
 
 
 def _table(scores: dict[str, dict[str, Any]]) -> list[Sequence[str]]:

@@ -171,17 +171,18 @@ def _check_points(source: str, points: NDArray[np.float64]) -> None:
 
 def _draw(out: Path, truth: am.Tracks, cameras: am.Rig, sheets: dict[int, tuple[str, str]]) -> None:
     """Draw the rig, its coverage, and what each camera sees: by frame a file and its title."""
-    from asterism.cli.film_pictures import contact_sheet, coverage_picture, rig_picture, save
+    from asterism.cli.film_pictures import contact_sheet, coverage_picture, rig_picture
+    from asterism.plot.export import write_figure
 
     with progress("drawing", len(sheets) + 2) as advance:
         if sheets:
             (out / PICTURES).mkdir(exist_ok=True)
         for i, (t, (file, title)) in enumerate(sheets.items()):
-            save(contact_sheet(truth, cameras, t, title), out / file)
+            write_figure(contact_sheet(truth, cameras, t, title), out / file)
             advance(i + 1)
-        save(rig_picture(truth, cameras), out / RIG_PICTURE)
+        write_figure(rig_picture(truth, cameras), out / RIG_PICTURE)
         advance(len(sheets) + 1)
-        save(coverage_picture(truth, cameras), out / COVERAGE_PICTURE)
+        write_figure(coverage_picture(truth, cameras), out / COVERAGE_PICTURE)
 
 
 def _truth(

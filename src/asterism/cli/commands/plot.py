@@ -92,8 +92,7 @@ def plot(
         asterism plot projections walk.c3d --rig walk.xcp -o walk.png
     """
     from asterism.cli.outputs import check_outputs
-    from asterism.io.atomic import replacing
-    from asterism.plot import figure_bytes
+    from asterism.plot.export import write_figure
 
     check_fields("KIND", [kind], KINDS)
     chosen = KINDS[kind]
@@ -103,15 +102,13 @@ def plot(
     )  # fmt: skip
     _check(kind, chosen, asked)
     out = _default_output(files[0], kind) if out is None else out
-    ending = _ending(out)
+    _check_ending(out)
     check_outputs(
         {"--out": out},
         [*files, truth, model, None if rig is None else Path(rig)],
         overwrite=overwrite,
     )
-    picture = figure_bytes(chosen.draw(asked), ending)
-    with replacing(out) as file:
-        file.write(picture)
+    write_figure(chosen.draw(asked), out)
     if json:
         print_json({"kind": kind, "files": [str(f) for f in files], "output": str(out)})
     elif not quiet:
@@ -146,13 +143,12 @@ def _check(name: str, kind: Kind, asked: Request) -> None:
         check_number("--seeds", asked.seeds, above=1, below=1000, closed=True, integer=True)
 
 
-def _ending(out: Path) -> str:
+def _check_ending(out: Path) -> None:
     from asterism.plot.export import ENDINGS
 
     ending = out.suffix.lower().removeprefix(".")
     if ending not in ENDINGS:
         raise ParameterError("--out", "a name ending in .pdf, .svg or .png", str(out))
-    return ending
 
 
 def _default_output(source: Path, kind: str) -> Path:

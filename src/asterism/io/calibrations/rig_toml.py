@@ -105,9 +105,10 @@ def _camera(path: Path, number: int, entry: Any) -> Camera:
 
 
 def _lens(path: Path, place: str, entry: Any) -> Lens:
-    if not isinstance(entry, dict) or entry.get("kind") not in _LENSES:
-        got = repr(entry.get("kind") if isinstance(entry, dict) else entry)[:60]
-        raise FormatError(path, f"{place}, kind", f"one of {', '.join(_LENSES)}", got)
+    if not isinstance(entry, dict):
+        raise FormatError(path, place, "a table", repr(entry)[:60])
+    with faults_at(path, place):
+        check_fields("kind", [entry.get("kind")], _LENSES)
     kind = _LENSES[entry["kind"]]
     numbers = {key: value for key, value in entry.items() if key != "kind"}
     with faults_at(path, place):
