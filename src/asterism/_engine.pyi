@@ -2,41 +2,33 @@
 
 from collections.abc import Callable, Sequence
 from enum import Enum
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Final, Generic, Self, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+Floats: TypeAlias = NDArray[np.float64]
+Ints: TypeAlias = NDArray[np.int64]
+Shorts: TypeAlias = NDArray[np.int32]
+
 class MotionModel:
     @staticmethod
-    def make(
-        n_axes: int,
-        H: NDArray[np.float64],
-        P0: NDArray[np.float64],
-        noise_sigma: float,
-        T: NDArray[np.float64],
-    ) -> MotionModel: ...
-    @property
-    def n_axes(self) -> int: ...
+    def make(n_axes: int, H: Floats, P0: Floats, noise_sigma: float, T: Floats) -> MotionModel: ...
+    n_axes: Final[int]
 
 class MotionLikelihood:
     def __init__(
         self,
         *,
         n_axes: int,
-        points: NDArray[np.float64],
-        frames: NDArray[np.int64],
-        offsets: NDArray[np.int64],
-        kind: NDArray[np.int32],
-        steps: NDArray[np.float64],
+        points: Floats,
+        frames: Ints,
+        offsets: Ints,
+        kind: Shorts,
+        steps: Floats,
     ) -> None: ...
     def sum(
-        self,
-        *,
-        squares: NDArray[np.float64],
-        transitions: NDArray[np.float64],
-        variance: float,
-        velocity_variance: float,
+        self, *, squares: Floats, transitions: Floats, variance: float, velocity_variance: float
     ) -> float: ...
 
 class ScoreModel:
@@ -74,90 +66,52 @@ class LensKind(Enum):
     quadratic = ...
 
 class FrameStats:
-    @property
-    def n_candidates(self) -> int: ...
-    @property
-    def n_groups(self) -> int: ...
-    @property
-    def largest_group(self) -> int: ...
-    @property
-    def n_confirmed(self) -> int: ...
-    @property
-    def n_tentative(self) -> int: ...
-    @property
-    def n_pending(self) -> int: ...
-    @property
-    def n_bonds(self) -> int: ...
-    @property
-    def n_carried(self) -> int: ...
-    @property
-    def n_returned(self) -> int: ...
-    @property
-    def n_refused(self) -> int: ...
+    n_candidates: Final[int]
+    n_groups: Final[int]
+    largest_group: Final[int]
+    n_confirmed: Final[int]
+    n_tentative: Final[int]
+    n_pending: Final[int]
+    n_bonds: Final[int]
+    n_carried: Final[int]
+    n_returned: Final[int]
+    n_refused: Final[int]
 
 class JointStats(FrameStats):
-    @property
-    def n_beams(self) -> int: ...
-    @property
-    def n_states(self) -> int: ...
-    @property
-    def n_unguarded(self) -> int: ...
-    @property
-    def bound(self) -> float: ...
+    n_beams: Final[int]
+    n_states: Final[int]
+    n_unguarded: Final[int]
+    bound: Final[float]
 
 class TreeStats(FrameStats):
-    @property
-    def n_branches(self) -> int: ...
-    @property
-    def most_branches(self) -> int: ...
-    @property
-    def n_cut(self) -> int: ...
-    @property
-    def n_limited(self) -> int: ...
-    @property
-    def n_shared(self) -> int: ...
-    @property
-    def n_beams(self) -> int: ...
-    @property
-    def n_hypotheses(self) -> int: ...
-    @property
-    def n_merged(self) -> int: ...
-    @property
-    def n_nodes(self) -> int: ...
-    @property
-    def bound(self) -> float: ...
-    @property
-    def gap(self) -> float: ...
+    n_branches: Final[int]
+    most_branches: Final[int]
+    n_cut: Final[int]
+    n_limited: Final[int]
+    n_shared: Final[int]
+    n_beams: Final[int]
+    n_hypotheses: Final[int]
+    n_merged: Final[int]
+    n_nodes: Final[int]
+    bound: Final[float]
+    gap: Final[float]
 
 class ChainStats:
-    @property
-    def moves(self) -> NDArray[np.int64]: ...
-    @property
-    def n_search(self) -> int: ...
-    @property
-    def n_sampled(self) -> int: ...
-    @property
-    def n_walked(self) -> int: ...
-    @property
-    def n_sure(self) -> int: ...
-    @property
-    def n_cut(self) -> int: ...
-    @property
-    def n_given(self) -> int: ...
-    @property
-    def n_refused(self) -> int: ...
-    @property
-    def n_doubtful(self) -> int: ...
-    @property
-    def n_unmoved(self) -> int: ...
-    @property
-    def rhat(self) -> float: ...
-    @property
-    def ess(self) -> float: ...
+    moves: Final[Ints]
+    n_search: Final[int]
+    n_sampled: Final[int]
+    n_walked: Final[int]
+    n_sure: Final[int]
+    n_cut: Final[int]
+    n_given: Final[int]
+    n_refused: Final[int]
+    n_doubtful: Final[int]
+    n_unmoved: Final[int]
+    rhat: Final[float]
+    ess: Final[float]
 
 class SampledStats(FrameStats):
-    @property
-    def chain(self) -> ChainStats: ...
+    chain: Final[ChainStats]
 
 class McmcOptions:
     def __init__(
@@ -187,55 +141,36 @@ class LifeOptions:
 _T = TypeVar("_T")
 
 class StepResult(Generic[_T]):
-    @property
-    def tracker(self) -> _T: ...
-    @property
-    def labels(self) -> NDArray[np.int64]: ...
-    @property
-    def confidence(self) -> NDArray[np.float64]: ...
-    @property
-    def revised(self) -> NDArray[np.int64]: ...
-    @property
-    def revised_labels(self) -> NDArray[np.int64]: ...
-    @property
-    def revised_confidence(self) -> NDArray[np.float64]: ...
-    @property
-    def stats(self) -> FrameStats: ...
+    tracker: Final[_T]
+    labels: Final[Ints]
+    confidence: Final[Floats]
+    revised: Final[Ints]
+    revised_labels: Final[Ints]
+    revised_confidence: Final[Floats]
+    stats: Final[FrameStats]
 
 # What all trackers have; there is no such class in the module.
 class _Tracker:
-    def step(
-        self,
-        time: float,
-        F: NDArray[np.float64],
-        Q: NDArray[np.float64],
-        points: NDArray[np.float64],
-    ) -> StepResult[Self]: ...
+    def step(self, time: float, F: Floats, Q: Floats, points: Floats) -> StepResult[Self]: ...
     def run(
         self,
-        times: NDArray[np.float64],
-        kind: NDArray[np.int32],
-        F: NDArray[np.float64],
-        Q: NDArray[np.float64],
-        offsets: NDArray[np.int64],
-        points: NDArray[np.float64],
-        labels: NDArray[np.int64],
-        confidence: NDArray[np.float64],
+        times: Floats,
+        kind: Shorts,
+        F: Floats,
+        Q: Floats,
+        offsets: Ints,
+        points: Floats,
+        labels: Ints,
+        confidence: Floats,
     ) -> None: ...
     def copy(self) -> Self: ...
     def tracks(self) -> dict[str, NDArray[Any]]: ...
-    @property
-    def has_confidence(self) -> bool: ...
-    @property
-    def n_frames(self) -> int: ...
-    @property
-    def n_seen(self) -> int: ...
-    @property
-    def n_ids(self) -> int: ...
-    @property
-    def last_time(self) -> float: ...
-    @property
-    def total(self) -> FrameStats: ...
+    has_confidence: Final[bool]
+    n_frames: Final[int]
+    n_seen: Final[int]
+    n_ids: Final[int]
+    last_time: Final[float]
+    total: Final[FrameStats]
 
 class CarryOptions:
     def __init__(
@@ -244,10 +179,10 @@ class CarryOptions:
 
 class BodyCarrier:
     def __init__(self, *, n_axes: int, noise_sigma: float) -> None: ...
-    def see(self, markers: NDArray[np.int64], points: NDArray[np.float64]) -> None: ...
+    def see(self, markers: Ints, points: Floats) -> None: ...
     def carry(
-        self, marker: int, markers: NDArray[np.int64], points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], float, int] | None: ...
+        self, marker: int, markers: Ints, points: Floats
+    ) -> tuple[Floats, float, int] | None: ...
     def n_bonds(self, marker: int) -> int: ...
     def forget(self, marker: int) -> None: ...
 
@@ -287,7 +222,7 @@ class BranchOptions:
         merge_last: int,
         prune_drop: float,
         fading: float,
-        delta: NDArray[np.float64],
+        delta: Floats,
         z: float,
     ) -> None: ...
 
@@ -305,16 +240,7 @@ class TreeTracker(_Tracker):
     ) -> None: ...
     def chi2(self) -> dict[str, NDArray[Any]]: ...
 
-_Choose = Callable[
-    [
-        NDArray[np.int64],
-        NDArray[np.float64],
-        NDArray[np.int64],
-        NDArray[np.int32],
-        NDArray[np.int32],
-    ],
-    tuple[NDArray[np.int32], float],
-]
+_Choose = Callable[[Ints, Floats, Ints, Shorts, Shorts], tuple[Shorts, float]]
 
 class HypothesisTracker(_Tracker):
     def __init__(
@@ -344,78 +270,62 @@ class MatrixTracker(_Tracker):
         new_track_claim: float,
         carry: CarryOptions,
     ) -> None: ...
-    def clusters(
-        self,
-    ) -> list[
-        tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
-    ]: ...
+    def clusters(self) -> list[tuple[Ints, Ints, Ints, Floats]]: ...
 
 def score_tracks(
     model: MotionModel,
     score: ScoreModel,
-    points: NDArray[np.float64],
-    frames: NDArray[np.int64],
-    offsets: NDArray[np.int64],
-    times: NDArray[np.float64],
-    kind: NDArray[np.int32],
-    F: NDArray[np.float64],
-    Q: NDArray[np.float64],
-) -> NDArray[np.float64]: ...
+    points: Floats,
+    frames: Ints,
+    offsets: Ints,
+    times: Floats,
+    kind: Shorts,
+    F: Floats,
+    Q: Floats,
+) -> Floats: ...
 def filter_tracks(
     model: MotionModel,
-    points: NDArray[np.float64],
-    frames: NDArray[np.int64],
-    offsets: NDArray[np.int64],
-    times: NDArray[np.float64],
-    kind: NDArray[np.int32],
-    F: NDArray[np.float64],
-    Q: NDArray[np.float64],
+    points: Floats,
+    frames: Ints,
+    offsets: Ints,
+    times: Floats,
+    kind: Shorts,
+    F: Floats,
+    Q: Floats,
     smooth: bool,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]: ...
-def assign(
-    n_rows: int,
-    n_columns: int,
-    rows: NDArray[np.int32],
-    columns: NDArray[np.int32],
-    gains: NDArray[np.float64],
-) -> NDArray[np.int32]: ...
-def k_best(cost: NDArray[np.float64], k: int) -> NDArray[np.int32]: ...
+) -> tuple[Floats, Floats, Ints, Floats]: ...
+def assign(n_rows: int, n_columns: int, rows: Shorts, columns: Shorts, gains: Floats) -> Shorts: ...
+def k_best(cost: Floats, k: int) -> Shorts: ...
 def pack(
-    first_option: NDArray[np.int64],
-    worths: NDArray[np.float64],
-    first_use: NDArray[np.int64],
-    uses: NDArray[np.int32],
+    first_option: Ints,
+    worths: Floats,
+    first_use: Ints,
+    uses: Shorts,
     k: int,
     drop: float,
     max_nodes: int,
-) -> tuple[NDArray[np.int32], NDArray[np.float64], bool, float, int]: ...
+) -> tuple[Shorts, Floats, bool, float, int]: ...
 def packing_losses(
-    first_option: NDArray[np.int64],
-    worths: NDArray[np.float64],
-    first_use: NDArray[np.int64],
-    uses: NDArray[np.int32],
-) -> tuple[float, NDArray[np.float64]]: ...
+    first_option: Ints, worths: Floats, first_use: Ints, uses: Shorts
+) -> tuple[float, Floats]: ...
 def joint_marginals(
-    log_weights: NDArray[np.float64], log_miss: NDArray[np.float64], max_states: int
-) -> tuple[NDArray[np.float64], float, NDArray[np.int32], float, int]: ...
+    log_weights: Floats, log_miss: Floats, max_states: int
+) -> tuple[Floats, float, Shorts, float, int]: ...
 def marry(
-    first: NDArray[np.int64],
-    receivers: NDArray[np.int32],
-    costs: NDArray[np.float64],
-    n_receivers: int,
-) -> tuple[NDArray[np.int32], int]: ...
+    first: Ints, receivers: Shorts, costs: Floats, n_receivers: int
+) -> tuple[Shorts, int]: ...
 
 class Camera:
     def __init__(
         self,
         *,
-        R: NDArray[np.float64],
-        t: NDArray[np.float64],
-        A: NDArray[np.float64],
-        B: NDArray[np.float64],
+        R: Floats,
+        t: Floats,
+        A: Floats,
+        B: Floats,
         lens_kind: LensKind,
         is_backward: bool,
-        coefficients: NDArray[np.float64],
+        coefficients: Floats,
         r_end: float,
         q_table: float,
         start: tuple[float, float],
@@ -424,46 +334,41 @@ class Camera:
         width: int,
         height: int,
     ) -> None: ...
-    def undistort(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]: ...
-    def distort(self, normalised: NDArray[np.float64]) -> NDArray[np.float64]: ...
-    def jacobian(self, points: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def undistort(self, pixels: Floats) -> Floats: ...
+    def distort(self, normalised: Floats) -> Floats: ...
+    def jacobian(self, points: Floats) -> Floats: ...
 
 class Surfaces:
     def __init__(
         self,
         *,
-        vertices: NDArray[np.float64],
-        faces: NDArray[np.int32],
-        face_owners: NDArray[np.int32],
-        ends: NDArray[np.float64],
-        radii: NDArray[np.float64],
-        capsule_owners: NDArray[np.int32],
+        vertices: Floats,
+        faces: Shorts,
+        face_owners: Shorts,
+        ends: Floats,
+        radii: Floats,
+        capsule_owners: Shorts,
     ) -> None: ...
 
 class RayGrid:
     def __init__(self, camera: Camera) -> None: ...
     def depth_image(
         self, camera: Camera, surfaces: Sequence[Surfaces], moment: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]: ...
-    def paint(
-        self, corners: NDArray[np.float64], owners: NDArray[np.int32]
-    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]: ...
+    ) -> tuple[Floats, Shorts]: ...
+    def paint(self, corners: Floats, owners: Shorts) -> tuple[Floats, Shorts]: ...
 
 def project(
-    cameras: Sequence[Camera],
-    points: NDArray[np.float64],
-    surfaces: Sequence[Surfaces],
-    clearance: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8], NDArray[np.int32]]: ...
+    cameras: Sequence[Camera], points: Floats, surfaces: Sequence[Surfaces], clearance: float
+) -> tuple[Floats, Floats, NDArray[np.uint8], Shorts]: ...
 
 class ViewSolver:
     def __init__(
         self,
         *,
         cameras: Sequence[Camera],
-        sigma: NDArray[np.float64],
-        p_detection: NDArray[np.float64],
-        clutter: NDArray[np.float64],
+        sigma: Floats,
+        p_detection: Floats,
+        clutter: Floats,
         log_density: float,
         gate: float,
         min_views: int,
@@ -472,38 +377,25 @@ class ViewSolver:
     ) -> None: ...
     def reconstruct(
         self,
-        pixels: NDArray[np.float64],
-        offsets: NDArray[np.int64],
-        priors: NDArray[np.float64],
-        prior_offsets: NDArray[np.int64],
+        pixels: Floats,
+        offsets: Ints,
+        priors: Floats,
+        prior_offsets: Ints,
         merge: float,
         max_nodes: int,
         n_threads: int,
-    ) -> tuple[
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.int64],
-        NDArray[np.int64],
-        NDArray[np.int64],
-        NDArray[np.int64],
-        float,
-    ]: ...
-    def candidates(
-        self, pixels: NDArray[np.float64], offsets: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]: ...
+    ) -> tuple[Floats, Floats, Ints, Ints, Ints, Ints, float]: ...
+    def candidates(self, pixels: Floats, offsets: Ints) -> tuple[Floats, Ints, Ints]: ...
 
 def choose_candidates(
-    scores: NDArray[np.float64],
-    first: NDArray[np.int64],
-    views: NDArray[np.int64],
-    max_nodes: int,
-) -> tuple[NDArray[np.int64], bool, float]: ...
+    scores: Floats, first: Ints, views: Ints, max_nodes: int
+) -> tuple[Ints, bool, float]: ...
 
 class ChainOptions:
     def __init__(
         self,
         *,
-        weights: NDArray[np.float64],
+        weights: Floats,
         is_informed: bool,
         stop: float,
         floor: float,
@@ -523,12 +415,9 @@ class _ChainTracker(_Tracker):
         options: McmcOptions,
         seed: int,
     ) -> None: ...
-    def start_from(self, labels: NDArray[np.int64]) -> None: ...
+    def start_from(self, labels: Ints) -> None: ...
     def finish(
-        self,
-        labels: NDArray[np.int64],
-        confidence: NDArray[np.float64],
-        goes_on: Callable[[float], bool],
+        self, labels: Ints, confidence: Floats, goes_on: Callable[[float], bool]
     ) -> None: ...
 
 class OneMotionTracker(_ChainTracker): ...
@@ -538,71 +427,44 @@ class Chain:
     def __init__(
         self, model: MotionModel, score: ScoreModel, options: ChainOptions, seed: int
     ) -> None: ...
-    def add_frame(
-        self,
-        time: float,
-        F: NDArray[np.float64],
-        Q: NDArray[np.float64],
-        points: NDArray[np.float64],
-    ) -> None: ...
+    def add_frame(self, time: float, F: Floats, Q: Floats, points: Floats) -> None: ...
     def freeze(self, frame: int) -> None: ...
-    def assign(self, labels: NDArray[np.int64]) -> None: ...
-    def labels(self) -> NDArray[np.int64]: ...
+    def assign(self, labels: Ints) -> None: ...
+    def labels(self) -> Ints: ...
     def log_posterior(self) -> float: ...
     def run(self, n_moves: int) -> None: ...
-    def counts(self) -> NDArray[np.int64]: ...
-    def visits(self, n_moves: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]: ...
+    def counts(self) -> Ints: ...
+    def visits(self, n_moves: int) -> tuple[Ints, Ints]: ...
     def trace(
         self, n_moves: int
-    ) -> list[
-        tuple[int, int, NDArray[np.int64], NDArray[np.int64], float, float, float, bool, float]
-    ]: ...
+    ) -> list[tuple[int, int, Ints, Ints, float, float, float, bool, float]]: ...
 
 BEND: float
 MIN_TOGETHER: int
 
 # (predictive variances, whether each is a bond)
 def judge_distances(
-    means: NDArray[np.float64], variances: NDArray[np.float64], frames: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]: ...
+    means: Floats, variances: Floats, frames: Ints
+) -> tuple[Floats, NDArray[np.bool_]]: ...
 
 # (R, from, to, rms): b = R (a - from) + to, in three axes.
-def fit_rigid(
-    a: NDArray[np.float64], b: NDArray[np.float64], weights: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]: ...
+def fit_rigid(a: Floats, b: Floats, weights: Floats) -> tuple[Floats, Floats, Floats, float]: ...
 
 # (where they carry what was at `then`, its variance beside `r`, log densities at some points)
 def carried(
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    then: NDArray[np.float64],
-    r: float,
-    points: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]: ...
+    a: Floats, b: Floats, weights: Floats, then: Floats, r: float, points: Floats
+) -> tuple[Floats, float, Floats]: ...
 
 # Log density of each of some points of a frame among the others, where some were seen before.
 def densities_elsewhere(
-    before: NDArray[np.float64],
-    points: NDArray[np.float64],
-    *,
-    noise: float,
-    ghost_radius: float,
-) -> NDArray[np.float64]: ...
+    before: Floats, points: Floats, *, noise: float, ghost_radius: float
+) -> Floats: ...
 
 class Neighbours:
     def __init__(self, n_axes: int, r: float) -> None: ...
-    def add(self, markers: NDArray[np.int32], points: NDArray[np.float64]) -> None: ...
+    def add(self, markers: Shorts, points: Floats) -> None: ...
     # (the others, frames seen together, mean distances, their variances, predictive variances)
-    def of(
-        self, marker: int
-    ) -> tuple[
-        NDArray[np.int64],
-        NDArray[np.int64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-    ]: ...
+    def of(self, marker: int) -> tuple[Ints, Ints, Floats, Floats, Floats]: ...
 
 class StitchOptions:
     def __init__(
@@ -619,50 +481,37 @@ class StitchOptions:
 class Stitcher:
     WORTH: float
     def __init__(self, motion: MotionModel, options: StitchOptions) -> None: ...
-    def advise(
-        self,
-        labels: NDArray[np.int64],
-        before: NDArray[np.int64],
-        weights: NDArray[np.float64],
-    ) -> None: ...
+    def advise(self, labels: Ints, before: Ints, weights: Floats) -> None: ...
     # (fragment of each point, and of each fragment its marker, the fragment before, how probably)
     def run(
         self,
         motion: MotionModel,
-        times: NDArray[np.float64],
-        kind: NDArray[np.int32],
-        F: NDArray[np.float64],
-        Q: NDArray[np.float64],
-        offsets: NDArray[np.int64],
-        points: NDArray[np.float64],
-        labels: NDArray[np.int64],
-    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]: ...
-    @property
-    def n_cuts(self) -> int: ...
-    @property
-    def n_markers(self) -> int: ...
+        times: Floats,
+        kind: Shorts,
+        F: Floats,
+        Q: Floats,
+        offsets: Ints,
+        points: Floats,
+        labels: Ints,
+    ) -> tuple[Shorts, Shorts, Shorts, Floats]: ...
+    n_cuts: Final[int]
+    n_markers: Final[int]
 
 class LiveStitcher:
     def __init__(self, motion: MotionModel, options: StitchOptions, *, lag: int) -> None: ...
     # (new state, markers, earlier detections whose marker changes, their markers)
     def step(
         self,
-        F: NDArray[np.float64],
-        Q: NDArray[np.float64],
-        points: NDArray[np.float64],
-        labels: NDArray[np.int64],
-        revised: NDArray[np.int64],
-        revised_labels: NDArray[np.int64],
-    ) -> tuple[LiveStitcher, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]: ...
-    @property
-    def n_seen(self) -> int: ...
-    @property
-    def n_joins(self) -> int: ...
-    @property
-    def n_ghosts(self) -> int: ...
-    @property
-    def n_cuts(self) -> int: ...
-    @property
-    def n_markers(self) -> int: ...
-    @property
-    def n_remembered(self) -> int: ...
+        F: Floats,
+        Q: Floats,
+        points: Floats,
+        labels: Ints,
+        revised: Ints,
+        revised_labels: Ints,
+    ) -> tuple[LiveStitcher, Ints, Ints, Ints]: ...
+    n_seen: Final[int]
+    n_joins: Final[int]
+    n_ghosts: Final[int]
+    n_cuts: Final[int]
+    n_markers: Final[int]
+    n_remembered: Final[int]
