@@ -131,16 +131,15 @@ class PointCandidates {
   }
 
   void grow(PointCandidate& c) {
-    std::vector<std::int32_t>& asked = asked_;
-    asked = all_;
-    extend(c, asked, false);
-    extend(c, asked, true);
+    asked_ = all_;
+    extend(c, asked_, false);
+    extend(c, asked_, true);
     prune(c);
     if (c.views.size() >= 3 && c.views.size() < all_.size()) {
       // The place is sure now, and may bring others into the gate.
       const std::size_t n = c.views.size();
-      asked = all_;
-      extend(c, asked, true);
+      asked_ = all_;
+      extend(c, asked_, true);
       if (c.views.size() > n) prune(c);
     }
     keep(c);
@@ -238,17 +237,12 @@ class PointCandidates {
     for (const View v : c.views) hash = (hash ^ static_cast<std::uint64_t>(number(v))) * 1099511628211u;
     const auto [from, to] = by_hash_.equal_range(hash);
     for (auto it = from; it != to; ++it)
-      if (is_same(found_[it->second], c)) return;
+      if (found_[it->second].views == c.views) return;
     const auto own = static_cast<std::int32_t>(found_.size());
     by_hash_.emplace(hash, own);
     if (c.views.size() >= 3)
       for (const View v : c.views) strong_of_[number(v)].push_back(own);
     found_.push_back(std::move(c));
-  }
-
-  static bool is_same(const PointCandidate& a, const PointCandidate& b) {
-    return std::equal(a.views.begin(), a.views.end(), b.views.begin(), b.views.end(),
-                      [](View v, View w) { return v.camera == w.camera && v.point == w.point; });
   }
 
   // Where two candidates want one image point: each of them without what the other has, if both
@@ -282,10 +276,7 @@ class PointCandidates {
     rest.X = found_[i].X;
     double lost = 0;
     for (const View v : found_[i].views) {
-      const bool is_shared = std::any_of(
-          found_[rival].views.begin(), found_[rival].views.end(),
-          [v](View w) { return v.camera == w.camera && v.point == w.point; });
-      if (is_shared) {
+      if (std::ranges::find(found_[rival].views, v) != found_[rival].views.end()) {
         const ImagePoints& camera = cameras_[v.camera];
         lost += camera.points[v.point].gain - camera.sense.miss - fit_.squared_of(found_[i], v) / 2;
       } else {

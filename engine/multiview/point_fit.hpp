@@ -21,6 +21,7 @@ namespace asterism {
 
 struct View {
   std::int32_t camera, point;  // of `ImagePoints::points`
+  bool operator==(const View&) const = default;
 };
 
 struct PointCandidate {

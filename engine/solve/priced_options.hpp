@@ -100,10 +100,7 @@ class PricedOptions {
       double dual = 0, length = 0;
       for (const double x : price) dual += x;
       std::fill(used.begin(), used.end(), 0);
-      for (std::int32_t o = 0; o < first_.back(); ++o) {
-        priced_[o] = options_[o]->worth;
-        for (const std::int32_t r : options_[o]->uses) priced_[o] -= price[r];
-      }
+      reprice(price);
       for (std::int32_t i = 0; i < n_trees(); ++i) {
         chosen[i] = static_cast<std::int32_t>(
             std::max_element(priced_.begin() + first_[i], priced_.begin() + first_[i + 1]) -
@@ -142,9 +139,12 @@ class PricedOptions {
       for (std::size_t r = 0; r < price.size(); ++r)
         price[r] = std::max(price[r] - step * (dual - known_.worth) / size * way[r], 0.0);
     }
+    reprice(price_);
+  }
+  void reprice(const std::vector<double>& price) {
     for (std::size_t o = 0; o < options_.size(); ++o) {
       priced_[o] = options_[o]->worth;
-      for (const std::int32_t r : options_[o]->uses) priced_[o] -= price_[r];
+      for (const std::int32_t r : options_[o]->uses) priced_[o] -= price[r];
     }
   }
 

@@ -54,7 +54,7 @@ class Walker {
     std::int64_t n = 0;
     for (; !budget.is_over(n); ++n) step(look_at_none);
     stats.n_search += n;
-    add_counts(stats);
+    stats.add_moves(sampler_.counts());
     if (is_draw_) return std::numeric_limits<double>::infinity();
     sampler_.restore_best();
     return sampler_.most();
@@ -99,7 +99,7 @@ class Walker {
     }
     out.ess = trace.ess_of_halves(out.all_moves());
     stats.n_sampled += out.all_moves();
-    add_counts(stats);
+    stats.add_moves(sampler_.counts());
   }
 
  private:
@@ -183,14 +183,6 @@ class Walker {
     hot_.push_back({toggle, before + std::exp(std::min(gain, 0.0) / 4)});
   }
   static constexpr double kHotWithin = 12;
-
-  void add_counts(ChainStats& stats) const {
-    for (int k = 0; k < kMoves; ++k) {
-      stats.moves[k].n_drawn += sampler_.counts()[k].n_drawn;
-      stats.moves[k].n_possible += sampler_.counts()[k].n_possible;
-      stats.moves[k].n_taken += sampler_.counts()[k].n_taken;
-    }
-  }
 
   Sampler<Filter> sampler_;
   Marginals<Filter> marginals_;

@@ -27,11 +27,7 @@ struct ChainStats {
   double ess = std::numeric_limits<double>::quiet_NaN();
 
   void add(const ChainStats& next) {
-    for (int k = 0; k < kMoves; ++k) {
-      moves[k].n_drawn += next.moves[k].n_drawn;
-      moves[k].n_possible += next.moves[k].n_possible;
-      moves[k].n_taken += next.moves[k].n_taken;
-    }
+    add_moves(next.moves);
     n_search += next.n_search;
     n_sampled += next.n_sampled;
     n_walked += next.n_walked;
@@ -42,6 +38,9 @@ struct ChainStats {
     n_doubtful += next.n_doubtful;
     n_unmoved += next.n_unmoved;
     add_mixing(next.rhat, next.ess);
+  }
+  void add_moves(const std::array<MoveCounts, kMoves>& next) {
+    for (int k = 0; k < kMoves; ++k) moves[k].add(next[k]);
   }
   void add_mixing(double next_rhat, double next_ess) {
     rhat = std::fmax(rhat, next_rhat);  // the other where one is NaN

@@ -39,6 +39,12 @@ inline constexpr Move inverse(Move move) {
 
 struct MoveCounts {
   std::int64_t n_drawn = 0, n_possible = 0, n_taken = 0;
+
+  void add(const MoveCounts& next) {
+    n_drawn += next.n_drawn;
+    n_possible += next.n_possible;
+    n_taken += next.n_taken;
+  }
 };
 
 }  // namespace asterism

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <utility>
 
 #include "mcmc/model/partition.hpp"
 #include "mcmc/moves/change.hpp"
@@ -46,21 +45,14 @@ class Splices {
   // A free detection in the place of another; false where its neighbours forbid it.
   bool replace(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
     if (!fits_in_place_of(y, x)) return false;
-    const std::int32_t k = p_.track_of(x);
-    Edit<Filter>& e = q.edit(k, p_.place_of(x));
-    p_.append(e, y);
-    append(e, k, p_.place_of(x) + 1);
+    put_in_place_of(y, x, q);
     return true;
   }
   // Each of two detections of one frame in the place of the other; false where neighbours forbid it.
   bool exchange(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
     if (!fits_in_place_of(y, x) || !fits_in_place_of(x, y)) return false;
-    for (const auto& [old, now] : {std::pair{x, y}, std::pair{y, x}}) {
-      const std::int32_t k = p_.track_of(old);
-      Edit<Filter>& e = q.edit(k, p_.place_of(old));
-      p_.append(e, now);
-      append(e, k, p_.place_of(old) + 1);
-    }
+    put_in_place_of(y, x, q);
+    put_in_place_of(x, y, q);
     return true;
   }
 
@@ -69,6 +61,12 @@ class Splices {
     const DetectionWindow& window = p_.window();
     const std::int32_t i = p_.before(x), j = p_.after(x);
     return (i < 0 || window.is_linkable(i, y)) && (j < 0 || window.is_linkable(y, j));
+  }
+  void put_in_place_of(std::int32_t y, std::int32_t x, Change<Filter>& q) const {
+    const std::int32_t k = p_.track_of(x);
+    Edit<Filter>& e = q.edit(k, p_.place_of(x));
+    p_.append(e, y);
+    append(e, k, p_.place_of(x) + 1);
   }
 
   const Partition<Filter>& p_;
