@@ -9,30 +9,17 @@
 #include <span>
 #include <vector>
 
-#include "frame/marriage_market.hpp"
-#include "solve/assignment.hpp"
+#include "frame/frame_pairing.hpp"
 #include "tracks/carried_tracks.hpp"
 #include "tracks/live_tracks.hpp"
 
 namespace asterism {
 
-struct FrameOptions {
-  Pairing pairing = Pairing::assignment;
-  // The 2010 report's own method: the points of the first frame are the tracks, every pair is a
-  // candidate, and no track begins, coasts or ends. Every frame has as many points as the first.
-  bool is_strict = false;
-  // Hospitals and residents: so many detections may marry one track, those beyond its favourite
-  // within a distance of it; they are merged by their likelihood.
-  std::int32_t capacity = 1;
-  double merged_within = 0;
-  CarryOptions carry;  // not where is_strict
-};
-
 class FrameTracker {
  public:
   FrameTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
-               const FrameOptions& options)
-      : live_(model, score, life), opt_(options), carried_(model, score, options.carry) {}
+               const PairingOptions& options, const CarryOptions& carry)
+      : live_(model, score, life), opt_(options), carried_(model, score, carry) {}
 
   // Take the points of the next frame. Calls label(detection, track id, confidence) for every
   // detection whose label is decided now: those of this frame in confirmed tracks and, when a track
@@ -42,9 +29,7 @@ class FrameTracker {
     FrameStats stats;
     find_candidates(time, step, points, stats);
     stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());
-    s_.match.assign(live_.size(), -1);
-    s_.is_taken.assign(points.size(), 0);
-    s_.extras.clear();
+    s_.pairs.begin(live_.size(), points.size());
     // Believed tracks first. A tentative one knows so little that it fits almost anything, and a
     // single frame cannot see that the marker which it takes over would have to vanish for good.
     match_all(true, points, stats);
@@ -52,10 +37,11 @@ class FrameTracker {
     update_tracks(time, points, stats, label);
     if (!opt_.is_strict)
       begin_tracks(time, points);
-    else if (live_.n_frames == 0)
+    else if (live_.so_far.n_frames == 0)
       begin_strictly(time, points, label);
     carried_.learn(live_, stats);
-    live_.end_frame(time, points.size(), stats);
+    live_.count(stats);
+    live_.so_far.add(time, points.size());
     total_.add(stats);
     return stats;
   }
@@ -64,18 +50,13 @@ class FrameTracker {
   const MotionModel& motion() const { return live_.m; }
   std::int64_t n_ids() const { return live_.next_id; }
   const LiveTracks<>& live() const { return live_; }
+  const Progress& so_far() const { return live_.so_far; }
   const FrameStats& total() const { return total_; }
-  std::int64_t n_frames() const { return live_.n_frames; }
-  std::int64_t n_seen() const { return live_.n_seen; }
-  double last_time() const { return live_.last_time; }
 
  private:
   struct Memory {
     std::vector<Candidate> candidates, eligible;
-    std::vector<std::int32_t> match;
-    std::vector<Pair> extras;  // further detections of a track
-    std::vector<char> is_taken;
-    Assignment assignment;
+    FramePairing pairs;
   };
 
   // How much likelier a frame becomes by a track's `gain`: by all of it for a believed track, and
@@ -91,25 +72,17 @@ class FrameTracker {
       return pair_all(points);
     }
     const double over = live_.leftover_gain();
-    const double spare = carried_.is_on() ? carried_.bond_weight() : 0;
     // A believed track takes a point only if that beats missing it and leaving the point over.
-    const auto least_of = [&](std::size_t i) {
+    const auto least_of = [&](std::size_t i, double gain) {
       const std::int32_t gap = live_[i].gap;
-      return live_[i].is_confirmed() ? live_.miss_gain(gap) + over - live_.hit_gain(gap) - spare
+      return live_[i].is_confirmed() ? live_.miss_gain(gap) + over - live_.hit_gain(gap) + gain
                                      : -std::numeric_limits<double>::infinity();
     };
     const auto gain_of = [&](std::size_t i, double log_likelihood) {
       const std::int32_t gap = live_[i].gap;
       return odds(i, live_.hit_gain(gap) + log_likelihood) - odds(i, live_.miss_gain(gap)) - over;
     };
-    if (!carried_.is_on())
-      return live_.candidates(time, step, points, 0.0, least_of, gain_of, s_.candidates);
-    carried_.list(
-        live_, step, points, 0.0,
-        [&](auto&& is_asked, std::vector<Candidate>& out) {
-          live_.list(time, points, -spare, is_asked, least_of, gain_of, out);
-        },
-        s_.candidates, stats);
+    carried_.list(live_, time, step, points, 0.0, least_of, gain_of, s_.candidates, stats);
   }
 
   void pair_all(std::span<const Point> points) {
@@ -129,37 +102,21 @@ class FrameTracker {
   void match_all(bool confirmed, std::span<const Point> points, FrameStats& stats) {
     s_.eligible.clear();
     for (const Candidate& c : s_.candidates)
-      if (live_[c.row].is_confirmed() == confirmed && !s_.is_taken[c.column])
+      if (live_[c.row].is_confirmed() == confirmed && !s_.pairs.is_taken[c.column])
         s_.eligible.push_back(c);
-    const Groups groups =
-        connected_groups(s_.eligible, static_cast<std::int32_t>(live_.size()),
-                         static_cast<std::int32_t>(points.size()));
-    const MarriageMarket market{opt_.pairing == Pairing::detections_propose, opt_.capacity,
-                                opt_.merged_within};
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      const bool is_alone = groups[g].size() == 1 && !opt_.is_strict;
-      if (is_alone || opt_.pairing == Pairing::assignment)
-        s_.assignment.solve(groups[g], s_.match);
-      else
-        market.marry(groups[g], points, live_.m.axis.D, s_.match, s_.extras);
-      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
-    }
-    stats.n_groups += static_cast<std::int64_t>(groups.size());
-    for (const Candidate& c : s_.eligible)
-      if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
-    for (const auto& [row, column] : s_.extras) s_.is_taken[column] = 1;
+    s_.pairs.pair(s_.eligible, points, live_.m.axis.D, opt_, stats);
   }
 
   // What a track takes for its measurement: its detection, or the mean of several by likelihood.
   Point measured(std::size_t i, std::span<const Point> points) const {
-    const Point& own = points[s_.match[i]];
+    const Point& own = points[s_.pairs.match[i]];
     std::array<double, kMaxModes> each{};
     const Prediction& prediction = live_.prediction(i);
     const int D = live_.m.axis.D;
     double total = 1;
     Point sum = own;
-    const double log_own = s_.extras.empty() ? 0 : prediction.log_likelihood(own, each);
-    for (const auto& [row, column] : s_.extras) {
+    const double log_own = s_.pairs.extras.empty() ? 0 : prediction.log_likelihood(own, each);
+    for (const auto& [row, column] : s_.pairs.extras) {
       if (row != static_cast<std::int32_t>(i)) continue;
       const double weight = std::exp(prediction.log_likelihood(points[column], each) - log_own);
       total += weight;
@@ -176,7 +133,7 @@ class FrameTracker {
       LiveTrack<NoMore>& track = live_.begin(j, points[j], time, 0.0);
       track.pending = {};
       track.id = live_.next_id++;
-      label(live_.n_seen + static_cast<std::int64_t>(j), track.id, 1.0);
+      label(live_.so_far.n_seen + static_cast<std::int64_t>(j), track.id, 1.0);
     }
   }
 
@@ -185,7 +142,7 @@ class FrameTracker {
                      Label&& label) {
     for (std::size_t i = 0; i < live_.size(); ++i) {
       LiveTrack<NoMore>& track = live_[i];
-      const std::int32_t j = s_.match[i];
+      const std::int32_t j = s_.pairs.match[i];
       if (j < 0) {
         track.score += live_.miss_gain(track.gap);
         ++track.gap;
@@ -202,11 +159,11 @@ class FrameTracker {
 
   void begin_tracks(double time, std::span<const Point> points) {
     for (std::size_t j = 0; j < points.size(); ++j)
-      if (!s_.is_taken[j]) live_.begin(j, points[j], time, live_.birth_gain());
+      if (!s_.pairs.is_taken[j]) live_.begin(j, points[j], time, live_.birth_gain());
   }
 
   LiveTracks<> live_;
-  FrameOptions opt_;
+  PairingOptions opt_;
   CarriedTracks carried_;
   FrameStats total_;
   Fresh<Memory> s_;

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "filter/pda_update.hpp"
+#include "frame/frame_pairing.hpp"
 #include "solve/best_permutations.hpp"
 #include "solve/joint_events.hpp"
 #include "tracks/carried_tracks.hpp"
@@ -34,7 +35,6 @@ struct JointOptions {
   // A believed track counts as one that exists until its gap is too long: markers hide in bursts,
   // of which P_d knows nothing. Otherwise its r falls with every miss, and ends it.
   bool is_sure_until_gap = true;
-  CarryOptions carry;
 };
 
 struct JointStats : FrameStats {
@@ -55,8 +55,8 @@ struct JointStats : FrameStats {
 class JointTracker {
  public:
   JointTracker(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
-               const JointOptions& options)
-      : live_(model, score, life), opt_(options), carried_(model, score, options.carry) {}
+               const JointOptions& options, const CarryOptions& carry)
+      : live_(model, score, life), opt_(options), carried_(model, score, carry) {}
 
   // As FrameTracker::step. Every point of the frame gets a label, -1 with the probability that it is
   // of no track that is believed.
@@ -66,19 +66,19 @@ class JointTracker {
     survive();
     find_candidates(time, step, points, stats);
     stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());
-    s_.match.assign(live_.size(), -1);
+    s_.pairs.begin(live_.size(), points.size());
     s_.match_probability.assign(live_.size(), 0);
     s_.missed.assign(live_.size(), 1);
     s_.free.assign(points.size(), 1);
-    s_.is_taken.assign(points.size(), 0);
     share_among_believed(points, stats);
     share_among_tentative(points, stats);
     for (std::size_t j = 0; j < points.size(); ++j)
-      label(live_.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * (1 - newborn(1)));
+      label(live_.so_far.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * (1 - newborn(1)));
     update_tracks(time, points, stats, label);
     begin_tracks(time, points);
     carried_.learn(live_, stats);
-    live_.end_frame(time, points.size(), stats);
+    live_.count(stats);
+    live_.so_far.add(time, points.size());
     total_.add(stats);
     return stats;
   }
@@ -87,20 +87,17 @@ class JointTracker {
   const MotionModel& motion() const { return live_.m; }
   std::int64_t n_ids() const { return live_.next_id; }
   const LiveTracks<>& live() const { return live_; }
+  const Progress& so_far() const { return live_.so_far; }
   const JointStats& total() const { return total_; }
-  std::int64_t n_frames() const { return live_.n_frames; }
-  std::int64_t n_seen() const { return live_.n_seen; }
-  double last_time() const { return live_.last_time; }
 
  private:
   struct Memory {
     std::vector<Candidate> candidates, eligible;
     std::vector<double> gains, marginals, log_miss, all_missed;
-    std::vector<std::int32_t> best, match;       // by track
+    std::vector<std::int32_t> best;  // by track
     std::vector<double> match_probability, missed;
-    std::vector<double> free;                    // probability that a detection is of no track
-    std::vector<char> is_taken;
-    Assignment assignment;  // of tentative tracks
+    std::vector<double> free;  // probability that a detection is of no track
+    FramePairing pairs;
     BestPermutations guard;
     std::vector<double> weights;
     std::vector<WeightedPoint> mixture;
@@ -148,23 +145,15 @@ class JointTracker {
   void find_candidates(double time, const MotionStep& step, std::span<const Point> points,
                        JointStats& stats) {
     const double common = -live_.sm.log_clutter - live_.leftover_gain();
-    const double least = kNegligible - (carried_.is_on() ? carried_.bond_weight() : 0);
     const auto offset = [&](std::size_t i) {
       return common + std::log(p_detect(i)) - softplus(-existence(i)) -
              std::log(not_seen(i, existence(i)));
     };
-    const auto least_of = [&](std::size_t i) { return least - offset(i); };
+    const auto least_of = [&](std::size_t i, double gain) { return gain - offset(i); };
     const auto gain_of = [&](std::size_t i, double log_likelihood) {
       return offset(i) + log_likelihood;
     };
-    if (!carried_.is_on())
-      return live_.candidates(time, step, points, least, least_of, gain_of, s_.candidates);
-    carried_.list(
-        live_, step, points, kNegligible,
-        [&](auto&& is_asked, std::vector<Candidate>& out) {
-          live_.list(time, points, least, is_asked, least_of, gain_of, out);
-        },
-        s_.candidates, stats);
+    carried_.list(live_, time, step, points, kNegligible, least_of, gain_of, s_.candidates, stats);
   }
 
   // Pairings of the believed tracks, or of the tentative ones with what is left.
@@ -172,7 +161,7 @@ class JointTracker {
     s_.eligible.clear();
     s_.gains.clear();
     for (Candidate c : s_.candidates) {
-      if (live_[c.row].is_confirmed() != confirmed || s_.is_taken[c.column]) continue;
+      if (live_[c.row].is_confirmed() != confirmed || s_.pairs.is_taken[c.column]) continue;
       c.gain += std::log(s_.free[c.column]);
       if (!(c.gain > kNegligible)) continue;
       s_.eligible.push_back(c);
@@ -193,16 +182,14 @@ class JointTracker {
     stats.n_states = std::max(stats.n_states, summary.n_states);
     stats.bound = std::max(stats.bound, summary.bound);
     const Groups& groups = events.groups();
-    stats.n_groups += static_cast<std::int64_t>(groups.size());
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
+    FramePairing::count(groups, stats);
+    for (std::size_t g = 0; g < groups.size(); ++g)
       take_group(groups[g], std::span(groups.sources).subspan(groups.starts[g]), points, stats);
-    }
     for (std::size_t e = 0; e < s_.eligible.size(); ++e) {
-      const Candidate& c = s_.eligible[e];
-      s_.free[c.column] = std::max(s_.free[c.column] - s_.marginals[e], 0.0);
-      if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
+      double& free = s_.free[s_.eligible[e].column];
+      free = std::max(free - s_.marginals[e], 0.0);
     }
+    s_.pairs.take(s_.eligible);
   }
 
   // Tentative tracks take what the likeliest event gives them, and each is as sure of it as it can be
@@ -210,20 +197,11 @@ class JointTracker {
   // all their events would take long and tell little.
   void share_among_tentative(std::span<const Point> points, JointStats& stats) {
     find_eligible(false);
-    const Groups groups =
-        connected_groups(s_.eligible, static_cast<std::int32_t>(live_.size()),
-                         static_cast<std::int32_t>(points.size()));
-    stats.n_groups += static_cast<std::int64_t>(groups.size());
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      s_.assignment.solve(groups[g], s_.match);
-      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
-    }
-    for (const Candidate& c : s_.eligible)
-      if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
+    s_.pairs.pair(s_.eligible, points, live_.m.axis.D, {}, stats);
     for (std::size_t first = 0, last; first < s_.eligible.size(); first = last) {
-      const std::int32_t i = s_.eligible[first].row;
+      const std::int32_t i = s_.eligible[first].row, match = s_.pairs.match[i];
       const auto is_open = [&](const Candidate& c) {
-        return !s_.is_taken[c.column] || s_.match[i] == c.column;
+        return !s_.pairs.is_taken[c.column] || match == c.column;
       };
       double most = 0, total = 0;
       for (last = first; last < s_.eligible.size() && s_.eligible[last].row == i; ++last)
@@ -237,10 +215,9 @@ class JointTracker {
         if (!is_open(c)) continue;
         const double p = std::exp(c.gain - most) / total;
         s_.free[c.column] = std::max(s_.free[c.column] - p, 0.0);
-        if (s_.match[i] == c.column) s_.match_probability[i] = p;
+        if (match == c.column) s_.match_probability[i] = p;
       }
-      if (s_.match[i] >= 0)
-        update(live_.m, live_.prediction(i), points[s_.match[i]], live_[i].state);
+      if (match >= 0) update(live_.m, live_.prediction(i), points[match], live_[i].state);
     }
   }
 
@@ -251,7 +228,7 @@ class JointTracker {
       const Candidate& c = group[e];
       s_.missed[c.row] = s_.all_missed[c.row];
       if (s_.best[c.row] != c.column) continue;
-      s_.match[c.row] = c.column;
+      s_.pairs.match[c.row] = c.column;
       s_.match_probability[c.row] = s_.marginals[sources[e]];
     }
     weigh(group, sources, stats);
@@ -265,8 +242,9 @@ class JointTracker {
       }
       if (s_.mixture.empty()) continue;
       // What carries a hidden marker is not its own until it is seen.
-      if (carried_.is_carried(i) && s_.match[i] < 0) continue;
-      if (s_.match[i] >= 0) carried_.take(live_, i, points[s_.match[i]], stats);
+      const std::int32_t match = s_.pairs.match[i];
+      if (carried_.is_carried(i) && match < 0) continue;
+      if (match >= 0) carried_.take(live_, i, points[match], stats);
       // Given that the track exists, a miss is less likely than it is in itself.
       const double seldom = probability(existence(i)) * p_miss(i) / not_seen(i, existence(i));
       const double missed = std::max(1 - taken, 0.0) * seldom;
@@ -294,7 +272,7 @@ class JointTracker {
     for (std::size_t i = 0; i < live_.size(); ++i) {
       LiveTrack<NoMore>& track = live_[i];
       update_existence(i);
-      const std::int32_t j = s_.match[i];
+      const std::int32_t j = s_.pairs.match[i];
       if (j < 0) {
         ++track.gap;
         carried_.miss(track, i, stats);
@@ -324,7 +302,7 @@ class JointTracker {
   void begin_tracks(double time, std::span<const Point> points) {
     for (std::size_t j = 0; j < points.size(); ++j) {
       const double r = newborn(s_.free[j]);
-      if (s_.is_taken[j] || !(r > 0)) continue;
+      if (s_.pairs.is_taken[j] || !(r > 0)) continue;
       live_.begin(j, points[j], time, std::log(r) - std::log1p(-r));
     }
   }

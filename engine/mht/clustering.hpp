@@ -12,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "math/union_find.hpp"
 #include "mht/clusters.hpp"
 #include "mht/frame_ways.hpp"
 #include "solve/assignment.hpp"
@@ -42,25 +41,27 @@ class Clustering {
       for (const auto& [j, bound] : bounds.back().by_detection)
         kept_from_others[j] += bounds.back().all - bound.without;
     }
-    UnionFind sets(static_cast<std::size_t>(n_clusters) + n_points);
-    for (std::int32_t c = 0; c < n_clusters; ++c)
+    // Clusters first, then the detections.
+    const auto sets = connected_sets(n_clusters + n_points, n_points, [&](std::int32_t c, auto&& visit) {
+      if (c >= n_clusters) return visit(c - n_clusters);
       for (const auto& [j, bound] : bounds[c].by_detection) {
         const double others = kept_from_others[j] - (bounds[c].all - bound.without);
-        if (bounds[c].all - bound.with + others <= opt_.drop) sets.join(c, n_clusters + j);
+        if (bounds[c].all - bound.with + others <= opt_.drop) visit(j);
       }
-    std::map<std::int32_t, SuperCluster> super;
-    for (std::int32_t c = 0; c < n_clusters; ++c) {
-      const auto [at, is_new] = super.try_emplace(sets.find(c));
-      at->second.cluster =
-          is_new ? std::move(clusters[c]) : combined(at->second.cluster, clusters[c], opt_, stats);
-    }
-    for (std::int32_t j = 0; j < n_points; ++j) {
-      const auto [at, is_new] = super.try_emplace(sets.find(n_clusters + j));
-      if (is_new) at->second.cluster.hypotheses.resize(1);  // that there is nothing so far
-      at->second.columns.push_back(j);
-    }
+    });
     std::vector<SuperCluster> out;
-    for (auto& [root, one] : super) out.push_back(std::move(one));
+    for (const std::vector<std::int32_t>& set : sets) {
+      SuperCluster& super = out.emplace_back();
+      if (set.front() < n_clusters)
+        super.cluster = std::move(clusters[set.front()]);
+      else
+        super.cluster.hypotheses.resize(1);  // that there is nothing so far
+      for (const std::int32_t c : set)
+        if (c >= n_clusters)
+          super.columns.push_back(c - n_clusters);
+        else if (c != set.front())
+          super.cluster = combined(super.cluster, clusters[c], opt_, stats);
+    }
     return out;
   }
 

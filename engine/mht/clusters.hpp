@@ -34,7 +34,13 @@ struct Cluster {
 // A cluster, and the detections of the new frame that it explains.
 struct SuperCluster {
   Cluster cluster;
-  std::vector<std::int32_t> columns;
+  std::vector<std::int32_t> columns;  // rising
+
+  // The place of a detection among them, -1 of one that is surely another cluster's.
+  std::int32_t place(std::int32_t column) const {
+    const auto at = std::ranges::lower_bound(columns, column);
+    return at == columns.end() || *at != column ? -1 : static_cast<std::int32_t>(at - columns.begin());
+  }
 };
 
 inline void sort_by_weight(std::vector<Hypothesis>& hypotheses) {

@@ -19,9 +19,6 @@ struct Ways {
   std::int32_t miss(std::int32_t branch) const { return first[branch + 1] - 1; }
 };
 
-// A tree is something to explain from its second detection on.
-inline bool is_lone(const Branch& b, bool is_seed) { return is_seed && b.n_taken < 2; }
-
 class FrameWays {
  public:
   Ways& operator[](std::size_t tree) { return ways_[tree]; }
@@ -52,7 +49,7 @@ class FrameWays {
         ways.first.push_back(static_cast<std::int32_t>(ways.branches.size()));
       }
       for (const Branch& b : ways.branches)
-        ways.worth.push_back(is_lone(b, open.is_seed(i)) ? 0 : grower.worth(b));
+        ways.worth.push_back(open.is_lone(i, b) ? 0 : grower.worth(b));
     }
     open.sow();
     for (std::size_t i = ways_.size(); i < open.n_all(); ++i)

@@ -32,10 +32,9 @@ class HypothesisGeneration {
     for (std::size_t i = open_.live.size(); i < open_.n_all(); ++i) {
       const LiveTrack<Tree>& tree = open_.tree(i);
       if (tree.more.first != frame.number) continue;
-      const std::int32_t j = ways_[i].branches.front().taken(frame.number);
-      const auto at = std::lower_bound(super.columns.begin(), super.columns.end(), j);
-      if (at == super.columns.end() || *at != j) continue;
-      seeds[at - super.columns.begin()] = static_cast<std::int32_t>(cluster.keys.size());
+      const std::int32_t j = super.place(ways_[i].branches.front().taken(frame.number));
+      if (j < 0) continue;
+      seeds[j] = static_cast<std::int32_t>(cluster.keys.size());
       cluster.keys.push_back(tree.more.key);
     }
     std::vector<Parent> parents(before.hypotheses.size());
@@ -97,10 +96,8 @@ class HypothesisGeneration {
       const std::size_t i = ways_.index_of(before.keys[k]);
       parent.missed += ways_[i].worth[ways_[i].miss(branch)];
       ways_.each_hit(i, branch, [&](std::int32_t w, double gain) {
-        const std::int32_t column = ways_[i].branches[w].taken(frame.number);
-        const auto at = std::lower_bound(super.columns.begin(), super.columns.end(), column);
-        if (at == super.columns.end() || *at != column) return;  // surely another cluster's
-        const auto j = static_cast<std::size_t>(at - super.columns.begin());
+        const std::int32_t j = super.place(ways_[i].branches[w].taken(frame.number));
+        if (j < 0) return;
         parent.cost[j * N + k] = -gain;
         parent.ways[k * n_points + j] = w;
         most[j] = std::max(most[j], gain);

@@ -21,7 +21,6 @@
 
 #include "base/scratch.hpp"
 #include "math/log_sums.hpp"
-#include "math/union_find.hpp"
 #include "mht/clustering.hpp"
 #include "mht/clusters.hpp"
 #include "mht/hypothesis_generation.hpp"
@@ -31,15 +30,11 @@ namespace asterism {
 
 class HypothesisMatrix {
  public:
-  HypothesisMatrix(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
-                   const BranchOptions& branches, const CarryOptions& carry, double new_track_claim,
-                   const MatrixOptions& options)
-      : open_{{{model, score, life}, branches, {}, {model, score, life, carry}}, new_track_claim, {}},
-        opt_(options) {}
+  HypothesisMatrix(const HypothesisWindow& open, const MatrixOptions& options)
+      : open_(open), opt_(options) {}
 
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, TreeStats& stats, Label&& label) {
-    frame->claimed.assign(frame->points.size(), 0);
     open_.advise(*frame, stats);
     open_.claim(*frame);
     open_.frames.push_back(frame);
@@ -57,9 +52,7 @@ class HypothesisMatrix {
     for (std::size_t i = 0; i < open_.n_all(); ++i)
       open_.tree(i).more.branches = std::move(s_.ways[i].branches);
     keep_used_branches();
-    for (std::size_t i = 0; i < open_.n_all(); ++i)
-      stats.most_branches = std::max<std::int64_t>(
-          stats.most_branches, static_cast<std::int64_t>(open_.tree(i).more.branches.size()));
+    open_.count_most(stats);
     if (open_.is_full()) {
       weigh(1);
       prune_by_oldest();
@@ -120,7 +113,7 @@ class HypothesisMatrix {
       const auto branch_of = [&](const Hypothesis& h) -> const Branch* {
         if (h.branches[k] < 0) return nullptr;
         const Branch& branch = s_.ways[i].branches[h.branches[k]];
-        return is_lone(branch, open_.is_seed(i)) ? nullptr : &branch;
+        return open_.is_lone(i, branch) ? nullptr : &branch;
       };
       const Branch *one = branch_of(a), *other = branch_of(b);
       if (!one && !other) continue;
@@ -191,7 +184,7 @@ class HypothesisMatrix {
   Fate fate_of(std::size_t tree, std::int32_t branch, const WindowFrame& frame) const {
     if (branch < 0) return {};
     const Branch& b = open_.tree(tree).more.branches[branch];
-    if (is_lone(b, open_.is_seed(tree)) || frame.number < open_.first_frame(tree)) return {};
+    if (open_.is_lone(tree, b) || frame.number < open_.first_frame(tree)) return {};
     return {true, b.taken(frame.number), 0};
   }
 
@@ -236,22 +229,16 @@ class HypothesisMatrix {
         if (s_.ways.has(cluster.keys[k]) && !open_.tree(i).more.branches.empty())
           alive.push_back(k);
       }
-      UnionFind sets(alive.size());
-      std::map<std::pair<std::int64_t, std::int32_t>, std::int32_t> owner;
-      for (std::size_t a = 0; a < alive.size(); ++a) {
-        const std::size_t i = s_.ways.index_of(cluster.keys[alive[a]]);
-        for (const Branch& b : open_.tree(i).more.branches)
-          for (const auto& frame : open_.frames) {
-            const std::int32_t j = b.taken(frame->number);
-            if (frame->number < open_.first_frame(i) || j < 0) continue;
-            const auto own = static_cast<std::int32_t>(a);
-            sets.join(owner.try_emplace({frame->number, j}, own).first->second, own);
-          }
+      const auto parts =
+          connected_sets(alive.size(), open_.n_detections(), [&](std::int32_t a, auto&& visit) {
+            const std::size_t i = s_.ways.index_of(cluster.keys[alive[a]]);
+            for (const Branch& b : open_.tree(i).more.branches) open_.each_detection(i, b, visit);
+          });
+      for (const std::vector<std::int32_t>& part : parts) {
+        std::vector<std::size_t> places;
+        for (const std::int32_t a : part) places.push_back(alive[a]);
+        clusters.push_back(part_of(cluster, places, grower));
       }
-      std::map<std::int32_t, std::vector<std::size_t>> parts;
-      for (std::size_t a = 0; a < alive.size(); ++a)
-        parts[sets.find(static_cast<std::int32_t>(a))].push_back(alive[a]);
-      for (const auto& [root, places] : parts) clusters.push_back(part_of(cluster, places, grower));
     }
     clusters_ = std::move(clusters);
     // Whose detections are all others' in every hypothesis that is left has no branch.
@@ -297,7 +284,7 @@ class HypothesisMatrix {
       if (branches[k] < 0) continue;
       const std::size_t i = s_.ways.index_of(cluster.keys[k]);
       const Branch& b = open_.tree(i).more.branches[branches[k]];
-      if (!is_lone(b, open_.is_seed(i))) sum += grower.worth(b);
+      if (!open_.is_lone(i, b)) sum += grower.worth(b);
     }
     return sum;
   }

@@ -9,8 +9,8 @@
 // parts of what is left over are solved each by `SetPacking`.
 #pragma once
 
-#include "math/union_find.hpp"
 #include "multiview/point_candidates.hpp"
+#include "solve/connected_components.hpp"
 #include "solve/set_packing.hpp"
 
 namespace asterism {
@@ -42,23 +42,12 @@ class CandidateChoice {
   using Numbers = std::vector<std::int32_t>;
 
   std::vector<Numbers> parts(const Numbers& members) const {
-    UnionFind sets(members.size());
-    Numbers owner(n_points_, -1);
-    for (std::size_t i = 0; i < members.size(); ++i)
-      for (const std::int32_t p : uses_[members[i]]) {
-        if (owner[p] >= 0) sets.join(owner[p], static_cast<std::int32_t>(i));
-        owner[p] = static_cast<std::int32_t>(i);
-      }
-    std::vector<Numbers> out;
-    Numbers place(members.size(), -1);
-    for (std::size_t i = 0; i < members.size(); ++i) {
-      const std::int32_t root = sets.find(static_cast<std::int32_t>(i));
-      if (place[root] < 0) {
-        place[root] = static_cast<std::int32_t>(out.size());
-        out.emplace_back();
-      }
-      out[place[root]].push_back(members[i]);
-    }
+    std::vector<Numbers> out =
+        connected_sets(members.size(), n_points_, [&](std::int32_t i, auto&& visit) {
+          for (const std::int32_t p : uses_[members[i]]) visit(p);
+        });
+    for (Numbers& part : out)
+      for (std::int32_t& i : part) i = members[i];
     return out;
   }
 

@@ -25,37 +25,25 @@ class ManyViews {
   }
 
   // `pixels` of all cameras, those of camera c from offsets[c] to offsets[c + 1] (from any start).
-  std::vector<PointCandidate> candidates(std::span<const double> pixels,
-                                         std::span<const std::int64_t> offsets,
-                                         std::span<const ExpectedPlace> expected) {
-    for (std::size_t c = 0; c < images_.size(); ++c) {
-      const auto from = static_cast<std::size_t>(offsets[c] - offsets[0]);
-      const auto n = static_cast<std::size_t>(offsets[c + 1] - offsets[c]);
-      images_[c].take(pixels.subspan(2 * from, 2 * n), static_cast<std::int32_t>(from));
-    }
-    return PointCandidates(images_, options_, expected).find();
-  }
-
-  std::vector<std::int32_t> uses(const PointCandidate& c) const {
-    std::vector<std::int32_t> out;
-    for (const View v : c.views) out.push_back(images_[v.camera].points[v.point].number);
-    return out;
-  }
-
   // The best choice of points; then, with merge > 0, those that it left because their images have
   // merged with others, as far as `merge` pixels (one standard deviation) from where they belong.
   std::vector<FoundPoint> solve(std::span<const double> pixels, std::span<const std::int64_t> offsets,
                                 std::span<const ExpectedPlace> expected, double merge, std::int64_t max_nodes,
                                 FrameSummary& summary) {
+    for (std::size_t c = 0; c < images_.size(); ++c) {
+      const auto from = static_cast<std::size_t>(offsets[c] - offsets[0]);
+      const auto n = static_cast<std::size_t>(offsets[c + 1] - offsets[c]);
+      images_[c].take(pixels.subspan(2 * from, 2 * n), static_cast<std::int32_t>(from));
+    }
     std::vector<FoundPoint> found;
-    choose(candidates(pixels, offsets, expected), pixels.size() / 2, max_nodes, summary, found);
     std::vector<char> is_taken(pixels.size() / 2, 0);
+    choose(expected, is_taken.size(), max_nodes, summary, found);
     for (const FoundPoint& p : found)
       for (const std::int32_t use : p.uses) is_taken[use] = 1;
     const bool is_any_left = std::find(is_taken.begin(), is_taken.end(), 0) != is_taken.end();
     if (merge > 0 && !found.empty() && is_any_left) {
       for (ImagePoints& camera : images_) camera.share(is_taken, std::max(merge, camera.sense.sigma));
-      choose(PointCandidates(images_, options_, expected).find(), is_taken.size(), max_nodes, summary, found);
+      choose(expected, is_taken.size(), max_nodes, summary, found);
     }
     std::sort(found.begin(), found.end(), [](const FoundPoint& a, const FoundPoint& b) {
       return a.X.x != b.X.x ? a.X.x < b.X.x : a.X.y < b.X.y;
@@ -64,12 +52,14 @@ class ManyViews {
   }
 
  private:
-  void choose(const std::vector<PointCandidate>& all, std::size_t n_points, std::int64_t max_nodes,
+  void choose(std::span<const ExpectedPlace> expected, std::size_t n_points, std::int64_t max_nodes,
               FrameSummary& summary, std::vector<FoundPoint>& found) const {
+    const std::vector<PointCandidate> all = PointCandidates(images_, options_, expected).find();
     std::vector<std::vector<std::int32_t>> used;
     std::vector<double> scores;
     for (const PointCandidate& c : all) {
-      used.push_back(uses(c));
+      used.emplace_back();
+      for (const View v : c.views) used.back().push_back(images_[v.camera].points[v.point].number);
       scores.push_back(c.score);
     }
     summary.n_candidates += static_cast<std::int64_t>(all.size());

@@ -5,9 +5,11 @@
 #include <nanobind/ndarray.h>
 
 #include <algorithm>
+#include <functional>
+#include <iterator>
 #include <memory>
+#include <span>
 #include <stdexcept>
-#include <string>
 
 namespace nb = nanobind;
 
@@ -29,8 +31,38 @@ struct Owned {
   }
 };
 
+// A copy of the values of a range, as an array of some shape; along one axis, of each what `project`
+// makes of it.
+template <typename T, typename Range>
+Out<T> array_of(const Range& values, std::initializer_list<std::size_t> shape) {
+  Owned<T> out(std::size(values));
+  std::transform(std::begin(values), std::end(values), out.data.get(),
+                 [](const auto& x) { return static_cast<T>(x); });
+  return out.give(shape);
+}
+template <typename T, typename Range, typename Project = std::identity>
+Out<T> array_of(const Range& values, Project project = {}) {
+  Owned<T> out(std::size(values));
+  std::transform(std::begin(values), std::end(values), out.data.get(),
+                 [&](const auto& x) { return static_cast<T>(std::invoke(project, x)); });
+  return out.give({std::size(values)});
+}
+
+// All that an array holds, one row after the other.
+template <typename T>
+std::span<const T> flat(const In<T>& array) {
+  return {array.data(), array.size()};
+}
+
 inline void require(bool holds, const char* what) {
   if (!holds) throw std::invalid_argument(what);
+}
+
+// That lists of so many values in all lie between offsets, the first from 0 on.
+inline void require_offsets(std::span<const std::int64_t> offsets, std::size_t n, const char* what) {
+  require(!offsets.empty() && offsets.front() >= 0 && std::ranges::is_sorted(offsets) &&
+              offsets.back() <= static_cast<std::int64_t>(n),
+          what);
 }
 
 }  // namespace asterism

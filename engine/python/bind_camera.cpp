@@ -24,6 +24,11 @@ Affine2 affine(const Rows& m) {
   return {p[0], p[1], p[2], p[3], p[4], p[5]};
 }
 
+template <typename T>
+std::vector<T> copied(const In<T>& array) {
+  return {array.data(), array.data() + array.size()};
+}
+
 Vec3 vec3(const double* p) { return {p[0], p[1], p[2]}; }
 
 // Triangles and capsules of a static scene (one moment) or of a moving one.
@@ -34,7 +39,13 @@ struct Surfaces {
 
   Surfaces(const In<double>& vertices_, const In<std::int32_t>& faces_,
            const In<std::int32_t>& face_owners_, const In<double>& ends_, const In<double>& radii_,
-           const In<std::int32_t>& capsule_owners_) {
+           const In<std::int32_t>& capsule_owners_)
+      : vertices(copied(vertices_)),
+        ends(copied(ends_)),
+        radii(copied(radii_)),
+        faces(copied(faces_)),
+        face_owners(copied(face_owners_)),
+        capsule_owners(copied(capsule_owners_)) {
     require(vertices_.ndim() == 3 && vertices_.shape(2) == 3, "vertices: shape (moments, V, 3)");
     require(faces_.ndim() == 2 && faces_.shape(1) == 3, "faces: shape (F, 3)");
     require(face_owners_.size() == faces_.shape(0), "face_owners: shape (F,)");
@@ -44,12 +55,8 @@ struct Surfaces {
     require(radii_.size() == ends_.shape(1) && capsule_owners_.size() == ends_.shape(1),
             "radii and capsule_owners: shape (M,)");
     n_moments = vertices_.shape(0), n_vertices = vertices_.shape(1), n_capsules = ends_.shape(1);
-    for (std::size_t i = 0; i < faces_.size(); ++i)
-      require(faces_.data()[i] >= 0 && static_cast<std::size_t>(faces_.data()[i]) < n_vertices,
-              "faces: indices of vertices");
-    auto copy = [](const auto& from, auto& to) { to.assign(from.data(), from.data() + from.size()); };
-    copy(vertices_, vertices), copy(faces_, faces), copy(face_owners_, face_owners);
-    copy(ends_, ends), copy(radii_, radii), copy(capsule_owners_, capsule_owners);
+    for (const std::int32_t i : faces)
+      require(i >= 0 && static_cast<std::size_t>(i) < n_vertices, "faces: indices of vertices");
   }
 
   // What is there at a moment, every point passed through `place`.
@@ -82,15 +89,14 @@ nb::tuple project(const std::vector<const Camera*>& cameras, const In<double>& p
   for (const Surfaces* s : surfaces)
     require(s->n_moments == 1 || s->n_moments == T, "surfaces: one moment or T");
   Owned<double> pixels(C * n * 2), depth(C * n);
-  Owned<Reason> reason(C * n);
-  Owned<std::int32_t> hidden_by(C * n);
+  std::vector<Reason> reason(C * n);
+  std::vector<std::int32_t> hidden_by(C * n, -1);
   {
     nb::gil_scoped_release release;
-    std::fill_n(hidden_by.data.get(), C * n, -1);
     std::vector<Vec3> centers;
     for (std::size_t c = 0; c < C; ++c) {
       cameras[c]->project({points.data(), 3 * n}, {pixels.data.get() + 2 * c * n, 2 * n},
-                          {depth.data.get() + c * n, n}, {reason.data.get() + c * n, n});
+                          {depth.data.get() + c * n, n}, {reason.data() + c * n, n});
       centers.push_back(cameras[c]->center());
     }
     std::vector<Scene> scenes(surfaces.size());
@@ -99,23 +105,21 @@ nb::tuple project(const std::vector<const Camera*>& cameras, const In<double>& p
         if (t == 0 || surfaces[i]->n_moments > 1) scenes[i] = standing(*surfaces[i], t);
       for (std::size_t c = 0; c < C; ++c)
         for (std::size_t k = t * K; k < (t + 1) * K; ++k) {
-          if (reason.data[c * n + k] != Reason::visible) continue;
+          if (reason[c * n + k] != Reason::visible) continue;
           const Vec3 d = vec3(points.data() + 3 * k) - centers[c];
           const double until = 1 - clearance / std::sqrt(dot(d, d));
           Hit first;
           for (const Scene& scene : scenes)
             if (const Hit hit = scene.first_hit(centers[c], d, until); hit.owner >= 0) first.keep(hit.s, hit.owner);
           if (first.owner < 0) continue;
-          reason.data[c * n + k] = Reason::hidden;
-          hidden_by.data[c * n + k] = first.owner;
+          reason[c * n + k] = Reason::hidden;
+          hidden_by[c * n + k] = first.owner;
         }
     }
   }
-  static_assert(sizeof(Reason) == sizeof(std::uint8_t));
-  nb::capsule owner(reason.data.get(), [](void* p) noexcept { delete[] static_cast<Reason*>(p); });
-  auto* const raw = reinterpret_cast<std::uint8_t*>(reason.data.release());
   return nb::make_tuple(pixels.give({C, T, K, 2}), depth.give({C, T, K}),
-                        Out<std::uint8_t>(raw, {C, T, K}, owner), hidden_by.give({C, T, K}));
+                        array_of<std::uint8_t>(reason, {C, T, K}),
+                        array_of<std::int32_t>(hidden_by, {C, T, K}));
 }
 
 nb::tuple give_image(const RayGrid& grid, const auto& draw) {
@@ -157,6 +161,15 @@ nb::tuple paint(const RayGrid& grid, const In<double>& corners, const In<std::in
   return give_image(grid, [&](DepthImage image) { grid.paint(triangles, image); });
 }
 
+// What a camera makes of points in an image or in the normalised plane.
+template <void (Camera::*map)(std::span<const double>, std::span<double>) const>
+Out<double> mapped(const Camera& camera, const Rows& points) {
+  const std::size_t n = rows(points, 2, "points: shape (n, 2)");
+  Owned<double> out(2 * n);
+  (camera.*map)(flat(points), {out.data.get(), 2 * n});
+  return out.give({n, 2});
+}
+
 Out<double> jacobian(const Camera& camera, const Rows& points) {
   const std::size_t n = rows(points, 3, "points: shape (n, 3)");
   Owned<double> J(6 * n);
@@ -185,31 +198,16 @@ void bind_camera(nb::module_& module) {
             const std::size_t needed[] = {0, 5, 10};
             require(coefficients.size() == needed[static_cast<int>(lens_kind)], "coefficients: as the kind needs");
             require(width > 0 && height > 0, "a size above 0");
-            new (self) Camera({R.data(), 9}, {t.data(), 3}, affine(A), affine(B),
-                              Lens(lens_kind, is_backward,
-                                   {coefficients.data(), coefficients.size()}, r_end, q_table,
+            new (self) Camera(flat(R), flat(t), affine(A), affine(B),
+                              Lens(lens_kind, is_backward, flat(coefficients), r_end, q_table,
                                    Plane{start[0], start[1]}),
                               near, far, width, height);
           },
           nb::kw_only(), "R"_a, "t"_a, "A"_a, "B"_a, "lens_kind"_a, "is_backward"_a,
           "coefficients"_a, "r_end"_a, "q_table"_a, "start"_a, "near"_a, "far"_a, "width"_a,
           "height"_a)
-      .def("undistort",
-           [](const Camera& self, const Rows& pixels) {
-             const std::size_t n = rows(pixels, 2, "pixels: shape (n, 2)");
-             Owned<double> out(2 * n);
-             self.undistort({pixels.data(), 2 * n}, {out.data.get(), 2 * n});
-             return out.give({n, 2});
-           },
-           "pixels"_a)
-      .def("distort",
-           [](const Camera& self, const Rows& normalised) {
-             const std::size_t n = rows(normalised, 2, "normalised: shape (n, 2)");
-             Owned<double> out(2 * n);
-             self.distort({normalised.data(), 2 * n}, {out.data.get(), 2 * n});
-             return out.give({n, 2});
-           },
-           "normalised"_a)
+      .def("undistort", &mapped<&Camera::undistort>, "pixels"_a)
+      .def("distort", &mapped<&Camera::distort>, "normalised"_a)
       .def("jacobian", &jacobian, "points"_a);
 
   nb::class_<Surfaces>(module, "Surfaces")

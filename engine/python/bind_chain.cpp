@@ -35,12 +35,9 @@ class Chain {
   }
 
   void add_frame(double time, const In<double>& F, const In<double>& Q, const In<double>& points) {
-    const std::size_t size = static_cast<std::size_t>(m_.M) * m_.axis.n * m_.axis.n;
-    require(F.size() == size && Q.size() == size, "F and Q: shape (modes, n, n)");
     const std::vector<Point> frame = to_points(points, m_.axis.D);
-    visit([&](auto& s) {
-      s.partition().add_frame(time, motion_step(m_, F.data(), Q.data()), frame, n_seen_);
-    });
+    const MotionStep step = motion_step(m_, F, Q);
+    visit([&](auto& s) { s.partition().add_frame(time, step, frame, n_seen_); });
     n_seen_ += static_cast<std::int64_t>(frame.size());
   }
 
@@ -58,12 +55,7 @@ class Chain {
   }
 
   Out<std::int64_t> labels() const {
-    return visit([&](const auto& s) {
-      const std::vector<std::int64_t> all = labels_of(s.partition());
-      Owned<std::int64_t> out(all.size());
-      std::copy(all.begin(), all.end(), out.data.get());
-      return out.give({all.size()});
-    });
+    return visit([&](const auto& s) { return array_of<std::int64_t>(labels_of(s.partition())); });
   }
   double log_posterior() const {
     return visit([](const auto& s) { return s.partition().log_posterior(); });
@@ -76,20 +68,6 @@ class Chain {
     });
   }
 
-  // (drawn, possible, taken) of each kind of move.
-  Out<std::int64_t> counts() const {
-    Owned<std::int64_t> out(kMoves * 3);
-    visit([&](const auto& s) {
-      for (int k = 0; k < kMoves; ++k) {
-        const MoveCounts& c = s.counts()[k];
-        out.data[3 * k] = c.n_drawn;
-        out.data[3 * k + 1] = c.n_possible;
-        out.data[3 * k + 2] = c.n_taken;
-      }
-    });
-    return out.give({kMoves, 3});
-  }
-
   // (labels of each partition, moves after which the chain was in it).
   nb::tuple visits(std::int64_t n_moves) {
     std::unordered_map<std::uint64_t, Visited> visited;
@@ -97,14 +75,14 @@ class Chain {
       nb::gil_scoped_release release;
       visited = visit([&](auto& s) { return tally(s, n_moves); });
     }
-    const auto n = static_cast<std::size_t>(n_seen_), V = visited.size();
-    Owned<std::int64_t> labels(V * n), counts(V);
-    std::size_t v = 0;
+    std::vector<std::int64_t> labels, counts;
     for (const auto& [key, one] : visited) {
-      std::copy(one.labels.begin(), one.labels.end(), labels.data.get() + v * n);
-      counts.data[v++] = one.count;
+      labels.insert(labels.end(), one.labels.begin(), one.labels.end());
+      counts.push_back(one.count);
     }
-    return nb::make_tuple(labels.give({V, n}), counts.give({V}));
+    return nb::make_tuple(
+        array_of<std::int64_t>(labels, {visited.size(), static_cast<std::size_t>(n_seen_)}),
+        array_of<std::int64_t>(counts));
   }
 
   // Moves that are weighed to the end, one by one: (kind, what was drawn on the way, labels before
@@ -151,34 +129,17 @@ class Chain {
   void trace_one(Sampler<Filter>& s, nb::list& out) {
     const std::vector<std::int64_t> before = labels_of(s.partition());
     const double value = s.partition().log_posterior();
-    struct Seen {
-      std::int64_t move = 0, with = -1;
-      double log_forward = 0, log_reverse = 0, gain = 0;
-      bool is_taken = false, is_any = false;
-      std::vector<std::int64_t> after;
-    } seen;
     s.step([&](const Change<Filter>& q, bool is_taken) {
-      seen.move = static_cast<std::int64_t>(q.move);
-      seen.with = q.with;
-      if (q.with >= 0 && q.move != Move::update) seen.with = s.partition().window()[q.with].number;
-      seen.log_forward = q.log_forward;
-      seen.log_reverse = q.log_reverse;
-      seen.gain = q.gain;
-      seen.is_taken = is_taken;
-      seen.is_any = true;
+      std::int64_t with = q.with;
+      if (q.with >= 0 && q.move != Move::update) with = s.partition().window()[q.with].number;
       Partition<Filter> copy(s.partition());
       std::vector<Edit<Filter>> edits(q.edits.begin(), q.edits.begin() + q.n_edits);
       copy.apply(edits);
-      seen.after = labels_of(copy);
+      out.append(nb::make_tuple(static_cast<std::int64_t>(q.move), with,
+                                array_of<std::int64_t>(before),
+                                array_of<std::int64_t>(labels_of(copy)), q.log_forward,
+                                q.log_reverse, q.gain, is_taken, value));
     });
-    if (!seen.is_any) return;
-    const auto give = [](const std::vector<std::int64_t>& all) {
-      Owned<std::int64_t> array(all.size());
-      std::copy(all.begin(), all.end(), array.data.get());
-      return array.give({all.size()});
-    };
-    out.append(nb::make_tuple(seen.move, seen.with, give(before), give(seen.after),
-                              seen.log_forward, seen.log_reverse, seen.gain, seen.is_taken, value));
   }
 
   MotionModel m_;
@@ -191,20 +152,14 @@ class Chain {
 
 void bind_chain(nb::module_& module) {
   nb::class_<Chain>(module, "Chain")
-      .def(
-          "__init__",
-          [](Chain* self, const MotionModel& model, const ScoreModel& score,
-             const ChainOptions& options, std::uint64_t seed) {
-            new (self) Chain(model, score, options, seed);
-          },
-          "model"_a, "score"_a, "options"_a, "seed"_a)
+      .def(nb::init<const MotionModel&, const ScoreModel&, const ChainOptions&, std::uint64_t>(),
+           "model"_a, "score"_a, "options"_a, "seed"_a)
       .def("add_frame", &Chain::add_frame, "time"_a, "F"_a, "Q"_a, "points"_a)
       .def("freeze", &Chain::freeze, "frame"_a)
       .def("assign", &Chain::assign, "labels"_a)
       .def("labels", &Chain::labels)
       .def("log_posterior", &Chain::log_posterior)
       .def("run", &Chain::run, "n_moves"_a)
-      .def("counts", &Chain::counts)
       .def("visits", &Chain::visits, "n_moves"_a)
       .def("trace", &Chain::trace, "n_moves"_a);
 }

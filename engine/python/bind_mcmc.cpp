@@ -17,29 +17,20 @@ namespace {
 template <typename Tracker>
 void finish(Tracker& tracker, Labels labels, Confidence confidence,
             const std::function<bool(double)>& goes_on) {
-  require(static_cast<std::int64_t>(labels.size()) >= tracker.n_seen(),
-          "labels: one for every detection so far");
-  require(!tracker.has_confidence() ||
-              static_cast<std::int64_t>(confidence.size()) >= tracker.n_seen(),
-          "confidence: one for every detection so far");
+  const Labeller label = labeller(tracker, labels, confidence, tracker.so_far().n_seen);
   std::optional<nb::python_error> raised;
   {
     nb::gil_scoped_release release;
-    tracker.finish(
-        [&](std::int64_t detection, std::int64_t id, double p) {
-          labels.data()[detection] = id;
-          if (tracker.has_confidence()) confidence.data()[detection] = p;
-        },
-        [&](double share) {
-          nb::gil_scoped_acquire acquire;
-          try {
-            if (PyErr_CheckSignals() != 0) throw nb::python_error();
-            return goes_on(share);
-          } catch (nb::python_error& error) {
-            raised.emplace(std::move(error));
-            return false;
-          }
-        });
+    tracker.finish(label, [&](double share) {
+      nb::gil_scoped_acquire acquire;
+      try {
+        if (PyErr_CheckSignals() != 0) throw nb::python_error();
+        return goes_on(share);
+      } catch (nb::python_error& error) {
+        raised.emplace(std::move(error));
+        return false;
+      }
+    });
   }
   if (raised) throw std::move(*raised);
 }
@@ -83,13 +74,10 @@ void bind_mcmc(nb::module_& module) {
       .def_ro("ess", &ChainStats::ess)
       // (drawn, possible, taken) of each kind of move.
       .def_prop_ro("moves", [](const ChainStats& self) {
-        Owned<std::int64_t> out(kMoves * 3);
-        for (int k = 0; k < kMoves; ++k) {
-          out.data[3 * k] = self.moves[k].n_drawn;
-          out.data[3 * k + 1] = self.moves[k].n_possible;
-          out.data[3 * k + 2] = self.moves[k].n_taken;
-        }
-        return out.give({kMoves, 3});
+        std::vector<std::int64_t> counts;
+        for (const MoveCounts& of : self.moves)
+          counts.insert(counts.end(), {of.n_drawn, of.n_possible, of.n_taken});
+        return array_of<std::int64_t>(counts, {kMoves, 3});
       }, nb::rv_policy::move);
   nb::class_<SampledStats, FrameStats>(module, "SampledStats")
       .def_ro("chain", &SampledStats::chain);

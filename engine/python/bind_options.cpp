@@ -26,13 +26,8 @@ void bind_options(nb::module_& module) {
       .def_ro("n_refused", &FrameStats::n_refused);
 
   nb::class_<LifeOptions>(module, "LifeOptions")
-      .def(
-          "__init__",
-          [](LifeOptions* self, double gate, double confirm_score, double delete_drop,
-             std::int64_t max_candidates) {
-            new (self) LifeOptions{gate, confirm_score, delete_drop, max_candidates};
-          },
-          nb::kw_only(), "gate"_a, "confirm_score"_a, "delete_drop"_a, "max_candidates"_a);
+      .def(nb::init<double, double, double, std::int64_t>(), nb::kw_only(), "gate"_a,
+           "confirm_score"_a, "delete_drop"_a, "max_candidates"_a);
 
   nb::class_<BranchOptions>(module, "BranchOptions")
       .def(
@@ -42,20 +37,16 @@ void bind_options(nb::module_& module) {
              double z) {
             require(window >= 1 && window <= kMaxWindow, "window: 1 to 16");
             require(max_branches >= 1 && merge_last >= 1, "max_branches, merge_last: at least 1");
+            const std::span<const double> bounds = flat(delta);
             new (self) BranchOptions{window, max_branches, merge_last, prune_drop, fading,
-                                     {delta.data(), delta.data() + delta.size()}, z, false, {}, 0};
+                                     {bounds.begin(), bounds.end()}, z, false, {}, 0};
           },
           nb::kw_only(), "window"_a, "max_branches"_a, "merge_last"_a, "prune_drop"_a, "fading"_a,
           "delta"_a, "z"_a);
 
   nb::class_<CarryOptions>(module, "CarryOptions")
-      .def(
-          "__init__",
-          [](CarryOptions* self, bool is_on, std::int32_t max_carried, double bond_weight) {
-            require(max_carried >= 0 && bond_weight >= 0, "options of bodies: at least 0");
-            new (self) CarryOptions{is_on, max_carried, bond_weight};
-          },
-          nb::kw_only(), "is_on"_a = false, "max_carried"_a = 0, "bond_weight"_a = 0.0);
+      .def(nb::init<bool, std::int32_t, double>(), nb::kw_only(), "is_on"_a = false,
+           "max_carried"_a = 0, "bond_weight"_a = 0.0);
 
   nb::enum_<Pairing>(module, "Pairing")
       .value("assignment", Pairing::assignment)

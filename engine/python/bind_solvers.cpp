@@ -5,7 +5,6 @@
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "solve/assignment.hpp"
-#include "solve/connected_components.hpp"
 #include "solve/deferred_acceptance.hpp"
 #include "solve/joint_events.hpp"
 #include "solve/k_best.hpp"
@@ -26,8 +25,8 @@ nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_m
   require(log_weights.shape(0) < most && log_weights.shape(1) < most, "sizes below 2^30");
   require(max_states >= 1 && max_states <= std::int64_t{1} << 30, "max_states: 1 to 2^30");
   const std::size_t n = log_weights.shape(0), m = log_weights.shape(1);
-  Owned<double> marginals(n * (m + 1));
-  Owned<std::int32_t> best(n);
+  std::vector<double> marginals(n * (m + 1));
+  std::vector<std::int32_t> best(n);
   JointSummary summary;
   {
     nb::gil_scoped_release release;
@@ -42,15 +41,15 @@ nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_m
         weights.push_back(w);
       }
     std::vector<double> paired(pairings.size()), missed(n);
-    summary = JointEvents(pairings, weights, {log_miss.data(), n}, static_cast<std::int32_t>(m),
-                          max_states)
-                  .solve(paired, missed, {best.data.get(), n});
+    summary =
+        JointEvents(pairings, weights, flat(log_miss), static_cast<std::int32_t>(m), max_states)
+            .solve(paired, missed, best);
     for (std::size_t e = 0; e < pairings.size(); ++e)
-      marginals.data[pairings[e].row * (m + 1) + pairings[e].column] = paired[e];
-    for (std::size_t i = 0; i < n; ++i) marginals.data[i * (m + 1) + m] = missed[i];
+      marginals[pairings[e].row * (m + 1) + pairings[e].column] = paired[e];
+    for (std::size_t i = 0; i < n; ++i) marginals[i * (m + 1) + m] = missed[i];
   }
-  return nb::make_tuple(marginals.give({n, m + 1}), summary.log_total, best.give({n}),
-                        summary.bound, summary.n_states);
+  return nb::make_tuple(array_of<double>(marginals, {n, m + 1}), summary.log_total,
+                        array_of<std::int32_t>(best), summary.bound, summary.n_states);
 }
 
 // Rows and columns of a sparse gain list, ordered by row, paired for the greatest sum of gains.
@@ -65,38 +64,29 @@ Out<std::int32_t> assign(std::int32_t n_rows, std::int32_t n_columns, const In<s
     require(e == 0 || i >= rows.data()[e - 1], "pairs ordered by row");
     candidates.push_back({i, j, gains.data()[e], 0});
   }
-  Owned<std::int32_t> match(n_rows);
-  std::fill_n(match.data.get(), n_rows, -1);
+  std::vector<std::int32_t> match(n_rows, -1);
   {
     nb::gil_scoped_release release;
-    const Groups groups = connected_groups(candidates, n_rows, n_columns);
-    Assignment solver;
-    for (std::size_t g = 0; g < groups.size(); ++g)
-      solver.solve(groups[g], {match.data.get(), static_cast<std::size_t>(n_rows)});
+    Assignment().solve_groups(candidates, n_columns, match);
   }
-  return match.give({static_cast<std::size_t>(n_rows)});
+  return array_of<std::int32_t>(match);
 }
 
 std::pair<Out<std::int32_t>, std::int64_t> marry(const In<std::int64_t>& first,
                                                  const In<std::int32_t>& receivers,
                                                  const In<double>& costs,
                                                  std::int32_t n_receivers) {
-  require(first.ndim() == 1 && first.size() >= 1, "first: shape (P + 1,)");
   require(receivers.size() == costs.size(), "a cost for every wish");
-  const std::size_t P = first.size() - 1;
-  require(first.data()[0] == 0 && first.data()[P] == static_cast<std::int64_t>(costs.size()),
-          "first: from 0 to the number of wishes");
-  for (std::size_t p = 0; p < P; ++p) require(first.data()[p] <= first.data()[p + 1], "first: rising");
+  require_offsets(flat(first), costs.size(), "first: rising, within the number of wishes");
   std::vector<Proposal> lists;
   for (std::size_t e = 0; e < costs.size(); ++e) {
     const std::int32_t r = receivers.data()[e];
     require(r >= 0 && r < n_receivers, "receivers within their number");
     lists.push_back({r, costs.data()[e]});
   }
-  Owned<std::int32_t> partner(P);
-  const std::int64_t n = deferred_acceptance(lists, {first.data(), first.size()}, n_receivers,
-                                             {partner.data.get(), P});
-  return {partner.give({P}), n};
+  std::vector<std::int32_t> partner(first.size() - 1);
+  const std::int64_t n = deferred_acceptance(lists, flat(first), n_receivers, partner);
+  return {array_of<std::int32_t>(partner), n};
 }
 
 // The first k assignments of n rows to N columns by cost, N ≥ n; further rows fill up at no cost.
@@ -108,13 +98,11 @@ Out<std::int32_t> k_best(const In<double>& cost, std::int64_t k) {
   std::size_t n_found = 0;
   {
     nb::gil_scoped_release release;
-    KBest best({cost.data(), n * N}, static_cast<std::int32_t>(n), static_cast<std::int32_t>(N));
+    KBest best(flat(cost), static_cast<std::int32_t>(n), static_cast<std::int32_t>(N));
     for (; static_cast<std::int64_t>(n_found) < k && best.next(); ++n_found)
       all.insert(all.end(), best.columns().begin(), best.columns().end());
   }
-  Owned<std::int32_t> out(all.size());
-  std::copy(all.begin(), all.end(), out.data.get());
-  return out.give({n_found, n});
+  return array_of<std::int32_t>(all, {n_found, n});
 }
 
 // Options are listed by tree; option o uses uses[first_use[o]:first_use[o + 1]]. Each tree needs one
@@ -123,19 +111,14 @@ std::vector<std::vector<PackingOption>> packing_trees(const In<std::int64_t>& fi
                                                       const In<double>& worths,
                                                       const In<std::int64_t>& first_use,
                                                       const In<std::int32_t>& uses) {
-  require(first_option.size() >= 1 && first_use.size() == worths.size() + 1, "one list of uses an option");
-  const std::size_t n = first_option.size() - 1;
-  require(first_option.data()[n] == static_cast<std::int64_t>(worths.size()) &&
-              first_use.data()[worths.size()] == static_cast<std::int64_t>(uses.size()),
-          "lists to the end");
-  std::vector<std::vector<PackingOption>> trees(n);
-  for (std::size_t i = 0; i < n; ++i) {
+  require_offsets(flat(first_option), worths.size(), "first_option: rising, within the options");
+  require(first_use.size() == worths.size() + 1, "one list of uses an option");
+  require_offsets(flat(first_use), uses.size(), "first_use: rising, within the uses");
+  std::vector<std::vector<PackingOption>> trees(first_option.size() - 1);
+  for (std::size_t i = 0; i < trees.size(); ++i) {
     bool has_free = false;
-    require(first_option.data()[i] >= 0 && first_option.data()[i] <= first_option.data()[i + 1],
-            "first_option: rising");
     for (std::int64_t o = first_option.data()[i]; o < first_option.data()[i + 1]; ++o) {
       const std::int64_t a = first_use.data()[o], b = first_use.data()[o + 1];
-      require(a >= 0 && a <= b, "first_use: rising");
       for (std::int64_t u = a; u < b; ++u) require(uses.data()[u] >= 0, "resources from 0");
       trees[i].push_back({worths.data()[o], {uses.data() + a, uses.data() + b}});
       has_free = has_free || a == b;
@@ -149,12 +132,10 @@ std::vector<std::vector<PackingOption>> packing_trees(const In<std::int64_t>& fi
 nb::tuple packing_losses(const In<std::int64_t>& first_option, const In<double>& worths,
                            const In<std::int64_t>& first_use, const In<std::int32_t>& uses) {
   const auto trees = packing_trees(first_option, worths, first_use, uses);
-  Owned<double> out(worths.size());
-  std::size_t o = 0;
   const SetPacking::Losses losses = SetPacking(trees).losses();
-  for (const std::vector<double>& tree : losses.of)
-    for (const double loss : tree) out.data[o++] = loss;
-  return nb::make_tuple(losses.bound, out.give({worths.size()}));
+  std::vector<double> all;
+  for (const std::vector<double>& tree : losses.of) all.insert(all.end(), tree.begin(), tree.end());
+  return nb::make_tuple(losses.bound, array_of<double>(all));
 }
 
 // The k best ways for every tree to take one option, no resource twice.
@@ -162,7 +143,6 @@ nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& worths,
                const In<std::int64_t>& first_use, const In<std::int32_t>& uses, std::int64_t k,
                double drop, std::int64_t max_nodes) {
   const auto trees = packing_trees(first_option, worths, first_use, uses);
-  const std::size_t n = trees.size();
   std::vector<std::int32_t> all;
   std::vector<double> totals;
   PackingSummary summary;
@@ -174,12 +154,8 @@ nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& worths,
           totals.push_back(worth);
         });
   }
-  Owned<std::int32_t> out(all.size());
-  std::copy(all.begin(), all.end(), out.data.get());
-  Owned<double> worth(totals.size());
-  std::copy(totals.begin(), totals.end(), worth.data.get());
-  return nb::make_tuple(out.give({totals.size(), n}), worth.give({totals.size()}), summary.is_exact,
-                        summary.bound, summary.n_nodes);
+  return nb::make_tuple(array_of<std::int32_t>(all, {totals.size(), trees.size()}),
+                        array_of<double>(totals), summary.is_exact, summary.bound, summary.n_nodes);
 }
 
 }  // namespace

@@ -1,5 +1,8 @@
 // Fragments made into markers, as Python sees it.
-#include <chrono>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/tuple.h>
+
+#include <optional>
 #include <tuple>
 
 #include "python/arrays.hpp"
@@ -12,59 +15,28 @@ using namespace asterism;
 
 namespace {
 
-// Of every fragment: its marker, the fragment that it goes on with, and how probably.
-struct Decisions {
-  std::vector<Decision> all;
-
-  void operator()(const Decision& d) {
-    if (static_cast<std::size_t>(d.fragment) >= all.size()) all.resize(d.fragment + 1);
-    all[d.fragment] = d;
-  }
-};
-
+// (fragment of each point, and of each fragment its marker, the fragment before, how probably)
 nb::tuple run_stitcher(Stitcher& stitcher, const MotionModel& m, const In<double>& times,
                        const In<std::int32_t>& kind, const In<double>& F, const In<double>& Q,
                        const In<std::int64_t>& offsets, const In<double>& points,
                        const In<std::int64_t>& labels) {
-  const Timeline line = timeline(m, times, kind, F, Q);
-  const std::vector<Point> all = to_points(points, m.axis.D);
-  const std::size_t T = line.times.size(), N = all.size();
-  require(labels.ndim() == 1 && labels.size() == N, "labels: one for each point");
-  require(offsets.ndim() == 1 && offsets.size() == T + 1, "offsets: shape (T + 1,)");
-  require(T == 0 || line.kind[0] >= 0, "kind: an index into F");
-  for (std::size_t t = 0; t <= T; ++t)
-    require(offsets.data()[t] >= 0 && offsets.data()[t] <= static_cast<std::int64_t>(N) &&
-                (t == 0 || offsets.data()[t] >= offsets.data()[t - 1]),
-            "offsets: rising, within the points");
-  Owned<std::int32_t> fragment_of(N);
-  std::fill_n(fragment_of.data.get(), N, -1);
-  Decisions decisions;
-  {
-    nb::gil_scoped_release release;
-    auto next_look = std::chrono::steady_clock::now();
-    for (std::size_t t = 0; t < T; ++t) {
-      if (std::chrono::steady_clock::now() > next_look) {
-        nb::gil_scoped_acquire acquire;
-        if (PyErr_CheckSignals() != 0) throw nb::python_error();
-        next_look = std::chrono::steady_clock::now() + std::chrono::milliseconds(50);
-      }
-      const auto from = static_cast<std::size_t>(offsets.data()[t]);
-      const auto n = static_cast<std::size_t>(offsets.data()[t + 1]) - from;
-      stitcher.step(line.step(t), {all.data() + from, n}, {labels.data() + from, n},
-                    {fragment_of.data.get() + from, n}, decisions);
-    }
-    stitcher.finish(decisions);
-  }
-  const std::size_t n = decisions.all.size();
-  Owned<std::int32_t> marker(n), after(n);
-  Owned<double> probability(n);
-  for (std::size_t k = 0; k < n; ++k) {
-    marker.data[k] = decisions.all[k].marker;
-    after.data[k] = decisions.all[k].after;
-    probability.data[k] = decisions.all[k].probability;
-  }
-  return nb::make_tuple(fragment_of.give({N}), marker.give({n}), after.give({n}),
-                        probability.give({n}));
+  const FrameRun frames(m, times, kind, F, Q, offsets, points);
+  require(labels.size() == frames.points.size(), "labels: one for each point");
+  std::vector<std::int32_t> fragment_of(labels.size(), -1);
+  std::vector<Decision> decisions;  // by fragment
+  const auto decide = [&](const Decision& d) {
+    if (static_cast<std::size_t>(d.fragment) >= decisions.size()) decisions.resize(d.fragment + 1);
+    decisions[d.fragment] = d;
+  };
+  frames.each([&](std::size_t t, std::size_t from, std::span<const Point> frame) {
+    stitcher.step(frames.line.step(t), frame, flat(labels).subspan(from, frame.size()),
+                  std::span(fragment_of).subspan(from, frame.size()), decide);
+  });
+  stitcher.finish(decide);
+  return nb::make_tuple(array_of<std::int32_t>(fragment_of),
+                        array_of<std::int32_t>(decisions, &Decision::marker),
+                        array_of<std::int32_t>(decisions, &Decision::after),
+                        array_of<double>(decisions, &Decision::probability));
 }
 
 // One frame of a stream, on a copy: (new state, markers, earlier detections whose marker changes, their
@@ -72,10 +44,8 @@ nb::tuple run_stitcher(Stitcher& stitcher, const MotionModel& m, const In<double
 nb::tuple step_stitcher(const LiveStitcher& before, const In<double>& F, const In<double>& Q,
                         const In<double>& points, const In<std::int64_t>& labels,
                         const In<std::int64_t>& revised, const In<std::int64_t>& revised_labels) {
-  const MotionModel& m = before.motion();
-  const std::size_t size = static_cast<std::size_t>(m.M) * m.axis.n * m.axis.n;
-  require(F.size() == size && Q.size() == size, "F and Q: shape (modes, n, n)");
-  const std::vector<Point> frame = to_points(points, m.axis.D);
+  const MotionStep step = motion_step(before.motion(), F, Q);
+  const std::vector<Point> frame = to_points(points, before.motion().axis.D);
   require(labels.ndim() == 1 && labels.size() == frame.size(), "labels: one for each point");
   require(revised.ndim() == 1 && revised_labels.ndim() == 1 &&
               revised.size() == revised_labels.size(),
@@ -88,23 +58,20 @@ nb::tuple step_stitcher(const LiveStitcher& before, const In<double>& F, const I
             "revised: detections of earlier frames");
   }
   LiveStitcher after(before);
-  Owned<std::int64_t> own(frame.size());
+  std::vector<std::int64_t> own(frame.size());
   {
     nb::gil_scoped_release release;
     const std::int64_t first = before.n_seen();
-    after.step(motion_step(m, F.data(), Q.data()), frame, {labels.data(), frame.size()}, changes,
-               [&](std::int64_t detection, std::int64_t marker) {
-                 if (detection < first)
-                   told.emplace_back(detection, marker);
-                 else
-                   own.data[detection - first] = marker;
-               });
+    after.step(step, frame, flat(labels), changes, [&](std::int64_t detection, std::int64_t marker) {
+      if (detection < first)
+        told.emplace_back(detection, marker);
+      else
+        own[detection - first] = marker;
+    });
   }
-  Owned<std::int64_t> which(told.size()), markers(told.size());
-  for (std::size_t i = 0; i < told.size(); ++i)
-    std::tie(which.data[i], markers.data[i]) = told[i];
-  return nb::make_tuple(std::move(after), own.give({frame.size()}), which.give({told.size()}),
-                        markers.give({told.size()}));
+  return nb::make_tuple(std::move(after), array_of<std::int64_t>(own),
+                        array_of<std::int64_t>(told, &Change::first),
+                        array_of<std::int64_t>(told, &Change::second));
 }
 
 std::vector<RigidPair> to_pairs(const In<double>& a, const In<double>& b,
@@ -123,11 +90,8 @@ std::vector<RigidPair> to_pairs(const In<double>& a, const In<double>& b,
 // (R, from, to, rms) of the rigid motion that takes points to others.
 nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weights) {
   const RigidFit found = fit_rigid(to_pairs(a, b, weights), static_cast<int>(a.shape(1)));
-  Owned<double> R(9), x(3), y(3);
-  std::copy(found.R.begin(), found.R.end(), R.data.get());
-  std::copy(found.from.begin(), found.from.end(), x.data.get());
-  std::copy(found.to.begin(), found.to.end(), y.data.get());
-  return nb::make_tuple(R.give({3, 3}), x.give({3}), y.give({3}), found.rms);
+  return nb::make_tuple(array_of<double>(found.R, {3, 3}), array_of<double>(found.from),
+                        array_of<double>(found.to), found.rms);
 }
 
 // (where they carry what was at `then`, its variance beside `r`, log densities at some points).
@@ -138,10 +102,8 @@ nb::tuple carried(const In<double>& a, const In<double>& b, const In<double>& we
   const std::vector<Point> was = to_points(then, D), at = to_points(points, D);
   require(was.size() == 1, "then: shape (1, D)");
   const Carried found = RigidPrediction(pairs, was[0], D, r).place(r, 1);
-  Owned<double> place(kMaxAxes), densities(at.size());
-  std::copy(found.at.begin(), found.at.end(), place.data.get());
-  for (std::size_t i = 0; i < at.size(); ++i) densities.data[i] = found.log_density(at[i], D);
-  return nb::make_tuple(place.give({kMaxAxes}), found.variance, densities.give({at.size()}));
+  const auto density = [&](const Point& y) { return found.log_density(y, D); };
+  return nb::make_tuple(array_of<double>(found.at), found.variance, array_of<double>(at, density));
 }
 
 // Log density of each of some points of a frame among the others, where some were seen before.
@@ -155,39 +117,45 @@ Out<double> densities_elsewhere(const In<double>& before, const In<double>& poin
   Frame frame;
   for (const Point& y : to_points(points, D))
     frame.seen.push_back({static_cast<std::int32_t>(frame.seen.size()), y});
-  Owned<double> densities(frame.seen.size());
-  for (const auto& one : frame.seen)
-    densities.data[one.fragment] = elsewhere.log_density(one.at, frame, one.fragment);
-  return densities.give({frame.seen.size()});
+  return array_of<double>(frame.seen, [&](const Frame::One& one) {
+    return elsewhere.log_density(one.at, frame, one.fragment);
+  });
 }
 
-void add_frame(Neighbours& neighbours, const In<std::int32_t>& markers, const In<double>& points) {
-  require(points.ndim() == 2 && markers.ndim() == 1 && markers.size() == points.shape(0),
-          "markers: one for each point");
-  const std::vector<Point> at = to_points(points, static_cast<int>(points.shape(1)));
+// The markers of a frame, in order of their numbers.
+std::vector<Seen> to_seen(const In<std::int64_t>& markers, const In<double>& points, int D) {
+  const std::vector<Point> at = to_points(points, D);
+  require(markers.size() == at.size(), "markers: one for each point");
   std::vector<Seen> seen;
-  for (std::size_t i = 0; i < at.size(); ++i) {
-    require(markers.data()[i] >= 0, "markers: numbers from 0");
-    seen.push_back({markers.data()[i], at[i]});
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    const std::int64_t marker = markers.data()[k];
+    require(marker >= 0 && marker < std::int64_t{1} << 30, "markers: 0 to 2^30");
+    require(k == 0 || markers.data()[k - 1] < marker, "markers: rising");
+    seen.push_back({static_cast<std::int32_t>(marker), at[k]});
   }
-  neighbours.add(seen);
+  return seen;
+}
+
+// (place, its variance, how many neighbours carry it) or None.
+std::optional<std::tuple<Out<double>, double, std::int32_t>> carry(
+    BodyCarrier& self, std::int32_t marker, const In<std::int64_t>& markers,
+    const In<double>& points) {
+  require(marker >= 0, "marker: 0 to 2^30");
+  Places places;
+  for (const Seen& one : to_seen(markers, points, self.n_axes())) places.set(one.marker, one.at);
+  Carriage found;
+  if (!self.carry(marker, places, found)) return std::nullopt;
+  const std::span place(found.place.at.begin(), self.n_axes());
+  return std::tuple(array_of<double>(place), found.place.variance, found.n_neighbours);
 }
 
 // (the others, frames seen together, mean distances, their variances, predictive variances).
 nb::tuple bonds_of(const Neighbours& neighbours, std::int32_t marker) {
   const std::span<const Bond> bonds = neighbours.of(marker);
-  const std::size_t n = bonds.size();
-  Owned<std::int64_t> others(n), frames(n);
-  Owned<double> means(n), variances(n), predictive(n);
-  for (std::size_t k = 0; k < n; ++k) {
-    others.data[k] = bonds[k].other;
-    frames.data[k] = bonds[k].n;
-    means.data[k] = bonds[k].mean;
-    variances.data[k] = bonds[k].variance;
-    predictive.data[k] = neighbours.variance(bonds[k]);
-  }
-  return nb::make_tuple(others.give({n}), frames.give({n}), means.give({n}), variances.give({n}),
-                        predictive.give({n}));
+  return nb::make_tuple(
+      array_of<std::int64_t>(bonds, &Bond::other), array_of<std::int64_t>(bonds, &Bond::n),
+      array_of<double>(bonds, &Bond::mean), array_of<double>(bonds, &Bond::variance),
+      array_of<double>(bonds, [&](const Bond& bond) { return neighbours.variance(bond); }));
 }
 
 // (predictive variances, whether each is a bond) of distances without noise of their own.
@@ -196,14 +164,12 @@ nb::tuple judge_distances(const In<double>& means, const In<double>& variances,
   const std::size_t n = means.size();
   require(means.ndim() == 1 && variances.size() == n && frames.size() == n,
           "means, variances and frames: shape (n,)");
-  Owned<double> predictive(n);
-  Owned<bool> is_one(n);
-  for (std::size_t k = 0; k < n; ++k) {
-    const Bond bond{0, frames.data()[k], means.data()[k], variances.data()[k]};
-    predictive.data[k] = predictive_variance(bond, 0);
-    is_one.data[k] = is_bond(bond, 0);
-  }
-  return nb::make_tuple(predictive.give({n}), is_one.give({n}));
+  std::vector<Bond> bonds;
+  for (std::size_t k = 0; k < n; ++k)
+    bonds.push_back({0, frames.data()[k], means.data()[k], variances.data()[k]});
+  return nb::make_tuple(
+      array_of<double>(bonds, [](const Bond& bond) { return predictive_variance(bond, 0); }),
+      array_of<bool>(bonds, [](const Bond& bond) { return is_bond(bond, 0); }));
 }
 
 }  // namespace
@@ -218,20 +184,37 @@ void bind_stitcher(nb::module_& module) {
              "noise"_a, "ghost_radius"_a);
   nb::class_<Neighbours>(module, "Neighbours")
       .def(nb::init<int, double>(), "n_axes"_a, "r"_a)
-      .def("add", &add_frame, "markers"_a, "points"_a)
+      .def(
+          "add",
+          [](Neighbours& self, const In<std::int64_t>& markers, const In<double>& points) {
+            self.add(to_seen(markers, points, self.n_axes()));
+          },
+          "markers"_a, "points"_a)
       .def("of", &bonds_of, "marker"_a);
-  nb::class_<StitchOptions>(module, "StitchOptions")
+  nb::class_<BodyCarrier>(module, "BodyCarrier")
       .def(
           "__init__",
-          [](StitchOptions* self, double noise, double ghost_radius, std::int64_t confirm,
-             std::int64_t max_gap, std::int64_t max_hidden, bool may_cut) {
-            new (self) StitchOptions{noise, ghost_radius, confirm, max_gap, max_hidden, may_cut};
+          [](BodyCarrier* self, int n_axes, double noise_sigma) {
+            require(n_axes == 2 || n_axes == 3, "n_axes: 2 or 3");
+            require(noise_sigma > 0, "noise_sigma: above 0");
+            new (self) BodyCarrier(n_axes, noise_sigma * noise_sigma);
           },
-          nb::kw_only(), "noise"_a, "ghost_radius"_a, "confirm"_a, "max_gap"_a, "max_hidden"_a,
-          "may_cut"_a);
+          nb::kw_only(), "n_axes"_a, "noise_sigma"_a)
+      .def(
+          "see",
+          [](BodyCarrier& self, const In<std::int64_t>& markers, const In<double>& points) {
+            self.see(to_seen(markers, points, self.n_axes()));
+          },
+          "markers"_a, "points"_a)
+      .def("carry", &carry, "marker"_a, "markers"_a, "points"_a)
+      .def("n_bonds", &BodyCarrier::n_bonds, "marker"_a)
+      .def("forget", &BodyCarrier::forget, "marker"_a);
+  nb::class_<StitchOptions>(module, "StitchOptions")
+      .def(nb::init<double, double, std::int64_t, std::int64_t, std::int64_t, bool>(),
+           nb::kw_only(), "noise"_a, "ghost_radius"_a, "confirm"_a, "max_gap"_a, "max_hidden"_a,
+           "may_cut"_a);
   nb::class_<Stitcher>(module, "Stitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&>(), "motion"_a, "options"_a)
-      // (fragment of each point, and of each fragment its marker, the fragment before, how probably).
       .def_prop_ro_static("WORTH", [](nb::handle) { return Claims::kWorth; })
       .def("run", &run_stitcher, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a,
            "points"_a, "labels"_a)

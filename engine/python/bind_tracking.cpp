@@ -30,19 +30,28 @@ MotionModel motion_model(int n_axes, const In<double>& H, const In<double>& P0, 
   return m;
 }
 
+// Tracks, and the steps between the frames that they lie in.
+struct TimedTracks : TrackPoints {
+  Timeline line;
+
+  TimedTracks(const MotionModel& m, const In<double>& p, const In<std::int64_t>& f,
+              const In<std::int64_t>& o, const In<double>& times, const In<std::int32_t>& kind,
+              const In<double>& F, const In<double>& Q)
+      : TrackPoints(p, f, o, m.axis.D, times.size()), line(timeline(m, times, kind, F, Q)) {}
+};
+
 Out<double> score_tracks(const MotionModel& m, const ScoreModel& sm, const In<double>& points,
                          const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
                          const In<double>& times, const In<std::int32_t>& kind,
                          const In<double>& F, const In<double>& Q) {
-  const Timeline line = timeline(m, times, kind, F, Q);
-  const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
+  const TimedTracks tracks(m, points, frames, offsets, times, kind, F, Q);
   Owned<double> scores(tracks.n_tracks());
   {
     nb::gil_scoped_release release;
-    const auto log_end = log_end_table(sm, static_cast<std::int64_t>(line.times.size()));
+    const auto log_end = log_end_table(sm, static_cast<std::int64_t>(tracks.line.times.size()));
     for (std::size_t k = 0; k < tracks.n_tracks(); ++k)
       scores.data[k] =
-          score_track(m, sm, line, tracks.points_of(k), tracks.frames_of(k), log_end);
+          score_track(m, sm, tracks.line, tracks.points_of(k), tracks.frames_of(k), log_end);
   }
   return scores.give({tracks.n_tracks()});
 }
@@ -51,38 +60,28 @@ nb::tuple filter_tracks(const MotionModel& m, const In<double>& points,
                         const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
                         const In<double>& times, const In<std::int32_t>& kind, const In<double>& F,
                         const In<double>& Q, bool smooth) {
-  const Timeline line = timeline(m, times, kind, F, Q);
-  const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
-  const std::size_t K = tracks.n_tracks();
-  Owned<std::int64_t> starts(K + 1);
-  for (std::size_t k = 0; k < K; ++k) {
-    const auto f = tracks.frames_of(k);
-    starts.data[k + 1] = starts.data[k] + (f.empty() ? 0 : f.back() - f.front() + 1);
-  }
-  const auto total = static_cast<std::size_t>(starts.data[K]);
-  const std::size_t D = m.axis.D, n = m.axis.n;
-  Owned<double> means(total * D * n), covariances(total * n * n), log_densities(tracks.points.size());
+  const TimedTracks tracks(m, points, frames, offsets, times, kind, F, Q);
+  std::vector<std::size_t> starts{0};
+  std::vector<AxisState> all;
+  Owned<double> log_densities(tracks.points.size());
   {
     nb::gil_scoped_release release;
     std::vector<AxisState> states, predicted;
-    for (std::size_t k = 0; k < K; ++k) {
-      const auto f = tracks.frames_of(k);
-      if (f.empty()) continue;
-      states.resize(starts.data[k + 1] - starts.data[k]);
-      predicted.resize(states.size());
-      filter_track(m, line, tracks.points_of(k), f, states, predicted,
-                   {log_densities.data.get() + tracks.offsets[k], f.size()});
-      if (smooth) smooth_track(m, line, f.front(), predicted, states);
-      for (std::size_t i = 0; i < states.size(); ++i) {
-        const std::size_t at = starts.data[k] + i;
-        for (std::size_t d = 0; d < D; ++d)
-          std::copy_n(states[i].x[d].begin(), n, means.data.get() + (at * D + d) * n);
-        std::copy_n(states[i].P.begin(), n * n, covariances.data.get() + at * n * n);
+    for (std::size_t k = 0; k < tracks.n_tracks(); ++k) {
+      if (const auto f = tracks.frames_of(k); !f.empty()) {
+        states.resize(f.back() - f.front() + 1);
+        predicted.resize(states.size());
+        filter_track(m, tracks.line, tracks.points_of(k), f, states, predicted,
+                     {log_densities.data.get() + tracks.offsets[k], f.size()});
+        if (smooth) smooth_track(m, tracks.line, f.front(), predicted, states);
+        all.insert(all.end(), states.begin(), states.end());
       }
+      starts.push_back(all.size());
     }
   }
-  return nb::make_tuple(means.give({total, D, n}), covariances.give({total, n, n}),
-                        starts.give({K + 1}), log_densities.give({tracks.points.size()}));
+  auto [means, covariances] = state_arrays(m, all);
+  return nb::make_tuple(means, covariances, array_of<std::int64_t>(starts),
+                        log_densities.give({tracks.points.size()}));
 }
 
 }  // namespace

@@ -22,30 +22,24 @@ namespace {
 
 // λ of the believed tracks and the number of detections in it, in the order of `tracks`.
 nb::dict chi2(const TreeTracker<Forest>& tracker) {
-  std::size_t K = 0;
-  for (const auto& t : tracker.live().tracks) K += t.is_confirmed();
-  Owned<double> lambda(K);
-  Owned<std::int64_t> n_updates(K);
-  std::size_t k = 0;
-  for (const auto& t : tracker.live().tracks) {
-    if (!t.is_confirmed()) continue;
-    lambda.data[k] = t.more.lambda;
-    n_updates.data[k++] = t.more.n_updates;
-  }
+  const auto tracks = confirmed(tracker.live());
   nb::dict out;
-  out["chi2"] = lambda.give({K});
-  out["updates"] = n_updates.give({K});
+  out["chi2"] = array_of<double>(tracks, [](const auto* t) { return t->more.lambda; });
+  out["updates"] = array_of<std::int64_t>(tracks, [](const auto* t) { return t->more.n_updates; });
   return out;
 }
 
-// Branches that are worth their part of the log posterior.
-void make_joint(BranchOptions& branches, const ScoreModel& score) {
+// Its branches are worth their part of the log posterior.
+HypothesisWindow joint_window(const MotionModel& model, const ScoreModel& score,
+                              const LifeOptions& life, BranchOptions branches,
+                              const CarryOptions& carry, double new_track_claim) {
   branches.is_joint = true;
   branches.log_end = log_end_table(score, score.max_gap + kMaxWindow);
   // A way on may be so much worse than another and still better than to lose the marker and to begin
   // a new one.
   branches.prune_drop += std::max(score.log_clutter - score.log_birth - score.log_detect, 0.0) -
                          std::log(score.p_disappear);
+  return {{model, score, life, branches, carry}, new_track_claim};
 }
 
 // Of each cluster (numbers of its trees, detections of the open frames that they may have, by
@@ -57,36 +51,28 @@ nb::list clusters(const TreeTracker<HypothesisMatrix>& tracker) {
   nb::list out;
   for (const Cluster& cluster : tracker.forest().clusters()) {
     const std::size_t n = cluster.keys.size(), H = cluster.hypotheses.size();
-    std::map<std::int64_t, std::size_t> place;  // of a detection
-    std::vector<std::map<std::int64_t, std::int64_t>> owners(H);
+    // By detection, the tree that has it in each hypothesis.
+    std::map<std::int64_t, std::vector<std::int64_t>> owners;
     for (std::size_t h = 0; h < H; ++h)
       for (std::size_t k = 0; k < n; ++k) {
         const std::int32_t b = cluster.hypotheses[h].branches[k];
         const std::size_t i = index_of.at(cluster.keys[k]);
         if (b < 0) continue;
         const Branch& branch = window.tree(i).more.branches[b];
-        for (const auto& frame : window.frames) {
-          const std::int32_t j = branch.taken(frame->number);
-          if (frame->number < window.first_frame(i) || j < 0) continue;
-          place[frame->first + j] = 0;
-          const bool is_lone = window.is_seed(i) && branch.n_taken < 2;
-          owners[h][frame->first + j] = is_lone ? -1 : cluster.keys[k];
-        }
+        window.each_detection(i, branch, [&](std::int64_t detection) {
+          std::vector<std::int64_t>& own =
+              owners.try_emplace(window.frames.front()->first + detection, H, -1).first->second;
+          if (!window.is_lone(i, branch)) own[h] = cluster.keys[k];
+        });
       }
-    std::size_t p = 0;
-    for (auto& [detection, at] : place) at = p++;
-    Owned<std::int64_t> keys(n), detections(p), origins(H * p);
-    Owned<double> log_weights(H);
-    std::copy(cluster.keys.begin(), cluster.keys.end(), keys.data.get());
-    for (const auto& [detection, at] : place) detections.data[at] = detection;
-    std::fill_n(origins.data.get(), H * p, -1);
-    for (std::size_t h = 0; h < H; ++h) {
-      log_weights.data[h] = cluster.hypotheses[h].log_weight();
-      for (const auto& [detection, key] : owners[h])
-        origins.data[h * p + place.at(detection)] = key;
-    }
-    out.append(nb::make_tuple(keys.give({n}), detections.give({p}), origins.give({H, p}),
-                              log_weights.give({H})));
+    std::vector<std::int64_t> origins;
+    for (std::size_t h = 0; h < H; ++h)
+      for (const auto& [detection, keys] : owners) origins.push_back(keys[h]);
+    const auto first = [](const auto& owner) { return owner.first; };
+    out.append(nb::make_tuple(
+        array_of<std::int64_t>(cluster.keys), array_of<std::int64_t>(owners, first),
+        array_of<std::int64_t>(origins, {H, owners.size()}),
+        array_of<double>(cluster.hypotheses, &Hypothesis::log_weight)));
   }
   return out;
 }
@@ -113,13 +99,11 @@ void bind_trees(nb::module_& module) {
       .def(
           "__init__",
           [](TreeTracker<Forest>* self, const MotionModel& model, const ScoreModel& score,
-             const LifeOptions& life, BranchOptions branches, Pairing pairing,
+             const LifeOptions& life, const BranchOptions& branches, Pairing pairing,
              bool is_independent, const CarryOptions& carry) {
             require(!(is_independent && carry.is_on), "carry: not where is_independent");
-            branches.max_carried = carry.max_carried;
             new (self) TreeTracker<Forest>(
-                Forest(model, score, life, branches, carry,
-                       {pairing, is_independent}));
+                Forest({model, score, life, branches, carry}, {pairing, is_independent}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "pairing"_a,
           "is_independent"_a, "carry"_a);
@@ -128,14 +112,11 @@ void bind_trees(nb::module_& module) {
       .def(
           "__init__",
           [](TreeTracker<HypothesisForest>* self, const MotionModel& model, const ScoreModel& score,
-             LifeOptions life, BranchOptions branches, std::int64_t max_hypotheses,
+             LifeOptions life, const BranchOptions& branches, std::int64_t max_hypotheses,
              std::int64_t max_nodes, double new_track_claim, const CarryOptions& carry,
              nb::object choose) {
             require(max_hypotheses >= 1 && max_nodes >= 1, "limits: at least 1");
-            const double least_new_worth = -branches.prune_drop;
-            const double drop = std::max(branches.prune_drop, 25.0), ambiguous_drop = branches.prune_drop;
-            make_joint(branches, score);
-            branches.max_carried = carry.max_carried;
+            const double drop = branches.prune_drop;
             // A tentative track is judged by its branches, and not by what is decided of it.
             const double delete_drop =
                 std::exchange(life.delete_drop, std::numeric_limits<double>::infinity());
@@ -146,9 +127,9 @@ void bind_trees(nb::module_& module) {
                            std::span<const std::int32_t> first_resource,
                            TreeStats& stats) { return (*shared)(trees, first_resource, stats); };
             new (self) TreeTracker<HypothesisForest>(
-                HypothesisForest(model, score, life, branches, carry, new_track_claim,
-                                 {max_hypotheses, max_nodes, least_new_worth, delete_drop, drop,
-                                  ambiguous_drop, std::move(packer)}));
+                HypothesisForest(joint_window(model, score, life, branches, carry, new_track_claim),
+                                 {max_hypotheses, max_nodes, -drop, delete_drop,
+                                  std::max(drop, 25.0), drop, std::move(packer)}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
           "max_nodes"_a, "new_track_claim"_a, "carry"_a, "choose"_a = nb::none());
@@ -158,15 +139,12 @@ void bind_trees(nb::module_& module) {
       .def(
           "__init__",
           [](TreeTracker<HypothesisMatrix>* self, const MotionModel& model, const ScoreModel& score,
-             const LifeOptions& life, BranchOptions branches, std::int64_t max_hypotheses,
+             const LifeOptions& life, const BranchOptions& branches, std::int64_t max_hypotheses,
              double merged_within, double new_track_claim, const CarryOptions& carry) {
             require(max_hypotheses >= 1, "max_hypotheses: at least 1");
-            const double drop = branches.prune_drop;
-            make_joint(branches, score);
-            branches.max_carried = carry.max_carried;
             new (self) TreeTracker<HypothesisMatrix>(
-                HypothesisMatrix(model, score, life, branches, carry, new_track_claim,
-                                 {max_hypotheses, drop, merged_within}));
+                HypothesisMatrix(joint_window(model, score, life, branches, carry, new_track_claim),
+                                 {max_hypotheses, branches.prune_drop, merged_within}));
           },
           "model"_a, "score"_a, "life"_a, "branches"_a, nb::kw_only(), "max_hypotheses"_a,
           "merged_within"_a, "new_track_claim"_a, "carry"_a);

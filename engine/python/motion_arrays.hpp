@@ -2,7 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "filter/imm.hpp"
@@ -20,6 +23,11 @@ inline MotionStep motion_step(const MotionModel& m, const double* F, const doubl
     std::copy_n(Q + b * nn, nn, step.mode[b].Q.begin());
   }
   return step;
+}
+inline MotionStep motion_step(const MotionModel& m, const In<double>& F, const In<double>& Q) {
+  const std::size_t size = static_cast<std::size_t>(m.M) * m.axis.n * m.axis.n;
+  require(F.size() == size && Q.size() == size, "F and Q: shape (modes, n, n)");
+  return motion_step(m, F.data(), Q.data());
 }
 
 inline std::vector<MotionStep> motion_steps(const MotionModel& m, const In<double>& F,
@@ -40,7 +48,7 @@ inline Timeline timeline(const MotionModel& m, const In<double>& times,
                          const In<std::int32_t>& kind, const In<double>& F, const In<double>& Q) {
   require(times.ndim() == 1 && kind.ndim() == 1 && times.shape(0) == kind.shape(0),
           "times and kind: shape (T,)");
-  Timeline line{{times.data(), times.shape(0)}, {kind.data(), kind.shape(0)}, motion_steps(m, F, Q)};
+  Timeline line{flat(times), flat(kind), motion_steps(m, F, Q)};
   // The first frame has no step to it where it is the first of all, which is said by -1.
   const auto n_kinds = static_cast<std::int64_t>(line.steps.size());
   for (std::size_t t = 0; t < line.kind.size(); ++t)
@@ -69,18 +77,16 @@ struct TrackPoints {
 
   TrackPoints(const In<double>& p, const In<std::int64_t>& f, const In<std::int64_t>& o, int D,
               std::size_t n_frames)
-      : points(to_points(p, D)), frames(f.data(), f.size()), offsets(o.data(), o.size()) {
-    require(f.ndim() == 1 && frames.size() == points.size(), "frames: shape (N,)");
-    require(o.ndim() == 1 && !offsets.empty() && offsets.front() == 0 &&
-                offsets.back() == static_cast<std::int64_t>(points.size()),
+      : points(to_points(p, D)), frames(flat(f)), offsets(flat(o)) {
+    require(frames.size() == points.size(), "frames: shape (N,)");
+    require_offsets(offsets, points.size(), "offsets: rising, from 0 to N");
+    require(offsets.front() == 0 && offsets.back() == static_cast<std::int64_t>(points.size()),
             "offsets: from 0 to N");
-    for (std::size_t k = 0; k + 1 < offsets.size(); ++k) {
-      require(offsets[k] <= offsets[k + 1], "offsets: rising");
+    for (std::size_t k = 0; k < n_tracks(); ++k)
       for (std::int64_t i = offsets[k]; i < offsets[k + 1]; ++i)
         require(frames[i] >= 0 && frames[i] < static_cast<std::int64_t>(n_frames) &&
                     (i == offsets[k] || frames[i] > frames[i - 1]),
                 "frames: rising within a track");
-    }
   }
   std::size_t n_tracks() const { return offsets.size() - 1; }
   std::span<const Point> points_of(std::size_t k) const {
@@ -88,6 +94,56 @@ struct TrackPoints {
   }
   std::span<const std::int64_t> frames_of(std::size_t k) const {
     return frames.subspan(offsets[k], offsets[k + 1] - offsets[k]);
+  }
+};
+
+// (means (K, D, n), covariances (K, n, n))
+inline std::pair<Out<double>, Out<double>> state_arrays(const MotionModel& m,
+                                                        std::span<const AxisState> states) {
+  const std::size_t K = states.size(), D = m.axis.D, n = m.axis.n;
+  Owned<double> means(K * D * n), covariances(K * n * n);
+  for (std::size_t k = 0; k < K; ++k) {
+    for (std::size_t d = 0; d < D; ++d)
+      std::copy_n(states[k].x[d].begin(), n, means.data.get() + (k * D + d) * n);
+    std::copy_n(states[k].P.begin(), n * n, covariances.data.get() + k * n * n);
+  }
+  return {means.give({K, D, n}), covariances.give({K, n, n})};
+}
+
+// Many frames that follow each other: the steps to them and their points.
+struct FrameRun {
+  Timeline line;
+  std::vector<Point> points;
+  std::span<const std::int64_t> offsets;
+
+  FrameRun(const MotionModel& m, const In<double>& times, const In<std::int32_t>& kind,
+           const In<double>& F, const In<double>& Q, const In<std::int64_t>& starts,
+           const In<double>& all)
+      : line(timeline(m, times, kind, F, Q)), points(to_points(all, m.axis.D)), offsets(flat(starts)) {
+    require(offsets.size() == size() + 1, "offsets: shape (T + 1,)");
+    require(size() == 0 || line.kind[0] >= 0, "kind: an index into F");
+    require_offsets(offsets, points.size(), "offsets: rising, within the points");
+  }
+  std::size_t size() const { return line.times.size(); }
+  std::int64_t n_points() const { return offsets.back() - offsets.front(); }
+
+  // Calls take(frame, number of its first point, its points) without the GIL; asks now and then
+  // whether the run is to end.
+  template <typename Take>
+  void each(Take&& take) const {
+    using Clock = std::chrono::steady_clock;
+    constexpr std::chrono::milliseconds look_every{50};
+    nb::gil_scoped_release release;
+    auto next_look = Clock::now() + look_every;
+    for (std::size_t t = 0; t < size(); ++t) {
+      if (Clock::now() > next_look) {
+        nb::gil_scoped_acquire acquire;
+        if (PyErr_CheckSignals() != 0) throw nb::python_error();
+        next_look = Clock::now() + look_every;
+      }
+      const auto from = static_cast<std::size_t>(offsets[t]);
+      take(t, from, std::span(points).subspan(from, offsets[t + 1] - offsets[t]));
+    }
   }
 };
 

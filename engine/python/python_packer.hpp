@@ -30,30 +30,22 @@ class PythonPacker {
   std::vector<std::int32_t> operator()(std::span<const std::vector<PackingOption>> trees,
                                        std::span<const std::int32_t> first_resource,
                                        TreeStats& stats) const {
-    std::size_t n_options = 0, n_uses = 0;
-    for (const auto& options : trees)
+    std::vector<std::size_t> first_option{0}, first_use{0};
+    std::vector<double> worths;
+    std::vector<std::int32_t> uses;
+    for (const auto& options : trees) {
       for (const PackingOption& option : options) {
-        ++n_options;
-        n_uses += option.uses.size();
+        worths.push_back(option.worth);
+        uses.insert(uses.end(), option.uses.begin(), option.uses.end());
+        first_use.push_back(uses.size());
       }
-    nb::gil_scoped_acquire acquire;
-    Owned<std::int64_t> first_option(trees.size() + 1), first_use(n_options + 1);
-    Owned<double> worths(n_options);
-    Owned<std::int32_t> uses(n_uses), resources(first_resource.size());
-    std::copy(first_resource.begin(), first_resource.end(), resources.data.get());
-    std::size_t o = 0, u = 0;
-    for (std::size_t i = 0; i < trees.size(); ++i) {
-      for (const PackingOption& option : trees[i]) {
-        worths.data[o] = option.worth;
-        for (const std::int32_t r : option.uses) uses.data[u++] = r;
-        first_use.data[++o] = static_cast<std::int64_t>(u);
-      }
-      first_option.data[i + 1] = static_cast<std::int64_t>(o);
+      first_option.push_back(worths.size());
     }
+    nb::gil_scoped_acquire acquire;
     const nb::tuple out = nb::cast<nb::tuple>(
-        choose_(first_option.give({trees.size() + 1}), worths.give({n_options}),
-                first_use.give({n_options + 1}), uses.give({n_uses}),
-                resources.give({first_resource.size()})));
+        choose_(array_of<std::int64_t>(first_option), array_of<double>(worths),
+                array_of<std::int64_t>(first_use), array_of<std::int32_t>(uses),
+                array_of<std::int32_t>(first_resource)));
     const auto own = nb::cast<In<std::int32_t>>(out[0]);
     require(own.size() == trees.size(), "an option for every tree");
     double value = 0;

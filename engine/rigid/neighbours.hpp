@@ -91,6 +91,8 @@ class Neighbours {
   // `r`: variance of a measured coordinate.
   Neighbours(int D, double r) : D_(D), r_(r) {}
 
+  int n_axes() const { return D_; }
+
   // The markers that are seen in a frame.
   void add(std::span<const Seen> seen) {
     ++n_frames_;

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "solve/connected_components.hpp"
+#include "solve/group_numbering.hpp"
 
 namespace asterism {
 
@@ -28,19 +28,26 @@ class Assignment {
       if (group[0].gain > 0) match[group[0].row] = group[0].column;
       return;
     }
-    compress(group);
-    const auto n_rows = static_cast<std::int32_t>(rows_.size());
-    const auto n_columns = static_cast<std::int32_t>(columns_.size());
+    group_ = group;
+    by_.number(group);
+    const std::int32_t n_rows = by_.n_rows();
     u_.assign(n_rows, 0);
-    v_.assign(n_columns, 0);
+    v_.assign(by_.n_columns(), 0);
     column_of_.assign(n_rows, kAlone);
-    row_of_.assign(n_columns, -1);
-    for (std::int32_t i = 0; i < n_rows; ++i)
-      for (std::int32_t e = first_[i]; e < first_[i + 1]; ++e)
-        u_[i] = std::min(u_[i], -edges_[e].gain);
+    row_of_.assign(by_.n_columns(), -1);
+    for (std::size_t e = 0; e < group.size(); ++e)
+      u_[by_.row_of[e]] = std::min(u_[by_.row_of[e]], -group[e].gain);
     for (std::int32_t i = 0; i < n_rows; ++i) augment(i);
     for (std::int32_t i = 0; i < n_rows; ++i)
-      if (column_of_[i] != kAlone) match[rows_[i]] = columns_[column_of_[i]];
+      if (column_of_[i] != kAlone) match[by_.rows[i]] = by_.columns[column_of_[i]];
+  }
+
+  // Group by group; match[row] is -1 where a row stays alone.
+  void solve_groups(std::span<const Candidate> candidates, std::int32_t n_columns,
+                    std::vector<std::int32_t>& match) {
+    const Groups groups =
+        connected_groups(candidates, static_cast<std::int32_t>(match.size()), n_columns);
+    for (std::size_t g = 0; g < groups.size(); ++g) solve(groups[g], match);
   }
 
   // Also writes what each column of the group is worth to whoever has it: no pairing has a greater
@@ -52,42 +59,17 @@ class Assignment {
       price[group[0].column] = 0;
       return;
     }
-    for (std::size_t j = 0; j < columns_.size(); ++j) price[columns_[j]] = -v_[j];
+    for (std::size_t j = 0; j < v_.size(); ++j) price[by_.columns[j]] = -v_[j];
   }
 
  private:
   static constexpr std::int32_t kAlone = -1;
 
-  struct Edge {
-    std::int32_t column;
-    double gain;
-  };
-
-  // Give the group's rows and columns small consecutive numbers.
-  void compress(std::span<const Candidate> group) {
-    rows_.clear();
-    first_.clear();
-    edges_.clear();
-    columns_.clear();
-    for (const Candidate& c : group) columns_.push_back(c.column);
-    std::sort(columns_.begin(), columns_.end());
-    columns_.erase(std::unique(columns_.begin(), columns_.end()), columns_.end());
-    for (const Candidate& c : group) {
-      if (rows_.empty() || rows_.back() != c.row) {
-        rows_.push_back(c.row);
-        first_.push_back(static_cast<std::int32_t>(edges_.size()));
-      }
-      const auto at = std::lower_bound(columns_.begin(), columns_.end(), c.column);
-      edges_.push_back({static_cast<std::int32_t>(at - columns_.begin()), c.gain});
-    }
-    first_.push_back(static_cast<std::int32_t>(edges_.size()));
-  }
-
   void augment(std::int32_t start) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    distance_.assign(columns_.size(), infinity);
-    from_.assign(columns_.size(), -1);
-    is_done_.assign(columns_.size(), 0);
+    distance_.assign(v_.size(), infinity);
+    from_.assign(v_.size(), -1);
+    is_done_.assign(v_.size(), 0);
     scanned_.clear();
     while (!heap_.empty()) heap_.pop();
 
@@ -102,10 +84,10 @@ class Assignment {
         end_row = row;
         end_column = kAlone;
       }
-      for (std::int32_t e = first_[row]; e < first_[row + 1]; ++e) {
-        const std::int32_t j = edges_[e].column;
+      for (std::int32_t e = by_.first[row]; e < by_.first[row + 1]; ++e) {
+        const std::int32_t j = by_.column_of[e];
         if (is_done_[j]) continue;
-        const double d = length - edges_[e].gain - u_[row] - v_[j];
+        const double d = length - group_[e].gain - u_[row] - v_[j];
         if (d < distance_[j]) {
           distance_[j] = d;
           from_[j] = row;
@@ -136,7 +118,7 @@ class Assignment {
       if (d >= best_end) continue;
       u_[r] += best_end - d;
     }
-    for (std::size_t j = 0; j < columns_.size(); ++j)
+    for (std::size_t j = 0; j < v_.size(); ++j)
       if (is_done_[j] && distance_[j] < best_end) v_[j] -= best_end - distance_[j];
     flip(start, end_row, end_column);
   }
@@ -154,8 +136,9 @@ class Assignment {
   }
 
   using HeapItem = std::pair<double, std::int32_t>;
-  std::vector<std::int32_t> rows_, columns_, first_, column_of_, row_of_, from_;
-  std::vector<Edge> edges_;
+  std::span<const Candidate> group_;  // while it is solved
+  GroupNumbering by_;
+  std::vector<std::int32_t> column_of_, row_of_, from_;
   std::vector<double> u_, v_, distance_;
   std::vector<char> is_done_;
   std::vector<std::pair<std::int32_t, double>> scanned_;

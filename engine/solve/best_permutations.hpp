@@ -13,7 +13,7 @@
 #include <tuple>
 #include <vector>
 
-#include "solve/connected_components.hpp"
+#include "solve/group_numbering.hpp"
 
 namespace asterism {
 
@@ -27,13 +27,15 @@ class BestPermutations {
   bool solve(std::span<const Candidate> group, std::span<const std::int32_t> match,
              std::vector<double>& weights) {
     group_ = group;
-    if (!number()) return false;
+    by_.number(group);
+    if (by_.n_rows() > 64 || by_.n_columns() > 64) return false;
+    list_most();
     best_ = 0;
     for (const Candidate& c : group)
       if (match[c.row] == c.column) best_ += c.gain;
     events_.clear();
     choices_.clear();
-    chosen_.assign(rows_.size() - 1, -1);
+    chosen_.assign(by_.rows.size(), -1);
     n_visits_ = 0;
     if (!visit(0, 0, 0, 0)) return false;
     std::sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) {
@@ -63,30 +65,15 @@ class BestPermutations {
     std::size_t first;  // of its choices
   };
 
-  // Where the rows of the group begin, its columns numbered from 0, and the most that the rows from
-  // each on could win.
-  bool number() {
-    rows_.clear();
-    columns_.clear();
-    for (const Candidate& c : group_) columns_.push_back(c.column);
-    std::sort(columns_.begin(), columns_.end());
-    columns_.erase(std::unique(columns_.begin(), columns_.end()), columns_.end());
-    column_of_.resize(group_.size());
-    for (std::size_t e = 0; e < group_.size(); ++e) {
-      if (e == 0 || group_[e].row != group_[e - 1].row) rows_.push_back(e);
-      const auto at = std::lower_bound(columns_.begin(), columns_.end(), group_[e].column);
-      column_of_[e] = static_cast<std::int32_t>(at - columns_.begin());
-    }
-    rows_.push_back(group_.size());
-    const std::size_t n = rows_.size() - 1;
-    if (n > 64 || columns_.size() > 64) return false;
-    most_.assign(n + 1, 0);
-    for (std::size_t r = n; r-- > 0;) {
+  // The most that the rows from each on could win.
+  void list_most() {
+    most_.assign(by_.rows.size() + 1, 0);
+    for (std::size_t r = by_.rows.size(); r-- > 0;) {
       double most = 0;
-      for (std::size_t e = rows_[r]; e < rows_[r + 1]; ++e) most = std::max(most, group_[e].gain);
+      for (std::int32_t e = by_.first[r]; e < by_.first[r + 1]; ++e)
+        most = std::max(most, group_[e].gain);
       most_[r] = most_[r + 1] + most;
     }
-    return true;
   }
 
   bool visit(std::size_t r, std::uint64_t tracks, std::uint64_t columns, double gain) {
@@ -99,10 +86,10 @@ class BestPermutations {
     }
     chosen_[r] = -1;
     if (!visit(r + 1, tracks, columns, gain)) return false;
-    for (std::size_t e = rows_[r]; e < rows_[r + 1]; ++e) {
-      const std::uint64_t bit = std::uint64_t{1} << column_of_[e];
+    for (std::int32_t e = by_.first[r]; e < by_.first[r + 1]; ++e) {
+      const std::uint64_t bit = std::uint64_t{1} << by_.column_of[e];
       if (columns & bit) continue;
-      chosen_[r] = static_cast<std::int32_t>(e);
+      chosen_[r] = e;
       if (!visit(r + 1, tracks | std::uint64_t{1} << r, columns | bit, gain + group_[e].gain))
         return false;
     }
@@ -110,8 +97,8 @@ class BestPermutations {
   }
 
   std::span<const Candidate> group_;
-  std::vector<std::size_t> rows_;
-  std::vector<std::int32_t> columns_, column_of_, chosen_, choices_;
+  GroupNumbering by_;
+  std::vector<std::int32_t> chosen_, choices_;
   std::vector<double> most_;
   std::vector<Event> events_;
   std::size_t n_visits_ = 0;

@@ -1,4 +1,5 @@
-// Connected components of a bipartite graph: what shares no candidate can be solved apart.
+// Connected components of a bipartite graph: what shares no candidate, or no resource, can be solved
+// apart.
 #pragma once
 
 #include <cstdint>
@@ -56,6 +57,24 @@ inline Groups connected_groups(std::span<const Candidate> candidates, std::int32
     groups.sources[at] = static_cast<std::int32_t>(e);
   }
   return groups;
+}
+
+// Items that share a resource, directly or through others: sets of their numbers, each rising, in the
+// order of their first items. `each_use(item, visit)` calls visit(resource) for what an item uses.
+template <typename EachUse>
+std::vector<std::vector<std::int32_t>> connected_sets(std::size_t n_items, std::size_t n_resources,
+                                                      EachUse&& each_use) {
+  UnionFind sets(n_items);
+  std::vector<std::int32_t> owner(n_resources, -1);
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(n_items); ++i)
+    each_use(i, [&](auto r) {
+      if (owner[r] < 0) owner[r] = i;
+      sets.join(owner[r], i);
+    });
+  std::vector<std::vector<std::int32_t>> out(n_items);
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(n_items); ++i) out[sets.find(i)].push_back(i);
+  std::erase_if(out, [](const auto& set) { return set.empty(); });
+  return out;
 }
 
 }  // namespace asterism

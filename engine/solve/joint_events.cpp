@@ -43,30 +43,14 @@ MatchingMarginals only_best(const MatchingGraph& graph, std::int32_t n,
   return out;
 }
 
-// Small consecutive numbers for the rows and columns of a group.
-void number(std::span<const Candidate> group, std::vector<std::int32_t>& rows,
-            std::vector<std::int32_t>& columns, std::span<std::int32_t> row_of,
-            std::span<std::int32_t> column_of) {
-  for (const Candidate& c : group) columns.push_back(c.column);
-  std::sort(columns.begin(), columns.end());
-  columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
-  for (std::size_t e = 0; e < group.size(); ++e) {
-    if (rows.empty() || rows.back() != group[e].row) rows.push_back(group[e].row);
-    row_of[e] = static_cast<std::int32_t>(rows.size()) - 1;
-    const auto at = std::lower_bound(columns.begin(), columns.end(), group[e].column);
-    column_of[e] = static_cast<std::int32_t>(at - columns.begin());
-  }
-}
-
 // The least prices p ≥ 0 at which everyone is content with the best event, and what is then left
 // to each track. They rise from 0 and, as the event is the best, come to rest.
-void price(std::span<const Candidate> group, std::span<const std::int32_t> row_of,
-           std::span<const std::int32_t> column_of, std::span<const std::int32_t> partner,
-           std::span<double> left, std::span<double> p) {
-  const auto n = static_cast<std::int32_t>(left.size());
+void price(std::span<const Candidate> group, const GroupNumbering& by,
+           std::span<const std::int32_t> partner, std::span<double> left, std::span<double> p) {
+  const std::int32_t n = by.n_rows();
   std::vector<std::size_t> own(n, 0);
   for (std::size_t e = 0; e < group.size(); ++e)
-    if (partner[row_of[e]] == n + column_of[e]) own[row_of[e]] = e;
+    if (partner[by.row_of[e]] == n + by.column_of[e]) own[by.row_of[e]] = e;
   const auto content = [&](std::int32_t i) {
     left[i] = partner[i] < 0 ? 0 : group[own[i]].gain - p[partner[i] - n];
   };
@@ -76,7 +60,7 @@ void price(std::span<const Candidate> group, std::span<const std::int32_t> row_o
   for (std::int32_t round = 0; round <= n && is_rising; ++round) {
     is_rising = false;
     for (std::size_t e = 0; e < group.size(); ++e) {
-      const std::int32_t i = row_of[e], j = column_of[e], holder = partner[n + j];
+      const std::int32_t i = by.row_of[e], j = by.column_of[e], holder = partner[n + j];
       if (holder < 0 || holder == i || group[e].gain - left[i] <= p[j]) continue;
       p[j] = group[e].gain - left[i];
       content(holder);
@@ -124,18 +108,17 @@ double JointEvents::solve_single(std::size_t g) {
 
 double JointEvents::solve_group(std::size_t g) {
   const std::span<const Candidate> group = groups_[g];
-  std::vector<std::int32_t> rows, columns, row_of(group.size()), column_of(group.size());
-  number(group, rows, columns, row_of, column_of);
-  const auto n = static_cast<std::int32_t>(rows.size());
-  const auto m = static_cast<std::int32_t>(columns.size());
+  GroupNumbering by;
+  by.number(group);
+  const std::int32_t n = by.n_rows(), m = by.n_columns();
   std::vector<std::int32_t> partner(n + m, -1);
   for (std::size_t e = 0; e < group.size(); ++e)
     if (best_[group[e].row] == group[e].column) {
-      partner[row_of[e]] = n + column_of[e];
-      partner[n + column_of[e]] = row_of[e];
+      partner[by.row_of[e]] = n + by.column_of[e];
+      partner[n + by.column_of[e]] = by.row_of[e];
     }
   std::vector<double> u(n), p(m);
-  price(group, row_of, column_of, partner, u, p);
+  price(group, by, partner, u, p);
 
   MatchingGraph graph;
   graph.links.resize(n + m);
@@ -143,8 +126,8 @@ double JointEvents::solve_group(std::size_t g) {
   graph.weight.resize(group.size());
   double log_scale = 0;
   for (std::int32_t i = 0; i < n; ++i) {
-    u[i] = snap(log_miss_[rows[i]] + u[i]);
-    graph.alone[i] = std::exp(log_miss_[rows[i]] - u[i]);
+    u[i] = snap(log_miss_[by.rows[i]] + u[i]);
+    graph.alone[i] = std::exp(log_miss_[by.rows[i]] - u[i]);
     log_scale += u[i];
   }
   for (std::int32_t j = 0; j < m; ++j) {
@@ -153,7 +136,7 @@ double JointEvents::solve_group(std::size_t g) {
     log_scale += p[j];
   }
   for (std::size_t e = 0; e < group.size(); ++e) {
-    const std::int32_t i = row_of[e], j = column_of[e];
+    const std::int32_t i = by.row_of[e], j = by.column_of[e];
     const auto edge = static_cast<std::int32_t>(e);
     graph.weight[e] = std::exp(log_weight(g, e) - (u[i] + p[j]));
     graph.links[i].push_back({n + j, edge});
@@ -163,7 +146,7 @@ double JointEvents::solve_group(std::size_t g) {
   MatchingMarginals result = sum(graph, n, partner);
   if (!is_finite(result)) result = only_best(graph, n, partner);
   for (std::size_t e = 0; e < group.size(); ++e) marginal(g, e) = result.edge[e];
-  for (std::int32_t i = 0; i < n; ++i) missed_[rows[i]] = result.alone[i];
+  for (std::int32_t i = 0; i < n; ++i) missed_[by.rows[i]] = result.alone[i];
   summary_.log_total += result.log_total + log_scale;
   summary_.n_states = std::max(summary_.n_states, result.n_states);
   return result.bound;

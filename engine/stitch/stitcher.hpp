@@ -52,7 +52,6 @@ class Stitcher {
         bodies_(m.axis.D, options.noise) {}
 
   const MotionModel& motion() const { return m_; }
-  std::int32_t n_fragments() const { return n_fragments_; }
   std::int32_t n_markers() const { return n_markers_; }
   std::size_t n_remembered() const { return markers_.size(); }
   std::int64_t n_cuts() const { return n_cuts_; }

@@ -42,19 +42,19 @@ class CarriedTracks {
   CarriedTracks(const MotionModel& m, const ScoreModel& score, const CarryOptions& options)
       : opt_(options), max_gap_(score.max_gap), carrier_(m.axis.D, m.axis.r) {}
 
-  bool is_on() const { return opt_.is_on; }
-  // A pairing may become better by so much.
-  double bond_weight() const { return opt_.bond_weight; }
-
-  // Lists the candidates of a frame. `list(asked, out)` adds those of the tracks for which asked(i)
-  // holds, by their predictions, with gains down to bond_weight() below `least_gain`. `n_open`: frames
+  // Predicts every track to a frame and lists its candidates (see LiveTracks::list). `n_open`: frames
   // before this one of which nothing was learnt yet.
-  template <typename List>
-  void list(LiveTracks<>& live, const MotionStep& step, std::span<const Point> points,
-            double least_gain, List&& list, std::vector<Candidate>& out, FrameStats& stats,
-            std::int64_t n_open = 0) {
+  template <typename Least, typename Gain>
+  void list(LiveTracks<>& live, double time, const MotionStep& step, std::span<const Point> points,
+            double least_gain, Least&& least, Gain&& gain, std::vector<Candidate>& out,
+            FrameStats& stats, std::int64_t n_open = 0) {
     live.predict_all(step);
     out.clear();
+    // A pairing may become better by what bonds say of it.
+    const auto list = [&](auto&& is_asked, std::vector<Candidate>& to) {
+      live.list(time, points, least_gain - opt_.bond_weight, is_asked, least, gain, to);
+    };
+    if (!opt_.is_on) return list([](std::size_t) { return true; }, out);
     list([&](std::size_t i) { return live[i].gap == 0; }, out);
     place_seen(live, points, out);
     place_hidden(live, n_open);

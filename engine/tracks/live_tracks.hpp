@@ -94,6 +94,18 @@ struct CandidateLimit : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// What a tracker has taken.
+struct Progress {
+  std::int64_t n_frames = 0, n_seen = 0;  // frames, detections
+  double last_time = -std::numeric_limits<double>::infinity();
+
+  void add(double time, std::size_t n_points) {
+    n_seen += static_cast<std::int64_t>(n_points);
+    last_time = time;
+    ++n_frames;
+  }
+};
+
 // Working memory of one step.
 struct GateMemory {
   std::vector<Prediction> predictions;
@@ -111,8 +123,8 @@ class LiveTracks {
   ScoreModel sm;
   LifeOptions opt;
   std::vector<Track> tracks;
-  std::int64_t n_frames = 0, n_seen = 0, next_id = 0;
-  double last_time = -std::numeric_limits<double>::infinity();
+  std::int64_t next_id = 0;
+  Progress so_far;
 
   LiveTracks(const MotionModel& motion, const ScoreModel& score, const LifeOptions& options)
       : m(motion), sm(score), opt(options) {}
@@ -134,18 +146,11 @@ class LiveTracks {
   // A point that no track takes is clutter or a new marker, not clutter alone.
   double leftover_gain() const { return softplus(birth_gain()); }
 
-  // Predicts every track to the frame and lists the pairings within its gate, by track.
+  // Adds the pairings within the gates of the tracks for which is_asked(i) holds, by track, by their
+  // predictions as they are.
   //
-  //   least(i)                     no point of less log likelihood is of any use to track i
-  //   gain(i, log likelihood)      of a pairing; it is listed where this is above `least_gain`
-  template <typename Least, typename Gain>
-  void candidates(double time, const MotionStep& step, std::span<const Point> points,
-                  double least_gain, Least&& least, Gain&& gain, std::vector<Candidate>& out) {
-    out.clear();
-    predict_all(step);
-    list(time, points, least_gain, [](std::size_t) { return true; }, least, gain, out);
-  }
-  // Adds those of the tracks for which is_asked(i) holds, by their predictions as they are.
+  //   gain(i, log likelihood)  of a pairing; it is listed where this is above `least_gain`
+  //   least(i, least_gain)     no point of less log likelihood gives track i as much
   template <typename Asked, typename Least, typename Gain>
   void list(double time, std::span<const Point> points, double least_gain, Asked&& is_asked,
             Least&& least, Gain&& gain, std::vector<Candidate>& out) {
@@ -157,7 +162,7 @@ class LiveTracks {
     for (std::size_t i = 0; i < tracks.size(); ++i) {
       if (!is_asked(i)) continue;
       s_.asked.push_back(i);
-      s_.radii.push_back(s_.predictions[i].radius(opt.gate, least(i), r_most));
+      s_.radii.push_back(s_.predictions[i].radius(opt.gate, least(i, least_gain), r_most));
       sum_radii += std::max(s_.radii.back(), 0.0);
     }
     if (s_.asked.empty() || points.empty()) return;
@@ -186,10 +191,10 @@ class LiveTracks {
                    const Prediction& prediction, double radius, const Point& last, double dt,
                    Visit&& visit) const {
     if (radius < 0) return;
-    const double reach = sm.max_speed * dt + sm.speed_margin;
     grid.within(prediction.center, radius, [&](std::int32_t j, double distance2) {
-      if (squared_distance(points[j], last, m.axis.D) > reach * reach) return;
-      if (prediction.is_gated(points[j], opt.gate)) visit(j, distance2);
+      if (is_reachable(sm, last, points[j], dt, m.axis.D) &&
+          prediction.is_gated(points[j], opt.gate))
+        visit(j, distance2);
     });
   }
 
@@ -212,10 +217,10 @@ class LiveTracks {
     track.last_time = time;
     track.gap = track.carried = 0;
     if (track.is_confirmed()) {
-      label(n_seen + j, track.id, confidence);
+      label(so_far.n_seen + j, track.id, confidence);
       return;
     }
-    track.pending.push_back({n_seen + j, confidence});
+    track.pending.push_back({so_far.n_seen + j, confidence});
     if (track.score < opt.confirm_score) return;
     track.id = next_id++;
     for (const Pending& p : track.pending) label(p.detection, track.id, p.confidence);
@@ -240,18 +245,15 @@ class LiveTracks {
     track.first_time = track.last_time = time;
     track.last = y;
     track.state = begin_state(m, y);
-    track.pending.push_back({n_seen + static_cast<std::int64_t>(j), 1.0});
+    track.pending.push_back({so_far.n_seen + static_cast<std::int64_t>(j), 1.0});
     return track;
   }
 
-  void end_frame(double time, std::size_t n_points, FrameStats& stats) {
+  void count(FrameStats& stats) const {
     for (const Track& track : tracks) {
       ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
       stats.n_pending += static_cast<std::int64_t>(track.pending.size());
     }
-    n_seen += static_cast<std::int64_t>(n_points);
-    last_time = time;
-    ++n_frames;
   }
 
  private:

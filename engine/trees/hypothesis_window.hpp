@@ -25,8 +25,11 @@ struct Fate {
 };
 
 struct HypothesisWindow : OpenWindow {
-  double new_track_claim = 0;  // a detection that is expected by more begins no tree
+  double new_track_claim;  // a detection that is expected by more begins no tree
   std::vector<LiveTrack<Tree>> seeds;  // begin in a frame that is not decided
+
+  HypothesisWindow(const OpenWindow& window, double claim)
+      : OpenWindow(window), new_track_claim(claim) {}
 
   std::size_t n_all() const { return live.size() + seeds.size(); }
   bool is_seed(std::size_t i) const { return i >= live.size(); }
@@ -39,11 +42,34 @@ struct HypothesisWindow : OpenWindow {
     return is_seed(i) ? tree(i).more.first : frames.front()->number;
   }
 
+  // Whether a branch is no marker's yet: a tree is something to explain from its second detection on.
+  bool is_lone(std::size_t i, const Branch& b) const { return is_seed(i) && b.n_taken < 2; }
+  // Detection of a branch of tree i in an open frame, -1 for none.
+  std::int32_t taken(std::size_t i, const Branch& b, const WindowFrame& frame) const {
+    return frame.number < first_frame(i) ? -1 : b.taken(frame.number);
+  }
+  // Calls visit(detection) for what a branch of tree i has, counted from the first of the open frames.
+  template <typename Visit>
+  void each_detection(std::size_t i, const Branch& b, Visit&& visit) const {
+    for (const auto& frame : frames)
+      if (const std::int32_t j = taken(i, b, *frame); j >= 0) visit(first_open(*frame) + j);
+  }
+  std::int32_t first_open(const WindowFrame& frame) const {
+    return static_cast<std::int32_t>(frame.first - frames.front()->first);
+  }
+  std::size_t n_detections() const {
+    return frames.empty() ? 0 : first_open(*frames.back()) + frames.back()->points.size();
+  }
+
   // What may begin in an open frame is tentative as well.
   void count(TreeStats& stats) const {
     OpenWindow::count(stats);
     stats.n_tentative += static_cast<std::int64_t>(seeds.size());
     stats.n_pending += static_cast<std::int64_t>(seeds.size());
+  }
+  void count_most(TreeStats& stats) const {
+    for (std::size_t i = 0; i < n_all(); ++i)
+      stats.most_branches = std::max<std::int64_t>(stats.most_branches, tree(i).more.branches.size());
   }
 
   // Trees that begin at the detections of the newest frame.
@@ -94,8 +120,7 @@ struct HypothesisWindow : OpenWindow {
         begin(*frame, seeds[k], fates[n_live + k].probability, stats);
     std::erase_if(seeds, [&](const LiveTrack<Tree>& s) { return s.more.first == frame->number; });
     live.end_tracks();
-    TreeStats ignored;
-    live.end_frame(frame->time, frame->points.size(), ignored);
+    live.so_far.add(frame->time, frame->points.size());
   }
 
  private:

@@ -18,22 +18,26 @@ namespace asterism {
 struct OpenWindow {
   LiveTracks<Tree> live;
   BranchOptions branches;
-  std::vector<std::shared_ptr<const WindowFrame>> frames;
   WindowBodies bodies;
+  std::vector<std::shared_ptr<const WindowFrame>> frames;
   std::int64_t n_trees = 0;
   // Branches that a track may have right after a further frame: all, where they are limited jointly.
   std::int32_t max_grown = branches.is_joint ? BranchGrower::kAll
                                              : branches.max_branches;
 
+  OpenWindow(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
+             const BranchOptions& options, const CarryOptions& carry)
+      : live(model, score, life), branches(options), bodies(model, score, life, carry) {
+    branches.max_carried = carry.max_carried;
+  }
+
   std::int32_t n_open() const { return static_cast<std::int32_t>(frames.size()); }
   bool is_full() const { return n_open() == branches.window; }
 
   void count(TreeStats& stats) const {
-    for (const LiveTrack<Tree>& track : live.tracks) {
-      ++(track.is_confirmed() ? stats.n_confirmed : stats.n_tentative);
-      stats.n_pending += static_cast<std::int64_t>(track.pending.size());
+    live.count(stats);
+    for (const LiveTrack<Tree>& track : live.tracks)
       stats.n_branches += static_cast<std::int64_t>(track.more.branches.size());
-    }
   }
 
   // What neighbours say of a frame that comes.

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "math/union_find.hpp"
+#include "solve/connected_components.hpp"
 #include "solve/set_packing.hpp"
 #include "trees/hypothesis_window.hpp"
 
@@ -35,15 +35,11 @@ struct HypothesisOptions {
 
 class HypothesisForest {
  public:
-  HypothesisForest(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
-                   const BranchOptions& branches, const CarryOptions& carry, double new_track_claim,
-                   const HypothesisOptions& options)
-      : open_{{{model, score, life}, branches, {}, {model, score, life, carry}}, new_track_claim, {}},
-        opt_(options) {}
+  HypothesisForest(const HypothesisWindow& open, const HypothesisOptions& options)
+      : open_(open), opt_(options) {}
 
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, TreeStats& stats, Label&& label) {
-    frame->claimed.assign(frame->points.size(), 0);
     open_.advise(*frame, stats);
     open_.claim(*frame);
     open_.push(frame, stats);
@@ -102,35 +98,22 @@ class HypothesisForest {
   // Every tree's branches as options, over the detections of all open frames as resources.
   void list_options() {
     const BranchGrower grower(open_.live, open_.branches);
-    s_.n_resources = 0;
-    s_.first_resource.clear();
-    for (const auto& frame : open_.frames) {
-      s_.first_resource.push_back(s_.n_resources);
-      s_.n_resources += static_cast<std::int32_t>(frame->points.size());
-    }
     s_.trees.assign(open_.n_all(), {});
     s_.fates.assign(open_.n_all(), {});
     for (std::size_t i = 0; i < s_.trees.size(); ++i) {
       const bool is_seed = open_.is_seed(i);
       const LiveTrack<Tree>& track = open_.tree(i);
       TreeOptions& tree = s_.trees[i];
-      const std::int64_t first = open_.first_frame(i);
       bool has_free = false;
       for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
         const Branch& b = track.more.branches[k];
-        if (is_seed && (b.n_taken < 2 || grower.worth(b) < opt_.least_new_worth)) continue;
+        if (is_seed && (open_.is_lone(i, b) || grower.worth(b) < opt_.least_new_worth)) continue;
         if (!is_seed && !track.is_confirmed() && track.best_score - b.score > opt_.delete_drop)
           continue;
         PackingOption option{grower.worth(b), {}};
-        for (std::size_t f = 0; f < open_.frames.size(); ++f) {
-          const std::int64_t number = open_.frames[f]->number;
-          if (number >= first && b.taken(number) >= 0)
-            option.uses.push_back(s_.first_resource[f] + b.taken(number));
-        }
+        open_.each_detection(i, b, [&](std::int32_t r) { option.uses.push_back(r); });
         has_free = has_free || option.uses.empty();
-        const std::int32_t column = is_seed && first != open_.frames.front()->number
-                                        ? -1
-                                        : b.taken(open_.frames.front()->number);
+        const std::int32_t column = open_.taken(i, b, *open_.frames.front());
         tree.options.push_back(std::move(option));
         tree.choices.push_back({static_cast<std::int32_t>(k), column, 0});
       }
@@ -148,20 +131,10 @@ class HypothesisForest {
 
   // Trees that share detections.
   std::vector<std::vector<std::int32_t>> clusters() const {
-    std::vector<std::int32_t> owner(s_.n_resources, -1);
-    UnionFind sets(s_.trees.size());
-    for (std::size_t i = 0; i < s_.trees.size(); ++i)
+    return connected_sets(s_.trees.size(), open_.n_detections(), [&](std::int32_t i, auto&& visit) {
       for (const PackingOption& option : s_.trees[i].options)
-        for (const std::int32_t r : option.uses) {
-          const auto own = static_cast<std::int32_t>(i);
-          if (owner[r] < 0) owner[r] = own;
-          sets.join(owner[r], own);
-        }
-    std::vector<std::vector<std::int32_t>> clusters(s_.trees.size());
-    for (std::size_t i = 0; i < s_.trees.size(); ++i)
-      clusters[sets.find(static_cast<std::int32_t>(i))].push_back(static_cast<std::int32_t>(i));
-    std::erase_if(clusters, [](const auto& cluster) { return cluster.empty(); });
-    return clusters;
+        for (const std::int32_t r : option.uses) visit(r);
+    });
   }
 
   // Drops the branches that no probable hypothesis needs. What a tree would like best may be another's,
@@ -170,8 +143,7 @@ class HypothesisForest {
   void limit(TreeStats& stats) {
     list_options();
     for (const std::vector<std::int32_t>& cluster : clusters()) limit(cluster, stats);
-    for (std::size_t i = 0; i < open_.n_all(); ++i)
-      stats.most_branches = std::max<std::int64_t>(stats.most_branches, branches(i).size());
+    open_.count_most(stats);
   }
   void limit(const std::vector<std::int32_t>& cluster, TreeStats& stats) {
     stats.largest_group = std::max<std::int64_t>(stats.largest_group, cluster.size());
@@ -261,7 +233,7 @@ class HypothesisForest {
   // probability. So the trees stand apart again that only improbable options join: those that lose much,
   // and those that use what a tree with one probable option has.
   void leave_out_improbable() {
-    std::vector<char> is_owned(s_.n_resources, 0), is_sure(s_.trees.size(), 0);
+    std::vector<char> is_owned(open_.n_detections(), 0), is_sure(s_.trees.size(), 0);
     for (bool is_new = true; is_new;) {
       is_new = false;
       for (std::size_t i = 0; i < s_.trees.size(); ++i) {
@@ -300,15 +272,16 @@ class HypothesisForest {
   }
 
   void mark(std::int32_t i, const Choice& best) {
-    std::vector<Branch>& branches = open_.tree(i).more.branches;
-    for (Branch& b : branches) b.is_chosen = false;
-    if (best.branch >= 0) branches[best.branch].is_chosen = true;
+    for (Branch& b : branches(i)) b.is_chosen = false;
+    if (best.branch >= 0) branches(i)[best.branch].is_chosen = true;
   }
 
   void choose_by_packer(const std::vector<std::int32_t>& entangled, TreeStats& stats) {
     std::vector<std::vector<PackingOption>> options;
     for (const std::int32_t i : entangled) options.push_back(std::move(s_.trees[i].options));
-    const std::vector<std::int32_t> own = opt_.packer(options, s_.first_resource, stats);
+    std::vector<std::int32_t> first_resource;
+    for (const auto& frame : open_.frames) first_resource.push_back(open_.first_open(*frame));
+    const std::vector<std::int32_t> own = opt_.packer(options, first_resource, stats);
     ++stats.n_groups;
     for (std::size_t c = 0; c < entangled.size(); ++c) {
       const Choice& best = s_.trees[entangled[c]].choices[own[c]];
@@ -366,8 +339,6 @@ class HypothesisForest {
     std::vector<TreeOptions> trees;
     std::vector<Ranked> ranked;
     std::vector<Fate> fates;
-    std::vector<std::int32_t> first_resource;
-    std::int32_t n_resources = 0;
     std::vector<double> free, taken;
   };
 

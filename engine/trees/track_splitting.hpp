@@ -10,9 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "frame/marriage_market.hpp"
+#include "frame/frame_pairing.hpp"
 #include "math/log_sums.hpp"
-#include "solve/assignment.hpp"
 #include "solve/joint_events.hpp"
 #include "trees/open_window.hpp"
 
@@ -27,14 +26,11 @@ struct ForestOptions {
 
 class Forest {
  public:
-  Forest(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
-         const BranchOptions& branches, const CarryOptions& carry, const ForestOptions& options)
-      : open_{{model, score, life}, branches, {}, {model, score, life, carry}}, opt_(options) {}
+  Forest(const OpenWindow& open, const ForestOptions& options) : open_(open), opt_(options) {}
 
   // Takes a frame; decides the oldest one if the window is full with it.
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, TreeStats& stats, Label&& label) {
-    frame->claimed.assign(frame->points.size(), 0);
     open_.advise(*frame, stats);
     if (!opt_.is_independent) open_.claim(*frame);
     open_.push(std::move(frame), stats);
@@ -66,23 +62,20 @@ class Forest {
 
   // Of one decision.
   struct Memory {
-    std::vector<std::int32_t> match, claims;
+    FramePairing pairs;
+    std::vector<std::int32_t> claims;
     std::vector<std::vector<Way>> ways;
-    std::vector<char> is_taken;
     std::vector<double> free;
     std::vector<Candidate> candidates, pairings;
     std::vector<double> gains, marginals, missed, log_miss;
     std::vector<std::int32_t> best;
-    std::vector<Pair> extras;
-    Assignment assignment;
   };
 
   template <typename Label>
   void decide(TreeStats& stats, Label&& label) {
     const std::shared_ptr<const WindowFrame> frame = open_.pop();
-    s_.match.assign(open_.live.size(), -1);
+    s_.pairs.begin(open_.live.size(), frame->points.size());
     s_.ways.resize(open_.live.size());
-    s_.is_taken.assign(frame->points.size(), 0);
     count_shared(*frame, stats);
     for (std::size_t i = 0; i < open_.live.size(); ++i) list_ways(*frame, i);
     for (const bool confirmed : {true, false}) {
@@ -93,13 +86,12 @@ class Forest {
     for (std::size_t i = 0; i < open_.live.size(); ++i) follow(*frame, i, stats, label);
     open_.live.end_tracks();
     for (std::size_t j = 0; j < frame->points.size(); ++j) {
-      if (s_.is_taken[j]) continue;
+      if (s_.pairs.is_taken[j]) continue;
       LiveTrack<Tree>& track = open_.live.begin(j, frame->points[j], frame->time, open_.live.birth_gain());
       track.more.key = open_.n_trees++;
       open_.regrow(track, stats);
     }
-    TreeStats ignored;
-    open_.live.end_frame(frame->time, frame->points.size(), ignored);
+    open_.live.so_far.add(frame->time, frame->points.size());
   }
 
   void list_ways(const WindowFrame& frame, std::size_t i) {
@@ -166,7 +158,7 @@ class Forest {
       for (std::size_t k = 1; k < s_.ways[i].size(); ++k) {
         const Way& way = s_.ways[i][k];
         const double gain = way.log_weight - log_sum(s_.ways[i][0].log_weight, way.newborn);
-        if (s_.is_taken[way.column] || !(gain > kNegligible) || !std::isfinite(gain)) continue;
+        if (s_.pairs.is_taken[way.column] || !(gain > kNegligible) || !std::isfinite(gain)) continue;
         s_.pairings.push_back({static_cast<std::int32_t>(i), way.column, gain, 0});
         s_.gains.push_back(gain);
       }
@@ -203,24 +195,12 @@ class Forest {
       for (std::size_t k = 1; k < s_.ways[i].size(); ++k) {
         const Way& way = s_.ways[i][k];
         const double gain = odds(track, way) - log_sum(missed, way.newborn);
-        if (s_.is_taken[way.column] || !(gain > 0) || !std::isfinite(gain)) continue;
+        if (s_.pairs.is_taken[way.column] || !(gain > 0) || !std::isfinite(gain)) continue;
         s_.candidates.push_back({static_cast<std::int32_t>(i), way.column, gain,
                                mean_distance2(track.more.branches[way.branch])});
       }
     }
-    const Groups groups = connected_groups(s_.candidates, static_cast<std::int32_t>(open_.live.size()),
-                                           static_cast<std::int32_t>(frame.points.size()));
-    const MarriageMarket market{opt_.pairing == Pairing::detections_propose, 1, 0};
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      if (opt_.pairing == Pairing::assignment || groups[g].size() == 1)
-        s_.assignment.solve(groups[g], s_.match);
-      else
-        market.marry(groups[g], frame.points, open_.live.m.axis.D, s_.match, s_.extras);
-      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
-    }
-    stats.n_groups += static_cast<std::int64_t>(groups.size());
-    for (const Candidate& c : s_.candidates)
-      if (s_.match[c.row] == c.column) s_.is_taken[c.column] = 1;
+    s_.pairs.pair(s_.candidates, frame.points, open_.live.m.axis.D, {opt_.pairing}, stats);
   }
 
   // Mean squared distance of a branch's detections in the window from what was expected of each.
@@ -259,10 +239,10 @@ class Forest {
   template <typename Label>
   void follow(const WindowFrame& frame, std::size_t i, TreeStats& stats, Label&& label) {
     LiveTrack<Tree>& track = open_.live[i];
-    const std::int32_t j = s_.match[i];
+    const std::int32_t j = s_.pairs.match[i];
     const std::int32_t own = opt_.is_independent ? track.more.branches.front().taken(frame.number) : j;
     open_.carry(frame, i, own, stats);
-    if (own >= 0) s_.is_taken[own] = 1;
+    if (own >= 0) s_.pairs.is_taken[own] = 1;
     if (j >= 0) {
       const Point last = track.last;
       open_.live.take(i, j, last, frame.time, way_to(i, j)->probability, label);

@@ -27,11 +27,8 @@ class TreeTracker {
   // As FrameTracker::step; also calls label for earlier detections whose label changes.
   template <typename Label>
   TreeStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
-    TreeStats stats;
     std::map<std::int64_t, Said> decided;
-    add(time, step, points, stats, decided);
-    forest_.count(stats);
-    total_.add(stats);
+    TreeStats stats = add(time, step, points, decided);
     look_ahead(decided, label);
     stats.add_work(ahead_);  // what is told of the open frames now is told of this step too
     return stats;
@@ -40,11 +37,8 @@ class TreeTracker {
   // Many frames whose labels are asked for at the end alone: step without the looks ahead.
   template <typename Label>
   TreeStats pass(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
-    TreeStats stats;
     std::map<std::int64_t, Said> decided;
-    add(time, step, points, stats, decided);
-    forest_.count(stats);
-    total_.add(stats);
+    const TreeStats stats = add(time, step, points, decided);
     for (const auto& [detection, said] : decided) {
       said_.erase(detection);
       label(detection, said.id, said.confidence);
@@ -68,9 +62,7 @@ class TreeTracker {
     all.add_work(ahead_);
     return all;
   }
-  std::int64_t n_frames() const { return n_frames_; }
-  std::int64_t n_seen() const { return n_seen_; }
-  double last_time() const { return last_time_; }
+  const Progress& so_far() const { return so_far_; }
 
  private:
   struct Said {
@@ -79,25 +71,28 @@ class TreeTracker {
     bool operator==(const Said&) const = default;
   };
 
-  void add(double time, const MotionStep& step, std::span<const Point> points, TreeStats& stats,
-           std::map<std::int64_t, Said>& decided) {
+  TreeStats add(double time, const MotionStep& step, std::span<const Point> points,
+                std::map<std::int64_t, Said>& decided) {
     auto frame = std::make_shared<WindowFrame>();
-    frame->number = n_frames_;
-    frame->first = n_seen_;
+    frame->number = so_far_.n_frames;
+    frame->first = so_far_.n_seen;
     frame->time = time;
     frame->step = step;
     frame->points.assign(points.begin(), points.end());
+    frame->claimed.assign(points.size(), 0);
     // Cells as wide as a track may move in the frame, were it as fast as can be.
     const LiveTracks<Tree>& live = forest_.live();
-    const double dt = n_frames_ == 0 ? 0 : time - last_time_;
+    const double dt = so_far_.n_frames == 0 ? 0 : time - so_far_.last_time;
     frame->grid.build(frame->points, live.m.axis.D, live.sm.max_speed * dt + live.sm.speed_margin);
+    TreeStats stats;
     forest_.add(std::move(frame), stats, [&](std::int64_t detection, std::int64_t id, double p) {
       decided[detection] = {id, has_confidence_ ? p : 0};
     });
     forget_old(decided);
-    n_seen_ += static_cast<std::int64_t>(points.size());
-    last_time_ = time;
-    ++n_frames_;
+    so_far_.add(time, points.size());
+    forest_.count(stats);
+    total_.add(stats);
+    return stats;
   }
 
   // What was decided to have no label may still get one, as long as a tentative track holds it; and
@@ -105,7 +100,7 @@ class TreeTracker {
   void forget_old(const std::map<std::int64_t, Said>& decided) {
     for (const auto& [detection, said] : decided)
       if (said.id < 0) unlabelled_[detection] = said.confidence;
-    std::int64_t oldest = said_.empty() ? n_seen_ : said_.begin()->first;
+    std::int64_t oldest = said_.empty() ? so_far_.n_seen : said_.begin()->first;
     for (const LiveTrack<Tree>& track : forest_.live().tracks)
       if (!track.pending.empty()) oldest = std::min(oldest, track.pending.front().detection);
     unlabelled_.erase(unlabelled_.begin(), unlabelled_.lower_bound(oldest));
@@ -141,8 +136,7 @@ class TreeTracker {
   std::map<std::int64_t, Said> said_;  // of what is not decided
   std::map<std::int64_t, double> unlabelled_;
   TreeStats total_, ahead_;
-  std::int64_t n_frames_ = 0, n_seen_ = 0;
-  double last_time_ = -std::numeric_limits<double>::infinity();
+  Progress so_far_;
 };
 
 }  // namespace asterism

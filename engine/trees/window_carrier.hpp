@@ -34,11 +34,15 @@ class WindowBodies {
               FrameStats& stats) {
     auto& [rows, carried] = all_.own();
     list_rows(live, rows);
+    // What a believed track wins by a detection over missing it and leaving that over.
+    const double over = rows.leftover_gain();
+    const auto base = [&](std::size_t i) {
+      return rows.hit_gain(rows[i].gap) - rows.miss_gain(rows[i].gap) - over;
+    };
     carried.list(
-        rows, frame.step, frame.points, 0.0,
-        [&](auto&& is_asked, std::vector<Candidate>& out) {
-          list_candidates(rows, frame, carried.bond_weight(), is_asked, out);
-        },
+        rows, frame.time, frame.step, frame.points, 0.0,
+        [&](std::size_t i, double gain) { return gain - base(i); },
+        [&](std::size_t i, double log_likelihood) { return base(i) + log_likelihood; },
         s_.candidates, stats, n_open);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       NeighbourAdvice& own = s_.advice[s_.place[i]];
@@ -101,20 +105,6 @@ class WindowBodies {
     s_.place.push_back(s_.advice.size() - 1);
   }
   bool is_best(std::size_t row) const { return row == 0 || s_.place[row] != s_.place[row - 1]; }
-
-  // What a believed track wins by a detection over missing it and leaving that over.
-  template <typename Asked>
-  static void list_candidates(LiveTracks<>& rows, const WindowFrame& frame, double spare,
-                              Asked&& is_asked, std::vector<Candidate>& out) {
-    const double over = rows.leftover_gain();
-    const auto base = [&](std::size_t i) {
-      return rows.hit_gain(rows[i].gap) - rows.miss_gain(rows[i].gap) - over;
-    };
-    rows.list(
-        frame.time, frame.points, -spare, is_asked,
-        [&](std::size_t i) { return -base(i) - spare; },
-        [&](std::size_t i, double log_likelihood) { return base(i) + log_likelihood; }, out);
-  }
 
   SharedCopy<All> all_;
   Fresh<Memory> s_;

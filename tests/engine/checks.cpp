@@ -13,6 +13,8 @@
 #include "rigid/neighbours.hpp"
 #include "base/parallel.hpp"
 #include "mcmc/chain/trace.hpp"
+#include "math/random.hpp"
+#include "multiview/candidate_choice.hpp"
 
 using namespace asterism;
 
@@ -173,7 +175,61 @@ void a_block_gains_what_the_capture_gains() {
   }
 }
 
+// Candidates of image points, and the best compatible ones by trying all sets of them.
+struct ChoiceProblem {
+  std::vector<std::vector<std::int32_t>> uses;
+  std::vector<double> scores;
+  std::size_t n_points;
+
+  ChoiceProblem(Random& random, int n, int m) : n_points(m) {
+    for (int i = 0; i < n; ++i) {
+      uses.emplace_back();
+      for (int k = random.below(3); k >= 0; --k)
+        if (const std::int32_t p = random.below(m); std::ranges::find(uses[i], p) == uses[i].end())
+          uses[i].push_back(p);
+      scores.push_back(1 + 5 * random.uniform());
+    }
+  }
+  double best(std::size_t from, std::vector<char> is_used) const {
+    if (from == uses.size()) return 0;
+    const double without = best(from + 1, is_used);
+    for (const std::int32_t p : uses[from])
+      if (is_used[p]++) return without;
+    return std::max(without, scores[from] + best(from + 1, is_used));
+  }
+  // The worth of a choice, in which no point is used twice.
+  double worth(const std::vector<std::int32_t>& chosen) const {
+    std::vector<char> is_used(n_points, 0);
+    double sum = 0;
+    for (const std::int32_t c : chosen) {
+      sum += scores[c];
+      for (const std::int32_t p : uses[c]) CHECK(!is_used[p]++);
+    }
+    return sum;
+  }
+};
+
+void choices_of_candidates_are_the_best_or_tell_by_how_much_not() {
+  Random random(6);
+  std::int64_t n_packed = 0, n_cut = 0;
+  for (int repeat = 0; repeat < 200; ++repeat) {
+    const ChoiceProblem problem(random, 4 + random.below(12), 4 + random.below(6));
+    const double best = problem.best(0, std::vector<char>(problem.n_points, 0));
+    for (const std::int64_t max_nodes : {1'000'000, 1}) {
+      ChoiceSummary summary;
+      const double worth = problem.worth(
+          CandidateChoice(problem.uses, problem.scores, problem.n_points).solve(max_nodes, summary));
+      CHECK(worth <= best + 1e-6 && best <= worth + summary.gap + 2e-6);
+      if (max_nodes > 1) CHECK(summary.n_inexact == 0 && summary.gap == 0);
+      n_packed += summary.n_packed;
+      n_cut += summary.n_inexact;
+    }
+  }
+  CHECK(n_packed > 20 && n_cut > 5);
+}
+
 int main() {
+  choices_of_candidates_are_the_best_or_tell_by_how_much_not();
   a_block_gains_what_the_capture_gains();
   exceptions_reach_the_caller();
   budgets_of_nothing_and_of_everything();

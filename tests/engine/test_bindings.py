@@ -52,6 +52,9 @@ def test_a_solver_of_views_keeps_its_cameras():
     del cameras
     gc.collect()
     ballast = [np.ones(2000) for _ in range(200)]  # what was freed would be overwritten
-    scores, _, _ = solver.candidates(np.empty((0, 2)), np.zeros(4, dtype=np.int64))
-    assert len(scores) == 0
+    points, *_ = solver.reconstruct(
+        np.empty((0, 2)), np.zeros(4, dtype=np.int64), np.empty((0, 4)),
+        np.zeros(2, dtype=np.int64), 0.0, 1000, 1,
+    )  # fmt: skip
+    assert len(points) == 0
     assert len(ballast) == 200

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 import asterism as am
-from asterism import _engine
 from tests.multiview.scenes import LENSES, MODEL, filmed, observations, random_rig
 from tests.references.reconstruction import every_set, score
 
@@ -112,50 +111,6 @@ def test_finds_the_best_of_all_choices():
         assert made.scores.sum() == pytest.approx(best.value, abs=0.05 * max(len(tuples), 1) ** 0.5)
         assert made.info["n_cut"] == 0
     assert n_contested > 7
-
-
-def test_the_choice_is_that_of_the_exact_solver():
-    rng = np.random.default_rng(6)
-    n_hard = 0
-    for _ in range(200):
-        n, m = int(rng.integers(1, 40)), int(rng.integers(4, 30))
-        uses = [rng.choice(m, rng.integers(1, 4), replace=False) for _ in range(n)]
-        scores = rng.exponential(5, n)
-        tuples = np.full((n, m), -1)
-        for i, use in enumerate(uses):
-            tuples[i, use] = 0
-        best = am.solve.assign_multidimensional(tuples, scores)
-        chosen, is_exact, gap = _engine.choose_candidates(
-            scores, np.cumsum([0] + [len(u) for u in uses]), np.concatenate(uses), 10**6
-        )
-        assert is_exact
-        assert gap == 0
-        taken = np.concatenate([uses[i] for i in chosen])
-        assert len(set(taken)) == len(taken)
-        assert scores[chosen].sum() == pytest.approx(best.value, abs=1e-6)
-        order = np.argsort(-scores)
-        greedy, used = 0.0, set()
-        for i in order:
-            if not used & set(uses[i]):
-                greedy += scores[i]
-                used |= set(uses[i])
-        n_hard += greedy < best.value - 1e-6
-    assert n_hard > 20
-
-
-def test_a_search_that_is_cut_says_by_how_much():
-    rng = np.random.default_rng(7)
-    n, m = 120, 40
-    uses = [np.sort(rng.choice(m, 3, replace=False)) for _ in range(n)]
-    scores = rng.uniform(5, 6, n)
-    first = np.cumsum([0] + [3] * n)
-    chosen, is_exact, gap = _engine.choose_candidates(scores, first, np.concatenate(uses), 1)
-    tuples = np.full((n, m), -1)
-    for i, use in enumerate(uses):
-        tuples[i, use] = 0
-    best = am.solve.assign_multidimensional(tuples, scores).value
-    assert not is_exact
-    assert scores[chosen].sum() <= best + 1e-6 <= scores[chosen].sum() + gap + 2e-6
 
 
 @settings(max_examples=20, deadline=None)

@@ -20,7 +20,7 @@ def test_distances_are_remembered_for_four_hundred_frames(n_frames):
     far = 0.3 + rng.normal(scale=0.01, size=n_frames)
     neighbours = _engine.Neighbours(3, NOISE**2)
     for x in far:
-        neighbours.add(np.array([0, 3], dtype=np.int32), np.array([[0.0, 0, 0], [0, x, 0]]))
+        neighbours.add(np.array([0, 3]), np.array([[0.0, 0, 0], [0, x, 0]]))
     shares = [1 / min(n, 400) for n in range(1, n_frames + 1)]
     weights = np.array([s * np.prod(1 - np.array(shares[n:])) for n, s in enumerate(shares, 1)])
     others, frames, mean, variance, _ = neighbours.of(0)
@@ -33,7 +33,7 @@ def test_what_varies_is_unsteady():
     neighbours = _engine.Neighbours(2, NOISE**2)
     for t in range(200):
         points = [[0.0, 0], [0.2, 0], [-0.2 - 0.01 * (-1) ** t, 0]]
-        neighbours.add(np.arange(3, dtype=np.int32), np.array(points))
+        neighbours.add(np.arange(3), np.array(points))
     others, _, mean, _, predictive = neighbours.of(0)
     assert (others.tolist(), mean) == ([1, 2], pytest.approx([0.2, 0.2]))
     unseen = (0.2 * (0.01 + 1 / 200)) ** 2
@@ -49,7 +49,7 @@ def test_a_nearer_neighbour_takes_the_place_of_the_least_steady():
         loose = around.copy()
         loose[7] *= 2 + 0.2 * np.sin(0.3 * t)
         points = np.concatenate([middle, loose, newcomer if t >= 60 else newcomer + 9])
-        neighbours.add(np.arange(26, dtype=np.int32), points)
+        neighbours.add(np.arange(26), points)
     assert sorted(neighbours.of(0)[0]) == sorted({*range(1, 26)} - {8})
 
 

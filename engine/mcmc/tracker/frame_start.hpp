@@ -13,7 +13,6 @@
 #include "mcmc/chain/chain_stats.hpp"
 #include "mcmc/model/partition.hpp"
 #include "solve/assignment.hpp"
-#include "solve/connected_components.hpp"
 
 namespace asterism {
 
@@ -48,9 +47,8 @@ class FrameStart {
     n_candidates = static_cast<std::int64_t>(s_.candidates.size());
     const auto n_rows = static_cast<std::int32_t>(s_.rows.size());
     const auto n_columns = static_cast<std::int32_t>(s_.row_given.size());
-    const Groups groups = connected_groups(s_.candidates, n_rows, n_columns);
     s_.match.assign(n_rows, -1);
-    for (std::size_t g = 0; g < groups.size(); ++g) s_.assignment.solve(groups[g], s_.match);
+    s_.assignment.solve_groups(s_.candidates, n_columns, s_.match);
     for (std::int32_t j = 0; j < n_columns; ++j)
       if (s_.row_given[j] >= 0) s_.match[s_.row_given[j]] = j;
     const auto& ids = p.window().frame(p.window().now()).ids;

@@ -80,10 +80,10 @@ class McmcTracker {
   // probable it is. `goes_on(share of the work that is done)` is asked now and then.
   template <typename Label>
   void finish(Label&& label, const std::function<bool(double)>& goes_on) {
-    if (n_seen_ == 0) return;
+    if (so_far_.n_seen == 0) return;
     SampledStats stats;
     sweep_.link_labels();
-    std::vector<double> sure(has_confidence() ? n_seen_ : 0, 1.0);
+    std::vector<double> sure(has_confidence() ? so_far_.n_seen : 0, 1.0);
     const auto blocks = sweep_.blocks();
     const double overlap = sweep_.overlap();
     const std::size_t n_sweeps = has_confidence() ? 2 : 1;
@@ -115,7 +115,7 @@ class McmcTracker {
       }
     stats.n_confirmed = sweep_.read_labels();
     total_.add(stats);
-    for (std::int64_t i = 0; i < n_seen_; ++i) {
+    for (std::int64_t i = 0; i < so_far_.n_seen; ++i) {
       // Of the first of a track, that the next follows it.
       const bool is_first = sweep_.before(i) < 0 && sweep_.after(i) >= 0;
       label(i, sweep_.labels()[i], has_confidence() ? sure[is_first ? sweep_.after(i) : i] : 0);
@@ -123,12 +123,10 @@ class McmcTracker {
   }
 
   // Links to begin the frames to come with, where the model allows them.
-  void start_from(std::vector<std::int64_t> labels) { start_.give({n_seen_, std::move(labels)}); }
+  void start_from(std::vector<std::int64_t> labels) { start_.give({so_far_.n_seen, std::move(labels)}); }
 
   bool has_confidence() const { return opt_.confidence > 0; }
-  std::int64_t n_frames() const { return n_frames_; }
-  std::int64_t n_seen() const { return n_seen_; }
-  double last_time() const { return last_time_; }
+  const Progress& so_far() const { return so_far_; }
   SampledStats total() const { return total_; }
   const Partition<Filter>& partition() const { return partition_; }
 
@@ -157,16 +155,14 @@ class McmcTracker {
  private:
   // Whether the labels are those of the chains over all frames so far.
   bool is_finished() const {
-    return opt_.is_whole && static_cast<std::int64_t>(sweep_.labels().size()) == n_seen_;
+    return opt_.is_whole && static_cast<std::int64_t>(sweep_.labels().size()) == so_far_.n_seen;
   }
 
   SampledStats add(double time, const MotionStep& step, std::span<const Point> points) {
     const auto arrival = Clock::now();
     Partition<Filter>& p = partition_;
-    p.add_frame(time, step, points, n_seen_);
-    n_seen_ += static_cast<std::int64_t>(points.size());
-    last_time_ = time;
-    ++n_frames_;
+    p.add_frame(time, step, points, so_far_.n_seen);
+    so_far_.add(time, points.size());
     SampledStats stats;
     start_.begin(p, doubts_, stats.chain, stats.n_candidates);
     if (opt_.is_whole) {
@@ -247,7 +243,7 @@ class McmcTracker {
     return out;
   }
   std::uint64_t seed_of(std::uint64_t phase) const {
-    return Random(Random(seed_ ^ static_cast<std::uint64_t>(n_frames_)).next() ^ phase).next();
+    return Random(Random(seed_ ^ static_cast<std::uint64_t>(so_far_.n_frames)).next() ^ phase).next();
   }
 
   // The mean over the frames since the link was made. Walks are short, and each begins at what is
@@ -363,8 +359,7 @@ class McmcTracker {
   CaptureSweep<Filter> sweep_;
   std::int64_t next_id_ = 0, n_named_ = 0;
   SampledStats total_;
-  std::int64_t n_frames_ = 0, n_seen_ = 0;
-  double last_time_ = -std::numeric_limits<double>::infinity();
+  Progress so_far_;
 };
 
 }  // namespace asterism

@@ -1,0 +1,70 @@
+// Which track has which detection of a frame: the candidates paired group by group.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "frame/marriage_market.hpp"
+#include "solve/assignment.hpp"
+#include "tracks/live_tracks.hpp"
+
+namespace asterism {
+
+struct PairingOptions {
+  Pairing pairing = Pairing::assignment;
+  // The 2010 report's own method: the points of the first frame are the tracks, every pair is a
+  // candidate, and no track begins, coasts or ends. Every frame has as many points as the first.
+  bool is_strict = false;
+  // Hospitals and residents: so many detections may marry one track, those beyond its favourite
+  // within a distance of it; they are merged by their likelihood.
+  std::int32_t capacity = 1;
+  double merged_within = 0;
+};
+
+struct FramePairing {
+  std::vector<std::int32_t> match;  // by track; -1: none
+  std::vector<Pair> extras;         // further detections of a track
+  std::vector<char> is_taken;       // by detection
+
+  void begin(std::size_t n_tracks, std::size_t n_points) {
+    match.assign(n_tracks, -1);
+    is_taken.assign(n_points, 0);
+    extras.clear();
+  }
+
+  void pair(std::span<const Candidate> candidates, std::span<const Point> points, int D,
+            const PairingOptions& options, FrameStats& stats) {
+    const Groups groups = connected_groups(candidates, static_cast<std::int32_t>(match.size()),
+                                           static_cast<std::int32_t>(points.size()));
+    const MarriageMarket market{options.pairing == Pairing::detections_propose, options.capacity,
+                                options.merged_within};
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const bool is_alone = groups[g].size() == 1 && !options.is_strict;
+      if (is_alone || options.pairing == Pairing::assignment)
+        assignment_.solve(groups[g], match);
+      else
+        market.marry(groups[g], points, D, match, extras);
+    }
+    count(groups, stats);
+    take(candidates);
+  }
+
+  static void count(const Groups& groups, FrameStats& stats) {
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
+    stats.n_groups += static_cast<std::int64_t>(groups.size());
+  }
+  // What is matched is taken.
+  void take(std::span<const Candidate> candidates) {
+    for (const Candidate& c : candidates)
+      if (match[c.row] == c.column) is_taken[c.column] = 1;
+    for (const auto& [row, column] : extras) is_taken[column] = 1;
+  }
+
+ private:
+  Assignment assignment_;
+};
+
+}  // namespace asterism
