@@ -135,10 +135,10 @@ def test_people_jump_as_high_as_people_do(seed):
     assert (np.diff((top > root[0] + 0.15).astype(int)) == 1).sum() == 3
 
 
-@pytest.mark.parametrize(("activity", "fastest"), [("walk", 6.5), ("run", 9), ("jump", 11)])
+@pytest.mark.parametrize(("activity", "limit"), [("walk", 6.5), ("run", 9), ("jump", 11)])
 @pytest.mark.parametrize("seed", range(4))
-def test_nobody_is_faster_than_people_are(activity, fastest, seed):
-    assert fastest(person(activity=activity, frames=400, seed=seed), 100.0, 1) < fastest
+def test_nobody_is_faster_than_people_are(activity, limit, seed):
+    assert fastest(person(activity=activity, frames=400, seed=seed), 100.0, 1) < limit
 
 
 @pytest.mark.parametrize("seed", range(2))
