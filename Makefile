@@ -62,6 +62,7 @@ tables: $(VENV)/.bench
 # beside the package, never installed: all its files as one, which takes less time, and where a type
 # or function that two files define differently is an error.
 sanitize: sanitized $(VENV)/.test
+	build/sanitize/engine_checks
 	$(BIN)/python tests/tools/run_sanitized.py build/sanitize
 
 sanitized: $(VENV)/.python

@@ -265,11 +265,10 @@ def test_help_and_version(capsys):
 
 def test_examples_in_the_help_are_indented(capsys):
     # The help's margin is that of its second paragraph on: with nothing but examples there, theirs.
-    from typer.main import get_command
 
-    from asterism.cli.program import app
+    from asterism.cli.program import command as program
 
-    for command in get_command(app).commands:
+    for command in program.commands:
         lines = run(f"{command} --help", capsys).splitlines()
         examples = [line for line in lines if line.strip().startswith(f"asterism {command} ")]
         indented = [line for line in examples if line.startswith("     asterism")]

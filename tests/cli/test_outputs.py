@@ -8,11 +8,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-import typer
 
 import asterism as am
 from asterism.cli import main
-from asterism.cli.program import app
+from asterism.cli.program import command as program
 
 # Each file that a command can write, by a line with the file as OUT; in brackets its ending.
 FILES = {
@@ -218,7 +217,7 @@ def test_every_command_that_writes_is_in_these_tables():
     tested = {line.split(" -")[0] for line in [*FILES, *FOLDERS]} | {"track", "film"}
     tested = {name.removesuffix(" a scene") for name in tested}
     found = set()
-    for name, command in _commands(typer.main.get_command(app)):
+    for name, command in _commands(program):
         names = {p.name for p in command.params}
         writes = names & {"out", "save", "by_frame", "run", "report"}
         assert ("overwrite" in names) == bool(writes), name

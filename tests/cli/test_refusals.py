@@ -129,11 +129,10 @@ def test_only_mcmcda_starts_from_tracks(scene, capsys, monkeypatch):
 
 def test_the_common_options_are_everywhere():
     # A command without --quiet or --json stops the script that passes them to all commands alike.
-    from typer.main import get_command
 
-    from asterism.cli.program import app
+    from asterism.cli.program import command as program
 
-    commands = dict(get_command(app).commands)
+    commands = dict(program.commands)
     commands |= {f"camera {name}": c for name, c in commands.pop("camera").commands.items()}
     lists = {"methods", "scenes"}
     assert lists < commands.keys()

@@ -1,4 +1,4 @@
-// Parts of the engine that Python does not reach by themselves; see test_checks.py.
+// Parts of the engine that Python does not reach by themselves, checked under the sanitizers.
 #include <cstdio>
 #include <cstdlib>
 #include <cmath>

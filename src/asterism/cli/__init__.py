@@ -28,9 +28,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from asterism.cli.exit_codes import exit_code
 
     def run() -> None:
-        from asterism.cli.program import app
-        from asterism.cli.usage import run_app
+        from asterism.cli.program import command
+        from asterism.cli.usage import run_command
 
-        run_app(app, None if arguments is None else list(arguments))
+        run_command(command, None if arguments is None else list(arguments))
 
     return exit_code(run)

@@ -29,7 +29,7 @@ from asterism.cli.commands.track import track
 from asterism.cli.commands.view import view
 from asterism.cli.options import with_option_names
 
-__all__ = ["app"]
+__all__ = ["command"]
 
 app = typer.Typer(
     name="asterism",
@@ -68,3 +68,5 @@ for _title, _commands in _TITLES.items():
     for _command in _commands:
         app.command(rich_help_panel=_title)(with_option_names(_command))
 app.add_typer(camera, rich_help_panel="Cameras")
+command = typer.main.get_command(app)
+"""The whole command line, built once a process."""

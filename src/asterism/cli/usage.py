@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 from asterism.checks import check_fields
 from asterism.errors import ParameterError
 
-if TYPE_CHECKING:
-    from typer import Typer
-
-__all__ = ["run_app"]
+__all__ = ["run_command"]
 
 # The parser's errors have no public name of their own in Typer: the base of one that has.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 _KINDS = {"int_parsing": "a whole number", "float_parsing": "a number"}
 
 
-def run_app(app: Typer, arguments: list[str] | None) -> None:
+def run_command(command: Any, arguments: list[str] | None) -> None:
     """Run the command line.
 
     Parameters
     ----------
-    app : Typer
-        The commands.
+    command : click command
+        Of the whole command line.
     arguments : list of str or None
         What follows the name of the program; those of the process unless given.
 
@@ -38,7 +35,7 @@ def run_app(app: Typer, arguments: list[str] | None) -> None:
         Where a command ends with a code of its own.
     """
     try:
-        code = app(args=arguments, prog_name="asterism", standalone_mode=False)
+        code = command(args=arguments, prog_name="asterism", standalone_mode=False)
     except _UsageError as error:
         message = str(getattr(error, "message", error))
         if type(error).__name__ == "NoArgsIsHelpError":  # which has printed the help

@@ -218,7 +218,7 @@ def test_two_cameras_of_one_name(tmp_path):
         (("version = 1", "version = 2"), "version", "1"),
         (("asterism-rig", "asterism-wig"), "format", "asterism-rig"),
         (('kind = "brown-conrady"', 'kind = "fisheye"'), "kind", "one of brown-conrady"),
-        (('kind = "brown-conrady"', 'kind = [1]'), "kind", "one of brown-conrady"),
+        (('kind = "brown-conrady"', "kind = [1]"), "kind", "one of brown-conrady"),
         (("k1 = ", "k9 = "), "lens, entry", "one of k1"),
         (("k1 = ", "k1 = 'a' #"), "lens, k1", "numbers"),
         (("near = 0.0", "near = -1.0"), "near", "≥ 0"),
