@@ -44,6 +44,7 @@ LEFT_OUT = (
     "best_of_all_choices or too_many_rivals or used_twice or eight_cameras or harm[1e-310 or "
     "clusters_apart or share_of_the_posterior or no_worse or window_s_best or "
     "identities_where_markers_hide or value_that_is_told or guessed_soon or "
+    "as_good_as_the_whole or endless_run or calibrated_where or interrupted or "
     "too_long_to_be_read or blurred_helps or chains_disagree or model_from_the_clip or "
     "wrong_links or deadline_stops or keep_their_distances or no_harm_where or "
     "of_a_person_come_back or carrying_ends or settled_tracks or hand[0.004 or "
