@@ -295,6 +295,13 @@ def test_quiet_prints_nothing_and_json_an_object(scene, capsys, line):
     assert isinstance(json.loads(run(f"{again} --json", capsys)), dict)
 
 
+@pytest.mark.parametrize("line", ["methods", "scenes", "info scene.csv", "track in.csv -o a.csv"])
+def test_no_line_ends_in_blanks(scene, capsys, line):
+    lines = run(line, capsys).splitlines()
+    assert len(lines) > 5
+    assert not [text for text in lines if text != text.rstrip()]
+
+
 def test_demo(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     # Shorter than what people see, and drawn for one method: what is written is the same.

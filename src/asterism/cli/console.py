@@ -66,7 +66,11 @@ def print_table(
     screen = console()
     if title:
         screen.print(Text(title, style="bold"))
-    screen.print(table)
+    with screen.capture() as printed:
+        screen.print(table)
+    # The last column is as wide as its longest cell; a file needs no blanks that fill it.
+    lines = (line.rstrip() for line in printed.get().splitlines())
+    screen.out("\n".join(lines), highlight=False)
 
 
 def to_json(value: Mapping[str, Any]) -> str:
