@@ -311,6 +311,8 @@ def test_demo(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(demo, "_N_FRAMES", 60)
     monkeypatch.setattr(demo, "_draw", lambda *a: a[2].name == "gnn" and draw(*a))
     text = run("demo -o one", capsys)
+    first = text[text.index("Scores") :].splitlines()[2]
+    assert first.split()[0] == "auto"
     assert "one/summary.md" in text
     run("demo -o two -q", capsys)
     names = sorted(str(p.relative_to(tmp_path / "one")) for p in (tmp_path / "one").rglob("*.*"))
