@@ -1,4 +1,5 @@
-// Independent tasks on several threads. What a task does may not depend on who does it, or when.
+// Runs independent tasks on several threads. The result of a task must not depend on the thread
+// that runs it or on the order.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +13,8 @@
 
 namespace asterism {
 
-// Calls task(worker, k) for every k below n; workers are numbered from 0. Tasks that throw keep the
-// others from being begun; the exception of the first of them, by k, is thrown again here.
+// Calls task(worker, k) for every k below n; workers are numbered from 0. After a task throws, no
+// further task starts. The exception of the failed task with the smallest k is thrown again here.
 template <typename Task>
 void in_parallel(std::int64_t n, std::int32_t n_threads, Task&& task) {
   const auto n_workers = static_cast<std::int32_t>(std::min<std::int64_t>(n, n_threads));
@@ -38,11 +39,11 @@ void in_parallel(std::int64_t n, std::int32_t n_threads, Task&& task) {
     }
   };
   {
-    std::vector<std::jthread> others;  // joined at the end of the block, whatever happens
+    std::vector<std::jthread> others;  // joined at the end of the block, also on an exception
     try {
       for (std::int32_t worker = 1; worker < n_workers; ++worker) others.emplace_back(work, worker);
     } catch (const std::system_error&) {
-      // The system has no more threads: the work is done by those that there are.
+      // The system has no more threads, so the threads already started do the work.
     }
     work(0);
   }

@@ -1,4 +1,5 @@
-// Working memory that is kept from step to step: whoever is copied, the copy begins with none.
+// Working memory that an object keeps between steps. Copying the object does not copy the memory,
+// which is then empty in the copy.
 #pragma once
 
 namespace asterism {

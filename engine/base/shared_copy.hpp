@@ -1,4 +1,4 @@
-// A value that its copies share until one of them changes it.
+// A copy-on-write value: copies share it until one of them changes it.
 #pragma once
 
 #include <atomic>
@@ -15,10 +15,10 @@ class SharedCopy {
 
   bool has_value() const { return value_ != nullptr; }
   const Value* operator->() const { return value_.get(); }
-  // To be changed: from here on this copy's own.
+  // Returns a reference that may be written. A shared value is cloned first.
   Value& own() {
     if (value_.use_count() > 1) value_ = std::make_shared<Value>(std::as_const(*value_));
-    // Whoever gave it up last has read it to the end.
+    // Orders the reads of the copy that last released the value before the writes of this one.
     std::atomic_thread_fence(std::memory_order_acquire);
     return *value_;
   }

@@ -1,4 +1,4 @@
-// Which of many points lie in a ball: a uniform grid over the points of one frame.
+// Finds the points of one frame that lie within a ball, by a uniform grid.
 #pragma once
 
 #include <algorithm>
@@ -15,10 +15,11 @@ namespace asterism {
 
 class PointGrid {
  public:
-  // Below so many points a plain scan is faster than any grid.
+  // With fewer points, a linear scan is faster than a grid.
   static constexpr std::size_t kScanBelow = 64;
 
-  // `cell` is the wished edge of a cell; cells are never more than a few for each point.
+  // `cell` is the requested edge of a cell. The edge is enlarged if there would be more than a few
+  // cells for each point.
   void build(std::span<const Point> points, int D, double cell) {
     points_ = points;
     D_ = D;
@@ -42,7 +43,7 @@ class PointGrid {
       inverse_[d] = 0;
       if (d >= D || !(high[d] > low_[d])) continue;
       const double fitting = (high[d] - low_[d]) / (2 * per_axis);
-      const double edge = cell > fitting ? cell : fitting;  // also where `cell` is not a number
+      const double edge = cell > fitting ? cell : fitting;  // also if `cell` is NaN
       if (!std::isfinite(edge) || !std::isfinite(1 / edge)) continue;
       inverse_[d] = 1 / edge;
       size_[d] = static_cast<std::int64_t>((high[d] - low_[d]) * inverse_[d]) + 1;
@@ -61,11 +62,11 @@ class PointGrid {
       order_[fill_[cell_of_[i]]++] = static_cast<std::int32_t>(i);
   }
 
-  // The most noise that a point has beyond the sensor's.
+  // The largest measurement variance of a point in addition to that of the sensor.
   double r_most() const { return r_most_; }
 
-  // Calls visit(index, squared distance) for every point within `radius` of `center`, each once,
-  // in an order that depends on the points alone.
+  // Calls visit(index, squared distance) once for every point within `radius` of `center`. The
+  // order depends on the points alone.
   template <typename Visit>
   void within(const Point& center, double radius, Visit&& visit) const {
     const double radius2 = radius * radius;
@@ -83,7 +84,7 @@ class PointGrid {
     }
     for (std::int64_t a = from[0]; a <= to[0]; ++a)
       for (std::int64_t b = from[1]; b <= to[1]; ++b) {
-        // Cells along the last axis lie side by side.
+        // Cells along the last axis are contiguous in memory.
         const std::int64_t row = (a * size_[1] + b) * size_[2];
         for (std::int32_t k = starts_[row + from[2]]; k < starts_[row + to[2] + 1]; ++k) {
           const std::int32_t i = order_[k];
@@ -96,7 +97,7 @@ class PointGrid {
  private:
   std::int64_t axis_cell(double x, int d) const {
     const double c = (x - low_[d]) * inverse_[d];
-    if (!(c > 0)) return 0;  // also where c is not a number
+    if (!(c > 0)) return 0;  // also if c is NaN
     return static_cast<std::int64_t>(std::min(c, static_cast<double>(size_[d] - 1)));
   }
   std::int64_t cell_index(const Point& p) const {

@@ -1,4 +1,4 @@
-// Mixing, predicting and updating several motions: compiled once, for all that call them.
+// Mixing, prediction and update of the interacting-multiple-model filter. They are compiled once.
 #include "filter/imm.hpp"
 
 #include <algorithm>
@@ -35,11 +35,11 @@ MotionState begin_state(const MotionModel& m, const Point& y) {
 
 namespace {
 
-// How far the modes of a state lie from the first: a mixture's spread needs no more of them.
+// Deviations of the modes of a state from mode 0, from which the spread of a mixture follows.
 //
-//   e_a  mean of mode a less that of mode 0       E_a  e_a e_aᵀ, averaged over the axes
+//   e_a  mean of mode a minus that of mode 0       E_a  e_a e_aᵀ, averaged over the axes
 //
-// The axes share one covariance, so what their means differ by is shared out evenly.
+// The axes share one covariance, so the spread of the means is averaged over the axes.
 
 // Mean over the axes of e eᵀ.
 template <int n>
@@ -121,7 +121,7 @@ Prediction::Prediction(const MotionModel& m, const MotionState& s) : M(m.M), D(m
     S[b] = innovation_variance(m.axis, s.mode[b]);
     log_peak[b] = log_density(D, S[b], 0) + (M > 1 ? std::log(w[b]) : 0.0);
     if (std::isfinite(log_peak[b])) continue;
-    // Numbers too large or small for the filter: this mode expects nothing, anywhere.
+    // The filter has over- or underflowed. The density of this mode is set to zero everywhere.
     log_peak[b] = -std::numeric_limits<double>::infinity();
     S[b] = 1;
     y[b] = {};
@@ -146,13 +146,13 @@ double Prediction::log_likelihood(const Point& point, std::array<double, kMaxMod
 }
 
 double Prediction::radius(double gate, double least, double r_most) const {
-  // One mode may have it in its gate and another make it likely.
+  // A point may lie in the gate of one mode while another mode gives it its likelihood.
   double gated = -1, likely = -1;
   for (int b = 0; b < M; ++b) {
     const double offset = std::sqrt(squared_distance(y[b], center, D));
     const auto reach = [&](double chi2) { return offset + std::sqrt(chi2 * (S[b] + r_most)); };
     gated = std::max(gated, reach(gate));
-    // Of M summands the largest is at least the sum over M.
+    // The largest of M summands is at least their sum divided by M.
     const double worth = 2 * (log_peak[b] + std::log(static_cast<double>(M)) - least);
     if (worth > 0) likely = std::max(likely, reach(worth));
   }

@@ -1,11 +1,11 @@
-// Several motion models at once: an interacting-multiple-model filter (Blom & Bar-Shalom 1988).
+// Interacting-multiple-model filter (Blom & Bar-Shalom 1988).
 //
-// A marker rests, walks and is thrown; one process noise fits none of these. Each mode keeps its
-// own Kalman state; before a prediction the modes are mixed by how likely each leads to which, and
-// a detection is weighed against the mixture of their predictions. With one mode this is the plain
-// Kalman filter, to the last bit.
+// A marker rests, walks and is thrown, and no single process noise fits all of these. Each mode has
+// its own Kalman state. Before a prediction, the filter mixes the states by the transition
+// probabilities. The likelihood of a detection is that of the mixture of the predictions. With one
+// mode this is the plain Kalman filter, to the last bit.
 //
-//   w_m  probability of mode m      T_lm  probability of going from mode l to m in a step
+//   w_m  probability of mode m      T_lm  probability of a transition from mode l to m in one step
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ struct MotionModel {
   AxisModel axis;
   int M = 1;
   std::array<double, kMaxModes * kMaxModes> T{1.0};  // row stride M
-  std::array<double, kMaxModes> w0{1.0};             // of a new track: the stationary ones
+  std::array<double, kMaxModes> w0{1.0};             // of a new track: the stationary probabilities
 };
 
 struct MotionStep {
@@ -32,11 +32,11 @@ struct MotionState {
   std::array<double, kMaxModes> w{};
 };
 
-// Stationary mode probabilities, by squaring T. Its rows are brought back to sum 1 each time, as
-// squaring doubles what rounding has added.
+// Stationary mode probabilities, by repeated squaring of T. The rows are normalised each time,
+// because squaring doubles the rounding error of their sums.
 std::array<double, kMaxModes> stationary(std::array<double, kMaxModes * kMaxModes> T, int M);
 
-// Every mode begins alike.
+// All modes start in the same state.
 MotionState begin_state(const MotionModel& m, const Point& y);
 
 // Mean and covariance of the mixture of the modes.
@@ -44,7 +44,7 @@ AxisState collapse(const MotionModel& m, const MotionState& s);
 
 void predict(const MotionModel& m, const MotionStep& step, MotionState& s);
 
-// What a prediction says of the next detection: a Gaussian for each mode.
+// The predicted distribution of the next detection: one Gaussian for each mode.
 struct Prediction {
   Point center{};  // ŷ of the mixture
   std::array<Point, kMaxModes> y{};
@@ -54,12 +54,12 @@ struct Prediction {
   Prediction() = default;
   Prediction(const MotionModel& m, const MotionState& s);
 
-  // Fills the log of w_m N(y; ŷ_m, S_m) of every mode; returns the log of their sum.
+  // Writes log(w_m N(y; ŷ_m, S_m)) of every mode to `each` and returns the log of their sum.
   double log_likelihood(const Point& point, std::array<double, kMaxModes>& each) const;
 
-  // A ball about `center` that holds every point whose χ² is at most `gate` in some mode and whose
-  // log likelihood may exceed `least`: its radius, negative where there is none. Points may have noise
-  // of their own up to `r_most`.
+  // Radius of a ball about `center` that contains two kinds of points at once: those whose χ² is at
+  // most `gate` in some mode, and those whose log likelihood can exceed `least`. It is negative if
+  // there are none. Points may have additional measurement variance up to `r_most`.
   double radius(double gate, double least, double r_most) const;
 
   bool is_gated(const Point& point, double gate) const {
@@ -69,7 +69,8 @@ struct Prediction {
   }
 };
 
-// Takes a detection; `p` is the prediction from this very state. Returns log p(y | past).
+// Updates the state with a detection. `p` must be the prediction from this state. Returns log p(y |
+// past).
 double update(const MotionModel& m, const Prediction& p, const Point& y, MotionState& s);
 
 }  // namespace asterism

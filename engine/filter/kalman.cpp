@@ -1,4 +1,4 @@
-// The steps of the filter that are long: compiled once, for all that call them.
+// The longer steps of the Kalman filter, compiled once.
 #include "filter/kalman.hpp"
 
 #include <algorithm>

@@ -1,16 +1,17 @@
-// One Kalman filter for a point whose axes share their covariance.
+// Kalman filter of a point whose axes share one covariance.
 //
-// Loops over axes run over all that there may be, where those beyond D are zeros: the compiler then
-// knows how many there are.
+// With isotropic noise the D axes of a point are independent and have the same covariance, which
+// depends only on the frames of the detections. A track therefore needs one n × n matrix and D
+// means of n states.
 //
-// With isotropic noise the D axes of a point do not mix and have the same covariance, which depends
-// on the pattern of detections alone. So a track needs one n × n matrix and D means of n states.
+// Loops over axes always run to kMaxAxes, with zeros beyond D, so that the compiler knows their
+// length.
 //
 //   x  state of one axis (n)         F  transition over a step (n × n, row-major)
 //   P  covariance of one axis        Q  process noise over a step
-//   H  observation (n)               r  variance of a measured coordinate, σ²; a point may bring
-//                                       more of its own, y.r
-//   S  innovation variance = H P Hᵀ + r, the same on every axis; S + y.r of a point
+//   H  observation (n)               r  variance of a measured coordinate, σ²; a point may add
+//                                       its own variance y.r
+//   S  innovation variance = H P Hᵀ + r, the same on every axis; S + y.r for such a point
 #pragma once
 
 #include <algorithm>
@@ -45,7 +46,7 @@ struct AxisState {
   AxisMatrix P{};
 };
 
-// Calls f with the number of states as a constant, so that its loops unroll.
+// Calls f with the number of states as a compile-time constant, so that its loops unroll.
 template <typename F>
 decltype(auto) with_states(int n, F&& f) {
   assert(n >= 1 && n <= kMaxStates);
@@ -54,7 +55,7 @@ decltype(auto) with_states(int n, F&& f) {
   return f(std::integral_constant<int, 3>{});
 }
 
-// The state after a track's first detection: at the point, at rest, as uncertain as P0 says.
+// The state after the first detection of a track: at that point, at rest, with covariance P0.
 inline AxisState begin_state(const AxisModel& m, const Point& y) {
   AxisState s;
   double hh = 0;
@@ -67,7 +68,7 @@ inline AxisState begin_state(const AxisModel& m, const Point& y) {
   return s;
 }
 
-// The mean alone; `out` may be `s`.
+// Predicts the mean alone. `out` may be `s`.
 inline void predict_mean(const AxisModel& m, const AxisStep& step, const AxisState& s,
                          AxisState& out) {
   with_states(m.n, [&](auto n_states) {
@@ -108,16 +109,17 @@ inline double log_density(int D, double S, double distance2) {
   return -0.5 * (D * std::log(2 * std::numbers::pi * S) + distance2 / S);
 }
 
-// What a detection does to a state: the mean moves by K times the innovation, the covariance becomes
-// P wherever the detection is. Joseph form: P stays symmetric and positive over runs of any length.
+// The effect of a detection on a state: the mean moves by K times the innovation, and the
+// covariance becomes P, which does not depend on the position of the detection. The Joseph form
+// keeps P symmetric and positive definite over sequences of any length.
 struct KalmanGain {
   AxisVector K{};
   AxisMatrix P{};
   double S = 0;
 
-  // What is left of K for a point with noise of its own: the whole for one without.
+  // The factor of the gain for a point with its own variance: S / (S + y.r), which is 1 without.
   double share(const Point& y) const { return y.r == 0 ? 1 : S / (S + y.r); }
-  // P for such a point, P + K Kᵀ S (1 - share).
+  // The covariance after such a point: P + K Kᵀ S (1 - share).
   AxisMatrix covariance(int n, double share) const {
     AxisMatrix out = P;
     if (share < 1)
@@ -132,9 +134,10 @@ struct KalmanGain {
 
 void update(const AxisModel& m, const Point& y, AxisState& s);
 
-// Rauch–Tung–Striebel: carry what the future knows (next, smoothed) back to a filtered state.
-// `predicted` is what `filtered` led to: mean F x, covariance F P Fᵀ + Q. Solves P' Cᵀ = F P by
-// Cholesky with a floor, so that a singular Q does no harm.
+// Rauch–Tung–Striebel step: combines a filtered state with the smoothed state of the next frame.
+// `predicted` is the prediction from `filtered`: mean F x, covariance F P Fᵀ + Q. The smoother gain
+// solves P' Cᵀ = F P by a Cholesky factorisation with a floor on the pivots, which tolerates a
+// singular Q.
 AxisState smooth_back(const AxisModel& m, const AxisMatrix& F, const AxisState& filtered,
                              const AxisState& predicted, const AxisState& next);
 

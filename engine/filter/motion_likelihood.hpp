@@ -1,10 +1,10 @@
-// The likelihood of tracks under motions that differ in the size of their process noise alone, for
-// fits that evaluate it hundreds of times. The same interacting-multiple-model filter as in imm.hpp,
-// written for two states an axis and several tracks abreast.
+// Likelihood of tracks for motion models that differ only in the size of their process noise.
+// Parameter fits evaluate it hundreds of times. The filter is that of imm.hpp, specialised to two
+// states per axis and vectorised over tracks.
 //
-//   x, v    position and velocity of a mode       p = [p00 p01; p01 p11] its covariance, of every axis
+//   x, v    position and velocity of a mode       p = [p00 p01; p01 p11] covariance on each axis
 //   w       probability of a mode                 q    process noise of a step at level 1
-//   S       innovation variance p00 + r           T    probabilities of changing between modes
+//   S       innovation variance p00 + r           T    transition probabilities of the modes
 #pragma once
 
 #include <algorithm>
@@ -22,15 +22,15 @@
 
 namespace asterism {
 
-// As many tracks are filtered abreast as every 64-bit processor's vectors hold numbers: each line
-// becomes one instruction.
+// Number of tracks filtered in parallel. Two doubles fit in a vector register of every 64-bit
+// processor.
 inline constexpr int kLanes = 2;
 
 struct Lanes {
   std::array<double, kLanes> at{};
 
   Lanes() = default;
-  Lanes(double value) { at.fill(value); }  // a number stands for one in every lane
+  Lanes(double value) { at.fill(value); }  // broadcasts a number to all lanes
 
   friend Lanes operator+(Lanes a, const Lanes& b) {
     for (int i = 0; i < kLanes; ++i) a.at[i] += b.at[i];
@@ -50,10 +50,10 @@ struct Lanes {
   }
 };
 
-// e to the power of x ≤ 0 to 2e-16 of it, in instructions that the compiler can do abreast, which it
-// cannot with std::exp: 2^k times the Taylor series of the rest, which is at most ½ log 2.
+// exp(x) for x ≤ 0, to a relative accuracy of 2e-16. Unlike std::exp, the compiler can vectorise
+// it: it is 2^k times the Taylor series of the remainder, which is at most ½ log 2.
 inline Lanes exp_of_negative(const Lanes& x) {
-  constexpr double kRound = 6755399441055744.0;  // 1.5 · 2^52: adding it rounds to a whole number
+  constexpr double kRound = 6755399441055744.0;  // 1.5 · 2^52: adding it rounds to an integer
   constexpr double kLn2High = 0x1.62e42fefap-1, kLn2Low = 0x1.cf79abc9e3b39803p-40;
   Lanes result;
   for (int i = 0; i < kLanes; ++i) {
@@ -72,14 +72,14 @@ inline Lanes exp_of_negative(const Lanes& x) {
 }
 
 // The step between two frames at level 1: F = [1 dt; 0 1] and its process noise. A random walk has
-// dt = 0 and no noise of the velocity.
+// dt = 0 and no velocity noise.
 struct UnitStep {
   double dt = 0, q00 = 0, q01 = 0, q11 = 0;
 };
 
 struct LeveledMotion {
   int M = 1;
-  std::array<double, kMaxModes> squares{};  // of the levels
+  std::array<double, kMaxModes> squares{};  // squared levels
   std::array<double, kMaxModes * kMaxModes> T{1.0};  // row stride M
   std::array<double, kMaxModes> w0{1.0};
   double r = 0;                  // variance of a measured coordinate
@@ -88,7 +88,8 @@ struct LeveledMotion {
 
 class MotionLikelihood {
  public:
-  // The points and frames of tracks, one track after the other, and the kind of step that leads to each frame.
+  // The points and frames of all tracks, one track after the other. `kind[t]` is the index in
+  // `steps` of the step that leads to frame t.
   MotionLikelihood(int D, std::span<const Point> points, std::span<const std::int64_t> frames,
                    std::span<const std::int64_t> offsets, std::span<const std::int32_t> kind,
                    std::vector<UnitStep> steps)
@@ -98,7 +99,7 @@ class MotionLikelihood {
     };
     std::vector<std::int64_t> order(offsets.size() - 1);
     std::iota(order.begin(), order.end(), 0);
-    // Tracks of one length go abreast, so that few lanes wait for others.
+    // Tracks of similar length share a group, so that few lanes are idle.
     std::ranges::stable_sort(order, std::greater<>(), length);
     for (std::size_t begin = 0; begin < order.size() && length(order[begin]) > 0; begin += kLanes) {
       const std::size_t end = std::min(order.size(), begin + kLanes);
@@ -111,7 +112,8 @@ class MotionLikelihood {
     }
   }
 
-  // The sum of the log densities of all detections given the earlier ones of their track.
+  // Returns the sum of the log densities of all detections, each given the earlier detections of
+  // its track.
   double sum(const LeveledMotion& m) const {
     double total = 0;
     for (const Group& group : groups_)
@@ -169,12 +171,13 @@ class MotionLikelihood {
     return std::accumulate(total.at.begin(), total.at.end(), 0.0);
   }
 
-  // Each mode begins a step with the mixture of those that may lead to it. Means and covariances are
-  // summed relative to the first mode, so that little is lost where the modes lie close.
+  // Replaces the state of each mode by the mixture of the modes that can lead to it. Means and
+  // covariances are summed relative to the first mode, which limits cancellation between similar
+  // modes.
   template <int M>
   void mix(const LeveledMotion& m, Modes<M>& s) const {
     const Modes<M> before = s;
-    Modes<M> e;  // of each mode less the first; covariances with the spread of the means
+    Modes<M> e;  // of each mode minus the first; covariances include the spread of the means
     const Lanes axes = 1.0 / D_;
     const auto spread = [&](const auto& x, const auto& v, Lanes& xx, Lanes& xv, Lanes& vv) {
       xx = xv = vv = 0.0;
@@ -247,11 +250,12 @@ class MotionLikelihood {
     }
   }
 
-  // Takes the detections of a step; returns their log densities, 0 in lanes without one.
+  // Updates the state with the detections of a step. Returns their log densities, 0 in lanes
+  // without a detection.
   template <int M>
   Lanes update(const LeveledMotion& m, const Observation& o, Modes<M>& s) const {
     const Lanes r = Lanes(m.r) + o.r;
-    std::array<Lanes, M> S, inverse, half;  // half a NIS
+    std::array<Lanes, M> S, inverse, half;  // half the NIS
     std::array<std::array<Lanes, kMaxAxes>, M> innovation;
     for (int b = 0; b < M; ++b) {
       S[b] = s.p00[b] + r;

@@ -1,4 +1,5 @@
-// How far a detection is from what was expected of it, as a value of χ².
+// Normalised innovation squared (NIS): the distance of a detection from its prediction as a χ²
+// value.
 #pragma once
 
 #include <algorithm>
@@ -9,14 +10,15 @@
 
 namespace asterism {
 
-// P[χ²_D > x], D 2 or 3.
+// P[χ²_D > x] for D = 2 or 3.
 inline double chi2_tail(int D, double x) {
   const double tail = std::exp(-x / 2);
   return D == 2 ? tail
                 : std::erfc(std::sqrt(x / 2)) + std::sqrt(2 * x / std::numbers::pi) * tail;
 }
 
-// ν ᵀ S⁻¹ ν; of a mixture, the χ² value that is as seldom exceeded as this point's distance.
+// νᵀ S⁻¹ ν with one mode. For a mixture, the χ² value that has the same tail probability as the
+// mixture has beyond this point.
 inline double surprise(const Prediction& p, const Point& y) {
   if (p.M == 1) return squared_distance(y, p.y[0], p.D) / (p.S[0] + y.r);
   double beyond = 0;
@@ -24,7 +26,8 @@ inline double surprise(const Prediction& p, const Point& y) {
     beyond += p.w[b] * chi2_tail(p.D, squared_distance(y, p.y[b], p.D) / (p.S[b] + y.r));
   beyond = std::clamp(beyond, 1e-300, 1.0);
   if (p.D == 2) return -2 * std::log(beyond);
-  // Newton on the log of the tail, from above, where it is concave.
+  // Newton's method on the log of the tail probability. It starts from above, where the function is
+  // concave.
   double x = 3 - 2 * std::log(beyond) + 2 * std::log1p(-2 * std::log(beyond));
   for (int k = 0; k < 60; ++k) {
     const double tail = chi2_tail(3, x);

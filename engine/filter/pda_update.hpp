@@ -1,13 +1,14 @@
-// Probabilistic data association: a state updated by several detections at once, each with the
-// probability that it is the track's, and brought back to one Gaussian (Bar-Shalom & Tse 1975).
+// Probabilistic data association: updates a state with several detections at once, weighted by
+// their association probabilities, and approximates the mixture by one Gaussian (Bar-Shalom & Tse
+// 1975).
 //
-//   u_j, u_0  probability of detection j and of none, which sum to 1      ν_j = y_j - ŷ
-//   a_j       what is left of the gain for a detection with noise of its own, else 1
+//   u_j, u_0  association probability of detection j and of a miss; they sum to 1     ν_j = y_j - ŷ
+//   a_j       factor of the gain for a detection with its own variance, else 1
 //   x = x̂ + K Σ u_j a_j ν_j
 //   P = u_0 P̂ + (1 - u_0) P⁺ + K Kᵀ ((Σ u_j |a_j ν_j|² - |Σ u_j a_j ν_j|²) / D + S Σ u_j (1 - a_j))
 //
-// The axes share one covariance, so the spread of the innovations is shared out evenly among them.
-// Each mode of the motion takes its own share of every detection.
+// The axes share one covariance, so the spread of the innovations is averaged over them. Each mode
+// of the motion model has its own association probabilities.
 #pragma once
 
 #include <cmath>
@@ -46,7 +47,7 @@ inline void update_axis(const AxisModel& m, std::span<const WeightedPoint> point
     }
 }
 
-// `p` is the prediction from this very state.
+// `p` must be the prediction from this state.
 inline void update_by_all(const MotionModel& m, const Prediction& p,
                           std::span<const WeightedPoint> points, double missed, MotionState& s) {
   std::vector<WeightedPoint> own(points.begin(), points.end());
@@ -59,7 +60,7 @@ inline void update_by_all(const MotionModel& m, const Prediction& p,
     double w = own_missed;
     for (std::size_t j = 0; j < points.size(); ++j)
       w += own[j].weight = points[j].weight * std::exp(each[j][b] - total[j]);
-    // A mode that none of this speaks for keeps its prediction.
+    // A mode whose weight vanishes keeps its prediction.
     if (w > 1e-300) {
       for (WeightedPoint& point : own) point.weight /= w;
       update_axis(m.axis, own, own_missed / w, s.mode[b]);

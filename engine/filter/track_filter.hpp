@@ -1,7 +1,8 @@
-// Kalman filter, smoother and score of whole tracks, one after the other.
+// Kalman filter, smoother and score s(τ) of whole tracks.
 //
-// A track is a rising sequence of frames with one point each. Frames in which it was not seen are
-// propagated one by one with their true spacing: white noise per step does not compose.
+// A track is an increasing sequence of frames with one point each. The filter steps through missed
+// frames one by one with their true time step, because the process noise of several steps is not
+// that of one long step.
 #pragma once
 
 #include <cmath>
@@ -14,7 +15,7 @@
 
 namespace asterism {
 
-// Steps by frame: step(t) leads from frame t - 1 to frame t.
+// The steps of a capture: step(t) leads from frame t - 1 to frame t.
 struct Timeline {
   std::span<const double> times;       // (T)
   std::span<const std::int32_t> kind;  // (T) index into steps; kind[0] is not used
@@ -23,21 +24,21 @@ struct Timeline {
   const MotionStep& step(std::int64_t t) const { return steps[kind[t]]; }
 };
 
-// Everything that s(τ) needs besides the filter; logs of the model's parameters.
+// The parameters of s(τ) apart from those of the filter, as logarithms.
 //
-// Whether a marker is seen depends on whether it was in the frame before (Gilbert 1960): P_d where it
-// was, P_r where it was missed. Where P_r = P_d, misses are independent.
+// The detection probability depends on the frame before (Gilbert 1960): P_d after a detection, P_r
+// after a missed detection. If P_r = P_d, missed detections are independent.
 struct ScoreModel {
   double log_birth = 0, log_clutter = 0, log_survive = 0;
   double p_disappear = 0, p_detection = 0, p_redetection = 0;
   double max_speed = 0, speed_margin = 0;
   int max_gap = 1;
-  bool last_termination = false;  // the report's: dead right after the last detection
+  bool last_termination = false;  // as in the report: the track ends right after its last detection
   double log_detect = std::log(p_detection), log_miss = std::log1p(-p_detection);
   double log_redetect = std::log(p_redetection), log_remiss = std::log1p(-p_redetection);
 
-  // Of a marker that was missed in the last `missed` frames: it is seen; it is missed again; it is
-  // missed n times in a row.
+  // Log probabilities for a marker that was missed in the last `missed` frames: that it is
+  // detected, that it is missed again, and that it is missed in the next n frames.
   double log_seen(std::int64_t missed) const { return missed > 0 ? log_redetect : log_detect; }
   double log_missed(std::int64_t missed) const { return missed > 0 ? log_remiss : log_miss; }
   double log_misses(std::int64_t missed, std::int64_t n) const {
@@ -45,10 +46,11 @@ struct ScoreModel {
   }
 };
 
-// log E_r: nothing more is seen in the r frames that are left (summed over the time of death).
+// log E_r: log probability of no further detection in the remaining r frames, summed over the time
+// of death.
 inline std::vector<double> log_end_table(const ScoreModel& m, std::int64_t n_frames) {
   std::vector<double> table(n_frames + 1, 0.0);
-  double E = 1;  // of r frames more, after a miss
+  double E = 1;  // for r further frames, after a missed detection
   for (std::int64_t r = 1; r <= n_frames; ++r) {
     const double alive = (1 - m.p_disappear) * E;
     table[r] = std::log(m.p_disappear + (m.last_termination ? 0 : alive * (1 - m.p_detection)));
@@ -62,7 +64,8 @@ inline bool is_reachable(const ScoreModel& m, const Point& a, const Point& b, do
   return squared_distance(a, b, D) <= reach * reach;
 }
 
-// s(τ) of a track, -inf outside the space Ω. `points` and `frames` are those of the track.
+// s(τ) of a track, or -inf for a track outside the space Ω. `points` and `frames` are those of the
+// track.
 inline double score_track(const MotionModel& m, const ScoreModel& sm, const Timeline& line,
                           std::span<const Point> points, std::span<const std::int64_t> frames,
                           const std::vector<double>& log_end) {
@@ -83,9 +86,9 @@ inline double score_track(const MotionModel& m, const ScoreModel& sm, const Time
   return s + log_end[left];
 }
 
-// States of every frame from the first to the last detection of a track, modes collapsed, and the
-// log density of each detection but the first (which gets 0). `predicted` are the states before
-// each frame's detection, for the way back.
+// Filters a track. Writes the states of every frame from the first to the last detection, with the
+// modes collapsed, and the log density of each detection (0 for the first). `predicted` receives
+// the states before the update of each frame, for the smoother.
 inline void filter_track(const MotionModel& m, const Timeline& line, std::span<const Point> points,
                          std::span<const std::int64_t> frames, std::span<AxisState> states,
                          std::span<AxisState> predicted, std::span<double> log_densities) {
@@ -104,8 +107,8 @@ inline void filter_track(const MotionModel& m, const Timeline& line, std::span<c
   }
 }
 
-// Rauch–Tung–Striebel, in place. Exact with one mode; with several, that of their moments, which
-// stands because the modes share one F.
+// Rauch–Tung–Striebel smoother, in place. It is exact with one mode. With several it smooths the
+// collapsed moments, which is valid because the modes share one F.
 inline void smooth_track(const MotionModel& m, const Timeline& line, std::int64_t first_frame,
                          std::span<const AxisState> predicted, std::span<AxisState> states) {
   for (auto i = static_cast<std::int64_t>(states.size()) - 2; i >= 0; --i)

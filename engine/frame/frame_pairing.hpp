@@ -1,4 +1,4 @@
-// Which track has which detection of a frame: the candidates paired group by group.
+// Assigns the detections of a frame to tracks, group by group.
 #pragma once
 
 #include <algorithm>
@@ -14,17 +14,18 @@ namespace asterism {
 
 struct PairingOptions {
   Pairing pairing = Pairing::assignment;
-  // The 2010 report's own method: the points of the first frame are the tracks, every pair is a
-  // candidate, and no track begins, coasts or ends. Every frame has as many points as the first.
+  // The method of the 2010 report: the points of the first frame initiate the tracks, every pair is
+  // a candidate, and tracks are never initiated, coasted or deleted later. Every frame must have as
+  // many points as the first.
   bool is_strict = false;
-  // Hospitals and residents: so many detections may marry one track, those beyond its favourite
-  // within a distance of it; they are merged by their likelihood.
+  // Hospitals–residents matching: the number of detections that one track may take. Those beyond
+  // its best must lie within `merged_within` of it. They are merged with likelihood weights.
   std::int32_t capacity = 1;
   double merged_within = 0;
 };
 
 struct FramePairing {
-  std::vector<std::int32_t> match;  // by track; -1: none
+  std::vector<std::int32_t> match;  // by track, -1 for none
   std::vector<Pair> extras;         // further detections of a track
   std::vector<char> is_taken;       // by detection
 
@@ -56,7 +57,7 @@ struct FramePairing {
       stats.largest_group = std::max<std::int64_t>(stats.largest_group, groups[g].size());
     stats.n_groups += static_cast<std::int64_t>(groups.size());
   }
-  // What is matched is taken.
+  // Marks the assigned detections as taken.
   void take(std::span<const Candidate> candidates) {
     for (const Candidate& c : candidates)
       if (match[c.row] == c.column) is_taken[c.column] = 1;

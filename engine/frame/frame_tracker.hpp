@@ -1,6 +1,7 @@
-// One decision a frame: predict, gate, group, pair, update (tracks/live_tracks.hpp has a track's life).
+// Tracking with one hard decision per frame: predict, gate, group, assign, update. The life cycle
+// of a track is that of tracks/live_tracks.hpp.
 //
-// What differs between the methods is how the candidates of a frame are paired (`Pairing`).
+// The methods differ only in how the candidates of a frame are assigned (`Pairing`).
 #pragma once
 
 #include <cmath>
@@ -21,8 +22,8 @@ class FrameTracker {
                const PairingOptions& options, const CarryOptions& carry)
       : live_(model, score, life), opt_(options), carried_(model, score, carry) {}
 
-  // Take the points of the next frame. Calls label(detection, track id, confidence) for every
-  // detection whose label is decided now: those of this frame in confirmed tracks and, when a track
+  // Processes the points of the next frame. Calls label(detection, track id, confidence) for every
+  // detection whose label is now decided: those of this frame in confirmed tracks and, when a track
   // is confirmed, its earlier ones. Detections are numbered from 0 in order of arrival.
   template <typename Label>
   FrameStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
@@ -30,8 +31,9 @@ class FrameTracker {
     find_candidates(time, step, points, stats);
     stats.n_candidates = static_cast<std::int64_t>(s_.candidates.size());
     s_.pairs.begin(live_.size(), points.size());
-    // Believed tracks first. A tentative one knows so little that it fits almost anything, and a
-    // single frame cannot see that the marker which it takes over would have to vanish for good.
+    // Confirmed tracks are assigned first. The prediction of a tentative track is so uncertain that
+    // it fits almost any detection. A single frame cannot account for the disappearance of the
+    // marker whose detection it would take.
     match_all(true, points, stats);
     match_all(false, points, stats);
     update_tracks(time, points, stats, label);
@@ -59,8 +61,8 @@ class FrameTracker {
     FramePairing pairs;
   };
 
-  // How much likelier a frame becomes by a track's `gain`: by all of it for a believed track, and
-  // for a tentative one weighed with the odds that it is a marker at all.
+  // Gain of the log likelihood of the frame from a track's `gain`. For a tentative track, the gain
+  // is weighted with the odds that the track is a marker.
   double odds(std::size_t i, double gain) {
     return live_[i].is_confirmed() ? gain : softplus(live_[i].score + gain);
   }
@@ -72,7 +74,8 @@ class FrameTracker {
       return pair_all(points);
     }
     const double over = live_.leftover_gain();
-    // A believed track takes a point only if that beats missing it and leaving the point over.
+    // A confirmed track takes a detection only if that is more likely than missing it and leaving
+    // the detection unassigned.
     const auto least_of = [&](std::size_t i, double gain) {
       const std::int32_t gap = live_[i].gap;
       return live_[i].is_confirmed() ? live_.miss_gain(gap) + over - live_.hit_gain(gap) + gain
@@ -98,7 +101,7 @@ class FrameTracker {
       }
   }
 
-  // Pairs the believed tracks, or the tentative ones, with points that are still free.
+  // Assigns unassigned detections to the confirmed or to the tentative tracks.
   void match_all(bool confirmed, std::span<const Point> points, FrameStats& stats) {
     s_.eligible.clear();
     for (const Candidate& c : s_.candidates)
@@ -107,7 +110,7 @@ class FrameTracker {
     s_.pairs.pair(s_.eligible, points, live_.m.axis.D, opt_, stats);
   }
 
-  // What a track takes for its measurement: its detection, or the mean of several by likelihood.
+  // The measurement of a track: its detection, or the likelihood-weighted mean of several.
   Point measured(std::size_t i, std::span<const Point> points) const {
     const Point& own = points[s_.pairs.match[i]];
     std::array<double, kMaxModes> each{};

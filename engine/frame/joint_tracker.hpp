@@ -1,17 +1,19 @@
-// Joint probabilistic data association, with the probability that each track exists (JIPDA,
-// Musicki & Evans 2004). The life of a track is that of tracks/live_tracks.hpp; its score is the log odds
-// that it exists.
+// Joint integrated probabilistic data association (JIPDA, Musicki & Evans 2004): joint
+// probabilistic data association with an existence probability for each track. The life cycle of a
+// track is that of tracks/live_tracks.hpp. Its score is the log odds of existence.
 //
-//   r        probability that a track exists, (1 - p_z) times that of the frame before
+//   r        existence probability of a track, (1 - p_z) times that of the frame before
 //   w_ij     r P_d N(y_j; ŷ_i, S_i) / (λ_f + P_d λ_b)      w_i0 = 1 - r P_d
 //   β_ij     marginals of the joint events (solve/joint_events.hpp)
 //   r⁺       1 - β_i0 + β_i0 r (1 - P_d) / (1 - r P_d)
 //
-// P_d is each track's own: that of a marker seen in the frame before or missed there, weighed by how
-// probable either is (“Markov chain two” of Musicki, Evans & Stankovic 1994).
+// P_d is specific to each track: it averages the detection probabilities after a detection and
+// after a missed detection, weighted by the probability of either (“Markov chain two” of Musicki,
+// Evans & Stankovic 1994).
 //
-// Believed tracks share the detections first; tentative ones take what they leave over, by the
-// likeliest event: they know so little that a mean over what fits would be nowhere.
+// Confirmed tracks share the detections first. Tentative tracks take remaining detections by the
+// most likely event. Their predictions are so uncertain that an average over all detections in the
+// gate would be meaningless.
 #pragma once
 
 #include <algorithm>
@@ -30,16 +32,17 @@
 namespace asterism {
 
 struct JointOptions {
-  std::int64_t max_states = 1;  // of a layer of the exact sum; a beam of as many beyond
-  bool is_guarded = true;       // against coalescence
-  // A believed track counts as one that exists until its gap is too long: markers hide in bursts,
-  // of which P_d knows nothing. Otherwise its r falls with every miss, and ends it.
+  std::int64_t max_states = 1;  // of a layer of the exact sum, and of the beam search beyond
+  bool is_guarded = true;       // use the guard against coalescence (solve/best_permutations.hpp)
+  // Whether a confirmed track counts as existing until its gap is too long, because occlusions are
+  // bursts that P_d does not model. Otherwise its r falls with every missed detection until the
+  // track is deleted.
   bool is_sure_until_gap = true;
 };
 
 struct JointStats : FrameStats {
-  // Groups that were not summed exactly, how far off they may be, most states held; groups too large
-  // for the guard against coalescence.
+  // Groups that were not summed exactly, the bound of their error, the largest number of states,
+  // and groups that were too large for the guard against coalescence.
   std::int64_t n_beams = 0, n_states = 0, n_unguarded = 0;
   double bound = 0;
 
@@ -58,8 +61,8 @@ class JointTracker {
                const JointOptions& options, const CarryOptions& carry)
       : live_(model, score, life), opt_(options), carried_(model, score, carry) {}
 
-  // As FrameTracker::step. Every point of the frame gets a label, -1 with the probability that it is
-  // of no track that is believed.
+  // Processes a frame as FrameTracker::step does. Every detection of the frame receives a label; -1
+  // comes with the probability that it belongs to no confirmed track.
   template <typename Label>
   JointStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
     JointStats stats;
@@ -96,14 +99,15 @@ class JointTracker {
     std::vector<double> gains, marginals, log_miss, all_missed;
     std::vector<std::int32_t> best;  // by track
     std::vector<double> match_probability, missed;
-    std::vector<double> free;  // probability that a detection is of no track
+    std::vector<double> free;  // probability that a detection belongs to no track
     FramePairing pairs;
     BestPermutations guard;
     std::vector<double> weights;
     std::vector<WeightedPoint> mixture;
   };
 
-  static constexpr double kNegligible = -20.7;  // log of a weight, of a miss of 1, not looked at
+  // log weight relative to a miss below which a pairing is ignored
+  static constexpr double kNegligible = -20.7;
   static constexpr double kMostOdds = 700;
 
   static double probability(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
@@ -111,21 +115,21 @@ class JointTracker {
   double not_seen(std::size_t i, double score) const {  // 1 - r P_d
     return probability(-score) + probability(score) * p_miss(i);
   }
-  // Of a track that exists, in this frame.
+  // Miss probability in this frame of a track that exists.
   double p_miss(std::size_t i) const {
     const double missed = live_.tracks[i].p_missed;
     return (1 - missed) * std::exp(live_.sm.log_miss) + missed * std::exp(live_.sm.log_remiss);
   }
   double p_detect(std::size_t i) const { return 1 - p_miss(i); }
 
-  // The log odds that a track exists, as far as sharing the detections goes.
+  // The log odds of existence that are used in the association.
   double existence(std::size_t i) const {
     const LiveTrack<NoMore>& track = live_.tracks[i];
     const bool is_sure = opt_.is_sure_until_gap && track.is_confirmed();
     return is_sure ? std::max(track.score, live_.opt.confirm_score) : track.score;
   }
 
-  // Probability that a detection which is of no track, with probability q, begins one.
+  // Probability that a detection initiates a track, if it belongs to no track with probability q.
   double newborn(double q) const {
     const double b = std::exp(live_.birth_gain());
     return q * b / (1 + b);
@@ -156,7 +160,8 @@ class JointTracker {
     carried_.list(live_, time, step, points, kNegligible, least_of, gain_of, s_.candidates, stats);
   }
 
-  // Pairings of the believed tracks, or of the tentative ones with what is left.
+  // Lists the candidates of the confirmed tracks, or those of the tentative ones with the remaining
+  // detections.
   void find_eligible(bool confirmed) {
     s_.eligible.clear();
     s_.gains.clear();
@@ -192,9 +197,10 @@ class JointTracker {
     s_.pairs.take(s_.eligible);
   }
 
-  // Tentative tracks take what the likeliest event gives them, and each is as sure of it as it can be
-  // if the others have what that event gives to them. Together they fit almost anything: a sum over
-  // all their events would take long and tell little.
+  // Tentative tracks take the detections that the most likely event assigns to them. The
+  // association probability of each is conditional on the other tracks following that event. A sum
+  // over all joint events would be slow and uninformative, because tentative tracks fit almost any
+  // detections.
   void share_among_tentative(std::span<const Point> points, JointStats& stats) {
     find_eligible(false);
     s_.pairs.pair(s_.eligible, points, live_.m.axis.D, {}, stats);
@@ -221,7 +227,8 @@ class JointTracker {
     }
   }
 
-  // What the joint events of a group say of its tracks: best pairings, misses, and new states.
+  // Applies the marginals of a group to its tracks: best assignment, miss probability and updated
+  // state.
   void take_group(std::span<const Candidate> group, std::span<const std::int32_t> sources,
                   std::span<const Point> points, JointStats& stats) {
     for (std::size_t e = 0; e < group.size(); ++e) {
@@ -241,11 +248,12 @@ class JointTracker {
         taken += s_.weights[last];
       }
       if (s_.mixture.empty()) continue;
-      // What carries a hidden marker is not its own until it is seen.
+      // The prediction from neighbours must not enter the track's own state before the marker is
+      // detected.
       const std::int32_t match = s_.pairs.match[i];
       if (carried_.is_carried(i) && match < 0) continue;
       if (match >= 0) carried_.take(live_, i, points[match], stats);
-      // Given that the track exists, a miss is less likely than it is in itself.
+      // Given that the track exists, a miss is less probable than without that condition.
       const double seldom = probability(existence(i)) * p_miss(i) / not_seen(i, existence(i));
       const double missed = std::max(1 - taken, 0.0) * seldom;
       for (WeightedPoint& point : s_.mixture) point.weight /= taken + missed;
@@ -254,8 +262,9 @@ class JointTracker {
     }
   }
 
-  // How far each pairing of a group moves its track: as much as is probable; where events differ by
-  // who is who, only the best of them; beyond the guard's reach, the best event.
+  // Weights of the pairings of a group in the update of the states. They are the marginals; with
+  // the guard, those over the best permutations; if the group is too large for the guard, the best
+  // event.
   void weigh(std::span<const Candidate> group, std::span<const std::int32_t> sources,
              JointStats& stats) {
     const bool needs_guard = opt_.is_guarded && group.front().row != group.back().row;
@@ -280,7 +289,7 @@ class JointTracker {
         if (track.is_confirmed() && is_gone) track.gap = live_.sm.max_gap + track.carried;
         continue;
       }
-      // Of a tentative track: given that it is a marker at all.
+      // For a tentative track, the confidence is conditional on the track being a marker.
       const double given = track.is_confirmed() ? 1 : probability(track.score);
       const double confidence = std::min(s_.match_probability[i] / given, 1.0);
       live_.take(i, j, points[j], time, confidence, label);
@@ -288,7 +297,8 @@ class JointTracker {
     live_.end_tracks();
   }
 
-  // The odds that a track exists change by the same factor, whatever they are taken to be.
+  // Multiplies the odds of existence by their likelihood ratio, also if the association assumed
+  // other odds.
   void update_existence(std::size_t i) {
     const double taken_as = existence(i), missed = std::max(s_.missed[i], 1e-300);
     const double hidden = missed * probability(taken_as) * p_miss(i);

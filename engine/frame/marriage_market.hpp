@@ -1,8 +1,8 @@
-// The stable marriage of tracks and detections, hospitals and residents included.
+// Stable marriage of tracks and detections, including the hospitals–residents variant.
 //
-// Tracks rank detections by predictive density; detections rank tracks by distance. A track that
-// may have several detections stands in the market as often, its copies in their order: those
-// beyond the first look no further than `merged_within` from its favourite.
+// Tracks rank detections by predictive density, and detections rank tracks by distance. A track
+// that may take several detections enters with as many ordered copies. Copies beyond the first only
+// propose to detections within `merged_within` of the track's best one.
 #pragma once
 
 #include <algorithm>
@@ -20,19 +20,20 @@ namespace asterism {
 
 using Pair = std::pair<std::int32_t, std::int32_t>;  // track, detection
 
-// How the candidates of a frame are paired.
+// How the candidates of a frame are assigned.
 enum class Pairing {
-  assignment,           // the most likely joint pairing
-  tracks_propose,       // stable, best for the tracks
-  detections_propose,   // stable, best for the detections
+  assignment,           // the most likely joint assignment
+  tracks_propose,       // the stable matching that is optimal for the tracks
+  detections_propose,   // the stable matching that is optimal for the detections
 };
 
 struct MarriageMarket {
   bool points_propose = false;
-  std::int32_t capacity = 1;  // so many detections may marry one track
+  std::int32_t capacity = 1;  // number of detections that one track may take
   double merged_within = 0;
 
-  // match[row] becomes the likeliest detection of each track that marries, `extras` its others.
+  // Sets match[row] to the most likely detection of each matched track. `extras` receives its
+  // further detections.
   void marry(std::span<const Candidate> group, std::span<const Point> points, int D,
              std::span<std::int32_t> match, std::vector<Pair>& extras) const {
     std::vector<Wish> wishes;

@@ -1,4 +1,5 @@
-// Four numbers at once, in single precision: one instruction where the compiler knows vectors.
+// Four single-precision numbers, computed with one instruction where the compiler supports vector
+// types.
 #pragma once
 
 #include <array>
@@ -41,7 +42,7 @@ inline Float4 filled(float x) {
 #endif
 }
 
-// One bit for each of the four, set where a ≤ b.
+// Returns a mask in which bit k is set if a[k] ≤ b[k].
 inline unsigned bits_not_above(Float4 a, Float4 b) {
   unsigned bits = 0;
   for (unsigned k = 0; k < 4; ++k) bits |= static_cast<unsigned>(a[k] <= b[k]) << k;

@@ -1,4 +1,5 @@
-// A set of small numbers from which one can be drawn: members lie side by side.
+// A set of small integers with O(1) insertion, removal and random choice. The members are stored
+// contiguously.
 #pragma once
 
 #include <cstdint>

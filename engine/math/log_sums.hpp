@@ -1,4 +1,4 @@
-// Sums of numbers that are given by their logarithms.
+// Sums of numbers that are given by their logarithms, without overflow.
 #pragma once
 
 #include <algorithm>

@@ -7,7 +7,8 @@ namespace asterism {
 
 inline constexpr int kMaxAxes = 3;
 
-// A place, and what the variance of its coordinates is beyond the sensor's.
+// Coordinates of a detection. `r` is the variance of each coordinate in addition to that of the
+// sensor.
 struct Point : std::array<double, kMaxAxes> {
   double r = 0;
 };

@@ -1,5 +1,5 @@
-// Random numbers that are the same everywhere: xoshiro256++ (Blackman & Vigna 2021), seeded by
-// splitmix64.
+// A random number generator that gives the same numbers on every platform: xoshiro256++ (Blackman &
+// Vigna 2021), seeded by splitmix64.
 #pragma once
 
 #include <array>
@@ -32,10 +32,10 @@ class Random {
     return result;
   }
 
-  // In (0, 1).
+  // Uniform in (0, 1).
   double uniform() { return (static_cast<double>(next() >> 11) + 0.5) * 0x1p-53; }
 
-  // 0 … n - 1; the bias of the multiplication is below n / 2^32.
+  // Uniform in 0 … n - 1. The multiplication has a bias below n / 2^32.
   std::int32_t below(std::int32_t n) {
     return static_cast<std::int32_t>(((next() >> 32) * static_cast<std::uint64_t>(n)) >> 32);
   }

@@ -1,4 +1,4 @@
-// Symmetric 3 × 3 matrices: information and covariance of a place.
+// Symmetric 3 × 3 matrices, for the information and the covariance of a position.
 #pragma once
 
 #include "math/vectors.hpp"

@@ -1,4 +1,4 @@
-// Sets that are joined step by step; the least member of a set stands for it.
+// Disjoint sets with path halving. The smallest member of a set is its representative.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Vectors in space.
+// Vectors in three dimensions.
 #pragma once
 
 namespace asterism {
@@ -11,8 +11,8 @@ struct Vec3 {
 };
 
 inline double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-// Swapping a and b changes the sign and nothing else, to the last bit: what two triangles say of
-// the edge that they share agrees.
+// Swapping a and b changes only the sign, to the last bit. Two triangles therefore give consistent
+// results for a shared edge.
 inline Vec3 cross(Vec3 a, Vec3 b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }

@@ -1,13 +1,15 @@
-// The distance between two markers: its estimate, its predictive variance, and whether it is a bond.
+// The distance between two markers: its estimate, its predictive variance, and the criterion of a
+// bond.
 //
 //   V = max(s², 2 r) + (m (kBend + 1/n))²
 //
-//   m, s²  mean and variance over the n frames in which both markers were seen
+//   m, s²  mean and variance over the n frames in which both markers were detected
 //   r      variance of a measured coordinate
 //
-// V is the variance of the distance when it is measured next. The first term is what was seen, and no
-// less than the noise of both ends. The second is bending that was not seen yet. Every ranking of
-// neighbours, every weight of a rigid fit and every threshold of a distance uses V.
+// V is the variance of the next measured distance. The first term is the observed variance, but at
+// least the measurement noise of both markers. The second term allows for deformation that has not
+// been observed yet. V is used to rank neighbours, to weight rigid fits and to set every threshold
+// on a distance.
 #pragma once
 
 #include <algorithm>
@@ -16,12 +18,13 @@
 
 namespace asterism {
 
-inline constexpr std::int64_t kMemory = 400;    // frames that a mean remembers
-inline constexpr double kBend = 0.01;           // share of a distance
+inline constexpr std::int64_t kMemory = 400;    // effective number of frames in a mean
+inline constexpr double kBend = 0.01;  // expected deformation as a fraction of the distance
 inline constexpr std::int64_t kMinTogether = 20;  // frames until a distance may be a bond
-inline constexpr double kSteady = 0.1;          // share of its length that √V of a bond may be
-inline constexpr std::size_t kSteadiest = 6;    // bonds that carry a marker or speak for it
-inline constexpr double kFar = 2;               // √V from which on a distance speaks against a bond
+inline constexpr double kSteady = 0.1;          // largest √V of a bond as a fraction of its length
+inline constexpr std::size_t kSteadiest = 6;    // number of bonds used for a marker
+// deviation in √V above which a distance is evidence against a bond
+inline constexpr double kFar = 2;
 
 struct Bond {
   std::int32_t other = 0;
@@ -47,8 +50,8 @@ inline bool is_bond(const Bond& bond, double r) {
   return bond.n >= kMinTogether && predictive_variance(bond, r) <= most * most;
 }
 
-// What a distance says of the bond's two markers, from 1 for a distance as it was to -1 for one that is
-// far off: bounded, however wrong.
+// Evidence of a distance for the two markers of the bond: 1 at the mean distance, falling to -1 for
+// large deviations. It is bounded, so that a single outlier cannot dominate a sum.
 inline double agreement(const Bond& bond, double r, double distance) {
   const double off = distance - bond.mean;
   const double z2 = off * off / (kFar * kFar * predictive_variance(bond, r));

@@ -1,21 +1,23 @@
-// Where neighbours carry a marker, and the variance of that place.
+// Predicts the position of an occluded marker from its rigid neighbours, with the variance of that
+// position.
 //
-//   a_k, b_k   neighbour k in the frame in which the marker was seen, and now
+//   a_k, b_k   position of neighbour k in the frame of the marker's last detection, and now
 //   v_k        predictive variance of its bond, W = Σ 1/v_k
-//   R a + t    the rigid motion of the n neighbours (least squares, weights 1/v_k)
-//   u          variance of a neighbour about that motion, along an axis: the larger of κ n / W, which
-//              bonds expect, and a third of what this one fit leaves beyond the noise of both ends, as
-//              it has few degrees of freedom
-//   d          R a + t less the weighted mean of the b_k
-//   J          their inertia about that mean, Σ (|b'|² 1 - b' b'ᵀ) / v_k
+//   R a + t    rigid motion of the n neighbours (least squares, weights 1/v_k)
+//   u          variance of a neighbour about that motion along an axis: the larger of κ n / W,
+//              which follows from the bonds, and a third of the residual of this fit beyond the
+//              noise of both ends; only a third, because the fit has few degrees of freedom
+//   d          R a + t minus the weighted mean of the b_k
+//   J          inertia of the b_k about that mean, Σ (|b'|² 1 - b' b'ᵀ) / v_k
 //
 //   V = r + u (1 + 1/n) + max(u, r) W/n tr([d]× J⁻¹ [d]×ᵀ) / D
 //
-// The 1 is the marker itself, which moves about the body as its neighbours do. κ is the squared error
-// of earlier places against what was expected of them. Noise alone turns neighbours that are nearly in
-// one line, so that the last term holds at least r. Neighbours in one line have no J⁻¹, and too few do
-// not determine a rotation. There the marker keeps its offset from the neighbours' mean,
-// to a share of that offset.
+// The term 1 is the marker's own motion relative to the segment, which has the variance of its
+// neighbours. κ is the ratio of squared errors of earlier predictions to their expected values.
+// Measurement noise alone rotates nearly collinear neighbours, so the last term contains at least
+// r. The rotation is undetermined for collinear neighbours, where J is singular, and for too few.
+// The marker then keeps its offset from the mean of its neighbours, with an error proportional to
+// that offset.
 #pragma once
 
 #include <algorithm>
@@ -32,10 +34,10 @@ namespace asterism {
 
 struct Carried {
   Point at{};
-  double variance = std::numeric_limits<double>::infinity();  // of a coordinate of the marker's place
+  double variance = std::numeric_limits<double>::infinity();  // of a coordinate of the marker's position
 
-  // Student's t with 3 degrees of freedom, its squared scale the variance: bodies bend, and now and
-  // then much, and their neighbours' errors are alike.
+  // Student's t distribution with 3 degrees of freedom, whose squared scale is the variance. The
+  // heavy tails allow for occasional large deformation and for correlated errors of the neighbours.
   double log_density(const Point& y, int D) const {
     constexpr double freedom = 3;
     return log_unit_peaks()[D] - 0.5 * D * std::log(variance) -
@@ -43,7 +45,7 @@ struct Carried {
   }
 
  private:
-  // Of a scale of 1, by the number of axes.
+  // Log density at the mode for a scale of 1, by the number of axes.
   static const std::array<double, 4>& log_unit_peaks() {
     static const std::array<double, 4> peaks = [] {
       std::array<double, 4> all{};
@@ -55,8 +57,8 @@ struct Carried {
   }
 };
 
-// What neighbours say of a marker that was at `then`. `pairs` have the weights 1/v_k. `noise`: variance of
-// a measured coordinate.
+// The position of a marker that was at `then`, predicted from its neighbours. `pairs` have the
+// weights 1/v_k; `noise` is the variance of a measured coordinate.
 class RigidPrediction {
  public:
   RigidPrediction(std::span<const RigidPair> pairs, const Point& then, int D, double noise) {
@@ -90,14 +92,14 @@ class RigidPrediction {
     return r + u * mean_ + std::max(u, r) * turn_;
   }
   double nearest2() const { return nearest2_; }  // squared distance of the nearest neighbour
-  // The one with the smaller variance.
+  // Returns the prediction with the smaller variance: rotated, or translated only.
   Carried place(double r, double kappa) const {
     const double V = turned_variance(r, kappa);
     return V < r + offset2_ ? Carried{turned_, V} : Carried{moved_, r + offset2_};
   }
 
  private:
-  static constexpr double kOffset = 0.3;  // share of the distance from the neighbours' mean
+  static constexpr double kOffset = 0.3;  // error of a kept offset as a fraction of its length
 
   Point turned_{}, moved_{};
   double nearest2_ = std::numeric_limits<double>::infinity(), offset2_ = 0;

@@ -1,8 +1,9 @@
-// What a hidden track expects of a frame: by its own motion, and where its neighbours carry it.
+// The state prediction of an occluded track, from its own motion and from its rigid neighbours.
 //
-// The carried place is fused with the track's own prediction as a measurement of it would be. Places
-// that are carried frame after frame err alike, so that this is for one frame alone: the own state goes
-// on untouched until the marker is seen.
+// The position predicted from neighbours is fused with the track's own prediction as if it were a
+// measurement. Its errors are correlated from frame to frame, so it must not enter the filter
+// repeatedly. The fused state is therefore used for one frame only, and the track's own state stays
+// unchanged until the marker is detected.
 #pragma once
 
 #include <algorithm>
@@ -17,11 +18,12 @@
 
 namespace asterism {
 
-// The carried place and the track's own may differ by so much, squared and along an axis, against what
-// is expected. Where they differ more, the track is less sure of its own than it says.
+// Largest squared difference per axis between the two predictions, relative to its expected value.
+// If it is exceeded, the covariance of the track's own prediction is inflated.
 inline constexpr double kAgreed = 4;
 
-// `state` and its prediction `own`, told of a place; none where the track knows better itself.
+// Fuses a state and its prediction `own` with a carried position. Returns nothing if the track's
+// own prediction has the smaller variance.
 inline std::optional<MotionState> fuse(const MotionModel& m, const MotionState& state,
                                        const Prediction& own, const Carried& place) {
   const int D = m.axis.D;
@@ -40,7 +42,8 @@ inline std::optional<MotionState> fuse(const MotionModel& m, const MotionState& 
   return fused;
 }
 
-// Of a state that was predicted to the frame; `place` where its neighbours tell one.
+// The prediction of one track in a frame. `place` is the position predicted from its neighbours, or
+// null.
 class Expected {
  public:
   Expected(const MotionModel& m, const MotionState& state, const Carried* place)
@@ -51,11 +54,12 @@ class Expected {
   }
 
   bool is_carried() const { return carried_.has_value(); }
-  // Without looking: where neighbours tell it, as they do.
+  // The prediction before any detection is considered: the fused one if there is one.
   const Prediction& prediction() const { return carried_ ? carried_->prediction : own_; }
-  // By which a point is likelier. A track may be right by itself where its neighbours are not.
+  // The prediction under which the detection y is more likely. The neighbours of a track can be
+  // wrong while its own motion is right.
   const Prediction& of(const Point& y) const { return is_own(y) ? own_ : carried_->prediction; }
-  // Brings a state as it was predicted to the one in which the point is taken.
+  // Replaces a predicted state by the one in which the detection y is used.
   void choose(const Point& y, MotionState& state) const {
     if (!is_own(y)) state = carried_->state;
   }
@@ -76,15 +80,19 @@ class Expected {
   std::optional<Fused> carried_;
 };
 
-// What its neighbours say of a believed track in a frame, by what all expected when it came.
+// Information from rigid neighbours on a confirmed track in one frame. It is computed once, when
+// the frame arrives.
 struct NeighbourAdvice {
-  std::int64_t track = 0;    // its key
-  bool is_carried = false;   // where it is hidden it is at `place`, and takes none but one of `may_take`
-  bool is_doubtful = false;  // that place is not known well enough to live by
-  bool gives_way = false;    // where it was seen it is a hidden one come back: so far it goes, no further
+  std::int64_t track = 0;    // key of the track
+  // the occluded track is predicted at `place` and may only take a detection of `may_take`
+  bool is_carried = false;
+  bool is_doubtful = false;  // the variance of `place` is too large to keep the track alive
+  // the track is an occluded track reappearing, and is deleted in favour of the old one
+  bool gives_way = false;
   Carried place;
   std::vector<std::int32_t> may_take;
-  std::vector<std::pair<std::int32_t, double>> says;  // of a detection so many nats
+  // log-likelihood ratio from bonds, by detection
+  std::vector<std::pair<std::int32_t, double>> says;
 
   double of(std::int32_t column) const {
     for (const auto& [j, nats] : says)

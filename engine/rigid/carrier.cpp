@@ -9,7 +9,7 @@ namespace asterism {
 
 namespace {
 
-// The one that is nearest to the others; of two the first.
+// The element with the smallest sum of distances to the others, the first of equals.
 const Carriage& middle(std::span<const Carriage> ways, int D) {
   std::size_t best = 0;
   double least = std::numeric_limits<double>::infinity();

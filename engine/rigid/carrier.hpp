@@ -1,9 +1,10 @@
-// The carrier of occluded markers: which neighbours carry a marker, where it was among them when it was
-// seen last, and how far off they carried it while it was seen.
+// Predicts occluded markers from rigid neighbours. The carrier selects the neighbours of each
+// marker, stores their relative positions at the last detection, and estimates the accuracy of its
+// predictions.
 //
-// While a marker is seen, its neighbours carry it now and then to the present frame from kLag frames ago.
-// The errors of these places scale the variance of later ones (rigid/carried.hpp), which grows with the
-// frames for which the marker is occluded.
+// While a marker is detected, the carrier regularly predicts its present position from the frame
+// kLag frames earlier. The errors of these predictions scale the variance of later ones
+// (rigid/carried.hpp), which grows with the length of the occlusion.
 #pragma once
 
 #include <algorithm>
@@ -22,12 +23,13 @@
 
 namespace asterism {
 
-// Where a marker was in a frame, and its neighbours there, the steadiest first.
+// The position of a marker in a frame and those of its neighbours, by increasing variance of their
+// distances.
 struct Anchor {
   std::int64_t frame = 0;
   Point at{};
   std::vector<Seen> around;
-  std::vector<double> weight;  // of these
+  std::vector<double> weight;  // of the neighbours in `around`
 };
 
 struct Carriage {
@@ -36,11 +38,11 @@ struct Carriage {
   std::int32_t n_neighbours = 0;
 };
 
-// Squared errors along an axis of the places to which a rotation carried a marker over kLag frames, and
-// what was expected of them: means over the last kRecent.
+// Mean squared error per axis of the positions predicted by a rotation over kLag frames, and its
+// expected value. The means have a memory of kRecent predictions.
 struct Trust {
   static constexpr std::int64_t kRecent = 50;
-  static constexpr double kLeast = 0.02;  // κ is no less
+  static constexpr double kLeast = 0.02;  // lower bound of κ
 
   std::int64_t n_judged = 0, n = 0;
   double error = 0, expected = 0;
@@ -50,37 +52,38 @@ struct Trust {
     error += share * (error2 - error);
     expected += share * (variance - expected);
   }
-  // Both ends were measured, so that the noise of both is in the error.
+  // Both positions were measured, so the error contains the measurement noise of both.
   double kappa(double r) const { return n == 0 ? 1 : (error - 2 * r) / expected; }
 };
 
 class Carrier {
  public:
   static constexpr std::int64_t kLag = 12;  // frames
-  // Frames before the one in which a marker was seen last, which may show a ghost beside it.
+  // Offsets of the anchor frames before the last detection. Several are used because the last
+  // detections may be those of a ghost beside the marker.
   static constexpr std::array<std::int64_t, 3> kAnchors{0, 4, 10};
 
-  // `r`: variance of a measured coordinate. Neighbours that are no bonds carry a marker too where they
-  // steadily do, unless `bonds_only`.
+  // `r` is the variance of a measured coordinate. Neighbours without a bond are also used if the
+  // variance of their distance is small, unless `bonds_only` is set.
   Carrier(int D, double r, bool bonds_only)
       : D_(D), r_(r), bonds_only_(bonds_only), neighbours_(D, r) {}
 
   int n_axes() const { return D_; }
   double noise() const { return r_; }
 
-  // The markers of the next frame.
+  // Adds the detected markers of the next frame.
   void learn(std::span<const Seen> seen) {
     ++n_frames_;
     neighbours_.add(seen);
   }
-  // A marker that will not be seen again.
+  // Removes a marker that will not be detected again.
   void forget(std::int32_t marker) {
     neighbours_.forget(marker);
     trust_.erase(marker);
   }
 
   std::span<const Bond> neighbours(std::int32_t marker) const { return neighbours_.of(marker); }
-  // The steadiest neighbours of a marker that are seen in both frames.
+  // Pairs of positions of the marker's most stable neighbours that are detected in both frames.
   template <typename Then, typename Now>
   std::span<const RigidPair> pair(std::int32_t marker, const Then& then, const Now& now) {
     list_steadiest(marker, kSteadiest, [&](std::int32_t other) {
@@ -92,8 +95,8 @@ class Carrier {
     return s_.pairs;
   }
 
-  // Where some of the markers of the newest frame would have been carried from `then`, kLag frames ago.
-  // Calls tell(marker, prediction, trust so far).
+  // Compares the detected positions of some markers with those predicted from `then`, kLag frames
+  // earlier. Calls tell(marker, prediction, trust before this frame).
   template <typename Then, typename Now, typename Tell>
   void judge(std::span<const Seen> seen, const Then& then, const Now& now, Tell&& tell) {
     for (const Seen& one : seen) {
@@ -107,18 +110,19 @@ class Carrier {
       tell(one, found, std::as_const(trust));
       ++trust.n_judged;
       if (!found.may_turn()) continue;
-      // What is farther off than the nearest neighbour was not carried at all.
+      // An error beyond the nearest neighbour is due to a wrong association, so it is clipped.
       const double error2 = std::min(squared_distance(one.at, found.turned(), D_), found.nearest2());
       trust.add(error2 / D_, found.turned_variance(0, 1));
     }
   }
-  // Too little is known of a marker that was hardly ever judged.
+  // Whether the accuracy was assessed often enough for predictions to be used.
   bool is_judged(std::int32_t marker) const {
     const auto at = trust_.find(marker);
     return at != trust_.end() && at->second.n_judged >= kMinJudged;
   }
 
-  // Adds where a marker is in `then`, a frame with this number; nothing where no neighbour is seen.
+  // Adds an anchor of the marker in `then`, frame number `frame`, if any neighbour is detected
+  // there.
   template <typename Then>
   void remember(std::int32_t marker, const Then& then, std::int64_t frame,
                 std::vector<Anchor>& anchors) {
@@ -133,9 +137,10 @@ class Carrier {
       anchor.weight.push_back(1 / variance);
     }
   }
-  // The place of a marker that was carried over so many frames. `r`: variance beside what is carried.
+  // The position of a marker carried over `frames` frames. `r` is the additional variance.
   Carried place(const RigidPrediction& found, const Trust& trust, std::int64_t frames, double r) const;
-  // Carries a marker from an anchor over so many frames. False where none of its neighbours is seen.
+  // Predicts the position of a marker from an anchor. Returns false if none of its neighbours is
+  // detected.
   bool carry(std::int32_t marker, const Anchor& from, const Places& now, std::int64_t frames, double r,
              Carriage& out);
 
@@ -143,7 +148,7 @@ class Carrier {
   static constexpr std::size_t kRemembered = 16;  // neighbours of an anchor
   static constexpr std::int64_t kJudgeEvery = 4, kMinJudged = 3;
 
-  // Up to `most` neighbours for which may_carry(neighbour) holds.
+  // Lists the up to `most` most stable neighbours for which may_carry(neighbour) holds.
   template <typename May>
   void list_steadiest(std::int32_t marker, std::size_t most, May&& may_carry) {
     s_.steadiest.clear();
@@ -166,8 +171,9 @@ class Carrier {
   Fresh<Memory> s_;
 };
 
-// A carrier for the tracks of a method: keeps the last frames and the anchors of occluded markers. Its
-// places enter the filters of tracks, so that strangers must not carry each other.
+// The carrier of a frame-by-frame method: keeps the latest frames and the anchors of occluded
+// markers. Its predictions enter the filters of tracks, so it uses bonds only; unrelated markers
+// must not carry each other.
 class BodyCarrier {
  public:
   BodyCarrier(int D, double r) : carrier_(D, r, true) {}
@@ -175,33 +181,33 @@ class BodyCarrier {
   int n_axes() const { return carrier_.n_axes(); }
   double noise() const { return carrier_.noise(); }
 
-  // The markers that are seen in the next frame, in order of their numbers.
+  // Adds the markers detected in the next frame, by increasing number.
   void see(std::span<const Seen> seen);
-  // A marker that will not be seen again.
+  // Removes a marker that will not be detected again.
   void forget(std::int32_t marker);
 
-  // Where a marker is that was not seen in the frames before, by where others are. False where none of
-  // its neighbours is among them, or too little is known of it. Of the frames before this one, `n_open`
-  // were not told to `see`: a marker that was there in the last that was may have gone since.
+  // Predicts the position of an occluded marker from the present positions of others. Returns false
+  // if none of its neighbours is among them or its accuracy is unknown. The last `n_open` frames
+  // were not passed to `see`, so a marker that was detected in the last known frame may have become
+  // occluded since.
   bool carry(std::int32_t marker, const Places& now, Carriage& out, std::int64_t n_open = 0);
 
-  // The bonds of a marker, the steadiest first.
+  // The bonds of a marker, by increasing predictive variance.
   std::span<const Bond> bonds(std::int32_t marker);
-  // Pairs of markers that are bonded, each for one of them.
+  // The number of bonds of a marker to markers of larger number, so that each pair is counted once.
   std::int64_t n_bonds(std::int32_t marker) const;
 
  private:
   struct Hidden {
     std::vector<Anchor> anchors;
-    std::int64_t n_back = 0;  // frames in which it was seen again
+    std::int64_t n_back = 0;  // frames in which the marker was detected again
   };
 
-  // A marker that is back for a while is not occluded any more. Until then it may be a ghost, so that
-  // its anchors are kept.
+  // Ends the occlusion of a marker that has been detected for several frames. Until then the
+  // detections may be a ghost, so the anchors are kept.
   void welcome(std::int32_t marker);
   void hide(std::int32_t marker);
-  // Where a marker was among others in the last frame in which it was seen, `back` frames ago, and
-  // before that.
+  // Adds the anchors of a marker whose last detection was `back` frames ago.
   void remember(std::int32_t marker, std::int64_t back, std::vector<Anchor>& anchors);
 
   struct Memory {

@@ -1,7 +1,7 @@
-// Which markers keep their distances: for each marker a few others, how far they are, and how steady
-// that is.
+// The rigid neighbours of each marker: estimates which other markers keep a stable distance to it.
 //
-// A mean over the last frames has no less than 1/kMemory of each, so that old frames are forgotten.
+// Means over the last frames give every frame a weight of at least 1/kMemory, so that old frames
+// are forgotten.
 #pragma once
 
 #include <algorithm>
@@ -18,13 +18,13 @@
 
 namespace asterism {
 
-// A marker in a frame.
+// A marker detected in a frame.
 struct Seen {
   std::int32_t marker = 0;
   Point at{};
 };
 
-// The markers of a frame in order of their numbers.
+// The detected markers of a frame, by increasing number.
 struct Sighting {
   std::vector<Seen> seen;
 
@@ -34,8 +34,8 @@ struct Sighting {
   }
 };
 
-// Where the markers of a frame are, by number: an open hash table, so that time and memory depend on
-// how many there are and not on how large their numbers have become.
+// Positions of the markers of a frame, by number. An open hash table makes time and memory depend
+// on the number of markers and not on the largest number.
 class Places {
  public:
   void clear() {
@@ -58,9 +58,9 @@ class Places {
  private:
   static constexpr std::int32_t kNobody = -1;
 
-  // Of a marker, or where it would stand.
+  // The slot of a marker, or the empty slot where it would be inserted.
   std::size_t place(std::int32_t marker) const {
-    const std::size_t last = slots_.size() - 1;  // a power of two, less one
+    const std::size_t last = slots_.size() - 1;  // a power of two minus one
     std::size_t at = static_cast<std::uint32_t>(marker) * 0x9e3779b1u & last;
     while (slots_[at].marker != kNobody && slots_[at].marker != marker) at = (at + 1) & last;
     return at;
@@ -76,7 +76,8 @@ class Places {
   std::size_t n_ = 0;
 };
 
-// Inserts into the `most` smallest in order, which for so few is quicker than a heap.
+// Inserts into a sorted list of the `most` smallest elements. For short lists this is faster than a
+// heap.
 template <typename T>
 void keep_smallest(std::vector<T>& all, std::size_t most, const T& one) {
   if (all.size() == most) {
@@ -88,12 +89,12 @@ void keep_smallest(std::vector<T>& all, std::size_t most, const T& one) {
 
 class Neighbours {
  public:
-  // `r`: variance of a measured coordinate.
+  // `r` is the variance of a measured coordinate.
   Neighbours(int D, double r) : D_(D), r_(r) {}
 
   int n_axes() const { return D_; }
 
-  // The markers that are seen in a frame.
+  // Adds the markers detected in a frame.
   void add(std::span<const Seen> seen) {
     ++n_frames_;
     places_.clear();
@@ -106,7 +107,7 @@ class Neighbours {
     }
   }
 
-  // A marker that will not be seen again.
+  // Removes a marker that will not be detected again.
   void forget(std::int32_t marker) {
     bonds_.erase(marker);
     for (auto& [own, bonds] : bonds_)
@@ -123,9 +124,10 @@ class Neighbours {
  private:
   static constexpr std::int64_t kLookEvery = 32;  // frames
   static constexpr std::size_t kMost = 24, kNearest = 12;
-  static constexpr std::int64_t kTrial = 60;  // frames until one may be given up for another
+  static constexpr std::int64_t kTrial = 60;  // frames before a neighbour may be replaced
 
-  // The nearest others are tried; where there is no room, instead of the least steady.
+  // Adds the nearest markers as neighbours. If the list is full, a new one replaces the neighbour
+  // with the largest variance.
   void look_around(std::span<const Seen> seen, const Seen& one, std::vector<Bond>& bonds) {
     near_.clear();
     for (const Seen& other : seen)

@@ -1,4 +1,4 @@
-// The rigid motion that takes some points nearest to others (least squares; Horn 1987 in space).
+// Least-squares rigid motion between two point sets (in space by quaternions, Horn 1987).
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace asterism {
 struct RigidFit {
   std::array<double, 9> R{1, 0, 0, 0, 1, 0, 0, 0, 1};
   Point from{}, to{};
-  double rms = 0;  // along an axis, of what the fit leaves, for as many numbers as it was not free in
+  double rms = 0;  // residual per axis, corrected for the degrees of freedom of the fit
 
   Point operator()(const Point& a) const {
     Point b = to;
@@ -32,14 +32,14 @@ struct RigidPair {
   double weight = 1;
 };
 
-// Fewer pairs than determine a rotation (three in space, two in the plane) are moved alone.
+// A rotation needs three pairs in space, two in the plane. With fewer, the fit is a translation.
 inline std::size_t least_for_rotation(int D) { return static_cast<std::size_t>(std::max(D, 1)); }
 
 namespace rigid {
 
 using Matrix4 = std::array<std::array<double, 4>, 4>;
 
-// The determinant of M without a row and a column, with its sign.
+// Signed cofactor of M.
 inline double cofactor(const Matrix4& M, int row, int column) {
   const int i = row == 0 ? 1 : 0, j = row <= 1 ? 2 : 1, k = row <= 2 ? 3 : 2;
   const int p = column == 0 ? 1 : 0, q = column <= 1 ? 2 : 1, r = column <= 2 ? 3 : 2;
@@ -49,9 +49,9 @@ inline double cofactor(const Matrix4& M, int row, int column) {
   return (row + column) % 2 == 0 ? det : -det;
 }
 
-// The same as `top_vector` where its eigenvalue stands alone, ten times faster: Newton's method on
-// the characteristic polynomial of a matrix of trace 0, down from a bound that is close where the
-// fit is good (Theobald 2005). False where it does not.
+// The same as `top_vector` if the largest eigenvalue is simple, but ten times faster: Newton's
+// method on the characteristic polynomial of a matrix of trace 0, from an upper bound that is close
+// if the fit is good (Theobald 2005). Returns false if it does not converge.
 inline bool top_vector_from(double bound, const Matrix4& M, std::array<double, 4>& v) {
   double squares = 0, cubes = 0;  // tr M², tr M³
   for (int i = 0; i < 4; ++i)
@@ -95,7 +95,7 @@ inline bool top_vector_from(double bound, const Matrix4& M, std::array<double, 4
   return true;
 }
 
-// The unit vector that makes vᵀ M v greatest, by Jacobi's rotations.
+// The unit vector that maximises vᵀ M v, by Jacobi rotations.
 inline std::array<double, 4> top_vector(Matrix4 M) {
   Matrix4 V{};
   for (int i = 0; i < 4; ++i) V[i][i] = 1;
@@ -142,7 +142,7 @@ inline std::array<double, 9> rotation(const std::array<double, 4>& q) {
 
 }  // namespace rigid
 
-// Without `may_turn` the points are moved alone.
+// Without `may_turn` the fit is a translation.
 inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D, bool may_turn = true) {
   RigidFit fit;
   double all = 0;
@@ -190,7 +190,7 @@ inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D, bool may_turn
   return fit;
 }
 
-// tr([d]× J⁻¹ [d]×ᵀ), infinite where the points lie in a line with each other.
+// tr([d]× J⁻¹ [d]×ᵀ); infinite for collinear points.
 inline double turning_variance(std::span<const RigidPair> pairs, const Point& mean, const Point& d,
                                int D) {
   constexpr double never = std::numeric_limits<double>::infinity();

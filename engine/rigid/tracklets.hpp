@@ -1,4 +1,4 @@
-// Fragments of tracks, the markers that are made of them, and the frames in which they were seen lately.
+// Tracklets, the markers composed of them, and the latest frames in which they were detected.
 #pragma once
 
 #include <algorithm>
@@ -14,20 +14,20 @@
 
 namespace asterism {
 
-// What was decided of a fragment.
+// The decision on a tracklet: to which marker it belongs.
 struct Decision {
   static constexpr std::int32_t kOpen = -1, kGhost = -2;
   std::int32_t fragment = 0;
   std::int32_t marker = kOpen;
-  std::int32_t after = -1;      // the fragment that it goes on with, -1 of a new marker
-  double probability = 1;       // that it does
+  std::int32_t after = -1;      // the tracklet that it continues, -1 for a new marker
+  double probability = 1;       // of that decision
 };
 
 struct FragmentPoint {
   std::int64_t frame = 0;
   Point at{};
 };
-// A hidden marker's own motion, gone on with by a fragment.
+// Hypothesis that a tracklet continues an occluded marker, with the filter state under it.
 struct Continuation {
   std::int32_t marker = 0;
   MotionState state;
@@ -38,22 +38,23 @@ struct Fragment {
   std::int32_t marker = Decision::kOpen;
   std::int64_t first = 0, last = 0;
   std::int32_t n = 0;
-  std::vector<FragmentPoint> sights;  // until it is decided upon
+  std::vector<FragmentPoint> sights;  // until a decision
   MotionState state;         // while its motion is compared
-  double alone = 0;  // log likelihood of its second detection and those after
+  double alone = 0;  // log likelihood of its second and later detections as a new marker
   std::vector<Continuation> continuations;
-  double known = 0;  // how well its neighbours knew its links, on average
-  std::int32_t guess = -1;  // the hidden marker that it may be, while nothing is decided
-  std::vector<std::pair<std::int32_t, double>> guesses;  // all that it may be, and what speaks for it
+  double known = 0;  // average accuracy with which its neighbours predicted its links
+  std::int32_t guess = -1;  // best candidate among the occluded markers, while undecided
+  // all candidates with their log-likelihood ratios
+  std::vector<std::pair<std::int32_t, double>> guesses;
 };
 struct Marker {
   std::int32_t fragment = -1;
-  std::int64_t label = -1;  // of that
+  std::int64_t label = -1;  // of that tracklet
   std::int64_t last = 0;
-  MotionState state;            // now, while it is hidden
-  std::vector<Anchor> anchors;  // as well
+  MotionState state;            // predicted to the newest frame, while occluded
+  std::vector<Anchor> anchors;  // while occluded
   bool is_hidden = false;
-  double trust = 3;  // how well its neighbours carried it lately, while it was seen
+  double trust = 3;  // how well its neighbours predicted it lately, while it was detected
 };
 using Fragments = std::map<std::int32_t, Fragment>;
 using Markers = std::map<std::int32_t, Marker>;
@@ -62,10 +63,10 @@ struct Frame {
   struct One {
     std::int32_t fragment = 0;
     Point at{};
-    std::int32_t point = 0;  // its number in the frame
+    std::int32_t point = 0;  // index in the frame
   };
-  MotionStep step;        // to it
-  std::vector<One> seen;  // in order of fragments
+  MotionStep step;        // the step that leads to the frame
+  std::vector<One> seen;  // by increasing tracklet
 
   const Point* find(std::int32_t fragment) const {
     const auto at = std::lower_bound(seen.begin(), seen.end(), fragment,
@@ -78,20 +79,21 @@ struct Frame {
   }
 };
 
-// Copies share their frames: only the newest is worked on, by the copy that has added it.
+// The latest frames. Copies share them: only the newest frame is modified, and only by the copy
+// that added it.
 class RecentFrames {
  public:
   std::int64_t now() const { return now_; }
   Frame& newest() { return *frames_.back(); }
   const Frame& newest() const { return *frames_.back(); }
-  // None where it is too long ago.
+  // Null if the frame is no longer kept.
   const Frame* find(std::int64_t t) const {
     const std::int64_t back = now_ - t;
     return back >= 0 && back < static_cast<std::int64_t>(frames_.size())
                ? frames_[frames_.size() - 1 - static_cast<std::size_t>(back)].get()
                : nullptr;
   }
-  // How a fragment moves now, by all that is remembered of it.
+  // The present motion state of a tracklet, filtered over the kept frames.
   MotionState motion(const MotionModel& m, std::int32_t fragment) const {
     MotionState state;
     bool has_begun = false;

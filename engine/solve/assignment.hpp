@@ -1,8 +1,9 @@
-// Exact sparse assignment: the pairing with the greatest sum of gains; anyone may stay alone.
+// Exact sparse assignment: finds the pairing with the largest sum of gains. Rows and columns may
+// stay unassigned.
 //
-// Successive shortest augmenting paths (Jonker & Volgenant 1987) on the candidates alone. Every
-// row owns a dummy column of cost 0, its right to stay alone, so a perfect matching of the rows
-// always exists and costs that are no better than 0 are never taken.
+// Successive shortest augmenting paths (Jonker & Volgenant 1987) over the candidates alone. Every
+// row has a dummy column of cost 0, which stands for no assignment. A perfect matching of the rows
+// therefore always exists, and no candidate without a positive gain is taken.
 //
 //   c_ij = -gain   u_i, v_j  potentials with c_ij - u_i - v_j ≥ 0, = 0 on matched pairs
 #pragma once
@@ -21,8 +22,8 @@ namespace asterism {
 
 class Assignment {
  public:
-  // match[row] becomes the column of each row of `group`, which is ordered by row; rows that stay
-  // alone are left untouched.
+  // Sets match[row] to the column of each assigned row of `group`, which must be ordered by row.
+  // Unassigned rows are left unchanged.
   void solve(std::span<const Candidate> group, std::span<std::int32_t> match) {
     if (group.size() == 1) {
       if (group[0].gain > 0) match[group[0].row] = group[0].column;
@@ -42,7 +43,7 @@ class Assignment {
       if (column_of_[i] != kAlone) match[by_.rows[i]] = by_.columns[column_of_[i]];
   }
 
-  // Group by group; match[row] is -1 where a row stays alone.
+  // Solves group by group. match[row] stays -1 for an unassigned row.
   void solve_groups(std::span<const Candidate> candidates, std::int32_t n_columns,
                     std::vector<std::int32_t>& match) {
     const Groups groups =
@@ -50,8 +51,8 @@ class Assignment {
     for (std::size_t g = 0; g < groups.size(); ++g) solve(groups[g], match);
   }
 
-  // Also writes what each column of the group is worth to whoever has it: no pairing has a greater
-  // sum of gains than Σ price_j + Σ_i max(0, max_j gain_ij - price_j), and the best has just that.
+  // Also writes the dual price of each column of the group. No pairing has a larger sum of gains
+  // than Σ price_j + Σ_i max(0, max_j gain_ij - price_j); the best pairing attains it.
   void solve(std::span<const Candidate> group, std::span<std::int32_t> match,
              std::span<double> price) {
     solve(group, match);
@@ -123,7 +124,7 @@ class Assignment {
     flip(start, end_row, end_column);
   }
 
-  // Each row on the path takes the column that it reached, and frees its old one.
+  // Augments: each row on the path takes the column that it reached and releases its old one.
   void flip(std::int32_t start, std::int32_t row, std::int32_t column) {
     for (;;) {
       const std::int32_t old = column_of_[row];
@@ -136,7 +137,7 @@ class Assignment {
   }
 
   using HeapItem = std::pair<double, std::int32_t>;
-  std::span<const Candidate> group_;  // while it is solved
+  std::span<const Candidate> group_;  // of the current solve
   GroupNumbering by_;
   std::vector<std::int32_t> column_of_, row_of_, from_;
   std::vector<double> u_, v_, distance_;

@@ -1,9 +1,9 @@
-// Of all joint events of a group that share out the same detections among the same tracks, only the
-// likeliest: a guard against coalescence (JPDA*, Blom & Bloem 2000).
+// Enumerates the joint events of a group and keeps the best permutation for each set of tracks and
+// detections. This prevents track coalescence in JPDA (JPDA*, Blom & Bloem 2000).
 //
-// The mean over events that differ by who is who pulls tracks that run side by side together, until
-// they are one. Pruned to the best permutation of each kind, the events that are left still tell
-// which detections are clutter and which tracks were missed, and pull nobody.
+// Averaging over events that permute the same tracks and detections draws neighbouring tracks
+// together until they coincide. The best permutations still give the probabilities of clutter and
+// of missed detections, and they cause no such bias.
 #pragma once
 
 #include <algorithm>
@@ -20,10 +20,11 @@ namespace asterism {
 class BestPermutations {
  public:
   static constexpr std::size_t kMostEvents = 20'000;
-  static constexpr double kNegligible = 25;  // nats below the best event: not worth a thought
+  // nats below the best event; events further below are ignored
+  static constexpr double kNegligible = 25;
 
-  // Weights of the group's pairings after pruning; false where the group has too many events.
-  // `match` is the best event.
+  // Computes the weights of the group's pairings after pruning. Returns false if the group has too
+  // many events. `match` is the best event.
   bool solve(std::span<const Candidate> group, std::span<const std::int32_t> match,
              std::vector<double>& weights) {
     group_ = group;
@@ -62,10 +63,10 @@ class BestPermutations {
   struct Event {
     std::uint64_t tracks, columns;
     double gain;
-    std::size_t first;  // of its choices
+    std::size_t first;  // index of its first choice
   };
 
-  // The most that the rows from each on could win.
+  // Upper bounds of the gain of each row and all rows after it.
   void list_most() {
     most_.assign(by_.rows.size() + 1, 0);
     for (std::size_t r = by_.rows.size(); r-- > 0;) {

@@ -1,5 +1,5 @@
-// Connected components of a bipartite graph: what shares no candidate, or no resource, can be solved
-// apart.
+// Connected components of a bipartite graph. Components share no candidate or resource and can be
+// solved separately.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@
 
 namespace asterism {
 
-// One possible pairing of a track (row) with a detection (column).
+// A possible pairing of a track (row) with a detection (column).
 struct Candidate {
   std::int32_t row = 0, column = 0;
-  double gain = 0;       // nats won by the pairing over leaving both alone
+  double gain = 0;       // log-likelihood ratio of the pairing against leaving both unassigned
   double distance2 = 0;  // squared distance of prediction and detection
 };
 
-// Candidates ordered by group, groups by their first row: group g is order[starts[g]:starts[g+1]],
-// and sources are the places of its candidates in the list that was grouped.
+// Candidates ordered by group, and groups by their first row. Group g is
+// order[starts[g]:starts[g+1]]; `sources` are the indices of its candidates in the input list.
 struct Groups {
   std::vector<Candidate> order;
   std::vector<std::int32_t> sources, starts;
@@ -59,8 +59,9 @@ inline Groups connected_groups(std::span<const Candidate> candidates, std::int32
   return groups;
 }
 
-// Items that share a resource, directly or through others: sets of their numbers, each rising, in the
-// order of their first items. `each_use(item, visit)` calls visit(resource) for what an item uses.
+// Groups items that share a resource, directly or through other items. Each group is increasing,
+// and groups are ordered by their first item. `each_use(item, visit)` calls visit(resource) for
+// each resource of an item.
 template <typename EachUse>
 std::vector<std::vector<std::int32_t>> connected_sets(std::size_t n_items, std::size_t n_resources,
                                                       EachUse&& each_use) {

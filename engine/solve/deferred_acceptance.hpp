@@ -1,8 +1,8 @@
 // Stable marriage with unequal numbers and unacceptable partners (Gale & Shapley 1962).
 //
-// The proposers' lists are ranked, best first; a list ends where partners become unacceptable. A
-// receiver compares suitors by a cost, least first; equal costs go to the lower number. The outcome
-// is the stable matching that is best for every proposer at once, whatever the order of proposals.
+// The list of a proposer is ranked, best first, and ends where partners become unacceptable. A
+// receiver prefers the proposer with the lower cost, and at equal cost the one with the lower
+// number. The result is the proposer-optimal stable matching, whatever the order of the proposals.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@ namespace asterism {
 
 struct Proposal {
   std::int32_t receiver = 0;
-  double cost = 0;  // how the receiver ranks this proposer, least first
+  double cost = 0;  // the receiver prefers the lowest cost
 };
 
-// Proposer p may propose to lists[first[p]:first[p+1]] in that order. Fills partner_of_proposer
-// (-1 where alone) and returns the number of proposals made.
+// Proposer p may propose to lists[first[p]:first[p+1]] in that order. Fills partner_of_proposer (-1
+// if unmatched) and returns the number of proposals made.
 inline std::int64_t deferred_acceptance(std::span<const Proposal> lists,
                                         std::span<const std::int64_t> first,
                                         std::int32_t n_receivers,
@@ -29,8 +29,8 @@ inline std::int64_t deferred_acceptance(std::span<const Proposal> lists,
   std::int64_t n_proposals = 0;
   for (std::int32_t p = 0; p < n_proposers; ++p) {
     partner_of_proposer[p] = -1;
-    // Follow the chain of rejections that p's proposals set off until someone stays alone or the
-    // last one rejected finds a free partner.
+    // Follow the chain of rejections that p's proposals cause, until a rejected proposer has no
+    // further proposal or finds a free receiver.
     std::int32_t suitor = p;
     while (suitor >= 0 && next[suitor] < first[suitor + 1]) {
       const Proposal& offer = lists[next[suitor]++];

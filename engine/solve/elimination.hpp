@@ -1,11 +1,11 @@
-// In which order to sum the vertices of a graph out of its weighted matchings.
+// Chooses the order in which vertices are summed out of the weighted matchings of a graph.
 //
 //   Z = Σ over matchings  Π_{matched edges} weight_e · Π_{unmatched vertices} alone_v
 //
-// A vertex is summed out by choosing its partner among the neighbours that are left, or none. What
-// must be remembered between two steps is which of the *frontier*, the vertices left that have a
-// neighbour already gone, are used: a set of at most 2^frontier states. Both sides of the graph are
-// treated alike, so three tracks with forty detections cost 2^3 states and not 2^40.
+// A vertex is summed out over its partners among the remaining neighbours and over being unmatched.
+// The state between two steps is the set of used vertices of the *frontier*: the remaining vertices
+// that have an eliminated neighbour. There are at most 2^frontier states. Both sides of the graph
+// are treated alike, so three tracks with forty detections need 2^3 states and not 2^40.
 #pragma once
 
 #include <algorithm>
@@ -31,13 +31,13 @@ struct MatchingGraph {
 struct EliminationStep {
   std::int32_t vertex = 0;
   bool is_active = false;              // in the frontier before the step
-  std::vector<Link> links;             // to the vertices left, whose bits the step may set
+  std::vector<Link> links;             // to the remaining vertices, whose bits the step may set
   std::vector<std::int32_t> entering;  // vertices that the step adds to the frontier
 };
 
 struct Elimination {
   std::vector<EliminationStep> steps;
-  std::int32_t peak = 0;  // largest frontier
+  std::int32_t peak = 0;  // size of the largest frontier
   double work = 0;        // multiplications of one pass
 };
 
@@ -45,13 +45,13 @@ class EliminationOrder {
  public:
   explicit EliminationOrder(const MatchingGraph& graph) : graph_(graph) {}
 
-  // The cheapest of several greedy orders, one from each promising first vertex.
+  // The cheapest of several greedy orders, each from another promising first vertex.
   Elimination best() {
     Elimination best;
     for (const std::int32_t start : starts()) {
       Elimination e = greedy(start);
       if (best.steps.empty() || e.work < best.work) best = std::move(e);
-      if (best.peak <= kSmallFrontier) break;  // looking further costs more than it saves
+      if (best.peak <= kSmallFrontier) break;  // more trials would cost more than they save
     }
     return best;
   }
@@ -59,7 +59,7 @@ class EliminationOrder {
  private:
   static constexpr std::int32_t kSmallFrontier = 6, kManyStarts = 16;
 
-  // Where a narrow graph ends, vertices of few neighbours, and one of many.
+  // First vertices to try: an end of the graph, vertices of low degree, and one of high degree.
   std::vector<std::int32_t> starts() const {
     std::vector<std::int32_t> all(graph_.size());
     std::iota(all.begin(), all.end(), 0);
@@ -89,7 +89,8 @@ class EliminationOrder {
     return queue.back();
   }
 
-  // Always the vertex that leaves the smallest frontier; of equals the one met first.
+  // Always eliminates the vertex that leaves the smallest frontier. Ties go to the vertex that was
+  // met first.
   Elimination greedy(std::int32_t start) {
     const std::int32_t n = graph_.size();
     is_gone_.assign(n, 0);
@@ -111,7 +112,7 @@ class EliminationOrder {
         if (!is_active_[l.to]) step.entering.push_back(l.to);
       }
       is_gone_[v] = 1;
-      if (!is_active_[v]) enter(v);  // for the counts of its neighbours only
+      if (!is_active_[v]) enter(v);  // only to update the counts of its neighbours
       for (const std::int32_t u : step.entering) enter(u);
       frontier += static_cast<std::int32_t>(step.entering.size()) - step.is_active;
       e.peak = std::max(e.peak, frontier);
@@ -137,7 +138,7 @@ class EliminationOrder {
     }
   }
 
-  // The graph is connected, so while vertices are left, some are near.
+  // The graph is connected, so some remaining vertex is always near.
   std::int32_t next() {
     std::size_t kept = 0;
     std::int32_t best = -1, least = 0;
@@ -156,7 +157,8 @@ class EliminationOrder {
 
   const MatchingGraph& graph_;
   std::vector<char> is_gone_, is_active_, is_near_;
-  std::vector<std::int32_t> fresh_;  // neighbours that are not in the frontier, nor gone
+  // number of neighbours that are neither in the frontier nor eliminated
+  std::vector<std::int32_t> fresh_;
   std::vector<std::int32_t> near_;   // candidates: the frontier and its neighbours
 };
 

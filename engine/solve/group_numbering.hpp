@@ -1,4 +1,4 @@
-// Small consecutive numbers for the rows and columns of a group of candidates.
+// Consecutive numbers for the rows and columns of a group of candidates.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 namespace asterism {
 
 struct GroupNumbering {
-  std::vector<std::int32_t> rows, columns;      // of the caller, by number, rising
-  std::vector<std::int32_t> first;              // the candidates of row i are first[i] to first[i + 1]
+  std::vector<std::int32_t> rows, columns;      // of the caller, by number, increasing
+  std::vector<std::int32_t> first;  // the candidates of row i are first[i] to first[i + 1]
   std::vector<std::int32_t> row_of, column_of;  // numbers, by candidate
 
   std::int32_t n_rows() const { return static_cast<std::int32_t>(rows.size()); }

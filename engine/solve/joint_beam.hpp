@@ -1,14 +1,14 @@
-// Marginals of weighted matchings where the frontier is too wide for solve/joint_exact.hpp: the same
-// sum over the heaviest states alone, with a proof of how much is missing.
+// Marginals of weighted matchings whose frontier is too wide for solve/joint_exact.hpp: the same
+// sum over the heaviest states only, with a proven bound of the omitted mass.
 //
-//   F(s) ≤ what the kept states lead to at s;  B(s) ≤ U(s);  dropped mass D ≤ Σ_dropped F(s) U(s)
-//   the kept events have mass Z, all have Z + D, and so the distribution over the kept is off by a
-//   total variation of D / (Z + D)
+//   F(s) ≤ mass that reaches state s;  B(s) ≤ U(s);  dropped mass D ≤ Σ_dropped F(s) U(s)
+//   the kept events have mass Z and all events at most Z + D, so the total variation between the
+//   two distributions is at most D / (Z + D)
 //
-// U comes from a backward pass that follows the use of some vertices and forgets that of the others,
-// taking for a forgotten one the better of both cases whenever it is summed out. It is tight when
-// the weights are scaled first so that a track's options sum to 1 and so, where wanted by more than
-// one, do a detection's: of all scalings this one makes the bound without memory the least.
+// U comes from a backward pass that tracks the use of some vertices only. For an untracked vertex
+// it takes the larger value of used and unused when the vertex is summed out. The bound is tightest
+// if the weights are scaled first: the options of a track sum to 1, and so do those of a detection
+// that several tracks compete for.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,8 @@ namespace asterism {
 template <std::size_t W>
 class JointBeam {
  public:
-  // `partner` is the best matching, which is never dropped; vertices below `n_tracks` are tracks.
+  // `partner` is the best matching, whose states are never dropped. Vertices below `n_tracks` are
+  // tracks.
   JointBeam(const MatchingGraph& graph, const Elimination& elimination, std::int32_t n_tracks,
             std::span<const std::int32_t> partner, std::int64_t max_states)
       : graph_(graph), steps_(elimination.steps), partner_(partner), max_states_(max_states) {
@@ -51,7 +52,7 @@ class JointBeam {
     best_.assign(1, Set{});
     std::int64_t n_all_dropped = 0;
     double log_all_dropped = -std::numeric_limits<double>::infinity();
-    // Some layers are kept and the others made again, as in solve/joint_exact.hpp.
+    // Some layers are kept and the others are recomputed, as in solve/joint_exact.hpp.
     const auto stride = static_cast<std::size_t>(std::sqrt(static_cast<double>(n)));
     for (std::size_t t = 0; t < n; ++t) {
       const auto [log_dropped, n_dropped] = prune(t);
@@ -81,13 +82,13 @@ class JointBeam {
 
   static constexpr std::int32_t kMostFollowed = 16, kBalanceRounds = 200;
   static constexpr double kNothing = 1e-17;  // an error far below rounding
-  static constexpr double kRounding = 1e-7;  // far above the rounding of a log of a mass
+  static constexpr double kRounding = 1e-7;  // far above the rounding of the log of a mass
 
   static double log_of(double value, std::int64_t exponent) {
     return std::log(value) + static_cast<double>(exponent) * std::log(2.0);
   }
 
-  // The power of two that brings the largest value near 1, taken out of all.
+  // Divides all values by the power of two that brings the largest near 1. Returns its exponent.
   static std::int64_t scale(std::vector<double>& values) {
     const double largest = *std::max_element(values.begin(), values.end());
     if (largest == 0) return 0;
@@ -96,8 +97,8 @@ class JointBeam {
     return exponent;
   }
 
-  // Scale every track's options to sum to 1, and every detection's to sum to 1 unless it is the
-  // more likely unused. Gives the log of what was taken out.
+  // Scales the options of every track to sum to 1. The options of a detection are scaled to sum to
+  // 1 too, unless it is more likely unused. Returns the log of the factor removed.
   double balance(std::int32_t n_tracks) {
     const std::int32_t n = graph_.size();
     std::vector<double> x(n, 1.0);
@@ -121,9 +122,10 @@ class JointBeam {
     return log_scale;
   }
 
-  // A slot for as long as a vertex is in the frontier, and the steps in which it enters and leaves.
-  // The vertex of a step gives its slot back before those that enter take theirs, so that no more
-  // slots are in use than the largest frontier has vertices, which is what W is chosen by.
+  // Assigns a slot to each vertex while it is in the frontier, and records the steps in which it
+  // enters and leaves. The vertex of a step releases its slot before the entering vertices take
+  // theirs. The number of slots is then at most the size of the largest frontier, from which W is
+  // chosen.
   void choose_slots() {
     slot_.assign(graph_.size(), -1);
     enters_.assign(graph_.size(), -1);
@@ -144,7 +146,8 @@ class JointBeam {
     assert(n_slots <= static_cast<std::int32_t>(64 * W));
   }
 
-  // The vertices that are most fought for are followed, while there is room.
+  // The backward pass tracks the vertices with the strongest conflicts, as far as the state limit
+  // allows.
   void choose_followed() {
     const auto n = static_cast<std::int32_t>(steps_.size());
     std::vector<double> conflict(n, 0);
@@ -183,7 +186,7 @@ class JointBeam {
     return static_cast<std::int32_t>(std::find(f.begin(), f.end(), v) - f.begin());
   }
 
-  // U of every layer, over the used sets of the vertices followed.
+  // U of every layer, over the used sets of the tracked vertices.
   void bound_completions() {
     const std::size_t n = steps_.size();
     completion_.resize(n + 1);
@@ -206,7 +209,7 @@ class JointBeam {
         else
           alone += graph_.weight[l.edge];
       }
-      // Where the bits of this layer stand in the next one.
+      // Positions of the bits of this layer in the next one.
       std::vector<std::size_t> image;
       std::size_t own = 0;
       for (std::size_t k = 0; k < followed_[t].size(); ++k) {
@@ -229,20 +232,20 @@ class JointBeam {
         before[s] = value;
       }
       completion_exponent_[t] = completion_exponent_[t + 1] + scale(before);
-      // What is too small for a double still counts for something.
+      // A value that underflowed must still count in the bound.
       for (double& x : before) x = std::max(x, std::numeric_limits<double>::min());
     }
   }
 
-  // Keep so many states of layer t that their successors are no more than max_states. Gives the log
-  // of a bound of the mass dropped and the number of states.
+  // Limits layer t to so many states that their successors number at most max_states. Returns the
+  // log of a bound of the dropped mass, and the number of dropped states.
   std::pair<double, std::int64_t> prune(std::size_t t) {
     const Set& best = best_[t];
     Layer& layer = layers_[t];
     const std::size_t n_next = steps_[t].links.size() + 1;
     const std::size_t room =
         std::max<std::size_t>(1, static_cast<std::size_t>(max_states_) / n_next);
-    // What underflow may lose in this step: F and U are at most about 1.
+    // Mass that underflow may lose in this step: F and U are at most about 1.
     const auto n_lost = static_cast<double>(layer.sets.size() * (n_next + 1));
     double dropped = 4 * n_lost * std::numeric_limits<double>::min();
     const std::int64_t exponent = layer.exponent + completion_exponent_[t];
@@ -326,7 +329,8 @@ class JointBeam {
     }
   }
 
-  // visit(state, next set, weight, option): -2 used already, -1 alone, else the link's number.
+  // Calls visit(state, next set, weight, option) with option -2 for a used vertex, -1 for an
+  // unmatched one, else the number of the link.
   template <typename Visit>
   void each_choice(std::size_t t, const Visit& visit) const {
     const EliminationStep& step = steps_[t];
@@ -350,7 +354,7 @@ class JointBeam {
     }
   }
 
-  // What the best matching uses after step t.
+  // The used set of the best matching after step t.
   void advance(std::size_t t) {
     const EliminationStep& step = steps_[t];
     Set best = best_[t];

@@ -1,4 +1,5 @@
-// Group by group: alone where nobody competes, exactly where few states do, by a beam beyond.
+// Solves the joint events group by group: in closed form for a single track, exactly if the states
+// are few, otherwise by a beam search.
 #include "solve/joint_events.hpp"
 
 #include <algorithm>
@@ -14,7 +15,8 @@ namespace asterism {
 
 namespace {
 
-// Prices on a grid: sums of two are exact, and so is their difference to a weight near them.
+// Rounds a price to a grid, so that the sum of two prices, and its difference to a similar weight,
+// are exact.
 double snap(double x) {
   constexpr double grid = 1 << 20;
   return std::abs(x) < grid * grid ? std::nearbyint(x * grid) / grid : x;
@@ -27,8 +29,8 @@ bool is_finite(const MatchingMarginals& result) {
          std::all_of(result.alone.begin(), result.alone.end(), finite);
 }
 
-// Where the range of doubles does not do after all, which takes hundreds of tracks in one group:
-// the best event alone, which weighs 1. It is nobody's approximation, and the bound says so.
+// Fallback for groups of hundreds of tracks that exceed the range of doubles. Returns the best
+// event alone, with weight 1. The bound is 1, because nothing is known of the omitted mass.
 MatchingMarginals only_best(const MatchingGraph& graph, std::int32_t n,
                             std::span<const std::int32_t> partner) {
   MatchingMarginals out;
@@ -43,8 +45,8 @@ MatchingMarginals only_best(const MatchingGraph& graph, std::int32_t n,
   return out;
 }
 
-// The least prices p ≥ 0 at which everyone is content with the best event, and what is then left
-// to each track. They rise from 0 and, as the event is the best, come to rest.
+// The smallest prices p ≥ 0 at which every track prefers its detection in the best event, and the
+// remaining gain of each track. Prices rise from 0 and converge because the event is optimal.
 void price(std::span<const Candidate> group, const GroupNumbering& by,
            std::span<const std::int32_t> partner, std::span<double> left, std::span<double> p) {
   const std::int32_t n = by.n_rows();
@@ -55,7 +57,8 @@ void price(std::span<const Candidate> group, const GroupNumbering& by,
     left[i] = partner[i] < 0 ? 0 : group[own[i]].gain - p[partner[i] - n];
   };
   for (std::int32_t i = 0; i < n; ++i) content(i);
-  // Rounding may keep ties rising by nothing at all: any prices do, so the rounds are counted.
+  // Rounding may let ties rise for ever, so the rounds are limited. Any prices give correct
+  // results.
   bool is_rising = true;
   for (std::int32_t round = 0; round <= n && is_rising; ++round) {
     is_rising = false;
@@ -82,7 +85,7 @@ JointSummary JointEvents::solve(std::span<double> marginals, std::span<double> m
   for (const Candidate& c : groups_.order) has_any[c.row] = 1;
   for (std::int32_t i = 0; i < n_; ++i)
     if (!has_any[i]) summary_.log_total += log_miss_[i];
-  double log_exact = 0;  // of the share of events that were summed
+  double log_exact = 0;  // log of the fraction of the events that was summed
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     assignment_.solve(groups_[g], best_);
     const double bound = is_single(g) ? solve_single(g) : solve_group(g);

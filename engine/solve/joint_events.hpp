@@ -1,11 +1,12 @@
 // Joint association events of tracks and detections: marginals, total weight and the best event.
 //
-//   w_ij  track i has detection j, w_i0 a miss;  event: every track one of them, no detection twice
+//   w_ij  weight of track i with detection j, w_i0 of a miss;
+//         an event gives every track one of them and uses no detection twice
 //   g_ij = log w_ij - log w_i0   the gain of a pairing over a miss
-//   u_i + p_j ≥ log w_ij, u_i ≥ log w_i0, p_j ≥ 0   prices; equal on what the best event takes
+//   u_i + p_j ≥ log w_ij, u_i ≥ log w_i0, p_j ≥ 0   dual prices; equal on the best event
 //
-// Divided by the prices every factor is at most 1 and the best event weighs exactly 1, so that plain
-// doubles do: what underflows is nothing against the total.
+// Divided by the prices, every factor is at most 1 and the best event weighs exactly 1. Plain
+// doubles therefore suffice: a term that underflows is negligible against the total.
 #pragma once
 
 #include <cstdint>
@@ -26,13 +27,14 @@ struct FrontierLimit : std::runtime_error {
 
 struct JointSummary {
   double log_total = 0, bound = 0;
-  std::int64_t n_states = 1, n_beams = 0;  // most states of a layer; groups that were not exact
+  // largest number of states of a layer; groups that were not solved exactly
+  std::int64_t n_states = 1, n_beams = 0;
 };
 
 class JointEvents {
  public:
-  // Pairings ordered by row, each with its gain; `log_weights` are the w of the pairings, as a gain
-  // may have lost digits where logs are great.
+  // Pairings ordered by row, each with its gain. `log_weights` are the log w of the pairings,
+  // passed separately because a gain loses digits if the logs are large.
   JointEvents(std::span<const Candidate> pairings, std::span<const double> log_weights,
               std::span<const double> log_miss, std::int32_t n_columns, std::int64_t max_states)
       : log_weights_(log_weights),
@@ -41,8 +43,8 @@ class JointEvents {
         n_(static_cast<std::int32_t>(log_miss.size())),
         groups_(connected_groups(pairings, n_, n_columns)) {}
 
-  // Marginals of the pairings and of each row's miss; `best` gets the column of each row, -1 for a
-  // miss.
+  // Writes the marginals of the pairings and of each row's miss. `best` receives the column of each
+  // row, -1 for a miss.
   JointSummary solve(std::span<double> marginals, std::span<double> missed,
                      std::span<std::int32_t> best);
 
@@ -58,7 +60,7 @@ class JointEvents {
 
   bool is_single(std::size_t g) const { return groups_[g].front().row == groups_[g].back().row; }
 
-  // A track that shares its detections with nobody has one of them or none.
+  // A track that competes with no other has one of its detections or none.
   double solve_single(std::size_t g);
   double solve_group(std::size_t g);
   MatchingMarginals sum(const MatchingGraph& graph, std::int32_t n,

@@ -1,13 +1,13 @@
-// Marginals of all weighted matchings of a connected graph, exactly: forward and backward over the
-// used sets of the frontier (solve/elimination.hpp).
+// Exact marginals of all weighted matchings of a connected graph: a forward and a backward pass
+// over the used sets of the frontier (solve/elimination.hpp).
 //
-//   F_t(s)  weight of all that the steps before t may have chosen, leaving the frontier used as s
-//   B_t(s)  weight of all that the steps from t on may choose, given s
+//   F_t(s)  total weight of the choices of the steps before t that leave the used set s
+//   B_t(s)  total weight of the choices of the steps from t on, given s
 //   P(edge (v, u)) = Σ_{s: v, u free} F_t(s) weight_vu B_{t+1}(s + u) / Σ_s F_t(s) B_t(s)
 //
-// Layers are dense arrays over bit masks. Layers are scaled by powers of two, so that the largest
-// value is near 1. Of the F_t, only some are kept and the others made again, which holds the memory
-// at about 2 sqrt(all · largest) instead of all.
+// Layers are dense arrays over bit masks, scaled by powers of two so that the largest value is near
+// 1. Only some of the F_t are kept and the others are recomputed. The memory is then about 2
+// sqrt(all · largest) instead of all.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@ struct MatchingMarginals {
   std::vector<double> edge;   // probability that an edge is matched
   std::vector<double> alone;  // probability that a vertex is unmatched
   double log_total = 0;
-  double bound = 0;  // of the total variation between the distribution that was summed and all
+  double bound = 0;  // of the total variation between the summed distribution and the full one
   std::int64_t n_states = 1;
 };
 
@@ -92,15 +92,15 @@ class JointExact {
     std::int32_t bit, edge;
   };
 
-  // `bit` is the vertex's own in the layer before, -1 where it is not in the frontier; without it
-  // the layer before has n_base bits, and the bits of those that enter follow above them.
+  // `bit` is the vertex's own bit in the layer before, -1 if it is not in the frontier. Without
+  // that bit the layer before has n_base bits; the bits of the entering vertices follow above them.
   struct Step {
     std::int32_t vertex = 0, bit = -1, n_base = 0, n_out = 0;
     std::vector<Option> options;
   };
 
-  static constexpr std::int32_t kTileBits = 11;  // tiles that stay in the first cache
-  static constexpr std::size_t kSmall = std::size_t{1} << 22;  // doubles kept without a thought
+  static constexpr std::int32_t kTileBits = 11;  // tiles that stay in the first-level cache
+  static constexpr std::size_t kSmall = std::size_t{1} << 22;  // doubles that are always kept
   static constexpr double kNothing = 1e-17;  // an error far below rounding
 
   std::int32_t n_in(std::int32_t t) const { return steps_[t].n_base + (steps_[t].bit >= 0); }
@@ -137,7 +137,8 @@ class JointExact {
     layer = {};
   }
 
-  // Split a layer by the bit of the vertex itself: where it is free, where it is used.
+  // Splits a layer by the bit of the vertex itself, into the states where it is free and where it
+  // is used.
   void split(std::int32_t t) {
     const Step& step = steps_[t];
     if (step.bit < 0) return;
@@ -151,12 +152,12 @@ class JointExact {
     }
   }
 
-  // No more vertices can be used than steps were made: tiles beyond that are zero.
+  // After n steps at most n vertices are used, so tiles with more bits are zero.
   static bool is_reached(std::size_t tile, std::int32_t n_steps) {
     return std::popcount(tile) <= n_steps;
   }
 
-  // layers_[t + 1] from layers_[t]; gives the power of two taken out.
+  // Computes layers_[t + 1] from layers_[t]. Returns the exponent of the power of two removed.
   std::int64_t forward(std::int32_t t) {
     const Step& step = steps_[t];
     split(t);
@@ -191,8 +192,8 @@ class JointExact {
     return scale(layers_[t + 1]);
   }
 
-  // `before` from `after`, and the marginals of what step t chooses. Gives a bound of the share
-  // that underflow may have lost.
+  // Computes `before` from `after`, and the marginals of step t. Returns a bound of the fraction of
+  // the mass that underflow may have lost.
   double backward(std::int32_t t, const std::vector<double>& after, std::vector<double>& before,
                   MatchingMarginals& marginals) {
     const Step& step = steps_[t];
@@ -247,8 +248,8 @@ class JointExact {
     for (std::size_t i = 0; i < n; ++i) to[i] += w * from[i];
   }
 
-  // to += w · from; gives Σ by · from. Four sums side by side, as the order of one would stop the
-  // machine from doing several at once.
+  // to += w · from; returns Σ by · from. Four partial sums break the dependency chain, so that the
+  // processor adds them in parallel.
   static double add(double* to, const double* from, double w, const double* by, std::size_t n) {
     if (n < 4) {
       double sum = 0;
@@ -279,7 +280,7 @@ class JointExact {
     if (largest == 0) return 0;
     const int exponent = std::ilogb(largest);
     if (exponent == 0) return 0;
-    // In two steps: the inverse of a very small number is no double.
+    // In two factors, because the inverse of a very small number overflows.
     const double a = std::ldexp(1.0, -exponent / 2), b = std::ldexp(1.0, -exponent + exponent / 2);
     for (double& x : layer) x = x * a * b;
     return exponent;

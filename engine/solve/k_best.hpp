@@ -1,10 +1,10 @@
-// The k best assignments, in order (Murty 1968), with the means of Miller, Stone & Cox 1997: each
-// subproblem starts from the solution and the duals of the problem that it is part of and takes one
-// shortest augmenting path; until its turn comes, a lower bound stands for it.
+// The k best assignments in order (Murty 1968), with the improvements of Miller, Stone & Cox 1997.
+// A subproblem starts from the solution and the duals of its parent and needs one shortest
+// augmenting path. Until it is first in the queue, a lower bound stands for its cost.
 //
-//   c_ij    cost, square N × N; the first n rows are those whose assignment tells solutions apart,
-//           the rest fill up and cost nothing
-//   u, v    duals with c_ij - u_i - v_j ≥ 0, = 0 on what is assigned
+//   c_ij    cost, square N × N; two solutions differ if they assign the first n rows differently,
+//           the other rows are padding of cost zero
+//   u, v    duals with c_ij - u_i - v_j ≥ 0, = 0 on assigned pairs
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ class KBest {
   // `cost` is row-major, n × N; all further rows are zero.
   KBest(std::span<const double> cost, std::int32_t n, std::int32_t N) : c_(cost), n_(n), N_(N) {}
 
-  // Goes on to the next best assignment; false where there is none.
+  // Advances to the next best assignment. Returns false if there is none.
   bool next() {
     if (current_.solution)
       split(current_);
@@ -43,7 +43,7 @@ class KBest {
     return false;
   }
 
-  // Of the assignment that `next` went to: its cost, and the column of each of the n rows.
+  // Cost of the current assignment, and the column of each of the n rows.
   double least_cost() const { return current_.cost; }
   std::span<const std::int32_t> columns() const {
     return std::span<const std::int32_t>(current_.solution->column).first(n_);
@@ -51,16 +51,17 @@ class KBest {
 
  private:
   struct Solution {
-    std::vector<std::int32_t> column, row;  // of each row, of each column; -1 where free
+    std::vector<std::int32_t> column, row;  // of each row, of each column; -1 if free
     std::vector<double> u, v;
     explicit Solution(std::int32_t N) : column(N, -1), row(N, -1), u(N, 0), v(N, 0) {}
   };
 
-  // Rows before `n_fixed` keep their columns in the solution; row n_fixed may not have `forbidden`.
+  // Rows before `n_fixed` keep their columns of the solution. Row n_fixed may not take a
+  // `forbidden` column.
   struct Node {
-    double cost = 0;  // of its best solution, or a lower bound of it
+    double cost = 0;  // of its best solution, or a lower bound
     std::int64_t number = 0;
-    std::shared_ptr<const Solution> solution;  // its own, or that of the problem it is part of
+    std::shared_ptr<const Solution> solution;  // its own if solved, else that of its parent
     std::int32_t n_fixed = 0;
     std::vector<std::int32_t> forbidden;
     bool is_solved = false;
@@ -104,8 +105,8 @@ class KBest {
     std::push_heap(queue_.begin(), queue_.end());
   }
 
-  // Shortest augmenting path from row `start` to a free column, over open columns; `forbidden` are
-  // those that `start` may not have. False where there is none.
+  // Finds the shortest augmenting path from row `start` to a free column, over open columns, and
+  // applies it. `start` may not take a `forbidden` column. Returns false if there is no path.
   bool augment(Solution& s, std::int32_t start, std::span<const std::int32_t> forbidden,
                const std::vector<char>& is_open) {
     distance_.assign(N_, kForbidden);
@@ -152,7 +153,7 @@ class KBest {
     return true;
   }
 
-  // Solves a node whose turn has come.
+  // Solves a node that has reached the front of the queue.
   void settle(Node& node) {
     auto own = std::make_shared<Solution>(*node.solution);
     std::vector<char> is_open(N_, 1);
@@ -164,7 +165,8 @@ class KBest {
     push({cost, 0, std::move(own), node.n_fixed, std::move(node.forbidden), true});
   }
 
-  // All but the node's own solution, in parts: rows up to r keep their columns, row r changes its.
+  // Partitions all solutions of a node except its best: in part r, rows before r keep their columns
+  // and row r changes its column.
   void split(const Node& node) {
     const Solution& s = *node.solution;
     std::vector<char> is_open(N_, 1);
@@ -180,8 +182,8 @@ class KBest {
     }
   }
 
-  // A lower bound of what changing row r costs: it must take another column, and its own must be
-  // taken by another row.
+  // A lower bound of the cost of changing row r: the row must take another column, and another row
+  // must take its column.
   double least_more(const Solution& s, std::int32_t r, std::span<const std::int32_t> forbidden,
                     const std::vector<char>& is_open) const {
     double out = kForbidden, in = kForbidden;
@@ -198,7 +200,7 @@ class KBest {
   std::int32_t n_, N_;
   std::int64_t n_nodes_ = 0;
   Node current_;
-  std::vector<Node> queue_;  // a heap, the least cost on top
+  std::vector<Node> queue_;  // a heap with the lowest cost on top
   std::vector<double> distance_;
   std::vector<std::int32_t> from_;
   std::vector<char> is_done_;

@@ -1,7 +1,9 @@
-// The options of the trees of a cluster, resources with prices, and the best packing that is known.
+// Lagrangian relaxation of a set packing: the options of the hypothesis trees of a cluster, dual
+// prices of the resources, and the best packing found so far.
 //
-// At prices an option is worth less by what its resources cost, and no packing is worth more than the
-// sum of all prices and of the best option of each tree (a Lagrangian relaxation).
+// At given prices, the reduced weight of an option is its weight minus the prices of its resources.
+// The sum of all prices and of the largest reduced weight of each tree bounds the weight of every
+// packing.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +15,7 @@
 
 namespace asterism {
 
-// An option of a tree: its log weight, and the resources that it uses.
+// An option of a tree: its log weight and the resources that it uses.
 struct PackingOption {
   double worth = 0;
   std::vector<std::int32_t> uses;
@@ -24,7 +26,7 @@ class PricedOptions {
   static constexpr double kBetter = 1e-9;
 
   struct Packing {
-    std::vector<std::int32_t> own;  // option of each tree, as the caller numbers them
+    std::vector<std::int32_t> own;  // option of each tree, in the caller's numbering
     double worth = 0;
   };
 
@@ -47,7 +49,7 @@ class PricedOptions {
   double most_priced(std::int32_t tree) const {
     return *std::max_element(priced_.begin() + first_[tree], priced_.begin() + first_[tree + 1]);
   }
-  // What no packing is worth more than, at the prices.
+  // Upper bound of the weight of a packing, at the prices.
   double bound() const {
     double sum = 0;
     for (const double x : price_) sum += x;
@@ -56,7 +58,8 @@ class PricedOptions {
   }
   std::int32_t n_trees() const { return static_cast<std::int32_t>(first_.size()) - 1; }
 
-  // Options of every tree by what they are worth at the prices, the best first; who uses what.
+  // Sorts the options of every tree by reduced weight, largest first, and lists the users of each
+  // resource.
   void sort() {
     std::vector<std::int32_t> order(options_.size());
     for (std::size_t o = 0; o < order.size(); ++o) order[o] = static_cast<std::int32_t>(o);
@@ -87,10 +90,11 @@ class PricedOptions {
         std::upper_bound(first_.begin(), first_.end() - 1, option) - first_.begin() - 1);
   }
 
-  // Lowers the bound by a descent on the prices: a resource that several options use becomes dearer,
-  // one that none uses cheaper. The direction is a deflected subgradient (Camerini, Fratta & Maffioli
-  // 1975), the length of a step follows the best known packing (Polyak 1969). The options chosen in a
-  // round are repaired into a packing, which may become the best known one unless that is the best.
+  // Lowers the bound by descent on the prices: the price of a resource rises if several chosen
+  // options use it, and falls if none does. The direction is a deflected subgradient (Camerini,
+  // Fratta & Maffioli 1975), the step length follows the best known packing (Polyak 1969). The
+  // options chosen in a round are repaired into a packing, which may replace the best known one
+  // unless that is proven optimal.
   void set_prices(bool is_best) {
     double least = std::numeric_limits<double>::infinity(), step = 1;
     std::vector<double> price(price_.size(), 0), used(price_.size()), way(price_.size(), 0);
@@ -123,12 +127,13 @@ class PricedOptions {
       if (!(least > known_.worth + kClosed)) break;
       double along = 0, own = 0;
       for (std::size_t r = 0; r < price.size(); ++r) {
-        if (used[r] < 1 && price[r] <= 0) used[r] = 1;  // an unused resource is free already
+        // an unused resource of price zero needs no change
+        if (used[r] < 1 && price[r] <= 0) used[r] = 1;
         along += (1 - used[r]) * way[r];
         own += way[r] * way[r];
         length += (1 - used[r]) * (1 - used[r]);
       }
-      if (length == 0) break;  // no conflict is left, so that the bound is met
+      if (length == 0) break;  // no conflict is left, so the bound is attained
       const double memory = along < 0 && own > 0 ? -1.5 * along / own : 0;
       double size = 0;
       for (std::size_t r = 0; r < price.size(); ++r) {
@@ -162,8 +167,9 @@ class PricedOptions {
     return std::find(list.begin(), list.end(), resource) != list.end();
   }
 
-  // A packing from the options chosen, of which several may want one resource: trees by what these are
-  // worth at the prices, each by its best option that fits; then each by a better one, while there is any.
+  // Makes a packing of the chosen options, of which several may use one resource. Trees take the
+  // best option that fits, in the order of the reduced weights of their chosen options. Then single
+  // trees are improved until none can be.
   std::vector<std::int32_t> repaired(const std::vector<std::int32_t>& chosen) {
     std::vector<std::int32_t> order(n_trees()), out(chosen);
     for (std::int32_t i = 0; i < n_trees(); ++i) order[i] = i;
@@ -209,16 +215,16 @@ class PricedOptions {
   }
 
   std::vector<const PackingOption*> options_;  // by tree, the best first
-  std::vector<double> priced_, price_;         // of options: worth less prices; of resources
-  std::vector<std::int32_t> number_;           // of an option within its tree, as the caller has it
+  std::vector<double> priced_, price_;  // reduced weight of each option; price of each resource
+  std::vector<std::int32_t> number_;  // of an option within its tree, in the caller's numbering
   std::vector<std::vector<std::int32_t>> users_;
   std::vector<std::int32_t> first_, tree_of_;
-  Packing known_;  // the best that was met
+  Packing known_;  // the best packing found so far
   std::vector<char> is_used_;
 
  private:
   static constexpr int kPriceRounds = 300;
-  static constexpr double kClosed = 1e-3;  // a gap that is worth no more rounds
+  static constexpr double kClosed = 1e-3;  // duality gap at which the descent stops
 };
 
 }  // namespace asterism

@@ -1,13 +1,13 @@
-// The best ways for all trees of a cluster to take one option each, no resource twice: weighted set
-// packing, exactly, and the k best in order.
+// Weighted set packing: finds the k best selections of one option per tree of a cluster such that
+// no resource is used twice. The solver is exact within a limit on nodes.
 //
-// Best first. A node allows each tree some of its options and is worth at most the sum of their best
-// ones. Where two of these want one resource, the node is split by who has it; where none do, they are
-// a packing, and the rest of the node is split as Murty does. The parts never overlap, so that every
-// packing comes once.
+// Best-first branch and bound. A node allows some options of each tree; its bound is the sum of the
+// best of them. If two best options use the same resource, the node is split by the owner of that
+// resource. Otherwise they form a packing, and the rest of the node is split as by Murty. The parts
+// are disjoint, so every packing is found once.
 //
-// Where that takes more than a few nodes, the resources get prices (solve/priced_options.hpp), and a node
-// is worth at most the sum of all prices and of its best options at these prices.
+// If that takes more than a few nodes, the resources get prices (solve/priced_options.hpp). The
+// bound of a node is then the sum of all prices and of its largest reduced weights.
 #pragma once
 
 #include <algorithm>
@@ -22,22 +22,23 @@
 namespace asterism {
 
 struct PackingSummary {
-  bool is_exact = true;  // all that were asked for were found within the limit on nodes
-  double bound = 0;      // no packing is worth more than this
+  bool is_exact = true;  // all packings requested were found within the node limit
+  double bound = 0;      // upper bound of the weight of a packing
   std::int64_t n_nodes = 0;
 };
 
 class SetPacking : PricedOptions {
  public:
-  // Options of each tree; each has one that uses nothing, so that there always is a packing.
+  // Options of each tree. Each tree needs an option without resources, so that a packing exists.
   explicit SetPacking(std::span<const std::vector<PackingOption>> trees) : PricedOptions(trees) {}
 
-  // What is lost with an option, by tree and option: no packing that holds it is worth more than the
-  // bound less that. The options of the best packing that is known lose nothing.
+  // For each tree and option, a lower bound of the weight lost by taking that option: a packing
+  // that contains it weighs at most the bound minus that loss. The options of the best known
+  // packing lose nothing.
   struct Losses {
     double bound = 0;
     std::vector<std::vector<double>> of;
-    std::vector<std::int32_t> best;  // option of each tree in the best packing that is known
+    std::vector<std::int32_t> best;  // option of each tree in the best known packing
   };
   Losses losses() {
     const bool is_best = search(1, 0, kUnpriced).is_exact;
@@ -53,7 +54,7 @@ class SetPacking : PricedOptions {
     for (std::int32_t i = 0; i < n_trees(); ++i) {
       const double most = most_priced(i);
       for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
-        loss[o] = std::max(0.0, most - priced_[o]);  // 0 where both are infinite
+        loss[o] = std::max(0.0, most - priced_[o]);  // 0 if both are infinite
         if (number_[o] == known_.own[i]) best[i] = o;
       }
       loss[best[i]] = 0;
@@ -69,8 +70,9 @@ class SetPacking : PricedOptions {
     return out;
   }
 
-  // Calls found(option of each tree, worth) for up to k packings, the best first, none of them more
-  // than `drop` below it. With more than `max_nodes` nodes the best that can be repaired is given.
+  // Calls found(option of each tree, weight) for up to k packings, the best first, none more than
+  // `drop` below the best. If the node limit is reached first, the best repaired packing is
+  // returned.
   template <typename Found>
   PackingSummary solve(std::int64_t k, double drop, std::int64_t max_nodes, Found&& found) {
     PackingSummary summary = search(k, drop, std::min(max_nodes, kUnpriced));
@@ -87,13 +89,13 @@ class SetPacking : PricedOptions {
   }
 
  private:
-  static constexpr std::int64_t kUnpriced = 32;  // nodes before prices are worth their while
+  static constexpr std::int64_t kUnpriced = 32;  // number of nodes before prices are used
   static constexpr int kDives = 32;
 
   struct Node {
     double bound = 0;
     std::int64_t number = 0;
-    bool is_packing = false;            // `chosen` is one, and all there is in the node
+    bool is_packing = false;            // `chosen` is a packing, and the only one in the node
     std::vector<bool> is_banned;        // by option
     std::vector<std::int32_t> chosen;  // best allowed option of each tree
 
@@ -102,13 +104,15 @@ class SetPacking : PricedOptions {
     }
   };
 
-  // Loss of the other trees, at the prices, where a tree takes an option: the larger of what the trees
-  // lose that must release its resources, and the least loss of a tree that takes a released resource.
+  // Loss of the other trees, at the prices, if a tree takes an option. It is the larger of two
+  // bounds: the loss of the trees that must release its resources, and the smallest loss of a tree
+  // that takes a released resource.
   std::vector<double> lost_by_others(const std::vector<double>& loss,
                                      const std::vector<std::int32_t>& best) const {
     constexpr double kNever = std::numeric_limits<double>::infinity();
     std::vector<std::int32_t> owner(price_.size(), -1);
-    std::vector<double> without(price_.size(), 0), taken(price_);  // by resource, of its owner; of others
+    // by resource, of its owner; of others
+    std::vector<double> without(price_.size(), 0), taken(price_);
     for (std::int32_t i = 0; i < n_trees(); ++i)
       for (const std::int32_t r : options_[best[i]]->uses) {
         owner[r] = i;
@@ -192,15 +196,16 @@ class SetPacking : PricedOptions {
       for (const double x : price_) node.bound += x;
       for (const std::int32_t o : node.chosen) node.bound += priced_[o];
     }
-    if (!known_.own.empty() && node.bound < known_.worth - drop_ - kBetter) return;  // no packing in it would count
+    // the node contains no packing that would count
+    if (!known_.own.empty() && node.bound < known_.worth - drop_ - kBetter) return;
     node.number = n_pushed_++;
     heap_.push_back(std::move(node));
     std::push_heap(heap_.begin(), heap_.end());
     if (static_cast<std::int64_t>(heap_.size()) / 2 > n_left_) forget_last();
   }
 
-  // Packings where the search is cut short: from the best nodes that are left, by the best part of each
-  // node down to where nothing is contested, then repaired.
+  // Finds packings when the search is stopped early. From each of the best remaining nodes it
+  // follows the best child until no resource is contested, then repairs the choice.
   void dive(Node node) {
     std::vector<Node> starts = std::exchange(heap_, {});
     for (int n = 0; n < kDives; ++n) {
@@ -221,7 +226,7 @@ class SetPacking : PricedOptions {
     }
   }
 
-  // Drops the nodes that the search cannot reach any more, as it takes the best first and stops after
+  // Drops the nodes that the search can no longer reach: it takes the best first and stops after
   // `max_nodes` nodes and k packings.
   void forget_last() {
     const auto end = heap_.begin() + static_cast<std::ptrdiff_t>(n_left_);
@@ -231,7 +236,7 @@ class SetPacking : PricedOptions {
     std::make_heap(heap_.begin(), heap_.end());
   }
 
-  // Bans an option; false where its tree has none left.
+  // Bans an option. Returns false if its tree has none left.
   bool ban(Node& node, std::int32_t option) const {
     if (node.is_banned[option]) return true;
     node.is_banned[option] = 1;
@@ -241,7 +246,7 @@ class SetPacking : PricedOptions {
     return best < first_[i + 1];
   }
 
-  // A resource that two of the chosen options use, the first of the tree that stands first; or -1.
+  // The smallest resource that two of the chosen options use, or -1.
   std::int32_t conflict(const Node& node) {
     is_used_.assign(users_.size(), 0);
     std::int32_t least = -1;
@@ -276,7 +281,8 @@ class SetPacking : PricedOptions {
     if (is_possible) push(std::move(child));
   }
 
-  // All of the node but what it chooses: trees up to i keep their options, tree i changes its own.
+  // Partitions the node without its chosen packing: in part i, the trees before i keep their
+  // options and tree i changes its own.
   void split_rest(const Node& node) {
     Node kept = node;
     for (std::int32_t i = 0; i < n_trees(); ++i) {
@@ -289,7 +295,7 @@ class SetPacking : PricedOptions {
 
   std::vector<Packing> packings_;
   std::vector<Node> heap_;
-  double drop_ = 0;  // of the search
+  double drop_ = 0;  // of the current search
   std::int64_t n_pushed_ = 0;
   std::int64_t n_left_ = 0;  // nodes that may still be taken
 };

@@ -1,4 +1,4 @@
-// Sets of used vertices as keys, for where all the sets there may be are too many for an array.
+// Hashable sets of used vertices, for frontiers whose sets are too many for an array.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,7 @@ struct UsedSet {
   }
 };
 
-// Sets in the order of their coming, each found by its value (open addressing).
+// Sets in the order of insertion, each found by its value (open addressing).
 template <std::size_t W>
 class SetIndex {
  public:

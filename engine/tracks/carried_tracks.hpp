@@ -1,17 +1,17 @@
-// Bodies between prediction and pairing: believed tracks that are not seen are expected where their
-// neighbours carry them, and neighbours have a say in who takes which point.
+// Uses rigid neighbours in frame-by-frame tracking. Occluded confirmed tracks are predicted from
+// their neighbours, and bonds contribute to ambiguous associations.
 //
-//   1  tracks that were seen in the last frame list their candidates; two that like each other best
-//      tell where the marker is for now
-//   2  by these the hidden ones are placed. The carried place is fused with the track's own prediction
-//      as a measurement of it would be; its own state goes on untouched until the marker is seen, for
-//      places that are carried frame after frame err alike
-//   3  the hidden ones list their candidates, by the fused place or by their own where that is
-//      likelier, and bonds say what they think of those in doubt
+// In each frame, after prediction and before association:
 //
-// A point that comes up for a hidden marker may be a ghost beside it, as well as it: anywhere within
-// half the distance to its nearest neighbour, about. A point that is more like that than like the
-// marker is not taken.
+//   1  Tracks detected in the last frame are gated. A track and a detection that are each other's
+//      best candidate fix the marker's position for this frame.
+//   2  Occluded tracks are predicted from these positions. The predicted position is fused with the
+//      track's own prediction (rigid/carried_state.hpp).
+//   3  Occluded tracks are gated by the fused or by their own prediction, whichever gives the
+//      higher likelihood. Bonds then add a log-likelihood ratio to ambiguous candidates.
+//
+// A detection near an occluded marker may be a ghost, anywhere within about half the distance to
+// its nearest neighbour. A detection that is more likely a ghost than the marker is refused.
 #pragma once
 
 #include <algorithm>
@@ -34,7 +34,7 @@ namespace asterism {
 struct CarryOptions {
   bool is_on = false;
   std::int32_t max_carried = 0;  // frames
-  double bond_weight = 0;        // all that bonds say of a pairing is within ± so many nats
+  double bond_weight = 0;        // bound in nats of the contribution of bonds to a pairing
 };
 
 class CarriedTracks {
@@ -42,15 +42,15 @@ class CarriedTracks {
   CarriedTracks(const MotionModel& m, const ScoreModel& score, const CarryOptions& options)
       : opt_(options), max_gap_(score.max_gap), carrier_(m.axis.D, m.axis.r) {}
 
-  // Predicts every track to a frame and lists its candidates (see LiveTracks::list). `n_open`: frames
-  // before this one of which nothing was learnt yet.
+  // Predicts every track to a frame and lists its candidates (see LiveTracks::list). The last
+  // `n_open` frames before it have not been passed to `learn`.
   template <typename Least, typename Gain>
   void list(LiveTracks<>& live, double time, const MotionStep& step, std::span<const Point> points,
             double least_gain, Least&& least, Gain&& gain, std::vector<Candidate>& out,
             FrameStats& stats, std::int64_t n_open = 0) {
     live.predict_all(step);
     out.clear();
-    // A pairing may become better by what bonds say of it.
+    // Bonds can raise a gain by up to the weight, so the threshold is lowered by it.
     const auto list = [&](auto&& is_asked, std::vector<Candidate>& to) {
       live.list(time, points, least_gain - opt_.bond_weight, is_asked, least, gain, to);
     };
@@ -73,7 +73,7 @@ class CarriedTracks {
     count_refused(least_gain, out, stats);
   }
 
-  // Track i takes a detection at y, or none.
+  // Completes the update of track i: with a detection at y, or without one.
   void take(LiveTracks<>& live, std::size_t i, const Point& y, FrameStats& stats) const {
     if (!is_carried(i)) return;
     ++stats.n_returned;
@@ -91,8 +91,9 @@ class CarriedTracks {
   }
   bool is_carried(std::size_t i) const { return opt_.is_on && s_.is_carried[i]; }
 
-  // What was found by `list`, of track i: where it is carried, and whether that is known well enough to
-  // live by; the hidden one that it is and gives way to, or -1; what bonds say of its pairings in doubt.
+  // Results of `list` for track i: its carried position, whether that position is too uncertain to
+  // keep the track alive, the reappearing track in whose favour it is deleted (or -1), and the
+  // contributions of bonds to its ambiguous candidates.
   struct Told {
     std::int32_t row = 0, column = 0;
     double nats = 0;
@@ -102,7 +103,7 @@ class CarriedTracks {
   std::int32_t heir(std::size_t i) const { return s_.heir[i]; }
   std::span<const Told> told() const { return s_.told; }
 
-  // After a frame.
+  // Updates the bonds after a frame.
   template <typename More>
   void learn(const LiveTracks<More>& live, FrameStats& stats) {
     if (!opt_.is_on) return;
@@ -125,7 +126,8 @@ class CarriedTracks {
 
  private:
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
-  // A place is doubtful that is not known to this share of the distance to the nearest neighbour.
+  // A position is uncertain if its standard deviation exceeds this fraction of the distance to the
+  // nearest neighbour.
   static constexpr double kDoubtful = 0.25;
   static constexpr std::size_t kFew = 3;  // bonds
 
@@ -134,7 +136,7 @@ class CarriedTracks {
     return static_cast<std::int32_t>(track.id);
   }
 
-  // A track and a point that like each other best.
+  // Fixes the positions of tracks and detections that are each other's best candidate.
   void place_seen(const LiveTracks<>& live, std::span<const Point> points,
                   std::span<const Candidate> candidates) {
     s_.best_row.assign(points.size(), -1);
@@ -177,7 +179,7 @@ class CarriedTracks {
       const double doubtful = kDoubtful * found.nearest;
       s_.is_doubtful[i] = !(found.place.variance < doubtful * doubtful);
       s_.is_carried[i] = 1;
-      // As likely as the marker itself, and clutter all the same.
+      // A ghost is given the likelihood of the marker itself, spread over its neighbourhood.
       const int D = live.m.axis.D;
       const double radius = 0.5 * found.nearest;
       s_.ghosts[i] = softplus(-0.5 * D * std::log(2 * std::numbers::pi * radius * radius) -
@@ -185,13 +187,14 @@ class CarriedTracks {
     }
   }
 
-  // The place of the same pairing among candidates in order of their rows, or how many there are.
+  // Index of the same pairing in candidates ordered by row, or their number if it is absent.
   static std::size_t find_same(std::span<const Candidate> all, const Candidate& one) {
     const auto row = std::ranges::equal_range(all, one.row, {}, &Candidate::row);
     const auto at = std::ranges::find(row, one.column, &Candidate::column);
     return at == row.end() ? all.size() : static_cast<std::size_t>(&*at - all.data());
   }
-  // A hidden track may be right by itself where its neighbours are not.
+  // Adds candidates from the tracks' own predictions. The neighbours of an occluded track can be
+  // wrong while its own motion is right.
   void add_alone(std::vector<Candidate>& out) {
     s_.added.clear();
     for (const Candidate& own : s_.alone) {
@@ -205,7 +208,7 @@ class CarriedTracks {
     out.insert(out.end(), s_.added.begin(), s_.added.end());
     std::ranges::stable_sort(out, {}, &Candidate::row);
   }
-  // What ghosts and bonds make of the candidates.
+  // Applies ghosts and bonds to the gains of the candidates.
   void weigh(const LiveTracks<>& live, std::span<const Point> points, double least_gain,
              std::vector<Candidate>& out, FrameStats& stats) {
     s_.n_rows.assign(points.size(), 0);
@@ -229,7 +232,7 @@ class CarriedTracks {
         c.gain += s_.told.back().nats;
       }
       if (is_carried(c.row) && (!(c.gain > s_.ghosts[c.row]) || !may_take(live, c))) c.gain = kNever;
-      // A hidden one's are counted against what it would take by itself.
+      // Occluded tracks are counted in count_refused, against their own predictions.
       stats.n_refused += was_listed && !is_carried(c.row) && !(c.gain > least_gain);
     }
     succeed(live, out);
@@ -239,7 +242,8 @@ class CarriedTracks {
     const std::int32_t owner = s_.owner[c.column];
     return owner < 0 || live[owner].first_time > live[c.row].last_time;
   }
-  // Tracks that are hidden ones come back give way to them.
+  // If a new track is an occluded track reappearing, the new track is deleted and the old one
+  // continues.
   void succeed(const LiveTracks<>& live, std::vector<Candidate>& out) {
     s_.heir.assign(live.size(), -1);
     for (std::int32_t e = 0; e < static_cast<std::int32_t>(out.size()); ++e) {
@@ -262,19 +266,19 @@ class CarriedTracks {
       if (s_.bonds.size() == kSteadiest) break;
     }
   }
-  // Within ± the weight; few bonds say less than many.
+  // Contribution of bonds, bounded by ± the weight. With fewer than kFew bonds it is smaller.
   double says(std::span<const Point> points, const Candidate& c) const {
     double sum = 0;
     for (const Bond& bond : s_.bonds) {
       const Point& other = *s_.places.find(bond.other);
       const double distance2 = squared_distance(points[c.column], other, carrier_.n_axes());
-      if (distance2 > 0)  // no marker is where another is
+      if (distance2 > 0)  // two markers cannot coincide
         sum += agreement(bond, carrier_.noise(), std::sqrt(distance2));
     }
     return sum * opt_.bond_weight / static_cast<double>(std::max(kFew, s_.bonds.size()));
   }
 
-  // Points that a hidden track would have taken by itself.
+  // Counts detections that an occluded track would have taken by its own prediction.
   void count_refused(double least_gain, std::span<const Candidate> out, FrameStats& stats) const {
     for (const Candidate& own : s_.alone)
       if (own.gain > least_gain) stats.n_refused += find_same(out, own) == out.size();
@@ -286,7 +290,7 @@ class CarriedTracks {
     std::vector<Told> told;
     std::vector<MotionState> fused;
     std::vector<Prediction> own;
-    std::vector<double> ghosts;  // log (1 + their density / clutter's), by track
+    std::vector<double> ghosts;  // log(1 + density of ghosts / density of clutter), by track
     std::vector<std::int32_t> best_row, best_column, owner, heir, n_rows, n_columns;
     std::vector<Candidate> alone, added;
     std::vector<Bond> bonds;

@@ -1,11 +1,12 @@
-// The life of a track, frame by frame: predicted, gated, updated or missed; born, believed, ended.
+// The life cycle of a track: prediction, gating, update or missed detection, initiation,
+// confirmation and deletion.
 //
-// How the points of a frame are shared out among the tracks is each method's own; all the rest is
-// here once. Everything is a plain value: copying it forks the run.
+// How detections are assigned to tracks is specific to each method; everything else is implemented
+// here once. All state has value semantics: copying it forks the tracker.
 //
 // The score of a track is the log odds of “these detections are one marker” against “they are
-// clutter”: log λ_b - log λ_f + log P_d at birth, then per frame log(1 - p_z) and either
-// log P_d N(y; ŷ, S) / λ_f or log(1 - P_d), with P_r for P_d after a miss.
+// clutter”. It is log λ_b - log λ_f + log P_d at initiation. Each frame adds log(1 - p_z) and
+// either log(P_d N(y; ŷ, S) / λ_f) or log(1 - P_d), with P_r for P_d after a missed detection.
 #pragma once
 
 #include <algorithm>
@@ -27,28 +28,31 @@
 namespace asterism {
 
 struct LifeOptions {
-  double gate = 0;           // χ² bound on a pairing
-  double confirm_score = 0;  // log odds at which a tentative track is believed
-  double delete_drop = 0;    // a tentative track ends when its score falls so far below its best
+  double gate = 0;           // χ² gate of a pairing
+  double confirm_score = 0;  // log odds at which a tentative track is confirmed
+  // a tentative track is deleted when its score falls this far below its maximum
+  double delete_drop = 0;
   std::int64_t max_candidates = 0;
 };
 
-// A detection of a tentative track, and how sure it is that it belongs to it, if it is a marker's.
+// A detection of a tentative track, and the probability that it belongs to the track if the track
+// is a marker.
 struct Pending {
   std::int64_t detection = 0;
   double confidence = 1;
 };
 
-// What a tracker keeps beside a track, where it keeps nothing.
+// The additional data of a track for trackers that need none.
 struct NoMore {};
 
 template <typename More = NoMore>
 struct LiveTrack {
   std::int64_t id = -1;  // -1 while tentative
   std::int32_t gap = 0;  // frames since the last detection
-  std::int32_t carried = 0;  // of these, in which its neighbours told where it is
+  std::int32_t carried = 0;  // of these, frames in which neighbours predicted its position
   double score = 0, best_score = 0;
-  double p_missed = 0;  // in the last frame, if it exists: where pairings are weighed, not decided
+  // probability of a missed detection in the last frame if the track exists, for soft association
+  double p_missed = 0;
   double first_time = 0, last_time = 0;
   Point last{};
   MotionState state;
@@ -56,18 +60,19 @@ struct LiveTrack {
   [[no_unique_address]] More more;
 
   bool is_confirmed() const { return id >= 0; }
-  std::int32_t untold() const { return gap - carried; }  // frames in which nobody told where it is
+  // missed frames without a prediction from neighbours
+  std::int32_t untold() const { return gap - carried; }
 };
 
-// Of one frame, or of many: sums of what is counted, the greatest of what is a size. Trackers that
-// count more derive from it.
+// Statistics of one frame or of many: counts are summed, sizes are maxima. Trackers with further
+// statistics derive from it.
 struct FrameStats {
   std::int64_t n_candidates = 0, n_groups = 0, largest_group = 0;
   std::int64_t n_confirmed = 0, n_tentative = 0;  // at the end
-  std::int64_t n_pending = 0;  // detections that tentative tracks hold at the end
+  std::int64_t n_pending = 0;  // detections of tentative tracks at the end
   std::int64_t n_bonds = 0;    // of markers, at the end
-  // Occluded tracks that were carried, by frames; those that were seen again; points that neighbours
-  // refused.
+  // Occluded tracks predicted from neighbours, counted per frame; occluded tracks detected again;
+  // detections refused because of neighbours.
   std::int64_t n_carried = 0, n_returned = 0, n_refused = 0;
 
   void add(const FrameStats& next) {
@@ -78,7 +83,7 @@ struct FrameStats {
     n_bonds = next.n_bonds;
   }
 
-  // What it took, without what there is at the end.
+  // Adds the work done, without the state at the end.
   void add_work(const FrameStats& next) {
     n_candidates += next.n_candidates;
     n_groups += next.n_groups;
@@ -89,12 +94,12 @@ struct FrameStats {
   }
 };
 
-// Thrown when a frame has more candidates than allowed.
+// Thrown if a frame has more candidates than allowed.
 struct CandidateLimit : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// What a tracker has taken.
+// The frames and detections that a tracker has processed.
 struct Progress {
   std::int64_t n_frames = 0, n_seen = 0;  // frames, detections
   double last_time = -std::numeric_limits<double>::infinity();
@@ -110,7 +115,7 @@ struct Progress {
 struct GateMemory {
   std::vector<Prediction> predictions;
   std::vector<std::size_t> asked;
-  std::vector<double> radii;  // of these
+  std::vector<double> radii;  // of these tracks
   PointGrid grid;
 };
 
@@ -135,7 +140,7 @@ class LiveTracks {
   const Prediction& prediction(std::size_t i) const { return s_.predictions[i]; }
 
   double birth_gain() const { return sm.log_birth + sm.log_detect - sm.log_clutter; }
-  // Of a track that was missed in the last `missed` frames; less the likelihood of what it takes.
+  // Gain of a detection without its likelihood, after `missed` missed frames.
   double hit_gain(std::int64_t missed) const {
     return sm.log_survive + sm.log_seen(missed) - sm.log_clutter;
   }
@@ -143,14 +148,14 @@ class LiveTracks {
   double misses_gain(std::int64_t missed, std::int64_t n) const {
     return static_cast<double>(n) * sm.log_survive + sm.log_misses(missed, n);
   }
-  // A point that no track takes is clutter or a new marker, not clutter alone.
+  // A detection that no track takes is clutter or a new marker.
   double leftover_gain() const { return softplus(birth_gain()); }
 
-  // Adds the pairings within the gates of the tracks for which is_asked(i) holds, by track, by their
-  // predictions as they are.
+  // Adds the candidates within the gates of the tracks for which is_asked(i) holds, ordered by
+  // track. The predictions must be up to date.
   //
-  //   gain(i, log likelihood)  of a pairing; it is listed where this is above `least_gain`
-  //   least(i, least_gain)     no point of less log likelihood gives track i as much
+  //   gain(i, log likelihood)  gain of a pairing; it is listed if above `least_gain`
+  //   least(i, least_gain)     smallest log likelihood with which a detection can reach that gain
   template <typename Asked, typename Least, typename Gain>
   void list(double time, std::span<const Point> points, double least_gain, Asked&& is_asked,
             Least&& least, Gain&& gain, std::vector<Candidate>& out) {
@@ -181,11 +186,11 @@ class LiveTracks {
       if (static_cast<std::int64_t>(out.size()) > opt.max_candidates) throw CandidateLimit("too many candidates in a frame");
     }
   }
-  // Track i is expected elsewhere than by its own state.
+  // Replaces the prediction of track i, for instance by one from its neighbours.
   void expect(std::size_t i, const Prediction& prediction) { s_.predictions[i] = prediction; }
 
-  // Calls visit(point, squared distance from the prediction) for every point within `radius` that is
-  // in the gate and that the marker, `dt` ago at `last`, can have come to.
+  // Calls visit(point, squared distance from the prediction) for every point within `radius` that
+  // is in the gate and that the marker can have reached from `last` within `dt`.
   template <typename Visit>
   void within_gate(const PointGrid& grid, std::span<const Point> points,
                    const Prediction& prediction, double radius, const Point& last, double dt,
@@ -206,9 +211,9 @@ class LiveTracks {
     }
   }
 
-  // Track i has detection j of this frame, measured at y. Its state and score are the caller's.
-  // Calls label(detection, id, confidence) for every detection whose label is decided now: this one
-  // of a believed track, and all so far of a track that is believed from now on.
+  // Assigns detection j of this frame, measured at y, to track i. The caller updates state and
+  // score. Calls label(detection, id, confidence) for every detection whose label is now decided:
+  // this one for a confirmed track, and all so far when the track is confirmed now.
   template <typename Label>
   void take(std::size_t i, std::int32_t j, const Point& y, double time, double confidence,
             Label&& label) {
@@ -227,8 +232,9 @@ class LiveTracks {
     track.pending = {};
   }
 
-  // After every track was updated or missed: a link spans at most max_gap frames in which nobody told
-  // where the marker is, and a tentative track also ends by its score.
+  // Deletes tracks after every track was updated or missed. A link spans at most max_gap frames
+  // without a position from neighbours. A tentative track is also deleted if its score has fallen
+  // too far.
   void end_tracks() {
     std::erase_if(tracks, [&](Track& track) {
       track.best_score = std::max(track.best_score, track.score);
@@ -238,7 +244,7 @@ class LiveTracks {
     });
   }
 
-  // A track begins at detection j of this frame.
+  // Initiates a track at detection j of this frame.
   Track& begin(std::size_t j, const Point& y, double time, double score) {
     Track& track = tracks.emplace_back();
     track.score = track.best_score = score;
