@@ -1,8 +1,9 @@
-// CLUSTER: which clusters want the same detections of a new frame.
+// CLUSTER step of Reid's algorithm: determines which clusters compete for the same detections of a
+// new frame.
 //
-// Every detection gets a price, what it is worth to whoever has it. By these prices a cluster is worth
-// so much at most with a detection and so much without; where it costs all of them together too much
-// that just this one has it, the two stay apart.
+// Every detection gets a dual price. At these prices, the hypotheses of a cluster have one upper
+// bound with a given detection and one without it. If the total loss over all clusters is too large
+// when a cluster takes the detection, that cluster stays separate.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +23,7 @@ class Clustering {
  public:
   Clustering(const FrameWays& ways, const MatrixOptions& options) : ways_(ways), opt_(options) {}
 
-  // Which clusters may have one and the same detection; these become one.
+  // Joins clusters that may take the same detection.
   std::vector<SuperCluster> join(std::vector<Cluster> clusters, const WindowFrame& frame,
                                  std::size_t n_trees, TreeStats& stats) {
     const auto n_clusters = static_cast<std::int32_t>(clusters.size());
@@ -32,8 +33,8 @@ class Clustering {
       for (std::size_t k = 0; k < one.keys.size(); ++k)
         likeliest_[ways_.index_of(one.keys[k])] = one.hypotheses.front().branches[k];
     set_prices(frame);
-    // What it costs at least that a cluster has a detection: its own hypotheses with it are worth so
-    // much less, and so are those of the others without.
+    // Smallest loss if a cluster takes a detection: that of its own hypotheses with the detection,
+    // plus that of the other clusters without it.
     std::vector<Bounds> bounds;
     std::vector<double> kept_from_others(n_points, 0);
     for (const Cluster& one : clusters) {
@@ -41,7 +42,7 @@ class Clustering {
       for (const auto& [j, bound] : bounds.back().by_detection)
         kept_from_others[j] += bounds.back().all - bound.without;
     }
-    // Clusters first, then the detections.
+    // Items are the clusters first, then the detections.
     const auto sets = connected_sets(n_clusters + n_points, n_points, [&](std::int32_t c, auto&& visit) {
       if (c >= n_clusters) return visit(c - n_clusters);
       for (const auto& [j, bound] : bounds[c].by_detection) {
@@ -55,7 +56,7 @@ class Clustering {
       if (set.front() < n_clusters)
         super.cluster = std::move(clusters[set.front()]);
       else
-        super.cluster.hypotheses.resize(1);  // that there is nothing so far
+        super.cluster.hypotheses.resize(1);  // the empty hypothesis
       for (const std::int32_t c : set)
         if (c >= n_clusters)
           super.columns.push_back(c - n_clusters);
@@ -66,7 +67,8 @@ class Clustering {
   }
 
  private:
-  // Prices of the new frame's detections, were the likeliest hypothesis of every cluster right.
+  // Dual prices of the detections of the new frame, given the most likely hypothesis of every
+  // cluster.
   void set_prices(const WindowFrame& frame) {
     std::vector<Candidate> wanted;
     for (std::size_t i = 0; i < likeliest_.size(); ++i) {
@@ -85,8 +87,8 @@ class Clustering {
       assignment_.solve(groups[g], match, price_);
   }
 
-  // What a cluster's hypotheses are worth at most at these prices, by what they may take of the frame:
-  // all of it, not detection j, or surely detection j.
+  // Upper bounds of the weight of a cluster's hypotheses at these prices: without restriction,
+  // without detection j, and with detection j.
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
   struct Bounds {
     struct Either {
@@ -96,7 +98,7 @@ class Clustering {
     std::map<std::int32_t, Either> by_detection;
   };
   Bounds bounds_of(const Cluster& cluster, const WindowFrame& frame) const {
-    // Of a tree in a hypothesis, the best and the next best that it may take.
+    // The best and second-best surplus of a tree in a hypothesis.
     struct Surplus {
       double best = 0, next = 0;
       std::int32_t column = -1;
@@ -124,7 +126,7 @@ class Clustering {
         total += surplus[k].best;
       }
       bounds.all = std::max(bounds.all, total);
-      // What the others lose where one takes detection j.
+      // Loss of the other trees if one of them takes detection j.
       std::map<std::int32_t, double> lost;
       for (const Surplus& s : surplus)
         if (s.column >= 0) lost[s.column] += s.best - s.next;
@@ -150,7 +152,7 @@ class Clustering {
 
   const FrameWays& ways_;
   const MatrixOptions& opt_;
-  std::vector<std::int32_t> likeliest_;  // branch of each tree in the likeliest hypothesis
+  std::vector<std::int32_t> likeliest_;  // branch of each tree in the most likely hypothesis
   std::vector<double> price_;            // of each detection of the new frame
   Assignment assignment_;
 };

@@ -14,29 +14,31 @@ namespace asterism {
 
 struct MatrixOptions {
   std::int64_t max_hypotheses = 1;  // of a cluster
-  double drop = 0;                  // one so many nats below its cluster's best is not kept
-  double merged_within = 0;         // estimates so few standard deviations apart are as good as one
+  double drop = 0;  // hypotheses this many nats below the best of their cluster are dropped
+  // hypotheses are merged if their estimates differ by at most this many standard deviations
+  double merged_within = 0;
 };
 
 struct Hypothesis {
   double worth = 0;   // of its branches
-  double merged = 0;  // log of how much likelier it is by those that were merged into it
-  std::vector<std::int32_t> branches;  // of each tree of the cluster; -1: its detections are others'
+  double merged = 0;  // log factor of the probability gained from merged hypotheses
+  // of each tree of the cluster; -1: its detections belong to others
+  std::vector<std::int32_t> branches;
 
   double log_weight() const { return worth + merged; }
 };
 
 struct Cluster {
-  std::vector<std::int64_t> keys;      // of its trees, rising
-  std::vector<Hypothesis> hypotheses;  // the likeliest first
+  std::vector<std::int64_t> keys;      // of its trees, increasing
+  std::vector<Hypothesis> hypotheses;  // the most likely first
 };
 
-// A cluster, and the detections of the new frame that it explains.
+// A cluster, and the detections of the new frame that it may explain.
 struct SuperCluster {
   Cluster cluster;
-  std::vector<std::int32_t> columns;  // rising
+  std::vector<std::int32_t> columns;  // increasing
 
-  // The place of a detection among them, -1 of one that is surely another cluster's.
+  // Index of a detection in `columns`, -1 if it certainly belongs to another cluster.
   std::int32_t place(std::int32_t column) const {
     const auto at = std::ranges::lower_bound(columns, column);
     return at == columns.end() || *at != column ? -1 : static_cast<std::int32_t>(at - columns.begin());
@@ -60,7 +62,7 @@ inline std::vector<double> probabilities(const Cluster& cluster) {
   return p;
 }
 
-// Whether enough hypotheses were found, the next of which would have this weight.
+// Whether enough hypotheses were found, if the next one has this weight.
 inline bool is_enough(const std::vector<Hypothesis>& found, double next, const MatrixOptions& options,
                       TreeStats& stats) {
   if (found.empty()) return false;
@@ -71,11 +73,11 @@ inline bool is_enough(const std::vector<Hypothesis>& found, double next, const M
   return true;
 }
 
-// The best of all pairs of hypotheses of two clusters.
+// The best combinations of the hypotheses of two clusters.
 inline Cluster combined(const Cluster& a, const Cluster& b, const MatrixOptions& options,
                         TreeStats& stats) {
   Cluster out;
-  std::vector<std::pair<std::int64_t, std::int32_t>> order;  // key, place in a then b
+  std::vector<std::pair<std::int64_t, std::int32_t>> order;  // key, index in a then b
   for (const auto* part : {&a, &b})
     for (const std::int64_t key : part->keys)
       order.emplace_back(key, static_cast<std::int32_t>(order.size()));

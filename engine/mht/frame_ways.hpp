@@ -1,4 +1,4 @@
-// What every branch of every tree may do in a new frame.
+// The continuations of every branch of every tree in a new frame.
 #pragma once
 
 #include <algorithm>
@@ -10,11 +10,11 @@
 
 namespace asterism {
 
-// Of branch b, from first[b] to first[b + 1], the miss last.
+// The continuations of branch b are first[b] to first[b + 1]; the last is the missed detection.
 struct Ways {
   std::vector<Branch> branches;
   std::vector<std::int32_t> first;
-  std::vector<double> worth;  // of each way; 0 of a single detection
+  std::vector<double> worth;  // of each continuation; 0 for a single detection
 
   std::int32_t miss(std::int32_t branch) const { return first[branch + 1] - 1; }
 };
@@ -24,7 +24,7 @@ class FrameWays {
   Ways& operator[](std::size_t tree) { return ways_[tree]; }
   const Ways& operator[](std::size_t tree) const { return ways_[tree]; }
 
-  // The place of a tree in the window by its key, which rises with it.
+  // Index of a tree in the window by its key. Keys increase with the index.
   bool has(std::int64_t key) const {
     return std::binary_search(keys_.begin(), keys_.end(), key);
   }
@@ -36,7 +36,8 @@ class FrameWays {
     for (std::size_t i = 0; i < open.n_all(); ++i) keys_.push_back(open.tree(i).more.key);
   }
 
-  // Splits all branches over the newest frame of the window, whose detections begin trees as well.
+  // Splits all branches over the newest frame of the window, and initiates a tree at each of its
+  // detections.
   void grow(HypothesisWindow& open, TreeStats& stats) {
     const BranchGrower grower(open.live, open.branches);
     ways_.assign(open.n_all(), {});
@@ -57,7 +58,8 @@ class FrameWays {
     list_keys(open);
   }
 
-  // Calls visit(way, gain over the miss) for what a branch may take.
+  // Calls visit(continuation, gain over the missed detection) for each detection that a branch may
+  // take.
   template <typename Visit>
   void each_hit(std::size_t tree, std::int32_t branch, Visit&& visit) const {
     const Ways& ways = ways_[tree];

@@ -1,4 +1,5 @@
-// HYPGEN: the best hypotheses about a new frame, of all that follow from those so far.
+// HYPGEN step of Reid's algorithm: generates the best hypotheses about a new frame from those so
+// far.
 #pragma once
 
 #include <algorithm>
@@ -21,13 +22,13 @@ class HypothesisGeneration {
                        const MatrixOptions& options)
       : open_(open), ways_(ways), opt_(options) {}
 
-  // Replaces the hypotheses of a cluster by the best that follow from them.
+  // Replaces the hypotheses of a cluster by their best successors.
   void explain(const WindowFrame& frame, SuperCluster& super, TreeStats& stats) const {
     Cluster& cluster = super.cluster;
     const std::size_t n_old = cluster.keys.size(), n_points = super.columns.size();
     const Cluster before = std::move(cluster);
     cluster = {before.keys, {}};
-    // The place of the tree that begins at each detection; -1 where none may.
+    // Index of the tree that begins at each detection; -1 if none may.
     std::vector<std::int32_t> seeds(n_points, -1);
     for (std::size_t i = open_.live.size(); i < open_.n_all(); ++i) {
       const LiveTrack<Tree>& tree = open_.tree(i);
@@ -38,7 +39,8 @@ class HypothesisGeneration {
       cluster.keys.push_back(tree.more.key);
     }
     std::vector<Parent> parents(before.hypotheses.size());
-    // Sorted by what the next hypothesis of each would be worth, first at most, then exactly.
+    // A queue by the weight of each parent's next successor: first an upper bound, then the exact
+    // value.
     using Turn = std::pair<double, std::int32_t>;
     const auto later = [](const Turn& a, const Turn& b) {
       return a.first != b.first ? a.first < b.first : a.second > b.second;
@@ -69,19 +71,19 @@ class HypothesisGeneration {
   }
 
  private:
-  // A hypothesis about what was, and the best ones in turn about who has what in the new frame: rows
-  // are the detections, columns its trees and for each detection that nobody has it.
+  // A hypothesis about the past, and its successors in order. In the assignment problem, rows are
+  // detections; columns are the trees and, for each detection, the option that no tree takes it.
   struct Parent {
     const Hypothesis* hypothesis = nullptr;
     std::vector<double> cost;
-    std::vector<std::int32_t> ways;  // by tree and detection, the way that takes it
-    double missed = 0;               // its worth were all missed
+    std::vector<std::int32_t> ways;  // by tree and detection, the continuation that takes it
+    double missed = 0;               // its weight if all detections were missed
     std::optional<KBest> best;
 
     double log_weight() const { return hypothesis->merged + missed - best->least_cost(); }
   };
 
-  // Fills in the costs; returns what the hypothesis' best successor is worth at most.
+  // Fills the cost matrix. Returns an upper bound of the weight of the best successor.
   double prepare(const WindowFrame& frame, const SuperCluster& super, const Cluster& before,
                  Parent& parent) const {
     const std::size_t n_old = before.keys.size(), n_points = super.columns.size();

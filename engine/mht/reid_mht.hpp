@@ -1,14 +1,16 @@
-// Reid's multiple hypotheses (1979): whole hypotheses carried from frame to frame, by cluster.
+// Multiple hypothesis tracking after Reid (1979): complete hypotheses are propagated from frame to
+// frame, in clusters.
 //
-//   CLUSTER  which clusters may have one and the same detection; these become one (a super-cluster)
-//   HYPGEN   the best hypotheses about the new frame, of all that follow from those so far
-//   REDUCE   few, likely and different ones are kept; what is older than the window is decided by the
-//            best (N-scan); what shares no detection any more goes into clusters of its own
-//   MASH     detections of which all hypotheses say the same leave the matrix: their targets have them
-//            for good, and tentative targets are confirmed by them
+//   CLUSTER  joins clusters that may take the same detection into a super-cluster
+//   HYPGEN   generates the best hypotheses about the new frame from those so far
+//   REDUCE   keeps few, likely and distinct hypotheses; decides frames older than the window by the
+//            best one (N-scan pruning); separates trees that share no detection any more
+//   MASH     removes detections on which all hypotheses agree: their tracks keep them, and
+//            tentative tracks are confirmed
 //
-// A detection that is nobody's begins a tree at once, worth nothing as long as it has no other
-// detection: “clutter so far” and “may be the first of a marker” are one hypothesis, not two.
+// An unassigned detection initiates a tree at once, which contributes nothing while it has no
+// second detection. “Clutter so far” and “possibly the first of a marker” are therefore one
+// hypothesis, not two.
 #pragma once
 
 #include <algorithm>
@@ -62,8 +64,8 @@ class HypothesisMatrix {
     split();
   }
 
-  // Decides all frames that are left by the best hypothesis of every cluster; all probabilities are
-  // those over the hypotheses as they are now.
+  // Decides all remaining frames by the best hypothesis of every cluster. All probabilities are
+  // taken over the present hypotheses.
   template <typename Label>
   void decide_all(TreeStats& stats, Label&& label) {
     s_.ways.list_keys(open_);
@@ -80,14 +82,14 @@ class HypothesisMatrix {
  private:
   struct Memory {
     FrameWays ways;
-    // By open frame and tree: what the best hypothesis says, and the probability of each detection
-    // to be nobody's.
+    // By open frame and tree: the decision of the best hypothesis. By frame and detection: the
+    // probability that it belongs to no tree.
     std::vector<std::map<std::int64_t, Fate>> fates;
     std::vector<std::vector<double>> free;
   };
 
-  // REDUCE, the similar: a hypothesis of the same targets, each nearly where a likelier one has it,
-  // is part of that one from now on.
+  // REDUCE, merging: a hypothesis with the same tracks is merged into a more likely one if all its
+  // estimates are close to those.
   void merge_similar(Cluster& cluster, TreeStats& stats) const {
     if (!(opt_.merged_within > 0)) return;
     std::vector<Hypothesis> kept;
@@ -122,7 +124,8 @@ class HypothesisMatrix {
     return true;
   }
 
-  // Means within so many standard deviations of the first, and deviations as much alike.
+  // Whether means and standard deviations differ by at most `merged_within` standard deviations of
+  // the first.
   bool is_near(const Branch& a, const Branch& b) const {
     const AxisState one = collapse(open_.live.m, a.state), other = collapse(open_.live.m, b.state);
     const int n = open_.live.m.axis.n;
@@ -136,7 +139,7 @@ class HypothesisMatrix {
     return true;
   }
 
-  // Every tree keeps the branches that some hypothesis takes, those of the likeliest first.
+  // Keeps the branches of every tree that some hypothesis contains, those of the most likely first.
   void keep_used_branches() {
     for (Cluster& cluster : clusters_)
       for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
@@ -156,7 +159,7 @@ class HypothesisMatrix {
       }
   }
 
-  // What the hypotheses say of the first open frames.
+  // Computes decisions and probabilities for the first open frames.
   void weigh(std::size_t n_frames) {
     s_.fates.assign(n_frames, {});
     s_.free.assign(n_frames, {});
@@ -188,7 +191,7 @@ class HypothesisMatrix {
     return {true, b.taken(frame.number), 0};
   }
 
-  // REDUCE, N-scan: who says otherwise of the oldest frame than the likeliest is given up.
+  // REDUCE, N-scan pruning: removes hypotheses that disagree with the best one in the oldest frame.
   void prune_by_oldest() {
     const WindowFrame& frame = *open_.frames.front();
     for (Cluster& cluster : clusters_)
@@ -204,7 +207,7 @@ class HypothesisMatrix {
     keep_used_branches();
   }
 
-  // MASH
+  // MASH: applies the decisions to the oldest frame.
   template <typename Label>
   void mash(TreeStats& stats, Label&& label) {
     std::vector<Fate> fates;
@@ -218,12 +221,12 @@ class HypothesisMatrix {
     s_.ways.list_keys(open_);
   }
 
-  // REDUCE, apart: trees that share no detection in any hypothesis are clusters of their own.
+  // REDUCE, splitting: trees that share no detection in any hypothesis become separate clusters.
   void split() {
     const BranchGrower grower(open_.live, open_.branches);
     std::vector<Cluster> clusters;
     for (const Cluster& cluster : clusters_) {
-      std::vector<std::size_t> alive;  // places of the trees that are left
+      std::vector<std::size_t> alive;  // indices of the trees that are left
       for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
         const std::size_t i = s_.ways.index_of(cluster.keys[k]);
         if (s_.ways.has(cluster.keys[k]) && !open_.tree(i).more.branches.empty())
@@ -241,19 +244,19 @@ class HypothesisMatrix {
       }
     }
     clusters_ = std::move(clusters);
-    // Whose detections are all others' in every hypothesis that is left has no branch.
+    // A seed whose detection belongs to others in every remaining hypothesis has no branch.
     std::erase_if(open_.seeds, [](const LiveTrack<Tree>& s) { return s.more.branches.empty(); });
     s_.ways.list_keys(open_);
   }
 
-  // The hypotheses as far as some of the trees go.
+  // The hypotheses of a cluster restricted to some of its trees.
   Cluster part_of(const Cluster& cluster, const std::vector<std::size_t>& places,
                   const BranchGrower& grower) const {
     Cluster part;
     for (const std::size_t k : places) part.keys.push_back(cluster.keys[k]);
     struct Sums {
       std::size_t place = 0;
-      double with = 0, without = 0;  // weights with and without what was merged
+      double with = 0, without = 0;  // weights with and without merged hypotheses
     } all;
     std::map<std::vector<std::int32_t>, Sums> seen;
     const double most = cluster.hypotheses.front().log_weight();
@@ -267,7 +270,7 @@ class HypothesisMatrix {
       }
       if (is_new) part.hypotheses.push_back({worth_of(part, branches, grower), 0, branches});
     }
-    // How much more probable the part is by what was merged; in each part just its own share.
+    // Each part keeps its own share of the probability gained by merging.
     for (const auto& [branches, sums] : seen)
       part.hypotheses[sums.place].merged =
           sums.with == sums.without && all.with == all.without

@@ -1,4 +1,5 @@
-// How probable a place is for what is no marker come back: a new one anywhere, or a ghost beside one.
+// The background density of a detection that is no reappearing marker: uniform for new markers,
+// with a peak beside each detected marker for ghosts.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +19,7 @@ class Elsewhere {
         radius2_(ghost_radius * ghost_radius),
         peak_(std::pow(2 * std::numbers::pi * radius2_, -0.5 * D)) {}
 
-  // Anywhere is where anything was seen so far.
+  // Extends the volume of the uniform density to all positions seen so far.
   void add(const Point& y) {
     if (!has_box_) low_ = high_ = y;
     has_box_ = true;
@@ -38,7 +39,7 @@ class Elsewhere {
     const double n = std::max<double>(static_cast<double>(at.seen.size()), 1);
     return std::log(1 / volume_ + beside / n * peak_);
   }
-  // Whether a ghost of another may be there.
+  // Whether a ghost of another tracklet may be at this position.
   bool is_beside(const Point& y, const Frame& at, std::int32_t own) const {
     return std::any_of(at.seen.begin(), at.seen.end(), [&](const Frame::One& other) {
       return other.fragment != own && squared_distance(other.at, y, D_) < 9 * radius2_;
@@ -53,7 +54,7 @@ class Elsewhere {
   double volume_ = 1;
 };
 
-// What has been seen, as far as it is remembered.
+// The tracklets and frames detected so far, as far as they are kept.
 struct Sightings {
   Fragments fragments;
   RecentFrames frames;

@@ -1,7 +1,8 @@
-// The markers of a stream: what is known of a frame now, and what of earlier frames changes.
+// Stitches tracklets in a stream: reports the marker of each detection at once, and corrections of
+// earlier frames later.
 //
-// A tracker may change its mind about the last frames, so that those wait until their labels are
-// settled. Meanwhile their detections have the marker of the fragment that they would go on with.
+// A tracker may revise the labels of the last frames, so these wait until their labels are settled.
+// Meanwhile their detections have the marker of the tracklet that they would continue.
 #pragma once
 
 #include <algorithm>
@@ -18,11 +19,11 @@ namespace asterism {
 
 class LiveStitcher {
  public:
-  // A frame waits until `lag` more have come.
+  // A frame waits until `lag` further frames have arrived.
   LiveStitcher(const MotionModel& m, const StitchOptions& options, std::int64_t lag)
       : stitcher_(m, options),
         n_waiting_(static_cast<std::size_t>(lag)),
-        // A fragment is decided upon before its first frame is forgotten.
+        // A tracklet is decided before its first frame is removed.
         n_kept_(static_cast<std::size_t>(options.confirm + options.max_gap + 2)) {}
 
   const Stitcher& stitcher() const { return stitcher_; }
@@ -31,8 +32,9 @@ class LiveStitcher {
   std::int64_t n_joins() const { return n_joins_; }
   std::int64_t n_ghosts() const { return n_ghosts_; }
 
-  // `labels` are the tracker's of this frame, `revised` those that it changes of earlier ones, as
-  // pairs of a detection and its label. Calls tell(detection, marker) for all that is new or changes.
+  // `labels` are the tracker's labels of this frame. `revised` are its corrections of earlier ones,
+  // as pairs of a detection and a label. Calls tell(detection, marker) for every new or changed
+  // marker.
   template <typename Tell>
   void step(const MotionStep& step, std::span<const Point> points,
             std::span<const std::int64_t> labels,
@@ -60,17 +62,18 @@ class LiveStitcher {
     std::int32_t fragment = -1, told = -2;
   };
   struct Recent {
-    std::int64_t first = 0;  // of its detections
+    std::int64_t first = 0;  // number of its first detection
     bool is_taken = false;
     std::vector<Known> known;
-    std::vector<std::int32_t> open;  // detections whose marker may change, once it is taken
-    // While it waits.
+    // detections whose marker may change, once the frame is processed
+    std::vector<std::int32_t> open;
+    // While the frame waits.
     MotionStep step;
     std::vector<Point> points;
     std::vector<std::int64_t> labels;
   };
 
-  // What has been taken is settled.
+  // Labels of processed frames are settled and ignored.
   void revise(std::int64_t detection, std::int64_t label) {
     for (auto frame = recent_.rbegin(); frame != recent_.rend() && !(*frame)->is_taken; ++frame) {
       if (detection < (*frame)->first) continue;
@@ -100,7 +103,7 @@ class LiveStitcher {
       return f < 0 || !stitcher_.is_open(f);
     });
   }
-  // A guess gives way to what is known.
+  // If several detections of a frame have the same marker, those of undecided tracklets lose it.
   template <typename Tell>
   void tell_of_waiting(Recent& frame, Tell&& tell) {
     fragments_.clear();
@@ -127,7 +130,7 @@ class LiveStitcher {
   std::size_t n_waiting_, n_kept_;
   std::int64_t n_seen_ = 0, n_joins_ = 0, n_ghosts_ = 0;
   std::deque<SharedCopy<Recent>> recent_;
-  std::vector<std::int32_t> fragments_, markers_;  // while a frame is worked on
+  std::vector<std::int32_t> fragments_, markers_;  // scratch of one frame
 };
 
 }  // namespace asterism

@@ -1,4 +1,4 @@
-// What their neighbours say of the links of tracklets and of occluded markers.
+// Evidence of rigid neighbours for the links of tracklets and for occluded markers.
 #pragma once
 
 #include <algorithm>
@@ -20,28 +20,29 @@ class Bodies {
  public:
   Bodies(int D, double noise) : D_(D), noise_(noise), carrier_(D, noise * noise, false) {}
 
-  // The markers of the newest frame.
+  // Updates the bonds with the markers of the newest frame.
   void learn(const Sightings& s, std::span<const Seen> seen, Markers& markers) {
     carrier_.learn(seen);
     judge(s, seen, markers);
   }
   void forget(std::int32_t marker) { carrier_.forget(marker); }
 
-  // Before the links of the newest frame are asked for.
+  // Prepares the evaluation of the links of the newest frame.
   void begin_links(const Sightings& s) {
     w_.common_from = kNever;
     list_markers(s, s.frames.newest(), w_.places_now);
   }
-  // How well the neighbours know the link of a fragment from then to now: log density against
-  // elsewhere, of the steadiest and, where these say less than `enough`, of the nearest too. False
-  // where there are too few to say.
+  // Log-likelihood ratio of a tracklet's link into the newest frame, predicted by its neighbours,
+  // against the background density. The most stable neighbours are used first, and the nearest ones
+  // also if the result is below `enough`. Returns false if there are too few neighbours.
   bool link(const Sightings& s, const Frame::One& own, const Fragment& f, double enough,
             double& gain) {
     list_common(s, f.last);
     if (w_.common.size() < least_for_rotation(D_) + 2) return false;
     const Point then = *s.frames.find(f.last)->find(own.fragment);
     const double elsewhere = s.elsewhere.log_density(own.at, s.frames.newest(), own.fragment);
-    // Bodies hardly bend from one frame to the next: the fit alone tells how much.
+    // Segments hardly deform between two frames, so the residual of the fit alone gives the
+    // variance.
     const auto say = [&](std::span<const RigidPair> pairs) {
       const RigidPrediction found(pairs, then, D_, square(noise_));
       return found.place(kNoise * square(noise_), 0).log_density(own.at, D_) - elsewhere;
@@ -56,8 +57,8 @@ class Bodies {
     return true;
   }
 
-  // A marker that is not seen any more remembers who was around it. What was seen last of it may be
-  // a ghost beside it already, so that some earlier frames are remembered too.
+  // Stores the positions of the neighbours of a marker that became occluded. The last detections
+  // may already be those of a ghost, so several earlier frames are stored.
   void remember_around(const Sightings& s, std::int32_t k, Marker& marker) {
     marker.is_hidden = true;
     marker.anchors.clear();
@@ -68,9 +69,9 @@ class Bodies {
       carrier_.remember(k, w_.places, marker.last - back, marker.anchors);
     }
   }
-  // How well the neighbours of a hidden marker carry it to where a fragment is: from each anchor on
-  // the mean over some looks at the fragment but the worst, which may be at a ghost; any anchor may be
-  // the right one.
+  // Log-likelihood ratio for a tracklet to be the occluded marker k, predicted by the neighbours of
+  // k. For each anchor, it is averaged over some detections of the tracklet, without the worst,
+  // which may be a ghost. The anchors are alternatives, so their likelihoods are averaged.
   double log_odds(const Sightings& s, const Fragment& f, std::int32_t id, std::int32_t k,
                   const Marker& marker) {
     const std::size_t every = std::max<std::size_t>(f.sights.size() / kLooks, 1);
@@ -82,7 +83,8 @@ class Bodies {
       list_markers(s, *at, w_.places);
       const double not_carried = s.elsewhere.log_density(f.sights[i].at, *at, id);
       for (std::size_t a = 0; a < marker.anchors.size(); ++a) {
-        // Over long gaps a body comes back to its shape: the variance does not grow with them.
+        // Over long gaps a segment returns to its shape, so the variance does not grow with the
+        // gap.
         if (carrier_.carry(k, marker.anchors[a], w_.places, Carrier::kLag, kNoise * square(noise_), way))
           w_.looks[a].add(way.place.log_density(f.sights[i].at, D_) - not_carried);
       }
@@ -96,13 +98,13 @@ class Bodies {
 
  private:
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min() / 2;
-  static constexpr std::size_t kLooks = 3;  // frames of a fragment in which it is compared
-  // What is added to the variance of a carried place, in variances of a measured coordinate.
+  static constexpr std::size_t kLooks = 3;  // frames of a tracklet in which it is compared
+  // Added to the variance of a predicted position, in units of the measurement variance.
   static constexpr double kNoise = 12;
 
   static double square(double x) { return x * x; }
 
-  // Fragments that are seen both then and now.
+  // Lists the tracklets detected in both frames.
   void list_common(const Sightings& s, std::int64_t then) {
     if (w_.common_from == then) return;
     w_.common_from = then;
@@ -127,7 +129,7 @@ class Bodies {
       w_.pairs.back().weight = 1 / (distance2 + w_.nearest.front().first + square(40 * noise_));
     }
   }
-  // How much better than elsewhere the markers would have been carried here, while they are seen.
+  // Updates the mean log-likelihood ratio with which neighbours predict each detected marker.
   void judge(const Sightings& s, std::span<const Seen> seen, Markers& markers) {
     const Frame* then = s.frames.find(s.frames.now() - Carrier::kLag);
     if (then == nullptr) return;
@@ -143,7 +145,7 @@ class Bodies {
     });
   }
 
-  // Where the markers are in a frame.
+  // The positions of the markers in a frame.
   static void list_markers(const Sightings& s, const Frame& at, Places& places) {
     places.clear();
     for (const auto& one : at.seen)
@@ -177,7 +179,7 @@ class Bodies {
   int D_;
   double noise_;
   Carrier carrier_;
-  Fresh<Memory> w_;  // while a frame is worked on
+  Fresh<Memory> w_;  // scratch of one frame
 };
 
 }  // namespace asterism

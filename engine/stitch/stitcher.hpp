@@ -1,19 +1,19 @@
-// Fragments of tracks made into markers, through gaps of any length.
+// Stitches tracklets into the tracks of markers, across gaps of any length.
 //
-// A tracker that gives up early makes fragments that are pure: what comes back after a while is a
-// stranger to it. Here a fragment that has been seen for a while, or is over, is weighed against every
-// marker that is hidden:
+// A tracker that terminates tracks early produces pure tracklets, and a reappearing marker begins a
+// new one. The stitcher decides on a tracklet when it is long enough or over. It compares the
+// tracklet with every occluded marker by two log-likelihood ratios:
 //
-//   body    the neighbours that keep their distance have moved on rigidly and carry the hidden marker
-//           with them; how well they fit says how sure that is
-//   motion  its own filter goes on through the gap
+//   body    rigid neighbours predict the occluded marker from their own motion
+//   motion  the marker's own filter is extrapolated through the gap
 //
-// against what else it may be: a new marker anywhere, or a ghost beside a marker. Fragments that are
-// seen at the same time compete for the hidden markers (an assignment). One that nothing explains is a
-// new marker; if it was short and beside another, a ghost.
+// The alternative hypothesis is a new marker anywhere or a ghost beside a marker. Tracklets
+// detected at the same time compete for the occluded markers in an assignment. A tracklet without a
+// match is a new marker, or a ghost if it was short and beside another marker.
 //
-// A link inside a fragment is weighed by its neighbours too; where they contradict, it is cut.
+// A link inside a tracklet is tested by its neighbours too, and is cut if they contradict it.
 //
+// The result of a pass through the capture in the other direction may be supplied as advice.
 // Whoever has gone through the take in the other direction may advise.
 #pragma once
 
@@ -36,11 +36,11 @@ namespace asterism {
 
 struct StitchOptions {
   double noise = 0;         // of a detection, along an axis
-  double ghost_radius = 0;  // so far from its marker is a ghost, about
-  std::int64_t confirm = 15;     // frames until a fragment is decided upon
-  std::int64_t max_gap = 0;      // frames after which an unseen fragment is over
-  std::int64_t max_hidden = 0;   // frames after which a marker is forgotten; 0: never
-  bool may_cut = true;           // links that the neighbours contradict
+  double ghost_radius = 0;  // scale of the distance of a ghost from its marker
+  std::int64_t confirm = 15;     // frames until a tracklet is decided
+  std::int64_t max_gap = 0;      // missed frames after which a tracklet is over
+  std::int64_t max_hidden = 0;   // frames after which an occluded marker is removed; 0: never
+  bool may_cut = true;           // cut links that neighbours contradict
 };
 
 class Stitcher {
@@ -56,11 +56,11 @@ class Stitcher {
   std::size_t n_remembered() const { return markers_.size(); }
   std::int64_t n_cuts() const { return n_cuts_; }
 
-  // What is thought already of fragments that begin with a label.
+  // Supplies advice on the tracklets that begin with a label.
   void advise(std::int64_t label, const JoinAdvice& advice) { claims_.advise(label, advice); }
 
-  // One frame: its points, and of each the label that the tracker gave it, -1 for none. Writes the
-  // fragment of each, and tells `decide(decision)`.
+  // Processes one frame: its points and the tracker's label of each, -1 for none. Writes the
+  // tracklet of each point, and calls `decide(decision)`.
   template <typename Decide>
   void step(const MotionStep& step, std::span<const Point> points,
             std::span<const std::int64_t> labels, std::span<std::int32_t> fragment_of,
@@ -77,7 +77,7 @@ class Stitcher {
     decide_due(false, decide);
     forget();
   }
-  // Which marker a fragment is, kGhost of one that is none, of one that is open what it may be.
+  // The marker of a tracklet: kGhost for none, its best candidate while undecided.
   std::int32_t marker_of(std::int32_t fragment) const {
     const Fragment& f = so_far_.fragments.at(fragment);
     return f.marker == Decision::kOpen ? f.guess : f.marker;
@@ -85,27 +85,29 @@ class Stitcher {
   bool is_open(std::int32_t fragment) const {
     return so_far_.fragments.at(fragment).marker == Decision::kOpen;
   }
-  // The fragment that a detection with this label would go on with, -1 if it would begin one.
+  // The tracklet that a detection with this label would continue, -1 if it would begin one.
   std::int32_t fragment_with(std::int64_t label) const {
     const auto at = of_label_.find(label);
     return at != of_label_.end() && may_go_on(at->second) ? at->second : -1;
   }
-  // What the fragments that are open may be, if nothing were to come any more.
+  // Computes the best candidates of all undecided tracklets, as if no further frame came.
   void guess() {
     claims_.guess(so_far_, markers_, bodies_, [this](const Fragment& f) { return is_short(f); });
   }
-  // After the last frame.
+  // Decides the remaining tracklets after the last frame.
   template <typename Decide>
   void finish(Decide&& decide) {
     decide_due(true, decide);
   }
 
  private:
-  static constexpr std::int32_t kMotionSights = 4;   // detections by which motions are compared
-  static constexpr std::int64_t kMotionFrames = 120;  // a motion is believed no longer than that
-  // A link is cut where the neighbours now give it no more than this, and that much less than so far.
+  static constexpr std::int32_t kMotionSights = 4;   // detections over which motions are compared
+  static constexpr std::int64_t kMotionFrames = 120;  // longest extrapolation of a motion
+  // A link is cut if its log-likelihood ratio is at most the first value, and below the tracklet's
+  // average by the second. The new tracklet starts with an average lowered by the third.
   static constexpr double kContradicted = 3, kFall = 8, kDoubted = 3;
-  static constexpr double kTrusted = 2;          // of the markers on average: there are bodies
+  // mean over the markers above which rigid prediction is considered reliable
+  static constexpr double kTrusted = 2;
 
   std::int64_t now() const { return so_far_.frames.now(); }
   bool is_over(const Fragment& f) const { return now() - f.last > opt_.max_gap; }
@@ -133,7 +135,7 @@ class Stitcher {
         so_far_.frames.newest().seen.push_back({fragment_of[i], points[i], static_cast<std::int32_t>(i)});
     so_far_.frames.newest().sort();
   }
-  // A marker may have been found again elsewhere, or the fragment may be long over.
+  // A tracklet cannot continue if it is over, or if its marker was found in another tracklet.
   bool may_go_on(std::int32_t id) const {
     const auto at = so_far_.fragments.find(id);
     if (at == so_far_.fragments.end() || is_over(at->second)) return false;
@@ -161,7 +163,7 @@ class Stitcher {
     return 2 * n_beside > n;
   }
 
-  // Whether neighbours carry the markers that are seen, on the whole.
+  // Whether neighbours predict the detected markers well on average.
   bool has_bodies() const {
     double sum = 0;
     std::size_t n = 0;
@@ -173,7 +175,7 @@ class Stitcher {
     return n > 0 && sum > kTrusted * static_cast<double>(n);
   }
 
-  // Links that the neighbours contradict.
+  // Cuts the links into the newest frame that neighbours contradict.
   void cut_links(std::span<const std::int64_t> labels, std::span<std::int32_t> fragment_of) {
     Frame& now = so_far_.frames.newest();
     w_.cut.clear();
@@ -224,7 +226,7 @@ class Stitcher {
     f.last = now();
     if (static_cast<std::int64_t>(f.sights.size()) < opt_.confirm) f.sights.push_back({now(), y});
   }
-  // Markers that are not seen any more remember who was around them, and how they moved.
+  // Stores the motion and the neighbours of each marker that became occluded.
   void hide() {
     for (auto& [k, marker] : markers_)
       if (!marker.is_hidden && marker.last < now()) hide(k, marker);
@@ -233,7 +235,7 @@ class Stitcher {
     bodies_.remember_around(so_far_, k, marker);
     marker.state = so_far_.frames.motion(m_, marker.fragment);
   }
-  // What begins in this frame may go on with the motion of any of them.
+  // Extrapolates every occluded marker's motion to the tracklets that begin in this frame.
   void go_on() {
     for (const auto& one : so_far_.frames.newest().seen) {
       Fragment& f = so_far_.fragments.at(one.fragment);
@@ -271,7 +273,7 @@ class Stitcher {
     std::tie(out.marker, out.probability) = claims_.best(
         so_far_, markers_, bodies_, id, [this](const Fragment& g) { return is_short(g); });
     if (out.marker == Decision::kOpen) {
-      // What comes up just before the take ends is no likelier to be a marker than at other times.
+      // A tracklet that begins just before the end of the capture is short for that reason alone.
       const bool is_late = is_brief(f) && f.first >= opt_.confirm;
       const bool may_be_ghost = (is_short(f) || is_late) && (has_bodies() || is_beside(f, id));
       out.marker = may_be_ghost ? Decision::kGhost : n_markers_++;
@@ -290,7 +292,7 @@ class Stitcher {
     return out;
   }
 
-  // Fragments that can not go on, and markers that have been hidden for long.
+  // Removes tracklets that cannot continue, and markers occluded for long.
   void forget() {
     for (auto at = so_far_.fragments.begin(); at != so_far_.fragments.end();) {
       const Fragment& f = at->second;
@@ -325,13 +327,13 @@ class Stitcher {
   StitchOptions opt_;
   std::int32_t n_fragments_ = 0, n_markers_ = 0;
   std::int64_t n_cuts_ = 0;
-  double usual_ = 0;  // how well neighbours know a link
+  double usual_ = 0;  // mean log-likelihood ratio of a link by neighbours
   Sightings so_far_;
   Markers markers_;
   std::unordered_map<std::int64_t, std::int32_t> of_label_;
   Bodies bodies_;
   Claims claims_;
-  Fresh<Memory> w_;  // while a frame is worked on
+  Fresh<Memory> w_;  // scratch of one frame
 };
 
 }  // namespace asterism

@@ -1,4 +1,5 @@
-// Which hidden marker a fragment is: what speaks for each, who takes whom, and how probably.
+// Assigns tracklets to occluded markers: scores each pair, solves the assignment, and computes the
+// probability of the result.
 #pragma once
 
 #include <algorithm>
@@ -19,8 +20,8 @@
 
 namespace asterism {
 
-// The label of the marker that a fragment is thought to go on with, and how much that is worth: log
-// odds for that marker, half of it against all others.
+// Advice that a tracklet continues the marker with a label. The log odds of that marker rise by
+// `weight`, those of all others fall by half of it.
 struct JoinAdvice {
   std::int64_t goes_on_with = 0;
   double weight = 0;
@@ -28,13 +29,13 @@ struct JoinAdvice {
 
 class Claims {
  public:
-  static constexpr double kWorth = 0.25;  // of the log odds, in a probability
+  static constexpr double kWorth = 0.25;  // factor of log odds in a probability
 
-  // What is thought already of fragments that begin with a label.
+  // Supplies advice on the tracklets that begin with a label.
   void advise(std::int64_t label, const JoinAdvice& advice) { advice_[label] = advice; }
 
-  // The marker that a fragment is, kOpen if it is none of those that are hidden; and how probably.
-  // `is_short` tells of fragments that were over before they were decided upon.
+  // The marker of a tracklet, kOpen if it is none of the occluded ones, and the probability.
+  // `is_short` identifies tracklets that were over before their decision.
   template <typename IsShort>
   std::pair<std::int32_t, double> best(const Sightings& s, const Markers& markers, Bodies& bodies,
                                        std::int32_t id, IsShort&& is_short) {
@@ -50,7 +51,7 @@ class Claims {
     const std::pair none(Decision::kOpen, 1 / (1 + odds(most)));
     if (n == 0) return none;
     w_.candidates.clear();
-    w_.rivals.assign(n, 1);  // Σ of the odds of all that may be this marker, and of none
+    w_.rivals.assign(n, 1);  // Σ of the odds of all candidates of this marker, and of none
     double all = 1;
     for (std::int32_t c = 0; c < n; ++c) {
       w_.candidates.push_back({0, c, w_.scored[c].second, 0});
@@ -77,8 +78,8 @@ class Claims {
     return {marker, odds(gain) / (all + w_.rivals[own] - 1)};
   }
 
-  // What the fragments that are open may be, if nothing were to come any more. They are compared anew
-  // when twice as much has been seen of them.
+  // Computes the best candidates of the undecided tracklets. A tracklet is compared again whenever
+  // its number of detections has doubled.
   template <typename IsShort>
   void guess(Sightings& s, const Markers& markers, Bodies& bodies, IsShort&& is_short) {
     w_.open.clear();
@@ -107,16 +108,17 @@ class Claims {
 
  private:
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
-  // Log odds that a fragment is a marker come back, before anything is compared: of short ones, and of
-  // others.
+  // Prior log odds that a tracklet is a reappearing marker: of a short one, and of others.
   static constexpr double kShort = -8, kLong = 2;
-  static constexpr double kLeastMotion = 0.005;  // weight of the motion where the body is trusted
+  // smallest weight of the motion if rigid prediction is trusted
+  static constexpr double kLeastMotion = 0.005;
 
-  // Neighbours bend together, and the looks at a fragment see the same bend: what they say is worth
-  // less than their sum. How much less was measured on captures whose truth is known.
+  // Errors of neighbours are correlated, and so are those of successive detections, so the sum of
+  // their log-likelihood ratios overstates the evidence. The factor was measured on captures with
+  // known truth.
   static double odds(double gain) { return std::exp(std::min(kWorth * gain, 500.0)); }
 
-  // Log odds that a fragment is a hidden marker come back.
+  // Log odds that a tracklet is the reappearing marker k.
   double score(const Sightings& s, Bodies& bodies, std::int32_t id, std::int32_t k,
                const Marker& marker, bool is_short) const {
     const Fragment& f = s.fragments.at(id);
@@ -149,7 +151,7 @@ class Claims {
   };
 
   std::unordered_map<std::int64_t, JoinAdvice> advice_;
-  Fresh<Memory> w_;  // while a fragment is compared
+  Fresh<Memory> w_;  // scratch of one comparison
 };
 
 }  // namespace asterism

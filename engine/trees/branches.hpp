@@ -1,7 +1,7 @@
-// A track split into branches: one for each detection in the gate and one for a miss, frame after
-// frame, over a window of frames that are not decided yet.
+// Track hypotheses as branches of a tree. In each frame of an undecided window, a branch is split
+// into one branch per gated detection and one for a missed detection.
 //
-//   λ(k) = ρ λ(k-1) + e²    e² = νᵀ S⁻¹ ν of the k-th detection, ρ what is left of the past (1: all)
+//   λ(k) = ρ λ(k-1) + e²    e² = νᵀ S⁻¹ ν of the k-th detection, ρ fading factor (1: none)
 //   δ(k)                    a branch is kept while λ(k) ≤ δ(k); P[λ(k) > δ(k)] = α for a true track
 #pragma once
 
@@ -22,14 +22,15 @@ namespace asterism {
 
 inline constexpr int kMaxWindow = 16;
 
-// What trackers count whose tracks are trees of branches.
+// Statistics of the trackers whose tracks are trees of branches.
 struct TreeStats : FrameStats {
-  // Branches at the end; most of a tree; ended by the χ² test; dropped by the limit on their number.
+  // Branches at the end; largest number in a tree; cut by the χ² test; dropped by the limit on
+  // their number.
   std::int64_t n_branches = 0, most_branches = 0, n_cut = 0, n_limited = 0;
-  std::int64_t n_shared = 0;  // detections that several trees like best
+  std::int64_t n_shared = 0;  // detections that are the best choice of several trees
   std::int64_t n_beams = 0;   // groups that were not solved exactly
-  double bound = 0, gap = 0;  // how far off their marginals may be, and their log posterior
-  // Joint hypotheses: most of a cluster, merged into a similar one, nodes of the search.
+  double bound = 0, gap = 0;  // bounds of the error of their marginals and of their log posterior
+  // Joint hypotheses: largest number of a cluster, merged into a similar one, nodes of the search.
   std::int64_t n_hypotheses = 0, n_merged = 0, n_nodes = 0;
 
   void add(const TreeStats& next) {
@@ -60,41 +61,44 @@ struct TreeStats : FrameStats {
 struct BranchOptions {
   std::int32_t window = 1;        // frames until one is decided
   std::int32_t max_branches = 1;  // of a track
-  std::int32_t merge_last = 1;    // branches that share their last so many frames become one
-  double prune_drop = 0;          // a branch ends so many nats below its tree's best
+  // branches with the same detections in this many last frames are merged
+  std::int32_t merge_last = 1;
+  double prune_drop = 0;          // a branch is pruned this many nats below the best of its tree
   double fading = 1;              // ρ
   std::vector<double> delta;      // δ(1), δ(2), …; empty: no test
-  double z = 0;                   // normal quantile of α, for δ beyond those where ρ is 1
-  // Tracks are weighed jointly: a branch is worth its part of the log posterior, and what others
-  // expect is for the joint choice to settle.
+  double z = 0;                   // normal quantile of α, for δ beyond those if ρ is 1
+  // Whether tracks are evaluated jointly. The gain of a branch is then its term of the log
+  // posterior, and conflicts between tracks are resolved by the joint choice instead of by claims.
   bool is_joint = false;
-  std::vector<double> log_end;  // then: log of the probability of nothing more in so many frames
-  std::int32_t max_carried = 0;  // frames that neighbours may carry a hidden track
+  // for joint evaluation: log probability of no further detection in so many frames
+  std::vector<double> log_end;
+  std::int32_t max_carried = 0;  // frames for which neighbours may predict an occluded track
 };
 
-// How much a believed track expects a detection: w_j / (w_0 + Σ_{l≠j} w_l), where
-// w_j = P_d N(y_j; ŷ, S) / λ_f and w_0 = 1 - P_d, with P_r for P_d after a miss. Who else takes it
-// lowers the likelihood of the frame by the factor 1 + this.
+// The association weight with which a confirmed track expects a detection: w_j / (w_0 + Σ_{l≠j}
+// w_l), where w_j = P_d N(y_j; ŷ, S) / λ_f and w_0 = 1 - P_d, with P_r for P_d after a missed
+// detection. If another track takes the detection, the likelihood of the frame falls by the factor
+// 1 + value.
 struct Claim {
-  std::int64_t track = 0;  // its key
+  std::int64_t track = 0;  // key of the track
   std::int32_t column = 0;
   double value = 0;
 };
 
-// A frame that is not decided yet; never changed, so that copies of a tracker share it.
+// An undecided frame. It is immutable, so that copies of a tracker share it.
 struct WindowFrame {
   std::int64_t number = 0, first = 0;  // of the frame; of its first detection
   double time = 0;
   MotionStep step;
   std::vector<Point> points;
   PointGrid grid;
-  std::vector<Claim> claims;    // by track
-  std::vector<double> claimed;  // by all tracks, of each detection
-  std::vector<NeighbourAdvice> advice;   // by track, to those who get any
+  std::vector<Claim> claims;    // ordered by track
+  std::vector<double> claimed;  // by all tracks, for each detection
+  std::vector<NeighbourAdvice> advice;   // ordered by track, only tracks that have any
 
-  // What a detection loses for a track by what the others expect, until the frame is decided and
-  // shared out: exact for two tracks, for more each is as if it were the only other one (linear
-  // multitarget, Musicki & La Scala 2008).
+  // The loss of log likelihood if a track takes a detection that other tracks expect, applied until
+  // the frame is decided. It is exact for two tracks. With more, each is treated as if it were the
+  // only other one (linear multitarget, Musicki & La Scala 2008).
   double crowding(std::int64_t track, std::int32_t column) const {
     double others = claimed[column];
     auto at = std::lower_bound(claims.begin(), claims.end(), track,
@@ -116,17 +120,17 @@ struct WindowFrame {
 
 struct Branch {
   MotionState state;
-  double score = 0;  // as a track's
+  double score = 0;  // as in LiveTrack
   double lambda = 0;
   std::int64_t n_updates = 0;
   double last_time = 0;
   Point last{};
-  std::int32_t gap = 0, carried = 0;  // as a track's
+  std::int32_t gap = 0, carried = 0;  // as in LiveTrack
   std::int32_t n_taken = 0;           // detections within the window
   bool has_ended = false;
-  bool is_chosen = false;  // by the last joint choice
-  // Detection in each frame of the window, -1 for a miss, and its squared distance from what was
-  // expected: by frame number, modulo the longest window.
+  bool is_chosen = false;  // in the last joint choice
+  // The detection in each frame of the window (-1 for a missed detection) and its squared distance
+  // from the prediction. The index is the frame number modulo the longest window.
   std::array<std::int32_t, kMaxWindow> path{};
   std::array<double, kMaxWindow> distance2{};
 
@@ -134,15 +138,15 @@ struct Branch {
   std::int32_t untold() const { return gap - carried; }
 };
 
-// What a track keeps beside what is decided of it: λ up to there, and the branches from there on.
+// The tree of a track: λ up to the last decided frame, and the branches from there on.
 struct Tree {
-  std::int64_t key = 0;    // its number in order of birth
-  std::int64_t first = 0;  // frame that it begins in, as far as that is not decided
+  std::int64_t key = 0;    // number in order of initiation
+  std::int64_t first = 0;  // first frame, while that is undecided
   double lambda = 0;
   std::int64_t n_updates = 0;
   std::vector<Branch> branches;
 
-  // By what all trees do together where that was asked, else by itself.
+  // The branch of the last joint choice if there is one, else the most likely branch.
   const Branch& best() const {
     const auto chosen = std::ranges::find(branches, true, &Branch::is_chosen);
     return chosen == branches.end() ? branches.front() : *chosen;
@@ -154,18 +158,18 @@ class BranchGrower {
   BranchGrower(const LiveTracks<Tree>& live, const BranchOptions& options)
       : live_(live), opt_(options) {}
 
-  // What a branch is worth among those of its tree, as long as the track lives: its score, less what
-  // the detections it takes would be worth if left over.
+  // Score by which the branches of a tree are compared while the track is alive: that of the branch
+  // minus the gain that its detections would have if left unassigned.
   double rank(const Branch& b) const { return b.score - b.n_taken * live_.leftover_gain(); }
 
-  // What a branch is worth. Jointly, its part of the posterior: no less for misses after which the
-  // track may have ended.
+  // Log-likelihood ratio of a branch. In joint evaluation it is the branch's term of the posterior,
+  // where trailing missed detections also allow for the end of the track.
   double worth(const Branch& b) const {
     if (opt_.is_joint) return b.score - live_.misses_gain(0, b.untold()) + opt_.log_end[b.untold()];
     return rank(b);
   }
 
-  // The decided part of a track, as the only branch.
+  // A branch for the decided part of a track.
   Branch root(const LiveTrack<Tree>& track) const {
     Branch b;
     b.state = track.state;
@@ -179,8 +183,8 @@ class BranchGrower {
     return b;
   }
 
-  // Splits every branch over a further frame, the n_open-th that is not decided, and prunes them to
-  // at most `max_branches`, or not at all with kAll.
+  // Splits every branch over a further frame, the n_open-th undecided one. Then prunes to at most
+  // `max_branches`; kAll keeps all.
   static constexpr std::int32_t kAll = std::numeric_limits<std::int32_t>::max();
   void grow(const WindowFrame& frame, LiveTrack<Tree>& track, std::int32_t n_open,
             std::int32_t max_branches, TreeStats& stats) {
@@ -191,26 +195,27 @@ class BranchGrower {
     track.more.branches.assign(grown_.begin(), grown_.end());
   }
 
-  // What a track that was hidden for `gap` frames expects of a frame, its state predicted to it.
+  // Prediction for a track missed in the last `gap` frames. Its state must be predicted to the
+  // frame.
   Expected expected(const MotionState& state, std::int32_t gap, const NeighbourAdvice* advice) const {
     const bool is_told = advice != nullptr && advice->is_carried && gap > 0;
     return Expected(live_.m, state, is_told ? &advice->place : nullptr);
   }
-  // Whether a track that was hidden for `gap` frames and is not seen in this one either lives by what
-  // its neighbours tell. Who is carried is hidden from view: such a frame says nothing of whether the
-  // marker is still there.
+  // Whether a track without a detection is kept alive by the prediction from its neighbours. Such a
+  // frame counts as occluded and does not change the probability that the marker still exists.
   bool lives_on(const Expected& expected, std::int32_t gap, const NeighbourAdvice* advice) const {
     return expected.is_carried() && !advice->is_doubtful && gap < opt_.max_carried;
   }
 
-  // Adds a branch's ways over a further frame: one for each detection in its gate, then the miss.
+  // Adds the continuations of a branch in a further frame: one for each detection in its gate, then
+  // the missed detection.
   void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch parent,
              std::vector<Branch>& out, TreeStats& stats) const {
     const std::int64_t slot = frame.number % kMaxWindow;
     parent.path[slot] = -1;
     parent.distance2[slot] = 0;
     if (parent.has_ended) {
-      if (opt_.is_joint) {  // one more frame in which it was not seen
+      if (opt_.is_joint) {  // one more missed frame
         parent.score += live_.miss_gain(parent.untold());
         ++parent.gap;
       }
@@ -270,7 +275,7 @@ class BranchGrower {
     out.push_back(std::move(parent));
   }
 
-  // What a track's best branch expects of a frame that comes next.
+  // Adds the claims of a track's best branch on the detections of the next frame.
   void claim(const LiveTrack<Tree>& track, WindowFrame& frame) {
     const Branch& best = track.more.branches.front();
     if (best.has_ended) return;
@@ -281,7 +286,7 @@ class BranchGrower {
     const Expected all = expected(state, best.gap, advice);
     const Prediction& prediction = all.prediction();
     const double log_seen = live_.sm.log_seen(best.gap) - live_.sm.log_clutter;
-    // Less is nothing beside the clutter.
+    // Smaller weights are negligible against clutter.
     const double radius = prediction.radius(live_.opt.gate, kNoClaim - log_seen,
                                              frame.grid.r_most());
     if (radius < 0 && !all.is_carried()) return;
@@ -314,7 +319,8 @@ class BranchGrower {
     const auto k = static_cast<std::size_t>(n_updates);
     if (k <= opt_.delta.size()) return lambda <= opt_.delta[k - 1];
     if (opt_.fading < 1) return lambda <= opt_.delta.back();
-    // Wilson & Hilferty 1931; with thousands of degrees of freedom right to seven digits.
+    // Approximation of Wilson & Hilferty 1931; with thousands of degrees of freedom accurate to
+    // seven digits.
     const double v = 2.0 / (9.0 * static_cast<double>(k) * live_.m.axis.D);
     const double root = 1 - v + opt_.z * std::sqrt(v);
     return lambda <= 2.0 / (9.0 * v) * root * root * root;
@@ -343,7 +349,7 @@ class BranchGrower {
     stats.most_branches = std::max<std::int64_t>(stats.most_branches, static_cast<std::int64_t>(kept));
   }
 
-  // Whether a likelier branch shares the last frames.
+  // Whether a more likely branch has the same detections in the last frames.
   bool is_merged(const Branch& branch, std::int64_t frame, std::size_t kept) const {
     for (std::size_t a = 0; a < kept; ++a) {
       bool is_same = true;

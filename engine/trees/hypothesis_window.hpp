@@ -1,9 +1,10 @@
-// An open window in which any detection may begin a tree, and all detections are explained at once.
+// An undecided window for joint hypotheses: every detection may initiate a tree, and a hypothesis
+// explains all detections at once.
 //
-// A hypothesis is one branch of every tree, or none of a tree whose detections are clutter, no
-// detection in two. It is worth the sum of their parts of the log posterior, s(τ) up to now; a
-// detection in none is clutter and worth nothing. A tree is worth something from its second detection
-// on. Which hypothesis decides the oldest frame is for others to say; here it is carried out.
+// A hypothesis selects one branch of every tree, or none if the detections of the tree are clutter.
+// No detection is in two branches. Its log-likelihood ratio is the sum of the terms s(τ) of its
+// branches up to now; clutter contributes 0, and so does a tree with a single detection. The
+// tracker selects the hypothesis; this class applies it to the oldest frame.
 #pragma once
 
 #include <algorithm>
@@ -17,16 +18,16 @@
 
 namespace asterism {
 
-// What becomes of a tree in the frame that is decided.
+// The decision on a tree in the oldest frame.
 struct Fate {
-  bool exists = false;       // its detections are a marker's
-  std::int32_t column = -1;  // its detection in that frame, -1 for a miss
-  double probability = 0;    // of just that
+  bool exists = false;       // the tree is a marker
+  std::int32_t column = -1;  // its detection in that frame, -1 for a missed detection
+  double probability = 0;    // of that decision
 };
 
 struct HypothesisWindow : OpenWindow {
-  double new_track_claim;  // a detection that is expected by more begins no tree
-  std::vector<LiveTrack<Tree>> seeds;  // begin in a frame that is not decided
+  double new_track_claim;  // a detection with a larger total claim initiates no tree
+  std::vector<LiveTrack<Tree>> seeds;  // trees that begin in an undecided frame
 
   HypothesisWindow(const OpenWindow& window, double claim)
       : OpenWindow(window), new_track_claim(claim) {}
@@ -37,18 +38,19 @@ struct HypothesisWindow : OpenWindow {
   const LiveTrack<Tree>& tree(std::size_t i) const {
     return is_seed(i) ? seeds[i - live.size()] : live[i];
   }
-  // The first frame in which a tree may have a branch of its own.
+  // The first frame in which the branches of a tree may differ.
   std::int64_t first_frame(std::size_t i) const {
     return is_seed(i) ? tree(i).more.first : frames.front()->number;
   }
 
-  // Whether a branch is no marker's yet: a tree is something to explain from its second detection on.
+  // Whether a branch has a single detection, so that it contributes nothing yet.
   bool is_lone(std::size_t i, const Branch& b) const { return is_seed(i) && b.n_taken < 2; }
   // Detection of a branch of tree i in an open frame, -1 for none.
   std::int32_t taken(std::size_t i, const Branch& b, const WindowFrame& frame) const {
     return frame.number < first_frame(i) ? -1 : b.taken(frame.number);
   }
-  // Calls visit(detection) for what a branch of tree i has, counted from the first of the open frames.
+  // Calls visit(detection) for the detections of a branch of tree i, numbered from the first open
+  // frame.
   template <typename Visit>
   void each_detection(std::size_t i, const Branch& b, Visit&& visit) const {
     for (const auto& frame : frames)
@@ -61,7 +63,7 @@ struct HypothesisWindow : OpenWindow {
     return frames.empty() ? 0 : first_open(*frames.back()) + frames.back()->points.size();
   }
 
-  // What may begin in an open frame is tentative as well.
+  // Trees that begin in an open frame count as tentative.
   void count(TreeStats& stats) const {
     OpenWindow::count(stats);
     stats.n_tentative += static_cast<std::int64_t>(seeds.size());
@@ -72,7 +74,7 @@ struct HypothesisWindow : OpenWindow {
       stats.most_branches = std::max<std::int64_t>(stats.most_branches, tree(i).more.branches.size());
   }
 
-  // Trees that begin at the detections of the newest frame.
+  // Initiates a tree at each detection of the newest frame.
   void sow() {
     const WindowFrame& frame = *frames.back();
     for (std::size_t j = 0; j < frame.points.size(); ++j) {
@@ -92,8 +94,8 @@ struct HypothesisWindow : OpenWindow {
     }
   }
 
-  // Decides the oldest frame: the fate of every tree, and the probability of each detection to be
-  // nobody's.
+  // Decides the oldest frame, given the fate of every tree and, for each detection, the probability
+  // that it belongs to none.
   template <typename Label>
   void carry_out(std::span<const Fate> fates, std::span<const double> free, TreeStats& stats,
                  Label&& label) {
@@ -124,7 +126,7 @@ struct HypothesisWindow : OpenWindow {
   }
 
  private:
-  // A seed becomes a track, with those of its branches that have a second detection.
+  // Turns a seed into a track, with its branches that have a second detection.
   void begin(const WindowFrame& frame, LiveTrack<Tree>& seed, double probability,
              TreeStats& stats) {
     const std::int32_t j = seed.more.branches.front().taken(frame.number);

@@ -1,7 +1,8 @@
-// The frames that are not decided yet, and the branches of every track over them.
+// The window of undecided frames, and the branches of every track over them.
 //
-// What is decided of a track lives in tracks/live_tracks.hpp; its branches (trees/branches.hpp) are what may
-// follow. Who has which point of the oldest frame is for others to decide; here it is carried out.
+// The decided part of a track is kept in tracks/live_tracks.hpp; its branches (trees/branches.hpp)
+// are hypotheses about the continuation. The trackers decide the assignment of the oldest frame;
+// this class applies it.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +22,8 @@ struct OpenWindow {
   WindowBodies bodies;
   std::vector<std::shared_ptr<const WindowFrame>> frames;
   std::int64_t n_trees = 0;
-  // Branches that a track may have right after a further frame: all, where they are limited jointly.
+  // Largest number of branches of a track right after a further frame. In joint evaluation there is
+  // no limit per track.
   std::int32_t max_grown = branches.is_joint ? BranchGrower::kAll
                                              : branches.max_branches;
 
@@ -40,11 +42,11 @@ struct OpenWindow {
       stats.n_branches += static_cast<std::int64_t>(track.more.branches.size());
   }
 
-  // What neighbours say of a frame that comes.
+  // Collects the information of rigid neighbours for an arriving frame.
   void advise(WindowFrame& frame, TreeStats& stats) {
     if (bodies.is_on()) bodies.advise(live, n_open(), frame, stats);
   }
-  // What the believed tracks expect of it.
+  // Collects the claims of the confirmed tracks on its detections.
   void claim(WindowFrame& frame) const {
     BranchGrower grower(live, branches);
     for (const LiveTrack<Tree>& track : live.tracks)
@@ -64,13 +66,13 @@ struct OpenWindow {
     return oldest;
   }
 
-  // After a decision.
+  // Updates the bonds after a decision.
   void learn(TreeStats& stats) {
     if (bodies.is_on()) bodies.learn(live, stats);
   }
 
-  // Carries what is decided of track i over the frame just popped, with detection `own` or, at -1,
-  // none; its gap is the caller's.
+  // Updates the decided part of track i over the frame just popped, with detection `own` or, if
+  // that is -1, without. The caller updates the gap.
   void carry(const WindowFrame& frame, std::size_t i, std::int32_t own, TreeStats& stats) {
     LiveTrack<Tree>& track = live[i];
     const BranchGrower grower(live, branches);
@@ -95,7 +97,7 @@ struct OpenWindow {
     }
   }
 
-  // Track i was not seen in that frame.
+  // Records a missed detection of track i in that frame.
   void miss(const WindowFrame& frame, std::size_t i) {
     const NeighbourAdvice* advice = frame.advice_to(live[i].more.key);
     if (advice != nullptr && advice->gives_way)
@@ -105,7 +107,7 @@ struct OpenWindow {
   }
   void end(std::size_t i) { live[i].gap = live.sm.max_gap + live[i].carried; }
 
-  // Keeps the branches that agree with what was carried; grows new ones where none do.
+  // Keeps the branches that agree with the decision, and grows new ones if there are none.
   void keep(const WindowFrame& frame, std::size_t i, std::int32_t own, TreeStats& stats) {
     LiveTrack<Tree>& track = live[i];
     std::erase_if(track.more.branches,
@@ -116,7 +118,7 @@ struct OpenWindow {
       settle(frame, own, track);
   }
 
-  // The branches of a track have `own` behind them.
+  // Moves `own` from the branches of a track into its decided part.
   void settle(const WindowFrame& frame, std::int32_t own, LiveTrack<Tree>& track) const {
     for (Branch& b : track.more.branches) {
       --b.n_taken;

@@ -1,5 +1,6 @@
-// Track-oriented multiple hypotheses: trees of track hypotheses over a window of frames, of which the
-// best compatible set explains all detections at once; the oldest frame is decided by it (N-scan).
+// Track-oriented multiple hypothesis tracking (TOMHT). Every track has a tree of hypotheses over a
+// window of frames. The best compatible set of hypotheses explains all detections and decides the
+// oldest frame (N-scan pruning).
 #pragma once
 
 #include <algorithm>
@@ -18,19 +19,22 @@
 
 namespace asterism {
 
-// Chooses an option of each tree, no resource twice: given the options of all trees and the first
-// resource of every open frame. Adds to the stats by how much its choice may be below the best.
+// Selects an option of each tree such that no resource is used twice. Receives the options of all
+// trees and the first resource of every open frame. Adds a bound of its optimality gap to the
+// stats.
 using Packer = std::function<std::vector<std::int32_t>(
     std::span<const std::vector<PackingOption>>, std::span<const std::int32_t>, TreeStats&)>;
 
 struct HypothesisOptions {
   std::int64_t max_hypotheses = 1;  // of a cluster, for the probabilities
   std::int64_t max_nodes = 1;       // of the search for them
-  double least_new_worth = 0;       // a branch of a new tree that is worth less is no option
-  double delete_drop = 0;           // a tentative track ends when no branch is less far below its best
-  double drop = 0;                  // a hypothesis so many nats below the best does not count
-  double ambiguous_drop = 0;        // an option that loses more counts by its loss alone
-  Packer packer;                    // who chooses in place of the search below, where there is one
+  double least_new_worth = 0;       // smallest log-likelihood ratio of a branch of a new tree
+  // a tentative track is deleted if all its branches are this far below its best score
+  double delete_drop = 0;
+  double drop = 0;                  // hypotheses this many nats below the best are ignored
+  // options with a larger loss enter the probabilities by their loss alone
+  double ambiguous_drop = 0;
+  Packer packer;                    // replaces the search below, if set
 };
 
 class HypothesisForest {
@@ -65,18 +69,17 @@ class HypothesisForest {
   void count(TreeStats& stats) const { open_.count(stats); }
 
  private:
-  // What a tree does in a hypothesis.
+  // The option that a tree takes in a hypothesis.
   struct Choice {
     std::int32_t branch = kNothing;
     std::int32_t column = -1;  // its detection in the frame that is decided
-    double loss = 0;           // at least, of the best hypothesis of the cluster with this choice
-                               // (kBest: the best of all has it)
+    double loss = 0;  // lower bound of the loss by this option; kBest in the best hypothesis
   };
-  static constexpr double kBest = -1;  // before what loses nothing either
-  static constexpr std::int32_t kNothing = -1;  // there is no such marker
-  static constexpr std::int32_t kLost = -2;     // missed in all open frames, and no branch says so
+  static constexpr double kBest = -1;  // sorts before options with a loss of zero
+  static constexpr std::int32_t kNothing = -1;  // the tree is no marker
+  static constexpr std::int32_t kLost = -2;  // missed in all open frames, without a branch for it
 
-  // A branch, and what the best hypothesis of its cluster loses with it.
+  // A branch, and the loss of the best hypothesis of its cluster that contains it.
   struct Ranked {
     double loss = 0;
     std::int32_t tree = 0, branch = 0;
@@ -84,10 +87,10 @@ class HypothesisForest {
   struct TreeOptions {
     std::vector<PackingOption> options;
     std::vector<Choice> choices;
-    std::vector<Choice> improbable;  // no options any more
+    std::vector<Choice> improbable;  // pruned options
   };
 
-  // Of the options that `limit` left and weighed.
+  // Decides the oldest frame, with the options and losses that `limit` has computed.
   template <typename Label>
   void decide(TreeStats& stats, Label&& label) {
     leave_out_improbable();
@@ -95,7 +98,8 @@ class HypothesisForest {
     open_.carry_out(s_.fates, s_.free, stats, label);
   }
 
-  // Every tree's branches as options, over the detections of all open frames as resources.
+  // Lists the branches of every tree as options, with the detections of all open frames as
+  // resources.
   void list_options() {
     const BranchGrower grower(open_.live, open_.branches);
     s_.trees.assign(open_.n_all(), {});
@@ -129,7 +133,7 @@ class HypothesisForest {
     }
   }
 
-  // Trees that share detections.
+  // Clusters of trees that share detections.
   std::vector<std::vector<std::int32_t>> clusters() const {
     return connected_sets(s_.trees.size(), open_.n_detections(), [&](std::int32_t i, auto&& visit) {
       for (const PackingOption& option : s_.trees[i].options)
@@ -137,9 +141,10 @@ class HypothesisForest {
     });
   }
 
-  // Drops the branches that no probable hypothesis needs. What a tree would like best may be another's,
-  // the more so the longer the window: so a branch is judged by what the best hypothesis of the whole
-  // cluster loses with it, and the branches of a cluster compete for its room together.
+  // Prunes branches that no probable hypothesis contains. The best branch of a tree may conflict
+  // with another tree, increasingly so in longer windows. A branch is therefore judged by the loss
+  // of the best hypothesis of its cluster that contains it, and all branches of a cluster share one
+  // limit.
   void limit(TreeStats& stats) {
     list_options();
     for (const std::vector<std::int32_t>& cluster : clusters()) limit(cluster, stats);
@@ -159,7 +164,8 @@ class HypothesisForest {
     std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::pair(r.tree, r.branch); });
     auto next = s_.ranked.begin();
     for (const std::int32_t i : cluster) {
-      std::vector<std::int32_t> now(branches(i).size(), kNothing);  // number of a branch that is kept
+      // number of a branch that is kept
+      std::vector<std::int32_t> now(branches(i).size(), kNothing);
       std::int32_t n_kept = 0;
       for (; next != s_.ranked.end() && next->tree == i; ++next) {
         now[next->branch] = n_kept;
@@ -192,7 +198,8 @@ class HypothesisForest {
     tree.choices.resize(n);
     tree.options.resize(n);
   }
-  // What every option of a cluster loses. Returns how many tracks the best hypothesis has, at least one.
+  // Computes the loss of every option of a cluster. Returns the number of tracks in the best
+  // hypothesis, at least one.
   std::int64_t weigh(const std::vector<std::int32_t>& cluster) {
     std::vector<std::vector<PackingOption>> options;
     for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
@@ -208,13 +215,13 @@ class HypothesisForest {
     }
     return std::max<std::int64_t>(n_tracks, 1);
   }
-  // The branches of a cluster with what each loses.
+  // Lists the branches of a cluster with their losses.
   void rank(const std::vector<std::int32_t>& cluster) {
     const BranchGrower grower(open_.live, open_.branches);
     s_.ranked.clear();
     for (const std::int32_t i : cluster) {
       const std::size_t first = s_.ranked.size();
-      // What is no option yet, such as the beginning of a track, is compared with no track.
+      // A branch that is no option yet, such as a new track, is compared with its absence.
       for (std::size_t b = 0; b < branches(i).size(); ++b) {
         const Branch& branch = branches(i)[b];
         const double loss = branch.n_taken < 2 ? 0 : std::max(0.0, -grower.worth(branch));
@@ -222,16 +229,17 @@ class HypothesisForest {
       }
       for (const Choice& choice : s_.trees[i].choices)
         if (choice.branch >= 0) s_.ranked[first + choice.branch].loss = choice.loss;
-      // A tree keeps one branch at least.
+      // Every tree keeps at least one branch.
       std::min_element(s_.ranked.begin() + static_cast<std::ptrdiff_t>(first), s_.ranked.end(),
                        [](const Ranked& x, const Ranked& y) { return x.loss < y.loss; })
           ->loss = kBest;
     }
   }
 
-  // Many ambiguities are independent, and the few best hypotheses of all trees hold little of their
-  // probability. So the trees stand apart again that only improbable options join: those that lose much,
-  // and those that use what a tree with one probable option has.
+  // Removes improbable options, so that clusters joined only by these separate again. Ambiguities
+  // of separate clusters are independent, and the best few hypotheses of a large cluster would
+  // cover little of the probability. An option is improbable if its loss is large or if it uses a
+  // detection of a tree with a single probable option.
   void leave_out_improbable() {
     std::vector<char> is_owned(open_.n_detections(), 0), is_sure(s_.trees.size(), 0);
     for (bool is_new = true; is_new;) {
@@ -256,7 +264,8 @@ class HypothesisForest {
   }
   std::vector<Branch>& branches(std::size_t tree) { return open_.tree(tree).more.branches; }
 
-  // The best hypothesis of every cluster of trees, and the probabilities over its best ones.
+  // Selects the best hypothesis of every cluster, and computes probabilities from its best
+  // hypotheses.
   void choose(TreeStats& stats) {
     s_.free.assign(open_.frames.front()->points.size(), 1);
     s_.taken.assign(open_.frames.front()->points.size(), 0);
@@ -322,7 +331,7 @@ class HypothesisForest {
         if (choice.column == best.column) own += p;
         if (choice.column >= 0) s_.free[choice.column] -= p;
       }
-      // What no hypothesis holds is as probable as the best hypothesis that may hold it.
+      // A removed option is weighted by the bound of the best hypothesis that contains it.
       double left_out = 0;
       for (const Choice& choice : tree.improbable) {
         if ((choice.branch == kNothing) != (best.branch == kNothing) || choice.column != best.column)
@@ -334,7 +343,7 @@ class HypothesisForest {
     }
   }
 
-  // Of one decision: live tracks first, then seeds.
+  // Data of one decision: live tracks first, then seeds.
   struct Memory {
     std::vector<TreeOptions> trees;
     std::vector<Ranked> ranked;

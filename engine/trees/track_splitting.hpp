@@ -1,5 +1,5 @@
-// The trees of all tracks over a window of frames, of which the oldest is decided when the window is
-// full: who has which of its points, by what the branches of every track have met since.
+// Track splitting: the trees of all tracks over a window of frames. When the window is full, the
+// oldest frame is decided from the branches of all tracks.
 #pragma once
 
 #include <algorithm>
@@ -18,9 +18,11 @@
 namespace asterism {
 
 struct ForestOptions {
-  // Where it is stable, tracks rank by the likelihood of the window and points by its distances.
+  // With stable marriage, tracks rank detections by the likelihood over the window, and detections
+  // rank tracks by the distances in it.
   Pairing pairing = Pairing::assignment;
-  // Trees keep what they like best though another has it: only the labels are shared out.
+  // Whether every tree keeps its best branch even if another tree takes the same detection. Only
+  // the labels are then exclusive.
   bool is_independent = false;
 };
 
@@ -28,7 +30,7 @@ class Forest {
  public:
   Forest(const OpenWindow& open, const ForestOptions& options) : open_(open), opt_(options) {}
 
-  // Takes a frame; decides the oldest one if the window is full with it.
+  // Processes a frame; decides the oldest one if the window is now full.
   template <typename Label>
   void add(std::shared_ptr<WindowFrame> frame, TreeStats& stats, Label&& label) {
     open_.advise(*frame, stats);
@@ -39,7 +41,7 @@ class Forest {
     open_.learn(stats);
   }
 
-  // Decides all frames that are left, with what is known of them.
+  // Decides all remaining frames from the data available.
   template <typename Label>
   void decide_all(TreeStats& stats, Label&& label) {
     while (open_.n_open() > 0) decide(stats, label);
@@ -50,17 +52,18 @@ class Forest {
   void count(TreeStats& stats) const { open_.count(stats); }
 
  private:
-  // The best branch of a tree through one detection of the frame that is decided, or through none.
+  // The best branch of a tree with one detection of the oldest frame, or with a missed detection.
   struct Way {
     std::int32_t column = -1;  // -1: missed
     double worth = 0, crowding = 0;
-    double newborn = -std::numeric_limits<double>::infinity();  // what it is worth to someone new
+    // log-likelihood ratio if the detection initiates a new track instead
+    double newborn = -std::numeric_limits<double>::infinity();
     double log_weight = 0;   // of all its branches
-    double probability = 0;  // that this way is right, over all ways of sharing out the frame
-    std::int32_t branch = -1;  // -1: no branch is left that misses
+    double probability = 0;  // marginal probability over all joint events of the frame
+    std::int32_t branch = -1;  // -1: no branch with a missed detection is left
   };
 
-  // Of one decision.
+  // Data of one decision.
   struct Memory {
     FramePairing pairs;
     std::vector<std::int32_t> claims;
@@ -98,8 +101,9 @@ class Forest {
     const BranchGrower grower(open_.live, open_.branches);
     const LiveTrack<Tree>& track = open_.live[i];
     std::vector<Way>& ways = s_.ways[i];
-    const double most = grower.worth(track.more.branches.front());  // the best comes first
-    // Where every branch that misses was pruned, it would have been worth no more than this.
+    // branches are sorted, the best first
+    const double most = grower.worth(track.more.branches.front());
+    // If all branches with a missed detection were pruned, this is an upper bound for them.
     const double pruned = most - open_.branches.prune_drop;
     ways.assign(1, Way{.worth = pruned, .log_weight = std::exp(pruned - most)});
     for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
@@ -109,7 +113,8 @@ class Forest {
       auto way = std::find_if(ways.begin(), ways.end(), [&](const Way& w) { return w.column == column; });
       if (way == ways.end()) way = ways.insert(ways.end(), Way{.column = column});
       if (way->branch < 0) {
-        // The frame is shared out now: what others expect of it counts by their own ways.
+        // The frame is decided now, so the claims of other tracks are replaced by their own
+        // alternatives.
         way->branch = static_cast<std::int32_t>(k);
         way->crowding = column < 0 ? 0 : frame.crowding(track.more.key, column);
         way->worth = worth + way->crowding;
@@ -123,9 +128,10 @@ class Forest {
               [](const Way& a, const Way& b) { return a.column < b.column; });
   }
 
-  // A believed track that takes a detection and all that follows may be mistaken: it may be gone,
-  // and these be the first of a new marker. That a single detection is one counts where it is left
-  // over; what the window adds is its future.
+  // Alternative to a confirmed track that takes a detection and its continuation: the track may
+  // have ended, and the detection may be the first of a new marker. The gain of initiation at a
+  // single detection is already part of leaving it unassigned. This function adds the gain of the
+  // continuation.
   void weigh_newborn(const WindowFrame& frame, const LiveTrack<Tree>& track,
                      std::vector<Way>& ways) const {
     MotionState state = track.state;
@@ -148,8 +154,8 @@ class Forest {
     }
   }
 
-  // The probability of every way of the believed tracks, or of the tentative ones given that they
-  // are markers: marginals over all that the frame may be, each way with the weight of its branches.
+  // The marginal probability of every alternative of the confirmed tracks, or of the tentative
+  // tracks given that they are markers. Each alternative has the total weight of its branches.
   void weigh_ways(const WindowFrame& frame, bool confirmed, TreeStats& stats) {
     s_.pairings.clear();
     s_.gains.clear();
@@ -177,7 +183,7 @@ class Forest {
         if (way.column == s_.pairings[e].column) way.probability = s_.marginals[e];
   }
 
-  // For a tentative track, weighed with the odds that it is a marker at all.
+  // For a tentative track, the gain is weighted with the odds that the track is a marker.
   double odds(const LiveTrack<Tree>& track, const Way& way) const {
     if (track.is_confirmed()) return way.worth;
     if (way.branch < 0) return softplus(way.worth);
@@ -185,7 +191,7 @@ class Forest {
     return softplus(b.score + way.crowding) - b.n_taken * open_.live.leftover_gain();
   }
 
-  // Pairs the believed tracks, or the tentative ones, with points that are still free.
+  // Assigns the remaining detections to the confirmed or to the tentative tracks.
   void match_all(const WindowFrame& frame, bool confirmed, TreeStats& stats) {
     s_.candidates.clear();
     for (std::size_t i = 0; i < open_.live.size(); ++i) {
@@ -203,7 +209,7 @@ class Forest {
     s_.pairs.pair(s_.candidates, frame.points, open_.live.m.axis.D, {opt_.pairing}, stats);
   }
 
-  // Mean squared distance of a branch's detections in the window from what was expected of each.
+  // Mean squared distance of a branch's detections in the window from their predictions.
   static double mean_distance2(const Branch& b) {
     double sum = 0;
     for (const double d2 : b.distance2) sum += d2;
@@ -224,7 +230,7 @@ class Forest {
     return nullptr;
   }
 
-  // What no track takes gets no label, with the probability that none of the believed has it.
+  // Labels unassigned detections -1, with the probability that they belong to no confirmed track.
   template <typename Label>
   void say_free(const WindowFrame& frame, Label&& label) {
     s_.free.assign(frame.points.size(), 1);
@@ -235,7 +241,7 @@ class Forest {
       label(frame.first + static_cast<std::int64_t>(j), -1, std::clamp(s_.free[j], 0.0, 1.0));
   }
 
-  // Carries what is decided of a track over the frame, and keeps the branches that agree with it.
+  // Updates a track with the decision, and keeps the branches that agree with it.
   template <typename Label>
   void follow(const WindowFrame& frame, std::size_t i, TreeStats& stats, Label&& label) {
     LiveTrack<Tree>& track = open_.live[i];
@@ -252,8 +258,9 @@ class Forest {
     open_.keep(frame, i, own, stats);
   }
 
-  static constexpr double kNegligible = -20.7;  // log of a weight, of a miss of 1, not looked at
-  static constexpr std::int64_t kMaxStates = 4096;  // of the sum over what a frame may be
+  // log weight relative to a miss below which a pairing is ignored
+  static constexpr double kNegligible = -20.7;
+  static constexpr std::int64_t kMaxStates = 4096;  // of the sum over joint events
 
   OpenWindow open_;
   ForestOptions opt_;

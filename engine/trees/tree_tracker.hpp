@@ -1,8 +1,8 @@
-// Decisions that wait for a window of frames, and what can be said before they are made.
+// A tracker with delayed decisions that also reports provisional labels.
 //
-// The forest decides a frame when the window has passed over it. Until then its points have labels
-// for the time being: those that the forest would decide on now, were there no more frames. They may
-// change with every frame; what is decided never does.
+// The forest decides a frame when the window has passed it. Until then, its detections have
+// provisional labels: those that the forest would assign if no further frame came. Provisional
+// labels may change with every frame; decided labels never change.
 #pragma once
 
 #include <cmath>
@@ -24,17 +24,20 @@ class TreeTracker {
   explicit TreeTracker(const Forest& forest)
       : forest_(forest), present_(forest.live()), has_confidence_(forest.has_confidence()) {}
 
-  // As FrameTracker::step; also calls label for earlier detections whose label changes.
+  // Processes a frame as FrameTracker::step does. Also calls label for earlier detections whose
+  // label changes.
   template <typename Label>
   TreeStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
     std::map<std::int64_t, Said> decided;
     TreeStats stats = add(time, step, points, decided);
     look_ahead(decided, label);
-    stats.add_work(ahead_);  // what is told of the open frames now is told of this step too
+    // the provisional labels are reported in this step, so their work counts here
+    stats.add_work(ahead_);
     return stats;
   }
 
-  // Many frames whose labels are asked for at the end alone: step without the looks ahead.
+  // Processes one of many frames whose labels are needed only at the end, without provisional
+  // labels in between.
   template <typename Label>
   TreeStats pass(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
     std::map<std::int64_t, Said> decided;
@@ -52,11 +55,11 @@ class TreeTracker {
 
   bool has_confidence() const { return has_confidence_; }
   const Forest& forest() const { return forest_; }
-  // The tracks as they would be decided on now.
+  // The tracks as they would be if all frames were decided now.
   const LiveTracks<Tree>& live() const { return present_; }
   const MotionModel& motion() const { return present_.m; }
   std::int64_t n_ids() const { return present_.next_id; }
-  // Of what is decided, and of what would be decided now.
+  // Statistics of the decided frames and of the provisional decisions.
   TreeStats total() const {
     TreeStats all = total_;
     all.add_work(ahead_);
@@ -80,7 +83,7 @@ class TreeTracker {
     frame->step = step;
     frame->points.assign(points.begin(), points.end());
     frame->claimed.assign(points.size(), 0);
-    // Cells as wide as a track may move in the frame, were it as fast as can be.
+    // Cells have the width of the largest displacement of a track in one frame.
     const LiveTracks<Tree>& live = forest_.live();
     const double dt = so_far_.n_frames == 0 ? 0 : time - so_far_.last_time;
     frame->grid.build(frame->points, live.m.axis.D, live.sm.max_speed * dt + live.sm.speed_margin);
@@ -95,8 +98,8 @@ class TreeTracker {
     return stats;
   }
 
-  // What was decided to have no label may still get one, as long as a tentative track holds it; and
-  // if that was said for the time being, it may have to be taken back.
+  // A detection decided as unassigned may still get a label while a tentative track contains it. If
+  // it had a provisional label, that label may have to be withdrawn.
   void forget_old(const std::map<std::int64_t, Said>& decided) {
     for (const auto& [detection, said] : decided)
       if (said.id < 0) unlabelled_[detection] = said.confidence;
@@ -106,7 +109,7 @@ class TreeTracker {
     unlabelled_.erase(unlabelled_.begin(), unlabelled_.lower_bound(oldest));
   }
 
-  // Labels all that is open as if there were no more frames, and tells what has changed since.
+  // Computes provisional labels of all open detections, and reports those that changed.
   template <typename Label>
   void look_ahead(const std::map<std::int64_t, Said>& decided, Label&& label) {
     Forest ahead(forest_);
@@ -115,7 +118,7 @@ class TreeTracker {
     ahead.decide_all(ahead_, [&](std::int64_t detection, std::int64_t id, double p) {
       now[detection] = {id, has_confidence_ ? p : 0};
     });
-    // Said before of what is neither decided nor open to a label any more: taken back.
+    // Withdraws labels of detections that are neither decided nor open to a label any more.
     for (const auto& [detection, said] : said_)
       if (!now.contains(detection) && !decided.contains(detection))
         label(detection, -1, unlabelled_.at(detection));
@@ -133,7 +136,7 @@ class TreeTracker {
   Forest forest_;
   LiveTracks<Tree> present_;
   bool has_confidence_;
-  std::map<std::int64_t, Said> said_;  // of what is not decided
+  std::map<std::int64_t, Said> said_;  // labels reported for undecided detections
   std::map<std::int64_t, double> unlabelled_;
   TreeStats total_, ahead_;
   Progress so_far_;

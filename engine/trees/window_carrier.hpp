@@ -1,8 +1,9 @@
-// Bodies over frames that are not decided yet: what neighbours say of a frame that comes, found by the
-// best branches of all confirmed tracks (tracks/carried_tracks.hpp) and passed to each of their branches.
+// Rigid neighbours in trackers with a window: information on an arriving frame is computed from the
+// best branches of all confirmed tracks (tracks/carried_tracks.hpp) and used by each of their
+// branches.
 //
-// What bodies are is learnt from decided frames alone. What is said of a frame is said once, when it
-// comes, and kept with it: whoever is split over the frame later hears the same.
+// Bonds are estimated from decided frames only. The information on a frame is computed once, on
+// arrival, and stored with the frame, so that branches grown over it later use the same values.
 #pragma once
 
 #include <algorithm>
@@ -29,12 +30,12 @@ class WindowBodies {
 
   bool is_on() const { return all_.has_value(); }
 
-  // Of the frame after `n_open` that are not decided.
+  // Adds the information on a frame that follows `n_open` undecided ones.
   void advise(const LiveTracks<Tree>& live, std::int64_t n_open, WindowFrame& frame,
               FrameStats& stats) {
     auto& [rows, carried] = all_.own();
     list_rows(live, rows);
-    // What a believed track wins by a detection over missing it and leaving that over.
+    // Gain of a confirmed track from a detection over missing it and leaving it unassigned.
     const double over = rows.leftover_gain();
     const auto base = [&](std::size_t i) {
       return rows.hit_gain(rows[i].gap) - rows.miss_gain(rows[i].gap) - over;
@@ -62,7 +63,7 @@ class WindowBodies {
         frame.advice.push_back(std::move(own));
   }
 
-  // After a decision.
+  // Updates the bonds after a decision.
   void learn(const LiveTracks<Tree>& live, FrameStats& stats) { all_.own().carried.learn(live, stats); }
 
  private:
@@ -71,13 +72,14 @@ class WindowBodies {
     CarriedTracks carried;
   };
   struct Memory {
-    std::vector<std::size_t> place;  // of each row's track among the advised
+    std::vector<std::size_t> place;  // index in `advice` of each row's track
     std::vector<NeighbourAdvice> advice;
     std::vector<Candidate> candidates;
   };
 
-  // The best branch of every believed track, and where that was seen last, its best hidden one: had it
-  // no place, what the best one took would never be found to be a ghost.
+  // Lists the best branch of every confirmed track. If that branch has a detection in the last
+  // frame, its best occluded branch is listed too; otherwise the detection of the best branch could
+  // never be identified as a ghost.
   void list_rows(const LiveTracks<Tree>& live, LiveTracks<>& rows) {
     rows.tracks.clear();
     s_.place.clear();

@@ -1,4 +1,5 @@
-// The links of a window that are in doubt: which detection may follow which instead of what does now.
+// The ambiguous links of a window: pairs of detections that are plausible alternatives to the
+// present links.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +15,14 @@ class Doubts {
   };
 
   void add_frame() { frames_.emplace_back(); }
-  // A link that leads into the newest frame.
+  // Adds a link that leads into the newest frame.
   void add(std::int32_t from, std::int32_t to) { frames_.back().push_back({from, to}); }
-  // Forgets all but the newest frames.
+  // Removes all but the newest frames.
   void keep(std::size_t n_frames) {
     while (frames_.size() > n_frames) frames_.pop_front();
   }
 
-  // Those of the newest frame.
+  // Calls visit for the links into the newest frame.
   template <typename Visit>
   void each_new(Visit&& visit) const {
     for (const Link& link : frames_.back()) visit(link.from, link.to);

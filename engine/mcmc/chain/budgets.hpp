@@ -1,4 +1,4 @@
-// How long walks may be: so many moves, so much time, until somebody says stop.
+// Limits on the length of chains: a number of moves, a deadline, and cancellation by the caller.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace asterism {
 
 using Clock = std::chrono::steady_clock;
 
-// A moment so many seconds after another, never for what no clock can hold.
+// The time so many seconds after `start`; the maximum if the clock cannot represent it.
 inline Clock::time_point after(Clock::time_point start, double seconds) {
   constexpr double kMost = 1e9;
   if (!(seconds < kMost)) return Clock::time_point::max();
@@ -32,7 +32,8 @@ inline Clock::time_point halfway_to(Clock::time_point end) {
   return now < end ? now + (end - now) / 2 : end;
 }
 
-// Asks now and then, on the thread that made it, whether to go on; tells how much of it is done.
+// Regularly asks a callback, on the thread that created the object, whether to continue. Passes it
+// the fraction of the work done.
 class Watch {
  public:
   Watch(double all, std::function<bool(double)> goes_on)
@@ -74,17 +75,17 @@ struct Budget {
   }
 };
 
-// Those of groups, by what they weigh.
+// The budgets of groups, proportional to their weights.
 class Budgets {
  public:
-  // `moves` for each unit of weight.
+  // `moves` is per unit of weight.
   Budgets(std::span<const double> weights, double moves, Watch* watch = nullptr) : watch_(watch) {
     for (const double weight : weights) {
-      const double own = weight > 0 ? std::ceil(moves * weight) : 0;  // moves may be without limit
+      const double own = weight > 0 ? std::ceil(moves * weight) : 0;  // moves may be infinite
       moves_.push_back(own < static_cast<double>(kEndless) ? static_cast<std::int64_t>(own) : kEndless);
     }
   }
-  // What time there is until then is shared out as well, among so many chains of each group.
+  // Also divides the time until `end` among the chains of all groups.
   void end_at(Clock::time_point end, std::span<const double> weights, std::int32_t n_chains,
               std::int32_t n_threads) {
     end_ = end;
@@ -96,7 +97,7 @@ class Budgets {
       seconds_.push_back(weight > 0 ? left * workers * weight / all : 0);
   }
 
-  // Its time begins now.
+  // Returns the budget of a group, whose time starts now.
   Budget of(std::size_t group) const {
     Budget out{moves_[group], end_, watch_};
     if (!seconds_.empty()) out.until = std::min(end_, after(Clock::now(), seconds_[group]));

@@ -1,4 +1,4 @@
-// Chains that walk over a part of a partition: for the best of it, and for how probable it is.
+// Runs a chain on a part of a partition, to find its best state or to estimate confidence.
 #pragma once
 
 #include <algorithm>
@@ -20,14 +20,15 @@
 
 namespace asterism {
 
-// What a chain found in its two halves.
+// Results of a chain, separately for its two halves.
 struct Halves {
   static constexpr int kN = 2;
-  std::vector<std::int32_t> detections;      // in the whole
-  std::array<std::vector<double>, kN> shares;  // in which they follow what they follow
+  std::vector<std::int32_t> detections;      // numbers in the whole partition
+  // fraction of moves in which each has its reference predecessor
+  std::array<std::vector<double>, kN> shares;
   std::array<double, kN> mean{}, variance{};   // of the log posterior
   std::array<std::int64_t, kN> n_moves{};
-  double ess = 0;  // NaN of a chain that never moved
+  double ess = 0;  // NaN for a chain that never moved
 
   std::int64_t all_moves() const { return std::accumulate(n_moves.begin(), n_moves.end(), std::int64_t{0}); }
 };
@@ -41,8 +42,8 @@ class Walker {
         hot_share_(options.share_at_doubts),
         is_draw_(options.is_draw) {}
 
-  // Looks for the best; returns what it is better by than the start, and stays there. Or draws: stays
-  // where it ends, which counts as better than anything.
+  // Searches for the best partition, returns its gain over the start, and stays there. With
+  // `is_draw` it stays at the last state instead and returns infinity.
   double search(const Partition<Filter>& whole, const Group& group,
                 std::uint64_t seed, const Budget& budget, ChainStats& stats) {
     sampler_.partition().take_part(whole, group.tracks, group.free);
@@ -61,7 +62,7 @@ class Walker {
   }
   const Partition<Filter>& partition() const { return sampler_.partition(); }
 
-  // How probable the partition is that it begins at.
+  // Estimates the probability of the links of the initial partition.
   void sample(const Partition<Filter>& whole, const Group& group,
               std::uint64_t seed, const Budget& budget, Halves& out, ChainStats& stats) {
     Partition<Filter>& p = sampler_.partition();
@@ -74,7 +75,7 @@ class Walker {
     out.detections.clear();
     for (std::int32_t i = 0; i < p.window().n_ids(); ++i)
       if (!p.is_frozen(i)) out.detections.push_back(p.origin(i));
-    // Halves of equal length; where time is short, each has half of it.
+    // The halves have the same number of moves; if time is limited, each has half of it.
     const auto weigh = [&](const Change<Filter>& change, bool is_taken) {
       marginals_.weigh(change, is_taken);
     };
@@ -103,7 +104,7 @@ class Walker {
   }
 
  private:
-  // Moves less probable than this before the way back is weighed need not be known when refused.
+  // Log ratio without the reverse move below which a rejected move is not evaluated further.
   static constexpr double kLookedAtAbove = -9;
 
   struct Hot {
@@ -123,8 +124,8 @@ class Walker {
     sampler_.step(hot->toggle, seen);
   }
 
-  // What may be done about the links in doubt of this part. That a toggle is drawn as often before as
-  // after makes it exact; how often is free.
+  // Lists the involutive moves at the ambiguous links of this part. They are in detailed balance
+  // because the list and its probabilities are fixed.
   void list_hot(const Group& group) {
     hot_.clear();
     if (hot_share_ == 0) return;
@@ -140,7 +141,7 @@ class Walker {
     };
     for (const auto& [from, to] : group.doubts) {
       const std::int32_t a = local(from), y = local(to);
-      if (a < 0 || y < 0 || p.is_frozen(y)) continue;  // a settled link is in doubt no more
+      if (a < 0 || y < 0 || p.is_frozen(y)) continue;  // a settled link is not ambiguous any more
       const std::int32_t x = p.track_of(a) < 0 ? -1 : p.after(a);
       const std::int32_t c = p.track_of(y) < 0 ? -1 : p.before(y);
       add_skips(a, y);
@@ -158,7 +159,7 @@ class Walker {
     }
     for (std::int32_t i = 0; i < n; ++i) local_[p.origin(i)] = -1;
   }
-  // A link that is not there is made, or one that is goes with either of its ends.
+  // Adds the move that makes an absent link, or those that remove either end of a present link.
   void add_skips(std::int32_t a, std::int32_t y) {
     const Partition<Filter>& p = sampler_.partition();
     if (p.track_of(a) < 0) return;
@@ -190,7 +191,7 @@ class Walker {
   bool is_draw_;
   std::vector<Hot> hot_;
   std::vector<std::int32_t> local_;
-  std::vector<char> is_listed_;  // detections that may be skipped by a toggle of their own
+  std::vector<char> is_listed_;  // detections that already have a skip move
 };
 
 }  // namespace asterism

@@ -1,4 +1,4 @@
-// What a walk over partitions did, and whether it agrees with itself.
+// Statistics of the chains, and diagnostics of their convergence.
 #pragma once
 
 #include <algorithm>
@@ -14,15 +14,18 @@ namespace asterism {
 
 struct ChainStats {
   std::array<MoveCounts, kMoves> moves{};
-  std::int64_t n_search = 0, n_sampled = 0;  // moves for the best partition, and for confidence
-  std::int64_t n_walked = 0;    // groups that were walked over, of all that were looked at
-  std::int64_t n_sure = 0;      // tracks that distance bonds kept out
-  std::int64_t n_cut = 0;       // plausible links between different groups, which none could take
-  std::int64_t n_given = 0, n_refused = 0;  // links to start from; that the model or others forbade
-  std::int64_t n_doubtful = 0;  // detections of whose label halves or chains differ by over 0.1
-  std::int64_t n_unmoved = 0;   // groups whose chains never moved, so that their mixing is not known
-  // Of the log posterior: the largest R̂ and the smallest effective sample size of the groups for which
-  // they are known. NaN where they are known for none.
+  // moves to find the best partition, and to estimate confidence
+  std::int64_t n_search = 0, n_sampled = 0;
+  std::int64_t n_walked = 0;    // groups in which chains ran
+  std::int64_t n_sure = 0;      // tracks excluded by distance bonds
+  std::int64_t n_cut = 0;  // plausible links between different groups, which no chain could use
+  // initial links given by the caller; those that were impossible
+  std::int64_t n_given = 0, n_refused = 0;
+  // detections whose confidence differs by over 0.1 between halves or chains
+  std::int64_t n_doubtful = 0;
+  std::int64_t n_unmoved = 0;   // groups whose chains never moved, so that their mixing is unknown
+  // Of the log posterior: the largest R̂ and the smallest effective sample size over the groups for
+  // which they are defined. NaN if there is no such group.
   double rhat = std::numeric_limits<double>::quiet_NaN();
   double ess = std::numeric_limits<double>::quiet_NaN();
 
@@ -43,12 +46,12 @@ struct ChainStats {
     for (int k = 0; k < kMoves; ++k) moves[k].add(next[k]);
   }
   void add_mixing(double next_rhat, double next_ess) {
-    rhat = std::fmax(rhat, next_rhat);  // the other where one is NaN
+    rhat = std::fmax(rhat, next_rhat);  // the other value if one is NaN
     ess = std::fmin(ess, next_ess);
   }
 };
 
-// What a frame, or a run of them, took in all.
+// Statistics of a frame, or of many.
 struct SampledStats : FrameStats {
   ChainStats chain;
 

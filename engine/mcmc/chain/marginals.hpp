@@ -1,8 +1,8 @@
-// How probable it is that each detection follows what it follows now: the share of a walk in which it
-// does.
+// Estimates the probability that each detection has its reference predecessor: the fraction of the
+// chain's states in which it has.
 //
-// Of every move that was weighed, what it would lead to counts with the probability that it is taken,
-// whether it was or not (the expectation over the last draw: less noise, no bias).
+// Every evaluated proposal counts with its acceptance probability, whether it is accepted or not.
+// This expectation over the last draw reduces the variance without bias.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ class Marginals {
  public:
   explicit Marginals(const Partition<Filter>& p) : p_(p) {}
 
-  // The partition as it is now is what is asked about.
+  // Makes the present partition the reference.
   void begin() {
     const std::int32_t n = p_.window().n_ids();
     reference_.resize(n);
@@ -30,7 +30,7 @@ class Marginals {
     n_steps_ = 0;
   }
 
-  // A move that leads from the partition to another; to be told before it is carried out.
+  // Adds a proposed change. It must be called before the change is applied.
   void weigh(const Change<Filter>& change, bool is_taken) {
     touched_.clear();
     for (std::int32_t e = 0; e < change.n_edits; ++e) {
@@ -58,14 +58,14 @@ class Marginals {
       is_so_[i] = will_be;
     }
   }
-  // After every move, possible or not.
+  // Counts a move. It must be called after every move, possible or not.
   void count() { ++n_steps_; }
 
   double share(std::int32_t i) const {
     const double sum = sum_[i] + (is_so_[i] ? static_cast<double>(n_steps_ - since_[i]) : 0);
     return sum / static_cast<double>(n_steps_);
   }
-  // Goes on with the same question, without what was counted.
+  // Keeps the reference and clears the counts.
   void forget() {
     std::fill(sum_.begin(), sum_.end(), 0.0);
     std::fill(since_.begin(), since_.end(), 0);
@@ -73,7 +73,7 @@ class Marginals {
   }
 
  private:
-  // What is before a detection: another, nothing in its track, or no track.
+  // Predecessor of a detection: another detection, none in its track, or no track.
   static constexpr std::int32_t kFirst = -1, kNowhere = -2, kUntouched = -3;
   std::int32_t where(std::int32_t i) const { return p_.track_of(i) < 0 ? kNowhere : p_.before(i); }
   void go(std::int32_t i, std::int32_t before) {

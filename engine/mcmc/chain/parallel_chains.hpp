@@ -1,5 +1,5 @@
-// Chains beside each other in every group of a partition: the best that they find, and how probable
-// they find it.
+// Runs several chains in parallel in every group of a partition, to find the best partition and its
+// confidence.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@ class Walks {
   Walks(const ChainOptions& chain, std::int32_t n_chains, std::int32_t n_threads)
       : chain_(chain), n_chains_(n_chains), n_threads_(n_threads) {}
 
-  // Each group as the best of its chains has it.
+  // Sets each group to the best state that its chains find.
   void search(Partition<Filter>& whole, std::span<const Group> groups, const Budgets& budgets,
               std::uint64_t seed, ChainStats& stats) {
     struct Found {
@@ -51,8 +51,8 @@ class Walks {
     }
   }
 
-  // By detection of the whole: in which share of the walks it follows what it follows; 1 where nothing
-  // is walked over.
+  // For each detection of the whole partition, the fraction of the chains' states in which it has
+  // its present predecessor; 1 for detections in no group.
   std::vector<double> sample(const Partition<Filter>& whole, std::span<const Group> groups,
                              const Budgets& budgets, std::uint64_t seed, ChainStats& stats) {
     std::vector<Halves> found(groups.size() * n_chains_);
@@ -69,10 +69,10 @@ class Walks {
   }
 
  private:
-  // Differences of a share from half to half that are told as doubtful.
+  // Difference of a fraction between halves from which a detection counts as uncertain.
   static constexpr double kDoubtful = 0.1;
 
-  // A number that is the same for the same task, whoever carries it out.
+  // A seed that depends on the task but not on the thread that runs it.
   static std::uint64_t seed_of(std::uint64_t seed, std::size_t task) {
     return Random(seed ^ static_cast<std::uint64_t>(task)).next();
   }
@@ -87,13 +87,14 @@ class Walks {
     });
   }
 
-  // Split R̂ (Gelman et al. 2013) of the log posterior over the halves of all chains, which are long;
-  // and the mean of their shares, each weighed by its moves. Chains that never moved have no variance
-  // to compare: of these neither R̂ nor the effective sample size is known.
+  // Computes split R̂ (Gelman et al. 2013) of the log posterior over the halves of all chains, and
+  // the mean fractions weighted by moves. Chains that never moved have no variance, so their R̂ and
+  // effective sample size are undefined.
   static void judge(std::span<const Halves> chains, std::vector<double>& shares, ChainStats& stats) {
     const auto n_halves = static_cast<double>(chains.size() * Halves::kN);
     double mean = 0, within = 0, between = 0, moves = 0;
-    double ess = std::numeric_limits<double>::quiet_NaN();  // of those chains for which it is known
+    // over the chains for which it is defined
+    double ess = std::numeric_limits<double>::quiet_NaN();
     for (const Halves& chain : chains) {
       if (!std::isnan(chain.ess)) ess = std::isnan(ess) ? chain.ess : ess + chain.ess;
       moves += static_cast<double>(chain.all_moves());

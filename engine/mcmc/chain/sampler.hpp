@@ -1,4 +1,5 @@
-// The Metropolis–Hastings chain over partitions: draws a move, weighs it, takes it or stays.
+// The Metropolis–Hastings chain over partitions: proposes a move, evaluates it, accepts or rejects
+// it.
 #pragma once
 
 #include <algorithm>
@@ -21,15 +22,16 @@ namespace asterism {
 struct ChainOptions {
   GrowthOptions growth;
   std::array<double, kMoves> weights{};  // ξ, up to a factor
-  // The report's rules: nothing but births while there is no track, no merge and no switch while
-  // there is one. The shares of the kinds of moves then depend on K.
+  // The rules of the report: only births while there is no track, and no merge or switch while
+  // there is one. The probabilities of the kinds of moves then depend on the number of tracks K.
   bool has_first_rules = false;
-  // The report's chain: ω' is drawn from the best partition so far and weighed against the last one
-  // that was taken. That climbs; it does not sample the posterior.
+  // The chain of the report: ω' is drawn from the best partition so far and compared with the last
+  // accepted one. This is an ascent and does not sample the posterior.
   bool is_ascent = false;
-  // So often a move is drawn at a link in doubt, where there is any (mcmc/chain/chain_runner.hpp).
+  // Probability of a move at an ambiguous link, if there is any (mcmc/chain/chain_runner.hpp).
   double share_at_doubts = 0;
-  // What is kept of a walk is where it ends, a draw from the posterior, and not the best it met.
+  // Whether the result of a search is its last state, a draw from the posterior, instead of the
+  // best state.
   bool is_draw = false;
 };
 
@@ -45,22 +47,22 @@ class Sampler {
       : partition_(std::move(partition)), opt_(options), random_(seed) {
     for (int K = 0; K < 3; ++K) shares_[K] = shares(K);
   }
-  Sampler(const Sampler&) = delete;  // the moves look at the partition beside them
+  Sampler(const Sampler&) = delete;  // the moves hold references to the partition
   Sampler& operator=(const Sampler&) = delete;
 
   Partition<Filter>& partition() { return partition_; }
   const Partition<Filter>& partition() const { return partition_; }
   const std::array<MoveCounts, kMoves>& counts() const { return counts_; }
 
-  // Begins anew, with other random numbers.
+  // Restarts with another seed.
   void begin(std::uint64_t seed) {
     random_ = Random(seed);
     counts_ = {};
     best_gain_ = last_gain_ = 0;
   }
 
-  // One move; true where the partition changes. `seen(change, is taken)` is called for what was
-  // weighed to the end, before it is carried out.
+  // Makes one move; returns true if the partition changes. Calls `seen(change, is taken)` for every
+  // evaluated proposal, before it is applied.
   template <typename Seen>
   bool step(Seen&& seen) {
     const Shares& now = shares_[std::min(partition_.tracks().size(), 2)];
@@ -74,7 +76,7 @@ class Sampler {
     const Shares& then = shares_[std::min(n_tracks_after(), 2)];
     const int back = static_cast<int>(inverse(change_.move));
     const double log_u = std::log(random_.uniform());
-    // A probability is at most 1: what is too little before the way back is weighed stays so.
+    // log_reverse is at most 0, so a ratio that is too small without it stays too small.
     change_.log_ratio = change_.gain + (best_gain_ - last_gain_) + then.log[back] -
                         now.log[kind] - change_.log_forward;
     const double least = std::min(log_u, weighed_above_);
@@ -90,24 +92,24 @@ class Sampler {
     return step([](const Change<Filter>&, bool) {});
   }
 
-  // One move of a list; see mcmc/moves/involutive_moves.hpp.
+  // Makes one move of a list; see mcmc/moves/involutive_moves.hpp.
   template <typename Seen>
   bool step(const Toggle& toggle, Seen&& seen) {
     if (!propose(toggle)) return false;
     change_.log_ratio = change_.gain;
     return take(std::log(random_.uniform()), true, seen);
   }
-  // What it would gain; -inf where it is impossible.
+  // The gain of a move; -inf if it is impossible.
   double gain_of(const Toggle& toggle) {
     return propose(toggle) ? change_.gain : -std::numeric_limits<double>::infinity();
   }
   Random& random() { return random_; }
 
-  // Since `begin_best`, what the partition has won, and the most of it.
+  // Gain of the log posterior since `begin_best`, and its maximum.
   double gain() const { return gain_; }
   double most() const { return most_; }
 
-  // From here on the best partition is kept in mind; then the chain is put there.
+  // `begin_best` starts to remember the best partition; `restore_best` returns the chain to it.
   void begin_best() {
     gain_ = most_ = 0;
     is_best_ = true;
@@ -139,8 +141,8 @@ class Sampler {
     gain_ = most_;
   }
 
-  // What has more than this log probability before the way back is weighed, is weighed to the end
-  // whether it will be taken or not, for whoever looks on.
+  // Proposals with a log ratio above this, without the reverse move, are evaluated completely even
+  // if they will be rejected. Estimators of marginals need them.
   void weigh_above(double log_p) { weighed_above_ = log_p; }
   static constexpr double kOnlyWhatMayBeTaken = std::numeric_limits<double>::infinity();
 
@@ -225,12 +227,13 @@ class Sampler {
   Change<Filter> change_;
   std::array<Shares, 3> shares_{};
   std::array<MoveCounts, kMoves> counts_{};
-  // Ascent: log posterior of the best partition and of the last one taken, less that at the start.
+  // Ascent: log posterior of the best partition and of the last accepted one, relative to the
+  // start.
   double best_gain_ = 0, last_gain_ = 0;
   double weighed_above_ = kOnlyWhatMayBeTaken;
 
-  // Since `begin_best`: what was won, the most of it, whether it is as good here as it ever was; and
-  // the tracks where it was best, if that is elsewhere.
+  // Since `begin_best`: the gain, its maximum, and whether the present partition attains it. If it
+  // does not, the tracks of the best partition are saved.
   static constexpr double kBetter = 1e-9;
   double gain_ = 0, most_ = 0;
   bool is_best_ = false;

@@ -1,13 +1,13 @@
-// A partition taken apart into groups of tracks and free detections, over each of which a chain can
-// walk alone.
+// Divides a partition into groups of tracks and free detections, in each of which a chain can run
+// independently.
 //
 //   whole       one group
-//   likelihood  joined by links in doubt: what no plausible link joins has nothing to decide
-//   cells       by cells of space (§4.2 of the report), which are shifted by half in every other frame
-//               so that no border stays
-//   clusters    joined where they are nearer to each other than some distance (ibid.)
+//   likelihood  joined by ambiguous links; tracks without any need no chain
+//   cells       by spatial cells (§4.2 of the report), which are shifted by half in every other
+//               frame so that the borders move
+//   clusters    joined if they are closer than some distance (ibid.)
 //
-// A track is in the group, or cell, of its last detection: none is cut.
+// A track belongs to the group or cell of its last detection, so no track is divided.
 #pragma once
 
 #include <array>
@@ -28,21 +28,22 @@ enum class SplitBy { whole, likelihood, cells, clusters };
 
 struct SplitOptions {
   SplitBy by = SplitBy::likelihood;
-  double doubt = 10;     // nats: links that are less probable than others by more are no doubt
-  double distance = 0;   // edge of a cell, or of what is in one cluster
+  // nats; a link is ambiguous if its log likelihood is within this of the best alternative
+  double doubt = 10;
+  double distance = 0;   // edge of a cell, or distance within a cluster
 };
 
 struct Group {
   std::vector<std::int32_t> tracks, free;
   std::vector<Doubts::Link> doubts;
-  std::int64_t n_new = 0;   // tracks and free detections that are seen in the newest frame
+  std::int64_t n_new = 0;   // tracks and free detections with a detection in the newest frame
   std::int64_t n_open = 0;  // detections that are not settled
 };
 
 struct Split {
   std::vector<Group> groups;  // those in which something may change
   std::int64_t n_all = 0;
-  std::int64_t n_cut = 0;  // links in doubt between groups
+  std::int64_t n_cut = 0;  // ambiguous links between groups
 };
 
 template <typename Filter>
@@ -51,7 +52,7 @@ class Splitter {
   Splitter(const Partition<Filter>& partition, const SplitOptions& options)
       : p_(partition), opt_(options) {}
 
-  // Tracks that are `sure` are left out.
+  // Tracks marked in `is_sure` are left out.
   Split split(const Doubts& doubts, const std::vector<char>& is_sure) {
     list(is_sure);
     UnionFind sets(items_.size());
@@ -89,7 +90,7 @@ class Splitter {
       items_.push_back({-1, i});
     }
   }
-  // The item that a detection belongs to; -1 of what is settled as clutter, or sure.
+  // The item of a detection; -1 if it is settled clutter or in an excluded track.
   std::int32_t item(std::int32_t i) const {
     const std::int32_t k = p_.track_of(i);
     return k >= 0 ? item_of_track_[k] : k == kFree ? item_of_[i] : -1;

@@ -1,4 +1,4 @@
-// How often a chain was in which partition.
+// Counts how often a chain visits each partition.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,8 @@
 
 namespace asterism {
 
-// A partition is the set of its links; its key is the sum of theirs, over which one may walk.
+// A partition is the set of its links. Its key is the sum of the keys of its links, which can be
+// summed in any order.
 inline std::uint64_t link_key(std::int64_t a, std::int64_t b) {
   std::uint64_t z = static_cast<std::uint64_t>(a) * 0x9e3779b97f4a7c15u +
                     static_cast<std::uint64_t>(b) * 0xd1342543de82ef95u + 1;
@@ -30,7 +31,7 @@ std::uint64_t key_of(const Partition<Filter>& p) {
   return key;
 }
 
-// Track of each detection in the window by number, from `first` on: -1 for none, tracks in order of
+// Track of each detection in the window, from the oldest frame on: -1 for none, tracks numbered by
 // their first detection.
 template <typename Filter>
 std::vector<std::int64_t> labels_of(const Partition<Filter>& p) {

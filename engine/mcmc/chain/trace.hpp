@@ -1,5 +1,4 @@
-// The log posterior along a walk: mean, variance, and from the means of batches how many independent
-// draws it is worth.
+// The log posterior along a chain: mean, variance, and effective sample size from batch means.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +29,7 @@ class Trace {
   double variance() const {
     return std::max(sum2_ / static_cast<double>(n_) - mean() * mean(), 0.0);
   }
-  // NaN where the chain never moved.
+  // NaN if the chain never moved.
   double ess_of_halves(std::int64_t n) const {
     double mean = 0, between = 0;
     for (const double x : means_) mean += x / static_cast<double>(means_.size());

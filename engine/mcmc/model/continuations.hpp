@@ -1,5 +1,6 @@
-// What the tracks of a block do in the longer capture after it: each goes on from its *continuation*, the
-// first of its detections after the block, with those that follow whatever is before it.
+// The fixed continuations of the tracks of a block in the longer capture. The *continuation* of a
+// track is its first detection after the block. It and the detections after it stay together,
+// whatever precedes them.
 #pragma once
 
 #include <cstdint>
@@ -28,8 +29,8 @@ class Continuations {
   const LaterPoints& of(std::int32_t i) const { return later_.at(i); }
   void set(std::int32_t i, LaterPoints later) { later_[i] = std::move(later); }
 
-  // Takes the state at continuation i over all that follows; gives what that adds to the score but for
-  // gaps, which stay as they are.
+  // Advances the state at continuation i over all later detections. Returns their contribution to
+  // the score without gap terms, which do not change.
   double go_on(const MotionModel& m, const DetectionWindow& window, Filter& filter, std::int32_t i,
                State& state) const {
     double gain = 0;

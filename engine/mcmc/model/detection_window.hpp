@@ -1,8 +1,8 @@
-// The detections of a window of frames, and which of them may follow which.
+// The detections of a window of frames, and the links that are possible between them.
 //
-// Detections have numbers below `n_ids` that are theirs as long as they are in the window, and are
-// used again for others later. Who may follow whom is asked when it matters: lists of all pairs would
-// be long, for over a gap of many frames a marker may come anywhere.
+// A detection has a number below `n_ids` while it is in the window; the number is then reused.
+// Links are tested on demand, because lists of all pairs would be long: across a gap of many frames
+// a marker may reach almost any detection.
 #pragma once
 
 #include <cassert>
@@ -26,19 +26,20 @@ class DetectionWindow {
     double time = 0;
     std::int64_t frame = 0, number = 0;  // number: in order of arrival
   };
-  // Where the detections of a frame are; never changed, so that copies of a window share it.
+  // Positions of the detections of a frame. They are immutable, so that copies of a window share
+  // them.
   struct Places {
     std::vector<Point> points;
     PointGrid grid;
   };
-  // How a track moves to a frame; shared as well.
+  // The motion model of the steps to a frame; shared as well.
   struct Steps {
     MotionStep step;               // from the frame before
-    std::vector<AxisStep> single;  // with one motion: from d frames before, at d - 1
+    std::vector<AxisStep> single;  // with one motion model: from d frames before, at index d - 1
   };
   struct Frame {
     double time = 0;
-    std::shared_ptr<const Places> places;  // none in a part of a window
+    std::shared_ptr<const Places> places;  // null in a part of a window
     std::shared_ptr<const Steps> steps;
     std::vector<std::int32_t> ids;
   };
@@ -52,8 +53,8 @@ class DetectionWindow {
   // Number of the newest frame; that of the first is 0.
   std::int64_t now() const { return first_ + static_cast<std::int64_t>(frames_.size()) - 1; }
   int max_gap() const { return sm_.max_gap; }
-  // Detections of later frames stand for what a track does after a block of frames: nothing follows
-  // them here (see Partition::continue_with).
+  // Last frame whose detections may have successors. Detections of later frames represent the
+  // continuation of a track after a block (see Partition::continue_with).
   std::int64_t last_open() const { return last_open_; }
   void close_after(std::int64_t frame) { last_open_ = frame; }
 
@@ -79,7 +80,7 @@ class DetectionWindow {
       if (squared_distance(a.y, detections_[j].y, m_.axis.D) <= reach * reach) visit(j);
   }
 
-  // The next frame, and the numbers of its detections in order of arrival.
+  // Adds the next frame. Returns the numbers of its detections in order of arrival.
   std::span<const std::int32_t> add(double time, const MotionStep& step,
                                     std::span<const Point> points, std::int64_t first_number) {
     Frame& frame = frames_.emplace_back();
@@ -112,7 +113,7 @@ class DetectionWindow {
     return frame.ids;
   }
 
-  // Becomes the part of a window that holds some of its detections, numbered here as they are given.
+  // Becomes the part of a window that contains the given detections, numbered in the given order.
   void take_part(const DetectionWindow& whole, std::span<const std::int32_t> ids) {
     first_ = whole.first_;
     last_open_ = whole.last_open_;
@@ -130,7 +131,7 @@ class DetectionWindow {
     }
   }
 
-  // Forgets the oldest frame. Nothing may refer to its detections any more.
+  // Removes the oldest frame. Its detections must not be referenced any more.
   void drop() {
     for (const std::int32_t id : frames_.front().ids) unused_.push_back(id);
     frames_.pop_front();
@@ -138,8 +139,8 @@ class DetectionWindow {
   }
 
  private:
-  // F and Q over d frames: x ↦ F₂ F₁ x, Q = F₂ Q₁ F₂ᵀ + Q₂. Noise of separate steps adds up; that of
-  // one step over the whole time would not be the same.
+  // F and Q over d frames: x ↦ F₂ F₁ x, Q = F₂ Q₁ F₂ᵀ + Q₂. The process noise of separate steps is
+  // accumulated; that of one long step would differ.
   void compose(Steps& steps, std::int64_t t) const {
     const int n = m_.axis.n;
     const AxisStep& last = steps.step.mode[0];

@@ -1,4 +1,4 @@
-// The tracks of a partition, and the edits that change one.
+// The tracks of a partition, and the edits that change a track.
 #pragma once
 
 #include <algorithm>
@@ -7,23 +7,23 @@
 
 namespace asterism {
 
-// In the place of a track's number.
+// Special values of the track of a detection.
 inline constexpr std::int32_t kFree = -1;     // in no track
-inline constexpr std::int32_t kClutter = -2;  // in none, and settled
+inline constexpr std::int32_t kClutter = -2;  // in no track, and settled
 
 struct PartitionTrack {
   std::vector<std::int32_t> nodes;
   std::int32_t n_frozen = 0;
-  std::int32_t n_gone = 0;  // detections before the first, which have left the window
-  std::int64_t id = -1;     // by which the outside knows it, once something of it is settled
+  std::int32_t n_gone = 0;  // detections before the first that have left the window
+  std::int64_t id = -1;     // public label, once part of the track is settled
 
   std::int32_t size() const { return static_cast<std::int32_t>(nodes.size()); }
   std::int32_t whole_size() const { return n_gone + size(); }
-  // Place of the last that is settled, from which the rest goes on; 0 where nothing is.
+  // Index of the last settled detection, after which the track may change; 0 if none is settled.
   std::int32_t first_open() const { return std::max(n_frozen - 1, 0); }
 };
 
-// What follows in a track after some of its detections are kept.
+// The part of a track after the detections that an edit keeps, with filter states and scores.
 template <typename Filter>
 struct Tail {
   std::vector<std::int32_t> nodes;
@@ -37,7 +37,8 @@ struct Tail {
   }
 };
 
-// A track that keeps its first detections and goes on with a tail; a new one has no number.
+// An edit: a track keeps its first detections and continues with a tail. A new track has the number
+// -1.
 template <typename Filter>
 struct Edit {
   std::int32_t track = -1;

@@ -1,13 +1,13 @@
 // A partition of a window's detections into tracks and clutter, and its log posterior.
 //
-// Every detection in a track keeps the track's state right after it and the score up to it. A
-// detection is in one track at most, so that this is all there is to know of every prefix: to end a
-// track earlier costs nothing, to lengthen it only what is new. Frames up to `frozen` are settled: their
-// detections stay where they are.
+// Every detection of a track stores the track's filter state after it and the score up to it. These
+// are the states and scores of all prefixes, as a detection is in at most one track. Shortening a
+// track is therefore free, and extending it costs only the new detections. Detections of frames up
+// to `frozen` are settled and do not change any more.
 //
-// A partition may be of a block of frames in a longer capture. The tracks that go on after the block
-// then end in a continuation (mcmc/model/continuations.hpp), by which the track is weighed as a whole.
-// It may follow other tracks, and has to stay in one.
+// A partition may cover a block of frames of a longer capture. Tracks that leave the block then end
+// in a continuation (mcmc/model/continuations.hpp), which extends their score beyond the block. A
+// continuation may be moved to another track, but must be in one.
 #pragma once
 
 #include <algorithm>
@@ -35,15 +35,15 @@ class Partition {
   Partition(const MotionModel& m, const ScoreModel& sm)
       : Partition(m, sm, std::make_shared<const std::vector<double>>(log_end_table(sm, kEndTable))) {}
 
-  // One of the same model, with nothing in it.
+  // An empty partition with the same model.
   Partition empty() const { return Partition(m_, sm_, log_end_); }
 
   const DetectionWindow& window() const { return window_; }
-  Filter& filter() const { return filter_; }  // it only remembers what it would give anyway
+  Filter& filter() const { return filter_; }  // mutable: it only caches values
   const MotionModel& motion() const { return m_; }
   const ScoreModel& model() const { return sm_; }
 
-  // The number of a track is its own until a change removes it; then it is another's.
+  // The number of a track is valid until an edit removes the track; it is then reused.
   const Track& track(std::int32_t k) const {
     assert(all_.has(k));
     return tracks_[k];
@@ -60,18 +60,18 @@ class Partition {
   const State& state(std::int32_t i) const { return state_[i]; }
   double score(std::int32_t i) const { return score_[i]; }
 
-  // Detections that are in no track, in one, and in one with another before them; all not frozen.
+  // Detections in no track, in a track, and in a track after another detection; none is settled.
   const IndexSet& free() const { return free_; }
   const IndexSet& taken() const { return taken_; }
   const IndexSet& linked() const { return linked_; }
-  // Of these, the ones before which their track was missed in some frame.
+  // The linked detections that follow a gap.
   const IndexSet& leapt() const { return leapt_; }
-  // Tracks, and those of which nothing is frozen.
+  // All tracks, and those without settled detections.
   const IndexSet& tracks() const { return all_; }
   const IndexSet& young() const { return young_; }
 
   std::int32_t last(std::int32_t k) const { return track(k).nodes.back(); }
-  // The detection before or after in the track, -1 where there is none.
+  // The previous or next detection of the track, -1 if there is none.
   std::int32_t before(std::int32_t i) const {
     return place_[i] > 0 ? track(track_of_[i]).nodes[place_[i] - 1] : -1;
   }
@@ -85,7 +85,7 @@ class Partition {
     return sm_.log_misses(0, gap - 1) + sm_.log_seen(gap - 1) - sm_.log_clutter + gap * sm_.log_survive;
   }
   double end_score(std::int32_t i) const {
-    if (is_continuation(i)) return 0;  // how the track ends is as it is
+    if (is_continuation(i)) return 0;  // the end of the track is unchanged
     const std::int64_t left = window_.now() + n_after_ - window_[i].frame;
     return (*log_end_)[std::min(left, kEndTable)];
   }
@@ -105,7 +105,7 @@ class Partition {
     return sum;
   }
 
-  // Adds a detection to the tail of an edit, with all that follows from it.
+  // Appends a detection to the tail of an edit, with its continuation if it has one.
   void append(Edit<Filter>& edit, std::int32_t j) const {
     Tail<Filter>& tail = edit.tail;
     State& state = tail.states.emplace_back();
@@ -125,7 +125,7 @@ class Partition {
     tail.nodes.push_back(j);
     if (is_continuation(j)) tail.scores.back() += later_.go_on(m_, window_, filter_, j, state);
   }
-  // Whether edits leave every continuation in a track.
+  // Whether every continuation is in a track after the edits.
   bool keeps_continuations(std::span<const Edit<Filter>> edits) const {
     for (const Edit<Filter>& edit : edits) {
       if (edit.track < 0 || edit.keep == track(edit.track).size()) continue;
@@ -138,14 +138,15 @@ class Partition {
     return true;
   }
 
-  // The same for the detection that follows in the track now, where the edit changes nothing before.
+  // Appends the present next detection of the track. Nothing before it has changed, so its state
+  // and score stay valid.
   void append_same(Edit<Filter>& edit, std::int32_t j) const {
     edit.tail.nodes.push_back(j);
     edit.tail.states.push_back(state_[j]);
     edit.tail.scores.push_back(score_[j]);
   }
 
-  // Takes the edits over. A track that keeps nothing is gone, its number free for others.
+  // Applies the edits. A track without detections is removed and its number reused.
   void apply(std::span<Edit<Filter>> edits) {
     for (Edit<Filter>& edit : edits) {
       if (edit.track < 0) {
@@ -188,8 +189,8 @@ class Partition {
   }
   std::int64_t frozen() const { return frozen_; }
 
-  // Becomes the part of a partition that has some of its tracks and free detections: everything that
-  // is open of them, and of what is settled the last of each track.
+  // Becomes the part of a partition with some of its tracks and free detections. Of each track it
+  // contains all open detections and the last settled one.
   void take_part(const Partition& whole, std::span<const std::int32_t> tracks,
                  std::span<const std::int32_t> free) {
     frozen_ = whole.frozen_;
@@ -217,10 +218,10 @@ class Partition {
     }
     for (; i < static_cast<std::int32_t>(origin_.size()); ++i) free_.add(i);
   }
-  // Number of a detection in the whole; its own in what is no part.
+  // Number of a detection in the whole partition; the number itself if this is not a part.
   std::int32_t origin(std::int32_t i) const { return origin_.empty() ? i : origin_[i]; }
 
-  // Takes over what a part, which was taken of these tracks, has come to.
+  // Replaces these tracks by the result of a part that was taken of them.
   void take_over(const Partition& part, std::span<const std::int32_t> tracks) {
     std::unordered_map<std::int32_t, std::int32_t> by_first;
     for (const std::int32_t k : tracks)
@@ -254,19 +255,20 @@ class Partition {
     apply(edits);
   }
 
-  // A block of a longer capture ends with this frame; so many frames of the capture come after the
-  // last of the window.
+  // Ends a block of a longer capture at this frame. `n_after` frames of the capture follow the last
+  // frame of the window.
   void close_after(std::int64_t frame, std::int64_t n_after) {
     window_.close_after(frame);
     n_after_ = n_after;
   }
-  // A detection after the block, before it is put into a track, goes on with these.
+  // Sets the detections after continuation i. It must be called before the detection is put into a
+  // track.
   void continue_with(std::int32_t i, LaterPoints later) {
     free_.remove(i);
     later_.set(i, std::move(later));
   }
-  // A track that begins with a settled detection, in a state that is known; or goes on with it, where
-  // others were before.
+  // Adds a track that begins with a settled detection in a known state. It may have had earlier
+  // detections.
   std::int32_t add_settled(std::int32_t i, const State& state, bool has_others_before) {
     const std::int32_t k = new_track();
     free_.remove(i);
@@ -275,7 +277,7 @@ class Partition {
     return k;
   }
 
-  // Forgets the oldest frame, which is settled.
+  // Removes the oldest frame, which must be settled.
   void drop_frame() {
     for (const std::int32_t i : window_.frame(window_.first()).ids) {
       const std::int32_t k = track_of_[i];
@@ -316,7 +318,7 @@ class Partition {
     score_.resize(n);
     for (IndexSet* set : {&free_, &taken_, &linked_, &leapt_}) set->reserve_up_to(n);
   }
-  // No tracks, and n detections of which nothing is known.
+  // Removes all tracks and resets n detections.
   void clear(std::int32_t n) {
     for (IndexSet* set : {&free_, &taken_, &linked_, &leapt_, &all_, &young_}) set->clear();
     reserve_up_to(n);
@@ -328,7 +330,7 @@ class Partition {
     }
   }
 
-  // A detection at the end of a track.
+  // Adds a detection at the end of a track.
   void put(std::int32_t k, std::int32_t i, const State& state, double score) {
     track_of_[i] = k;
     place_[i] = tracks_[k].size();
@@ -341,7 +343,7 @@ class Partition {
     put(k, i, state, score);
     filter_.adopt(state_[i]);
   }
-  // Into the sets of what may change.
+  // Adds a detection to the sets of what may change.
   void list(std::int32_t i) {
     taken_.add(i);
     if (place_[i] == 0) return;
@@ -391,8 +393,8 @@ class Partition {
   std::vector<State> state_;
   std::vector<double> score_;
   mutable Filter filter_;
-  mutable typename Filter::Expected expected_{};  // while one is asked for
-  std::vector<std::int32_t> origin_;  // of a part: numbers of its detections in the whole
+  mutable typename Filter::Expected expected_{};  // scratch
+  std::vector<std::int32_t> origin_;  // of a part: numbers of its detections in the whole partition
 };
 
 }  // namespace asterism

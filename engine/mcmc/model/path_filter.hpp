@@ -1,12 +1,12 @@
-// The state of a track after each of its detections, and what the next one adds to its score.
+// The filters that give the state of a track after each detection and the score of the next one.
 //
-// A filter has a State, what it has Expected of a later frame, and
+// A filter has the types State and Expected (a prediction), and these functions:
 //
-//   begin       the state after a track's first detection
-//   expect      what a state leads to after a gap
-//   center, radius, log_likelihood   of what is expected: where, how far around it the log
-//               likelihood is above some value, and the log likelihood of a point
-//   take        the state after a point that was expected
+//   begin       state after the first detection of a track
+//   expect      prediction from a state after a gap
+//   center, radius, log_likelihood   of a prediction: its position, the radius within which the log
+//               likelihood exceeds a value, and the log likelihood of a point
+//   take        state after the update with a point
 #pragma once
 
 #include <algorithm>
@@ -20,17 +20,18 @@
 
 namespace asterism {
 
-// One motion: the steps of a gap are taken at once.
+// The filter of a single motion model. The steps of a gap are composed into one.
 //
-// Covariances depend on the pattern of detections alone, and a chain tries the same patterns again and
-// again. In a part they are remembered: a node is a pattern, and knows those that it leads to. Where
-// points have noise of their own, nothing is.
+// The covariance of a track depends only on the frames of its detections, and a chain tries the
+// same sequences of gaps repeatedly. A filter of a part therefore caches gains in a tree, where a
+// node stands for a sequence of gaps. Points with their own variance are not cached.
 class OneMotion {
  public:
   struct State : AxisState {
-    std::int32_t node = -1;  // of what is remembered
+    std::int32_t node = -1;  // in the cache
   };
-  // What does not depend on where a track is: how sharply it is expected, and what a detection does.
+  // The part of a prediction that does not depend on position: the gain, and the log density at the
+  // mode.
   struct Pattern {
     KalmanGain gain;
     double log_peak = 0;
@@ -40,10 +41,10 @@ class OneMotion {
     Point center{};
     double S = 0, log_peak = 0;
     std::int32_t node = -1;
-    Pattern own;  // where none is remembered
+    Pattern own;  // if it is not cached
   };
 
-  // Forgets what was remembered, and remembers from now on, for frames from this one on.
+  // Clears the cache and enables it for the frames of this window.
   void remember(const DetectionWindow& window) {
     is_remembered_ = true;
     first_ = window.first();
@@ -52,7 +53,7 @@ class OneMotion {
     nodes_.clear();
     next_.clear();
   }
-  // A state that comes from elsewhere.
+  // Registers a state that was computed outside the cache.
   void adopt(State& state) { state.node = is_remembered_ ? add({}) : -1; }
 
   State begin(const MotionModel& m, const Point& y, std::int64_t frame) {
@@ -133,8 +134,8 @@ class OneMotion {
   std::vector<Pattern> nodes_;
 };
 
-// Several interacting motions, frame by frame. What is expected after a gap may go on from what was
-// expected `before`, after a shorter one.
+// The filter of several interacting motion models, frame by frame. The prediction after a gap can
+// continue from that after a shorter gap `before`.
 class SeveralMotions {
  public:
   using State = MotionState;

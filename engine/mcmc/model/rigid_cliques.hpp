@@ -1,8 +1,8 @@
-// Tracks that distance bonds make sure (§4.2 of the report): over a whole window they were seen in
-// every frame and kept their distances from each other.
+// Tracks confirmed by rigid distances (§4.2 of the report): cliques of tracks that were detected in
+// every frame of a window and kept their mutual distances.
 //
-// The threshold is the report's: the range of a distance over the frames of one window. It is not that
-// of rigid/bond.hpp, which needs more frames than a window has.
+// The criterion is that of the report: the range of a distance over one window. The criterion of
+// rigid/bond.hpp needs more frames than a window has.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,9 @@
 namespace asterism {
 
 struct BondOptions {
-  std::int32_t size = 0;      // so many tracks that are bonded two by two: 2, 3 or 4; 0: none
+  std::int32_t size = 0;      // size of a clique: 2, 3 or 4; 0: none
   std::int32_t n_frames = 0;  // of the window
-  double tolerance = 0;       // the most by which a distance may vary, m
+  double tolerance = 0;       // largest range of a distance, m
 };
 
 struct Bonds {
@@ -37,7 +37,7 @@ class BondFinder {
     if (opt_.size == 0) return out;
     const std::vector<std::int32_t> tracks = whole_tracks();
     const auto n = static_cast<std::int32_t>(tracks.size());
-    std::vector<std::vector<std::int32_t>> bonded(n);  // of each those after it, in order
+    std::vector<std::vector<std::int32_t>> bonded(n);  // of each track, those after it, increasing
     for (std::int32_t a = 0; a < n; ++a)
       for (std::int32_t b = a + 1; b < n; ++b)
         if (keep_distance(tracks[a], tracks[b])) bonded[a].push_back(b);
@@ -78,7 +78,7 @@ class BondFinder {
     return true;
   }
 
-  // Lengthens `members` by one of `next`, all of which are bonded with all of them.
+  // Extends the clique `members` by one of `next`, which are bonded to all members.
   void mark(const std::vector<std::vector<std::int32_t>>& bonded,
             const std::vector<std::int32_t>& next, std::vector<std::int32_t>& members,
             const std::vector<std::int32_t>& tracks, Bonds& out) const {

@@ -1,4 +1,4 @@
-// What a move changes in a partition.
+// A proposed change of a partition.
 #pragma once
 
 #include <array>
@@ -17,10 +17,11 @@ struct Change {
   std::int32_t n_edits = 0;
   double gain = 0;  // of the log posterior
   double log_forward = 0, log_reverse = 0;
-  double log_ratio = 0;  // of Metropolis and Hastings
-  // How probably it is taken; of what was hardly weighed whether it was, which is right on average.
+  double log_ratio = 0;  // Metropolis–Hastings
+  // Acceptance probability. If the reverse move was not evaluated, it is 1 or 0 as the move was
+  // accepted or not, which is unbiased.
   double p_taken = 0;
-  std::int32_t with = -1;  // what was drawn on the way: detections kept, or the detection at hand
+  std::int32_t with = -1;  // auxiliary draw: number of detections kept, or the detection concerned
 
   std::span<Edit<Filter>> all() { return {edits.data(), static_cast<std::size_t>(n_edits)}; }
   Edit<Filter>& edit(std::int32_t track, std::int32_t keep) {

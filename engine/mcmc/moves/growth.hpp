@@ -1,11 +1,11 @@
-// How moves lengthen a track: detection after detection, each drawn among those that are free to
-// follow, until the track stops; and how probable it is to grow just so.
+// The growth of a track in a move: detections are drawn one after the other among the free ones
+// that may follow, until the track stops. Also computes the probability of a given growth.
 //
-//   uniform   stop with probability γ, else a gap d uniform in 1 … d̄ and a free detection with that
-//             gap, all alike; where there is none the track stops too
-//   informed  a detection j weighs exp(what it adds to the score) + ε, the stop exp(its end term)
+//   uniform   stop with probability γ, else draw a gap d in 1 … d̄ and a free detection at that
+//             gap, both uniformly; the track also stops if there is none
+//   informed  a detection j has weight exp(its gain of the score) + ε, the stop exp(its end term)
 //
-// Forced growth takes at least one step, which is no stop.
+// Forced growth does not stop before the first step.
 #pragma once
 
 #include <algorithm>
@@ -36,13 +36,13 @@ class Growth {
   Growth(const Partition<Filter>& partition, const GrowthOptions& options)
       : p_(partition), opt_(options) {}
 
-  // Lengthens the tail of an edit. Free is what is in no track, and what the edited track has beyond
-  // what it keeps. Returns the log probability, -inf where a forced step is impossible.
+  // Extends the tail of an edit. Free are detections in no track and those of the edited track that
+  // it does not keep. Returns the log probability, -inf if a forced step is impossible.
   double grow(Edit<Filter>& edit, bool is_forced, Random& random) {
     own_ = edit.track;
     keep_ = edit.keep;
     double log_p = 0;
-    std::int32_t n_same = keep_;  // detections from the first that are as before
+    std::int32_t n_same = keep_;  // number of leading detections that are unchanged
     for (;; is_forced = false) {
       const bool is_first = edit.tail.nodes.empty();
       const std::int32_t i =
@@ -62,7 +62,7 @@ class Growth {
     }
   }
 
-  // Log probability that a track which keeps its first detections grows into what it is now.
+  // Log probability that a track that keeps its first detections grows into its present form.
   double log_probability(std::int32_t track, std::int32_t keep, bool is_forced) {
     own_ = track;
     keep_ = keep;
@@ -82,7 +82,7 @@ class Growth {
     auto operator<=>(const Follower&) const = default;
   };
 
-  // What is free to follow i, in order of gaps and numbers.
+  // Lists the free detections that may follow i, ordered by gap and number.
   void list_free(std::int32_t i) {
     const DetectionWindow& window = p_.window();
     free_.clear();
@@ -96,7 +96,7 @@ class Growth {
       std::sort(free_.begin() + static_cast<std::ptrdiff_t>(n), free_.end());
     }
   }
-  // In no track, or in what the edited track does not keep.
+  // Whether a detection is in no track, or in the part of the edited track that it does not keep.
   bool is_free(std::int32_t j) const {
     return p_.is_free(j) ? !p_.is_continuation(j)
                          : own_ >= 0 && p_.track_of(j) == own_ && p_.place_of(j) >= keep_;
@@ -146,7 +146,8 @@ class Growth {
     return {first, last};
   }
 
-  // Fills in what may follow i and their weights; returns the sum, with that of the stop.
+  // Lists the possible successors of i and their weights. Returns the total weight, including that
+  // of stopping.
   double weigh(std::int32_t i, const State& state, bool is_forced) {
     const DetectionWindow& window = p_.window();
     const std::int64_t frame = window[i].frame;

@@ -1,12 +1,14 @@
-// Moves at given detections that are their own inverses: as long as a list of them stays, each is drawn
-// as often in ω as in ω', and the gain alone decides.
+// Moves at given detections that are their own inverses. As long as the list of moves is fixed, ω →
+// ω' and ω' → ω are proposed with the same probability. The acceptance ratio is then the posterior
+// ratio alone.
 //
-//   trade     x and y, of which one at least is in a track, in each other's place
-//   swap      two tracks change what they have from x and from y on
-//   relocate  y stands after a instead of after c, or back
-//   transfer  all from y on stands after a instead of after c, one of which is a track's last; or back
-//   begin     a is the first of the track that had y as its first, or of a new one of both; or back
-//   skip      y, which stands between a and c, is taken out, or put back; without c, y is the last
+//   trade     x and y, at least one of them in a track, exchange their places
+//   swap      two tracks exchange their tails, from x and from y on
+//   relocate  y moves from after c to after a, or back
+//   transfer  the tail from y on moves from after c to after a, one of which ends a track; or back
+//   begin     a becomes the first detection of the track that began with y, or of a new track of
+//             both; or back
+//   skip      y between a and c is removed, or inserted; without c, y is the last
 #pragma once
 
 #include <cstdint>
@@ -21,7 +23,7 @@ namespace asterism {
 struct Toggle {
   enum class Kind { trade, swap, relocate, transfer, begin, skip };
   Kind kind = Kind::trade;
-  std::int32_t y = 0, a = 0, c = 0;  // for the first two a stands for x
+  std::int32_t y = 0, a = 0, c = 0;  // in the first two kinds, a stands for x
 };
 
 template <typename Filter>
@@ -29,7 +31,7 @@ class Toggles {
  public:
   explicit Toggles(const Partition<Filter>& partition) : p_(partition), splices_(partition) {}
 
-  // False where it leads nowhere.
+  // Returns false if the move is impossible.
   bool propose(const Toggle& t, Change<Filter>& out) const {
     out.n_edits = 0;
     out.log_forward = out.log_reverse = 0;
@@ -55,7 +57,7 @@ class Toggles {
   bool trade(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
     if (is_taken(x) && is_taken(y))
       return p_.track_of(x) != p_.track_of(y) && splices_.exchange(x, y, q);
-    // One that is settled is neither taken nor free, and stays where it is.
+    // A settled detection is neither taken nor free, and does not move.
     if (is_taken(x) && p_.is_free(y)) return splices_.replace(x, y, q);
     if (is_taken(y) && p_.is_free(x)) return splices_.replace(y, x, q);
     return false;
@@ -69,14 +71,15 @@ class Toggles {
     splices_.append(q.edit(l, p_.place_of(y)), k, p_.place_of(x));
     return true;
   }
-  // Whether a track may go on with y in place of x; as its first y must not be its last.
+  // Whether a track may continue with y in place of x. If y becomes its first detection, y must not
+  // be its last.
   bool goes_on(std::int32_t y, std::int32_t x) const {
     const std::int32_t i = p_.before(x);
     return i < 0 ? p_.after(y) >= 0 : p_.window().is_linkable(i, y);
   }
 
-  // After whom y stands if it does not after whom it does now; -1 where that is neither, or in the
-  // same track.
+  // The detection after which y would be placed by the move; -1 if y follows neither a nor c, or if
+  // both are in the same track.
   std::int32_t other(const Toggle& t) const {
     if (!is_taken(t.y)) return -1;
     const std::int32_t now = p_.before(t.y);

@@ -1,4 +1,4 @@
-// The kinds of moves of a chain over partitions.
+// The kinds of moves of a Markov chain over partitions.
 #pragma once
 
 #include <cstdint>
@@ -6,20 +6,20 @@
 namespace asterism {
 
 enum class Move : std::int32_t {
-  birth = 0,      // a free detection and what grows from it become a track
-  death,          // a track's detections become free
+  birth = 0,      // a free detection and its growth become a track
+  death,          // all detections of a track become free
   split,          // a track becomes two
-  merge,          // two tracks become one, the second after the first
+  merge,          // a track is appended to another
   extension,      // a track grows
-  reduction,      // a track ends earlier
-  update,         // a track ends earlier and grows anew
-  switch_tails,   // two tracks change tails
-  insertion,      // a free detection goes into, before or after a track
+  reduction,      // a track is shortened
+  update,         // a track is shortened and grows again
+  switch_tails,   // two tracks exchange their tails
+  insertion,      // a free detection is inserted into, before or after a track
   deletion,       // a detection of a track becomes free
-  transfer,       // the tail of a track goes to the end of another
-  replacement,    // a free detection stands in for one of a track in the same frame
-  exchange,       // two tracks change one detection of the same frame
-  relocation,     // a detection of a track goes into, before or after another
+  transfer,       // the tail of a track moves to the end of another
+  replacement,    // a free detection replaces a detection of a track in the same frame
+  exchange,       // two tracks exchange one detection of the same frame
+  relocation,     // a detection of a track moves into, before or after another
 };
 inline constexpr int kMoves = 14;
 

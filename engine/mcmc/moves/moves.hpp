@@ -1,10 +1,10 @@
 // The moves of MCMC data association (Oh, Russell & Sastry 2009; §4.2 of the report) and six more.
 //
-// A move draws a new partition ω' from ω; `log_forward` is the log probability of having drawn just
-// that, log q(ω → ω'), and `log_reverse` that of the inverse move in ω', both without the share ξ of
-// the kind of move. Where the same ω' may be drawn by several values of a number drawn on the way
-// (what is kept in an update, the link in a switch), both are given for that value: detailed balance
-// holds for each.
+// A move draws a partition ω' from ω. `log_forward` is the proposal probability log q(ω → ω'), and
+// `log_reverse` that of the inverse move in ω'. Both exclude the probability ξ of the kind of move.
+// Some moves reach the same ω' by several auxiliary draws, such as the number kept in an update or
+// the link in a switch. Both probabilities are then those for the same auxiliary draw, and detailed
+// balance holds for each.
 //
 //   K  tracks      F  free detections      N  detections in tracks      L  links
 #pragma once
@@ -31,7 +31,7 @@ class Moves {
   Moves(const Partition<Filter>& partition, const GrowthOptions& growth)
       : p_(partition), splices_(partition), growth_(partition, growth) {}
 
-  // Draws ω'; false where the draw leads nowhere, so that the state stays.
+  // Draws ω'. Returns false if the draw is impossible, so that the chain stays.
   bool propose(Move move, Random& random, Change<Filter>& out) {
     out.move = move;
     out.n_edits = 0;
@@ -43,7 +43,7 @@ class Moves {
   }
 
   double log_reverse(const Change<Filter>& q) {
-    if (q.n_edits == 0) return q.log_forward;  // the way back is the same
+    if (q.n_edits == 0) return q.log_forward;  // the reverse move has the same probability
     const Edit<Filter>& first = q.edits[0];
     const auto n_tail = static_cast<std::int32_t>(first.tail.nodes.size());
     const std::int32_t n_new = first.keep + n_tail;
@@ -81,7 +81,7 @@ class Moves {
   }
 
  private:
-  // Of counts, which are small for the most part.
+  // Logarithms of counts; small ones are tabulated.
   template <typename Count>
   static double log(Count n) {
     static const auto table = [] {
@@ -95,14 +95,15 @@ class Moves {
   std::int32_t node(std::int32_t track, std::int32_t place) const {
     return p_.track(track).nodes[place];
   }
-  // A track keeps at least so many detections when it is cut, or grown anew.
+  // Smallest number of detections that a track keeps when it is cut, or in an update.
   std::int32_t least_kept(std::int32_t track) const {
     return std::max(2 - p_.track(track).n_gone, p_.track(track).n_frozen);
   }
   std::int32_t least_updated(std::int32_t track) const {
     return std::max(1, p_.track(track).n_frozen);
   }
-  // Whether a track that keeps so much of its own must grow, as one detection is no track.
+  // Whether a track that keeps so many detections must grow, because a single detection is no
+  // track.
   bool must_grow(std::int32_t track, std::int32_t keep) const {
     return p_.track(track).n_gone + keep == 1;
   }
@@ -127,7 +128,7 @@ class Moves {
     return false;
   }
 
-  // One of a set, each alike; -1 of an empty one.
+  // Draws a member of a set uniformly; -1 if the set is empty.
   std::int32_t draw_one(const IndexSet& set, Random& random, Change<Filter>& q) const {
     if (set.size() == 0) return -1;
     q.log_forward -= log(set.size());
@@ -179,7 +180,7 @@ class Moves {
     q.edit(other, 0);
     return true;
   }
-  // Tracks that begin within reach, in what is not settled.
+  // The number of tracks without settled detections whose first detection may follow i.
   std::int32_t n_starts_after(std::int32_t i) const {
     std::int32_t n = 0;
     for (const std::int32_t k : p_.young().items()) n += p_.window().is_linkable(i, node(k, 0));
@@ -222,8 +223,9 @@ class Moves {
            std::equal(e.tail.nodes.begin(), e.tail.nodes.end(), nodes.begin() + e.keep);
   }
 
-  // The link is a → b. Another track goes on with d after a; and b goes on where d did: after the c
-  // before it, which it must be able to follow, or as the first, where it must not be all there is.
+  // The link is a → b. Another track's detection d follows a in ω', and b takes the place of d. If
+  // d has a predecessor c, b must be able to follow it. Otherwise b becomes the first detection of
+  // its track and must have a successor.
   bool draw_switch(Random& random, Change<Filter>& q) {
     const std::int32_t b = draw_one(p_.linked(), random, q);
     if (b < 0) return false;
@@ -242,8 +244,9 @@ class Moves {
     splices_.append(q.edit(other, p_.place_of(d)), own, p_.place_of(b));
     return true;
   }
-  // Every detection in a track, and not settled, that may follow a and where b may have been before:
-  // one no later than b, one whose track leaps over the frame of b, or one that begins its track.
+  // Calls visit for every open detection of a track that may follow a, and whose predecessor lies
+  // before b: those not later than b, those after a gap that contains the frame of b, and first
+  // detections of tracks.
   template <typename Visit>
   void each_rival(std::int32_t a, std::int32_t b, Visit&& visit) const {
     const DetectionWindow& window = p_.window();
@@ -258,7 +261,7 @@ class Moves {
     for (const std::int32_t k : p_.young().items())
       if (window[node(k, 0)].frame > last && window.is_linkable(a, node(k, 0))) visit(node(k, 0));
   }
-  // The partners of the link a → d in ω', where the tails have changed tracks.
+  // The number of partners of the link a → d in ω', after the exchange of the tails.
   std::int32_t n_partners_after(const Change<Filter>& q) const {
     const DetectionWindow& window = p_.window();
     const std::int32_t b = q.with, a = p_.before(b), own = q.edits[0].track, other = q.edits[1].track;
@@ -278,12 +281,12 @@ class Moves {
     return n;
   }
 
-  // Where a detection may stand in a track: the track, and how many are before it.
+  // A place in a track for a detection: the track, and the number of detections before it.
   struct Slot {
     std::int32_t track = 0, keep = 0;
   };
-  // Slots of x, as if it were free: in a leap over its frame, after a track's end, before its
-  // beginning.
+  // Lists the slots of x, as if it were free: in a gap that contains its frame, after the end of a
+  // track, and before its beginning.
   void list_slots(std::int32_t x) {
     const DetectionWindow& window = p_.window();
     const std::int64_t frame = window[x].frame;
@@ -354,12 +357,12 @@ class Moves {
     return splices_.replace(x, y, q);
   }
 
-  // Without x both partitions are the same, and so are the places where it may go.
+  // Without x, ω and ω' are the same partition and have the same slots.
   bool draw_relocation(Random& random, Change<Filter>& q) {
     const std::int32_t x = draw_one(p_.taken(), random, q);
     if (x < 0 || !splices_.may_go(x)) return false;
     list_slots(x);
-    slots_.pop_back();  // where it is
+    slots_.pop_back();  // its present slot
     if (slots_.empty()) return false;
     const Slot slot = draw_one(slots_, random, q);
     q.with = x;

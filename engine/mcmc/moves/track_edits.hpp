@@ -1,5 +1,5 @@
-// Building blocks of moves: one detection taken out of a track, put into it, or put in the place of
-// another, and what that gains.
+// Elementary edits of moves: remove, insert or replace one detection of a track; and the gain of an
+// edit.
 #pragma once
 
 #include <cstdint>
@@ -14,41 +14,42 @@ class Splices {
  public:
   explicit Splices(const Partition<Filter>& partition) : p_(partition) {}
 
-  // What a drawn change gains.
+  // Computes the gain of a proposed change.
   void weigh(Change<Filter>& q) const {
     q.gain = 0;
     for (const Edit<Filter>& e : q.all())
       q.gain += p_.score_of(e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
   }
-  // What a track has from a place on.
+  // Appends the detections of a track from an index on.
   void append(Edit<Filter>& edit, std::int32_t track, std::int32_t from) const {
     const auto& nodes = p_.track(track).nodes;
     for (std::size_t n = from; n < nodes.size(); ++n) p_.append(edit, nodes[n]);
   }
-  // Whether what is left without x is a track.
+  // Whether the track without x is still valid.
   bool may_go(std::int32_t x) const {
     const std::int32_t i = p_.before(x), j = p_.after(x);
     return p_.track(p_.track_of(x)).whole_size() >= 3 &&
            (i < 0 || j < 0 || p_.window().is_linkable(i, j));
   }
-  // A track without x.
+  // Removes x from its track.
   void take_out(std::int32_t x, Change<Filter>& q) const {
     const std::int32_t k = p_.track_of(x);
     append(q.edit(k, p_.place_of(x)), k, p_.place_of(x) + 1);
   }
-  // A track with y at a place of its own, before what had it.
+  // Inserts y into a track at an index.
   void put_in(std::int32_t y, std::int32_t track, std::int32_t place, Change<Filter>& q) const {
     Edit<Filter>& e = q.edit(track, place);
     p_.append(e, y);
     append(e, track, place);
   }
-  // A free detection in the place of another; false where its neighbours forbid it.
+  // Replaces a detection by a free one. Returns false if a link would be impossible.
   bool replace(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
     if (!fits_in_place_of(y, x)) return false;
     put_in_place_of(y, x, q);
     return true;
   }
-  // Each of two detections of one frame in the place of the other; false where neighbours forbid it.
+  // Exchanges two detections of one frame between their tracks. Returns false if a link would be
+  // impossible.
   bool exchange(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
     if (!fits_in_place_of(y, x) || !fits_in_place_of(x, y)) return false;
     put_in_place_of(y, x, q);

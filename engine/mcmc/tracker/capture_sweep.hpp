@@ -1,19 +1,19 @@
-// MCMC data association over a whole capture: chains in overlapping blocks of frames, each given all
-// that is before and after it.
+// MCMC data association over a whole capture: chains run in overlapping blocks of frames,
+// conditional on the tracks before and after the block.
 //
 //   ....ffff|oooooooooooooooo|cccccc....
 //           a              b
 //
-//   o  open: the frames a to b of the block, in which the chains may change everything
-//   f  of each track the last detection before the block, with its filter state
-//   c  of each track that goes on the next detection after the block, by which it is weighed together
-//      with those in the kAfter frames that follow (Partition::continue_with)
+//   o  open: the frames a to b of the block, in which the chains may change all links
+//   f  for each track, the last detection before the block with its filter state
+//   c  for each track that continues, its next detection after the block; the score includes it and
+//      the detections of the kAfter frames that follow (Partition::continue_with)
 //
-// A filter forgets what was kAfter frames ago, so that a move within a block changes the log posterior
-// of the capture by what it changes that of the block. Blocks overlap by half: each link is well inside
-// one of them. The cost of a move does not depend on the length of the capture.
+// The effect of a detection on the filter vanishes within kAfter frames. The change of the
+// capture's log posterior by a move is therefore that of its block. Blocks overlap by half, so each
+// link is well inside one of them. The cost of a move does not depend on the length of the capture.
 //
-// The tracks are kept as links between detections, which have their numbers in order of arrival.
+// Tracks are stored as links between detections, which are numbered in order of arrival.
 #pragma once
 
 #include <algorithm>
@@ -36,19 +36,19 @@ template <typename Filter>
 class CaptureSweep {
  public:
   using Link = Doubts::Link;
-  // The open frames of a block, and its part of the work.
+  // The open frames of a block.
   struct Block {
-    std::int64_t first = 0, last = 0, next = 0;  // `next`: where the next block begins
+    std::int64_t first = 0, last = 0, next = 0;  // `next`: first frame of the next block
     bool is_first = true, is_last = true;
   };
-  // A block as a partition. Its detections have numbers of their own; `numbers` are those of the capture.
+  // A block as a partition. Its detections have local numbers; `numbers` are those in the capture.
   struct Part {
     Partition<Filter> partition;
     Doubts doubts;
     std::vector<std::int32_t> numbers;
   };
 
-  // Blocks are `n_frames` long, or longer where tracks leap over many frames.
+  // Blocks have `n_frames` frames, or more if tracks have long gaps.
   CaptureSweep(std::int64_t n_frames, int max_gap)
       : n_block_(std::max<std::int64_t>(n_frames, 4 * std::int64_t{max_gap})), max_gap_(max_gap) {}
 
@@ -58,13 +58,13 @@ class CaptureSweep {
     labels_.resize(points_.size(), -1);
     doubts_.emplace_back();
   }
-  // A link in doubt that leads into the newest frame, or a label; of detections by number.
+  // Adds an ambiguous link that leads into the newest frame. Detections are given by number.
   void add_doubt(std::int64_t from, std::int64_t to) {
     doubts_.back().push_back({static_cast<std::int32_t>(from), static_cast<std::int32_t>(to)});
   }
   void set_label(std::int64_t detection, std::int64_t label) { labels_[detection] = label; }
 
-  // Begins with the tracks that the labels say.
+  // Links the detections according to the labels.
   void link_labels() {
     before_.assign(points_.size(), kNone);
     after_.assign(points_.size(), kNone);
@@ -90,15 +90,16 @@ class CaptureSweep {
       first = block.next;
     }
   }
-  // Open detections of all blocks, of which each may be in two, for one in the capture.
+  // The number of open detections of all blocks per detection of the capture. A detection may be in
+  // two blocks.
   double overlap() const {
     double all = 0;
     for (const Block& block : blocks()) all += static_cast<double>(n_between(block.first, block.last));
     return n_points() == 0 ? 1 : all / static_cast<double>(n_points());
   }
 
-  // The block as it is linked now. Blocks are taken in order: the filter states at the beginning of
-  // each are those of the one before.
+  // Returns the block with its present links. Blocks must be taken in order, because each starts
+  // from the filter states of the one before.
   Part take(const Partition<Filter>& empty, const Block& block) {
     Part part{empty.empty(), {}, {}};
     Partition<Filter>& p = part.partition;
@@ -134,7 +135,7 @@ class CaptureSweep {
     return part;
   }
 
-  // Links the detections of a block as it has them, and keeps the states that the next begins with.
+  // Stores the links of a block, and the filter states from which the next one starts.
   void put_back(const Block& block, const Part& part) {
     const Partition<Filter>& p = part.partition;
     for (std::int32_t i = 0; i < p.window().n_ids(); ++i) {
@@ -159,7 +160,7 @@ class CaptureSweep {
           states_.insert_or_assign(part.numbers[i], p.state(i));
   }
 
-  // Labels the tracks as they are linked, in order of their first detections; returns how many they are.
+  // Labels the tracks in order of their first detections. Returns their number.
   std::int64_t read_labels() {
     std::int64_t n = 0;
     found_.resize(points_.size());
@@ -167,7 +168,7 @@ class CaptureSweep {
       found_[i] = before_[i] != kNone ? found_[before_[i]] : after_[i] != kNone ? n++ : -1;
     return n;
   }
-  // As they were read last.
+  // The labels of the last `read_labels`.
   std::span<const std::int64_t> labels() const { return found_; }
   std::int32_t before(std::int64_t i) const { return before_[i]; }
   std::int32_t after(std::int64_t i) const { return after_[i]; }
@@ -197,7 +198,8 @@ class CaptureSweep {
     after_[i] = j;
     before_[j] = i;
   }
-  // All detections of the open frames; of those before and after, what tracks were and go on with.
+  // Whether a detection belongs to a block: all of the open frames, and the neighbouring detections
+  // of tracks before and after.
   bool belongs(const Block& block, std::int64_t t, std::int32_t i) const {
     if (t < block.first)
       return states_.contains(i) && (after_[i] == kNone || after_[i] >= frames_[block.first].begin);
@@ -234,7 +236,7 @@ class CaptureSweep {
     for (std::size_t e = n_settled; e < edits.size(); ++e)
       p.set_id(edits[e].track, labels_[part.numbers[edits[e].tail.nodes.front()]]);
   }
-  // What follows a continuation until the filter has forgotten the block.
+  // The detections after a continuation, until the filter has forgotten the block.
   LaterPoints later_points(std::int32_t i, std::int64_t from, std::int64_t to) const {
     auto later = std::make_shared<std::vector<LaterPoint>>();
     for (i = after_[i]; i != kNone && i < end_of(to); i = after_[i])
@@ -246,11 +248,12 @@ class CaptureSweep {
   int max_gap_;
   std::vector<Frame> frames_;
   std::vector<Point> points_;
-  std::vector<std::int64_t> labels_, found_;  // to begin with, and in the end
+  std::vector<std::int64_t> labels_, found_;  // initial and final
   std::vector<std::vector<Link>> doubts_;  // by the frame they lead into
   std::vector<std::int32_t> before_, after_;
-  std::unordered_map<std::int32_t, typename Filter::State> states_;  // where the next block begins
-  std::unordered_map<std::int32_t, std::int32_t> local_;  // numbers in the block, while it is taken
+  // at the start of the next block
+  std::unordered_map<std::int32_t, typename Filter::State> states_;
+  std::unordered_map<std::int32_t, std::int32_t> local_;  // local numbers, while the block is taken
 };
 
 }  // namespace asterism

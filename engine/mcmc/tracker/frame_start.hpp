@@ -1,5 +1,5 @@
-// Where a walk begins in a new frame: the exact assignment of its detections to what the tracks expect,
-// or links that are given; and which links are in doubt.
+// Initial state of the chain in a new frame: the exact assignment of its detections to predicted
+// tracks, or links given by the caller. Also finds the ambiguous links.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +30,7 @@ struct GivenLabels {
 template <typename Filter>
 class FrameStart {
  public:
-  // A link is in doubt where it is less plausible than another by fewer nats than `doubt`.
+  // A link is ambiguous if its log likelihood is within `doubt` nats of an alternative.
   FrameStart(bool has_assignment, double doubt) : has_assignment_(has_assignment), doubt_(doubt) {}
 
   void give(GivenLabels labels) {
@@ -38,7 +38,8 @@ class FrameStart {
     last_.clear();
   }
 
-  // Takes the newest frame's detections into the partition; frames up to `settled` are.
+  // Adds the detections of the newest frame to the tracks of the partition, and its ambiguous
+  // links.
   void begin(Partition<Filter>& p, Doubts& doubts, ChainStats& stats, std::int64_t& n_candidates) {
     doubts.add_frame();
     list_ends(p);
@@ -67,7 +68,7 @@ class FrameStart {
     s_.unseen.clear();
     for (std::int32_t r = 0; r < n_rows; ++r)
       if (s_.match[r] < 0) s_.unseen.push_back(p.last(s_.rows[r]));
-    p.apply(s_.edits);  // from here on the numbers of tracks may be others'
+    p.apply(s_.edits);  // invalidates the numbers of tracks
     doubt_births(p, doubts);
     for (const std::int32_t last : s_.unseen) doubt_last(p, last, doubts);
   }
@@ -79,7 +80,7 @@ class FrameStart {
     std::int64_t number = -1;
   };
 
-  // Tracks that the frame may go on with.
+  // Lists the tracks that a detection of the frame may continue.
   void list_ends(const Partition<Filter>& p) {
     const DetectionWindow& window = p.window();
     s_.rows.clear();
@@ -92,7 +93,7 @@ class FrameStart {
     }
   }
 
-  // The links that are given, of each detection by column: the row that it goes on with.
+  // Applies the given links. For each detection, stores the row of the track that it continues.
   void give_links(const Partition<Filter>& p, ChainStats& stats) {
     const DetectionWindow& window = p.window();
     const auto& ids = window.frame(window.now()).ids;
@@ -106,7 +107,7 @@ class FrameStart {
       const auto [at, is_new] = last_.try_emplace(label);
       const std::int32_t i = at->second.detection;
       if (!is_new) ++stats.n_given;
-      // A number may have gone to another detection since.
+      // The number may have been reused for another detection.
       const bool is_here = !is_new && window[i].number == at->second.number && window.is_linkable(i, j);
       if (is_here && p.track_of(i) >= 0 && p.last(p.track_of(i)) == i) {
         s_.row_given[c] = s_.row_of.at(p.track_of(i));
@@ -122,7 +123,7 @@ class FrameStart {
     }
   }
 
-  // Pairs that gain by being linked; and others that are plausible, or given.
+  // Lists candidates with a positive gain, and other plausible or given links.
   void list_candidates(const Partition<Filter>& p) {
     const DetectionWindow& window = p.window();
     const auto& ids = window.frame(window.now()).ids;
@@ -148,7 +149,8 @@ class FrameStart {
     }
   }
 
-  // Free detections from which a track may have begun that goes on with one of the newest frame.
+  // Adds ambiguous links between a free detection of an earlier frame and one of the newest frame,
+  // as the beginning of a track.
   void doubt_births(const Partition<Filter>& p, Doubts& doubts) {
     const DetectionWindow& window = p.window();
     for (int gap = 1; gap <= window.max_gap(); ++gap) {
@@ -173,7 +175,8 @@ class FrameStart {
     }
   }
 
-  // Hindsight: where a track is not seen, what it would expect had its last detection not been its own.
+  // For a track missed in this frame, adds ambiguous links from its detection before the last, in
+  // case the last one is wrong.
   void doubt_last(const Partition<Filter>& p, std::int32_t last, Doubts& doubts) {
     const DetectionWindow& window = p.window();
     const std::int32_t k = p.track_of(last), i = p.before(last);
@@ -207,7 +210,7 @@ class FrameStart {
   bool has_assignment_;
   double doubt_;
   std::shared_ptr<const GivenLabels> given_;
-  std::unordered_map<std::int64_t, Last> last_;  // detection of each given label
+  std::unordered_map<std::int64_t, Last> last_;  // last detection of each given label
   Fresh<Memory> s_;
 };
 

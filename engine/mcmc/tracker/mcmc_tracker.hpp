@@ -1,9 +1,9 @@
-// MCMC data association on a stream: a window of frames in which the chain may still change its mind,
-// and behind it what is settled.
+// MCMC data association on a stream. The chain may change the associations of a window of frames;
+// older frames are settled.
 //
-// Per frame: the exact assignment of its detections to what the tracks expect, as a start; the chain;
-// the best partition met; and the frame that leaves the window is settled by it. Of what is settled only
-// the filter states are needed, so that frames older than the longest gap are forgotten.
+// In each frame, the chain starts from the exact assignment of the detections to predicted tracks.
+// The best partition found settles the frame that leaves the window. Only filter states of settled
+// frames are needed later, so frames older than the longest gap are removed.
 #pragma once
 
 #include <algorithm>
@@ -29,12 +29,12 @@ namespace asterism {
 
 struct McmcOptions {
   std::int32_t window = 1;     // frames until one is settled
-  bool is_whole = false;       // in the end the chains go over all frames again, block by block
+  bool is_whole = false;       // at the end the chains run again over all frames, block by block
   std::int32_t block = 1;      // frames of a block
-  double moves = 0;            // in each frame, for each of its detections or for each track
+  double moves = 0;            // in each frame, per detection or per track, whichever is more
   double deadline = 0;         // seconds from the frame's arrival; 0: none
-  bool has_assignment = true;  // start from the exact assignment; else from no change
-  double confidence = 0;       // moves for confidence, as above; 0: none
+  bool has_assignment = true;  // start from the exact assignment; else without new links
+  double confidence = 0;       // moves to estimate confidence, as above; 0: none
   std::int32_t n_chains = 1, n_threads = 1;
   SplitOptions split;
   BondOptions bonds;
@@ -61,7 +61,7 @@ class McmcTracker {
     return stats;
   }
 
-  // Many frames whose labels are asked for at the end alone.
+  // Processes one of many frames whose labels are needed only at the end.
   template <typename Label>
   SampledStats pass(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
     const SampledStats stats = add(time, step, points);
@@ -76,8 +76,8 @@ class McmcTracker {
     tell(label);
   }
 
-  // Goes over all frames so far again, block by block: first for the best partition, then for how
-  // probable it is. `goes_on(share of the work that is done)` is asked now and then.
+  // Runs over all frames so far again, block by block: first for the best partition, then for
+  // confidence. Regularly calls `goes_on(fraction of the work done)`.
   template <typename Label>
   void finish(Label&& label, const std::function<bool(double)>& goes_on) {
     if (so_far_.n_seen == 0) return;
@@ -116,13 +116,13 @@ class McmcTracker {
     stats.n_confirmed = sweep_.read_labels();
     total_.add(stats);
     for (std::int64_t i = 0; i < so_far_.n_seen; ++i) {
-      // Of the first of a track, that the next follows it.
+      // The confidence of a track's first detection is that of the link to the next one.
       const bool is_first = sweep_.before(i) < 0 && sweep_.after(i) >= 0;
       label(i, sweep_.labels()[i], has_confidence() ? sure[is_first ? sweep_.after(i) : i] : 0);
     }
   }
 
-  // Links to begin the frames to come with, where the model allows them.
+  // Sets labels whose links the coming frames start from, if the model allows them.
   void start_from(std::vector<std::int64_t> labels) { start_.give({so_far_.n_seen, std::move(labels)}); }
 
   bool has_confidence() const { return opt_.confidence > 0; }
@@ -132,7 +132,7 @@ class McmcTracker {
 
   const MotionModel& motion() const { return partition().motion(); }
   std::int64_t n_ids() const { return is_finished() ? total_.n_confirmed : next_id_ + n_named_; }
-  // The tracks as they would be settled now.
+  // The tracks as they would be if all frames were settled now.
   LiveTracks<> live() const {
     const Partition<Filter>& p = partition();
     LiveTracks<> live(p.motion(), p.model(), {});
@@ -140,7 +140,7 @@ class McmcTracker {
     for (const std::int32_t k : p.tracks().items()) {
       const std::int32_t i = p.last(k);
       const std::int64_t number = p.window()[i].number;
-      if (is_finished() && sweep_.after(number) >= 0) continue;  // it goes on as another
+      if (is_finished() && sweep_.after(number) >= 0) continue;  // continued by another detection
       LiveTrack<NoMore>& track = live.tracks.emplace_back();
       track.id = is_finished() ? sweep_.labels()[number] : id_of(k);
       track.gap = static_cast<std::int32_t>(p.window().now() - p.window()[i].frame);
@@ -153,7 +153,7 @@ class McmcTracker {
   }
 
  private:
-  // Whether the labels are those of the chains over all frames so far.
+  // Whether the labels are those of the run over all frames so far.
   bool is_finished() const {
     return opt_.is_whole && static_cast<std::int64_t>(sweep_.labels().size()) == so_far_.n_seen;
   }
@@ -183,8 +183,8 @@ class McmcTracker {
     return stats;
   }
 
-  // Looks for the best partition, and then for how probable it is, if it `is_asked`. `allowed(groups,
-  // moves, share of the time)` is how long.
+  // Searches for the best partition, and then estimates confidence if `is_asked`. `allowed(groups,
+  // moves, fraction of the time)` returns the budgets.
   template <typename Allowed, typename IsAsked>
   void walk(const std::vector<char>& is_sure, Allowed&& allowed, std::uint64_t phase,
             SampledStats& stats, IsAsked&& is_asked) {
@@ -193,13 +193,14 @@ class McmcTracker {
                   allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1), seed_of(phase),
                   stats.chain);
     if (!is_asked()) return;
-    // The search may have made other tracks.
+    // The search may have changed the tracks.
     const Split now = Splitter<Filter>(partition_, opt_.split).split(doubts_, is_sure);
     keep_shares(walks_.sample(partition_, now.groups, allowed(now.groups, opt_.confidence, 1),
                               seed_of(phase + 1), stats.chain));
   }
 
-  // Shares of a block for those frames that are as far inside it as in any other.
+  // Stores the confidences of a block for the frames that are at least as far inside it as in any
+  // other block.
   void take_shares(const typename CaptureSweep<Filter>::Block& block,
                    const typename CaptureSweep<Filter>::Part& part, const std::vector<double>& shares,
                    std::vector<double>& sure) const {
@@ -230,7 +231,7 @@ class McmcTracker {
     for (const Group& group : groups) weights.push_back(static_cast<double>(weight(group)));
     return weights;
   }
-  // Of a frame, whose time is up after a share of what is allowed.
+  // Budgets of a frame; the deadline applies to a fraction of the time allowed.
   Budgets budgets(std::span<const Group> groups, double moves, Clock::time_point arrival,
                   double share) const {
     const auto weights = weights_of(groups, [](const Group& group) {
@@ -246,8 +247,9 @@ class McmcTracker {
     return Random(Random(seed_ ^ static_cast<std::uint64_t>(so_far_.n_frames)).next() ^ phase).next();
   }
 
-  // The mean over the frames since the link was made. Walks are short, and each begins at what is
-  // best; and once the detection before is settled, whether that is right is no longer asked.
+  // Averages the confidence of a link over the frames since it was made, because the chains of one
+  // frame are short and each starts at the best partition. The average stays fixed once the
+  // predecessor is settled.
   void keep_shares(const std::vector<double>& now) {
     const Partition<Filter>& p = partition_;
     const DetectionWindow& window = p.window();
@@ -265,7 +267,7 @@ class McmcTracker {
 
   std::int64_t oldest_open() const { return partition().frozen() + 1; }
 
-  // Tracks of which nothing is settled get the numbers that they would be settled with.
+  // Numbers the tracks without settled detections as they would be numbered if settled now.
   void name_new() {
     Partition<Filter>& p = partition_;
     std::vector<std::pair<std::int64_t, std::int32_t>> unnamed;  // first detection, track
@@ -277,7 +279,7 @@ class McmcTracker {
   }
   std::int64_t id_of(std::int32_t track) const { return partition().track(track).id; }
 
-  // Tells the labels of the open frames that are not what was told.
+  // Reports the labels of the open frames that have changed.
   template <typename Label>
   void tell(Label&& label, std::int64_t last = std::numeric_limits<std::int64_t>::max()) {
     const Partition<Filter>& p = partition();
@@ -293,24 +295,24 @@ class McmcTracker {
         label(window[i].number, now.id, now.confidence);
       }
   }
-  // That the link to the detection before is right; of the first the one after, of clutter that it is
-  // in no track.
+  // Probability that the link to the previous detection is right. For a first detection it is that
+  // of the link to the next; for clutter, that the detection is in no track.
   double confidence_of(std::int32_t i) const {
-    if (shares_.empty()) return 0;  // not asked for, or not yet
+    if (shares_.empty()) return 0;  // not requested, or not yet available
     const Partition<Filter>& p = partition();
     const bool is_first = p.track_of(i) >= 0 && p.place_of(i) == 0 && p.track(p.track_of(i)).n_gone == 0;
     const Share& all = shares_[is_first ? p.after(i) : i];
     return all.sum / all.n;
   }
 
-  // Settles what is older than the window, and forgets what nothing can follow any more.
+  // Settles frames older than the window, and removes frames that no link can reach any more.
   void settle() {
     Partition<Filter>& p = partition_;
     const DetectionWindow& window = p.window();
     const std::int64_t settled = window.now() - opt_.window;
     if (settled < oldest_open()) return;
     p.freeze(settled);
-    // Numbers of tracks that are settled now are theirs.
+    // Tracks with settled detections keep their numbers.
     for (const std::int32_t k : p.tracks().items())
       if (p.track(k).n_frozen > 0) next_id_ = std::max(next_id_, id_of(k) + 1);
     doubts_.keep(static_cast<std::size_t>(window.now() - settled));
@@ -344,7 +346,8 @@ class McmcTracker {
   FrameStart<Filter> start_;
   Walks<Filter> walks_;
   Doubts doubts_;
-  // By detection of the window: how probable it is that it follows what it follows; and what was told.
+  // By detection of the window: the probability of its link, and the label and confidence last
+  // reported.
   struct Share {
     double sum = 0;
     std::int32_t n = 0, before = -3;
