@@ -1,9 +1,10 @@
-// Surfaces that hide points: triangles and capsules, and a tree of boxes over them.
+// Surfaces that occlude points: triangles and capsules, and a bounding volume hierarchy (BVH) over
+// them.
 //
 //   c, d      a ray c + s d; d leads from the camera to the point in question, so s = 1 there
-//   s         where the ray meets a surface
+//   s         intersection of the ray with a surface
 //   a, b, e   corners of a triangle
-//   u, v, w   on which side of its edges the ray passes
+//   u, v, w   signs tell on which side of the triangle's edges the ray passes
 #pragma once
 
 #include <bit>
@@ -17,14 +18,15 @@ namespace asterism {
 struct Hit {
   double s = std::numeric_limits<double>::infinity();
   std::int32_t owner = -1;
-  // Of two at the same place the lower number, so that the order of the tests does not matter.
+  // Equal distances are resolved by the lower number, so that the result does not depend on the
+  // order of the tests.
   void keep(double other, std::int32_t who) {
     if (other < s || (other == s && who < owner)) s = other, owner = who;
   }
 };
 
-// A ray, and coordinates in which it is an axis: (x - Sx z, y - Sy z) with z the longest component
-// of its direction, relative to its origin.
+// A ray, and sheared coordinates relative to its origin in which it is an axis: (x - Sx z, y - Sy
+// z), where z is the longest component of its direction.
 struct Ray {
   Vec3 c, d;
   std::int32_t axis;
@@ -53,9 +55,9 @@ struct Triangle {
   Vec3 a, b, e;
   std::int32_t owner;
 
-  // Where the ray meets the triangle, infinity if it does not. What two triangles say of a corner
-  // or an edge that they share rests on the same numbers, so no ray slips through a seam (S. Woop,
-  // C. Benthin, I. Wald, Watertight ray/triangle intersection, JCGT 2, 2013).
+  // Distance along the ray to the triangle, infinity if it misses. Adjacent triangles compute a
+  // shared edge or corner from the same numbers, so no ray passes between them (S. Woop, C.
+  // Benthin, I. Wald, Watertight ray/triangle intersection, JCGT 2, 2013).
   double meet(const Ray& ray) const {
     return ray.axis == 0 ? meet<0>(ray) : ray.axis == 1 ? meet<1>(ray) : meet<2>(ray);
   }
@@ -70,7 +72,7 @@ struct Triangle {
     const double w = q.x * p.y - q.y * p.x;
     const bool is_inside = (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
     const double all = u + v + w;
-    if (!is_inside || all == 0) return kNo;  // beside it, or edge on
+    if (!is_inside || all == 0) return kNo;  // misses it, or the triangle is edge on
     const double s = ray.Sz * (u * p.z + v * q.z + w * r.z) / all;
     return s > 0 ? s : kNo;
   }
@@ -81,7 +83,7 @@ struct Capsule {
   double r;
   std::int32_t owner;
 
-  // The nearest crossing of its skin in front of the camera.
+  // Distance to the nearest intersection with the surface in front of the camera.
   double meet(const Ray& ray) const { return meet_seen(a - ray.c, b - ray.c, ray.d); }
 
   double meet_seen(Vec3 p, Vec3 q, Vec3 d) const {
@@ -100,7 +102,7 @@ struct Capsule {
         for (const double s : {(-B - std::sqrt(D)) / A, (-B + std::sqrt(D)) / A})
           if (const double y = s * ad - ap; y >= 0 && y <= aa) take(s);
     }
-    for (const bool is_far : {false, true}) {  // the half spheres beyond them
+    for (const bool is_far : {false, true}) {  // the half spheres at the ends
       const Vec3 m = is_far ? q : p;
       const double B = dot(d, m), D = B * B - dd * (dot(m, m) - r * r);
       if (D < 0) continue;
@@ -124,7 +126,7 @@ struct Box {
   Vec3 middle() const { return 0.5 * (low + high); }
 };
 
-// Triangles and capsules of one moment.
+// The triangles and capsules of one moment.
 class Scene {
  public:
   std::vector<Triangle> triangles;
@@ -132,7 +134,7 @@ class Scene {
 
   std::size_t size() const { return triangles.size() + capsules.size(); }
 
-  // To be called when the surfaces are in place, before `first_hit`.
+  // Builds the hierarchy. It must be called after the surfaces are set and before `first_hit`.
   void build() {
     order_.resize(size());
     std::iota(order_.begin(), order_.end(), 0);
@@ -155,7 +157,7 @@ class Scene {
     if (size() > 0) grow(0, size());
   }
 
-  // The first surface on the way from `c` to c + s d, for s below `until`.
+  // The first surface on the ray c + s d with s below `until`.
   Hit first_hit(Vec3 c, Vec3 d, double until) const {
     if (nodes_.empty()) return {};
     Hit hit{until, -1};
@@ -165,8 +167,8 @@ class Scene {
       std::int32_t node;
       float from;
     };
-    // A node leaves three children behind at most, and the tree is a quarter as deep as its size
-    // has bits.
+    // A node leaves at most three children on the stack, and the tree's depth is a quarter of the
+    // number of bits of its size.
     std::array<Visit, 128> stack;
     std::size_t top = 0;
     stack[top++] = {0, 0};
@@ -181,7 +183,7 @@ class Scene {
         for (std::int32_t i = 0; i < node.n[k]; ++i)
           test(order_[static_cast<std::size_t>(node.first[k] + i)], ray, hit);
         if (node.n[k] > 0) continue;
-        // The nearest child on top.
+        // The nearest child is on top of the stack.
         std::size_t place = top++;
         for (; place > first && stack[place - 1].from < from[k]; --place)
           stack[place] = stack[place - 1];
@@ -192,26 +194,27 @@ class Scene {
   }
 
  private:
-  // Four boxes, side by side, so that a ray is tried against all at once. In single precision,
-  // relative to the middle of the scene; a margin beyond the rounding costs a test now and then,
-  // and never a hit.
+  // Four boxes in parallel lanes, which one ray tests at once. Coordinates are in single precision
+  // relative to the centre of the scene. A margin above the rounding error causes some extra tests
+  // but never misses a hit.
   struct Node {
     std::array<std::array<Float4, 3>, 2> bound;  // low and high, axis; four boxes
-    std::array<std::int32_t, 4> first;  // of its surfaces, or the node below
-    std::array<std::int32_t, 4> n;      // of surfaces, 0 for a node below, -1 for nothing
+    std::array<std::int32_t, 4> first;  // of its surfaces, or the child node
+    std::array<std::int32_t, 4> n;      // of surfaces, 0 for a child node, -1 for none
   };
 
-  // A ray as the boxes see it.
+  // A ray in single precision, for tests against boxes.
   struct Feeler {
     std::array<float, 3> c, inverse;
     std::array<std::size_t, 3> is_backward;
     float margin;
 
-    // `origin` relative to the middle of a scene of a certain radius.
+    // `origin` is relative to the centre of a scene of the given radius.
     Feeler(Vec3 origin, Vec3 d, double radius)
         : c{as_float(origin.x), as_float(origin.y), as_float(origin.z)},
           margin(as_float(1e-6 * (1 + (radius + std::sqrt(dot(origin, origin))) / std::sqrt(dot(d, d))))) {
-      // Not infinite, since 0 times infinity would refuse what lies in a face of the box.
+      // The inverse must be finite, because 0 times infinity would reject points in a face of the
+      // box.
       auto inverted = [](double x) { return as_float(1 / (std::abs(x) < 1e-30 ? 1e-30 : x)); };
       inverse = {inverted(d.x), inverted(d.y), inverted(d.z)};
       for (std::size_t k = 0; k < 3; ++k) is_backward[k] = inverse[k] < 0;
@@ -219,7 +222,8 @@ class Scene {
     static float as_float(double x) { return static_cast<float>(x); }
     float reach(double s) const { return as_float(std::min(s, 1e30)) * (1 + 1e-6F) + margin; }
 
-    // Where the ray enters each box; a bit of the result is set if before it leaves it.
+    // Computes where the ray enters each box. A bit of the result is set if the ray enters before
+    // it leaves.
     unsigned enters(const Node& node, double until, Float4& from) const {
       Float4 to = filled(reach(until));
       from = filled(0);
@@ -248,7 +252,8 @@ class Scene {
     return boxes_[static_cast<std::size_t>(order_[place])];
   }
 
-  // Puts the lower half along the longest axis of the middles first; where the halves meet.
+  // Partitions the surfaces at the median of their centres along the longest axis. Returns the
+  // first index of the second half.
   std::size_t halve(std::size_t first, std::size_t last) {
     Box middles;
     for (std::size_t k = first; k < last; ++k) middles.add(box_of(k).middle());
@@ -275,7 +280,7 @@ class Scene {
       if (last - half > 1) cut[3] = halve(half, last);
     }
     for (std::size_t k = 0; k < 4; ++k) {
-      Box box;  // inside out while nothing is in it: no ray enters
+      Box box;  // an empty box is inverted, so that no ray enters it
       for (std::size_t i = cut[k]; i < cut[k + 1]; ++i) box.add(box_of(i));
       const std::size_t n = cut[k + 1] - cut[k];
       const std::int32_t child = n > kLeaf ? grow(cut[k], cut[k + 1]) : static_cast<std::int32_t>(cut[k]);

@@ -1,8 +1,8 @@
-// The pin-hole camera with its lens, over many points at once.
+// The pin-hole camera with its lens, vectorised over points.
 //
 //   X_c = R X + t                         camera frame, looking along +z
 //   (x, y) = (X_c / Z_c, Y_c / Z_c)       normalised coordinates
-//   l = A (x, y, 1)                       coordinates in which the lens works
+//   l = A (x, y, 1)                       coordinates of the lens model
 //   (u, v) = B (l_d, 1)                   pixels, origin at the centre of the top left one
 #pragma once
 
@@ -11,7 +11,7 @@
 
 namespace asterism {
 
-// As `camera/projection.py` names them.
+// The names are those of `camera/projection.py`.
 enum class Reason : std::uint8_t { visible, absent, behind, near, far, lens, outside, hidden };
 
 struct Affine2 {
@@ -31,7 +31,7 @@ class Camera {
         height_(height), is_plain_(A.a == 1 && A.b == 0 && A.c == 0 && A.d == 0 && A.e == 1 && A.f == 0) {
     std::copy_n(R.begin(), 9, R_.begin());
     std::copy_n(t.begin(), 3, t_.begin());
-    // Nearer than rounding can tell is not before the camera.
+    // A depth below the rounding error does not count as in front of the camera.
     z_least_ = 1e-14 * std::sqrt(t_[0] * t_[0] + t_[1] * t_[1] + t_[2] * t_[2]);
   }
 
@@ -49,7 +49,7 @@ class Camera {
             R_[6] * p.x + R_[7] * p.y + R_[8] * p.z + t_[2]};
   }
 
-  // `points` (n, 3) to `pixels` (n, 2), `depth` and `reason` (n): all but what surfaces hide.
+  // Projects `points` (n, 3) to `pixels` (n, 2), `depth` and `reason` (n), without occlusion.
   void project(std::span<const double> points, std::span<double> pixels, std::span<double> depth,
                std::span<Reason> reason) const {
     constexpr std::size_t kBlock = 256;
@@ -83,7 +83,8 @@ class Camera {
     }
   }
 
-  // `pixels` (n, 2) to normalised coordinates (n, 2), NaN where the lens model does not reach.
+  // Maps `pixels` (n, 2) to normalised coordinates (n, 2), NaN outside the domain of the lens
+  // model.
   void undistort(std::span<const double> pixels, std::span<double> normalised) const {
     for (std::size_t i = 0; i < pixels.size() / 2; ++i) {
       Plane l = B_.inverse({pixels[2 * i], pixels[2 * i + 1]});
@@ -93,7 +94,7 @@ class Camera {
     }
   }
 
-  // Normalised coordinates (n, 2) to pixels (n, 2), wherever they fall.
+  // Maps normalised coordinates (n, 2) to pixels (n, 2), also outside the image.
   void distort(std::span<const double> normalised, std::span<double> pixels) const {
     for (std::size_t i = 0; i < pixels.size() / 2; ++i) {
       Plane l = A_({normalised[2 * i], normalised[2 * i + 1]});
@@ -106,7 +107,7 @@ class Camera {
   // Row k of R.
   Vec3 row(std::size_t k) const { return {R_[3 * k], R_[3 * k + 1], R_[3 * k + 2]}; }
 
-  // Derivative of a pixel by its normalised coordinates, B D A; NaN where there is no pixel.
+  // Derivative of a pixel by its normalised coordinates, B D A; NaN if there is no pixel.
   Jacobian2 slope(Plane n) const {
     const Plane ideal = A_(n);
     Plane bent = ideal;
@@ -119,7 +120,7 @@ class Camera {
             B_.d * m01 + B_.e * m11};
   }
 
-  // Derivative of a point's pixel by its world coordinates, row by row; NaN where it has no pixel.
+  // Derivative of a point's pixel by its world coordinates, row by row; NaN if it has no pixel.
   std::array<double, 6> jacobian(Vec3 point) const {
     const Vec3 c = to_camera(point);
     std::array<double, 6> J;

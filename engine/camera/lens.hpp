@@ -1,4 +1,4 @@
-// Lenses: how an ideal image is bent, and back.
+// Lens models: distort an ideal image, and undistort it.
 //
 //   (x, y)    lens coordinates, mostly normalised: X_c / Z_c and Y_c / Z_c
 //   q         x^2 + y^2
@@ -7,9 +7,9 @@
 //   radial    m = x (1 + k1 q + k2 q^2 + k3 q^3), plus the tangential p1, p2
 //   quadratic m = x + e . (x, y, x^2, y^2, xy), each axis with its own e
 //
-// One direction is the polynomial, the other is solved. A map is used only where it stretches by
-// kLeastStretch at least in every direction: within that domain, which is convex, it is injective,
-// so nothing folds over.
+// One direction is the polynomial, and the other is solved for. A map is used only where it
+// stretches by at least kLeastStretch in every direction. This domain is convex, and the map is
+// injective on it.
 #pragma once
 
 #include <algorithm>
@@ -47,9 +47,9 @@ class Lens {
   enum class Kind { none, radial, quadratic };
 
   Lens() = default;
-  // `r_end`: radius of the domain of a radial map; `q_table`: squared radius of the image in the
-  // coordinates that are solved from, up to which a table gives the first guess; `start`: a point
-  // of the domain.
+  // `r_end`: radius of the domain of a radial map. `q_table`: squared image radius, in the
+  // coordinates from which the lens solves, up to which a table gives the initial guess. `start`: a
+  // point of the domain.
   Lens(Kind kind, bool is_backward, std::span<const double> c, double r_end, double q_table,
        Plane start)
       : kind_(kind), is_backward_(is_backward), r_end_(r_end), start_(start) {
@@ -65,7 +65,7 @@ class Lens {
 
   Kind kind() const { return kind_; }
 
-  // Ideal to distorted and back, in place; NaN where the model does not reach.
+  // From ideal to distorted coordinates and back, in place; NaN outside the domain of the model.
   void distort(std::span<double> x, std::span<double> y) const {
     is_backward_ ? solve(x, y) : apply(x, y);
   }
@@ -73,7 +73,8 @@ class Lens {
     is_backward_ ? apply(x, y) : solve(x, y);
   }
 
-  // Derivative of distorted by ideal coordinates, at distorted coordinates `d` of ideal ones `i`.
+  // Derivative of distorted by ideal coordinates, at the distorted coordinates `d` of the ideal
+  // ones `i`.
   Jacobian2 distort_slope(Plane i, Plane d) const {
     if (kind_ == Kind::none) return {1, 0, 0, 1};
     return is_backward_ ? slope(d).inverse() : slope(i);
@@ -105,7 +106,7 @@ class Lens {
             g + h * a.y * a.y + 6 * p1_ * a.y + 2 * p2_ * a.x};
   }
 
-  // Whether the map may be used at `a`.
+  // Whether `a` is in the domain of the map.
   bool reaches(Plane a) const {
     if (kind_ == Kind::radial) return a.x * a.x + a.y * a.y < r_end_ * r_end_;
     const Jacobian2 J = slope(a);
@@ -150,8 +151,8 @@ class Lens {
     }
   }
 
-  // As `solve_factor`, fast: the table's guess and one Newton step reach the last digit nearly
-  // everywhere; where the step was not small, the slow way is taken.
+  // A fast version of `solve_factor`. The table's guess and one Newton step are accurate to the
+  // last digit nearly everywhere. If the step is not small, `solve_factor` is used.
   double factor(double q) const {
     const double at = q * to_cell_;
     if (!(at < n_cells_)) return solve_factor(q);
@@ -186,9 +187,9 @@ class Lens {
     return r / s;
   }
 
-  // m(a) = b for a in the domain, NaN if there is none. The radial and tangential map is the
-  // gradient of a potential that is convex on the domain, the quadratic one is monotone there:
-  // Newton steps, shortened until the residual falls, cannot go astray.
+  // Solves m(a) = b for a in the domain; NaN if there is none. The radial and tangential map is the
+  // gradient of a potential that is convex on the domain, and the quadratic map is monotone there.
+  // Newton steps that are shortened until the residual falls therefore converge.
   Plane solve_plane(Plane b) const {
     if (!std::isfinite(b.x) || !std::isfinite(b.y)) return {kNaN, kNaN};
     Plane a{0, 0};
@@ -214,7 +215,7 @@ class Lens {
           break;
         }
       }
-      if (part <= 1e-12) break;  // at rounding, or against the edge of the domain
+      if (part <= 1e-12) break;  // limited by rounding, or at the edge of the domain
     }
     return size <= 1e-24 * (1e-6 + scale) ? a : Plane{kNaN, kNaN};
   }
@@ -222,10 +223,10 @@ class Lens {
   static Plane minus(Plane a, Plane b) { return {a.x - b.x, a.y - b.y}; }
   static double squared(Plane a) { return a.x * a.x + a.y * a.y; }
 
-  // The factor r / s as a smooth function of q = s^2, in cubic pieces with the right slopes.
+  // Tabulates the factor r / s as a function of q = s^2, in cubic Hermite pieces.
   void make_table(double q_table) {
     if (!(q_table > 0)) return;
-    // Short of the domain's end: beyond, the factor bends too sharply for cubic pieces.
+    // The table ends before the domain, where the factor changes too fast for cubic pieces.
     const double q_end = std::min(q_table, 0.999 * s_end_ * s_end_);
     const std::size_t n = 1024;
     const double width = q_end / static_cast<double>(n);

@@ -1,10 +1,10 @@
-// The z-buffer: which surface each pixel sees, and how deep.
+// The z-buffer: the surface that each pixel shows, and its depth.
 //
-//   (x, y)   normalised coordinates of a pixel's ray (x, y, 1), the lens undone
+//   (x, y)   normalised coordinates of a pixel's ray (x, y, 1), after undistortion
 //
-// The rays of all pixels are kept, so surfaces are drawn exactly through any lens: a pixel is tested
-// by its own ray, as a point is. Which pixels are tested is found in a pyramid of tiles that know
-// the extent of their rays.
+// The rays of all pixels are stored, so that surfaces are drawn exactly through any lens: each
+// pixel is tested by its own ray. A pyramid of tiles with the extents of their rays limits the
+// pixels to be tested.
 #pragma once
 
 #include "camera/bvh.hpp"
@@ -12,10 +12,10 @@
 namespace asterism {
 
 struct DepthImage {
-  std::span<double> depth;        // row by row, infinity where nothing is seen
-  std::span<std::int32_t> owner;  // -1 where nothing is seen
+  std::span<double> depth;        // row by row, infinity if no surface is hit
+  std::span<std::int32_t> owner;  // -1 if no surface is hit
 
-  // While surfaces are drawn `depth` holds its inverse, which is linear in the image: no division.
+  // During drawing `depth` holds its inverse, which is linear in the image and needs no division.
   void begin() const {
     std::fill(depth.begin(), depth.end(), 0.0);
     std::fill(owner.begin(), owner.end(), -1);
@@ -51,15 +51,15 @@ class RayGrid {
   std::int32_t width() const { return w_; }
   std::int32_t height() const { return h_; }
 
-  // The nearest surface of every pixel. Triangles and capsules are in camera coordinates; between
-  // `begin` and `end` of the image.
+  // Draws the nearest surface of every pixel. Triangles and capsules are in camera coordinates. It
+  // must be called between `begin` and `end` of the image.
   void draw_nearest(std::span<const Triangle> triangles, std::span<const Capsule> capsules,
                     DepthImage image) const {
     for (const Triangle& t : triangles) draw<true>(t, image);
     for (const Capsule& k : capsules) draw(k, image);
   }
 
-  // Every triangle over what is there already, as a painter does.
+  // Draws every triangle over the existing image, without a depth test (painter's algorithm).
   void paint(std::span<const Triangle> triangles, DepthImage image) const {
     for (const Triangle& t : triangles) draw<false>(t, image);
   }
@@ -76,7 +76,7 @@ class RayGrid {
     bool meets(const Extent& e) const { return x0 <= e.x1 && e.x0 <= x1 && y0 <= e.y1 && e.y0 <= y1; }
   };
 
-  // One level of tiles; a tile covers 2 x 2 of the level below.
+  // A level of the pyramid; a tile covers 2 x 2 tiles of the level below.
   struct Level {
     std::int32_t w, h;
     std::vector<Extent> tiles;
@@ -114,7 +114,7 @@ class RayGrid {
     }
   }
 
-  // Visits the rows of the tiles that `may_meet` cannot rule out.
+  // Visits the rows of the tiles that `may_meet` does not exclude.
   template <typename MayMeet, typename Row>
   void visit(std::size_t level, std::int32_t i, std::int32_t j, const MayMeet& may_meet, const Row& row) const {
     const Level& l = levels_[level];
@@ -141,7 +141,7 @@ class RayGrid {
     if (a.z <= 0 && b.z <= 0 && e.z <= 0) return;
     const Vec3 normal = cross(b - a, e - a);
     const double volume = dot(a, normal);
-    if (volume == 0) return;  // seen edge on
+    if (volume == 0) return;  // edge on
     const Vec3 n = (1 / volume) * normal;  // n . (x, y, 1) is the inverse depth of the plane
     const double sign = volume > 0 ? 1 : -1;
     const Vec3 U = sign * cross(b, e), V = sign * cross(e, a), W = sign * cross(a, b);
@@ -160,7 +160,7 @@ class RayGrid {
     auto row = [&](std::size_t at, std::int32_t count) {
       const double* const x = x_.data() + at;
       const double* const y = y_.data() + at;
-      // In two passes, the first without a branch: most pixels of most tiles are not inside.
+      // Two passes, the first without a branch, because most pixels of most tiles are outside.
       std::array<double, kTile> least;
       for (std::int32_t i = 0; i < count; ++i) {
         const double u = x[i] * U.x + y[i] * U.y + U.z, v = x[i] * V.x + y[i] * V.y + V.z;
@@ -189,7 +189,7 @@ class RayGrid {
     visit(levels_.size() - 1, 0, 0, [&](const Extent& x) { return extent.meets(x); }, row);
   }
 
-  // What the two end spheres span, or everything if one of them reaches behind the camera.
+  // The extent of the two end spheres, or unbounded if one of them reaches behind the camera.
   static Extent extent_of(const Capsule& k) {
     Extent extent;
     for (const Vec3 c : {k.a, k.b}) {

@@ -1,12 +1,13 @@
-// The compatible candidates of the greatest total score: no image point twice. Weighted set packing.
+// Selects the compatible candidates with the largest total score, such that no image point is used
+// twice. This is weighted set packing.
 //
-// A greedy choice first. Each chosen candidate pays its score in equal parts as the price of its
-// points. By these prices no choice is worth more than
-//     Σ prices + Σ_candidates max(0, score - prices of its points),
-// which proves the greedy choice best where every candidate's points cost at least its score: almost
-// always, as a point pays the more for each view the more of them it has. A candidate whose points
-// cost more than its score by over what the bound leaves open is in no best choice. The connected
-// parts of what is left over are solved each by `SetPacking`.
+// A greedy choice comes first. The score of each chosen candidate is divided equally into prices of
+// its image points. At these prices, every choice has a total score of at most
+//     Σ prices + Σ_candidates max(0, score - prices of its points).
+// The greedy choice is therefore optimal if the points of every candidate cost at least its score.
+// This is the usual case, because the score per view rises with the number of views. A candidate
+// whose points cost more than its score by over the remaining gap is in no optimal choice. The
+// connected components of the remaining candidates are solved separately by `SetPacking`.
 #pragma once
 
 #include "multiview/point_candidates.hpp"
@@ -16,9 +17,9 @@
 namespace asterism {
 
 struct ChoiceSummary {
-  std::int64_t n_packed = 0;      // parts that had to be searched
-  std::int64_t n_inexact = 0;     // those of them whose search was cut
-  double gap = 0;                 // the best choice is worth at most so much more
+  std::int64_t n_packed = 0;      // components that had to be searched
+  std::int64_t n_inexact = 0;     // components whose search reached the node limit
+  double gap = 0;                 // bound of the score by which the best choice is better
 };
 
 class CandidateChoice {
@@ -28,7 +29,7 @@ class CandidateChoice {
                   std::size_t n_points)
       : uses_(uses), scores_(scores), n_points_(n_points) {}
 
-  // Numbers of the chosen candidates, rising.
+  // Numbers of the chosen candidates, increasing.
   std::vector<std::int32_t> solve(std::int64_t max_nodes, ChoiceSummary& summary) {
     std::vector<std::int32_t> all(scores_.size());
     for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::int32_t>(i);
@@ -61,7 +62,7 @@ class CandidateChoice {
     for (const std::int32_t c : greedy)
       for (const std::int32_t p : uses_[c])
         price[p] = scores_[c] / static_cast<double>(uses_[c].size());
-    std::vector<double> left(part.size());  // what its points cost beyond its score
+    std::vector<double> left(part.size());  // price of its points minus its score
     double open = 0;
     for (std::size_t i = 0; i < part.size(); ++i) {
       left[i] = -scores_[part[i]];
@@ -98,7 +99,8 @@ class CandidateChoice {
     return out;
   }
 
-  // Candidates that share a point exclude each other: a tree each, the largest such sets first.
+  // Candidates that share an image point exclude each other and form one tree; the points with the
+  // most candidates come first.
   void pack(const Numbers& part, std::int64_t max_nodes, ChoiceSummary& summary, Numbers& chosen) const {
     std::unordered_map<std::int32_t, Numbers> holders;
     Numbers resources;

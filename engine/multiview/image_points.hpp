@@ -1,10 +1,10 @@
-// One camera and its image points in one frame, the lens undone once for all of them.
+// The image points of one camera in one frame, undistorted once for all uses.
 //
 //   n = (x, y)   normalised coordinates, X_c / Z_c and Y_c / Z_c
 //   D            derivative of the pixel by n, at the point
 //   W            information of n: Dᵀ D / σ², so that eᵀ W e is the squared distance in pixels over
 //                σ², to first order in the distance
-//   J            derivative of n by the world coordinates of a place
+//   J            derivative of n by the world coordinates of a position
 #pragma once
 
 #include <span>
@@ -15,13 +15,13 @@
 
 namespace asterism {
 
-// What is known of the images of a camera. Densities are by pixel².
+// The image model of a camera. Densities are per pixel².
 struct ImageSense {
   double sigma;  // px, each axis
-  double gain;   // what a view adds to the log likelihood ratio of a point, but for its distance
-  double miss;   // what no view adds, where there could be one
+  double gain;   // gain of a view in the log-likelihood ratio of a point, without its distance
+  double miss;   // log probability of no view where the camera could see the point
 
-  // `clutter`: density of image points that are of no point in space.
+  // `clutter`: density of false image points.
   ImageSense(double sigma_px, double p_detection, double clutter)
       : sigma(sigma_px),
         gain(std::log(p_detection / (clutter * 6.283185307179586 * sigma_px * sigma_px))),
@@ -33,14 +33,14 @@ struct ImagePoint {
   double wxx, wxy, wyy;  // W
   double vxx, vxy, vyy;  // its inverse
   double spread;         // largest standard deviation of n
-  double gain;           // what it adds to the log likelihood ratio, but for its distance
+  double gain;           // gain in the log-likelihood ratio, without its distance
   std::int32_t number;   // in the frame, over all cameras
   bool is_shared = false;
 
   double squared(Plane e) const { return wxx * e.x * e.x + 2 * wxy * e.x * e.y + wyy * e.y * e.y; }
 };
 
-// A place as a camera has it.
+// A position in the coordinates of a camera.
 struct ProjectedPlace {
   Plane n;
   Vec3 jx, jy;  // rows of J
@@ -53,7 +53,7 @@ class ImagePoints {
       : camera(&of), sense(known), center(of.center()), r0_(of.row(0)), r1_(of.row(1)),
         r2_(of.row(2)) {}
 
-  // Takes the points of a frame; those that no ray leads to are left out.
+  // Sets the image points of a frame, except those outside the domain of the lens model.
   void take(std::span<const double> pixels, std::int32_t first) {
     points.clear();
     normalised_.resize(pixels.size());
@@ -89,9 +89,9 @@ class ImagePoints {
     }
   }
 
-  // Lets another point in space share an image point that is taken: its image may have merged with
-  // it. That explains why there is no other, and says where the place is, but only to sigma pixels.
-  // The image point itself is explained already, so it gains nothing.
+  // Lets a further point in space share an image point that is already taken, because two images
+  // may have merged. This explains why the point has no image of its own, and locates it to within
+  // sigma pixels. The image point is explained already, so it adds no gain.
   void share(const std::vector<char>& is_taken, double sigma) {
     const double wider = sigma / sense.sigma;
     n_free = points.size();
@@ -106,7 +106,7 @@ class ImagePoints {
     }
   }
 
-  // A point before which all are left of x, hardly any between.
+  // An image point before which all others are left of x, with few between it and x.
   std::vector<ImagePoint>::const_iterator right_of(double x) const {
     const double at = (x - left_) * cells_;
     if (!(at > 0)) return points.begin();
@@ -123,7 +123,8 @@ class ImagePoints {
     return {n, s * (r0_ - n.x * r2_), s * (r1_ - n.y * r2_), c.z};
   }
 
-  // Whether the camera could see the place: in range, in the image, within the lens model.
+  // Whether the camera could see the position: in range, in the image, and in the domain of the
+  // lens model.
   bool could_see(Vec3 X) const {
     const double place[3] = {X.x, X.y, X.z};
     double pixel[2], depth[1];
@@ -135,13 +136,13 @@ class ImagePoints {
   const Camera* camera;
   ImageSense sense;
   Vec3 center;
-  std::vector<ImagePoint> points;   // by n.x
-  std::vector<double> dx, dy, dz;   // unit vectors of their rays, world
+  std::vector<ImagePoint> points;   // ordered by n.x
+  std::vector<double> dx, dy, dz;   // unit vectors of their rays in world coordinates
   double widest = 0;                // largest spread
-  std::size_t n_free = 0;           // of the points: not shared
+  std::size_t n_free = 0;           // number of points that are not shared
 
  private:
-  // Where the points of each of many even strips begin.
+  // Stores the index of the first point in each of many strips of equal width.
   void make_table() {
     starts_.clear();
     if (points.empty()) return;

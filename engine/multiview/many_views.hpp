@@ -1,4 +1,4 @@
-// One frame of many views: which image points are of one point in space, and where that is.
+// Reconstructs the points of one frame from many views: groups image points and locates each group.
 #pragma once
 
 #include "multiview/candidate_choice.hpp"
@@ -8,7 +8,7 @@ namespace asterism {
 struct FoundPoint {
   Vec3 X;
   double score;
-  std::vector<std::int32_t> uses;  // numbers of its image points, rising
+  std::vector<std::int32_t> uses;  // numbers of its image points, increasing
 };
 
 struct FrameSummary {
@@ -24,9 +24,9 @@ class ManyViews {
     for (std::size_t c = 0; c < cameras.size(); ++c) images_.emplace_back(cameras[c], senses[c]);
   }
 
-  // `pixels` of all cameras, those of camera c from offsets[c] to offsets[c + 1] (from any start).
-  // The best choice of points; then, with merge > 0, those that it left because their images have
-  // merged with others, as far as `merge` pixels (one standard deviation) from where they belong.
+  // `pixels` are those of all cameras; camera c has those from offsets[c] to offsets[c + 1],
+  // counted from offsets[0]. After the best choice of points, merge > 0 adds points whose images
+  // have merged with others. `merge` is the standard deviation in pixels of such an image.
   std::vector<FoundPoint> solve(std::span<const double> pixels, std::span<const std::int64_t> offsets,
                                 std::span<const ExpectedPlace> expected, double merge, std::int64_t max_nodes,
                                 FrameSummary& summary) {

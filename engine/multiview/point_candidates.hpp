@@ -1,8 +1,10 @@
-// Which image points of different cameras may be of one point in space.
+// Generates candidates: groups of image points of different cameras that may show one point in
+// space.
 //
-// Pairs of rays that meet within the gate are seeds. A seed's place tells where the other cameras
-// must have it: first the cameras where the gate holds one point alone, then those where the nearest
-// of several is taken. A pair that is in a found candidate of three views is no seed again.
+// Pairs of rays that meet within the gate are seeds. The position of a seed is projected into the
+// other cameras. First, cameras with a single image point in the gate are added, then those where
+// the nearest of several is taken. A pair within a found candidate of three or more views is not
+// used as a seed again.
 #pragma once
 
 #include <cmath>
@@ -15,10 +17,10 @@
 namespace asterism {
 
 struct CandidateOptions {
-  double log_density = 0;    // log ρ, of points by m³
+  double log_density = 0;    // log ρ, points per m³
   double gate = 4;           // standard deviations
   std::int32_t min_views = 2;
-  std::array<double, 3> low{}, high{};  // the volume; nothing is beyond
+  std::array<double, 3> low{}, high{};  // bounds of the volume
 };
 
 class PointCandidates {
@@ -37,7 +39,7 @@ class PointCandidates {
     for (std::size_t k = 0; k < cameras_.size(); ++k) all_.push_back(static_cast<std::int32_t>(k));
   }
 
-  // All candidates that are likelier than clutter.
+  // All candidates that are more likely than clutter.
   std::vector<PointCandidate> find() {
     for (const ExpectedPlace& e : expected_) grow_from_place(e.X);
     find_seeds();
@@ -55,7 +57,7 @@ class PointCandidates {
  private:
   struct Seed {
     std::int32_t a, i, b, j;  // cameras and points
-    double squared;           // of the gap between the rays, to order them
+    double squared;           // normalised squared distance of the rays, for ordering
     Vec3 X;
   };
 
@@ -77,12 +79,13 @@ class PointCandidates {
         height.resize(B.points.size());
         for (std::size_t i = 0; i < A.points.size(); ++i) {
           if (A.points[i].is_shared && B.n_free == 0) continue;
-          // How far the rays of b are out of the plane of this ray and the base line.
+          // Distances of the rays of b from the plane of this ray and the base line.
           const Vec3 d = A.ray(i), m = cross(base, d);
           const double m2 = dot(m, m);
           for (std::size_t j = 0; j < height.size(); ++j)
             height[j] = m.x * B.dx[j] + m.y * B.dy[j] + m.z * B.dz[j];
-          // A coarse gate: neither ray is more than kReach times as long as the other.
+          // A coarse gate, which assumes that neither ray is more than kReach times as long as the
+          // other.
           constexpr double kReach = 5;
           const double coarse = options_.gate * (B.widest + kReach * A.points[i].spread);
           const double most = coarse * coarse * m2;
@@ -104,7 +107,7 @@ class PointCandidates {
     const Vec3 d = A.ray(i), e = B.ray(j);
     const double de = dot(d, e), sine2 = 1 - de * de;
     if (!(sine2 > 1e-9)) return;
-    // Lengths of the rays to where they are nearest to each other.
+    // Distances along the rays to their closest approach.
     const double bd = dot(base, d), be = dot(base, e);
     const double s = (bd - de * be) / sine2, t = (de * bd - be) / sine2;
     if (!(s > 0 && t > 0)) return;
@@ -118,7 +121,7 @@ class PointCandidates {
     seeds_.push_back({a, static_cast<std::int32_t>(i), b, static_cast<std::int32_t>(j), squared, X});
   }
 
-  // Whether a strong candidate holds both points.
+  // Whether a candidate of three or more views contains both points.
   bool is_known(const Seed& seed) const {
     const auto &p = strong_of_[number({seed.a, seed.i})], &q = strong_of_[number({seed.b, seed.j})];
     auto i = p.begin();
@@ -136,7 +139,7 @@ class PointCandidates {
     extend(c, asked_, true);
     prune(c);
     if (c.views.size() >= 3 && c.views.size() < all_.size()) {
-      // The place is sure now, and may bring others into the gate.
+      // The position is more accurate now, which may bring further views into the gate.
       const std::size_t n = c.views.size();
       asked_ = all_;
       extend(c, asked_, true);
@@ -145,7 +148,7 @@ class PointCandidates {
     keep(c);
   }
 
-  // A place where a point is expected: what lies nearest to it in each image.
+  // Starts a candidate at an expected position, with the nearest image point of each camera.
   void grow_from_place(Vec3 X) {
     PointCandidate c;
     c.X = X;
@@ -167,8 +170,8 @@ class PointCandidates {
     grow(c);
   }
 
-  // Adds a view in each of `asked` that has none, where one lies within the gate; those where several
-  // do are left in `asked`, unless the nearest of them is to be taken.
+  // Adds a view for each camera in `asked` that has none and has an image point in the gate.
+  // Cameras with several such points stay in `asked`, unless `takes_nearest` is set.
   void extend(PointCandidate& c, std::vector<std::int32_t>& asked, bool takes_nearest) const {
     Symmetric3 P = c.information.inverse();
     std::size_t n_left = 0;
@@ -208,7 +211,7 @@ class PointCandidates {
     asked.resize(n_left);
   }
 
-  // Drops the worst view as long as it is beyond the gate.
+  // Removes the worst view while it is outside the gate.
   void prune(PointCandidate& c) const {
     while (c.views.size() >= 2) {
       if (!fit_.fit(c)) {
@@ -224,7 +227,7 @@ class PointCandidates {
     }
   }
 
-  // Keeps a candidate that has been fitted, unless it is there already.
+  // Stores a fitted candidate, unless it is a duplicate.
   void keep(PointCandidate& c) {
     if (static_cast<std::int32_t>(c.views.size()) < std::max(options_.min_views, 2)) return;
     const bool is_own = std::any_of(c.views.begin(), c.views.end(), [this](View v) {
@@ -245,8 +248,8 @@ class PointCandidates {
     found_.push_back(std::move(c));
   }
 
-  // Where two candidates want one image point: each of them without what the other has, if both
-  // together may be worth more than either.
+  // If two candidates share an image point, adds each of them without the views of the other,
+  // provided that both together could have a higher score than either alone.
   void add_remainders() {
     std::size_t from = 0;
     for (int round = 0; round < 2; ++round) {
@@ -271,7 +274,8 @@ class PointCandidates {
   }
 
   void add_remainder(std::size_t i, std::size_t rival) {
-    constexpr double kMargin = 6;  // the place is less sure without the views: that is not foreseen
+    // the position is less certain without the views, which the estimate neglects
+    constexpr double kMargin = 6;
     PointCandidate rest;
     rest.X = found_[i].X;
     double lost = 0;
@@ -288,7 +292,8 @@ class PointCandidates {
     if (fit_.fit(rest)) keep(rest);
   }
 
-  static constexpr double kFar = 30;  // standard deviations, of an image point from where it is expected
+  // standard deviations, of an image point from its expected position
+  static constexpr double kFar = 30;
   std::span<const ImagePoints> cameras_;
   CandidateOptions options_;
   std::span<const ExpectedPlace> expected_;
@@ -298,7 +303,8 @@ class PointCandidates {
   std::vector<Seed> seeds_;
   std::vector<PointCandidate> found_;
   std::unordered_multimap<std::uint64_t, std::int32_t> by_hash_;
-  std::vector<std::vector<std::int32_t>> strong_of_;  // candidates of three views and more, rising
+  // candidates of three or more views, increasing
+  std::vector<std::vector<std::int32_t>> strong_of_;
 };
 
 }  // namespace asterism

@@ -1,10 +1,9 @@
-// A point in space as image points of several cameras tell it: its place, its information, its score.
+// Fits a point in space to image points of several cameras: its position, information and score.
 //
-//   X, Λ     place and its information, Σ Jᵀ W J
-//   r²       squared distance of an image point from that of X, in its standard deviations
-//   score    log likelihood ratio of "one point, of density ρ, made these" against "clutter did" (ρ is
-//            higher where one is expected),
-//            the place integrated out (Laplace):
+//   X, Λ     position and its information, Σ Jᵀ W J
+//   r²       squared distance of an image point from the projection of X, in standard deviations
+//   score    log-likelihood ratio of "one point, of density ρ" against "clutter", with the position
+//            integrated out (Laplace); ρ is higher at expected positions:
 //            log ρ + log((2π)^{3/2} |Λ|^{-1/2}) + Σ_seen (log(P_d / (λ 2πσ²)) - r²/2)
 //              + Σ_{could see, did not} log(1 - P_d)
 #pragma once
@@ -20,19 +19,19 @@
 namespace asterism {
 
 struct View {
-  std::int32_t camera, point;  // of `ImagePoints::points`
+  std::int32_t camera, point;  // index in `ImagePoints::points`
   bool operator==(const View&) const = default;
 };
 
 struct PointCandidate {
-  std::vector<View> views;  // by camera
+  std::vector<View> views;  // ordered by camera
   Vec3 X{};
   Symmetric3 information;
   double squared = 0;  // Σ r²
   double score = 0;
 };
 
-// Where a point is expected, as a tracker says: a Gaussian, the same along every axis.
+// An expected position from a tracker: an isotropic Gaussian.
 struct ExpectedPlace {
   Vec3 X;
   double variance;
@@ -40,12 +39,13 @@ struct ExpectedPlace {
 
 class PointFit {
  public:
-  // `log_density`: log ρ, of points by m³ anywhere; besides, there may be one at each place expected.
+  // `log_density`: log ρ, points per m³. In addition, each expected position may have a point.
   PointFit(std::span<const ImagePoints> cameras, double log_density,
            std::span<const ExpectedPlace> expected)
       : cameras_(cameras), log_density_(log_density), expected_(expected) {}
 
-  // Best place of a candidate from where it is; false where there is none.
+  // Optimises the position of a candidate by Gauss–Newton from its present one. Returns false on
+  // failure.
   bool fit(PointCandidate& c) const {
     for (int round = 0; round < 8; ++round) {
       Symmetric3 A;
@@ -63,7 +63,7 @@ class PointFit {
       const Vec3 step = A.inverse() * g;
       c.information = A;
       c.X = c.X + step;
-      const double gained = dot(step, g);  // by so much the squares fall, to first order
+      const double gained = dot(step, g);  // first-order decrease of the squared residuals
       if (!std::isfinite(gained)) return false;
       if (gained < 1e-4) {
         c.squared = std::max(c.squared - gained, 0.0);
@@ -72,7 +72,8 @@ class PointFit {
     }
     return false;
   }
-  // The information of a seed's place; false where its two rays leave the depth open.
+  // Computes the information of a seed's position. Returns false if its two rays do not determine
+  // the depth.
   bool inform(PointCandidate& c) const {
     Vec3 g{0, 0, 0};
     for (const View v : c.views) {
@@ -84,7 +85,7 @@ class PointFit {
     c.X = c.X + c.information.inverse() * g;
     return true;
   }
-  // One step with a new view alone, seen as `s` says: the others are at their minimum.
+  // One Gauss–Newton step for a new view, projected to `s`; the other views are at their minimum.
   static void step(PointCandidate& c, const ImagePoint& p, const ProjectedPlace& s) {
     Vec3 g{0, 0, 0};
     add(p, s, c.information, g);
@@ -101,7 +102,7 @@ class PointFit {
     double s = log_density(c) + 1.5 * kLogTwoPi -
                0.5 * std::log(c.information.determinant()) - c.squared / 2;
     for (const View v : c.views) s += cameras_[v.camera].points[v.point].gain;
-    if (s <= 0) return s;  // misses only lower it
+    if (s <= 0) return s;  // missing views only lower it
     std::size_t at = 0;
     for (std::size_t k = 0; k < cameras_.size() && s > 0; ++k) {
       if (at < c.views.size() && c.views[at].camera == static_cast<std::int32_t>(k))
@@ -114,10 +115,10 @@ class PointFit {
 
  private:
   static constexpr double kLogTwoPi = 1.8378770664093453;
-  static constexpr double kThere = 0.9;  // probability that an expected point is where it is expected
+  static constexpr double kThere = 0.9;  // probability that an expected point exists
   static constexpr double kFar = 6;      // standard deviations
 
-  // log of ρ + Σ 0.9 N(X; expected place, its variance + Λ⁻¹), the place integrated out.
+  // log of ρ + Σ 0.9 N(X; expected position, its variance + Λ⁻¹), with the position integrated out.
   double log_density(const PointCandidate& c) const {
     if (expected_.empty()) return log_density_;
     const Symmetric3 own = c.information.inverse();

@@ -1,4 +1,4 @@
-// Python's arrays, in and out.
+// Conversion between NumPy arrays and C++ ranges.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -31,8 +31,8 @@ struct Owned {
   }
 };
 
-// A copy of the values of a range, as an array of some shape; along one axis, of each what `project`
-// makes of it.
+// An array with the given shape and the values of a range. `project` is applied to each value of a
+// one-dimensional array.
 template <typename T, typename Range>
 Out<T> array_of(const Range& values, std::initializer_list<std::size_t> shape) {
   Owned<T> out(std::size(values));
@@ -48,7 +48,7 @@ Out<T> array_of(const Range& values, Project project = {}) {
   return out.give({std::size(values)});
 }
 
-// All that an array holds, one row after the other.
+// All values of an array in row-major order.
 template <typename T>
 std::span<const T> flat(const In<T>& array) {
   return {array.data(), array.size()};
@@ -58,7 +58,7 @@ inline void require(bool holds, const char* what) {
   if (!holds) throw std::invalid_argument(what);
 }
 
-// That lists of so many values in all lie between offsets, the first from 0 on.
+// Checks that offsets start at 0 or above, increase, and end within n values.
 inline void require_offsets(std::span<const std::int64_t> offsets, std::size_t n, const char* what) {
   require(!offsets.empty() && offsets.front() >= 0 && std::ranges::is_sorted(offsets) &&
               offsets.back() <= static_cast<std::int64_t>(n),

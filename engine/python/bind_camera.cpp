@@ -1,4 +1,4 @@
-// Cameras, the surfaces that hide, and depth images, as Python sees them.
+// Bindings of cameras, occluding surfaces and depth images.
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/vector.h>
 
@@ -59,7 +59,7 @@ struct Surfaces {
       require(i >= 0 && static_cast<std::size_t>(i) < n_vertices, "faces: indices of vertices");
   }
 
-  // What is there at a moment, every point passed through `place`.
+  // The surfaces at a moment, with every point transformed by `place`.
   template <typename Place>
   Scene at(std::size_t moment, const Place& place) const {
     Scene scene;
@@ -81,7 +81,7 @@ Scene standing(const Surfaces& surfaces, std::size_t moment) {
   return scene;
 }
 
-// Points (T, K, 3) through every camera, hidden by surfaces that stand and surfaces that move.
+// Projects points (T, K, 3) through every camera, with occlusion by static and moving surfaces.
 nb::tuple project(const std::vector<const Camera*>& cameras, const In<double>& points,
                   const std::vector<const Surfaces*>& surfaces, double clearance) {
   require(points.ndim() == 3 && points.shape(2) == 3, "points: shape (T, K, 3)");
@@ -148,7 +148,7 @@ nb::tuple depth_image(const RayGrid& grid, const Camera& camera,
   });
 }
 
-// Triangles (F, 3, 3) in camera coordinates, in the order given.
+// Draws triangles (F, 3, 3) in camera coordinates in the given order.
 nb::tuple paint(const RayGrid& grid, const In<double>& corners, const In<std::int32_t>& owners) {
   require(corners.ndim() == 3 && corners.shape(1) == 3 && corners.shape(2) == 3 &&
               owners.size() == corners.shape(0),
@@ -161,7 +161,7 @@ nb::tuple paint(const RayGrid& grid, const In<double>& corners, const In<std::in
   return give_image(grid, [&](DepthImage image) { grid.paint(triangles, image); });
 }
 
-// What a camera makes of points in an image or in the normalised plane.
+// Applies a map between image and normalised plane to points.
 template <void (Camera::*map)(std::span<const double>, std::span<double>) const>
 Out<double> mapped(const Camera& camera, const Rows& points) {
   const std::size_t n = rows(points, 2, "points: shape (n, 2)");

@@ -1,4 +1,4 @@
-// The chain of MCMC data association, as Python sees it.
+// Bindings of the MCMC data association chain.
 #include <nanobind/stl/tuple.h>
 
 #include <memory>
@@ -48,7 +48,7 @@ class Chain {
     });
   }
 
-  // Tracks as in `labels`, in place of what is there; nothing may be settled yet.
+  // Replaces the present tracks by those of `labels`. Nothing may be settled yet.
   void assign(const In<std::int64_t>& labels) {
     require(static_cast<std::int64_t>(labels.size()) == n_seen_, "labels: one for each detection");
     visit([&](auto& s) { assign_to(s, labels.data()); });
@@ -68,7 +68,7 @@ class Chain {
     });
   }
 
-  // (labels of each partition, moves after which the chain was in it).
+  // Returns (labels of each partition, number of moves after which the chain was in it).
   nb::tuple visits(std::int64_t n_moves) {
     std::unordered_map<std::uint64_t, Visited> visited;
     {
@@ -85,8 +85,8 @@ class Chain {
         array_of<std::int64_t>(counts));
   }
 
-  // Moves that are weighed to the end, one by one: (kind, what was drawn on the way, labels before
-  // and after, log q forward and back, gain, whether it was taken).
+  // Returns the evaluated moves one by one: (kind, auxiliary draw, labels before and after, log q
+  // forward and reverse, gain, whether it was accepted).
   nb::list trace(std::int64_t n_moves) {
     nb::list out;
     visit([&](auto& s) {

@@ -1,4 +1,4 @@
-// The trackers that decide frame by frame.
+// Bindings of the trackers with one decision per frame.
 #include "frame/frame_tracker.hpp"
 #include "frame/joint_tracker.hpp"
 #include "python/bindings.hpp"

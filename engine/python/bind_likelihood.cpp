@@ -1,4 +1,4 @@
-// The likelihood that fits of the motion maximise, as Python sees it.
+// Bindings of the likelihood that motion fits maximise.
 #include "filter/motion_likelihood.hpp"
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"

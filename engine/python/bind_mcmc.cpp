@@ -1,4 +1,4 @@
-// The trackers that sample partitions, for one motion and for several.
+// Bindings of the MCMC trackers, for one motion model and for several.
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/tuple.h>
 
@@ -12,8 +12,8 @@ using namespace asterism;
 
 namespace {
 
-// Walks over all that a tracker has seen, and writes its labels. Between two calls of `goes_on`, with
-// the share that is done, no Python runs; what it raises ends the walk.
+// Runs over all frames that a tracker has processed, and writes its labels. The GIL is held only in
+// calls of `goes_on(fraction done)`. An exception in `goes_on` ends the run.
 template <typename Tracker>
 void finish(Tracker& tracker, Labels labels, Confidence confidence,
             const std::function<bool(double)>& goes_on) {
@@ -58,7 +58,6 @@ void bind_mcmc_tracker(nb::module_& module, const char* name) {
 
 }  // namespace
 
-// Long, because it is a list: what each class shows to Python.
 void bind_mcmc(nb::module_& module) {
   nb::class_<ChainStats>(module, "ChainStats")
       .def_ro("n_search", &ChainStats::n_search)

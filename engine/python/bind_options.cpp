@@ -1,4 +1,4 @@
-// What every tracker is told, and what it tells of a frame.
+// Bindings of the options and the statistics that all trackers share.
 #include <algorithm>
 
 #include "python/bindings.hpp"

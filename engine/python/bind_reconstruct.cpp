@@ -1,4 +1,4 @@
-// From many views to points, as Python sees it.
+// Bindings of the reconstruction of points from many views.
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/vector.h>
 
@@ -12,9 +12,9 @@ using namespace asterism;
 
 namespace {
 
-// Cameras, what is known of their images, and what a candidate must be.
+// The cameras, their image models and the options of candidates.
 struct ViewSolver {
-  std::vector<Camera> cameras;  // copies: the list that they came in may let go of them
+  std::vector<Camera> cameras;  // copies, because the Python list may release its cameras
   std::vector<ImageSense> senses;
   CandidateOptions options;
 
@@ -40,7 +40,7 @@ std::span<const std::int64_t> checked(const In<double>& pixels, const In<std::in
   return flat(offsets);
 }
 
-// Place and variance of each.
+// Position and variance of each.
 std::vector<ExpectedPlace> places(const In<double>& points) {
   require(points.ndim() == 2 && points.shape(1) == 4, "priors: shape (M, 4)");
   std::vector<ExpectedPlace> out;
@@ -52,7 +52,7 @@ std::vector<ExpectedPlace> places(const In<double>& points) {
 }
 
 // (points (n, 3), scores (n,), points of each frame (T,), offsets of their views (n + 1,), views,
-//  counts (4,): candidates, parts searched, parts cut; and what the best choice may be worth more).
+// counts (4,): candidates, components searched, components cut; bound of the optimality gap).
 nb::tuple reconstruct(const ViewSolver& solver, const In<double>& pixels,
                       const In<std::int64_t>& offsets, const In<double>& priors,
                       const In<std::int64_t>& prior_offsets, double merge,

@@ -1,4 +1,4 @@
-// The solvers on plain arrays, as Python sees them.
+// Bindings of the solvers on plain arrays.
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
@@ -15,7 +15,8 @@ using namespace asterism;
 
 namespace {
 
-// (marginals with the miss last, log of the total weight, best event, bound, most states).
+// Returns (marginals with the miss last, log of the total weight, best event, bound, largest number
+// of states).
 nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_miss,
                           std::int64_t max_states) {
   require(log_weights.ndim() == 2 && log_miss.ndim() == 1 &&
@@ -52,7 +53,7 @@ nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_m
                         array_of<std::int32_t>(best), summary.bound, summary.n_states);
 }
 
-// Rows and columns of a sparse gain list, ordered by row, paired for the greatest sum of gains.
+// Pairs rows and columns of a sparse list of gains, ordered by row, for the largest sum of gains.
 Out<std::int32_t> assign(std::int32_t n_rows, std::int32_t n_columns, const In<std::int32_t>& rows,
                          const In<std::int32_t>& columns, const In<double>& gains) {
   require(rows.size() == gains.size() && columns.size() == gains.size(), "one gain a pair");
@@ -89,7 +90,7 @@ std::pair<Out<std::int32_t>, std::int64_t> marry(const In<std::int64_t>& first,
   return {array_of<std::int32_t>(partner), n};
 }
 
-// The first k assignments of n rows to N columns by cost, N ≥ n; further rows fill up at no cost.
+// The first k assignments of n rows to N ≥ n columns by cost; all further rows cost nothing.
 Out<std::int32_t> k_best(const In<double>& cost, std::int64_t k) {
   require(cost.ndim() == 2 && cost.shape(1) >= cost.shape(0), "cost: shape (n, N), N ≥ n");
   require(cost.shape(1) < std::size_t{1} << 15, "N below 2^15");
@@ -105,8 +106,8 @@ Out<std::int32_t> k_best(const In<double>& cost, std::int64_t k) {
   return array_of<std::int32_t>(all, {n_found, n});
 }
 
-// Options are listed by tree; option o uses uses[first_use[o]:first_use[o + 1]]. Each tree needs one
-// that uses nothing.
+// Options are listed by tree; option o uses uses[first_use[o]:first_use[o + 1]]. Each tree needs
+// one without uses.
 std::vector<std::vector<PackingOption>> packing_trees(const In<std::int64_t>& first_option,
                                                       const In<double>& worths,
                                                       const In<std::int64_t>& first_use,
@@ -128,7 +129,7 @@ std::vector<std::vector<PackingOption>> packing_trees(const In<std::int64_t>& fi
   return trees;
 }
 
-// (what no packing is worth more than; by option, in the order given, what is lost with it).
+// Returns (upper bound of the weight of a packing; the loss by each option, in the order given).
 nb::tuple packing_losses(const In<std::int64_t>& first_option, const In<double>& worths,
                            const In<std::int64_t>& first_use, const In<std::int32_t>& uses) {
   const auto trees = packing_trees(first_option, worths, first_use, uses);
@@ -138,7 +139,7 @@ nb::tuple packing_losses(const In<std::int64_t>& first_option, const In<double>&
   return nb::make_tuple(losses.bound, array_of<double>(all));
 }
 
-// The k best ways for every tree to take one option, no resource twice.
+// The k best selections of one option per tree such that no resource is used twice.
 nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& worths,
                const In<std::int64_t>& first_use, const In<std::int32_t>& uses, std::int64_t k,
                double drop, std::int64_t max_nodes) {

@@ -1,4 +1,4 @@
-// Fragments made into markers, as Python sees it.
+// Bindings of stitching and of rigid neighbours.
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
 
@@ -15,7 +15,8 @@ using namespace asterism;
 
 namespace {
 
-// (fragment of each point, and of each fragment its marker, the fragment before, how probably)
+// Returns (tracklet of each point; for each tracklet its marker, the previous tracklet, the
+// probability).
 nb::tuple run_stitcher(Stitcher& stitcher, const MotionModel& m, const In<double>& times,
                        const In<std::int32_t>& kind, const In<double>& F, const In<double>& Q,
                        const In<std::int64_t>& offsets, const In<double>& points,
@@ -23,7 +24,7 @@ nb::tuple run_stitcher(Stitcher& stitcher, const MotionModel& m, const In<double
   const FrameRun frames(m, times, kind, F, Q, offsets, points);
   require(labels.size() == frames.points.size(), "labels: one for each point");
   std::vector<std::int32_t> fragment_of(labels.size(), -1);
-  std::vector<Decision> decisions;  // by fragment
+  std::vector<Decision> decisions;  // by tracklet
   const auto decide = [&](const Decision& d) {
     if (static_cast<std::size_t>(d.fragment) >= decisions.size()) decisions.resize(d.fragment + 1);
     decisions[d.fragment] = d;
@@ -39,8 +40,8 @@ nb::tuple run_stitcher(Stitcher& stitcher, const MotionModel& m, const In<double
                         array_of<double>(decisions, &Decision::probability));
 }
 
-// One frame of a stream, on a copy: (new state, markers, earlier detections whose marker changes, their
-// markers).
+// Processes one frame of a stream on a copy: (new state, markers, earlier detections whose marker
+// changes, their markers).
 nb::tuple step_stitcher(const LiveStitcher& before, const In<double>& F, const In<double>& Q,
                         const In<double>& points, const In<std::int64_t>& labels,
                         const In<std::int64_t>& revised, const In<std::int64_t>& revised_labels) {
@@ -87,14 +88,15 @@ std::vector<RigidPair> to_pairs(const In<double>& a, const In<double>& b,
   return pairs;
 }
 
-// (R, from, to, rms) of the rigid motion that takes points to others.
+// Returns (R, from, to, rms) of the rigid motion between two point sets.
 nb::tuple fit(const In<double>& a, const In<double>& b, const In<double>& weights) {
   const RigidFit found = fit_rigid(to_pairs(a, b, weights), static_cast<int>(a.shape(1)));
   return nb::make_tuple(array_of<double>(found.R, {3, 3}), array_of<double>(found.from),
                         array_of<double>(found.to), found.rms);
 }
 
-// (where they carry what was at `then`, its variance beside `r`, log densities at some points).
+// Returns (predicted position of what was at `then`, its variance in addition to `r`, log densities
+// at some points).
 nb::tuple carried(const In<double>& a, const In<double>& b, const In<double>& weights,
                   const In<double>& then, double r, const In<double>& points) {
   const std::vector<RigidPair> pairs = to_pairs(a, b, weights);
@@ -106,7 +108,7 @@ nb::tuple carried(const In<double>& a, const In<double>& b, const In<double>& we
   return nb::make_tuple(array_of<double>(found.at), found.variance, array_of<double>(at, density));
 }
 
-// Log density of each of some points of a frame among the others, where some were seen before.
+// Background log density of each point of a frame, given earlier points.
 Out<double> densities_elsewhere(const In<double>& before, const In<double>& points, double noise,
                                 double ghost_radius) {
   require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
@@ -122,7 +124,7 @@ Out<double> densities_elsewhere(const In<double>& before, const In<double>& poin
   });
 }
 
-// The markers of a frame, in order of their numbers.
+// The markers of a frame, by increasing number.
 std::vector<Seen> to_seen(const In<std::int64_t>& markers, const In<double>& points, int D) {
   const std::vector<Point> at = to_points(points, D);
   require(markers.size() == at.size(), "markers: one for each point");
@@ -136,7 +138,7 @@ std::vector<Seen> to_seen(const In<std::int64_t>& markers, const In<double>& poi
   return seen;
 }
 
-// (place, its variance, how many neighbours carry it) or None.
+// Returns (position, its variance, number of neighbours used) or None.
 std::optional<std::tuple<Out<double>, double, std::int32_t>> carry(
     BodyCarrier& self, std::int32_t marker, const In<std::int64_t>& markers,
     const In<double>& points) {
@@ -149,7 +151,8 @@ std::optional<std::tuple<Out<double>, double, std::int32_t>> carry(
   return std::tuple(array_of<double>(place), found.place.variance, found.n_neighbours);
 }
 
-// (the others, frames seen together, mean distances, their variances, predictive variances).
+// Returns (other markers, frames seen together, mean distances, their variances, predictive
+// variances).
 nb::tuple bonds_of(const Neighbours& neighbours, std::int32_t marker) {
   const std::span<const Bond> bonds = neighbours.of(marker);
   return nb::make_tuple(
@@ -158,7 +161,7 @@ nb::tuple bonds_of(const Neighbours& neighbours, std::int32_t marker) {
       array_of<double>(bonds, [&](const Bond& bond) { return neighbours.variance(bond); }));
 }
 
-// (predictive variances, whether each is a bond) of distances without noise of their own.
+// Returns (predictive variances, whether each is a bond) for distances without measurement noise.
 nb::tuple judge_distances(const In<double>& means, const In<double>& variances,
                           const In<std::int64_t>& frames) {
   const std::size_t n = means.size();

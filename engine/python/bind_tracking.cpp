@@ -1,4 +1,4 @@
-// Models, filters and scores, as Python sees them.
+// Bindings of models, filters and scores.
 #include "filter/track_filter.hpp"
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
@@ -30,7 +30,7 @@ MotionModel motion_model(int n_axes, const In<double>& H, const In<double>& P0, 
   return m;
 }
 
-// Tracks, and the steps between the frames that they lie in.
+// Tracks, and the steps between their frames.
 struct TimedTracks : TrackPoints {
   Timeline line;
 

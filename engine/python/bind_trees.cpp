@@ -1,4 +1,4 @@
-// The trackers that keep several futures of a track open: trees, forests of hypotheses, matrices.
+// Bindings of the trackers with hypothesis trees: track splitting, TOMHT and MHT.
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/tuple.h>
 
@@ -20,7 +20,7 @@ using namespace asterism;
 
 namespace {
 
-// λ of the believed tracks and the number of detections in it, in the order of `tracks`.
+// Returns λ of the confirmed tracks and its number of detections, in the order of `tracks`.
 nb::dict chi2(const TreeTracker<Forest>& tracker) {
   const auto tracks = confirmed(tracker.live());
   nb::dict out;
@@ -29,21 +29,21 @@ nb::dict chi2(const TreeTracker<Forest>& tracker) {
   return out;
 }
 
-// Its branches are worth their part of the log posterior.
+// The window of undecided frames for joint hypotheses.
 HypothesisWindow joint_window(const MotionModel& model, const ScoreModel& score,
                               const LifeOptions& life, BranchOptions branches,
                               const CarryOptions& carry, double new_track_claim) {
   branches.is_joint = true;
   branches.log_end = log_end_table(score, score.max_gap + kMaxWindow);
-  // A way on may be so much worse than another and still better than to lose the marker and to begin
-  // a new one.
+  // A branch may be this much less likely than another and still be better than ending the track
+  // and initiating a new one.
   branches.prune_drop += std::max(score.log_clutter - score.log_birth - score.log_detect, 0.0) -
                          std::log(score.p_disappear);
   return {{model, score, life, branches, carry}, new_track_claim};
 }
 
-// Of each cluster (numbers of its trees, detections of the open frames that they may have, by
-// hypothesis and detection the tree that has it or -1, log weights).
+// Returns for each cluster: numbers of its trees, open detections that they may take, the tree that
+// has each detection by hypothesis (-1 for none), log weights.
 nb::list clusters(const TreeTracker<HypothesisMatrix>& tracker) {
   const HypothesisWindow& window = tracker.forest().window();
   std::map<std::int64_t, std::size_t> index_of;
@@ -51,7 +51,7 @@ nb::list clusters(const TreeTracker<HypothesisMatrix>& tracker) {
   nb::list out;
   for (const Cluster& cluster : tracker.forest().clusters()) {
     const std::size_t n = cluster.keys.size(), H = cluster.hypotheses.size();
-    // By detection, the tree that has it in each hypothesis.
+    // For each detection, the tree that has it in each hypothesis.
     std::map<std::int64_t, std::vector<std::int64_t>> owners;
     for (std::size_t h = 0; h < H; ++h)
       for (std::size_t k = 0; k < n; ++k) {
@@ -79,7 +79,6 @@ nb::list clusters(const TreeTracker<HypothesisMatrix>& tracker) {
 
 }  // namespace
 
-// Long, because it is a list: what each class shows to Python.
 void bind_trees(nb::module_& module) {
   nb::class_<TreeStats, FrameStats>(module, "TreeStats")
       .def_ro("n_branches", &TreeStats::n_branches)
@@ -117,7 +116,7 @@ void bind_trees(nb::module_& module) {
              nb::object choose) {
             require(max_hypotheses >= 1 && max_nodes >= 1, "limits: at least 1");
             const double drop = branches.prune_drop;
-            // A tentative track is judged by its branches, and not by what is decided of it.
+            // A tentative track is judged by its branches, and not by its decided part.
             const double delete_drop =
                 std::exchange(life.delete_drop, std::numeric_limits<double>::infinity());
             Packer packer;

@@ -1,12 +1,12 @@
-// The compiled module. Only the bind_* files know Python: they check shapes, release the GIL and turn
-// statuses into exceptions. The Python face has checked values already; what they check keeps memory
-// safe.
+// The compiled module. Only the bind_* files depend on Python: they check shapes, release the GIL
+// and turn status values into exceptions. The Python layer has validated the values already; the
+// checks here protect memory.
 #include "python/bindings.hpp"
 
 namespace nb = nanobind;
 
 NB_MODULE(_engine, module) {
-  nb::set_leak_warnings(false);  // what is alive at exit is nobody's loss
+  nb::set_leak_warnings(false);  // objects alive at exit are no leak
   bind_tracking(module);
   bind_likelihood(module);
   bind_options(module);

@@ -1,4 +1,4 @@
-// What each file that knows Python adds to the module.
+// The functions by which each binding file adds its part to the module.
 #pragma once
 
 #include <nanobind/nanobind.h>

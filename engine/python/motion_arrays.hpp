@@ -1,4 +1,4 @@
-// Models and frames, from Python's arrays.
+// Conversion of models and frames from NumPy arrays.
 #pragma once
 
 #include <algorithm>
@@ -49,14 +49,14 @@ inline Timeline timeline(const MotionModel& m, const In<double>& times,
   require(times.ndim() == 1 && kind.ndim() == 1 && times.shape(0) == kind.shape(0),
           "times and kind: shape (T,)");
   Timeline line{flat(times), flat(kind), motion_steps(m, F, Q)};
-  // The first frame has no step to it where it is the first of all, which is said by -1.
+  // The first frame of a capture has no step; its kind is then -1.
   const auto n_kinds = static_cast<std::int64_t>(line.steps.size());
   for (std::size_t t = 0; t < line.kind.size(); ++t)
     require(line.kind[t] >= (t == 0 ? -1 : 0) && line.kind[t] < n_kinds, "kind: an index into F");
   return line;
 }
 
-// A column more than there are axes is the variance of each point's coordinates beyond the sensor's.
+// An additional column is the variance of each point's coordinates in addition to the sensor's.
 inline std::vector<Point> to_points(const In<double>& array, int D) {
   const auto n_axes = static_cast<std::size_t>(D);
   require(array.ndim() == 2 && (array.shape(1) == n_axes || array.shape(1) == n_axes + 1),
@@ -70,7 +70,7 @@ inline std::vector<Point> to_points(const In<double>& array, int D) {
   return points;
 }
 
-// The points of many tracks, one track after the other, and where each begins.
+// The points of many tracks, one track after the other, and the start of each.
 struct TrackPoints {
   std::vector<Point> points;
   std::span<const std::int64_t> frames, offsets;
@@ -110,7 +110,7 @@ inline std::pair<Out<double>, Out<double>> state_arrays(const MotionModel& m,
   return {means.give({K, D, n}), covariances.give({K, n, n})};
 }
 
-// Many frames that follow each other: the steps to them and their points.
+// Consecutive frames: their steps and points.
 struct FrameRun {
   Timeline line;
   std::vector<Point> points;
@@ -127,8 +127,8 @@ struct FrameRun {
   std::size_t size() const { return line.times.size(); }
   std::int64_t n_points() const { return offsets.back() - offsets.front(); }
 
-  // Calls take(frame, number of its first point, its points) without the GIL; asks now and then
-  // whether the run is to end.
+  // Calls take(frame, number of its first point, its points) without the GIL. Regularly checks for
+  // an interrupt.
   template <typename Take>
   void each(Take&& take) const {
     using Clock = std::chrono::steady_clock;

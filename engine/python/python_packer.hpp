@@ -1,4 +1,4 @@
-// Packing by a function of Python's.
+// A packing solver that is implemented by a Python function.
 #pragma once
 
 #include <algorithm>
@@ -14,9 +14,9 @@
 
 namespace asterism {
 
-// A Python function that chooses: (first option of each tree, worths, first use of each option, uses,
-// first resource of each frame) to (option of each tree, bound of the sum of worths). Trackers are
-// copied and dropped without the GIL, so the function is held once and let go with it.
+// The function maps (first option of each tree, weights, first use of each option, uses, first
+// resource of each frame) to (option of each tree, bound of the total weight). Trackers are copied
+// and destroyed without the GIL, so the function is held by one shared object that acquires it.
 class PythonPacker {
  public:
   explicit PythonPacker(nb::object choose) : choose_(std::move(choose)) {}

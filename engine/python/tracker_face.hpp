@@ -1,4 +1,4 @@
-// The face that every tracker shows to Python: one frame on a copy, many frames in place, the tracks.
+// The interface of every tracker to Python: one frame on a copy, many frames in place, the tracks.
 #pragma once
 
 #include <algorithm>
@@ -17,12 +17,12 @@ using namespace nb::literals;
 
 using Labels = nb::ndarray<std::int64_t, nb::numpy, nb::c_contig, nb::device::cpu>;
 using Confidence = nb::ndarray<double, nb::numpy, nb::c_contig, nb::device::cpu>;
-// Takes a detection, its track's id or -1, and how sure that is. One type for all callers, so that a
-// tracker is compiled once.
+// Receives a detection, the id of its track or -1, and the confidence. One type for all callers, so
+// that a tracker is compiled once.
 using Labeller = std::function<void(std::int64_t, std::int64_t, double)>;
 
-// Writes into arrays that cover every detection since the state began; into `confidence` where the
-// tracker has any.
+// Writes into arrays that cover every detection since the state began. `confidence` is written if
+// the tracker provides it.
 template <typename Tracker>
 Labeller labeller(const Tracker& tracker, Labels labels, Confidence confidence, std::int64_t n_seen) {
   const bool has_confidence = tracker.has_confidence();
@@ -37,7 +37,8 @@ Labeller labeller(const Tracker& tracker, Labels labels, Confidence confidence, 
   };
 }
 
-// What one frame, taken on a copy of the tracker, decided. Without confidence its arrays are empty.
+// The decisions of one frame, processed on a copy of the tracker. Without confidence its arrays are
+// empty.
 struct StepResult {
   nb::object tracker;  // the copy, after the frame
   nb::object labels, confidence;
@@ -84,7 +85,7 @@ StepResult step(const Tracker& before, double time, const In<double>& F, const I
   return out;
 }
 
-// Many frames in place.
+// Processes many frames in place.
 template <typename Tracker>
 void run(Tracker& tracker, const In<double>& times, const In<std::int32_t>& kind,
          const In<double>& F, const In<double>& Q, const In<std::int64_t>& offsets,
@@ -112,7 +113,7 @@ std::vector<const LiveTrack<More>*> confirmed(const LiveTracks<More>& live) {
   return out;
 }
 
-// What a live display needs of the confirmed tracks.
+// The data of the confirmed tracks for a live display.
 template <typename Tracker>
 nb::dict tracks(const Tracker& tracker) {
   const auto& live = tracker.live();

@@ -34,7 +34,7 @@ namespace asterism {
 
 struct Carried {
   Point at{};
-  double variance = std::numeric_limits<double>::infinity();  // of a coordinate of the marker's position
+  double variance = std::numeric_limits<double>::infinity();  // per coordinate
 
   // Student's t distribution with 3 degrees of freedom, whose squared scale is the variance. The
   // heavy tails allow for occasional large deformation and for correlated errors of the neighbours.

@@ -1,4 +1,4 @@
-// Parts of the engine that Python does not reach by themselves, checked under the sanitizers.
+// Tests of engine parts that Python cannot reach separately; `make sanitize` runs them.
 #include <cstdio>
 #include <cstdlib>
 #include <cmath>
@@ -24,7 +24,7 @@ using namespace asterism;
     std::exit(1);                                                       \
   }
 
-// An exception in a task ended the process; now the first one, by number, reaches the caller.
+// An exception in a task must reach the caller; of several, the one with the smallest task number.
 void exceptions_reach_the_caller() {
   for (int repeat = 0; repeat < 200; ++repeat) {
     std::string caught;
@@ -42,8 +42,8 @@ void exceptions_reach_the_caller() {
   for (const int n : done) CHECK(n == 1);
 }
 
-// Moves without limit, weights of nothing and deadlines beyond any clock were cast to integers,
-// which the undefined-behaviour sanitizer reports.
+// Infinite numbers of moves, zero weights and distant deadlines must not overflow when cast to
+// integers.
 void budgets_of_nothing_and_of_everything() {
   const double inf = std::numeric_limits<double>::infinity();
   const std::vector<double> weights{0, 1, 5};
@@ -65,7 +65,7 @@ void budgets_of_nothing_and_of_everything() {
   while (!was_asked) watch.is_stopped_before(0);
 }
 
-// The first half of a chain took all the time there was, and the second was left with 16 moves.
+// Each half of a chain must get half of the time.
 void each_half_has_half_of_the_time() {
   const Clock::time_point now = Clock::now(), end = after(now, 10);
   const double first = std::chrono::duration<double>(halfway_to(end) - now).count();
@@ -74,7 +74,7 @@ void each_half_has_half_of_the_time() {
   CHECK(halfway_to(after(now, -1)) <= Clock::now());
 }
 
-// A chain that never moved was reported with as many effective samples as moves, and R-hat 1.
+// A chain that never moved has no known effective sample size and no R-hat.
 void mixing_that_is_not_known() {
   Trace still;
   for (int half = 0; half < 2; ++half) {
@@ -90,8 +90,8 @@ void mixing_that_is_not_known() {
   CHECK(known.rhat == 1.2 && known.ess == 20);
 }
 
-// The table was as large as the largest number ever given, and said that marker 0 was somewhere
-// before any marker was.
+// The table must not grow with the largest marker number, and must be empty before the first
+// marker.
 void places_by_number() {
   Places places;
   CHECK(places.find(0) == nullptr);
@@ -108,8 +108,8 @@ void places_by_number() {
   CHECK(sizeof(Places) < 100 && places.capacity() <= 512);
 }
 
-// What a change of two tracks gains in a block is what it gains in the whole capture: the detections
-// after the block count as well, and so do the frames in which a track that ends is not seen.
+// The gain of a change of two tracks must be the same in a block as in the whole capture. The block
+// must include the detections after it, and the missed frames of a track that ends.
 using Swept = CaptureSweep<OneMotion>;
 
 double gain_of_exchange(const Swept::Part& part, std::int64_t from, bool is_cut) {
@@ -145,7 +145,7 @@ void a_block_gains_what_the_capture_gains() {
   step.mode[0].F = {1, dt, 0, 1};
   step.mode[0].Q = {q * dt * dt * dt * dt / 4, q * dt * dt * dt / 2, q * dt * dt * dt / 2, q * dt * dt};
   for (const bool is_cut : {false, true}) {
-    // Two markers pass each other; where their ends are compared both are gone after some frames.
+    // Two markers pass each other; where the ends are compared, both disappear after some frames.
     Swept short_blocks(40, sm.max_gap), one_block(1000, sm.max_gap);
     for (Swept* sweep : {&short_blocks, &one_block}) {
       for (std::int64_t t = 0; t < T; ++t) {
@@ -165,7 +165,8 @@ void a_block_gains_what_the_capture_gains() {
       const Swept::Part part = short_blocks.take(empty, block);
       for (std::int64_t t = block.first + 2; t <= block.last && t < (is_cut ? ended : T - 2); ++t) {
         const double own = gain_of_exchange(part, t, is_cut);
-        if (is_cut && block.last < ended) continue;  // goes on after the block, so it may not end in it
+        // continues after the block, so it must not end in it
+        if (is_cut && block.last < ended) continue;
         CHECK(std::abs(own - gain_of_exchange(whole, t, is_cut)) < 1e-6 * (1 + std::abs(own)));
         ++n_checked;
       }
@@ -175,7 +176,7 @@ void a_block_gains_what_the_capture_gains() {
   }
 }
 
-// Candidates of image points, and the best compatible ones by trying all sets of them.
+// Candidates of image points, and the optimal choice by enumeration of all sets.
 struct ChoiceProblem {
   std::vector<std::vector<std::int32_t>> uses;
   std::vector<double> scores;
@@ -197,7 +198,7 @@ struct ChoiceProblem {
       if (is_used[p]++) return without;
     return std::max(without, scores[from] + best(from + 1, is_used));
   }
-  // The worth of a choice, in which no point is used twice.
+  // The total score of a choice, which must use no point twice.
   double worth(const std::vector<std::int32_t>& chosen) const {
     std::vector<char> is_used(n_points, 0);
     double sum = 0;
