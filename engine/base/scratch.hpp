@@ -5,10 +5,10 @@
 namespace asterism {
 
 template <typename Memory>
-struct Fresh : Memory {
-  Fresh() = default;
-  Fresh(const Fresh&) : Memory() {}
-  Fresh& operator=(const Fresh&) { return *this; }
+struct Scratch : Memory {
+  Scratch() = default;
+  Scratch(const Scratch&) : Memory() {}
+  Scratch& operator=(const Scratch&) { return *this; }
 };
 
 }  // namespace asterism

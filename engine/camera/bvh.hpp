@@ -84,9 +84,9 @@ struct Capsule {
   std::int32_t owner;
 
   // Distance to the nearest intersection with the surface in front of the camera.
-  double meet(const Ray& ray) const { return meet_seen(a - ray.c, b - ray.c, ray.d); }
+  double meet(const Ray& ray) const { return meet_relative(a - ray.c, b - ray.c, ray.d); }
 
-  double meet_seen(Vec3 p, Vec3 q, Vec3 d) const {
+  double meet_relative(Vec3 p, Vec3 q, Vec3 d) const {
     const Vec3 axis = q - p;
     const double aa = dot(axis, axis), dd = dot(d, d), ad = dot(axis, d);
     double first = std::numeric_limits<double>::infinity();
@@ -228,8 +228,8 @@ class Scene {
       Float4 to = filled(reach(until));
       from = filled(0);
       for (std::size_t d = 0; d < 3; ++d) {
-        from = greatest(from, (node.bound[is_backward[d]][d] - c[d]) * inverse[d]);
-        to = least(to, (node.bound[1 - is_backward[d]][d] - c[d]) * inverse[d]);
+        from = maximum(from, (node.bound[is_backward[d]][d] - c[d]) * inverse[d]);
+        to = minimum(to, (node.bound[1 - is_backward[d]][d] - c[d]) * inverse[d]);
       }
       return bits_not_above(from, to * (1 + 1e-6F) + margin);
     }

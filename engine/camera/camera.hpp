@@ -32,7 +32,7 @@ class Camera {
     std::copy_n(R.begin(), 9, R_.begin());
     std::copy_n(t.begin(), 3, t_.begin());
     // A depth below the rounding error does not count as in front of the camera.
-    z_least_ = 1e-14 * std::sqrt(t_[0] * t_[0] + t_[1] * t_[1] + t_[2] * t_[2]);
+    min_z_ = 1e-14 * std::sqrt(t_[0] * t_[0] + t_[1] * t_[1] + t_[2] * t_[2]);
   }
 
   std::int32_t width() const { return width_; }
@@ -75,7 +75,7 @@ class Camera {
         const double u = B_.a * x[i] + B_.b * y[i] + B_.c, v = B_.d * x[i] + B_.e * y[i] + B_.f;
         out[2 * i] = u, out[2 * i + 1] = v;
         const bool inside = (u >= -0.5) & (u < right) & (v >= -0.5) & (v < bottom);
-        const bool in_range = (z[i] > z_least_) & (z[i] >= near_) & (z[i] <= far_);
+        const bool in_range = (z[i] > min_z_) & (z[i] >= near_) & (z[i] <= far_);
         why[i] = inside & in_range ? Reason::visible : Reason::outside;
       }
       for (std::size_t i = 0; i < n; ++i)
@@ -125,7 +125,7 @@ class Camera {
     const Vec3 c = to_camera(point);
     std::array<double, 6> J;
     J.fill(kNaN);
-    if (!(c.z > z_least_)) return J;
+    if (!(c.z > min_z_)) return J;
     const Plane n{c.x / c.z, c.y / c.z};
     const Jacobian2 G = slope(n);
     if (!std::isfinite(G.xx)) return J;
@@ -149,7 +149,7 @@ class Camera {
     Reason why = Reason::outside;
     if (!std::isfinite(z))
       why = Reason::absent;
-    else if (z <= z_least_)
+    else if (z <= min_z_)
       why = Reason::behind;
     else if (!std::isfinite(pixel[0]) || !std::isfinite(pixel[1]))
       why = Reason::lens;
@@ -165,7 +165,7 @@ class Camera {
   std::array<double, 3> t_;
   Affine2 A_, B_;
   Lens lens_;
-  double near_, far_, z_least_ = 0;
+  double near_, far_, min_z_ = 0;
   std::int32_t width_, height_;
   bool is_plain_;
 };

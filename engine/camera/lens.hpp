@@ -8,7 +8,7 @@
 //   quadratic m = x + e . (x, y, x^2, y^2, xy), each axis with its own e
 //
 // One direction is the polynomial, and the other is solved for. A map is used only where it
-// stretches by at least kLeastStretch in every direction. This domain is convex, and the map is
+// stretches by at least kMinStretch in every direction. This domain is convex, and the map is
 // injective on it.
 #pragma once
 
@@ -22,7 +22,7 @@
 
 namespace asterism {
 
-inline constexpr double kLeastStretch = 1e-2;
+inline constexpr double kMinStretch = 1e-2;
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 struct Plane {
@@ -110,7 +110,7 @@ class Lens {
   bool reaches(Plane a) const {
     if (kind_ == Kind::radial) return a.x * a.x + a.y * a.y < r_end_ * r_end_;
     const Jacobian2 J = slope(a);
-    const double A = J.xx - kLeastStretch, B = J.yy - kLeastStretch, C = 0.5 * (J.xy + J.yx);
+    const double A = J.xx - kMinStretch, B = J.yy - kMinStretch, C = 0.5 * (J.xy + J.yx);
     return A > 0 && A * B > C * C;
   }
 

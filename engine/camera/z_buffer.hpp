@@ -151,24 +151,24 @@ class RayGrid {
       for (const Vec3 p : {a, b, e}) extent.add({p.x / p.z, p.x / p.z, p.y / p.z, p.y / p.z});
       widen(extent);
     }
-    auto greatest = [](Vec3 N, const Extent& x) {
+    auto max_over = [](Vec3 N, const Extent& x) {
       return std::max(N.x * x.x0, N.x * x.x1) + std::max(N.y * x.y0, N.y * x.y1) + N.z;
     };
     auto may_meet = [&](const Extent& x) {
-      return extent.meets(x) && greatest(U, x) >= 0 && greatest(V, x) >= 0 && greatest(W, x) >= 0;
+      return extent.meets(x) && max_over(U, x) >= 0 && max_over(V, x) >= 0 && max_over(W, x) >= 0;
     };
     auto row = [&](std::size_t at, std::int32_t count) {
       const double* const x = x_.data() + at;
       const double* const y = y_.data() + at;
       // Two passes, the first without a branch, because most pixels of most tiles are outside.
-      std::array<double, kTile> least;
+      std::array<double, kTile> min_side;
       for (std::int32_t i = 0; i < count; ++i) {
         const double u = x[i] * U.x + y[i] * U.y + U.z, v = x[i] * V.x + y[i] * V.y + V.z;
         const double w = x[i] * W.x + y[i] * W.y + W.z, uv = u < v ? u : v;
-        least[static_cast<std::size_t>(i)] = uv < w ? uv : w;
+        min_side[static_cast<std::size_t>(i)] = uv < w ? uv : w;
       }
       for (std::int32_t i = 0; i < count; ++i) {
-        if (!(least[static_cast<std::size_t>(i)] >= 0)) continue;
+        if (!(min_side[static_cast<std::size_t>(i)] >= 0)) continue;
         const double inverse = x[i] * n.x + y[i] * n.y + n.z;
         if (!(inverse > 0)) continue;
         const std::size_t k = at + static_cast<std::size_t>(i);
@@ -183,7 +183,7 @@ class RayGrid {
     auto row = [&](std::size_t at, std::int32_t count) {
       for (std::size_t i = at; i < at + static_cast<std::size_t>(count); ++i) {
         if (!std::isfinite(x_[i])) continue;
-        image.see(i, 1 / k.meet_seen(k.a, k.b, {x_[i], y_[i], 1}), k.owner);
+        image.see(i, 1 / k.meet_relative(k.a, k.b, {x_[i], y_[i], 1}), k.owner);
       }
     };
     visit(levels_.size() - 1, 0, 0, [&](const Extent& x) { return extent.meets(x); }, row);

@@ -23,8 +23,8 @@ class PointGrid {
   void build(std::span<const Point> points, int D, double cell) {
     points_ = points;
     D_ = D;
-    r_most_ = 0;
-    for (const Point& p : points) r_most_ = std::max(r_most_, p.r);
+    max_r_ = 0;
+    for (const Point& p : points) max_r_ = std::max(max_r_, p.r);
     is_grid_ = points.size() >= kScanBelow;
     if (!is_grid_) return;
     Point high{};
@@ -63,7 +63,7 @@ class PointGrid {
   }
 
   // The largest measurement variance of a point in addition to that of the sensor.
-  double r_most() const { return r_most_; }
+  double max_r() const { return max_r_; }
 
   // Calls visit(index, squared distance) once for every point within `radius` of `center`. The
   // order depends on the points alone.
@@ -108,7 +108,7 @@ class PointGrid {
 
   std::span<const Point> points_;
   int D_ = 0;
-  double r_most_ = 0;
+  double max_r_ = 0;
   bool is_grid_ = false;
   Point low_{}, inverse_{};
   std::array<std::int64_t, kMaxAxes> size_{1, 1, 1};

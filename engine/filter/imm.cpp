@@ -145,16 +145,16 @@ double Prediction::log_likelihood(const Point& point, std::array<double, kMaxMod
   return best + std::log(sum);
 }
 
-double Prediction::radius(double gate, double least, double r_most) const {
+double Prediction::radius(double gate, double min_log_likelihood, double max_r) const {
   // A point may lie in the gate of one mode while another mode gives it its likelihood.
   double gated = -1, likely = -1;
   for (int b = 0; b < M; ++b) {
     const double offset = std::sqrt(squared_distance(y[b], center, D));
-    const auto reach = [&](double chi2) { return offset + std::sqrt(chi2 * (S[b] + r_most)); };
+    const auto reach = [&](double x2) { return offset + std::sqrt(x2 * (S[b] + max_r)); };
     gated = std::max(gated, reach(gate));
     // The largest of M summands is at least their sum divided by M.
-    const double worth = 2 * (log_peak[b] + std::log(static_cast<double>(M)) - least);
-    if (worth > 0) likely = std::max(likely, reach(worth));
+    const double chi2 = 2 * (log_peak[b] + std::log(static_cast<double>(M)) - min_log_likelihood);
+    if (chi2 > 0) likely = std::max(likely, reach(chi2));
   }
   return std::min(gated, likely);
 }

@@ -57,10 +57,10 @@ struct Prediction {
   // Writes log(w_m N(y; ŷ_m, S_m)) of every mode to `each` and returns the log of their sum.
   double log_likelihood(const Point& point, std::array<double, kMaxModes>& each) const;
 
-  // Radius of a ball about `center` that contains two kinds of points at once: those whose χ² is at
-  // most `gate` in some mode, and those whose log likelihood can exceed `least`. It is negative if
-  // there are none. Points may have additional measurement variance up to `r_most`.
-  double radius(double gate, double least, double r_most) const;
+  // Radius of a ball about `center` that contains every point whose χ² is at most `gate` in some
+  // mode and whose log likelihood can exceed `min_log_likelihood`; negative if there are none.
+  // Points may have additional measurement variance up to `max_r`.
+  double radius(double gate, double min_log_likelihood, double max_r) const;
 
   bool is_gated(const Point& point, double gate) const {
     for (int b = 0; b < M; ++b)

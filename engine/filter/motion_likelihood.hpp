@@ -124,7 +124,7 @@ class MotionLikelihood {
  private:
   struct Observation {
     std::array<Lanes, kMaxAxes> y{};
-    Lanes r, seen;                          // 1 where there is a detection
+    Lanes r, detected;                          // 1 where there is a detection
     std::array<std::int32_t, kLanes> kind{};
   };
   struct Group {
@@ -147,7 +147,7 @@ class MotionLikelihood {
       Observation& o = group.steps[frames[i] - frames[begin] - 1];
       for (int d = 0; d < kMaxAxes; ++d) o.y[d].at[lane] = points[i][d];
       o.r.at[lane] = points[i].r;
-      o.seen.at[lane] = 1;
+      o.detected.at[lane] = 1;
     }
     for (std::int64_t t = frames[begin] + 1; t <= frames[end - 1]; ++t)
       group.steps[t - frames[begin] - 1].kind[lane] = kind[t];
@@ -281,12 +281,12 @@ class MotionLikelihood {
     Lanes log_density;
     const double constant = -0.5 * D_ * std::log(2 * std::numbers::pi);
     for (int i = 0; i < kLanes; ++i)
-      if (o.seen.at[i] > 0) log_density.at[i] = constant + std::log(sum.at[i]) - nearest.at[i];
+      if (o.detected.at[i] > 0) log_density.at[i] = constant + std::log(sum.at[i]) - nearest.at[i];
     for (int b = 0; b < M; ++b) {
       if constexpr (M > 1)
         for (int i = 0; i < kLanes; ++i)
-          if (o.seen.at[i] > 0) s.w[b].at[i] = std::max(each[b].at[i] / sum.at[i], 1e-300);
-      const Lanes gain = inverse[b] * o.seen;
+          if (o.detected.at[i] > 0) s.w[b].at[i] = std::max(each[b].at[i] / sum.at[i], 1e-300);
+      const Lanes gain = inverse[b] * o.detected;
       const Lanes k0 = s.p00[b] * gain, k1 = s.p01[b] * gain;
       for (int d = 0; d < kMaxAxes; ++d) {
         s.x[b][d] = s.x[b][d] + k0 * innovation[b][d];

@@ -19,7 +19,7 @@ inline double chi2_tail(int D, double x) {
 
 // νᵀ S⁻¹ ν with one mode. For a mixture, the χ² value that has the same tail probability as the
 // mixture has beyond this point.
-inline double surprise(const Prediction& p, const Point& y) {
+inline double nis(const Prediction& p, const Point& y) {
   if (p.M == 1) return squared_distance(y, p.y[0], p.D) / (p.S[0] + y.r);
   double beyond = 0;
   for (int b = 0; b < p.M; ++b)

@@ -39,7 +39,7 @@ struct ScoreModel {
 
   // Log probabilities for a marker that was missed in the last `missed` frames: that it is
   // detected, that it is missed again, and that it is missed in the next n frames.
-  double log_seen(std::int64_t missed) const { return missed > 0 ? log_redetect : log_detect; }
+  double log_hit(std::int64_t missed) const { return missed > 0 ? log_redetect : log_detect; }
   double log_missed(std::int64_t missed) const { return missed > 0 ? log_remiss : log_miss; }
   double log_misses(std::int64_t missed, std::int64_t n) const {
     return n > 0 ? log_missed(missed) + static_cast<double>(n - 1) * log_remiss : 0.0;
@@ -79,7 +79,7 @@ inline double score_track(const MotionModel& m, const ScoreModel& sm, const Time
     const double dt = line.times[frames[i]] - line.times[frames[i - 1]];
     if (gap > sm.max_gap || !is_reachable(sm, points[i - 1], points[i], dt, m.axis.D)) return impossible;
     for (std::int64_t t = frames[i - 1] + 1; t <= frames[i]; ++t) predict(m, line.step(t), state);
-    s += sm.log_misses(0, gap - 1) + sm.log_seen(gap - 1) + gap * sm.log_survive +
+    s += sm.log_misses(0, gap - 1) + sm.log_hit(gap - 1) + gap * sm.log_survive +
          update(m, Prediction(m, state), points[i], state);
   }
   const auto left = static_cast<std::int64_t>(line.times.size()) - 1 - frames[n - 1];

@@ -76,7 +76,7 @@ class FrameTracker {
     const double over = live_.leftover_gain();
     // A confirmed track takes a detection only if that is more likely than missing it and leaving
     // the detection unassigned.
-    const auto least_of = [&](std::size_t i, double gain) {
+    const auto min_log_likelihood_of = [&](std::size_t i, double gain) {
       const std::int32_t gap = live_[i].gap;
       return live_[i].is_confirmed() ? live_.miss_gain(gap) + over - live_.hit_gain(gap) + gain
                                      : -std::numeric_limits<double>::infinity();
@@ -85,7 +85,8 @@ class FrameTracker {
       const std::int32_t gap = live_[i].gap;
       return odds(i, live_.hit_gain(gap) + log_likelihood) - odds(i, live_.miss_gain(gap)) - over;
     };
-    carried_.list(live_, time, step, points, 0.0, least_of, gain_of, s_.candidates, stats);
+    carried_.list(live_, time, step, points, 0.0, min_log_likelihood_of, gain_of, s_.candidates,
+                  stats);
   }
 
   void pair_all(std::span<const Point> points) {
@@ -169,7 +170,7 @@ class FrameTracker {
   PairingOptions opt_;
   CarriedTracks carried_;
   FrameStats total_;
-  Fresh<Memory> s_;
+  Scratch<Memory> s_;
 };
 
 }  // namespace asterism

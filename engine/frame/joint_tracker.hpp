@@ -73,7 +73,7 @@ class JointTracker {
     s_.match_probability.assign(live_.size(), 0);
     s_.missed.assign(live_.size(), 1);
     s_.free.assign(points.size(), 1);
-    share_among_believed(points, stats);
+    share_among_confirmed(points, stats);
     share_among_tentative(points, stats);
     for (std::size_t j = 0; j < points.size(); ++j)
       label(live_.so_far.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * (1 - newborn(1)));
@@ -108,11 +108,11 @@ class JointTracker {
 
   // log weight relative to a miss below which a pairing is ignored
   static constexpr double kNegligible = -20.7;
-  static constexpr double kMostOdds = 700;
+  static constexpr double kMaxOdds = 700;
 
   static double probability(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
 
-  double not_seen(std::size_t i, double score) const {  // 1 - r P_d
+  double p_undetected(std::size_t i, double score) const {  // 1 - r P_d
     return probability(-score) + probability(score) * p_miss(i);
   }
   // Miss probability in this frame of a track that exists.
@@ -140,8 +140,9 @@ class JointTracker {
     for (LiveTrack<NoMore>& track : live_.tracks) {
       const double log_r = -softplus(-track.score), log_none = -softplus(track.score);
       const double log_died = log_die + log_r;
-      const double most = std::max(log_none, log_died);
-      const double log_gone = most + std::log(std::exp(log_none - most) + std::exp(log_died - most));
+      const double max_log = std::max(log_none, log_died);
+      const double log_gone =
+          max_log + std::log(std::exp(log_none - max_log) + std::exp(log_died - max_log));
       track.score = live_.sm.log_survive + log_r - log_gone;
     }
   }
@@ -151,13 +152,14 @@ class JointTracker {
     const double common = -live_.sm.log_clutter - live_.leftover_gain();
     const auto offset = [&](std::size_t i) {
       return common + std::log(p_detect(i)) - softplus(-existence(i)) -
-             std::log(not_seen(i, existence(i)));
+             std::log(p_undetected(i, existence(i)));
     };
-    const auto least_of = [&](std::size_t i, double gain) { return gain - offset(i); };
+    const auto min_log_likelihood_of = [&](std::size_t i, double gain) { return gain - offset(i); };
     const auto gain_of = [&](std::size_t i, double log_likelihood) {
       return offset(i) + log_likelihood;
     };
-    carried_.list(live_, time, step, points, kNegligible, least_of, gain_of, s_.candidates, stats);
+    carried_.list(live_, time, step, points, kNegligible, min_log_likelihood_of, gain_of,
+                  s_.candidates, stats);
   }
 
   // Lists the candidates of the confirmed tracks, or those of the tentative ones with the remaining
@@ -174,7 +176,7 @@ class JointTracker {
     }
   }
 
-  void share_among_believed(std::span<const Point> points, JointStats& stats) {
+  void share_among_confirmed(std::span<const Point> points, JointStats& stats) {
     find_eligible(true);
     s_.log_miss.assign(live_.size(), 0);
     s_.all_missed.resize(live_.size());
@@ -209,17 +211,17 @@ class JointTracker {
       const auto is_open = [&](const Candidate& c) {
         return !s_.pairs.is_taken[c.column] || match == c.column;
       };
-      double most = 0, total = 0;
+      double max_log = 0, total = 0;
       for (last = first; last < s_.eligible.size() && s_.eligible[last].row == i; ++last)
-        if (is_open(s_.eligible[last])) most = std::max(most, s_.eligible[last].gain);
-      total = std::exp(-most);
+        if (is_open(s_.eligible[last])) max_log = std::max(max_log, s_.eligible[last].gain);
+      total = std::exp(-max_log);
       for (std::size_t e = first; e < last; ++e)
-        if (is_open(s_.eligible[e])) total += std::exp(s_.eligible[e].gain - most);
-      s_.missed[i] = std::exp(-most) / total;
+        if (is_open(s_.eligible[e])) total += std::exp(s_.eligible[e].gain - max_log);
+      s_.missed[i] = std::exp(-max_log) / total;
       for (std::size_t e = first; e < last; ++e) {
         const Candidate& c = s_.eligible[e];
         if (!is_open(c)) continue;
-        const double p = std::exp(c.gain - most) / total;
+        const double p = std::exp(c.gain - max_log) / total;
         s_.free[c.column] = std::max(s_.free[c.column] - p, 0.0);
         if (match == c.column) s_.match_probability[i] = p;
       }
@@ -254,8 +256,9 @@ class JointTracker {
       if (carried_.is_carried(i) && match < 0) continue;
       if (match >= 0) carried_.take(live_, i, points[match], stats);
       // Given that the track exists, a miss is less probable than without that condition.
-      const double seldom = probability(existence(i)) * p_miss(i) / not_seen(i, existence(i));
-      const double missed = std::max(1 - taken, 0.0) * seldom;
+      const double given_missed =
+          probability(existence(i)) * p_miss(i) / p_undetected(i, existence(i));
+      const double missed = std::max(1 - taken, 0.0) * given_missed;
       for (WeightedPoint& point : s_.mixture) point.weight /= taken + missed;
       update_by_all(live_.m, live_.prediction(i), s_.mixture, missed / (taken + missed),
                     live_[i].state);
@@ -301,12 +304,12 @@ class JointTracker {
   // other odds.
   void update_existence(std::size_t i) {
     const double taken_as = existence(i), missed = std::max(s_.missed[i], 1e-300);
-    const double hidden = missed * probability(taken_as) * p_miss(i);
-    const double exists = (1 - missed) * not_seen(i, taken_as) + hidden;
+    const double exists_missed = missed * probability(taken_as) * p_miss(i);
+    const double exists = (1 - missed) * p_undetected(i, taken_as) + exists_missed;
     const double factor = std::log(exists) - std::log(missed) + softplus(taken_as) - taken_as;
     double& score = live_[i].score;
-    score = std::clamp(score + factor, -kMostOdds, kMostOdds);
-    live_[i].p_missed = hidden / exists;
+    score = std::clamp(score + factor, -kMaxOdds, kMaxOdds);
+    live_[i].p_missed = exists_missed / exists;
   }
 
   void begin_tracks(double time, std::span<const Point> points) {
@@ -321,7 +324,7 @@ class JointTracker {
   JointOptions opt_;
   CarriedTracks carried_;
   JointStats total_;
-  Fresh<Memory> s_;
+  Scratch<Memory> s_;
 };
 
 }  // namespace asterism

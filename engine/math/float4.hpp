@@ -10,8 +10,8 @@ namespace asterism {
 
 using Float4 = float __attribute__((vector_size(16)));
 
-inline Float4 least(Float4 a, Float4 b) { return a < b ? a : b; }
-inline Float4 greatest(Float4 a, Float4 b) { return a > b ? a : b; }
+inline Float4 minimum(Float4 a, Float4 b) { return a < b ? a : b; }
+inline Float4 maximum(Float4 a, Float4 b) { return a > b ? a : b; }
 
 #else
 
@@ -29,8 +29,12 @@ inline Float4 of(float x) { return {{x, x, x, x}}; }
 inline Float4 operator-(Float4 a, float b) { return each(a, of(b), [](float p, float q) { return p - q; }); }
 inline Float4 operator*(Float4 a, float b) { return each(a, of(b), [](float p, float q) { return p * q; }); }
 inline Float4 operator+(Float4 a, float b) { return each(a, of(b), [](float p, float q) { return p + q; }); }
-inline Float4 least(Float4 a, Float4 b) { return each(a, b, [](float p, float q) { return p < q ? p : q; }); }
-inline Float4 greatest(Float4 a, Float4 b) { return each(a, b, [](float p, float q) { return p > q ? p : q; }); }
+inline Float4 minimum(Float4 a, Float4 b) {
+  return each(a, b, [](float p, float q) { return p < q ? p : q; });
+}
+inline Float4 maximum(Float4 a, Float4 b) {
+  return each(a, b, [](float p, float q) { return p > q ? p : q; });
+}
 
 #endif
 

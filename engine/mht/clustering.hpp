@@ -114,7 +114,7 @@ class Clustering {
         surplus[k] = {};
         if (h.branches[k] < 0) continue;
         const std::size_t i = ways_.index_of(cluster.keys[k]);
-        total += ways_[i].worth[ways_[i].first[h.branches[k] + 1] - 1];
+        total += ways_[i].log_ratio[ways_[i].first[h.branches[k] + 1] - 1];
         ways_.each_hit(i, h.branches[k], [&](std::int32_t w, double gain) {
           const std::int32_t j = ways_[i].branches[w].taken(frame.number);
           const double left = gain - price_[j];

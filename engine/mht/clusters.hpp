@@ -20,12 +20,12 @@ struct MatrixOptions {
 };
 
 struct Hypothesis {
-  double worth = 0;   // of its branches
+  double log_ratio = 0;   // of its branches
   double merged = 0;  // log factor of the probability gained from merged hypotheses
   // of each tree of the cluster; -1: its detections belong to others
   std::vector<std::int32_t> branches;
 
-  double log_weight() const { return worth + merged; }
+  double log_weight() const { return log_ratio + merged; }
 };
 
 struct Cluster {
@@ -103,7 +103,7 @@ inline Cluster combined(const Cluster& a, const Cluster& b, const MatrixOptions&
     offer(g, h + 1);
     if (h == 0) offer(g + 1, 0);
     const Hypothesis &one = a.hypotheses[g], &other = b.hypotheses[h];
-    Hypothesis both{one.worth + other.worth, one.merged + other.merged, {}};
+    Hypothesis both{one.log_ratio + other.log_ratio, one.merged + other.merged, {}};
     for (const auto& [key, place] : order)
       both.branches.push_back(static_cast<std::size_t>(place) < a.keys.size()
                                   ? one.branches[place]

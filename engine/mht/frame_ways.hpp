@@ -14,7 +14,7 @@ namespace asterism {
 struct Ways {
   std::vector<Branch> branches;
   std::vector<std::int32_t> first;
-  std::vector<double> worth;  // of each continuation; 0 for a single detection
+  std::vector<double> log_ratio;  // of each continuation; 0 for a single detection
 
   std::int32_t miss(std::int32_t branch) const { return first[branch + 1] - 1; }
 };
@@ -50,7 +50,7 @@ class FrameWays {
         ways.first.push_back(static_cast<std::int32_t>(ways.branches.size()));
       }
       for (const Branch& b : ways.branches)
-        ways.worth.push_back(open.is_lone(i, b) ? 0 : grower.worth(b));
+        ways.log_ratio.push_back(open.is_lone(i, b) ? 0 : grower.log_ratio(b));
     }
     open.sow();
     for (std::size_t i = ways_.size(); i < open.n_all(); ++i)
@@ -65,7 +65,7 @@ class FrameWays {
     const Ways& ways = ways_[tree];
     const std::int32_t miss = ways.miss(branch);
     for (std::int32_t w = ways.first[branch]; w < miss; ++w)
-      visit(w, ways.worth[w] - ways.worth[miss]);
+      visit(w, ways.log_ratio[w] - ways.log_ratio[miss]);
   }
 
  private:

@@ -48,8 +48,8 @@ class HypothesisGeneration {
     std::priority_queue<Turn, std::vector<Turn>, decltype(later)> turns(later);
     for (std::size_t h = 0; h < parents.size(); ++h) {
       parents[h].hypothesis = &before.hypotheses[h];
-      const double most = prepare(frame, super, before, parents[h]);
-      turns.emplace(most, static_cast<std::int32_t>(h));
+      const double max_gain = prepare(frame, super, before, parents[h]);
+      turns.emplace(max_gain, static_cast<std::int32_t>(h));
     }
     while (!turns.empty()) {
       const auto [log_weight, h] = turns.top();
@@ -80,7 +80,7 @@ class HypothesisGeneration {
     double missed = 0;               // its weight if all detections were missed
     std::optional<KBest> best;
 
-    double log_weight() const { return hypothesis->merged + missed - best->least_cost(); }
+    double log_weight() const { return hypothesis->merged + missed - best->current_cost(); }
   };
 
   // Fills the cost matrix. Returns an upper bound of the weight of the best successor.
@@ -90,23 +90,23 @@ class HypothesisGeneration {
     const std::size_t N = n_old + n_points;
     parent.cost.assign(n_points * N, KBest::kForbidden);
     parent.ways.assign(n_old * n_points, -1);
-    std::vector<double> most(n_points, 0);
+    std::vector<double> max_gain(n_points, 0);
     for (std::size_t j = 0; j < n_points; ++j) parent.cost[j * N + n_old + j] = 0;
     for (std::size_t k = 0; k < n_old; ++k) {
       const std::int32_t branch = parent.hypothesis->branches[k];
       if (branch < 0) continue;
       const std::size_t i = ways_.index_of(before.keys[k]);
-      parent.missed += ways_[i].worth[ways_[i].miss(branch)];
+      parent.missed += ways_[i].log_ratio[ways_[i].miss(branch)];
       ways_.each_hit(i, branch, [&](std::int32_t w, double gain) {
         const std::int32_t j = super.place(ways_[i].branches[w].taken(frame.number));
         if (j < 0) return;
         parent.cost[j * N + k] = -gain;
         parent.ways[k * n_points + j] = w;
-        most[j] = std::max(most[j], gain);
+        max_gain[j] = std::max(max_gain[j], gain);
       });
     }
     double sum = parent.hypothesis->merged + parent.missed;
-    for (const double gain : most) sum += gain;
+    for (const double gain : max_gain) sum += gain;
     return sum;
   }
 
@@ -128,7 +128,7 @@ class HypothesisGeneration {
     }
     for (std::size_t k = 0; k < n_old; ++k)
       if (child.branches[k] >= 0)
-        child.worth += ways_[ways_.index_of(before.keys[k])].worth[child.branches[k]];
+        child.log_ratio += ways_[ways_.index_of(before.keys[k])].log_ratio[child.branches[k]];
     return child;
   }
 

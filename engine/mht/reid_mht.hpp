@@ -54,7 +54,7 @@ class HypothesisMatrix {
     for (std::size_t i = 0; i < open_.n_all(); ++i)
       open_.tree(i).more.branches = std::move(s_.ways[i].branches);
     keep_used_branches();
-    open_.count_most(stats);
+    open_.count_branches(stats);
     if (open_.is_full()) {
       weigh(1);
       prune_by_oldest();
@@ -259,16 +259,16 @@ class HypothesisMatrix {
       double with = 0, without = 0;  // weights with and without merged hypotheses
     } all;
     std::map<std::vector<std::int32_t>, Sums> seen;
-    const double most = cluster.hypotheses.front().log_weight();
+    const double max_weight = cluster.hypotheses.front().log_weight();
     for (const Hypothesis& h : cluster.hypotheses) {
       std::vector<std::int32_t> branches;
       for (const std::size_t k : places) branches.push_back(h.branches[k]);
       const auto [at, is_new] = seen.try_emplace(branches, Sums{part.hypotheses.size(), 0, 0});
       for (Sums* sums : {&at->second, &all}) {
-        sums->with += std::exp(h.log_weight() - most);
-        sums->without += std::exp(h.worth - most);
+        sums->with += std::exp(h.log_weight() - max_weight);
+        sums->without += std::exp(h.log_ratio - max_weight);
       }
-      if (is_new) part.hypotheses.push_back({worth_of(part, branches, grower), 0, branches});
+      if (is_new) part.hypotheses.push_back({log_ratio_of(part, branches, grower), 0, branches});
     }
     // Each part keeps its own share of the probability gained by merging.
     for (const auto& [branches, sums] : seen)
@@ -280,14 +280,14 @@ class HypothesisMatrix {
     return part;
   }
 
-  double worth_of(const Cluster& cluster, const std::vector<std::int32_t>& branches,
+  double log_ratio_of(const Cluster& cluster, const std::vector<std::int32_t>& branches,
                   const BranchGrower& grower) const {
     double sum = 0;
     for (std::size_t k = 0; k < branches.size(); ++k) {
       if (branches[k] < 0) continue;
       const std::size_t i = s_.ways.index_of(cluster.keys[k]);
       const Branch& b = open_.tree(i).more.branches[branches[k]];
-      if (!open_.is_lone(i, b)) sum += grower.worth(b);
+      if (!open_.is_lone(i, b)) sum += grower.log_ratio(b);
     }
     return sum;
   }
@@ -295,7 +295,7 @@ class HypothesisMatrix {
   HypothesisWindow open_;
   MatrixOptions opt_;
   std::vector<Cluster> clusters_;
-  Fresh<Memory> s_;
+  Scratch<Memory> s_;
 };
 
 }  // namespace asterism

@@ -134,17 +134,17 @@ class CandidateChoice {
       members.push_back(std::move(own));
     }
     ++summary.n_packed;
-    double worth = 0;
+    double score = 0;
     const PackingSummary found = SetPacking(trees).solve(
         1, std::numeric_limits<double>::infinity(), max_nodes,
         [&](std::span<const std::int32_t> options, double total) {
-          worth = total;
+          score = total;
           for (std::size_t i = 0; i < options.size(); ++i)
             if (const std::int32_t c = members[i][options[i]]; c >= 0) chosen.push_back(c);
         });
     if (!found.is_exact) {
       ++summary.n_inexact;
-      summary.gap += std::max(found.bound - worth, 0.0);
+      summary.gap += std::max(found.bound - score, 0.0);
     }
   }
 

@@ -116,7 +116,7 @@ class ImagePoints {
 
   Vec3 ray(std::size_t i) const { return {dx[i], dy[i], dz[i]}; }
 
-  ProjectedPlace sight(Vec3 X) const {
+  ProjectedPlace project(Vec3 X) const {
     const Vec3 c = camera->to_camera(X);
     const Plane n{c.x / c.z, c.y / c.z};
     const double s = 1 / c.z;

@@ -88,9 +88,9 @@ class PointCandidates {
           // other.
           constexpr double kReach = 5;
           const double coarse = options_.gate * (B.widest + kReach * A.points[i].spread);
-          const double most = coarse * coarse * m2;
+          const double max_squared = coarse * coarse * m2;
           for (std::size_t j = 0; j < height.size(); ++j)
-            if (height[j] * height[j] <= most) try_seed(a, i, b, j, base, height[j], m2);
+            if (height[j] * height[j] <= max_squared) try_seed(a, i, b, j, base, height[j], m2);
         }
       }
     std::sort(seeds_.begin(), seeds_.end(), [this](const Seed& s, const Seed& t) {
@@ -134,15 +134,15 @@ class PointCandidates {
   }
 
   void grow(PointCandidate& c) {
-    asked_ = all_;
-    extend(c, asked_, false);
-    extend(c, asked_, true);
+    open_cameras_ = all_;
+    extend(c, open_cameras_, false);
+    extend(c, open_cameras_, true);
     prune(c);
     if (c.views.size() >= 3 && c.views.size() < all_.size()) {
       // The position is more accurate now, which may bring further views into the gate.
       const std::size_t n = c.views.size();
-      asked_ = all_;
-      extend(c, asked_, true);
+      open_cameras_ = all_;
+      extend(c, open_cameras_, true);
       if (c.views.size() > n) prune(c);
     }
     keep(c);
@@ -153,14 +153,14 @@ class PointCandidates {
     PointCandidate c;
     c.X = X;
     for (std::size_t k = 0; k < cameras_.size(); ++k) {
-      const ProjectedPlace s = cameras_[k].sight(X);
+      const ProjectedPlace s = cameras_[k].project(X);
       if (!(s.depth > 0)) continue;
       const std::vector<ImagePoint>& points = cameras_[k].points;
       std::int32_t best = -1;
-      double least = kFar * kFar;
+      double min_squared = kFar * kFar;
       for (std::size_t i = 0; i < points.size(); ++i) {
         const double r2 = points[i].squared({points[i].n.x - s.n.x, points[i].n.y - s.n.y});
-        if (r2 < least) least = r2, best = static_cast<std::int32_t>(i);
+        if (r2 < min_squared) min_squared = r2, best = static_cast<std::int32_t>(i);
       }
       if (best >= 0) c.views.push_back({static_cast<std::int32_t>(k), best});
     }
@@ -170,17 +170,17 @@ class PointCandidates {
     grow(c);
   }
 
-  // Adds a view for each camera in `asked` that has none and has an image point in the gate.
-  // Cameras with several such points stay in `asked`, unless `takes_nearest` is set.
-  void extend(PointCandidate& c, std::vector<std::int32_t>& asked, bool takes_nearest) const {
+  // Adds a view for each camera in `open` that has none and has an image point in the gate.
+  // Cameras with several such points stay in `open`, unless `takes_nearest` is set.
+  void extend(PointCandidate& c, std::vector<std::int32_t>& open, bool takes_nearest) const {
     Symmetric3 P = c.information.inverse();
     std::size_t n_left = 0;
-    for (const std::int32_t k : asked) {
+    for (const std::int32_t k : open) {
       const auto at = std::lower_bound(c.views.begin(), c.views.end(), k,
                                        [](View v, std::int32_t camera) { return v.camera < camera; });
       if (at != c.views.end() && at->camera == k) continue;
       const ImagePoints& camera = cameras_[k];
-      const ProjectedPlace s = camera.sight(c.X);
+      const ProjectedPlace s = camera.project(c.X);
       if (!(s.depth > 0)) continue;
       const Vec3 px = P * s.jx, py = P * s.jy;
       const double sxx = dot(s.jx, px), sxy = dot(s.jx, py), syy = dot(s.jy, py);
@@ -188,7 +188,7 @@ class PointCandidates {
       const double reach = options_.gate * std::sqrt(sxx + width2), height2 = gate2_ * (syy + width2);
       const auto from = camera.right_of(s.n.x - reach);
       std::int32_t best = -1, n_inside = 0;
-      double least = gate2_;
+      double min_squared = gate2_;
       for (auto p = from; p != camera.points.end() && p->n.x <= s.n.x + reach; ++p) {
         const double ex = p->n.x - s.n.x, ey = p->n.y - s.n.y;
         if (ey * ey > height2) continue;
@@ -197,18 +197,19 @@ class PointCandidates {
             (cyy * ex * ex - 2 * cxy * ex * ey + cxx * ey * ey) / (cxx * cyy - cxy * cxy);
         if (r2 > gate2_) continue;
         ++n_inside;
-        if (r2 <= least) least = r2, best = static_cast<std::int32_t>(p - camera.points.begin());
+        if (r2 > min_squared) continue;
+        min_squared = r2, best = static_cast<std::int32_t>(p - camera.points.begin());
       }
       if (best < 0) continue;
       if (n_inside > 1 && !takes_nearest) {
-        asked[n_left++] = k;
+        open[n_left++] = k;
         continue;
       }
       c.views.insert(at, {k, best});
       PointFit::step(c, camera.points[best], s);
       P = c.information.inverse();
     }
-    asked.resize(n_left);
+    open.resize(n_left);
   }
 
   // Removes the worst view while it is outside the gate.
@@ -218,10 +219,11 @@ class PointCandidates {
         c.views.clear();
         return;
       }
-      double most = gate2_;
+      double max_squared = gate2_;
       std::size_t worst = c.views.size();
       for (std::size_t i = 0; i < c.views.size(); ++i)
-        if (const double r2 = fit_.squared_of(c, c.views[i]); r2 > most) most = r2, worst = i;
+        if (const double r2 = fit_.squared_of(c, c.views[i]); r2 > max_squared)
+          max_squared = r2, worst = i;
       if (worst == c.views.size()) return;
       c.views.erase(c.views.begin() + static_cast<std::ptrdiff_t>(worst));
     }
@@ -299,7 +301,7 @@ class PointCandidates {
   std::span<const ExpectedPlace> expected_;
   PointFit fit_;
   double gate2_;
-  std::vector<std::int32_t> all_, asked_;  // cameras
+  std::vector<std::int32_t> all_, open_cameras_;  // cameras
   std::vector<Seed> seeds_;
   std::vector<PointCandidate> found_;
   std::unordered_multimap<std::uint64_t, std::int32_t> by_hash_;

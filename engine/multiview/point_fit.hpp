@@ -54,7 +54,7 @@ class PointFit {
       for (const View v : c.views) {
         const ImagePoints& camera = cameras_[v.camera];
         const ImagePoint& p = camera.points[v.point];
-        const ProjectedPlace s = camera.sight(c.X);
+        const ProjectedPlace s = camera.project(c.X);
         if (!(s.depth > 0)) return false;
         add(p, s, A, g);
         c.squared += p.squared({p.n.x - s.n.x, p.n.y - s.n.y});
@@ -77,7 +77,7 @@ class PointFit {
   bool inform(PointCandidate& c) const {
     Vec3 g{0, 0, 0};
     for (const View v : c.views) {
-      const ProjectedPlace s = cameras_[v.camera].sight(c.X);
+      const ProjectedPlace s = cameras_[v.camera].project(c.X);
       if (!(s.depth > 0)) return false;
       add(cameras_[v.camera].points[v.point], s, c.information, g);
     }
@@ -94,7 +94,7 @@ class PointFit {
 
   double squared_of(const PointCandidate& c, View v) const {
     const ImagePoints& camera = cameras_[v.camera];
-    const ProjectedPlace s = camera.sight(c.X);
+    const ProjectedPlace s = camera.project(c.X);
     const ImagePoint& p = camera.points[v.point];
     return p.squared({p.n.x - s.n.x, p.n.y - s.n.y});
   }

@@ -22,8 +22,8 @@ nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_m
   require(log_weights.ndim() == 2 && log_miss.ndim() == 1 &&
               log_weights.shape(0) == log_miss.shape(0),
           "log_weights: shape (n, m), log_miss: shape (n,)");
-  constexpr std::size_t most = std::size_t{1} << 30;
-  require(log_weights.shape(0) < most && log_weights.shape(1) < most, "sizes below 2^30");
+  constexpr std::size_t max_size = std::size_t{1} << 30;
+  require(log_weights.shape(0) < max_size && log_weights.shape(1) < max_size, "sizes below 2^30");
   require(max_states >= 1 && max_states <= std::int64_t{1} << 30, "max_states: 1 to 2^30");
   const std::size_t n = log_weights.shape(0), m = log_weights.shape(1);
   std::vector<double> marginals(n * (m + 1));
@@ -109,11 +109,11 @@ Out<std::int32_t> k_best(const In<double>& cost, std::int64_t k) {
 // Options are listed by tree; option o uses uses[first_use[o]:first_use[o + 1]]. Each tree needs
 // one without uses.
 std::vector<std::vector<PackingOption>> packing_trees(const In<std::int64_t>& first_option,
-                                                      const In<double>& worths,
+                                                      const In<double>& weights,
                                                       const In<std::int64_t>& first_use,
                                                       const In<std::int32_t>& uses) {
-  require_offsets(flat(first_option), worths.size(), "first_option: rising, within the options");
-  require(first_use.size() == worths.size() + 1, "one list of uses an option");
+  require_offsets(flat(first_option), weights.size(), "first_option: rising, within the options");
+  require(first_use.size() == weights.size() + 1, "one list of uses an option");
   require_offsets(flat(first_use), uses.size(), "first_use: rising, within the uses");
   std::vector<std::vector<PackingOption>> trees(first_option.size() - 1);
   for (std::size_t i = 0; i < trees.size(); ++i) {
@@ -121,7 +121,7 @@ std::vector<std::vector<PackingOption>> packing_trees(const In<std::int64_t>& fi
     for (std::int64_t o = first_option.data()[i]; o < first_option.data()[i + 1]; ++o) {
       const std::int64_t a = first_use.data()[o], b = first_use.data()[o + 1];
       for (std::int64_t u = a; u < b; ++u) require(uses.data()[u] >= 0, "resources from 0");
-      trees[i].push_back({worths.data()[o], {uses.data() + a, uses.data() + b}});
+      trees[i].push_back({weights.data()[o], {uses.data() + a, uses.data() + b}});
       has_free = has_free || a == b;
     }
     require(has_free, "an option that uses nothing in every tree");
@@ -130,9 +130,9 @@ std::vector<std::vector<PackingOption>> packing_trees(const In<std::int64_t>& fi
 }
 
 // Returns (upper bound of the weight of a packing; the loss by each option, in the order given).
-nb::tuple packing_losses(const In<std::int64_t>& first_option, const In<double>& worths,
+nb::tuple packing_losses(const In<std::int64_t>& first_option, const In<double>& weights,
                            const In<std::int64_t>& first_use, const In<std::int32_t>& uses) {
-  const auto trees = packing_trees(first_option, worths, first_use, uses);
+  const auto trees = packing_trees(first_option, weights, first_use, uses);
   const SetPacking::Losses losses = SetPacking(trees).losses();
   std::vector<double> all;
   for (const std::vector<double>& tree : losses.of) all.insert(all.end(), tree.begin(), tree.end());
@@ -140,19 +140,19 @@ nb::tuple packing_losses(const In<std::int64_t>& first_option, const In<double>&
 }
 
 // The k best selections of one option per tree such that no resource is used twice.
-nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& worths,
+nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& weights,
                const In<std::int64_t>& first_use, const In<std::int32_t>& uses, std::int64_t k,
                double drop, std::int64_t max_nodes) {
-  const auto trees = packing_trees(first_option, worths, first_use, uses);
+  const auto trees = packing_trees(first_option, weights, first_use, uses);
   std::vector<std::int32_t> all;
   std::vector<double> totals;
   PackingSummary summary;
   {
     nb::gil_scoped_release release;
     summary = SetPacking(trees).solve(
-        k, drop, max_nodes, [&](std::span<const std::int32_t> options, double worth) {
+        k, drop, max_nodes, [&](std::span<const std::int32_t> options, double log_weight) {
           all.insert(all.end(), options.begin(), options.end());
-          totals.push_back(worth);
+          totals.push_back(log_weight);
         });
   }
   return nb::make_tuple(array_of<std::int32_t>(all, {totals.size(), trees.size()}),

@@ -23,18 +23,18 @@ nb::tuple run_stitcher(Stitcher& stitcher, const MotionModel& m, const In<double
                        const In<std::int64_t>& labels) {
   const FrameRun frames(m, times, kind, F, Q, offsets, points);
   require(labels.size() == frames.points.size(), "labels: one for each point");
-  std::vector<std::int32_t> fragment_of(labels.size(), -1);
+  std::vector<std::int32_t> tracklet_of(labels.size(), -1);
   std::vector<Decision> decisions;  // by tracklet
   const auto decide = [&](const Decision& d) {
-    if (static_cast<std::size_t>(d.fragment) >= decisions.size()) decisions.resize(d.fragment + 1);
-    decisions[d.fragment] = d;
+    if (static_cast<std::size_t>(d.tracklet) >= decisions.size()) decisions.resize(d.tracklet + 1);
+    decisions[d.tracklet] = d;
   };
   frames.each([&](std::size_t t, std::size_t from, std::span<const Point> frame) {
     stitcher.step(frames.line.step(t), frame, flat(labels).subspan(from, frame.size()),
-                  std::span(fragment_of).subspan(from, frame.size()), decide);
+                  std::span(tracklet_of).subspan(from, frame.size()), decide);
   });
   stitcher.finish(decide);
-  return nb::make_tuple(array_of<std::int32_t>(fragment_of),
+  return nb::make_tuple(array_of<std::int32_t>(tracklet_of),
                         array_of<std::int32_t>(decisions, &Decision::marker),
                         array_of<std::int32_t>(decisions, &Decision::after),
                         array_of<double>(decisions, &Decision::probability));
@@ -52,7 +52,7 @@ nb::tuple step_stitcher(const LiveStitcher& before, const In<double>& F, const I
               revised.size() == revised_labels.size(),
           "revised_labels: one for each of revised");
   using Change = std::pair<std::int64_t, std::int64_t>;
-  std::vector<Change> changes(revised.size()), told;
+  std::vector<Change> changes(revised.size()), reported;
   for (std::size_t i = 0; i < changes.size(); ++i) {
     changes[i] = {revised.data()[i], revised_labels.data()[i]};
     require(changes[i].first >= 0 && changes[i].first < before.n_seen(),
@@ -65,14 +65,14 @@ nb::tuple step_stitcher(const LiveStitcher& before, const In<double>& F, const I
     const std::int64_t first = before.n_seen();
     after.step(step, frame, flat(labels), changes, [&](std::int64_t detection, std::int64_t marker) {
       if (detection < first)
-        told.emplace_back(detection, marker);
+        reported.emplace_back(detection, marker);
       else
         own[detection - first] = marker;
     });
   }
   return nb::make_tuple(std::move(after), array_of<std::int64_t>(own),
-                        array_of<std::int64_t>(told, &Change::first),
-                        array_of<std::int64_t>(told, &Change::second));
+                        array_of<std::int64_t>(reported, &Change::first),
+                        array_of<std::int64_t>(reported, &Change::second));
 }
 
 std::vector<RigidPair> to_pairs(const In<double>& a, const In<double>& b,
@@ -114,21 +114,21 @@ Out<double> densities_elsewhere(const In<double>& before, const In<double>& poin
   require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
           "points: shape (n, D)");
   const auto D = static_cast<int>(points.shape(1));
-  Elsewhere elsewhere(D, noise, ghost_radius);
-  for (const Point& y : to_points(before, D)) elsewhere.add(y);
+  BackgroundDensity background(D, noise, ghost_radius);
+  for (const Point& y : to_points(before, D)) background.add(y);
   Frame frame;
   for (const Point& y : to_points(points, D))
     frame.seen.push_back({static_cast<std::int32_t>(frame.seen.size()), y});
   return array_of<double>(frame.seen, [&](const Frame::One& one) {
-    return elsewhere.log_density(one.at, frame, one.fragment);
+    return background.log_density(one.at, frame, one.tracklet);
   });
 }
 
 // The markers of a frame, by increasing number.
-std::vector<Seen> to_seen(const In<std::int64_t>& markers, const In<double>& points, int D) {
+std::vector<MarkerPoint> to_seen(const In<std::int64_t>& markers, const In<double>& points, int D) {
   const std::vector<Point> at = to_points(points, D);
   require(markers.size() == at.size(), "markers: one for each point");
-  std::vector<Seen> seen;
+  std::vector<MarkerPoint> seen;
   for (std::size_t k = 0; k < at.size(); ++k) {
     const std::int64_t marker = markers.data()[k];
     require(marker >= 0 && marker < std::int64_t{1} << 30, "markers: 0 to 2^30");
@@ -140,11 +140,12 @@ std::vector<Seen> to_seen(const In<std::int64_t>& markers, const In<double>& poi
 
 // Returns (position, its variance, number of neighbours used) or None.
 std::optional<std::tuple<Out<double>, double, std::int32_t>> carry(
-    BodyCarrier& self, std::int32_t marker, const In<std::int64_t>& markers,
+    RigidCarrier& self, std::int32_t marker, const In<std::int64_t>& markers,
     const In<double>& points) {
   require(marker >= 0, "marker: 0 to 2^30");
   Places places;
-  for (const Seen& one : to_seen(markers, points, self.n_axes())) places.set(one.marker, one.at);
+  for (const MarkerPoint& one : to_seen(markers, points, self.n_axes()))
+    places.set(one.marker, one.at);
   Carriage found;
   if (!self.carry(marker, places, found)) return std::nullopt;
   const std::span place(found.place.at.begin(), self.n_axes());
@@ -194,31 +195,31 @@ void bind_stitcher(nb::module_& module) {
           },
           "markers"_a, "points"_a)
       .def("of", &bonds_of, "marker"_a);
-  nb::class_<BodyCarrier>(module, "BodyCarrier")
+  nb::class_<RigidCarrier>(module, "BodyCarrier")
       .def(
           "__init__",
-          [](BodyCarrier* self, int n_axes, double noise_sigma) {
+          [](RigidCarrier* self, int n_axes, double noise_sigma) {
             require(n_axes == 2 || n_axes == 3, "n_axes: 2 or 3");
             require(noise_sigma > 0, "noise_sigma: above 0");
-            new (self) BodyCarrier(n_axes, noise_sigma * noise_sigma);
+            new (self) RigidCarrier(n_axes, noise_sigma * noise_sigma);
           },
           nb::kw_only(), "n_axes"_a, "noise_sigma"_a)
       .def(
           "see",
-          [](BodyCarrier& self, const In<std::int64_t>& markers, const In<double>& points) {
+          [](RigidCarrier& self, const In<std::int64_t>& markers, const In<double>& points) {
             self.see(to_seen(markers, points, self.n_axes()));
           },
           "markers"_a, "points"_a)
       .def("carry", &carry, "marker"_a, "markers"_a, "points"_a)
-      .def("n_bonds", &BodyCarrier::n_bonds, "marker"_a)
-      .def("forget", &BodyCarrier::forget, "marker"_a);
+      .def("n_bonds", &RigidCarrier::n_bonds, "marker"_a)
+      .def("forget", &RigidCarrier::forget, "marker"_a);
   nb::class_<StitchOptions>(module, "StitchOptions")
       .def(nb::init<double, double, std::int64_t, std::int64_t, std::int64_t, bool>(),
            nb::kw_only(), "noise"_a, "ghost_radius"_a, "confirm"_a, "max_gap"_a, "max_hidden"_a,
            "may_cut"_a);
   nb::class_<Stitcher>(module, "Stitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&>(), "motion"_a, "options"_a)
-      .def_prop_ro_static("WORTH", [](nb::handle) { return Claims::kWorth; })
+      .def_prop_ro_static("WORTH", [](nb::handle) { return TrackletAssignment::kOddsFactor; })
       .def("run", &run_stitcher, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a,
            "points"_a, "labels"_a)
       .def(

@@ -31,19 +31,19 @@ class PythonPacker {
                                        std::span<const std::int32_t> first_resource,
                                        TreeStats& stats) const {
     std::vector<std::size_t> first_option{0}, first_use{0};
-    std::vector<double> worths;
+    std::vector<double> log_weights;
     std::vector<std::int32_t> uses;
     for (const auto& options : trees) {
       for (const PackingOption& option : options) {
-        worths.push_back(option.worth);
+        log_weights.push_back(option.log_weight);
         uses.insert(uses.end(), option.uses.begin(), option.uses.end());
         first_use.push_back(uses.size());
       }
-      first_option.push_back(worths.size());
+      first_option.push_back(log_weights.size());
     }
     nb::gil_scoped_acquire acquire;
     const nb::tuple out = nb::cast<nb::tuple>(
-        choose_(array_of<std::int64_t>(first_option), array_of<double>(worths),
+        choose_(array_of<std::int64_t>(first_option), array_of<double>(log_weights),
                 array_of<std::int64_t>(first_use), array_of<std::int32_t>(uses),
                 array_of<std::int32_t>(first_resource)));
     const auto own = nb::cast<In<std::int32_t>>(out[0]);
@@ -52,7 +52,7 @@ class PythonPacker {
     for (std::size_t i = 0; i < trees.size(); ++i) {
       const std::int32_t k = own.data()[i];
       require(k >= 0 && k < static_cast<std::int32_t>(trees[i].size()), "options of the trees");
-      value += trees[i][k].worth;
+      value += trees[i][k].log_weight;
     }
     const double gap = nb::cast<double>(out[1]) - value;
     stats.gap = std::max(stats.gap, gap > 1e-6 ? gap : 0.0);

@@ -40,14 +40,14 @@ struct Bond {
 };
 
 inline double predictive_variance(const Bond& bond, double r) {
-  const double unseen =
+  const double unobserved =
       bond.mean * (kBend + 1 / static_cast<double>(std::max<std::int64_t>(bond.n, 1)));
-  return std::max(bond.variance, 2 * r) + unseen * unseen;
+  return std::max(bond.variance, 2 * r) + unobserved * unobserved;
 }
 
 inline bool is_bond(const Bond& bond, double r) {
-  const double most = kSteady * bond.mean;
-  return bond.n >= kMinTogether && predictive_variance(bond, r) <= most * most;
+  const double max_deviation = kSteady * bond.mean;
+  return bond.n >= kMinTogether && predictive_variance(bond, r) <= max_deviation * max_deviation;
 }
 
 // Evidence of a distance for the two markers of the bond: 1 at the mean distance, falling to -1 for

@@ -80,7 +80,7 @@ class RigidPrediction {
     offset2_ = kOffset * kOffset * squared_distance(then, fit.from, D);
     left_ = std::max(fit.rms * fit.rms - 2 * noise, 0.0) / 3;
     expected_ = n / all;
-    if (D > 1 && pairs.size() >= least_for_rotation(D))
+    if (D > 1 && pairs.size() >= min_for_rotation(D))
       turn_ = all / n * turning_variance(pairs, fit.to, arm, D) / D;
     mean_ = 1 + 1 / n;
   }

@@ -86,16 +86,16 @@ struct NeighbourAdvice {
   std::int64_t track = 0;    // key of the track
   // the occluded track is predicted at `place` and may only take a detection of `may_take`
   bool is_carried = false;
-  bool is_doubtful = false;  // the variance of `place` is too large to keep the track alive
+  bool is_uncertain = false;  // the variance of `place` is too large to keep the track alive
   // the track is an occluded track reappearing, and is deleted in favour of the old one
-  bool gives_way = false;
+  bool is_reappearance = false;
   Carried place;
   std::vector<std::int32_t> may_take;
   // log-likelihood ratio from bonds, by detection
-  std::vector<std::pair<std::int32_t, double>> says;
+  std::vector<std::pair<std::int32_t, double>> bond_gains;
 
   double of(std::int32_t column) const {
-    for (const auto& [j, nats] : says)
+    for (const auto& [j, nats] : bond_gains)
       if (j == column) return nats;
     return 0;
   }

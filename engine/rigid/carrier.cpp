@@ -12,13 +12,13 @@ namespace {
 // The element with the smallest sum of distances to the others, the first of equals.
 const Carriage& middle(std::span<const Carriage> ways, int D) {
   std::size_t best = 0;
-  double least = std::numeric_limits<double>::infinity();
+  double min_sum = std::numeric_limits<double>::infinity();
   for (std::size_t a = 0; a < ways.size(); ++a) {
     double sum = 0;
     for (const Carriage& other : ways)
       sum += std::sqrt(squared_distance(ways[a].place.at, other.place.at, D));
-    if (sum < least) {
-      least = sum;
+    if (sum < min_sum) {
+      min_sum = sum;
       best = a;
     }
   }
@@ -30,7 +30,7 @@ const Carriage& middle(std::span<const Carriage> ways, int D) {
 Carried Carrier::place(const RigidPrediction& found, const Trust& trust, std::int64_t frames,
                        double r) const {
   const double bent = static_cast<double>(frames) / kLag;
-  return found.place(r, std::max(bent * trust.kappa(r_), Trust::kLeast));
+  return found.place(r, std::max(bent * trust.kappa(r_), Trust::kMinKappa));
 }
 
 bool Carrier::carry(std::int32_t marker, const Anchor& from, const Places& now, std::int64_t frames,
@@ -48,34 +48,36 @@ bool Carrier::carry(std::int32_t marker, const Anchor& from, const Places& now, 
   return true;
 }
 
-void BodyCarrier::see(std::span<const Seen> seen) {
+void RigidCarrier::see(std::span<const MarkerPoint> seen) {
   frames_.push_back({{seen.begin(), seen.end()}});
   if (static_cast<std::int64_t>(frames_.size()) > Carrier::kLag + 1) frames_.pop_front();
   ++n_frames_;
-  for (const Seen& one : seen) welcome(one.marker);
+  for (const MarkerPoint& one : seen) mark_detected(one.marker);
   carrier_.learn(seen);
   if (frames_.size() > 1)
-    for (const Seen& one : frames_[frames_.size() - 2].seen)
-      if (frames_.back().find(one.marker) == nullptr) hide(one.marker);
+    for (const MarkerPoint& one : frames_[frames_.size() - 2].seen)
+      if (frames_.back().find(one.marker) == nullptr) mark_occluded(one.marker);
   if (static_cast<std::int64_t>(frames_.size()) <= Carrier::kLag) return;
-  carrier_.judge(seen, frames_.front(), frames_.back(), [](const Seen&, const RigidPrediction&, const Trust&) {});
+  carrier_.judge(seen, frames_.front(), frames_.back(),
+                 [](const MarkerPoint&, const RigidPrediction&, const Trust&) {});
 }
 
-void BodyCarrier::forget(std::int32_t marker) {
+void RigidCarrier::forget(std::int32_t marker) {
   carrier_.forget(marker);
-  hidden_.erase(marker);
+  occluded_.erase(marker);
 }
 
-bool BodyCarrier::carry(std::int32_t marker, const Places& now, Carriage& out, std::int64_t n_open) {
+bool RigidCarrier::carry(std::int32_t marker, const Places& now, Carriage& out,
+                         std::int64_t n_open) {
   if (!carrier_.is_judged(marker)) return false;
-  const auto hidden = hidden_.find(marker);
-  if (hidden == hidden_.end()) {
+  const auto occlusion = occluded_.find(marker);
+  if (occlusion == occluded_.end()) {
     s_.anchors.clear();
     if (n_open > 0) remember(marker, 0, s_.anchors);
   }
   s_.ways.clear();
   Carriage way;
-  for (const Anchor& anchor : hidden == hidden_.end() ? s_.anchors : hidden->second.anchors)
+  for (const Anchor& anchor : occlusion == occluded_.end() ? s_.anchors : occlusion->second.anchors)
     if (carrier_.carry(marker, anchor, now, n_frames_ + n_open + 1 - anchor.frame, noise(), way))
       s_.ways.push_back(way);
   if (s_.ways.empty()) return false;
@@ -83,7 +85,7 @@ bool BodyCarrier::carry(std::int32_t marker, const Places& now, Carriage& out, s
   return true;
 }
 
-std::span<const Bond> BodyCarrier::bonds(std::int32_t marker) {
+std::span<const Bond> RigidCarrier::bonds(std::int32_t marker) {
   s_.bonds.clear();
   for (const Bond& bond : carrier_.neighbours(marker))
     if (is_bond(bond, noise())) s_.bonds.push_back(bond);
@@ -93,29 +95,29 @@ std::span<const Bond> BodyCarrier::bonds(std::int32_t marker) {
   return s_.bonds;
 }
 
-std::int64_t BodyCarrier::n_bonds(std::int32_t marker) const {
+std::int64_t RigidCarrier::n_bonds(std::int32_t marker) const {
   return std::ranges::count_if(carrier_.neighbours(marker), [&](const Bond& bond) {
     return bond.other > marker && is_bond(bond, noise());
   });
 }
 
-void BodyCarrier::welcome(std::int32_t marker) {
-  const auto hidden = hidden_.find(marker);
-  if (hidden == hidden_.end()) return;
-  if (++hidden->second.n_back > Carrier::kAnchors.back()) hidden_.erase(hidden);
+void RigidCarrier::mark_detected(std::int32_t marker) {
+  const auto occlusion = occluded_.find(marker);
+  if (occlusion == occluded_.end()) return;
+  if (++occlusion->second.n_back > Carrier::kAnchors.back()) occluded_.erase(occlusion);
 }
 
-void BodyCarrier::hide(std::int32_t marker) {
-  if (const auto hidden = hidden_.find(marker); hidden != hidden_.end()) {
-    hidden->second.n_back = 0;
+void RigidCarrier::mark_occluded(std::int32_t marker) {
+  if (const auto occlusion = occluded_.find(marker); occlusion != occluded_.end()) {
+    occlusion->second.n_back = 0;
     return;
   }
-  std::vector<Anchor>& anchors = hidden_[marker].anchors;
+  std::vector<Anchor>& anchors = occluded_[marker].anchors;
   remember(marker, 1, anchors);
-  if (anchors.empty()) hidden_.erase(marker);
+  if (anchors.empty()) occluded_.erase(marker);
 }
 
-void BodyCarrier::remember(std::int32_t marker, std::int64_t back, std::vector<Anchor>& anchors) {
+void RigidCarrier::remember(std::int32_t marker, std::int64_t back, std::vector<Anchor>& anchors) {
   const auto n = static_cast<std::int64_t>(frames_.size());
   for (const std::int64_t before : Carrier::kAnchors) {
     const std::int64_t ago = back + before;

@@ -28,7 +28,7 @@ namespace asterism {
 struct Anchor {
   std::int64_t frame = 0;
   Point at{};
-  std::vector<Seen> around;
+  std::vector<MarkerPoint> around;
   std::vector<double> weight;  // of the neighbours in `around`
 };
 
@@ -42,7 +42,7 @@ struct Carriage {
 // expected value. The means have a memory of kRecent predictions.
 struct Trust {
   static constexpr std::int64_t kRecent = 50;
-  static constexpr double kLeast = 0.02;  // lower bound of κ
+  static constexpr double kMinKappa = 0.02;  // lower bound of κ
 
   std::int64_t n_judged = 0, n = 0;
   double error = 0, expected = 0;
@@ -72,7 +72,7 @@ class Carrier {
   double noise() const { return r_; }
 
   // Adds the detected markers of the next frame.
-  void learn(std::span<const Seen> seen) {
+  void learn(std::span<const MarkerPoint> seen) {
     ++n_frames_;
     neighbours_.add(seen);
   }
@@ -98,8 +98,8 @@ class Carrier {
   // Compares the detected positions of some markers with those predicted from `then`, kLag frames
   // earlier. Calls tell(marker, prediction, trust before this frame).
   template <typename Then, typename Now, typename Tell>
-  void judge(std::span<const Seen> seen, const Then& then, const Now& now, Tell&& tell) {
-    for (const Seen& one : seen) {
+  void judge(std::span<const MarkerPoint> seen, const Then& then, const Now& now, Tell&& tell) {
+    for (const MarkerPoint& one : seen) {
       if ((n_frames_ + one.marker) % kJudgeEvery != 0) continue;
       const Point* before = then.find(one.marker);
       if (before == nullptr) continue;
@@ -148,13 +148,13 @@ class Carrier {
   static constexpr std::size_t kRemembered = 16;  // neighbours of an anchor
   static constexpr std::int64_t kJudgeEvery = 4, kMinJudged = 3;
 
-  // Lists the up to `most` most stable neighbours for which may_carry(neighbour) holds.
+  // Lists the up to `n_max` most stable neighbours for which may_carry(neighbour) holds.
   template <typename May>
-  void list_steadiest(std::int32_t marker, std::size_t most, May&& may_carry) {
+  void list_steadiest(std::int32_t marker, std::size_t n_max, May&& may_carry) {
     s_.steadiest.clear();
     for (const Bond& bond : neighbours_.of(marker))
       if ((!bonds_only_ || is_bond(bond, r_)) && may_carry(bond.other))
-        keep_smallest(s_.steadiest, most, {neighbours_.variance(bond), bond.other});
+        keep_smallest(s_.steadiest, n_max, {neighbours_.variance(bond), bond.other});
   }
 
   struct Memory {
@@ -168,21 +168,21 @@ class Carrier {
   std::int64_t n_frames_ = 0;
   Neighbours neighbours_;
   std::map<std::int32_t, Trust> trust_;
-  Fresh<Memory> s_;
+  Scratch<Memory> s_;
 };
 
 // The carrier of a frame-by-frame method: keeps the latest frames and the anchors of occluded
 // markers. Its predictions enter the filters of tracks, so it uses bonds only; unrelated markers
 // must not carry each other.
-class BodyCarrier {
+class RigidCarrier {
  public:
-  BodyCarrier(int D, double r) : carrier_(D, r, true) {}
+  RigidCarrier(int D, double r) : carrier_(D, r, true) {}
 
   int n_axes() const { return carrier_.n_axes(); }
   double noise() const { return carrier_.noise(); }
 
   // Adds the markers detected in the next frame, by increasing number.
-  void see(std::span<const Seen> seen);
+  void see(std::span<const MarkerPoint> seen);
   // Removes a marker that will not be detected again.
   void forget(std::int32_t marker);
 
@@ -198,15 +198,15 @@ class BodyCarrier {
   std::int64_t n_bonds(std::int32_t marker) const;
 
  private:
-  struct Hidden {
+  struct Occlusion {
     std::vector<Anchor> anchors;
     std::int64_t n_back = 0;  // frames in which the marker was detected again
   };
 
   // Ends the occlusion of a marker that has been detected for several frames. Until then the
   // detections may be a ghost, so the anchors are kept.
-  void welcome(std::int32_t marker);
-  void hide(std::int32_t marker);
+  void mark_detected(std::int32_t marker);
+  void mark_occluded(std::int32_t marker);
   // Adds the anchors of a marker whose last detection was `back` frames ago.
   void remember(std::int32_t marker, std::int64_t back, std::vector<Anchor>& anchors);
 
@@ -218,9 +218,9 @@ class BodyCarrier {
 
   Carrier carrier_;
   std::int64_t n_frames_ = 0;
-  std::deque<Sighting> frames_;
-  std::map<std::int32_t, Hidden> hidden_;
-  Fresh<Memory> s_;
+  std::deque<MarkerFrame> frames_;
+  std::map<std::int32_t, Occlusion> occluded_;
+  Scratch<Memory> s_;
 };
 
 }  // namespace asterism

@@ -19,17 +19,17 @@
 namespace asterism {
 
 // A marker detected in a frame.
-struct Seen {
+struct MarkerPoint {
   std::int32_t marker = 0;
   Point at{};
 };
 
 // The detected markers of a frame, by increasing number.
-struct Sighting {
-  std::vector<Seen> seen;
+struct MarkerFrame {
+  std::vector<MarkerPoint> seen;
 
   const Point* find(std::int32_t marker) const {
-    const auto at = std::ranges::lower_bound(seen, marker, {}, &Seen::marker);
+    const auto at = std::ranges::lower_bound(seen, marker, {}, &MarkerPoint::marker);
     return at != seen.end() && at->marker == marker ? &at->at : nullptr;
   }
 };
@@ -39,48 +39,48 @@ struct Sighting {
 class Places {
  public:
   void clear() {
-    std::fill(slots_.begin(), slots_.end(), Seen{kNobody, {}});
+    std::fill(slots_.begin(), slots_.end(), MarkerPoint{kEmpty, {}});
     n_ = 0;
   }
   void set(std::int32_t marker, const Point& at) {
     if (2 * (n_ + 1) > slots_.size()) grow();
-    Seen& slot = slots_[place(marker)];
-    n_ += slot.marker == kNobody;
+    MarkerPoint& slot = slots_[place(marker)];
+    n_ += slot.marker == kEmpty;
     slot = {marker, at};
   }
   const Point* find(std::int32_t marker) const {
     if (slots_.empty()) return nullptr;
-    const Seen& slot = slots_[place(marker)];
+    const MarkerPoint& slot = slots_[place(marker)];
     return slot.marker == marker ? &slot.at : nullptr;
   }
   std::size_t capacity() const { return slots_.size(); }
 
  private:
-  static constexpr std::int32_t kNobody = -1;
+  static constexpr std::int32_t kEmpty = -1;
 
   // The slot of a marker, or the empty slot where it would be inserted.
   std::size_t place(std::int32_t marker) const {
     const std::size_t last = slots_.size() - 1;  // a power of two minus one
     std::size_t at = static_cast<std::uint32_t>(marker) * 0x9e3779b1u & last;
-    while (slots_[at].marker != kNobody && slots_[at].marker != marker) at = (at + 1) & last;
+    while (slots_[at].marker != kEmpty && slots_[at].marker != marker) at = (at + 1) & last;
     return at;
   }
   void grow() {
-    const std::vector<Seen> old = std::move(slots_);
-    slots_.assign(std::max<std::size_t>(2 * old.size(), 32), Seen{kNobody, {}});
-    for (const Seen& one : old)
-      if (one.marker != kNobody) slots_[place(one.marker)] = one;
+    const std::vector<MarkerPoint> old = std::move(slots_);
+    slots_.assign(std::max<std::size_t>(2 * old.size(), 32), MarkerPoint{kEmpty, {}});
+    for (const MarkerPoint& one : old)
+      if (one.marker != kEmpty) slots_[place(one.marker)] = one;
   }
 
-  std::vector<Seen> slots_;
+  std::vector<MarkerPoint> slots_;
   std::size_t n_ = 0;
 };
 
-// Inserts into a sorted list of the `most` smallest elements. For short lists this is faster than a
-// heap.
+// Inserts into a sorted list of the `n_max` smallest elements. For short lists this is faster than
+// a heap.
 template <typename T>
-void keep_smallest(std::vector<T>& all, std::size_t most, const T& one) {
-  if (all.size() == most) {
+void keep_smallest(std::vector<T>& all, std::size_t n_max, const T& one) {
+  if (all.size() == n_max) {
     if (!(one < all.back())) return;
     all.pop_back();
   }
@@ -95,11 +95,11 @@ class Neighbours {
   int n_axes() const { return D_; }
 
   // Adds the markers detected in a frame.
-  void add(std::span<const Seen> seen) {
+  void add(std::span<const MarkerPoint> seen) {
     ++n_frames_;
     places_.clear();
-    for (const Seen& one : seen) places_.set(one.marker, one.at);
-    for (const Seen& one : seen) {
+    for (const MarkerPoint& one : seen) places_.set(one.marker, one.at);
+    for (const MarkerPoint& one : seen) {
       std::vector<Bond>& bonds = bonds_[one.marker];
       if (bonds.empty() || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one, bonds);
       for (Bond& bond : bonds)
@@ -123,23 +123,24 @@ class Neighbours {
 
  private:
   static constexpr std::int64_t kLookEvery = 32;  // frames
-  static constexpr std::size_t kMost = 24, kNearest = 12;
+  static constexpr std::size_t kMaxNeighbours = 24, kNearest = 12;
   static constexpr std::int64_t kTrial = 60;  // frames before a neighbour may be replaced
 
   // Adds the nearest markers as neighbours. If the list is full, a new one replaces the neighbour
   // with the largest variance.
-  void look_around(std::span<const Seen> seen, const Seen& one, std::vector<Bond>& bonds) {
+  void look_around(std::span<const MarkerPoint> seen, const MarkerPoint& one,
+                   std::vector<Bond>& bonds) {
     near_.clear();
-    for (const Seen& other : seen)
+    for (const MarkerPoint& other : seen)
       if (other.marker != one.marker)
         near_.push_back({squared_distance(one.at, other.at, D_), other.marker});
-    const std::size_t n = std::min(bonds.empty() ? kMost : kNearest, near_.size());
+    const std::size_t n = std::min(bonds.empty() ? kMaxNeighbours : kNearest, near_.size());
     std::partial_sort(near_.begin(), near_.begin() + static_cast<std::ptrdiff_t>(n), near_.end());
     for (std::size_t k = 0; k < n; ++k) {
       const std::int32_t other = near_[k].second;
       if (std::any_of(bonds.begin(), bonds.end(), [&](const Bond& b) { return b.other == other; }))
         continue;
-      if (bonds.size() < kMost) {
+      if (bonds.size() < kMaxNeighbours) {
         bonds.push_back({other});
         continue;
       }
@@ -154,7 +155,7 @@ class Neighbours {
   double r_;
   std::int64_t n_frames_ = 0;
   std::map<std::int32_t, std::vector<Bond>> bonds_;
-  Fresh<Places> places_;
+  Scratch<Places> places_;
   std::vector<std::pair<double, std::int32_t>> near_;
 };
 

@@ -33,7 +33,7 @@ struct RigidPair {
 };
 
 // A rotation needs three pairs in space, two in the plane. With fewer, the fit is a translation.
-inline std::size_t least_for_rotation(int D) { return static_cast<std::size_t>(std::max(D, 1)); }
+inline std::size_t min_for_rotation(int D) { return static_cast<std::size_t>(std::max(D, 1)); }
 
 namespace rigid {
 
@@ -74,10 +74,10 @@ inline bool top_vector_from(double bound, const Matrix4& M, std::array<double, 4
   Matrix4 shifted = M;
   for (int i = 0; i < 4; ++i) shifted[i][i] -= x;
   int best = 0;  // of four columns that are multiples of the vector
-  double most = 0;
+  double max_cofactor = 0;
   for (int i = 0; i < 4; ++i)
-    if (const double own = std::abs(cofactor(shifted, i, i)); own > most) {
-      most = own;
+    if (const double own = std::abs(cofactor(shifted, i, i)); own > max_cofactor) {
+      max_cofactor = own;
       best = i;
     }
   double length2 = 0, left2 = 0;
@@ -157,7 +157,7 @@ inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D, bool may_turn
     fit.from[d] /= all;
     fit.to[d] /= all;
   }
-  const bool can_turn = may_turn && D > 1 && pairs.size() >= least_for_rotation(D);
+  const bool can_turn = may_turn && D > 1 && pairs.size() >= min_for_rotation(D);
   if (can_turn) {
     double S[3][3] = {}, size = 0;
     for (const RigidPair& p : pairs)

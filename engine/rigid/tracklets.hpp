@@ -17,13 +17,13 @@ namespace asterism {
 // The decision on a tracklet: to which marker it belongs.
 struct Decision {
   static constexpr std::int32_t kOpen = -1, kGhost = -2;
-  std::int32_t fragment = 0;
+  std::int32_t tracklet = 0;
   std::int32_t marker = kOpen;
   std::int32_t after = -1;      // the tracklet that it continues, -1 for a new marker
   double probability = 1;       // of that decision
 };
 
-struct FragmentPoint {
+struct TrackletPoint {
   std::int64_t frame = 0;
   Point at{};
 };
@@ -33,12 +33,12 @@ struct Continuation {
   MotionState state;
   double log_likelihood = 0;
 };
-struct Fragment {
+struct Tracklet {
   std::int64_t label = -1;
   std::int32_t marker = Decision::kOpen;
   std::int64_t first = 0, last = 0;
   std::int32_t n = 0;
-  std::vector<FragmentPoint> sights;  // until a decision
+  std::vector<TrackletPoint> detections;  // until a decision
   MotionState state;         // while its motion is compared
   double alone = 0;  // log likelihood of its second and later detections as a new marker
   std::vector<Continuation> continuations;
@@ -48,34 +48,33 @@ struct Fragment {
   std::vector<std::pair<std::int32_t, double>> guesses;
 };
 struct Marker {
-  std::int32_t fragment = -1;
+  std::int32_t tracklet = -1;
   std::int64_t label = -1;  // of that tracklet
   std::int64_t last = 0;
   MotionState state;            // predicted to the newest frame, while occluded
   std::vector<Anchor> anchors;  // while occluded
-  bool is_hidden = false;
+  bool is_occluded = false;
   double trust = 3;  // how well its neighbours predicted it lately, while it was detected
 };
-using Fragments = std::map<std::int32_t, Fragment>;
+using Tracklets = std::map<std::int32_t, Tracklet>;
 using Markers = std::map<std::int32_t, Marker>;
 
 struct Frame {
   struct One {
-    std::int32_t fragment = 0;
+    std::int32_t tracklet = 0;
     Point at{};
     std::int32_t point = 0;  // index in the frame
   };
   MotionStep step;        // the step that leads to the frame
   std::vector<One> seen;  // by increasing tracklet
 
-  const Point* find(std::int32_t fragment) const {
-    const auto at = std::lower_bound(seen.begin(), seen.end(), fragment,
-                                     [](const One& one, std::int32_t id) { return one.fragment < id; });
-    return at != seen.end() && at->fragment == fragment ? &at->at : nullptr;
+  const Point* find(std::int32_t tracklet) const {
+    const auto at = std::ranges::lower_bound(seen, tracklet, {}, &One::tracklet);
+    return at != seen.end() && at->tracklet == tracklet ? &at->at : nullptr;
   }
   void sort() {
     std::sort(seen.begin(), seen.end(),
-              [](const One& a, const One& b) { return a.fragment < b.fragment; });
+              [](const One& a, const One& b) { return a.tracklet < b.tracklet; });
   }
 };
 
@@ -94,12 +93,12 @@ class RecentFrames {
                : nullptr;
   }
   // The present motion state of a tracklet, filtered over the kept frames.
-  MotionState motion(const MotionModel& m, std::int32_t fragment) const {
+  MotionState motion(const MotionModel& m, std::int32_t tracklet) const {
     MotionState state;
     bool has_begun = false;
     for (const std::shared_ptr<Frame>& frame : frames_) {
       if (has_begun) predict(m, frame->step, state);
-      const Point* y = frame->find(fragment);
+      const Point* y = frame->find(tracklet);
       if (y == nullptr) continue;
       if (has_begun)
         update(m, Prediction(m, state), *y, state);

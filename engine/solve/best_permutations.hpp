@@ -19,7 +19,7 @@ namespace asterism {
 
 class BestPermutations {
  public:
-  static constexpr std::size_t kMostEvents = 20'000;
+  static constexpr std::size_t kMaxEvents = 20'000;
   // nats below the best event; events further below are ignored
   static constexpr double kNegligible = 25;
 
@@ -30,7 +30,7 @@ class BestPermutations {
     group_ = group;
     by_.number(group);
     if (by_.n_rows() > 64 || by_.n_columns() > 64) return false;
-    list_most();
+    list_max_gains();
     best_ = 0;
     for (const Candidate& c : group)
       if (match[c.row] == c.column) best_ += c.gain;
@@ -67,19 +67,19 @@ class BestPermutations {
   };
 
   // Upper bounds of the gain of each row and all rows after it.
-  void list_most() {
-    most_.assign(by_.rows.size() + 1, 0);
+  void list_max_gains() {
+    max_gain_.assign(by_.rows.size() + 1, 0);
     for (std::size_t r = by_.rows.size(); r-- > 0;) {
-      double most = 0;
+      double max_gain = 0;
       for (std::int32_t e = by_.first[r]; e < by_.first[r + 1]; ++e)
-        most = std::max(most, group_[e].gain);
-      most_[r] = most_[r + 1] + most;
+        max_gain = std::max(max_gain, group_[e].gain);
+      max_gain_[r] = max_gain_[r + 1] + max_gain;
     }
   }
 
   bool visit(std::size_t r, std::uint64_t tracks, std::uint64_t columns, double gain) {
-    if (gain + most_[r] < best_ - kNegligible) return true;
-    if (++n_visits_ > 4 * kMostEvents || events_.size() > kMostEvents) return false;
+    if (gain + max_gain_[r] < best_ - kNegligible) return true;
+    if (++n_visits_ > 4 * kMaxEvents || events_.size() > kMaxEvents) return false;
     if (r == chosen_.size()) {
       events_.push_back({tracks, columns, gain, choices_.size()});
       choices_.insert(choices_.end(), chosen_.begin(), chosen_.end());
@@ -100,7 +100,7 @@ class BestPermutations {
   std::span<const Candidate> group_;
   GroupNumbering by_;
   std::vector<std::int32_t> chosen_, choices_;
-  std::vector<double> most_;
+  std::vector<double> max_gain_;
   std::vector<Event> events_;
   std::size_t n_visits_ = 0;
   double best_ = 0;

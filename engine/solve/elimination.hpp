@@ -78,12 +78,12 @@ class EliminationOrder {
   // The last vertex that a breadth-first search reaches.
   std::int32_t farthest(std::int32_t from) const {
     std::vector<std::int32_t> queue{from};
-    std::vector<char> is_seen(graph_.size(), 0);
-    is_seen[from] = 1;
+    std::vector<char> is_visited(graph_.size(), 0);
+    is_visited[from] = 1;
     for (std::size_t k = 0; k < queue.size(); ++k)
       for (const Link& l : graph_.links[queue[k]])
-        if (!is_seen[l.to]) {
-          is_seen[l.to] = 1;
+        if (!is_visited[l.to]) {
+          is_visited[l.to] = 1;
           queue.push_back(l.to);
         }
     return queue.back();
@@ -96,9 +96,9 @@ class EliminationOrder {
     is_gone_.assign(n, 0);
     is_active_.assign(n, 0);
     is_near_.assign(n, 0);
-    fresh_.resize(n);
+    n_outside_.resize(n);
     for (std::int32_t v = 0; v < n; ++v)
-      fresh_[v] = static_cast<std::int32_t>(graph_.links[v].size());
+      n_outside_[v] = static_cast<std::int32_t>(graph_.links[v].size());
     near_.clear();
     Elimination e;
     std::int32_t frontier = 0, v = start;
@@ -130,7 +130,7 @@ class EliminationOrder {
       near_.push_back(u);
     }
     for (const Link& l : graph_.links[u]) {
-      --fresh_[l.to];
+      --n_outside_[l.to];
       if (!is_near_[l.to]) {
         is_near_[l.to] = 1;
         near_.push_back(l.to);
@@ -141,14 +141,14 @@ class EliminationOrder {
   // The graph is connected, so some remaining vertex is always near.
   std::int32_t next() {
     std::size_t kept = 0;
-    std::int32_t best = -1, least = 0;
+    std::int32_t best = -1, min_growth = 0;
     for (const std::int32_t u : near_) {
       if (is_gone_[u]) continue;
       near_[kept++] = u;
-      const std::int32_t growth = fresh_[u] - is_active_[u];
-      if (best < 0 || growth < least) {
+      const std::int32_t growth = n_outside_[u] - is_active_[u];
+      if (best < 0 || growth < min_growth) {
         best = u;
-        least = growth;
+        min_growth = growth;
       }
     }
     near_.resize(kept);
@@ -158,7 +158,7 @@ class EliminationOrder {
   const MatchingGraph& graph_;
   std::vector<char> is_gone_, is_active_, is_near_;
   // number of neighbours that are neither in the frontier nor eliminated
-  std::vector<std::int32_t> fresh_;
+  std::vector<std::int32_t> n_outside_;
   std::vector<std::int32_t> near_;   // candidates: the frontier and its neighbours
 };
 

@@ -80,7 +80,7 @@ class JointBeam {
     std::int64_t exponent = 0;
   };
 
-  static constexpr std::int32_t kMostFollowed = 16, kBalanceRounds = 200;
+  static constexpr std::int32_t kMaxFollowed = 16, kBalanceRounds = 200;
   static constexpr double kNothing = 1e-17;  // an error far below rounding
   static constexpr double kRounding = 1e-7;  // far above the rounding of the log of a mass
 
@@ -164,7 +164,7 @@ class JointBeam {
     std::stable_sort(order.begin(), order.end(),
                      [&](std::int32_t a, std::int32_t b) { return conflict[a] > conflict[b]; });
     std::int32_t room = 0;
-    while (room < kMostFollowed && std::int64_t{2} << room <= max_states_) ++room;
+    while (room < kMaxFollowed && std::int64_t{2} << room <= max_states_) ++room;
     std::vector<std::int32_t> n_followed(n + 1, 0);  // in the layer before each step
     is_followed_.assign(n, 0);
     for (const std::int32_t v : order) {

@@ -99,13 +99,14 @@ JointSummary JointEvents::solve(std::span<double> marginals, std::span<double> m
 double JointEvents::solve_single(std::size_t g) {
   const std::int32_t i = groups_[g].front().row;
   const std::size_t n = groups_[g].size();
-  double most = log_miss_[i], total = 0;
-  for (std::size_t e = 0; e < n; ++e) most = std::max(most, log_weight(g, e));
-  for (std::size_t e = 0; e < n; ++e) total += marginal(g, e) = std::exp(log_weight(g, e) - most);
-  total += missed_[i] = std::exp(log_miss_[i] - most);
+  double max_log = log_miss_[i], total = 0;
+  for (std::size_t e = 0; e < n; ++e) max_log = std::max(max_log, log_weight(g, e));
+  for (std::size_t e = 0; e < n; ++e)
+    total += marginal(g, e) = std::exp(log_weight(g, e) - max_log);
+  total += missed_[i] = std::exp(log_miss_[i] - max_log);
   for (std::size_t e = 0; e < n; ++e) marginal(g, e) /= total;
   missed_[i] /= total;
-  summary_.log_total += most + std::log(total);
+  summary_.log_total += max_log + std::log(total);
   return 0;
 }
 

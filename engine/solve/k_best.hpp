@@ -44,7 +44,7 @@ class KBest {
   }
 
   // Cost of the current assignment, and the column of each of the n rows.
-  double least_cost() const { return current_.cost; }
+  double current_cost() const { return current_.cost; }
   std::span<const std::int32_t> columns() const {
     return std::span<const std::int32_t>(current_.solution->column).first(n_);
   }
@@ -74,9 +74,9 @@ class KBest {
   void begin() {
     auto first = std::make_shared<Solution>(N_);
     for (std::int32_t i = 0; i < n_; ++i) {
-      const double least = *std::min_element(&c_[static_cast<std::size_t>(i) * N_],
+      const double min_cost = *std::min_element(&c_[static_cast<std::size_t>(i) * N_],
                                              &c_[static_cast<std::size_t>(i) * N_] + N_);
-      first->u[i] = least < kForbidden ? least : 0;
+      first->u[i] = min_cost < kForbidden ? min_cost : 0;
     }
     std::vector<char> is_open(N_, 1);
     for (std::int32_t i = 0; i < N_; ++i)
@@ -117,7 +117,7 @@ class KBest {
     while (sink < 0) {
       const double left = reached - s.u[i];
       std::int32_t nearest = -1;
-      double least = kForbidden;
+      double min_cost = kForbidden;
       for (std::int32_t j = 0; j < N_; ++j) {
         if (!is_open[j] || is_done_[j]) continue;
         const double d = std::max(left + cost(i, j) - s.v[j], reached);
@@ -125,8 +125,8 @@ class KBest {
           distance_[j] = d;
           from_[j] = i;
         }
-        if (distance_[j] < least) {
-          least = distance_[j];
+        if (distance_[j] < min_cost) {
+          min_cost = distance_[j];
           nearest = j;
         }
       }
@@ -175,7 +175,7 @@ class KBest {
       std::vector<std::int32_t> forbidden;
       if (r == node.n_fixed) forbidden = node.forbidden;
       forbidden.push_back(s.column[r]);
-      const double more = least_more(s, r, forbidden, is_open);
+      const double more = min_increase(s, r, forbidden, is_open);
       if (more < kForbidden)
         push({node.cost + more, 0, node.solution, r, std::move(forbidden), false});
       is_open[s.column[r]] = 0;
@@ -184,7 +184,7 @@ class KBest {
 
   // A lower bound of the cost of changing row r: the row must take another column, and another row
   // must take its column.
-  double least_more(const Solution& s, std::int32_t r, std::span<const std::int32_t> forbidden,
+  double min_increase(const Solution& s, std::int32_t r, std::span<const std::int32_t> forbidden,
                     const std::vector<char>& is_open) const {
     double out = kForbidden, in = kForbidden;
     for (std::int32_t j = 0; j < N_; ++j)

@@ -17,7 +17,7 @@ namespace asterism {
 
 // An option of a tree: its log weight and the resources that it uses.
 struct PackingOption {
-  double worth = 0;
+  double log_weight = 0;
   std::vector<std::int32_t> uses;
 };
 
@@ -27,7 +27,7 @@ class PricedOptions {
 
   struct Packing {
     std::vector<std::int32_t> own;  // option of each tree, in the caller's numbering
-    double worth = 0;
+    double log_weight = 0;
   };
 
   explicit PricedOptions(std::span<const std::vector<PackingOption>> trees) {
@@ -35,7 +35,7 @@ class PricedOptions {
       first_.push_back(static_cast<std::int32_t>(options_.size()));
       for (const PackingOption& option : options) {
         options_.push_back(&option);
-        priced_.push_back(option.worth);
+        reduced_.push_back(option.log_weight);
       }
     }
     first_.push_back(static_cast<std::int32_t>(options_.size()));
@@ -46,14 +46,14 @@ class PricedOptions {
     sort();
   }
 
-  double most_priced(std::int32_t tree) const {
-    return *std::max_element(priced_.begin() + first_[tree], priced_.begin() + first_[tree + 1]);
+  double max_reduced(std::int32_t tree) const {
+    return *std::max_element(reduced_.begin() + first_[tree], reduced_.begin() + first_[tree + 1]);
   }
   // Upper bound of the weight of a packing, at the prices.
   double bound() const {
     double sum = 0;
     for (const double x : price_) sum += x;
-    for (std::int32_t i = 0; i < n_trees(); ++i) sum += most_priced(i);
+    for (std::int32_t i = 0; i < n_trees(); ++i) sum += max_reduced(i);
     return sum;
   }
   std::int32_t n_trees() const { return static_cast<std::int32_t>(first_.size()) - 1; }
@@ -65,17 +65,17 @@ class PricedOptions {
     for (std::size_t o = 0; o < order.size(); ++o) order[o] = static_cast<std::int32_t>(o);
     for (std::size_t i = 0; i + 1 < first_.size(); ++i)
       std::stable_sort(order.begin() + first_[i], order.begin() + first_[i + 1],
-                       [&](std::int32_t a, std::int32_t b) { return priced_[a] > priced_[b]; });
+                       [&](std::int32_t a, std::int32_t b) { return reduced_[a] > reduced_[b]; });
     std::vector<const PackingOption*> options;
-    std::vector<double> priced;
+    std::vector<double> reduced;
     std::vector<std::int32_t> number;
     for (const std::int32_t o : order) {
       options.push_back(options_[o]);
-      priced.push_back(priced_[o]);
+      reduced.push_back(reduced_[o]);
       number.push_back(number_.empty() ? o - first_[tree_of(o)] : number_[o]);
     }
     options_ = std::move(options);
-    priced_ = std::move(priced);
+    reduced_ = std::move(reduced);
     number_ = std::move(number);
     users_.assign(price_.size(), {});
     tree_of_.resize(options_.size());
@@ -96,7 +96,7 @@ class PricedOptions {
   // options chosen in a round are repaired into a packing, which may replace the best known one
   // unless that is proven optimal.
   void set_prices(bool is_best) {
-    double least = std::numeric_limits<double>::infinity(), step = 1;
+    double min_dual = std::numeric_limits<double>::infinity(), step = 1;
     std::vector<double> price(price_.size(), 0), used(price_.size()), way(price_.size(), 0);
     std::vector<std::int32_t> chosen(n_trees());
     int n_idle = 0;
@@ -107,13 +107,13 @@ class PricedOptions {
       reprice(price);
       for (std::int32_t i = 0; i < n_trees(); ++i) {
         chosen[i] = static_cast<std::int32_t>(
-            std::max_element(priced_.begin() + first_[i], priced_.begin() + first_[i + 1]) -
-            priced_.begin());
-        dual += priced_[chosen[i]];
+            std::max_element(reduced_.begin() + first_[i], reduced_.begin() + first_[i + 1]) -
+            reduced_.begin());
+        dual += reduced_[chosen[i]];
         for (const std::int32_t r : options_[chosen[i]]->uses) used[r] += 1;
       }
-      if (dual < least - kBetter) {
-        least = dual;
+      if (dual < min_dual - kBetter) {
+        min_dual = dual;
         price_ = price;
         n_idle = 0;
       } else if (++n_idle >= 10) {
@@ -124,7 +124,7 @@ class PricedOptions {
         continue;
       }
       if (!is_best) keep_if_better(repaired(chosen));
-      if (!(least > known_.worth + kClosed)) break;
+      if (!(min_dual > known_.log_weight + kClosed)) break;
       double along = 0, own = 0;
       for (std::size_t r = 0; r < price.size(); ++r) {
         // an unused resource of price zero needs no change
@@ -142,14 +142,14 @@ class PricedOptions {
       }
       if (size == 0) break;
       for (std::size_t r = 0; r < price.size(); ++r)
-        price[r] = std::max(price[r] - step * (dual - known_.worth) / size * way[r], 0.0);
+        price[r] = std::max(price[r] - step * (dual - known_.log_weight) / size * way[r], 0.0);
     }
     reprice(price_);
   }
   void reprice(const std::vector<double>& price) {
     for (std::size_t o = 0; o < options_.size(); ++o) {
-      priced_[o] = options_[o]->worth;
-      for (const std::int32_t r : options_[o]->uses) priced_[o] -= price[r];
+      reduced_[o] = options_[o]->log_weight;
+      for (const std::int32_t r : options_[o]->uses) reduced_[o] -= price[r];
     }
   }
 
@@ -157,7 +157,7 @@ class PricedOptions {
     Packing out;
     for (const std::int32_t o : chosen) {
       out.own.push_back(number_[o]);
-      out.worth += options_[o]->worth;
+      out.log_weight += options_[o]->log_weight;
     }
     return out;
   }
@@ -174,21 +174,21 @@ class PricedOptions {
     std::vector<std::int32_t> order(n_trees()), out(chosen);
     for (std::int32_t i = 0; i < n_trees(); ++i) order[i] = i;
     std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-      return priced_[chosen[a]] > priced_[chosen[b]];
+      return reduced_[chosen[a]] > reduced_[chosen[b]];
     });
     is_used_.assign(users_.size(), 0);
     for (const std::int32_t i : order) {
-      if (!fits(out[i])) out[i] = best_fitting(i, priced_);
+      if (!fits(out[i])) out[i] = best_fitting(i, reduced_);
       mark(out[i], 1);
     }
-    std::vector<double> worth;
-    for (const PackingOption* o : options_) worth.push_back(o->worth);
+    std::vector<double> log_weight;
+    for (const PackingOption* o : options_) log_weight.push_back(o->log_weight);
     for (bool is_better = true; is_better;) {
       is_better = false;
       for (std::int32_t i = 0; i < n_trees(); ++i) {
         mark(out[i], 0);
-        const std::int32_t best = best_fitting(i, worth);
-        if (worth[best] > worth[out[i]] + kBetter) {
+        const std::int32_t best = best_fitting(i, log_weight);
+        if (log_weight[best] > log_weight[out[i]] + kBetter) {
           out[i] = best;
           is_better = true;
         }
@@ -211,11 +211,11 @@ class PricedOptions {
   }
   void keep_if_better(const std::vector<std::int32_t>& chosen) {
     Packing one = packing(chosen);
-    if (known_.own.empty() || one.worth > known_.worth) known_ = std::move(one);
+    if (known_.own.empty() || one.log_weight > known_.log_weight) known_ = std::move(one);
   }
 
   std::vector<const PackingOption*> options_;  // by tree, the best first
-  std::vector<double> priced_, price_;  // reduced weight of each option; price of each resource
+  std::vector<double> reduced_, price_;  // reduced weight of each option; price of each resource
   std::vector<std::int32_t> number_;  // of an option within its tree, in the caller's numbering
   std::vector<std::vector<std::int32_t>> users_;
   std::vector<std::int32_t> first_, tree_of_;

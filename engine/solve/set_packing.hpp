@@ -42,7 +42,7 @@ class SetPacking : PricedOptions {
   };
   Losses losses() {
     const bool is_best = search(1, 0, kUnpriced).is_exact;
-    if (bound() > known_.worth + kBetter) {
+    if (bound() > known_.log_weight + kBetter) {
       set_prices(is_best);
       if (!is_best) {
         sort();
@@ -52,9 +52,9 @@ class SetPacking : PricedOptions {
     std::vector<double> loss(options_.size());
     std::vector<std::int32_t> best(n_trees());
     for (std::int32_t i = 0; i < n_trees(); ++i) {
-      const double most = most_priced(i);
+      const double max_of_tree = max_reduced(i);
       for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
-        loss[o] = std::max(0.0, most - priced_[o]);  // 0 if both are infinite
+        loss[o] = std::max(0.0, max_of_tree - reduced_[o]);  // 0 if both are infinite
         if (number_[o] == known_.own[i]) best[i] = o;
       }
       loss[best[i]] = 0;
@@ -84,7 +84,7 @@ class SetPacking : PricedOptions {
       summary.n_nodes += n_before;
     }
     for (const Packing& packing : packings_)
-      found(std::span<const std::int32_t>(packing.own), packing.worth);
+      found(std::span<const std::int32_t>(packing.own), packing.log_weight);
     return summary;
   }
 
@@ -136,7 +136,7 @@ class SetPacking : PricedOptions {
           at->second = std::max(at->second, without[r]);
       }
       double given_up = 0;
-      for (const auto& [tree, least] : losers) given_up += least;
+      for (const auto& [tree, min_loss] : losers) given_up += min_loss;
       for (const std::int32_t r : options_[best[tree_of_[o]]]->uses)
         if (taken[r] > out[o] && !uses(o, r)) out[o] = taken[r];
       out[o] = std::max(out[o], given_up);
@@ -160,7 +160,7 @@ class SetPacking : PricedOptions {
       Node node = std::move(heap_.back());
       heap_.pop_back();
       --n_left_;
-      if (!packings_.empty() && node.bound < packings_.front().worth - drop) break;
+      if (!packings_.empty() && node.bound < packings_.front().log_weight - drop) break;
       if (packings_.empty()) summary.bound = node.bound;
       if (node.is_packing) {
         packings_.push_back(packing(node.chosen));
@@ -184,20 +184,20 @@ class SetPacking : PricedOptions {
       node.is_packing = true;
       push(std::move(node));
     }
-    if (!packings_.empty() && summary.is_exact) summary.bound = packings_.front().worth;
+    if (!packings_.empty() && summary.is_exact) summary.bound = packings_.front().log_weight;
     return summary;
   }
 
   void push(Node node) {
     node.bound = 0;
     if (node.is_packing) {
-      for (const std::int32_t o : node.chosen) node.bound += options_[o]->worth;
+      for (const std::int32_t o : node.chosen) node.bound += options_[o]->log_weight;
     } else {
       for (const double x : price_) node.bound += x;
-      for (const std::int32_t o : node.chosen) node.bound += priced_[o];
+      for (const std::int32_t o : node.chosen) node.bound += reduced_[o];
     }
     // the node contains no packing that would count
-    if (!known_.own.empty() && node.bound < known_.worth - drop_ - kBetter) return;
+    if (!known_.own.empty() && node.bound < known_.log_weight - drop_ - kBetter) return;
     node.number = n_pushed_++;
     heap_.push_back(std::move(node));
     std::push_heap(heap_.begin(), heap_.end());
@@ -249,13 +249,13 @@ class SetPacking : PricedOptions {
   // The smallest resource that two of the chosen options use, or -1.
   std::int32_t conflict(const Node& node) {
     is_used_.assign(users_.size(), 0);
-    std::int32_t least = -1;
+    std::int32_t first = -1;
     for (const std::int32_t o : node.chosen)
       for (const std::int32_t r : options_[o]->uses) {
-        if (is_used_[r] && (least < 0 || r < least)) least = r;
+        if (is_used_[r] && (first < 0 || r < first)) first = r;
         is_used_[r] = 1;
       }
-    return least;
+    return first;
   }
 
   void split_by_owner(const Node& node, std::int32_t resource) {

@@ -11,9 +11,9 @@
 
 namespace asterism {
 
-class Elsewhere {
+class BackgroundDensity {
  public:
-  Elsewhere(int D, double noise, double ghost_radius)
+  BackgroundDensity(int D, double noise, double ghost_radius)
       : D_(D),
         noise_(noise),
         radius2_(ghost_radius * ghost_radius),
@@ -31,18 +31,18 @@ class Elsewhere {
     }
   }
   double log_density(const Point& y, const Frame& at, std::int32_t own) const {
-    double beside = 0;
+    double ghosts = 0;
     for (const auto& one : at.seen) {
       const double far = squared_distance(one.at, y, D_) / radius2_;
-      if (one.fragment != own && far < 40) beside += std::exp(-0.5 * far);
+      if (one.tracklet != own && far < 40) ghosts += std::exp(-0.5 * far);
     }
     const double n = std::max<double>(static_cast<double>(at.seen.size()), 1);
-    return std::log(1 / volume_ + beside / n * peak_);
+    return std::log(1 / volume_ + ghosts / n * peak_);
   }
   // Whether a ghost of another tracklet may be at this position.
-  bool is_beside(const Point& y, const Frame& at, std::int32_t own) const {
+  bool is_near_another(const Point& y, const Frame& at, std::int32_t own) const {
     return std::any_of(at.seen.begin(), at.seen.end(), [&](const Frame::One& other) {
-      return other.fragment != own && squared_distance(other.at, y, D_) < 9 * radius2_;
+      return other.tracklet != own && squared_distance(other.at, y, D_) < 9 * radius2_;
     });
   }
 
@@ -55,10 +55,10 @@ class Elsewhere {
 };
 
 // The tracklets and frames detected so far, as far as they are kept.
-struct Sightings {
-  Fragments fragments;
+struct StitchMemory {
+  Tracklets tracklets;
   RecentFrames frames;
-  Elsewhere elsewhere;
+  BackgroundDensity background;
 };
 
 }  // namespace asterism

@@ -38,7 +38,7 @@ class LiveStitcher {
   template <typename Tell>
   void step(const MotionStep& step, std::span<const Point> points,
             std::span<const std::int64_t> labels,
-            std::span<const std::pair<std::int64_t, std::int64_t>> revised, Tell&& tell) {
+            std::span<const std::pair<std::int64_t, std::int64_t>> revised, Tell&& report) {
     for (const auto& [detection, label] : revised) revise(detection, label);
     Recent& now = recent_.emplace_back(Recent{}).own();
     now.step = step;
@@ -51,15 +51,15 @@ class LiveStitcher {
     stitcher_.guess();
     for (SharedCopy<Recent>& frame : recent_)
       if (!frame->is_taken)
-        tell_of_waiting(frame.own(), tell);
+        report_waiting(frame.own(), report);
       else if (!frame->open.empty())
-        tell_of_taken(frame.own(), tell);
+        report_taken(frame.own(), report);
     if (recent_.size() > n_waiting_ + n_kept_) recent_.pop_front();
   }
 
  private:
   struct Known {
-    std::int32_t fragment = -1, told = -2;
+    std::int32_t tracklet = -1, reported = -2;
   };
   struct Recent {
     std::int64_t first = 0;  // number of its first detection
@@ -82,13 +82,13 @@ class LiveStitcher {
     }
   }
   void take(Recent& frame) {
-    fragments_.assign(frame.points.size(), -1);
-    stitcher_.step(frame.step, frame.points, frame.labels, fragments_, [&](const Decision& d) {
+    tracklets_.assign(frame.points.size(), -1);
+    stitcher_.step(frame.step, frame.points, frame.labels, tracklets_, [&](const Decision& d) {
       n_joins_ += d.marker >= 0 && d.after >= 0;
       n_ghosts_ += d.marker == Decision::kGhost;
     });
     for (std::size_t i = 0; i < frame.known.size(); ++i) {
-      frame.known[i].fragment = fragments_[i];
+      frame.known[i].tracklet = tracklets_[i];
       frame.open.push_back(static_cast<std::int32_t>(i));
     }
     frame.is_taken = true;
@@ -96,41 +96,41 @@ class LiveStitcher {
     std::vector<std::int64_t>().swap(frame.labels);
   }
   template <typename Tell>
-  void tell_of_taken(Recent& frame, Tell&& tell) {
+  void report_taken(Recent& frame, Tell&& report) {
     std::erase_if(frame.open, [&](std::int32_t i) {
-      const std::int32_t f = frame.known[i].fragment;
-      tell_of(frame, i, f < 0 ? -1 : stitcher_.marker_of(f), tell);
+      const std::int32_t f = frame.known[i].tracklet;
+      report_one(frame, i, f < 0 ? -1 : stitcher_.marker_of(f), report);
       return f < 0 || !stitcher_.is_open(f);
     });
   }
   // If several detections of a frame have the same marker, those of undecided tracklets lose it.
   template <typename Tell>
-  void tell_of_waiting(Recent& frame, Tell&& tell) {
-    fragments_.clear();
+  void report_waiting(Recent& frame, Tell&& report) {
+    tracklets_.clear();
     markers_.clear();
     for (const std::int64_t label : frame.labels) {
-      const std::int32_t f = label < 0 ? -1 : stitcher_.fragment_with(label);
-      fragments_.push_back(f);
+      const std::int32_t f = label < 0 ? -1 : stitcher_.tracklet_with(label);
+      tracklets_.push_back(f);
       markers_.push_back(f < 0 ? -1 : stitcher_.marker_of(f));
     }
     for (std::size_t i = 0; i < markers_.size(); ++i)
-      if (fragments_[i] >= 0 && stitcher_.is_open(fragments_[i]) &&
+      if (tracklets_[i] >= 0 && stitcher_.is_open(tracklets_[i]) &&
           std::count(markers_.begin(), markers_.end(), markers_[i]) > 1)
         markers_[i] = -1;
-    for (std::size_t i = 0; i < markers_.size(); ++i) tell_of(frame, i, markers_[i], tell);
+    for (std::size_t i = 0; i < markers_.size(); ++i) report_one(frame, i, markers_[i], report);
   }
   template <typename Tell>
-  void tell_of(Recent& frame, std::size_t i, std::int32_t marker, Tell&& tell) {
-    std::int32_t& told = frame.known[i].told;
+  void report_one(Recent& frame, std::size_t i, std::int32_t marker, Tell&& report) {
+    std::int32_t& reported = frame.known[i].reported;
     marker = std::max(marker, -1);
-    if (told != marker) tell(frame.first + static_cast<std::int64_t>(i), told = marker);
+    if (reported != marker) report(frame.first + static_cast<std::int64_t>(i), reported = marker);
   }
 
   Stitcher stitcher_;
   std::size_t n_waiting_, n_kept_;
   std::int64_t n_seen_ = 0, n_joins_ = 0, n_ghosts_ = 0;
   std::deque<SharedCopy<Recent>> recent_;
-  std::vector<std::int32_t> fragments_, markers_;  // scratch of one frame
+  std::vector<std::int32_t> tracklets_, markers_;  // scratch of one frame
 };
 
 }  // namespace asterism

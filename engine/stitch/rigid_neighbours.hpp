@@ -16,51 +16,51 @@
 
 namespace asterism {
 
-class Bodies {
+class RigidNeighbours {
  public:
-  Bodies(int D, double noise) : D_(D), noise_(noise), carrier_(D, noise * noise, false) {}
+  RigidNeighbours(int D, double noise) : D_(D), noise_(noise), carrier_(D, noise * noise, false) {}
 
   // Updates the bonds with the markers of the newest frame.
-  void learn(const Sightings& s, std::span<const Seen> seen, Markers& markers) {
+  void learn(const StitchMemory& s, std::span<const MarkerPoint> seen, Markers& markers) {
     carrier_.learn(seen);
     judge(s, seen, markers);
   }
   void forget(std::int32_t marker) { carrier_.forget(marker); }
 
   // Prepares the evaluation of the links of the newest frame.
-  void begin_links(const Sightings& s) {
+  void begin_links(const StitchMemory& s) {
     w_.common_from = kNever;
     list_markers(s, s.frames.newest(), w_.places_now);
   }
   // Log-likelihood ratio of a tracklet's link into the newest frame, predicted by its neighbours,
   // against the background density. The most stable neighbours are used first, and the nearest ones
   // also if the result is below `enough`. Returns false if there are too few neighbours.
-  bool link(const Sightings& s, const Frame::One& own, const Fragment& f, double enough,
+  bool link(const StitchMemory& s, const Frame::One& own, const Tracklet& f, double enough,
             double& gain) {
     list_common(s, f.last);
-    if (w_.common.size() < least_for_rotation(D_) + 2) return false;
-    const Point then = *s.frames.find(f.last)->find(own.fragment);
-    const double elsewhere = s.elsewhere.log_density(own.at, s.frames.newest(), own.fragment);
+    if (w_.common.size() < min_for_rotation(D_) + 2) return false;
+    const Point then = *s.frames.find(f.last)->find(own.tracklet);
+    const double background = s.background.log_density(own.at, s.frames.newest(), own.tracklet);
     // Segments hardly deform between two frames, so the residual of the fit alone gives the
     // variance.
     const auto say = [&](std::span<const RigidPair> pairs) {
       const RigidPrediction found(pairs, then, D_, square(noise_));
-      return found.place(kNoise * square(noise_), 0).log_density(own.at, D_) - elsewhere;
+      return found.place(kNoise * square(noise_), 0).log_density(own.at, D_) - background;
     };
     gain = -std::numeric_limits<double>::infinity();
     if (f.marker >= 0)
       if (const auto pairs = carrier_.pair(f.marker, w_.places, w_.places_now); pairs.size() == kSteadiest)
         gain = say(pairs);
     if (gain >= enough) return true;
-    pair_nearest(own.fragment, then);
+    pair_nearest(own.tracklet, then);
     gain = std::max(gain, say(w_.pairs));
     return true;
   }
 
   // Stores the positions of the neighbours of a marker that became occluded. The last detections
   // may already be those of a ghost, so several earlier frames are stored.
-  void remember_around(const Sightings& s, std::int32_t k, Marker& marker) {
-    marker.is_hidden = true;
+  void remember_around(const StitchMemory& s, std::int32_t k, Marker& marker) {
+    marker.is_occluded = true;
     marker.anchors.clear();
     for (const std::int64_t back : Carrier::kAnchors) {
       const Frame* then = s.frames.find(marker.last - back);
@@ -72,28 +72,28 @@ class Bodies {
   // Log-likelihood ratio for a tracklet to be the occluded marker k, predicted by the neighbours of
   // k. For each anchor, it is averaged over some detections of the tracklet, without the worst,
   // which may be a ghost. The anchors are alternatives, so their likelihoods are averaged.
-  double log_odds(const Sightings& s, const Fragment& f, std::int32_t id, std::int32_t k,
+  double log_odds(const StitchMemory& s, const Tracklet& f, std::int32_t id, std::int32_t k,
                   const Marker& marker) {
-    const std::size_t every = std::max<std::size_t>(f.sights.size() / kLooks, 1);
+    const std::size_t every = std::max<std::size_t>(f.detections.size() / kLooks, 1);
     w_.looks.assign(marker.anchors.size(), {});
     Carriage way;
-    for (std::size_t i = 0; i < f.sights.size(); i += every) {
-      const Frame* at = s.frames.find(f.sights[i].frame);
+    for (std::size_t i = 0; i < f.detections.size(); i += every) {
+      const Frame* at = s.frames.find(f.detections[i].frame);
       if (at == nullptr) continue;
       list_markers(s, *at, w_.places);
-      const double not_carried = s.elsewhere.log_density(f.sights[i].at, *at, id);
+      const double not_carried = s.background.log_density(f.detections[i].at, *at, id);
       for (std::size_t a = 0; a < marker.anchors.size(); ++a) {
         // Over long gaps a segment returns to its shape, so the variance does not grow with the
         // gap.
         if (carrier_.carry(k, marker.anchors[a], w_.places, Carrier::kLag, kNoise * square(noise_), way))
-          w_.looks[a].add(way.place.log_density(f.sights[i].at, D_) - not_carried);
+          w_.looks[a].add(way.place.log_density(f.detections[i].at, D_) - not_carried);
       }
     }
-    double most = -std::numeric_limits<double>::infinity(), total = 0;
-    for (const Looks& looks : w_.looks) most = std::max(most, looks.mean());
-    if (most == -std::numeric_limits<double>::infinity()) return most;
-    for (const Looks& looks : w_.looks) total += std::exp(looks.mean() - most);
-    return most + std::log(total / static_cast<double>(w_.looks.size()));
+    double max_gain = -std::numeric_limits<double>::infinity(), total = 0;
+    for (const Looks& looks : w_.looks) max_gain = std::max(max_gain, looks.mean());
+    if (max_gain == -std::numeric_limits<double>::infinity()) return max_gain;
+    for (const Looks& looks : w_.looks) total += std::exp(looks.mean() - max_gain);
+    return max_gain + std::log(total / static_cast<double>(w_.looks.size()));
   }
 
  private:
@@ -105,7 +105,7 @@ class Bodies {
   static double square(double x) { return x * x; }
 
   // Lists the tracklets detected in both frames.
-  void list_common(const Sightings& s, std::int64_t then) {
+  void list_common(const StitchMemory& s, std::int64_t then) {
     if (w_.common_from == then) return;
     w_.common_from = then;
     w_.common.clear();
@@ -113,9 +113,9 @@ class Bodies {
     const auto& before = s.frames.find(then)->seen;
     auto a = before.begin();
     for (const auto& b : s.frames.newest().seen) {
-      while (a != before.end() && a->fragment < b.fragment) ++a;
-      if (a != before.end() && a->fragment == b.fragment)
-        w_.common.push_back({b.fragment, {a->at, b.at, 1}});
+      while (a != before.end() && a->tracklet < b.tracklet) ++a;
+      if (a != before.end() && a->tracklet == b.tracklet)
+        w_.common.push_back({b.tracklet, {a->at, b.at, 1}});
     }
   }
   void pair_nearest(std::int32_t own, const Point& then) {
@@ -130,26 +130,27 @@ class Bodies {
     }
   }
   // Updates the mean log-likelihood ratio with which neighbours predict each detected marker.
-  void judge(const Sightings& s, std::span<const Seen> seen, Markers& markers) {
+  void judge(const StitchMemory& s, std::span<const MarkerPoint> seen, Markers& markers) {
     const Frame* then = s.frames.find(s.frames.now() - Carrier::kLag);
     if (then == nullptr) return;
     list_markers(s, *then, w_.places);
     list_markers(s, s.frames.newest(), w_.places_now);
     carrier_.judge(seen, w_.places, w_.places_now,
-                   [&](const Seen& one, const RigidPrediction& found, const Trust& trust) {
+                   [&](const MarkerPoint& one, const RigidPrediction& found, const Trust& trust) {
       Marker& marker = markers.at(one.marker);
       const double gain =
           carrier_.place(found, trust, Carrier::kLag, kNoise * square(noise_)).log_density(one.at, D_) -
-          s.elsewhere.log_density(one.at, s.frames.newest(), marker.fragment);
+          s.background.log_density(one.at, s.frames.newest(), marker.tracklet);
       marker.trust += 0.2 * (std::clamp(gain, -20.0, 20.0) - marker.trust);
     });
   }
 
   // The positions of the markers in a frame.
-  static void list_markers(const Sightings& s, const Frame& at, Places& places) {
+  static void list_markers(const StitchMemory& s, const Frame& at, Places& places) {
     places.clear();
     for (const auto& one : at.seen)
-      if (const auto f = s.fragments.find(one.fragment); f != s.fragments.end() && f->second.marker >= 0)
+      if (const auto f = s.tracklets.find(one.tracklet);
+          f != s.tracklets.end() && f->second.marker >= 0)
         places.set(f->second.marker, one.at);
   }
 
@@ -179,7 +180,7 @@ class Bodies {
   int D_;
   double noise_;
   Carrier carrier_;
-  Fresh<Memory> w_;  // scratch of one frame
+  Scratch<Memory> w_;  // scratch of one frame
 };
 
 }  // namespace asterism

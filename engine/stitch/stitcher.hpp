@@ -49,7 +49,7 @@ class Stitcher {
       : m_(m),
         opt_(options),
         so_far_{{}, {}, {m.axis.D, options.noise, options.ghost_radius}},
-        bodies_(m.axis.D, options.noise) {}
+        neighbours_(m.axis.D, options.noise) {}
 
   const MotionModel& motion() const { return m_; }
   std::int32_t n_markers() const { return n_markers_; }
@@ -57,42 +57,43 @@ class Stitcher {
   std::int64_t n_cuts() const { return n_cuts_; }
 
   // Supplies advice on the tracklets that begin with a label.
-  void advise(std::int64_t label, const JoinAdvice& advice) { claims_.advise(label, advice); }
+  void advise(std::int64_t label, const JoinAdvice& advice) { assignment_.advise(label, advice); }
 
   // Processes one frame: its points and the tracker's label of each, -1 for none. Writes the
   // tracklet of each point, and calls `decide(decision)`.
   template <typename Decide>
   void step(const MotionStep& step, std::span<const Point> points,
-            std::span<const std::int64_t> labels, std::span<std::int32_t> fragment_of,
+            std::span<const std::int64_t> labels, std::span<std::int32_t> tracklet_of,
             Decide&& decide) {
     so_far_.frames.add(step, static_cast<std::size_t>(opt_.confirm + opt_.max_gap + 2));
-    move_on(step);
-    take_in(points, labels, fragment_of);
-    cut_links(labels, fragment_of);
+    predict_all(step);
+    add_points(points, labels, tracklet_of);
+    cut_links(labels, tracklet_of);
     for (std::size_t i = 0; i < points.size(); ++i)
-      if (fragment_of[i] >= 0) see(fragment_of[i], points[i]);
-    hide();
-    go_on();
+      if (tracklet_of[i] >= 0) add_detection(tracklet_of[i], points[i]);
+    mark_occluded();
+    extrapolate();
     learn();
     decide_due(false, decide);
     forget();
   }
   // The marker of a tracklet: kGhost for none, its best candidate while undecided.
-  std::int32_t marker_of(std::int32_t fragment) const {
-    const Fragment& f = so_far_.fragments.at(fragment);
+  std::int32_t marker_of(std::int32_t tracklet) const {
+    const Tracklet& f = so_far_.tracklets.at(tracklet);
     return f.marker == Decision::kOpen ? f.guess : f.marker;
   }
-  bool is_open(std::int32_t fragment) const {
-    return so_far_.fragments.at(fragment).marker == Decision::kOpen;
+  bool is_open(std::int32_t tracklet) const {
+    return so_far_.tracklets.at(tracklet).marker == Decision::kOpen;
   }
   // The tracklet that a detection with this label would continue, -1 if it would begin one.
-  std::int32_t fragment_with(std::int64_t label) const {
+  std::int32_t tracklet_with(std::int64_t label) const {
     const auto at = of_label_.find(label);
-    return at != of_label_.end() && may_go_on(at->second) ? at->second : -1;
+    return at != of_label_.end() && can_continue(at->second) ? at->second : -1;
   }
   // Computes the best candidates of all undecided tracklets, as if no further frame came.
   void guess() {
-    claims_.guess(so_far_, markers_, bodies_, [this](const Fragment& f) { return is_short(f); });
+    assignment_.guess(so_far_, markers_, neighbours_,
+                      [this](const Tracklet& f) { return is_short(f); });
   }
   // Decides the remaining tracklets after the last frame.
   template <typename Decide>
@@ -101,74 +102,76 @@ class Stitcher {
   }
 
  private:
-  static constexpr std::int32_t kMotionSights = 4;   // detections over which motions are compared
+  static constexpr std::int32_t kMotionDetections = 4;  // over which motions are compared
   static constexpr std::int64_t kMotionFrames = 120;  // longest extrapolation of a motion
   // A link is cut if its log-likelihood ratio is at most the first value, and below the tracklet's
   // average by the second. The new tracklet starts with an average lowered by the third.
-  static constexpr double kContradicted = 3, kFall = 8, kDoubted = 3;
+  static constexpr double kContradicted = 3, kFall = 8, kCutPenalty = 3;
   // mean over the markers above which rigid prediction is considered reliable
   static constexpr double kTrusted = 2;
 
   std::int64_t now() const { return so_far_.frames.now(); }
-  bool is_over(const Fragment& f) const { return now() - f.last > opt_.max_gap; }
-  bool is_brief(const Fragment& f) const { return f.last - f.first + 1 < opt_.confirm; }
-  bool is_short(const Fragment& f) const { return is_over(f) && is_brief(f); }
+  bool is_over(const Tracklet& f) const { return now() - f.last > opt_.max_gap; }
+  bool is_brief(const Tracklet& f) const { return f.last - f.first + 1 < opt_.confirm; }
+  bool is_short(const Tracklet& f) const { return is_over(f) && is_brief(f); }
 
-  void move_on(const MotionStep& step) {
-    for (auto& [id, f] : so_far_.fragments) {
-      if (f.marker != Decision::kOpen || f.n >= kMotionSights) continue;
+  void predict_all(const MotionStep& step) {
+    for (auto& [id, f] : so_far_.tracklets) {
+      if (f.marker != Decision::kOpen || f.n >= kMotionDetections) continue;
       predict(m_, step, f.state);
       for (Continuation& c : f.continuations) predict(m_, step, c.state);
     }
     for (auto& [id, marker] : markers_)
-      if (marker.is_hidden && now() - marker.last <= kMotionFrames) predict(m_, step, marker.state);
+      if (marker.is_occluded && now() - marker.last <= kMotionFrames)
+        predict(m_, step, marker.state);
   }
 
-  void take_in(std::span<const Point> points, std::span<const std::int64_t> labels,
-               std::span<std::int32_t> fragment_of) {
+  void add_points(std::span<const Point> points, std::span<const std::int64_t> labels,
+               std::span<std::int32_t> tracklet_of) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      fragment_of[i] = labels[i] < 0 ? -1 : fragment_with(labels[i]);
-      if (labels[i] >= 0 && fragment_of[i] < 0) fragment_of[i] = begin(labels[i]);
+      tracklet_of[i] = labels[i] < 0 ? -1 : tracklet_with(labels[i]);
+      if (labels[i] >= 0 && tracklet_of[i] < 0) tracklet_of[i] = begin(labels[i]);
     }
     for (std::size_t i = 0; i < points.size(); ++i)
-      if (fragment_of[i] >= 0)
-        so_far_.frames.newest().seen.push_back({fragment_of[i], points[i], static_cast<std::int32_t>(i)});
+      if (tracklet_of[i] >= 0)
+        so_far_.frames.newest().seen.push_back(
+            {tracklet_of[i], points[i], static_cast<std::int32_t>(i)});
     so_far_.frames.newest().sort();
   }
   // A tracklet cannot continue if it is over, or if its marker was found in another tracklet.
-  bool may_go_on(std::int32_t id) const {
-    const auto at = so_far_.fragments.find(id);
-    if (at == so_far_.fragments.end() || is_over(at->second)) return false;
+  bool can_continue(std::int32_t id) const {
+    const auto at = so_far_.tracklets.find(id);
+    if (at == so_far_.tracklets.end() || is_over(at->second)) return false;
     if (at->second.marker < 0) return at->second.marker == Decision::kOpen;
     const auto marker = markers_.find(at->second.marker);
-    return marker != markers_.end() && marker->second.fragment == id;
+    return marker != markers_.end() && marker->second.tracklet == id;
   }
   std::int32_t begin(std::int64_t label) {
-    const std::int32_t id = n_fragments_++;
-    Fragment& f = so_far_.fragments[id];
+    const std::int32_t id = n_tracklets_++;
+    Tracklet& f = so_far_.tracklets[id];
     f.label = label;
-    f.known = usual_;
+    f.known = usual_gain_;
     f.first = f.last = now();
     of_label_[label] = id;
     return id;
   }
 
-  bool is_beside(const Fragment& f, std::int32_t own) const {
-    std::size_t n = 0, n_beside = 0;
-    for (const FragmentPoint& sight : f.sights)
-      if (const Frame* at = so_far_.frames.find(sight.frame); at != nullptr) {
+  bool may_be_ghost_of_another(const Tracklet& f, std::int32_t own) const {
+    std::size_t n = 0, n_near = 0;
+    for (const TrackletPoint& detection : f.detections)
+      if (const Frame* at = so_far_.frames.find(detection.frame); at != nullptr) {
         ++n;
-        n_beside += so_far_.elsewhere.is_beside(sight.at, *at, own);
+        n_near += so_far_.background.is_near_another(detection.at, *at, own);
       }
-    return 2 * n_beside > n;
+    return 2 * n_near > n;
   }
 
   // Whether neighbours predict the detected markers well on average.
-  bool has_bodies() const {
+  bool is_rigid() const {
     double sum = 0;
     std::size_t n = 0;
     for (const auto& [k, marker] : markers_)
-      if (!marker.is_hidden) {
+      if (!marker.is_occluded) {
         sum += marker.trust;
         ++n;
       }
@@ -176,39 +179,39 @@ class Stitcher {
   }
 
   // Cuts the links into the newest frame that neighbours contradict.
-  void cut_links(std::span<const std::int64_t> labels, std::span<std::int32_t> fragment_of) {
+  void cut_links(std::span<const std::int64_t> labels, std::span<std::int32_t> tracklet_of) {
     Frame& now = so_far_.frames.newest();
     w_.cut.clear();
-    bodies_.begin_links(so_far_);
+    neighbours_.begin_links(so_far_);
     for (Frame::One& one : now.seen) {
-      Fragment& f = so_far_.fragments.at(one.fragment);
+      Tracklet& f = so_far_.tracklets.at(one.tracklet);
       if (f.n == 0 || so_far_.frames.find(f.last) == nullptr) continue;
-      const double least = std::min(kContradicted, f.known - kFall);
+      const double min_gain = std::min(kContradicted, f.known - kFall);
       double gain = 0;
-      if (!bodies_.link(so_far_, one, f, f.known, gain)) continue;
-      if (opt_.may_cut && gain < least) {
+      if (!neighbours_.link(so_far_, one, f, f.known, gain)) continue;
+      if (opt_.may_cut && gain < min_gain) {
         w_.cut.push_back(&one);
       } else {
         f.known += 0.2 * (gain - f.known);
-        usual_ += 0.01 * (gain - usual_);
+        usual_gain_ += 0.01 * (gain - usual_gain_);
       }
     }
     if (w_.cut.empty()) return;
     n_cuts_ += static_cast<std::int64_t>(w_.cut.size());
     for (Frame::One* one : w_.cut) {
-      const double known = so_far_.fragments.at(one->fragment).known - kDoubted;
-      one->fragment = fragment_of[one->point] = begin(labels[one->point]);
-      so_far_.fragments.at(one->fragment).known = known;
+      const double known = so_far_.tracklets.at(one->tracklet).known - kCutPenalty;
+      one->tracklet = tracklet_of[one->point] = begin(labels[one->point]);
+      so_far_.tracklets.at(one->tracklet).known = known;
     }
     now.sort();
   }
-  void see(std::int32_t id, const Point& y) {
-    so_far_.elsewhere.add(y);
-    Fragment& f = so_far_.fragments.at(id);
+  void add_detection(std::int32_t id, const Point& y) {
+    so_far_.background.add(y);
+    Tracklet& f = so_far_.tracklets.at(id);
     if (f.marker >= 0) {
       Marker& marker = markers_.at(f.marker);
-      if (marker.is_hidden) {
-        marker.is_hidden = false;
+      if (marker.is_occluded) {
+        marker.is_occluded = false;
         marker.anchors.clear();
       }
       marker.last = f.last = now();
@@ -217,31 +220,32 @@ class Stitcher {
     }
     if (f.n == 0) {
       f.state = begin_state(m_, y);
-    } else if (f.n < kMotionSights) {
+    } else if (f.n < kMotionDetections) {
       f.alone += update(m_, Prediction(m_, f.state), y, f.state);
       for (Continuation& c : f.continuations)
         c.log_likelihood += update(m_, Prediction(m_, c.state), y, c.state);
     }
     ++f.n;
     f.last = now();
-    if (static_cast<std::int64_t>(f.sights.size()) < opt_.confirm) f.sights.push_back({now(), y});
+    if (static_cast<std::int64_t>(f.detections.size()) < opt_.confirm)
+      f.detections.push_back({now(), y});
   }
   // Stores the motion and the neighbours of each marker that became occluded.
-  void hide() {
+  void mark_occluded() {
     for (auto& [k, marker] : markers_)
-      if (!marker.is_hidden && marker.last < now()) hide(k, marker);
+      if (!marker.is_occluded && marker.last < now()) mark_occluded(k, marker);
   }
-  void hide(std::int32_t k, Marker& marker) {
-    bodies_.remember_around(so_far_, k, marker);
-    marker.state = so_far_.frames.motion(m_, marker.fragment);
+  void mark_occluded(std::int32_t k, Marker& marker) {
+    neighbours_.remember_around(so_far_, k, marker);
+    marker.state = so_far_.frames.motion(m_, marker.tracklet);
   }
   // Extrapolates every occluded marker's motion to the tracklets that begin in this frame.
-  void go_on() {
+  void extrapolate() {
     for (const auto& one : so_far_.frames.newest().seen) {
-      Fragment& f = so_far_.fragments.at(one.fragment);
+      Tracklet& f = so_far_.tracklets.at(one.tracklet);
       if (f.n != 1 || f.marker != Decision::kOpen) continue;
       for (const auto& [k, marker] : markers_) {
-        if (!marker.is_hidden || now() - marker.last > kMotionFrames) continue;
+        if (!marker.is_occluded || now() - marker.last > kMotionFrames) continue;
         Continuation& c = f.continuations.emplace_back(Continuation{k, marker.state, 0});
         c.log_likelihood = update(m_, Prediction(m_, c.state), one.at, c.state);
       }
@@ -250,52 +254,53 @@ class Stitcher {
   void learn() {
     w_.seen.clear();
     for (const auto& one : so_far_.frames.newest().seen)
-      if (const std::int32_t k = so_far_.fragments.at(one.fragment).marker; k >= 0)
+      if (const std::int32_t k = so_far_.tracklets.at(one.tracklet).marker; k >= 0)
         w_.seen.push_back({k, one.at});
-    bodies_.learn(so_far_, w_.seen, markers_);
+    neighbours_.learn(so_far_, w_.seen, markers_);
   }
   template <typename Decide>
   void decide_due(bool is_end, Decide&& decide) {
     w_.due.clear();
-    for (const auto& [id, f] : so_far_.fragments)
+    for (const auto& [id, f] : so_far_.tracklets)
       if (f.marker == Decision::kOpen &&
           (is_end || is_over(f) || (f.last == now() && now() - f.first + 1 >= opt_.confirm)))
         w_.due.push_back(id);
-    std::sort(w_.due.begin(), w_.due.end(), [&](std::int32_t a, std::int32_t b) {
-      return std::pair(so_far_.fragments.at(a).first, a) < std::pair(so_far_.fragments.at(b).first, b);
+    std::ranges::sort(w_.due, {}, [&](std::int32_t id) {
+      return std::pair(so_far_.tracklets.at(id).first, id);
     });
     for (const std::int32_t id : w_.due) decide(decide_upon(id));
   }
 
   Decision decide_upon(std::int32_t id) {
-    Fragment& f = so_far_.fragments.at(id);
+    Tracklet& f = so_far_.tracklets.at(id);
     Decision out{id};
-    std::tie(out.marker, out.probability) = claims_.best(
-        so_far_, markers_, bodies_, id, [this](const Fragment& g) { return is_short(g); });
+    std::tie(out.marker, out.probability) = assignment_.best(
+        so_far_, markers_, neighbours_, id, [this](const Tracklet& g) { return is_short(g); });
     if (out.marker == Decision::kOpen) {
       // A tracklet that begins just before the end of the capture is short for that reason alone.
       const bool is_late = is_brief(f) && f.first >= opt_.confirm;
-      const bool may_be_ghost = (is_short(f) || is_late) && (has_bodies() || is_beside(f, id));
+      const bool may_be_ghost =
+          (is_short(f) || is_late) && (is_rigid() || may_be_ghost_of_another(f, id));
       out.marker = may_be_ghost ? Decision::kGhost : n_markers_++;
     }
     f.marker = out.marker;
     if (out.marker < 0) return out;
     Marker& marker = markers_[out.marker];
-    out.after = marker.fragment;
-    marker.fragment = id;
+    out.after = marker.tracklet;
+    marker.tracklet = id;
     marker.label = f.label;
     marker.last = f.last;
-    marker.is_hidden = false;
-    if (f.last < now()) hide(out.marker, marker);
-    f.sights.clear();
+    marker.is_occluded = false;
+    if (f.last < now()) mark_occluded(out.marker, marker);
+    f.detections.clear();
     f.continuations.clear();
     return out;
   }
 
   // Removes tracklets that cannot continue, and markers occluded for long.
   void forget() {
-    for (auto at = so_far_.fragments.begin(); at != so_far_.fragments.end();) {
-      const Fragment& f = at->second;
+    for (auto at = so_far_.tracklets.begin(); at != so_far_.tracklets.end();) {
+      const Tracklet& f = at->second;
       const bool is_gone = f.marker != Decision::kOpen &&
                            now() - f.last > opt_.confirm + 2 * opt_.max_gap + 2;
       if (!is_gone) {
@@ -304,7 +309,7 @@ class Stitcher {
       }
       if (const auto of = of_label_.find(f.label); of != of_label_.end() && of->second == at->first)
         of_label_.erase(of);
-      at = so_far_.fragments.erase(at);
+      at = so_far_.tracklets.erase(at);
     }
     if (opt_.max_hidden == 0) return;
     for (auto at = markers_.begin(); at != markers_.end();) {
@@ -312,28 +317,28 @@ class Stitcher {
         ++at;
         continue;
       }
-      bodies_.forget(at->first);
+      neighbours_.forget(at->first);
       at = markers_.erase(at);
     }
   }
 
   struct Memory {
     std::vector<Frame::One*> cut;
-    std::vector<Seen> seen;
+    std::vector<MarkerPoint> seen;
     std::vector<std::int32_t> due;
   };
 
   MotionModel m_;
   StitchOptions opt_;
-  std::int32_t n_fragments_ = 0, n_markers_ = 0;
+  std::int32_t n_tracklets_ = 0, n_markers_ = 0;
   std::int64_t n_cuts_ = 0;
-  double usual_ = 0;  // mean log-likelihood ratio of a link by neighbours
-  Sightings so_far_;
+  double usual_gain_ = 0;  // mean log-likelihood ratio of a link by neighbours
+  StitchMemory so_far_;
   Markers markers_;
   std::unordered_map<std::int64_t, std::int32_t> of_label_;
-  Bodies bodies_;
-  Claims claims_;
-  Fresh<Memory> w_;  // scratch of one frame
+  RigidNeighbours neighbours_;
+  TrackletAssignment assignment_;
+  Scratch<Memory> w_;  // scratch of one frame
 };
 
 }  // namespace asterism

@@ -23,13 +23,13 @@ namespace asterism {
 // Advice that a tracklet continues the marker with a label. The log odds of that marker rise by
 // `weight`, those of all others fall by half of it.
 struct JoinAdvice {
-  std::int64_t goes_on_with = 0;
+  std::int64_t continues = 0;
   double weight = 0;
 };
 
-class Claims {
+class TrackletAssignment {
  public:
-  static constexpr double kWorth = 0.25;  // factor of log odds in a probability
+  static constexpr double kOddsFactor = 0.25;  // factor of log odds in a probability
 
   // Supplies advice on the tracklets that begin with a label.
   void advise(std::int64_t label, const JoinAdvice& advice) { advice_[label] = advice; }
@@ -37,18 +37,19 @@ class Claims {
   // The marker of a tracklet, kOpen if it is none of the occluded ones, and the probability.
   // `is_short` identifies tracklets that were over before their decision.
   template <typename IsShort>
-  std::pair<std::int32_t, double> best(const Sightings& s, const Markers& markers, Bodies& bodies,
-                                       std::int32_t id, IsShort&& is_short) {
-    const Fragment& f = s.fragments.at(id);
-    double most = kNever;
+  std::pair<std::int32_t, double> best(const StitchMemory& s, const Markers& markers,
+                                       RigidNeighbours& neighbours, std::int32_t id,
+                                       IsShort&& is_short) {
+    const Tracklet& f = s.tracklets.at(id);
+    double max_gain = kNever;
     w_.scored.clear();
     for (const auto& [k, marker] : markers) {
-      const double gain = score(s, bodies, id, k, marker, is_short(f));
-      most = std::max(most, gain);
+      const double gain = score(s, neighbours, id, k, marker, is_short(f));
+      max_gain = std::max(max_gain, gain);
       if (gain > 0) w_.scored.emplace_back(k, gain);
     }
     const auto n = static_cast<std::int32_t>(w_.scored.size());
-    const std::pair none(Decision::kOpen, 1 / (1 + odds(most)));
+    const std::pair none(Decision::kOpen, 1 / (1 + odds(max_gain)));
     if (n == 0) return none;
     w_.candidates.clear();
     w_.rivals.assign(n, 1);  // Σ of the odds of all candidates of this marker, and of none
@@ -58,13 +59,13 @@ class Claims {
       all += odds(w_.scored[c].second);
     }
     std::int32_t row = 0;
-    for (const auto& [other, g] : s.fragments) {
+    for (const auto& [other, g] : s.tracklets) {
       if (other == id || g.marker != Decision::kOpen || g.n == 0) continue;
       if (g.last < f.first || g.first > f.last) continue;  // both may be the same marker
       ++row;
       for (std::int32_t c = 0; c < n; ++c) {
         const std::int32_t k = w_.scored[c].first;
-        const double gain = score(s, bodies, other, k, markers.at(k), is_short(g));
+        const double gain = score(s, neighbours, other, k, markers.at(k), is_short(g));
         if (!(gain > 0)) continue;
         w_.candidates.push_back({row, c, gain, 0});
         w_.rivals[c] += odds(gain);
@@ -81,29 +82,30 @@ class Claims {
   // Computes the best candidates of the undecided tracklets. A tracklet is compared again whenever
   // its number of detections has doubled.
   template <typename IsShort>
-  void guess(Sightings& s, const Markers& markers, Bodies& bodies, IsShort&& is_short) {
+  void guess(StitchMemory& s, const Markers& markers, RigidNeighbours& neighbours,
+             IsShort&& is_short) {
     w_.open.clear();
     w_.candidates.clear();
-    for (auto& [id, f] : s.fragments) {
+    for (auto& [id, f] : s.tracklets) {
       f.guess = -1;
       if (f.marker != Decision::kOpen || f.n == 0) continue;
       if (std::has_single_bit(static_cast<std::uint32_t>(f.n)) && f.last == s.frames.now()) {
         f.guesses.clear();
         for (const auto& [k, marker] : markers)
-          if (const double gain = score(s, bodies, id, k, marker, is_short(f)); gain > 0)
+          if (const double gain = score(s, neighbours, id, k, marker, is_short(f)); gain > 0)
             f.guesses.emplace_back(k, gain);
       }
       const auto row = static_cast<std::int32_t>(w_.open.size());
       w_.open.push_back(id);
       for (const auto& [k, gain] : f.guesses)
-        if (const auto at = markers.find(k); at != markers.end() && at->second.is_hidden)
+        if (const auto at = markers.find(k); at != markers.end() && at->second.is_occluded)
           w_.candidates.push_back({row, k, gain, 0});
     }
     if (w_.candidates.empty()) return;
     w_.match.assign(w_.open.size(), -1);
     w_.assignment.solve(w_.candidates, w_.match);
     for (std::size_t row = 0; row < w_.open.size(); ++row)
-      s.fragments.at(w_.open[row]).guess = w_.match[row];
+      s.tracklets.at(w_.open[row]).guess = w_.match[row];
   }
 
  private:
@@ -111,35 +113,37 @@ class Claims {
   // Prior log odds that a tracklet is a reappearing marker: of a short one, and of others.
   static constexpr double kShort = -8, kLong = 2;
   // smallest weight of the motion if rigid prediction is trusted
-  static constexpr double kLeastMotion = 0.005;
+  static constexpr double kMinMotion = 0.005;
 
   // Errors of neighbours are correlated, and so are those of successive detections, so the sum of
   // their log-likelihood ratios overstates the evidence. The factor was measured on captures with
   // known truth.
-  static double odds(double gain) { return std::exp(std::min(kWorth * gain, 500.0)); }
+  static double odds(double gain) { return std::exp(std::min(kOddsFactor * gain, 500.0)); }
 
   // Log odds that a tracklet is the reappearing marker k.
-  double score(const Sightings& s, Bodies& bodies, std::int32_t id, std::int32_t k,
+  double score(const StitchMemory& s, RigidNeighbours& neighbours, std::int32_t id, std::int32_t k,
                const Marker& marker, bool is_short) const {
-    const Fragment& f = s.fragments.at(id);
-    if (!marker.is_hidden || marker.last >= f.first) return kNever;
-    const double body = bodies.log_odds(s, f, id, k, marker), motion = by_motion(s, f, id, k);
-    const double at_rest = std::clamp(1 / (1 + std::exp(marker.trust)), kLeastMotion, 0.5);
+    const Tracklet& f = s.tracklets.at(id);
+    if (!marker.is_occluded || marker.last >= f.first) return kNever;
+    const double body = neighbours.log_odds(s, f, id, k, marker), motion = by_motion(s, f, id, k);
+    const double at_rest = std::clamp(1 / (1 + std::exp(marker.trust)), kMinMotion, 0.5);
     const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
     const double both = log_sum(a, b);
     return both == kNever ? kNever : both + (is_short ? kShort : kLong) + advised(f, marker);
   }
-  static double by_motion(const Sightings& s, const Fragment& f, std::int32_t id, std::int32_t k) {
+  static double by_motion(const StitchMemory& s, const Tracklet& f, std::int32_t id,
+                          std::int32_t k) {
     for (const Continuation& c : f.continuations)
       if (c.marker == k)
         if (const Frame* at = s.frames.find(f.first); at != nullptr)
-          return c.log_likelihood - f.alone - s.elsewhere.log_density(f.sights.front().at, *at, id);
+          return c.log_likelihood - f.alone -
+                 s.background.log_density(f.detections.front().at, *at, id);
     return kNever;
   }
-  double advised(const Fragment& f, const Marker& marker) const {
+  double advised(const Tracklet& f, const Marker& marker) const {
     const auto at = advice_.find(f.label);
     if (at == advice_.end()) return 0;
-    return marker.label == at->second.goes_on_with ? at->second.weight : -0.5 * at->second.weight;
+    return marker.label == at->second.continues ? at->second.weight : -0.5 * at->second.weight;
   }
 
   struct Memory {
@@ -151,7 +155,7 @@ class Claims {
   };
 
   std::unordered_map<std::int64_t, JoinAdvice> advice_;
-  Fresh<Memory> w_;  // scratch of one comparison
+  Scratch<Memory> w_;  // scratch of one comparison
 };
 
 }  // namespace asterism

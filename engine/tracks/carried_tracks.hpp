@@ -44,20 +44,21 @@ class CarriedTracks {
 
   // Predicts every track to a frame and lists its candidates (see LiveTracks::list). The last
   // `n_open` frames before it have not been passed to `learn`.
-  template <typename Least, typename Gain>
+  template <typename MinLogLikelihood, typename Gain>
   void list(LiveTracks<>& live, double time, const MotionStep& step, std::span<const Point> points,
-            double least_gain, Least&& least, Gain&& gain, std::vector<Candidate>& out,
-            FrameStats& stats, std::int64_t n_open = 0) {
+            double min_gain, MinLogLikelihood&& min_log_likelihood, Gain&& gain,
+            std::vector<Candidate>& out, FrameStats& stats, std::int64_t n_open = 0) {
     live.predict_all(step);
     out.clear();
     // Bonds can raise a gain by up to the weight, so the threshold is lowered by it.
-    const auto list = [&](auto&& is_asked, std::vector<Candidate>& to) {
-      live.list(time, points, least_gain - opt_.bond_weight, is_asked, least, gain, to);
+    const auto list = [&](auto&& is_selected, std::vector<Candidate>& to) {
+      live.list(time, points, min_gain - opt_.bond_weight, is_selected, min_log_likelihood, gain,
+                to);
     };
     if (!opt_.is_on) return list([](std::size_t) { return true; }, out);
     list([&](std::size_t i) { return live[i].gap == 0; }, out);
-    place_seen(live, points, out);
-    place_hidden(live, n_open);
+    fix_positions(live, points, out);
+    predict_occluded(live, n_open);
     s_.alone.clear();
     list([&](std::size_t i) { return s_.is_carried[i] != 0; }, s_.alone);
     s_.own.resize(live.size());
@@ -69,8 +70,8 @@ class CarriedTracks {
     list([&](std::size_t i) { return live[i].gap > 0; }, out);
     std::ranges::stable_sort(out, {}, &Candidate::row);
     add_alone(out);
-    weigh(live, points, least_gain, out, stats);
-    count_refused(least_gain, out, stats);
+    weigh(live, points, min_gain, out, stats);
+    count_refused(min_gain, out, stats);
   }
 
   // Completes the update of track i: with a detection at y, or without one.
@@ -84,8 +85,8 @@ class CarriedTracks {
       live[i].state = s_.fused[i];
   }
   void miss(LiveTrack<>& track, std::size_t i, FrameStats& stats) const {
-    if (opt_.is_on && s_.heir[i] >= 0) track.gap = max_gap_ + track.carried;
-    if (!is_carried(i) || s_.is_doubtful[i] || track.gap > opt_.max_carried) return;
+    if (opt_.is_on && s_.replaced_by[i] >= 0) track.gap = max_gap_ + track.carried;
+    if (!is_carried(i) || s_.is_uncertain[i] || track.gap > opt_.max_carried) return;
     ++track.carried;
     ++stats.n_carried;
   }
@@ -94,14 +95,14 @@ class CarriedTracks {
   // Results of `list` for track i: its carried position, whether that position is too uncertain to
   // keep the track alive, the reappearing track in whose favour it is deleted (or -1), and the
   // contributions of bonds to its ambiguous candidates.
-  struct Told {
+  struct BondGain {
     std::int32_t row = 0, column = 0;
     double nats = 0;
   };
   const Carried& place(std::size_t i) const { return s_.place[i]; }
-  bool is_doubtful(std::size_t i) const { return s_.is_doubtful[i] != 0; }
-  std::int32_t heir(std::size_t i) const { return s_.heir[i]; }
-  std::span<const Told> told() const { return s_.told; }
+  bool is_uncertain(std::size_t i) const { return s_.is_uncertain[i] != 0; }
+  std::int32_t replaced_by(std::size_t i) const { return s_.replaced_by[i]; }
+  std::span<const BondGain> bond_gains() const { return s_.bond_gains; }
 
   // Updates the bonds after a frame.
   template <typename More>
@@ -116,7 +117,7 @@ class CarriedTracks {
     }
     std::sort(s_.known.begin(), s_.known.end());
     std::sort(s_.seen.begin(), s_.seen.end(),
-              [](const Seen& a, const Seen& b) { return a.marker < b.marker; });
+              [](const MarkerPoint& a, const MarkerPoint& b) { return a.marker < b.marker; });
     for (const std::int32_t marker : known_)
       if (!std::binary_search(s_.known.begin(), s_.known.end(), marker)) carrier_.forget(marker);
     known_.assign(s_.known.begin(), s_.known.end());
@@ -128,7 +129,7 @@ class CarriedTracks {
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
   // A position is uncertain if its standard deviation exceeds this fraction of the distance to the
   // nearest neighbour.
-  static constexpr double kDoubtful = 0.25;
+  static constexpr double kUncertain = 0.25;
   static constexpr std::size_t kFew = 3;  // bonds
 
   template <typename More>
@@ -137,7 +138,7 @@ class CarriedTracks {
   }
 
   // Fixes the positions of tracks and detections that are each other's best candidate.
-  void place_seen(const LiveTracks<>& live, std::span<const Point> points,
+  void fix_positions(const LiveTracks<>& live, std::span<const Point> points,
                   std::span<const Candidate> candidates) {
     s_.best_row.assign(points.size(), -1);
     s_.best_column.assign(live.size(), -1);
@@ -160,9 +161,9 @@ class CarriedTracks {
     }
   }
 
-  void place_hidden(const LiveTracks<>& live, std::int64_t n_open) {
+  void predict_occluded(const LiveTracks<>& live, std::int64_t n_open) {
     s_.is_carried.assign(live.size(), 0);
-    s_.is_doubtful.assign(live.size(), 0);
+    s_.is_uncertain.assign(live.size(), 0);
     s_.place.resize(live.size());
     s_.fused.resize(live.size());
     s_.ghosts.assign(live.size(), 0);
@@ -176,8 +177,8 @@ class CarriedTracks {
       if (!fused) continue;
       s_.fused[i] = *fused;
       s_.place[i] = found.place;
-      const double doubtful = kDoubtful * found.nearest;
-      s_.is_doubtful[i] = !(found.place.variance < doubtful * doubtful);
+      const double max_deviation = kUncertain * found.nearest;
+      s_.is_uncertain[i] = !(found.place.variance < max_deviation * max_deviation);
       s_.is_carried[i] = 1;
       // A ghost is given the likelihood of the marker itself, spread over its neighbourhood.
       const int D = live.m.axis.D;
@@ -209,7 +210,7 @@ class CarriedTracks {
     std::ranges::stable_sort(out, {}, &Candidate::row);
   }
   // Applies ghosts and bonds to the gains of the candidates.
-  void weigh(const LiveTracks<>& live, std::span<const Point> points, double least_gain,
+  void weigh(const LiveTracks<>& live, std::span<const Point> points, double min_gain,
              std::vector<Candidate>& out, FrameStats& stats) {
     s_.n_rows.assign(points.size(), 0);
     s_.n_columns.assign(live.size(), 0);
@@ -217,26 +218,26 @@ class CarriedTracks {
       ++s_.n_rows[c.column];
       ++s_.n_columns[c.row];
     }
-    const auto is_in_doubt = [&](const Candidate& c) {
+    const auto is_ambiguous = [&](const Candidate& c) {
       return s_.n_rows[c.column] > 1 || s_.n_columns[c.row] > 1 ||
-             c.gain - opt_.bond_weight <= least_gain;
+             c.gain - opt_.bond_weight <= min_gain;
     };
-    s_.told.clear();
+    s_.bond_gains.clear();
     std::int32_t row = -1;
     for (Candidate& c : out) {
       if (!live[c.row].is_confirmed()) continue;
-      const bool was_listed = c.gain > least_gain;
-      if (opt_.bond_weight > 0 && is_in_doubt(c)) {
-        if (row != c.row) list_bonds(live[row = c.row]);
-        s_.told.push_back({c.row, c.column, says(points, c)});
-        c.gain += s_.told.back().nats;
+      const bool was_listed = c.gain > min_gain;
+      if (opt_.bond_weight > 0 && is_ambiguous(c)) {
+        if (row != c.row) list_detected_bonds(live[row = c.row]);
+        s_.bond_gains.push_back({c.row, c.column, bond_gain(points, c)});
+        c.gain += s_.bond_gains.back().nats;
       }
       if (is_carried(c.row) && (!(c.gain > s_.ghosts[c.row]) || !may_take(live, c))) c.gain = kNever;
       // Occluded tracks are counted in count_refused, against their own predictions.
-      stats.n_refused += was_listed && !is_carried(c.row) && !(c.gain > least_gain);
+      stats.n_refused += was_listed && !is_carried(c.row) && !(c.gain > min_gain);
     }
-    succeed(live, out);
-    std::erase_if(out, [&](const Candidate& c) { return !(c.gain > least_gain); });
+    replace_reappeared(live, out);
+    std::erase_if(out, [&](const Candidate& c) { return !(c.gain > min_gain); });
   }
   bool may_take(const LiveTracks<>& live, const Candidate& c) const {
     const std::int32_t owner = s_.owner[c.column];
@@ -244,21 +245,21 @@ class CarriedTracks {
   }
   // If a new track is an occluded track reappearing, the new track is deleted and the old one
   // continues.
-  void succeed(const LiveTracks<>& live, std::vector<Candidate>& out) {
-    s_.heir.assign(live.size(), -1);
+  void replace_reappeared(const LiveTracks<>& live, std::vector<Candidate>& out) {
+    s_.replaced_by.assign(live.size(), -1);
     for (std::int32_t e = 0; e < static_cast<std::int32_t>(out.size()); ++e) {
       const Candidate& c = out[e];
       if (!is_carried(c.row) || c.gain == kNever || s_.owner[c.column] < 0) continue;
-      std::int32_t& heir = s_.heir[s_.owner[c.column]];
-      if (heir < 0 || c.gain > out[heir].gain) heir = e;
+      std::int32_t& replaced_by = s_.replaced_by[s_.owner[c.column]];
+      if (replaced_by < 0 || c.gain > out[replaced_by].gain) replaced_by = e;
     }
-    for (std::int32_t& heir : s_.heir)
-      if (heir >= 0) heir = out[heir].row;
+    for (std::int32_t& replaced_by : s_.replaced_by)
+      if (replaced_by >= 0) replaced_by = out[replaced_by].row;
     for (Candidate& c : out)
-      if (s_.heir[c.row] >= 0) c.gain = kNever;
+      if (s_.replaced_by[c.row] >= 0) c.gain = kNever;
   }
 
-  void list_bonds(const LiveTrack<>& track) {
+  void list_detected_bonds(const LiveTrack<>& track) {
     s_.bonds.clear();
     for (const Bond& bond : carrier_.bonds(number(track))) {
       if (s_.places.find(bond.other) == nullptr) continue;
@@ -267,7 +268,7 @@ class CarriedTracks {
     }
   }
   // Contribution of bonds, bounded by ± the weight. With fewer than kFew bonds it is smaller.
-  double says(std::span<const Point> points, const Candidate& c) const {
+  double bond_gain(std::span<const Point> points, const Candidate& c) const {
     double sum = 0;
     for (const Bond& bond : s_.bonds) {
       const Point& other = *s_.places.find(bond.other);
@@ -279,31 +280,31 @@ class CarriedTracks {
   }
 
   // Counts detections that an occluded track would have taken by its own prediction.
-  void count_refused(double least_gain, std::span<const Candidate> out, FrameStats& stats) const {
+  void count_refused(double min_gain, std::span<const Candidate> out, FrameStats& stats) const {
     for (const Candidate& own : s_.alone)
-      if (own.gain > least_gain) stats.n_refused += find_same(out, own) == out.size();
+      if (own.gain > min_gain) stats.n_refused += find_same(out, own) == out.size();
   }
 
   struct Memory {
-    std::vector<char> is_carried, is_doubtful;
+    std::vector<char> is_carried, is_uncertain;
     std::vector<Carried> place;
-    std::vector<Told> told;
+    std::vector<BondGain> bond_gains;
     std::vector<MotionState> fused;
     std::vector<Prediction> own;
     std::vector<double> ghosts;  // log(1 + density of ghosts / density of clutter), by track
-    std::vector<std::int32_t> best_row, best_column, owner, heir, n_rows, n_columns;
+    std::vector<std::int32_t> best_row, best_column, owner, replaced_by, n_rows, n_columns;
     std::vector<Candidate> alone, added;
     std::vector<Bond> bonds;
-    std::vector<Seen> seen;
+    std::vector<MarkerPoint> seen;
     std::vector<std::int32_t> known;
     Places places;
   };
 
   CarryOptions opt_;
   std::int32_t max_gap_;
-  BodyCarrier carrier_;
+  RigidCarrier carrier_;
   std::vector<std::int32_t> known_;
-  Fresh<Memory> s_;
+  Scratch<Memory> s_;
 };
 
 }  // namespace asterism

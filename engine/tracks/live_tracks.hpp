@@ -61,7 +61,7 @@ struct LiveTrack {
 
   bool is_confirmed() const { return id >= 0; }
   // missed frames without a prediction from neighbours
-  std::int32_t untold() const { return gap - carried; }
+  std::int32_t unpredicted() const { return gap - carried; }
 };
 
 // Statistics of one frame or of many: counts are summed, sizes are maxima. Trackers with further
@@ -114,7 +114,7 @@ struct Progress {
 // Working memory of one step.
 struct GateMemory {
   std::vector<Prediction> predictions;
-  std::vector<std::size_t> asked;
+  std::vector<std::size_t> selected;
   std::vector<double> radii;  // of these tracks
   PointGrid grid;
 };
@@ -142,7 +142,7 @@ class LiveTracks {
   double birth_gain() const { return sm.log_birth + sm.log_detect - sm.log_clutter; }
   // Gain of a detection without its likelihood, after `missed` missed frames.
   double hit_gain(std::int64_t missed) const {
-    return sm.log_survive + sm.log_seen(missed) - sm.log_clutter;
+    return sm.log_survive + sm.log_hit(missed) - sm.log_clutter;
   }
   double miss_gain(std::int64_t missed) const { return sm.log_survive + sm.log_missed(missed); }
   double misses_gain(std::int64_t missed, std::int64_t n) const {
@@ -151,35 +151,36 @@ class LiveTracks {
   // A detection that no track takes is clutter or a new marker.
   double leftover_gain() const { return softplus(birth_gain()); }
 
-  // Adds the candidates within the gates of the tracks for which is_asked(i) holds, ordered by
+  // Adds the candidates within the gates of the tracks for which is_selected(i) holds, ordered by
   // track. The predictions must be up to date.
   //
-  //   gain(i, log likelihood)  gain of a pairing; it is listed if above `least_gain`
-  //   least(i, least_gain)     smallest log likelihood with which a detection can reach that gain
-  template <typename Asked, typename Least, typename Gain>
-  void list(double time, std::span<const Point> points, double least_gain, Asked&& is_asked,
-            Least&& least, Gain&& gain, std::vector<Candidate>& out) {
-    s_.asked.clear();
+  //   gain(i, log likelihood)           gain of a pairing; it is listed if above `min_gain`
+  //   min_log_likelihood(i, min_gain)   smallest log likelihood of a detection with that gain
+  template <typename Selected, typename MinLogLikelihood, typename Gain>
+  void list(double time, std::span<const Point> points, double min_gain, Selected&& is_selected,
+            MinLogLikelihood&& min_log_likelihood, Gain&& gain, std::vector<Candidate>& out) {
+    s_.selected.clear();
     s_.radii.clear();
     double sum_radii = 0;
-    double r_most = 0;
-    for (const Point& y : points) r_most = std::max(r_most, y.r);
+    double max_r = 0;
+    for (const Point& y : points) max_r = std::max(max_r, y.r);
     for (std::size_t i = 0; i < tracks.size(); ++i) {
-      if (!is_asked(i)) continue;
-      s_.asked.push_back(i);
-      s_.radii.push_back(s_.predictions[i].radius(opt.gate, least(i, least_gain), r_most));
+      if (!is_selected(i)) continue;
+      s_.selected.push_back(i);
+      s_.radii.push_back(
+          s_.predictions[i].radius(opt.gate, min_log_likelihood(i, min_gain), max_r));
       sum_radii += std::max(s_.radii.back(), 0.0);
     }
-    if (s_.asked.empty() || points.empty()) return;
-    s_.grid.build(points, m.axis.D, 2 * sum_radii / static_cast<double>(s_.asked.size()));
+    if (s_.selected.empty() || points.empty()) return;
+    s_.grid.build(points, m.axis.D, 2 * sum_radii / static_cast<double>(s_.selected.size()));
     std::array<double, kMaxModes> each{};
-    for (std::size_t a = 0; a < s_.asked.size(); ++a) {
-      const std::size_t i = s_.asked[a];
+    for (std::size_t a = 0; a < s_.selected.size(); ++a) {
+      const std::size_t i = s_.selected[a];
       const Prediction& prediction = s_.predictions[i];
       const auto add = [&](std::int32_t j, double distance2) {
-        const double won = gain(i, prediction.log_likelihood(points[j], each));
-        if (won > least_gain && std::isfinite(won))
-          out.push_back({static_cast<std::int32_t>(i), j, won, distance2});
+        const double pairing_gain = gain(i, prediction.log_likelihood(points[j], each));
+        if (pairing_gain > min_gain && std::isfinite(pairing_gain))
+          out.push_back({static_cast<std::int32_t>(i), j, pairing_gain, distance2});
       };
       within_gate(s_.grid, points, prediction, s_.radii[a], tracks[i].last,
                   time - tracks[i].last_time, add);
@@ -238,9 +239,9 @@ class LiveTracks {
   void end_tracks() {
     std::erase_if(tracks, [&](Track& track) {
       track.best_score = std::max(track.best_score, track.score);
-      const bool is_doubted =
+      const bool has_fallen =
           !track.is_confirmed() && track.best_score - track.score > opt.delete_drop;
-      return track.untold() >= sm.max_gap || is_doubted;
+      return track.unpredicted() >= sm.max_gap || has_fallen;
     });
   }
 
@@ -263,7 +264,7 @@ class LiveTracks {
   }
 
  private:
-  Fresh<GateMemory> s_;
+  Scratch<GateMemory> s_;
 };
 
 }  // namespace asterism

@@ -112,7 +112,7 @@ struct WindowFrame {
     const auto at = std::ranges::lower_bound(advice, track, {}, &NeighbourAdvice::track);
     return at != advice.end() && at->track == track ? &*at : nullptr;
   }
-  double says(std::int64_t track, std::int32_t column) const {
+  double bond_gains(std::int64_t track, std::int32_t column) const {
     const NeighbourAdvice* own = advice_to(track);
     return own == nullptr ? 0 : own->of(column);
   }
@@ -135,7 +135,7 @@ struct Branch {
   std::array<double, kMaxWindow> distance2{};
 
   std::int32_t taken(std::int64_t frame) const { return path[frame % kMaxWindow]; }
-  std::int32_t untold() const { return gap - carried; }
+  std::int32_t unpredicted() const { return gap - carried; }
 };
 
 // The tree of a track: λ up to the last decided frame, and the branches from there on.
@@ -164,9 +164,9 @@ class BranchGrower {
 
   // Log-likelihood ratio of a branch. In joint evaluation it is the branch's term of the posterior,
   // where trailing missed detections also allow for the end of the track.
-  double worth(const Branch& b) const {
-    if (opt_.is_joint) return b.score - live_.misses_gain(0, b.untold()) + opt_.log_end[b.untold()];
-    return rank(b);
+  double log_ratio(const Branch& b) const {
+    if (!opt_.is_joint) return rank(b);
+    return b.score - live_.misses_gain(0, b.unpredicted()) + opt_.log_end[b.unpredicted()];
   }
 
   // A branch for the decided part of a track.
@@ -198,13 +198,13 @@ class BranchGrower {
   // Prediction for a track missed in the last `gap` frames. Its state must be predicted to the
   // frame.
   Expected expected(const MotionState& state, std::int32_t gap, const NeighbourAdvice* advice) const {
-    const bool is_told = advice != nullptr && advice->is_carried && gap > 0;
-    return Expected(live_.m, state, is_told ? &advice->place : nullptr);
+    const bool is_predicted = advice != nullptr && advice->is_carried && gap > 0;
+    return Expected(live_.m, state, is_predicted ? &advice->place : nullptr);
   }
   // Whether a track without a detection is kept alive by the prediction from its neighbours. Such a
   // frame counts as occluded and does not change the probability that the marker still exists.
   bool lives_on(const Expected& expected, std::int32_t gap, const NeighbourAdvice* advice) const {
-    return expected.is_carried() && !advice->is_doubtful && gap < opt_.max_carried;
+    return expected.is_carried() && !advice->is_uncertain && gap < opt_.max_carried;
   }
 
   // Adds the continuations of a branch in a further frame: one for each detection in its gate, then
@@ -216,7 +216,7 @@ class BranchGrower {
     parent.distance2[slot] = 0;
     if (parent.has_ended) {
       if (opt_.is_joint) {  // one more missed frame
-        parent.score += live_.miss_gain(parent.untold());
+        parent.score += live_.miss_gain(parent.unpredicted());
         ++parent.gap;
       }
       out.push_back(std::move(parent));
@@ -226,23 +226,23 @@ class BranchGrower {
     const NeighbourAdvice* advice = frame.advice_to(track.more.key);
     const Expected all = expected(parent.state, parent.gap, advice);
     const double hit = live_.hit_gain(parent.gap), miss = live_.miss_gain(parent.gap);
-    const double least =
+    const double min_log_likelihood =
         track.is_confirmed() ? miss + live_.leftover_gain() - hit - opt_.prune_drop
                     : -std::numeric_limits<double>::infinity();
     const auto child_with = [&](std::int32_t j, double d2) {
       const Point& y = frame.points[j];
       ++stats.n_candidates;
       const Prediction& prediction = all.of(y);
-      const double lambda = opt_.fading * parent.lambda + surprise(prediction, y);
+      const double lambda = opt_.fading * parent.lambda + nis(prediction, y);
       if (!passes(lambda, parent.n_updates + 1)) {
         ++stats.n_cut;
         return;
       }
       Branch child = parent;
       all.choose(y, child.state);
-      const double won = hit + update(live_.m, prediction, y, child.state);
-      if (!std::isfinite(won)) return;
-      child.score += opt_.is_joint ? won : won - frame.crowding(track.more.key, j);
+      const double hit_gain = hit + update(live_.m, prediction, y, child.state);
+      if (!std::isfinite(hit_gain)) return;
+      child.score += opt_.is_joint ? hit_gain : hit_gain - frame.crowding(track.more.key, j);
       if (advice != nullptr) child.score += advice->of(j);
       child.lambda = lambda;
       ++child.n_updates;
@@ -254,16 +254,16 @@ class BranchGrower {
       child.distance2[slot] = d2;
       out.push_back(std::move(child));
     };
-    const bool gives_way = advice != nullptr && advice->gives_way;
+    const bool is_reappearance = advice != nullptr && advice->is_reappearance;
     if (all.is_carried()) {
       for (const std::int32_t j : advice->may_take)
         child_with(j, squared_distance(frame.points[j], all.of(frame.points[j]).center,
                                        live_.m.axis.D));
-    } else if (!gives_way) {
+    } else if (!is_reappearance) {
       const Prediction& own = all.prediction();
       live_.within_gate(frame.grid, frame.points, own,
-                        own.radius(live_.opt.gate, least, frame.grid.r_most()), parent.last,
-                        frame.time - parent.last_time, child_with);
+                        own.radius(live_.opt.gate, min_log_likelihood, frame.grid.max_r()),
+                        parent.last, frame.time - parent.last_time, child_with);
     }
     if (static_cast<std::int64_t>(out.size()) > live_.opt.max_candidates) throw CandidateLimit("too many candidates in a frame");
     if (lives_on(all, parent.gap, advice))
@@ -271,7 +271,7 @@ class BranchGrower {
     else
       parent.score += miss;
     ++parent.gap;
-    parent.has_ended = gives_way || parent.untold() >= live_.sm.max_gap;
+    parent.has_ended = is_reappearance || parent.unpredicted() >= live_.sm.max_gap;
     out.push_back(std::move(parent));
   }
 
@@ -280,21 +280,21 @@ class BranchGrower {
     const Branch& best = track.more.branches.front();
     if (best.has_ended) return;
     const NeighbourAdvice* advice = frame.advice_to(track.more.key);
-    if (advice != nullptr && advice->gives_way) return;
+    if (advice != nullptr && advice->is_reappearance) return;
     MotionState state = best.state;
     predict(live_.m, frame.step, state);
     const Expected all = expected(state, best.gap, advice);
     const Prediction& prediction = all.prediction();
-    const double log_seen = live_.sm.log_seen(best.gap) - live_.sm.log_clutter;
+    const double log_hit = live_.sm.log_hit(best.gap) - live_.sm.log_clutter;
     // Smaller weights are negligible against clutter.
-    const double radius = prediction.radius(live_.opt.gate, kNoClaim - log_seen,
-                                             frame.grid.r_most());
+    const double radius = prediction.radius(live_.opt.gate, kNoClaim - log_hit,
+                                             frame.grid.max_r());
     if (radius < 0 && !all.is_carried()) return;
     std::array<double, kMaxModes> each{};
     const std::size_t first = frame.claims.size();
     const auto weigh = [&](std::int32_t j, double) {
       const Point& y = frame.points[j];
-      const double log_w = log_seen + all.of(y).log_likelihood(y, each);
+      const double log_w = log_hit + all.of(y).log_likelihood(y, each);
       if (log_w > kNoClaim && log_w < 700) frame.claims.push_back({track.more.key, j, std::exp(log_w)});
     };
     if (all.is_carried())
@@ -332,11 +332,11 @@ class BranchGrower {
   void prune(std::int64_t frame, std::int32_t n_open, std::int32_t max_branches, TreeStats& stats) {
     std::stable_sort(grown_.begin(), grown_.end(),
                      [&](const Branch& a, const Branch& b) { return rank(a) > rank(b); });
-    const double least = max_branches == kAll ? -std::numeric_limits<double>::infinity()
+    const double min_rank = max_branches == kAll ? -std::numeric_limits<double>::infinity()
                                               : rank(grown_.front()) - opt_.prune_drop;
     std::size_t kept = 0;
     for (std::size_t b = 0; b < grown_.size(); ++b) {
-      if (rank(grown_[b]) < least) break;
+      if (rank(grown_[b]) < min_rank) break;
       if (n_open > opt_.merge_last && is_merged(grown_[b], frame, kept)) continue;
       if (kept == static_cast<std::size_t>(max_branches)) {
         ++stats.n_limited;

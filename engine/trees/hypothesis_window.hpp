@@ -69,7 +69,7 @@ struct HypothesisWindow : OpenWindow {
     stats.n_tentative += static_cast<std::int64_t>(seeds.size());
     stats.n_pending += static_cast<std::int64_t>(seeds.size());
   }
-  void count_most(TreeStats& stats) const {
+  void count_branches(TreeStats& stats) const {
     for (std::size_t i = 0; i < n_all(); ++i)
       stats.most_branches = std::max<std::int64_t>(stats.most_branches, tree(i).more.branches.size());
   }

@@ -19,7 +19,7 @@ namespace asterism {
 struct OpenWindow {
   LiveTracks<Tree> live;
   BranchOptions branches;
-  WindowBodies bodies;
+  WindowCarrier carrier;
   std::vector<std::shared_ptr<const WindowFrame>> frames;
   std::int64_t n_trees = 0;
   // Largest number of branches of a track right after a further frame. In joint evaluation there is
@@ -29,7 +29,7 @@ struct OpenWindow {
 
   OpenWindow(const MotionModel& model, const ScoreModel& score, const LifeOptions& life,
              const BranchOptions& options, const CarryOptions& carry)
-      : live(model, score, life), branches(options), bodies(model, score, life, carry) {
+      : live(model, score, life), branches(options), carrier(model, score, life, carry) {
     branches.max_carried = carry.max_carried;
   }
 
@@ -44,7 +44,7 @@ struct OpenWindow {
 
   // Collects the information of rigid neighbours for an arriving frame.
   void advise(WindowFrame& frame, TreeStats& stats) {
-    if (bodies.is_on()) bodies.advise(live, n_open(), frame, stats);
+    if (carrier.is_on()) carrier.advise(live, n_open(), frame, stats);
   }
   // Collects the claims of the confirmed tracks on its detections.
   void claim(WindowFrame& frame) const {
@@ -68,7 +68,7 @@ struct OpenWindow {
 
   // Updates the bonds after a decision.
   void learn(TreeStats& stats) {
-    if (bodies.is_on()) bodies.learn(live, stats);
+    if (carrier.is_on()) carrier.learn(live, stats);
   }
 
   // Updates the decided part of track i over the frame just popped, with detection `own` or, if
@@ -84,7 +84,7 @@ struct OpenWindow {
       const Prediction& prediction = expected.of(y);
       expected.choose(y, track.state);
       stats.n_returned += expected.is_carried();
-      track.more.lambda = branches.fading * track.more.lambda + surprise(prediction, y);
+      track.more.lambda = branches.fading * track.more.lambda + nis(prediction, y);
       ++track.more.n_updates;
       track.score += live.hit_gain(track.gap) + update(live.m, prediction, y, track.state);
       track.last = y;
@@ -100,7 +100,7 @@ struct OpenWindow {
   // Records a missed detection of track i in that frame.
   void miss(const WindowFrame& frame, std::size_t i) {
     const NeighbourAdvice* advice = frame.advice_to(live[i].more.key);
-    if (advice != nullptr && advice->gives_way)
+    if (advice != nullptr && advice->is_reappearance)
       end(i);
     else
       ++live[i].gap;
@@ -124,7 +124,7 @@ struct OpenWindow {
       --b.n_taken;
       b.distance2[frame.number % kMaxWindow] = 0;
       if (!branches.is_joint) b.score += frame.crowding(track.more.key, own);
-      b.score -= frame.says(track.more.key, own);
+      b.score -= frame.bond_gains(track.more.key, own);
     }
   }
 

@@ -28,7 +28,7 @@ using Packer = std::function<std::vector<std::int32_t>(
 struct HypothesisOptions {
   std::int64_t max_hypotheses = 1;  // of a cluster, for the probabilities
   std::int64_t max_nodes = 1;       // of the search for them
-  double least_new_worth = 0;       // smallest log-likelihood ratio of a branch of a new tree
+  double min_new_log_ratio = 0;       // smallest log-likelihood ratio of a branch of a new tree
   // a tentative track is deleted if all its branches are this far below its best score
   double delete_drop = 0;
   double drop = 0;                  // hypotheses this many nats below the best are ignored
@@ -111,10 +111,11 @@ class HypothesisForest {
       bool has_free = false;
       for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
         const Branch& b = track.more.branches[k];
-        if (is_seed && (open_.is_lone(i, b) || grower.worth(b) < opt_.least_new_worth)) continue;
+        if (is_seed && (open_.is_lone(i, b) || grower.log_ratio(b) < opt_.min_new_log_ratio))
+          continue;
         if (!is_seed && !track.is_confirmed() && track.best_score - b.score > opt_.delete_drop)
           continue;
-        PackingOption option{grower.worth(b), {}};
+        PackingOption option{grower.log_ratio(b), {}};
         open_.each_detection(i, b, [&](std::int32_t r) { option.uses.push_back(r); });
         has_free = has_free || option.uses.empty();
         const std::int32_t column = open_.taken(i, b, *open_.frames.front());
@@ -125,8 +126,8 @@ class HypothesisForest {
         tree.options.push_back({0, {}});
         tree.choices.push_back({kNothing, -1, 0});
       } else if (!has_free) {
-        const double lost = track.score - open_.live.misses_gain(0, track.untold()) +
-                            open_.branches.log_end[track.untold() + open_.n_open()];
+        const double lost = track.score - open_.live.misses_gain(0, track.unpredicted()) +
+                            open_.branches.log_end[track.unpredicted() + open_.n_open()];
         tree.options.push_back({lost, {}});
         tree.choices.push_back({kLost, -1, 0});
       }
@@ -148,7 +149,7 @@ class HypothesisForest {
   void limit(TreeStats& stats) {
     list_options();
     for (const std::vector<std::int32_t>& cluster : clusters()) limit(cluster, stats);
-    open_.count_most(stats);
+    open_.count_branches(stats);
   }
   void limit(const std::vector<std::int32_t>& cluster, TreeStats& stats) {
     stats.largest_group = std::max<std::int64_t>(stats.largest_group, cluster.size());
@@ -157,10 +158,11 @@ class HypothesisForest {
     std::ranges::stable_sort(s_.ranked, {}, &Ranked::loss);
     const auto probable = std::ranges::upper_bound(s_.ranked, open_.branches.prune_drop, {}, &Ranked::loss);
     const std::ptrdiff_t n_probable = probable - s_.ranked.begin();
-    const auto n_most = static_cast<std::ptrdiff_t>(cluster.size()) + open_.branches.max_branches * n_tracks;
-    stats.n_limited += std::max<std::ptrdiff_t>(n_probable - n_most, 0);
-    if (std::min(n_probable, n_most) == std::ssize(s_.ranked)) return;
-    s_.ranked.resize(std::min(n_probable, n_most));
+    const auto n_max =
+        static_cast<std::ptrdiff_t>(cluster.size()) + open_.branches.max_branches * n_tracks;
+    stats.n_limited += std::max<std::ptrdiff_t>(n_probable - n_max, 0);
+    if (std::min(n_probable, n_max) == std::ssize(s_.ranked)) return;
+    s_.ranked.resize(std::min(n_probable, n_max));
     std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::pair(r.tree, r.branch); });
     auto next = s_.ranked.begin();
     for (const std::int32_t i : cluster) {
@@ -224,7 +226,7 @@ class HypothesisForest {
       // A branch that is no option yet, such as a new track, is compared with its absence.
       for (std::size_t b = 0; b < branches(i).size(); ++b) {
         const Branch& branch = branches(i)[b];
-        const double loss = branch.n_taken < 2 ? 0 : std::max(0.0, -grower.worth(branch));
+        const double loss = branch.n_taken < 2 ? 0 : std::max(0.0, -grower.log_ratio(branch));
         s_.ranked.push_back({loss, i, static_cast<std::int32_t>(b)});
       }
       for (const Choice& choice : s_.trees[i].choices)
@@ -306,9 +308,9 @@ class HypothesisForest {
     std::vector<double> totals;
     const PackingSummary summary = SetPacking(options).solve(
         opt_.max_hypotheses, opt_.drop, opt_.max_nodes,
-        [&](std::span<const std::int32_t> own, double worth) {
+        [&](std::span<const std::int32_t> own, double log_ratio) {
           chosen.insert(chosen.end(), own.begin(), own.end());
-          totals.push_back(worth);
+          totals.push_back(log_ratio);
         });
     ++stats.n_groups;
     stats.n_hypotheses = std::max<std::int64_t>(stats.n_hypotheses, totals.size());
@@ -353,7 +355,7 @@ class HypothesisForest {
 
   HypothesisWindow open_;
   HypothesisOptions opt_;
-  Fresh<Memory> s_;
+  Scratch<Memory> s_;
 };
 
 }  // namespace asterism

@@ -55,9 +55,9 @@ class Forest {
   // The best branch of a tree with one detection of the oldest frame, or with a missed detection.
   struct Way {
     std::int32_t column = -1;  // -1: missed
-    double worth = 0, crowding = 0;
+    double log_ratio = 0, crowding = 0;
     // log-likelihood ratio if the detection initiates a new track instead
-    double newborn = -std::numeric_limits<double>::infinity();
+    double new_track = -std::numeric_limits<double>::infinity();
     double log_weight = 0;   // of all its branches
     double probability = 0;  // marginal probability over all joint events of the frame
     std::int32_t branch = -1;  // -1: no branch with a missed detection is left
@@ -85,7 +85,7 @@ class Forest {
       if (opt_.pairing == Pairing::assignment) weigh_ways(*frame, confirmed, stats);
       match_all(*frame, confirmed, stats);
     }
-    say_free(*frame, label);
+    label_free(*frame, label);
     for (std::size_t i = 0; i < open_.live.size(); ++i) follow(*frame, i, stats, label);
     open_.live.end_tracks();
     for (std::size_t j = 0; j < frame->points.size(); ++j) {
@@ -102,14 +102,14 @@ class Forest {
     const LiveTrack<Tree>& track = open_.live[i];
     std::vector<Way>& ways = s_.ways[i];
     // branches are sorted, the best first
-    const double most = grower.worth(track.more.branches.front());
+    const double max_log_ratio = grower.log_ratio(track.more.branches.front());
     // If all branches with a missed detection were pruned, this is an upper bound for them.
-    const double pruned = most - open_.branches.prune_drop;
-    ways.assign(1, Way{.worth = pruned, .log_weight = std::exp(pruned - most)});
+    const double pruned = max_log_ratio - open_.branches.prune_drop;
+    ways.assign(1, Way{.log_ratio = pruned, .log_weight = std::exp(pruned - max_log_ratio)});
     for (std::size_t k = 0; k < track.more.branches.size(); ++k) {
       const Branch& b = track.more.branches[k];
       const std::int32_t column = b.taken(frame.number);
-      const double worth = grower.worth(b);
+      const double log_ratio = grower.log_ratio(b);
       auto way = std::find_if(ways.begin(), ways.end(), [&](const Way& w) { return w.column == column; });
       if (way == ways.end()) way = ways.insert(ways.end(), Way{.column = column});
       if (way->branch < 0) {
@@ -117,13 +117,13 @@ class Forest {
         // alternatives.
         way->branch = static_cast<std::int32_t>(k);
         way->crowding = column < 0 ? 0 : frame.crowding(track.more.key, column);
-        way->worth = worth + way->crowding;
+        way->log_ratio = log_ratio + way->crowding;
         way->log_weight = 0;
       }
-      way->log_weight += std::exp(worth - most);
+      way->log_weight += std::exp(log_ratio - max_log_ratio);
     }
-    for (Way& way : ways) way.log_weight = most + std::log(way.log_weight) + way.crowding;
-    if (track.is_confirmed() && ways.size() > 1) weigh_newborn(frame, track, ways);
+    for (Way& way : ways) way.log_weight = max_log_ratio + std::log(way.log_weight) + way.crowding;
+    if (track.is_confirmed() && ways.size() > 1) weigh_new_tracks(frame, track, ways);
     std::sort(ways.begin() + 1, ways.end(),
               [](const Way& a, const Way& b) { return a.column < b.column; });
   }
@@ -132,14 +132,15 @@ class Forest {
   // have ended, and the detection may be the first of a new marker. The gain of initiation at a
   // single detection is already part of leaving it unassigned. This function adds the gain of the
   // continuation.
-  void weigh_newborn(const WindowFrame& frame, const LiveTrack<Tree>& track,
+  void weigh_new_tracks(const WindowFrame& frame, const LiveTrack<Tree>& track,
                      std::vector<Way>& ways) const {
     MotionState state = track.state;
     predict(open_.live.m, frame.step, state);
     const BranchGrower grower(open_.live, open_.branches);
     const NeighbourAdvice* advice = frame.advice_to(track.more.key);
     const Expected expected = grower.expected(state, track.gap, advice);
-    const std::int32_t n_missed = std::min(open_.n_open() + 1, open_.live.sm.max_gap - track.untold());
+    const std::int32_t n_missed =
+        std::min(open_.n_open() + 1, open_.live.sm.max_gap - track.unpredicted());
     const double gone = track.score + open_.live.misses_gain(track.gap, n_missed);
     const double over = open_.live.leftover_gain();
     std::array<double, kMaxModes> each{};
@@ -150,7 +151,8 @@ class Forest {
       if (advice != nullptr) hit += advice->of(ways[k].column);
       const double future = b.score + ways[k].crowding - track.score - hit - over * (b.n_taken - 1);
       if (future > 0)
-        ways[k].newborn = gone + open_.live.birth_gain() - over + future + std::log1p(-std::exp(-future));
+        ways[k].new_track =
+            gone + open_.live.birth_gain() - over + future + std::log1p(-std::exp(-future));
     }
   }
 
@@ -163,7 +165,7 @@ class Forest {
       if (open_.live[i].is_confirmed() != confirmed) continue;
       for (std::size_t k = 1; k < s_.ways[i].size(); ++k) {
         const Way& way = s_.ways[i][k];
-        const double gain = way.log_weight - log_sum(s_.ways[i][0].log_weight, way.newborn);
+        const double gain = way.log_weight - log_sum(s_.ways[i][0].log_weight, way.new_track);
         if (s_.pairs.is_taken[way.column] || !(gain > kNegligible) || !std::isfinite(gain)) continue;
         s_.pairings.push_back({static_cast<std::int32_t>(i), way.column, gain, 0});
         s_.gains.push_back(gain);
@@ -185,8 +187,8 @@ class Forest {
 
   // For a tentative track, the gain is weighted with the odds that the track is a marker.
   double odds(const LiveTrack<Tree>& track, const Way& way) const {
-    if (track.is_confirmed()) return way.worth;
-    if (way.branch < 0) return softplus(way.worth);
+    if (track.is_confirmed()) return way.log_ratio;
+    if (way.branch < 0) return softplus(way.log_ratio);
     const Branch& b = track.more.branches[way.branch];
     return softplus(b.score + way.crowding) - b.n_taken * open_.live.leftover_gain();
   }
@@ -200,7 +202,7 @@ class Forest {
       const double missed = odds(track, s_.ways[i][0]);
       for (std::size_t k = 1; k < s_.ways[i].size(); ++k) {
         const Way& way = s_.ways[i][k];
-        const double gain = odds(track, way) - log_sum(missed, way.newborn);
+        const double gain = odds(track, way) - log_sum(missed, way.new_track);
         if (s_.pairs.is_taken[way.column] || !(gain > 0) || !std::isfinite(gain)) continue;
         s_.candidates.push_back({static_cast<std::int32_t>(i), way.column, gain,
                                mean_distance2(track.more.branches[way.branch])});
@@ -232,7 +234,7 @@ class Forest {
 
   // Labels unassigned detections -1, with the probability that they belong to no confirmed track.
   template <typename Label>
-  void say_free(const WindowFrame& frame, Label&& label) {
+  void label_free(const WindowFrame& frame, Label&& label) {
     s_.free.assign(frame.points.size(), 1);
     for (std::size_t i = 0; i < open_.live.size(); ++i)
       for (const Way& way : s_.ways[i])
@@ -265,7 +267,7 @@ class Forest {
   OpenWindow open_;
   ForestOptions opt_;
 
-  Fresh<Memory> s_;
+  Scratch<Memory> s_;
 };
 
 }  // namespace asterism

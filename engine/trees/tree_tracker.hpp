@@ -28,7 +28,7 @@ class TreeTracker {
   // label changes.
   template <typename Label>
   TreeStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
-    std::map<std::int64_t, Said> decided;
+    std::map<std::int64_t, Reported> decided;
     TreeStats stats = add(time, step, points, decided);
     look_ahead(decided, label);
     // the provisional labels are reported in this step, so their work counts here
@@ -40,11 +40,11 @@ class TreeTracker {
   // labels in between.
   template <typename Label>
   TreeStats pass(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
-    std::map<std::int64_t, Said> decided;
+    std::map<std::int64_t, Reported> decided;
     const TreeStats stats = add(time, step, points, decided);
-    for (const auto& [detection, said] : decided) {
-      said_.erase(detection);
-      label(detection, said.id, said.confidence);
+    for (const auto& [detection, reported] : decided) {
+      reported_.erase(detection);
+      label(detection, reported.id, reported.confidence);
     }
     return stats;
   }
@@ -68,14 +68,14 @@ class TreeTracker {
   const Progress& so_far() const { return so_far_; }
 
  private:
-  struct Said {
+  struct Reported {
     std::int64_t id = -1;
     double confidence = 0;
-    bool operator==(const Said&) const = default;
+    bool operator==(const Reported&) const = default;
   };
 
   TreeStats add(double time, const MotionStep& step, std::span<const Point> points,
-                std::map<std::int64_t, Said>& decided) {
+                std::map<std::int64_t, Reported>& decided) {
     auto frame = std::make_shared<WindowFrame>();
     frame->number = so_far_.n_frames;
     frame->first = so_far_.n_seen;
@@ -100,10 +100,10 @@ class TreeTracker {
 
   // A detection decided as unassigned may still get a label while a tentative track contains it. If
   // it had a provisional label, that label may have to be withdrawn.
-  void forget_old(const std::map<std::int64_t, Said>& decided) {
-    for (const auto& [detection, said] : decided)
-      if (said.id < 0) unlabelled_[detection] = said.confidence;
-    std::int64_t oldest = said_.empty() ? so_far_.n_seen : said_.begin()->first;
+  void forget_old(const std::map<std::int64_t, Reported>& decided) {
+    for (const auto& [detection, reported] : decided)
+      if (reported.id < 0) unlabelled_[detection] = reported.confidence;
+    std::int64_t oldest = reported_.empty() ? so_far_.n_seen : reported_.begin()->first;
     for (const LiveTrack<Tree>& track : forest_.live().tracks)
       if (!track.pending.empty()) oldest = std::min(oldest, track.pending.front().detection);
     unlabelled_.erase(unlabelled_.begin(), unlabelled_.lower_bound(oldest));
@@ -111,32 +111,32 @@ class TreeTracker {
 
   // Computes provisional labels of all open detections, and reports those that changed.
   template <typename Label>
-  void look_ahead(const std::map<std::int64_t, Said>& decided, Label&& label) {
+  void look_ahead(const std::map<std::int64_t, Reported>& decided, Label&& label) {
     Forest ahead(forest_);
     ahead_ = {};
-    std::map<std::int64_t, Said> now;
+    std::map<std::int64_t, Reported> now;
     ahead.decide_all(ahead_, [&](std::int64_t detection, std::int64_t id, double p) {
       now[detection] = {id, has_confidence_ ? p : 0};
     });
     // Withdraws labels of detections that are neither decided nor open to a label any more.
-    for (const auto& [detection, said] : said_)
+    for (const auto& [detection, reported] : reported_)
       if (!now.contains(detection) && !decided.contains(detection))
         label(detection, -1, unlabelled_.at(detection));
-    for (const auto* news : {&decided, &std::as_const(now)})
-      for (const auto& [detection, said] : *news) {
-        if (news == &decided && now.contains(detection)) continue;
-        const auto before = said_.find(detection);
-        if (before == said_.end() || !(before->second == said))
-          label(detection, said.id, said.confidence);
+    for (const auto* labels : {&decided, &std::as_const(now)})
+      for (const auto& [detection, reported] : *labels) {
+        if (labels == &decided && now.contains(detection)) continue;
+        const auto before = reported_.find(detection);
+        if (before == reported_.end() || !(before->second == reported))
+          label(detection, reported.id, reported.confidence);
       }
-    said_ = std::move(now);
+    reported_ = std::move(now);
     present_ = ahead.live();
   }
 
   Forest forest_;
   LiveTracks<Tree> present_;
   bool has_confidence_;
-  std::map<std::int64_t, Said> said_;  // labels reported for undecided detections
+  std::map<std::int64_t, Reported> reported_;  // labels reported for undecided detections
   std::map<std::int64_t, double> unlabelled_;
   TreeStats total_, ahead_;
   Progress so_far_;

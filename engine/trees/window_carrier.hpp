@@ -21,9 +21,9 @@
 
 namespace asterism {
 
-class WindowBodies {
+class WindowCarrier {
  public:
-  WindowBodies(const MotionModel& m, const ScoreModel& score, const LifeOptions& life,
+  WindowCarrier(const MotionModel& m, const ScoreModel& score, const LifeOptions& life,
                const CarryOptions& carry) {
     if (carry.is_on) all_ = SharedCopy(All{{m, score, life}, {m, score, carry}});
   }
@@ -47,19 +47,19 @@ class WindowBodies {
         s_.candidates, stats, n_open);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       NeighbourAdvice& own = s_.advice[s_.place[i]];
-      const std::int32_t heir = carried.heir(i);
-      own.gives_way = own.gives_way || (heir >= 0 && is_best(heir));
+      const std::int32_t replaced_by = carried.replaced_by(i);
+      own.is_reappearance = own.is_reappearance || (replaced_by >= 0 && is_best(replaced_by));
       if (!carried.is_carried(i)) continue;
       own.is_carried = true;
-      own.is_doubtful = carried.is_doubtful(i);
+      own.is_uncertain = carried.is_uncertain(i);
       own.place = carried.place(i);
     }
     for (const Candidate& c : s_.candidates)
       if (carried.is_carried(c.row)) s_.advice[s_.place[c.row]].may_take.push_back(c.column);
-    for (const CarriedTracks::Told& told : carried.told())
-      s_.advice[s_.place[told.row]].says.emplace_back(told.column, told.nats);
+    for (const CarriedTracks::BondGain& gain : carried.bond_gains())
+      s_.advice[s_.place[gain.row]].bond_gains.emplace_back(gain.column, gain.nats);
     for (NeighbourAdvice& own : s_.advice)
-      if (own.is_carried || own.gives_way || !own.says.empty())
+      if (own.is_carried || own.is_reappearance || !own.bond_gains.empty())
         frame.advice.push_back(std::move(own));
   }
 
@@ -90,9 +90,9 @@ class WindowBodies {
       s_.advice.emplace_back().track = track.more.key;
       add_row(track, best, rows);
       if (best.gap > 0) continue;
-      const auto hidden = std::ranges::find_if(
+      const auto occluded = std::ranges::find_if(
           track.more.branches, [](const Branch& b) { return b.gap > 0 && !b.has_ended; });
-      if (hidden != track.more.branches.end()) add_row(track, *hidden, rows);
+      if (occluded != track.more.branches.end()) add_row(track, *occluded, rows);
     }
   }
   void add_row(const LiveTrack<Tree>& track, const Branch& b, LiveTracks<>& rows) {
@@ -109,7 +109,7 @@ class WindowBodies {
   bool is_best(std::size_t row) const { return row == 0 || s_.place[row] != s_.place[row - 1]; }
 
   SharedCopy<All> all_;
-  Fresh<Memory> s_;
+  Scratch<Memory> s_;
 };
 
 }  // namespace asterism

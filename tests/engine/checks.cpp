@@ -199,7 +199,7 @@ struct ChoiceProblem {
     return std::max(without, scores[from] + best(from + 1, is_used));
   }
   // The total score of a choice, which must use no point twice.
-  double worth(const std::vector<std::int32_t>& chosen) const {
+  double total_score(const std::vector<std::int32_t>& chosen) const {
     std::vector<char> is_used(n_points, 0);
     double sum = 0;
     for (const std::int32_t c : chosen) {
@@ -218,9 +218,9 @@ void choices_of_candidates_are_the_best_or_tell_by_how_much_not() {
     const double best = problem.best(0, std::vector<char>(problem.n_points, 0));
     for (const std::int64_t max_nodes : {1'000'000, 1}) {
       ChoiceSummary summary;
-      const double worth = problem.worth(
+      const double total_score = problem.total_score(
           CandidateChoice(problem.uses, problem.scores, problem.n_points).solve(max_nodes, summary));
-      CHECK(worth <= best + 1e-6 && best <= worth + summary.gap + 2e-6);
+      CHECK(total_score <= best + 1e-6 && best <= total_score + summary.gap + 2e-6);
       if (max_nodes > 1) CHECK(summary.n_inexact == 0 && summary.gap == 0);
       n_packed += summary.n_packed;
       n_cut += summary.n_inexact;

@@ -8,7 +8,7 @@
 
 namespace asterism {
 
-class Doubts {
+class AmbiguousLinks {
  public:
   struct Link {
     std::int32_t from = 0, to = 0;

@@ -21,8 +21,8 @@ using Clock = std::chrono::steady_clock;
 
 // The time so many seconds after `start`; the maximum if the clock cannot represent it.
 inline Clock::time_point after(Clock::time_point start, double seconds) {
-  constexpr double kMost = 1e9;
-  if (!(seconds < kMost)) return Clock::time_point::max();
+  constexpr double kMaxSeconds = 1e9;
+  if (!(seconds < kMaxSeconds)) return Clock::time_point::max();
   return start + std::chrono::duration_cast<Clock::duration>(
                      std::chrono::duration<double>(std::max(seconds, 0.0)));
 }

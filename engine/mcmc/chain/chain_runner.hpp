@@ -39,7 +39,7 @@ class Walker {
   Walker(Partition<Filter> empty, const ChainOptions& options)
       : sampler_(std::move(empty), options, 0),
         marginals_(sampler_.partition()),
-        hot_share_(options.share_at_doubts),
+        hot_share_(options.share_at_ambiguous),
         is_draw_(options.is_draw) {}
 
   // Searches for the best partition, returns its gain over the start, and stays there. With
@@ -58,7 +58,7 @@ class Walker {
     stats.add_moves(sampler_.counts());
     if (is_draw_) return std::numeric_limits<double>::infinity();
     sampler_.restore_best();
-    return sampler_.most();
+    return sampler_.max_gain();
   }
   const Partition<Filter>& partition() const { return sampler_.partition(); }
 
@@ -112,16 +112,16 @@ class Walker {
     double upto = 0;
   };
 
-  template <typename Seen>
-  void step(Seen&& seen) {
+  template <typename Observe>
+  void step(Observe&& observe) {
     if (hot_.empty() || sampler_.random().uniform() >= hot_share_) {
-      sampler_.step(seen);
+      sampler_.step(observe);
       return;
     }
     const double at = sampler_.random().uniform() * hot_.back().upto;
     const auto hot = std::upper_bound(hot_.begin(), hot_.end(), at,
                                       [](double x, const Hot& h) { return x < h.upto; });
-    sampler_.step(hot->toggle, seen);
+    sampler_.step(hot->toggle, observe);
   }
 
   // Lists the involutive moves at the ambiguous links of this part. They are in detailed balance
@@ -131,7 +131,7 @@ class Walker {
     if (hot_share_ == 0) return;
     const Partition<Filter>& p = sampler_.partition();
     const std::int32_t n = p.window().n_ids();
-    is_listed_.assign(n, false);
+    has_skip_.assign(n, false);
     for (std::int32_t i = 0; i < n; ++i) {
       if (static_cast<std::int32_t>(local_.size()) <= p.origin(i)) local_.resize(p.origin(i) + 1, -1);
       local_[p.origin(i)] = i;
@@ -139,7 +139,7 @@ class Walker {
     const auto local = [&](std::int32_t i) {
       return i < static_cast<std::int32_t>(local_.size()) ? local_[i] : -1;
     };
-    for (const auto& [from, to] : group.doubts) {
+    for (const auto& [from, to] : group.ambiguous) {
       const std::int32_t a = local(from), y = local(to);
       if (a < 0 || y < 0 || p.is_frozen(y)) continue;  // a settled link is not ambiguous any more
       const std::int32_t x = p.track_of(a) < 0 ? -1 : p.after(a);
@@ -173,8 +173,8 @@ class Walker {
   }
   void add_skip_of(std::int32_t y) {
     const Partition<Filter>& p = sampler_.partition();
-    if (is_listed_[y] || p.is_frozen(y) || p.before(y) < 0) return;
-    is_listed_[y] = true;
+    if (has_skip_[y] || p.is_frozen(y) || p.before(y) < 0) return;
+    has_skip_[y] = true;
     add_hot({Toggle::Kind::skip, y, p.before(y), p.after(y)});
   }
   void add_hot(const Toggle& toggle) {
@@ -191,7 +191,7 @@ class Walker {
   bool is_draw_;
   std::vector<Hot> hot_;
   std::vector<std::int32_t> local_;
-  std::vector<char> is_listed_;  // detections that already have a skip move
+  std::vector<char> has_skip_;  // detections that already have a skip move
 };
 
 }  // namespace asterism

@@ -70,7 +70,7 @@ class Walks {
 
  private:
   // Difference of a fraction between halves from which a detection counts as uncertain.
-  static constexpr double kDoubtful = 0.1;
+  static constexpr double kUncertain = 0.1;
 
   // A seed that depends on the task but not on the thread that runs it.
   static std::uint64_t seed_of(std::uint64_t seed, std::size_t task) {
@@ -111,16 +111,16 @@ class Walks {
     else
       ++stats.n_unmoved;
     for (std::size_t n = 0; n < chains[0].detections.size(); ++n) {
-      double sum = 0, least = 1, most = 0;
+      double sum = 0, min_share = 1, max_share = 0;
       for (const Halves& chain : chains)
         for (int h = 0; h < Halves::kN; ++h) {
           const double share = chain.shares[h][n];
           sum += share * (n_halves * static_cast<double>(chain.n_moves[h]) / moves) / n_halves;
-          least = std::min(least, share);
-          most = std::max(most, share);
+          min_share = std::min(min_share, share);
+          max_share = std::max(max_share, share);
         }
       shares[chains[0].detections[n]] = std::clamp(sum, 0.0, 1.0);
-      stats.n_doubtful += most - least > kDoubtful;
+      stats.n_doubtful += max_share - min_share > kUncertain;
     }
   }
 
@@ -129,7 +129,7 @@ class Walks {
   };
   ChainOptions chain_;
   std::int32_t n_chains_, n_threads_;
-  Fresh<Memory> s_;
+  Scratch<Memory> s_;
 };
 
 }  // namespace asterism

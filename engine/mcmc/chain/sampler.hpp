@@ -29,7 +29,7 @@ struct ChainOptions {
   // accepted one. This is an ascent and does not sample the posterior.
   bool is_ascent = false;
   // Probability of a move at an ambiguous link, if there is any (mcmc/chain/chain_runner.hpp).
-  double share_at_doubts = 0;
+  double share_at_ambiguous = 0;
   // Whether the result of a search is its last state, a draw from the posterior, instead of the
   // best state.
   bool is_draw = false;
@@ -61,10 +61,10 @@ class Sampler {
     best_gain_ = last_gain_ = 0;
   }
 
-  // Makes one move; returns true if the partition changes. Calls `seen(change, is taken)` for every
-  // evaluated proposal, before it is applied.
-  template <typename Seen>
-  bool step(Seen&& seen) {
+  // Makes one move; returns true if the partition changes. Calls `observe(change, is taken)` for
+  // every evaluated proposal, before it is applied.
+  template <typename Observe>
+  bool step(Observe&& observe) {
     const Shares& now = shares_[std::min(partition_.tracks().size(), 2)];
     const double at = random_.uniform();
     int kind = 0;
@@ -79,12 +79,12 @@ class Sampler {
     // log_reverse is at most 0, so a ratio that is too small without it stays too small.
     change_.log_ratio = change_.gain + (best_gain_ - last_gain_) + then.log[back] -
                         now.log[kind] - change_.log_forward;
-    const double least = std::min(log_u, weighed_above_);
-    if (!(change_.log_ratio > least)) return false;
+    const double threshold = std::min(log_u, weighed_above_);
+    if (!(change_.log_ratio > threshold)) return false;
     const bool is_weighed = change_.log_ratio > weighed_above_;
     change_.log_reverse = moves_.log_reverse(change_);
     change_.log_ratio += change_.log_reverse;
-    const bool is_taken = take(log_u, is_weighed, seen);
+    const bool is_taken = take(log_u, is_weighed, observe);
     count.n_taken += is_taken;
     return is_taken;
   }
@@ -93,11 +93,11 @@ class Sampler {
   }
 
   // Makes one move of a list; see mcmc/moves/involutive_moves.hpp.
-  template <typename Seen>
-  bool step(const Toggle& toggle, Seen&& seen) {
+  template <typename Observe>
+  bool step(const Toggle& toggle, Observe&& observe) {
     if (!propose(toggle)) return false;
     change_.log_ratio = change_.gain;
-    return take(std::log(random_.uniform()), true, seen);
+    return take(std::log(random_.uniform()), true, observe);
   }
   // The gain of a move; -inf if it is impossible.
   double gain_of(const Toggle& toggle) {
@@ -107,15 +107,15 @@ class Sampler {
 
   // Gain of the log posterior since `begin_best`, and its maximum.
   double gain() const { return gain_; }
-  double most() const { return most_; }
+  double max_gain() const { return max_gain_; }
 
   // `begin_best` starts to remember the best partition; `restore_best` returns the chain to it.
   void begin_best() {
-    gain_ = most_ = 0;
+    gain_ = max_gain_ = 0;
     is_best_ = true;
   }
   void restore_best() {
-    if (is_best_ || gain_ >= most_ - kBetter) return;
+    if (is_best_ || gain_ >= max_gain_ - kBetter) return;
     edits_.clear();
     std::map<std::int32_t, std::size_t> now;  // tracks by first detection
     for (const std::int32_t k : partition_.tracks().items())
@@ -138,7 +138,7 @@ class Sampler {
     for (const auto& [first, k] : now) edits_.emplace_back().track = static_cast<std::int32_t>(k);
     partition_.apply(edits_);
     is_best_ = true;
-    gain_ = most_;
+    gain_ = max_gain_;
   }
 
   // Proposals with a log ratio above this, without the reverse move, are evaluated completely even
@@ -151,13 +151,13 @@ class Sampler {
     return toggles_.propose(toggle, change_);
   }
 
-  template <typename Seen>
-  bool take(double log_u, bool is_weighed, Seen&& seen) {
+  template <typename Observe>
+  bool take(double log_u, bool is_weighed, Observe&& observe) {
     const bool is_taken = change_.log_ratio > log_u;
     change_.p_taken = !is_weighed             ? is_taken
                       : change_.log_ratio >= 0 ? 1
                                                : std::exp(change_.log_ratio);
-    seen(std::as_const(change_), is_taken);
+    observe(std::as_const(change_), is_taken);
     if (!is_taken) return false;
     if (opt_.is_ascent) {
       last_gain_ = best_gain_ + change_.gain;
@@ -170,8 +170,8 @@ class Sampler {
     }
     partition_.apply(change_.all());
     gain_ += change_.gain;
-    is_best_ = is_best_ || gain_ > most_ + kBetter;
-    most_ = std::max(most_, gain_);
+    is_best_ = is_best_ || gain_ > max_gain_ + kBetter;
+    max_gain_ = std::max(max_gain_, gain_);
     return true;
   }
 
@@ -235,7 +235,7 @@ class Sampler {
   // Since `begin_best`: the gain, its maximum, and whether the present partition attains it. If it
   // does not, the tracks of the best partition are saved.
   static constexpr double kBetter = 1e-9;
-  double gain_ = 0, most_ = 0;
+  double gain_ = 0, max_gain_ = 0;
   bool is_best_ = false;
   std::vector<std::int32_t> saved_, first_saved_;
   std::vector<Edit<Filter>> edits_;

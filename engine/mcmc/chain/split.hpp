@@ -29,13 +29,13 @@ enum class SplitBy { whole, likelihood, cells, clusters };
 struct SplitOptions {
   SplitBy by = SplitBy::likelihood;
   // nats; a link is ambiguous if its log likelihood is within this of the best alternative
-  double doubt = 10;
+  double ambiguous_within = 10;
   double distance = 0;   // edge of a cell, or distance within a cluster
 };
 
 struct Group {
   std::vector<std::int32_t> tracks, free;
-  std::vector<Doubts::Link> doubts;
+  std::vector<AmbiguousLinks::Link> ambiguous;
   std::int64_t n_new = 0;   // tracks and free detections with a detection in the newest frame
   std::int64_t n_open = 0;  // detections that are not settled
 };
@@ -53,7 +53,7 @@ class Splitter {
       : p_(partition), opt_(options) {}
 
   // Tracks marked in `is_sure` are left out.
-  Split split(const Doubts& doubts, const std::vector<char>& is_sure) {
+  Split split(const AmbiguousLinks& ambiguous, const std::vector<char>& is_sure) {
     list(is_sure);
     UnionFind sets(items_.size());
     switch (opt_.by) {
@@ -61,12 +61,12 @@ class Splitter {
         for (std::size_t n = 1; n < items_.size(); ++n) sets.join(0, static_cast<std::int32_t>(n));
         break;
       case SplitBy::likelihood:
-        doubts.each([&](std::int32_t i, std::int32_t j) { join(sets, i, j); });
+        ambiguous.each([&](std::int32_t i, std::int32_t j) { join(sets, i, j); });
         break;
       case SplitBy::cells: join_cells(sets); break;
       case SplitBy::clusters: join_clusters(sets); break;
     }
-    return collect(sets, doubts);
+    return collect(sets, ambiguous);
   }
 
  private:
@@ -120,10 +120,10 @@ class Splitter {
       grid.within(places[n], opt_.distance, [&](std::int32_t other, double) { sets.join(n, other); });
   }
 
-  Split collect(UnionFind& sets, const Doubts& doubts) const {
+  Split collect(UnionFind& sets, const AmbiguousLinks& ambiguous) const {
     Split out;
     std::vector<char> is_open(items_.size(), opt_.by != SplitBy::likelihood);
-    doubts.each([&](std::int32_t, std::int32_t j) {
+    ambiguous.each([&](std::int32_t, std::int32_t j) {
       if (item(j) >= 0) is_open[sets.find(item(j))] = true;
     });
     std::vector<std::int32_t> group_of(items_.size(), -1);
@@ -146,11 +146,11 @@ class Splitter {
       }
       group.n_new += p_.window()[item.detection].frame == p_.window().now();
     }
-    doubts.each([&](std::int32_t i, std::int32_t j) {
+    ambiguous.each([&](std::int32_t i, std::int32_t j) {
       const std::int32_t a = item(i), b = item(j);
       if (a < 0 || b < 0) return;
       if (sets.find(a) == sets.find(b))
-        out.groups[group_of[sets.find(a)]].doubts.push_back({i, j});
+        out.groups[group_of[sets.find(a)]].ambiguous.push_back({i, j});
       else
         ++out.n_cut;
     });

@@ -31,8 +31,8 @@ class Continuations {
 
   // Advances the state at continuation i over all later detections. Returns their contribution to
   // the score without gap terms, which do not change.
-  double go_on(const MotionModel& m, const DetectionWindow& window, Filter& filter, std::int32_t i,
-               State& state) const {
+  double advance(const MotionModel& m, const DetectionWindow& window, Filter& filter,
+                 std::int32_t i, State& state) const {
     double gain = 0;
     std::int64_t frame = window[i].frame;
     typename Filter::Expected expected{};

@@ -82,7 +82,8 @@ class Partition {
 
   double begin_score() const { return sm_.log_birth + sm_.log_detect - sm_.log_clutter; }
   double gap_score(int gap) const {
-    return sm_.log_misses(0, gap - 1) + sm_.log_seen(gap - 1) - sm_.log_clutter + gap * sm_.log_survive;
+    return sm_.log_misses(0, gap - 1) + sm_.log_hit(gap - 1) - sm_.log_clutter +
+           gap * sm_.log_survive;
   }
   double end_score(std::int32_t i) const {
     if (is_continuation(i)) return 0;  // the end of the track is unchanged
@@ -123,7 +124,7 @@ class Partition {
       tail.scores.push_back((is_first ? score_[i] : tail.scores.back()) + gain);
     }
     tail.nodes.push_back(j);
-    if (is_continuation(j)) tail.scores.back() += later_.go_on(m_, window_, filter_, j, state);
+    if (is_continuation(j)) tail.scores.back() += later_.advance(m_, window_, filter_, j, state);
   }
   // Whether every continuation is in a track after the edits.
   bool keeps_continuations(std::span<const Edit<Filter>> edits) const {
@@ -138,8 +139,7 @@ class Partition {
     return true;
   }
 
-  // Appends the present next detection of the track. Nothing before it has changed, so its state
-  // and score stay valid.
+  // Appends the present next detection, whose state and score stay valid without earlier changes.
   void append_same(Edit<Filter>& edit, std::int32_t j) const {
     edit.tail.nodes.push_back(j);
     edit.tail.states.push_back(state_[j]);
@@ -261,14 +261,12 @@ class Partition {
     window_.close_after(frame);
     n_after_ = n_after;
   }
-  // Sets the detections after continuation i. It must be called before the detection is put into a
-  // track.
+  // Sets the detections after continuation i, which must not be in a track yet.
   void continue_with(std::int32_t i, LaterPoints later) {
     free_.remove(i);
     later_.set(i, std::move(later));
   }
-  // Adds a track that begins with a settled detection in a known state. It may have had earlier
-  // detections.
+  // Adds a track that begins, or continues earlier detections, with a settled one in a known state.
   std::int32_t add_settled(std::int32_t i, const State& state, bool has_others_before) {
     const std::int32_t k = new_track();
     free_.remove(i);

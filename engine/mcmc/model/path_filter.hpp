@@ -72,7 +72,7 @@ class OneMotion {
     out.node = -1;
     if (from.node >= 0) {
       const std::size_t at = static_cast<std::size_t>(from.node) * max_gap_ + (gap - 1);
-      if (next_[at] < 0 && nodes_.size() < kMost) {
+      if (next_[at] < 0 && nodes_.size() < kMaxNodes) {
         const std::int32_t node = add(pattern(m, step, from));
         next_[at] = node;
       }
@@ -87,9 +87,9 @@ class OneMotion {
   }
 
   static const Point& center(const Expected& e) { return e.center; }
-  static double radius(const Expected& e, double log_likelihood, double r_most) {
+  static double radius(const Expected& e, double log_likelihood, double max_r) {
     const double half = e.log_peak - log_likelihood;
-    return half < 0 ? -1 : std::sqrt(2 * (e.S + r_most) * half);
+    return half < 0 ? -1 : std::sqrt(2 * (e.S + max_r) * half);
   }
   static double log_likelihood(const MotionModel& m, const Expected& e, const Point& y) {
     const double d2 = squared_distance(y, e.center, m.axis.D);
@@ -109,10 +109,10 @@ class OneMotion {
   }
 
  private:
-  static constexpr std::size_t kMost = 1 << 16;
+  static constexpr std::size_t kMaxNodes = 1 << 16;
 
   std::int32_t add(const Pattern& pattern) {
-    if (nodes_.size() >= kMost) return -1;
+    if (nodes_.size() >= kMaxNodes) return -1;
     nodes_.push_back(pattern);
     next_.resize(next_.size() + max_gap_, -1);
     return static_cast<std::int32_t>(nodes_.size()) - 1;
@@ -157,8 +157,8 @@ class SeveralMotions {
     out.prediction = Prediction(m, out.state);
   }
   static const Point& center(const Expected& e) { return e.prediction.center; }
-  static double radius(const Expected& e, double log_likelihood, double r_most) {
-    return e.prediction.radius(std::numeric_limits<double>::infinity(), log_likelihood, r_most);
+  static double radius(const Expected& e, double log_likelihood, double max_r) {
+    return e.prediction.radius(std::numeric_limits<double>::infinity(), log_likelihood, max_r);
   }
   static double log_likelihood(const MotionModel&, const Expected& e, const Point& y) {
     std::array<double, kMaxModes> each{};

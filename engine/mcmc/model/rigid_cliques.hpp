@@ -67,13 +67,13 @@ class BondFinder {
 
   bool keep_distance(std::int32_t a, std::int32_t b) const {
     const auto &s = p_.track(a).nodes, &t = p_.track(b).nodes;
-    double least = 0, most = 0;
+    double min_distance = 0, max_distance = 0;
     for (std::int32_t n = 1; n <= opt_.n_frames; ++n) {
       const Point &x = p_.window()[s[s.size() - n]].y, &y = p_.window()[t[t.size() - n]].y;
       const double distance = std::sqrt(squared_distance(x, y, p_.motion().axis.D));
-      least = n == 1 ? distance : std::min(least, distance);
-      most = n == 1 ? distance : std::max(most, distance);
-      if (most - least > opt_.tolerance) return false;
+      min_distance = n == 1 ? distance : std::min(min_distance, distance);
+      max_distance = n == 1 ? distance : std::max(max_distance, distance);
+      if (max_distance - min_distance > opt_.tolerance) return false;
     }
     return true;
   }

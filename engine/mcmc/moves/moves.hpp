@@ -56,13 +56,13 @@ class Moves {
       case Move::split:
         return -log(p_.tracks().size() + 1) - log(n_starts_after(node(first.track, first.keep - 1)) + 1);
       case Move::merge:
-        return -log(p_.tracks().size() - 1) - log(n_new - 1 - least_kept(first.track));
+        return -log(p_.tracks().size() - 1) - log(n_new - 1 - min_kept(first.track));
       case Move::extension:
-        return -log(p_.tracks().size()) - log(n_new - least_kept(first.track));
+        return -log(p_.tracks().size()) - log(n_new - min_kept(first.track));
       case Move::reduction:
         return -log(p_.tracks().size()) + growth_.log_probability(first.track, first.keep, true);
       case Move::update:
-        return -log(p_.tracks().size()) - log(n_new + 1 - least_updated(first.track)) +
+        return -log(p_.tracks().size()) - log(n_new + 1 - min_updated(first.track)) +
                growth_.log_probability(first.track, first.keep, must_grow(first.track, first.keep));
       case Move::switch_tails:
         return -log(p_.linked().size()) - log(n_partners_after(q));
@@ -96,10 +96,10 @@ class Moves {
     return p_.track(track).nodes[place];
   }
   // Smallest number of detections that a track keeps when it is cut, or in an update.
-  std::int32_t least_kept(std::int32_t track) const {
+  std::int32_t min_kept(std::int32_t track) const {
     return std::max(2 - p_.track(track).n_gone, p_.track(track).n_frozen);
   }
-  std::int32_t least_updated(std::int32_t track) const {
+  std::int32_t min_updated(std::int32_t track) const {
     return std::max(1, p_.track(track).n_frozen);
   }
   // Whether a track that keeps so many detections must grow, because a single detection is no
@@ -159,9 +159,9 @@ class Moves {
   bool draw_split(Random& random, Change<Filter>& q) {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
-    const std::int32_t n_cuts = p_.track(k).size() - 1 - least_kept(k);
+    const std::int32_t n_cuts = p_.track(k).size() - 1 - min_kept(k);
     if (n_cuts < 1) return false;
-    const std::int32_t keep = least_kept(k) + random.below(n_cuts);
+    const std::int32_t keep = min_kept(k) + random.below(n_cuts);
     q.log_forward -= log(n_cuts);
     q.edit(k, keep);
     splices_.append(q.edit(-1, 0), k, keep);
@@ -198,19 +198,19 @@ class Moves {
   bool draw_reduction(Random& random, Change<Filter>& q) {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
-    const std::int32_t n_cuts = p_.track(k).size() - least_kept(k);
+    const std::int32_t n_cuts = p_.track(k).size() - min_kept(k);
     if (n_cuts < 1) return false;
     q.log_forward -= log(n_cuts);
-    q.edit(k, least_kept(k) + random.below(n_cuts));
+    q.edit(k, min_kept(k) + random.below(n_cuts));
     return true;
   }
 
   bool draw_update(Random& random, Change<Filter>& q) {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
-    const std::int32_t n_cuts = p_.track(k).size() + 1 - least_updated(k);
+    const std::int32_t n_cuts = p_.track(k).size() + 1 - min_updated(k);
     q.log_forward -= log(n_cuts);
-    q.with = least_updated(k) + random.below(n_cuts);
+    q.with = min_updated(k) + random.below(n_cuts);
     Edit<Filter>& e = q.edit(k, q.with);
     q.log_forward += growth_.grow(e, must_grow(k, q.with), random);
     if (is_as_it_is(e)) q.n_edits = 0;

@@ -35,7 +35,7 @@ namespace asterism {
 template <typename Filter>
 class CaptureSweep {
  public:
-  using Link = Doubts::Link;
+  using Link = AmbiguousLinks::Link;
   // The open frames of a block.
   struct Block {
     std::int64_t first = 0, last = 0, next = 0;  // `next`: first frame of the next block
@@ -44,7 +44,7 @@ class CaptureSweep {
   // A block as a partition. Its detections have local numbers; `numbers` are those in the capture.
   struct Part {
     Partition<Filter> partition;
-    Doubts doubts;
+    AmbiguousLinks ambiguous;
     std::vector<std::int32_t> numbers;
   };
 
@@ -56,11 +56,11 @@ class CaptureSweep {
     frames_.push_back({time, step, n_points()});
     points_.insert(points_.end(), points.begin(), points.end());
     labels_.resize(points_.size(), -1);
-    doubts_.emplace_back();
+    ambiguous_.emplace_back();
   }
   // Adds an ambiguous link that leads into the newest frame. Detections are given by number.
-  void add_doubt(std::int64_t from, std::int64_t to) {
-    doubts_.back().push_back({static_cast<std::int32_t>(from), static_cast<std::int32_t>(to)});
+  void add_ambiguous(std::int64_t from, std::int64_t to) {
+    ambiguous_.back().push_back({static_cast<std::int32_t>(from), static_cast<std::int32_t>(to)});
   }
   void set_label(std::int64_t detection, std::int64_t label) { labels_[detection] = label; }
 
@@ -126,10 +126,10 @@ class CaptureSweep {
     }
     add_tracks(block, from, to, part);
     for (std::int64_t t = block.first; t <= std::min(block.last + max_gap_, T - 1); ++t) {
-      part.doubts.add_frame();
-      for (const Link& doubt : doubts_[t]) {
-        const auto a = local_.find(doubt.from), y = local_.find(doubt.to);
-        if (a != local_.end() && y != local_.end()) part.doubts.add(a->second, y->second);
+      part.ambiguous.add_frame();
+      for (const Link& link : ambiguous_[t]) {
+        const auto a = local_.find(link.from), y = local_.find(link.to);
+        if (a != local_.end() && y != local_.end()) part.ambiguous.add(a->second, y->second);
       }
     }
     return part;
@@ -249,7 +249,7 @@ class CaptureSweep {
   std::vector<Frame> frames_;
   std::vector<Point> points_;
   std::vector<std::int64_t> labels_, found_;  // initial and final
-  std::vector<std::vector<Link>> doubts_;  // by the frame they lead into
+  std::vector<std::vector<Link>> ambiguous_;  // by the frame they lead into
   std::vector<std::int32_t> before_, after_;
   // at the start of the next block
   std::unordered_map<std::int32_t, typename Filter::State> states_;

@@ -30,8 +30,9 @@ struct GivenLabels {
 template <typename Filter>
 class FrameStart {
  public:
-  // A link is ambiguous if its log likelihood is within `doubt` nats of an alternative.
-  FrameStart(bool has_assignment, double doubt) : has_assignment_(has_assignment), doubt_(doubt) {}
+  // A link is ambiguous if its log likelihood is within `ambiguous_within` nats of an alternative.
+  FrameStart(bool has_assignment, double ambiguous_within)
+      : has_assignment_(has_assignment), within_(ambiguous_within) {}
 
   void give(GivenLabels labels) {
     given_ = std::make_shared<const GivenLabels>(std::move(labels));
@@ -40,8 +41,9 @@ class FrameStart {
 
   // Adds the detections of the newest frame to the tracks of the partition, and its ambiguous
   // links.
-  void begin(Partition<Filter>& p, Doubts& doubts, ChainStats& stats, std::int64_t& n_candidates) {
-    doubts.add_frame();
+  void begin(Partition<Filter>& p, AmbiguousLinks& ambiguous, ChainStats& stats,
+             std::int64_t& n_candidates) {
+    ambiguous.add_frame();
     list_ends(p);
     give_links(p, stats);
     list_candidates(p);
@@ -55,8 +57,8 @@ class FrameStart {
     const auto& ids = p.window().frame(p.window().now()).ids;
     for (const auto* list : {&s_.candidates, &s_.others})
       for (const Candidate& c : *list)
-        if (s_.match[c.row] != c.column || c.gain < doubt_)
-          doubts.add(p.last(s_.rows[c.row]), ids[c.column]);
+        if (s_.match[c.row] != c.column || c.gain < within_)
+          ambiguous.add(p.last(s_.rows[c.row]), ids[c.column]);
     for (std::int32_t r = 0; r < n_rows; ++r) {
       const std::int32_t j = s_.match[r];
       if (j < 0 || (!has_assignment_ && s_.row_given[j] != r)) continue;
@@ -65,12 +67,12 @@ class FrameStart {
       edit.keep = p.track(edit.track).size();
       p.append(edit, ids[j]);
     }
-    s_.unseen.clear();
+    s_.missed.clear();
     for (std::int32_t r = 0; r < n_rows; ++r)
-      if (s_.match[r] < 0) s_.unseen.push_back(p.last(s_.rows[r]));
+      if (s_.match[r] < 0) s_.missed.push_back(p.last(s_.rows[r]));
     p.apply(s_.edits);  // invalidates the numbers of tracks
-    doubt_births(p, doubts);
-    for (const std::int32_t last : s_.unseen) doubt_last(p, last, doubts);
+    add_ambiguous_births(p, ambiguous);
+    for (const std::int32_t last : s_.missed) add_ambiguous_before_last(p, last, ambiguous);
   }
 
  private:
@@ -138,11 +140,11 @@ class FrameStart {
       const auto gap = static_cast<int>(window.now() - window[i].frame);
       p.filter().expect(p.motion(), window, p.state(i), window[i].frame, gap, s_.expected);
       const double base = p.gap_score(gap) - p.end_score(i);
-      const double radius = Filter::radius(s_.expected, -base - doubt_, places.grid.r_most());
+      const double radius = Filter::radius(s_.expected, -base - within_, places.grid.max_r());
       if (radius < 0) continue;
       places.grid.within(Filter::center(s_.expected), radius, [&](std::int32_t j, double) {
         const double gain = base + Filter::log_likelihood(p.motion(), s_.expected, places.points[j]);
-        if (gain < -doubt_ || !window.is_linkable(i, ids[j])) return;
+        if (gain < -within_ || !window.is_linkable(i, ids[j])) return;
         const bool is_open = gain > 0 && !s_.is_given[r] && s_.row_given[j] == kNone;
         (is_open ? s_.candidates : s_.others).push_back({r, j, gain, 0});
       });
@@ -151,7 +153,7 @@ class FrameStart {
 
   // Adds ambiguous links between a free detection of an earlier frame and one of the newest frame,
   // as the beginning of a track.
-  void doubt_births(const Partition<Filter>& p, Doubts& doubts) {
+  void add_ambiguous_births(const Partition<Filter>& p, AmbiguousLinks& ambiguous) {
     const DetectionWindow& window = p.window();
     for (int gap = 1; gap <= window.max_gap(); ++gap) {
       const std::int64_t t = window.now() - gap;
@@ -159,25 +161,26 @@ class FrameStart {
       const DetectionWindow::Frame& before = window.frame(t);
       if (before.ids.empty()) continue;
       Point begin{};
-      begin.r = before.places->grid.r_most();
+      begin.r = before.places->grid.max_r();
       const auto begun = p.filter().begin(p.motion(), begin, t);
       p.filter().expect(p.motion(), window, begun, t, gap, s_.expected);
       const double radius =
-          Filter::radius(s_.expected, -p.begin_score() - p.gap_score(gap) - doubt_,
-                         window.frame(window.now()).places->grid.r_most());
+          Filter::radius(s_.expected, -p.begin_score() - p.gap_score(gap) - within_,
+                         window.frame(window.now()).places->grid.max_r());
       if (radius < 0) continue;
       for (const std::int32_t j : window.frame(window.now()).ids)
         if (p.is_free(j))
           before.places->grid.within(window[j].y, radius, [&](std::int32_t n, double) {
             if (p.is_free(before.ids[n]) && window.is_linkable(before.ids[n], j))
-              doubts.add(before.ids[n], j);
+              ambiguous.add(before.ids[n], j);
           });
     }
   }
 
   // For a track missed in this frame, adds ambiguous links from its detection before the last, in
   // case the last one is wrong.
-  void doubt_last(const Partition<Filter>& p, std::int32_t last, Doubts& doubts) {
+  void add_ambiguous_before_last(const Partition<Filter>& p, std::int32_t last,
+                                 AmbiguousLinks& ambiguous) {
     const DetectionWindow& window = p.window();
     const std::int32_t k = p.track_of(last), i = p.before(last);
     if (i < 0 || p.is_frozen(last) || window.now() - window[i].frame > window.max_gap()) return;
@@ -187,18 +190,19 @@ class FrameStart {
     p.filter().expect(p.motion(), window, p.state(i), window[i].frame, gap, s_.expected);
     const double base = p.score(i) + p.gap_score(gap) - p.score_of(k);
     const double radius =
-        Filter::radius(s_.expected, -base - doubt_, frame.places->grid.r_most());
+        Filter::radius(s_.expected, -base - within_, frame.places->grid.max_r());
     if (radius < 0) return;
     frame.places->grid.within(Filter::center(s_.expected), radius, [&](std::int32_t n, double) {
       const std::int32_t j = frame.ids[n];
       if (p.is_free(j) && window.is_linkable(i, j) &&
-          base + Filter::log_likelihood(p.motion(), s_.expected, frame.places->points[n]) > -doubt_)
-        doubts.add(i, j);
+          base + Filter::log_likelihood(p.motion(), s_.expected, frame.places->points[n]) >
+              -within_)
+        ambiguous.add(i, j);
     });
   }
 
   struct Memory {
-    std::vector<std::int32_t> rows, row_given, match, unseen;
+    std::vector<std::int32_t> rows, row_given, match, missed;
     std::unordered_map<std::int32_t, std::int32_t> row_of;
     std::vector<char> is_given;
     std::vector<Candidate> candidates, others;
@@ -208,10 +212,10 @@ class FrameStart {
   };
 
   bool has_assignment_;
-  double doubt_;
+  double within_;  // ambiguous_within
   std::shared_ptr<const GivenLabels> given_;
   std::unordered_map<std::int64_t, Last> last_;  // last detection of each given label
-  Fresh<Memory> s_;
+  Scratch<Memory> s_;
 };
 
 }  // namespace asterism

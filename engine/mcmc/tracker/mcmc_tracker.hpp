@@ -48,7 +48,7 @@ class McmcTracker {
       : partition_(m, sm),
         opt_(options),
         seed_(seed),
-        start_(options.has_assignment, options.split.doubt),
+        start_(options.has_assignment, options.split.ambiguous_within),
         walks_(chain, options.n_chains, options.n_threads),
         sweep_(options.block, sm.max_gap) {}
 
@@ -56,7 +56,7 @@ class McmcTracker {
   SampledStats step(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
     const SampledStats stats = add(time, step, points);
     name_new();
-    tell(label);
+    report(label);
     settle();
     return stats;
   }
@@ -66,14 +66,14 @@ class McmcTracker {
   SampledStats pass(double time, const MotionStep& step, std::span<const Point> points, Label&& label) {
     const SampledStats stats = add(time, step, points);
     name_new();
-    if (oldest_open() <= partition().window().now() - opt_.window) tell(label, oldest_open());
+    if (oldest_open() <= partition().window().now() - opt_.window) report(label, oldest_open());
     settle();
     return stats;
   }
   template <typename Label>
   void end_pass(Label&& label) {
     name_new();
-    tell(label);
+    report(label);
   }
 
   // Runs over all frames so far again, block by block: first for the best partition, then for
@@ -95,7 +95,7 @@ class McmcTracker {
         const auto go_on = [&](double share) { return goes_on((n_done + share) / n_all); };
         auto part = sweep_.take(partition_, blocks[b]);
         const double moves = (s == 0 ? opt_.moves : opt_.confidence) / overlap;
-        const Split split = split_up(part.partition, part.doubts, {}, stats);
+        const Split split = split_up(part.partition, part.ambiguous, {}, stats);
         const auto weights = weights_of(split.groups, [](const Group& g) { return g.n_open; });
         double all = 0;
         for (const double weight : weights) all += weight;
@@ -164,11 +164,11 @@ class McmcTracker {
     p.add_frame(time, step, points, so_far_.n_seen);
     so_far_.add(time, points.size());
     SampledStats stats;
-    start_.begin(p, doubts_, stats.chain, stats.n_candidates);
+    start_.begin(p, ambiguous_, stats.chain, stats.n_candidates);
     if (opt_.is_whole) {
       sweep_.add_frame(time, step, points);
-      doubts_.each_new([&](std::int32_t from, std::int32_t to) {
-        sweep_.add_doubt(p.window()[from].number, p.window()[to].number);
+      ambiguous_.each_new([&](std::int32_t from, std::int32_t to) {
+        sweep_.add_ambiguous(p.window()[from].number, p.window()[to].number);
       });
     }
     const Bonds sure = BondFinder<Filter>(p, opt_.bonds).find();
@@ -183,18 +183,18 @@ class McmcTracker {
     return stats;
   }
 
-  // Searches for the best partition, and then estimates confidence if `is_asked`. `allowed(groups,
-  // moves, fraction of the time)` returns the budgets.
-  template <typename Allowed, typename IsAsked>
+  // Searches for the best partition, and then estimates confidence if `wants_confidence`.
+  // `allowed(groups, moves, fraction of the time)` returns the budgets.
+  template <typename Allowed, typename WantsConfidence>
   void walk(const std::vector<char>& is_sure, Allowed&& allowed, std::uint64_t phase,
-            SampledStats& stats, IsAsked&& is_asked) {
-    const Split split = split_up(partition_, doubts_, is_sure, stats);
+            SampledStats& stats, WantsConfidence&& wants_confidence) {
+    const Split split = split_up(partition_, ambiguous_, is_sure, stats);
     walks_.search(partition_, split.groups,
                   allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1), seed_of(phase),
                   stats.chain);
-    if (!is_asked()) return;
+    if (!wants_confidence()) return;
     // The search may have changed the tracks.
-    const Split now = Splitter<Filter>(partition_, opt_.split).split(doubts_, is_sure);
+    const Split now = Splitter<Filter>(partition_, opt_.split).split(ambiguous_, is_sure);
     keep_shares(walks_.sample(partition_, now.groups, allowed(now.groups, opt_.confidence, 1),
                               seed_of(phase + 1), stats.chain));
   }
@@ -213,9 +213,9 @@ class McmcTracker {
     }
   }
 
-  Split split_up(const Partition<Filter>& p, const Doubts& doubts, const std::vector<char>& is_sure,
-                 SampledStats& stats) const {
-    Split split = Splitter<Filter>(p, opt_.split).split(doubts, is_sure);
+  Split split_up(const Partition<Filter>& p, const AmbiguousLinks& ambiguous,
+                 const std::vector<char>& is_sure, SampledStats& stats) const {
+    Split split = Splitter<Filter>(p, opt_.split).split(ambiguous, is_sure);
     stats.n_groups += split.n_all;
     for (const Group& group : split.groups)
       stats.largest_group = std::max<std::int64_t>(
@@ -281,16 +281,17 @@ class McmcTracker {
 
   // Reports the labels of the open frames that have changed.
   template <typename Label>
-  void tell(Label&& label, std::int64_t last = std::numeric_limits<std::int64_t>::max()) {
+  void report(Label&& label, std::int64_t last = std::numeric_limits<std::int64_t>::max()) {
     const Partition<Filter>& p = partition();
     const DetectionWindow& window = p.window();
-    if (static_cast<std::int32_t>(said_.size()) < window.n_ids()) said_.resize(window.n_ids());
+    if (static_cast<std::int32_t>(reported_.size()) < window.n_ids())
+      reported_.resize(window.n_ids());
     for (std::int64_t t = oldest_open(); t <= std::min(last, window.now()); ++t)
       for (const std::int32_t i : window.frame(t).ids) {
         const std::int32_t k = p.track_of(i);
-        const Said now{k < 0 ? -1 : id_of(k), confidence_of(i)};
-        if (now == said_[i]) continue;
-        said_[i] = now;
+        const Reported now{k < 0 ? -1 : id_of(k), confidence_of(i)};
+        if (now == reported_[i]) continue;
+        reported_[i] = now;
         if (opt_.is_whole) sweep_.set_label(window[i].number, now.id);
         label(window[i].number, now.id, now.confidence);
       }
@@ -315,10 +316,10 @@ class McmcTracker {
     // Tracks with settled detections keep their numbers.
     for (const std::int32_t k : p.tracks().items())
       if (p.track(k).n_frozen > 0) next_id_ = std::max(next_id_, id_of(k) + 1);
-    doubts_.keep(static_cast<std::size_t>(window.now() - settled));
+    ambiguous_.keep(static_cast<std::size_t>(window.now() - settled));
     while (window.first() + window.max_gap() <= settled) {
       for (const std::int32_t i : window.frame(window.first()).ids) {
-        if (i < static_cast<std::int32_t>(said_.size())) said_[i] = {};
+        if (i < static_cast<std::int32_t>(reported_.size())) reported_[i] = {};
         if (i < static_cast<std::int32_t>(shares_.size())) shares_[i] = {};
       }
       p.drop_frame();
@@ -345,7 +346,7 @@ class McmcTracker {
   std::uint64_t seed_;
   FrameStart<Filter> start_;
   Walks<Filter> walks_;
-  Doubts doubts_;
+  AmbiguousLinks ambiguous_;
   // By detection of the window: the probability of its link, and the label and confidence last
   // reported.
   struct Share {
@@ -353,12 +354,12 @@ class McmcTracker {
     std::int32_t n = 0, before = -3;
   };
   std::vector<Share> shares_;
-  struct Said {
+  struct Reported {
     std::int64_t id = -1;
     double confidence = -1;
-    bool operator==(const Said&) const = default;
+    bool operator==(const Reported&) const = default;
   };
-  std::vector<Said> said_;
+  std::vector<Reported> reported_;
   CaptureSweep<Filter> sweep_;
   std::int64_t next_id_ = 0, n_named_ = 0;
   SampledStats total_;
