@@ -146,7 +146,7 @@ double Prediction::log_likelihood(const Point& point, std::array<double, kMaxMod
 }
 
 double Prediction::radius(double gate, double min_log_likelihood, double max_r) const {
-  // A point may lie in the gate of one mode while another mode gives it its likelihood.
+  // The mode that gates a point and the mode that makes it likely may differ.
   double gated = -1, likely = -1;
   for (int b = 0; b < M; ++b) {
     const double offset = std::sqrt(squared_distance(y[b], center, D));

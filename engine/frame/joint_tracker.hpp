@@ -76,7 +76,7 @@ class JointTracker {
     share_among_confirmed(points, stats);
     share_among_tentative(points, stats);
     for (std::size_t j = 0; j < points.size(); ++j)
-      label(live_.so_far.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * (1 - newborn(1)));
+      label(live_.so_far.n_seen + static_cast<std::int64_t>(j), -1, s_.free[j] * (1 - p_new(1)));
     update_tracks(time, points, stats, label);
     begin_tracks(time, points);
     carried_.learn(live_, stats);
@@ -130,7 +130,7 @@ class JointTracker {
   }
 
   // Probability that a detection initiates a track, if it belongs to no track with probability q.
-  double newborn(double q) const {
+  double p_new(double q) const {
     const double b = std::exp(live_.birth_gain());
     return q * b / (1 + b);
   }
@@ -314,7 +314,7 @@ class JointTracker {
 
   void begin_tracks(double time, std::span<const Point> points) {
     for (std::size_t j = 0; j < points.size(); ++j) {
-      const double r = newborn(s_.free[j]);
+      const double r = p_new(s_.free[j]);
       if (s_.pairs.is_taken[j] || !(r > 0)) continue;
       live_.begin(j, points[j], time, std::log(r) - std::log1p(-r));
     }

@@ -1,4 +1,4 @@
-// The continuations of every branch of every tree in a new frame.
+// The continuations (“ways”) of every branch of every tree in a new frame.
 #pragma once
 
 #include <algorithm>
@@ -52,7 +52,7 @@ class FrameWays {
       for (const Branch& b : ways.branches)
         ways.log_ratio.push_back(open.is_lone(i, b) ? 0 : grower.log_ratio(b));
     }
-    open.sow();
+    open.begin_trees();
     for (std::size_t i = ways_.size(); i < open.n_all(); ++i)
       ways_.push_back({open.tree(i).more.branches, {0, 1}, {0}});
     list_keys(open);

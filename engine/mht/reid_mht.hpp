@@ -84,7 +84,7 @@ class HypothesisMatrix {
     FrameWays ways;
     // By open frame and tree: the decision of the best hypothesis. By frame and detection: the
     // probability that it belongs to no tree.
-    std::vector<std::map<std::int64_t, Fate>> fates;
+    std::vector<std::map<std::int64_t, TreeDecision>> decisions;
     std::vector<std::vector<double>> free;
   };
 
@@ -161,7 +161,7 @@ class HypothesisMatrix {
 
   // Computes decisions and probabilities for the first open frames.
   void weigh(std::size_t n_frames) {
-    s_.fates.assign(n_frames, {});
+    s_.decisions.assign(n_frames, {});
     s_.free.assign(n_frames, {});
     for (std::size_t f = 0; f < n_frames; ++f) {
       const WindowFrame& frame = *open_.frames[f];
@@ -170,21 +170,21 @@ class HypothesisMatrix {
         const std::vector<double> p = probabilities(cluster);
         for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
           const std::size_t i = s_.ways.index_of(cluster.keys[k]);
-          Fate fate = fate_of(i, cluster.hypotheses.front().branches[k], frame);
+          TreeDecision decision = decision_of(i, cluster.hypotheses.front().branches[k], frame);
           for (std::size_t h = 0; h < p.size(); ++h) {
-            const Fate other = fate_of(i, cluster.hypotheses[h].branches[k], frame);
+            const TreeDecision other = decision_of(i, cluster.hypotheses[h].branches[k], frame);
             if (!other.exists) continue;
-            if (fate.column == other.column) fate.probability += p[h];
+            if (decision.column == other.column) decision.probability += p[h];
             if (other.column >= 0) s_.free[f][other.column] -= p[h];
           }
-          fate.probability = std::min(fate.probability, 1.0);
-          s_.fates[f].emplace(cluster.keys[k], fate);
+          decision.probability = std::min(decision.probability, 1.0);
+          s_.decisions[f].emplace(cluster.keys[k], decision);
         }
       }
     }
   }
 
-  Fate fate_of(std::size_t tree, std::int32_t branch, const WindowFrame& frame) const {
+  TreeDecision decision_of(std::size_t tree, std::int32_t branch, const WindowFrame& frame) const {
     if (branch < 0) return {};
     const Branch& b = open_.tree(tree).more.branches[branch];
     if (open_.is_lone(tree, b) || frame.number < open_.first_frame(tree)) return {};
@@ -198,8 +198,8 @@ class HypothesisMatrix {
       std::erase_if(cluster.hypotheses, [&](const Hypothesis& h) {
         for (std::size_t k = 0; k < cluster.keys.size(); ++k) {
           const std::size_t i = s_.ways.index_of(cluster.keys[k]);
-          const Fate best = s_.fates[0].at(cluster.keys[k]);
-          const Fate own = fate_of(i, h.branches[k], frame);
+          const TreeDecision best = s_.decisions[0].at(cluster.keys[k]);
+          const TreeDecision own = decision_of(i, h.branches[k], frame);
           if (own.column != best.column) return true;
         }
         return false;
@@ -210,13 +210,13 @@ class HypothesisMatrix {
   // MASH: applies the decisions to the oldest frame.
   template <typename Label>
   void mash(TreeStats& stats, Label&& label) {
-    std::vector<Fate> fates;
+    std::vector<TreeDecision> decisions;
     for (std::size_t i = 0; i < open_.n_all(); ++i) {
-      const auto at = s_.fates.front().find(open_.tree(i).more.key);
-      fates.push_back(at == s_.fates.front().end() ? Fate{} : at->second);
+      const auto at = s_.decisions.front().find(open_.tree(i).more.key);
+      decisions.push_back(at == s_.decisions.front().end() ? TreeDecision{} : at->second);
     }
-    open_.carry_out(fates, s_.free.front(), stats, label);
-    s_.fates.erase(s_.fates.begin());
+    open_.carry_out(decisions, s_.free.front(), stats, label);
+    s_.decisions.erase(s_.decisions.begin());
     s_.free.erase(s_.free.begin());
     s_.ways.list_keys(open_);
   }

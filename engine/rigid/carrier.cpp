@@ -27,10 +27,10 @@ const Carriage& middle(std::span<const Carriage> ways, int D) {
 
 }  // namespace
 
-Carried Carrier::place(const RigidPrediction& found, const Trust& trust, std::int64_t frames,
+Carried Carrier::place(const RigidPrediction& found, const Accuracy& accuracy, std::int64_t frames,
                        double r) const {
   const double bent = static_cast<double>(frames) / kLag;
-  return found.place(r, std::max(bent * trust.kappa(r_), Trust::kMinKappa));
+  return found.place(r, std::max(bent * accuracy.kappa(r_), Accuracy::kMinKappa));
 }
 
 bool Carrier::carry(std::int32_t marker, const Anchor& from, const Places& now, std::int64_t frames,
@@ -41,8 +41,8 @@ bool Carrier::carry(std::int32_t marker, const Anchor& from, const Places& now, 
       s_.pairs.push_back({from.around[k].at, *at, from.weight[k]});
   if (s_.pairs.empty()) return false;
   const RigidPrediction found(s_.pairs, from.at, D_, r_);
-  const auto at = trust_.find(marker);
-  out.place = place(found, at == trust_.end() ? Trust{} : at->second, frames, r);
+  const auto at = accuracy_.find(marker);
+  out.place = place(found, at == accuracy_.end() ? Accuracy{} : at->second, frames, r);
   out.n_neighbours = static_cast<std::int32_t>(s_.pairs.size());
   out.nearest = std::sqrt(found.nearest2());
   return true;
@@ -58,8 +58,8 @@ void RigidCarrier::see(std::span<const MarkerPoint> seen) {
     for (const MarkerPoint& one : frames_[frames_.size() - 2].seen)
       if (frames_.back().find(one.marker) == nullptr) mark_occluded(one.marker);
   if (static_cast<std::int64_t>(frames_.size()) <= Carrier::kLag) return;
-  carrier_.judge(seen, frames_.front(), frames_.back(),
-                 [](const MarkerPoint&, const RigidPrediction&, const Trust&) {});
+  carrier_.assess(seen, frames_.front(), frames_.back(),
+                 [](const MarkerPoint&, const RigidPrediction&, const Accuracy&) {});
 }
 
 void RigidCarrier::forget(std::int32_t marker) {
@@ -69,7 +69,7 @@ void RigidCarrier::forget(std::int32_t marker) {
 
 bool RigidCarrier::carry(std::int32_t marker, const Places& now, Carriage& out,
                          std::int64_t n_open) {
-  if (!carrier_.is_judged(marker)) return false;
+  if (!carrier_.is_assessed(marker)) return false;
   const auto occlusion = occluded_.find(marker);
   if (occlusion == occluded_.end()) {
     s_.anchors.clear();

@@ -1,6 +1,6 @@
-// Predicts occluded markers from rigid neighbours. The carrier selects the neighbours of each
-// marker, stores their relative positions at the last detection, and estimates the accuracy of its
-// predictions.
+// Predicts occluded markers from rigid neighbours, which are said to carry them. The carrier
+// selects the neighbours of each marker, stores their relative positions at the last detection, and
+// estimates the accuracy of its predictions.
 //
 // While a marker is detected, the carrier regularly predicts its present position from the frame
 // kLag frames earlier. The errors of these predictions scale the variance of later ones
@@ -40,11 +40,11 @@ struct Carriage {
 
 // Mean squared error per axis of the positions predicted by a rotation over kLag frames, and its
 // expected value. The means have a memory of kRecent predictions.
-struct Trust {
+struct Accuracy {
   static constexpr std::int64_t kRecent = 50;
   static constexpr double kMinKappa = 0.02;  // lower bound of κ
 
-  std::int64_t n_judged = 0, n = 0;
+  std::int64_t n_assessed = 0, n = 0;
   double error = 0, expected = 0;
 
   void add(double error2, double variance) {
@@ -79,7 +79,7 @@ class Carrier {
   // Removes a marker that will not be detected again.
   void forget(std::int32_t marker) {
     neighbours_.forget(marker);
-    trust_.erase(marker);
+    accuracy_.erase(marker);
   }
 
   std::span<const Bond> neighbours(std::int32_t marker) const { return neighbours_.of(marker); }
@@ -96,29 +96,29 @@ class Carrier {
   }
 
   // Compares the detected positions of some markers with those predicted from `then`, kLag frames
-  // earlier. Calls tell(marker, prediction, trust before this frame).
-  template <typename Then, typename Now, typename Tell>
-  void judge(std::span<const MarkerPoint> seen, const Then& then, const Now& now, Tell&& tell) {
+  // earlier. Calls tell(marker, prediction, accuracy before this frame).
+  template <typename Then, typename Now, typename Visit>
+  void assess(std::span<const MarkerPoint> seen, const Then& then, const Now& now, Visit&& visit) {
     for (const MarkerPoint& one : seen) {
-      if ((n_frames_ + one.marker) % kJudgeEvery != 0) continue;
+      if ((n_frames_ + one.marker) % kAssessEvery != 0) continue;
       const Point* before = then.find(one.marker);
       if (before == nullptr) continue;
       const std::span<const RigidPair> pairs = pair(one.marker, then, now);
       if (pairs.empty()) continue;
       const RigidPrediction found(pairs, *before, D_, r_);
-      Trust& trust = trust_[one.marker];
-      tell(one, found, std::as_const(trust));
-      ++trust.n_judged;
+      Accuracy& accuracy = accuracy_[one.marker];
+      visit(one, found, std::as_const(accuracy));
+      ++accuracy.n_assessed;
       if (!found.may_turn()) continue;
       // An error beyond the nearest neighbour is due to a wrong association, so it is clipped.
       const double error2 = std::min(squared_distance(one.at, found.turned(), D_), found.nearest2());
-      trust.add(error2 / D_, found.turned_variance(0, 1));
+      accuracy.add(error2 / D_, found.turned_variance(0, 1));
     }
   }
   // Whether the accuracy was assessed often enough for predictions to be used.
-  bool is_judged(std::int32_t marker) const {
-    const auto at = trust_.find(marker);
-    return at != trust_.end() && at->second.n_judged >= kMinJudged;
+  bool is_assessed(std::int32_t marker) const {
+    const auto at = accuracy_.find(marker);
+    return at != accuracy_.end() && at->second.n_assessed >= kMinAssessed;
   }
 
   // Adds an anchor of the marker in `then`, frame number `frame`, if any neighbour is detected
@@ -138,7 +138,8 @@ class Carrier {
     }
   }
   // The position of a marker carried over `frames` frames. `r` is the additional variance.
-  Carried place(const RigidPrediction& found, const Trust& trust, std::int64_t frames, double r) const;
+  Carried place(const RigidPrediction& found, const Accuracy& accuracy, std::int64_t frames,
+                double r) const;
   // Predicts the position of a marker from an anchor. Returns false if none of its neighbours is
   // detected.
   bool carry(std::int32_t marker, const Anchor& from, const Places& now, std::int64_t frames, double r,
@@ -146,7 +147,7 @@ class Carrier {
 
  private:
   static constexpr std::size_t kRemembered = 16;  // neighbours of an anchor
-  static constexpr std::int64_t kJudgeEvery = 4, kMinJudged = 3;
+  static constexpr std::int64_t kAssessEvery = 4, kMinAssessed = 3;
 
   // Lists the up to `n_max` most stable neighbours for which may_carry(neighbour) holds.
   template <typename May>
@@ -167,7 +168,7 @@ class Carrier {
   bool bonds_only_;
   std::int64_t n_frames_ = 0;
   Neighbours neighbours_;
-  std::map<std::int32_t, Trust> trust_;
+  std::map<std::int32_t, Accuracy> accuracy_;
   Scratch<Memory> s_;
 };
 

@@ -42,7 +42,7 @@ struct Tracklet {
   MotionState state;         // while its motion is compared
   double alone = 0;  // log likelihood of its second and later detections as a new marker
   std::vector<Continuation> continuations;
-  double known = 0;  // average accuracy with which its neighbours predicted its links
+  double link_gain = 0;  // mean log-likelihood ratio of its links by neighbours
   std::int32_t guess = -1;  // best candidate among the occluded markers, while undecided
   // all candidates with their log-likelihood ratios
   std::vector<std::pair<std::int32_t, double>> guesses;
@@ -54,7 +54,7 @@ struct Marker {
   MotionState state;            // predicted to the newest frame, while occluded
   std::vector<Anchor> anchors;  // while occluded
   bool is_occluded = false;
-  double trust = 3;  // how well its neighbours predicted it lately, while it was detected
+  double mean_gain = 3;  // mean log-likelihood ratio of its detections by neighbours
 };
 using Tracklets = std::map<std::int32_t, Tracklet>;
 using Markers = std::map<std::int32_t, Marker>;

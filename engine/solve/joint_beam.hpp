@@ -5,10 +5,10 @@
 //   the kept events have mass Z and all events at most Z + D, so the total variation between the
 //   two distributions is at most D / (Z + D)
 //
-// U comes from a backward pass that tracks the use of some vertices only. For an untracked vertex
-// it takes the larger value of used and unused when the vertex is summed out. The bound is tightest
-// if the weights are scaled first: the options of a track sum to 1, and so do those of a detection
-// that several tracks compete for.
+// U comes from a backward pass that follows the use of some vertices and ignores that of the
+// others. For an ignored vertex it takes the larger of the values as used and as unused, when the
+// vertex is summed out. The bound is tightest if the weights are scaled first: the options of a
+// track sum to 1, and so do those of a detection that several tracks compete for.
 #pragma once
 
 #include <algorithm>
@@ -146,7 +146,7 @@ class JointBeam {
     assert(n_slots <= static_cast<std::int32_t>(64 * W));
   }
 
-  // The backward pass tracks the vertices with the strongest conflicts, as far as the state limit
+  // The backward pass follows the vertices with the strongest conflicts, as far as the state limit
   // allows.
   void choose_followed() {
     const auto n = static_cast<std::int32_t>(steps_.size());
@@ -186,7 +186,7 @@ class JointBeam {
     return static_cast<std::int32_t>(std::find(f.begin(), f.end(), v) - f.begin());
   }
 
-  // U of every layer, over the used sets of the tracked vertices.
+  // U of every layer, over the used sets of the followed vertices.
   void bound_completions() {
     const std::size_t n = steps_.size();
     completion_.resize(n + 1);

@@ -35,10 +35,10 @@ class LiveStitcher {
   // `labels` are the tracker's labels of this frame. `revised` are its corrections of earlier ones,
   // as pairs of a detection and a label. Calls tell(detection, marker) for every new or changed
   // marker.
-  template <typename Tell>
+  template <typename Report>
   void step(const MotionStep& step, std::span<const Point> points,
             std::span<const std::int64_t> labels,
-            std::span<const std::pair<std::int64_t, std::int64_t>> revised, Tell&& report) {
+            std::span<const std::pair<std::int64_t, std::int64_t>> revised, Report&& report) {
     for (const auto& [detection, label] : revised) revise(detection, label);
     Recent& now = recent_.emplace_back(Recent{}).own();
     now.step = step;
@@ -95,8 +95,8 @@ class LiveStitcher {
     std::vector<Point>().swap(frame.points);
     std::vector<std::int64_t>().swap(frame.labels);
   }
-  template <typename Tell>
-  void report_taken(Recent& frame, Tell&& report) {
+  template <typename Report>
+  void report_taken(Recent& frame, Report&& report) {
     std::erase_if(frame.open, [&](std::int32_t i) {
       const std::int32_t f = frame.known[i].tracklet;
       report_one(frame, i, f < 0 ? -1 : stitcher_.marker_of(f), report);
@@ -104,8 +104,8 @@ class LiveStitcher {
     });
   }
   // If several detections of a frame have the same marker, those of undecided tracklets lose it.
-  template <typename Tell>
-  void report_waiting(Recent& frame, Tell&& report) {
+  template <typename Report>
+  void report_waiting(Recent& frame, Report&& report) {
     tracklets_.clear();
     markers_.clear();
     for (const std::int64_t label : frame.labels) {
@@ -119,8 +119,8 @@ class LiveStitcher {
         markers_[i] = -1;
     for (std::size_t i = 0; i < markers_.size(); ++i) report_one(frame, i, markers_[i], report);
   }
-  template <typename Tell>
-  void report_one(Recent& frame, std::size_t i, std::int32_t marker, Tell&& report) {
+  template <typename Report>
+  void report_one(Recent& frame, std::size_t i, std::int32_t marker, Report&& report) {
     std::int32_t& reported = frame.known[i].reported;
     marker = std::max(marker, -1);
     if (reported != marker) report(frame.first + static_cast<std::int64_t>(i), reported = marker);

@@ -23,7 +23,7 @@ class RigidNeighbours {
   // Updates the bonds with the markers of the newest frame.
   void learn(const StitchMemory& s, std::span<const MarkerPoint> seen, Markers& markers) {
     carrier_.learn(seen);
-    judge(s, seen, markers);
+    assess(s, seen, markers);
   }
   void forget(std::int32_t marker) { carrier_.forget(marker); }
 
@@ -130,19 +130,22 @@ class RigidNeighbours {
     }
   }
   // Updates the mean log-likelihood ratio with which neighbours predict each detected marker.
-  void judge(const StitchMemory& s, std::span<const MarkerPoint> seen, Markers& markers) {
+  void assess(const StitchMemory& s, std::span<const MarkerPoint> seen, Markers& markers) {
     const Frame* then = s.frames.find(s.frames.now() - Carrier::kLag);
     if (then == nullptr) return;
     list_markers(s, *then, w_.places);
     list_markers(s, s.frames.newest(), w_.places_now);
-    carrier_.judge(seen, w_.places, w_.places_now,
-                   [&](const MarkerPoint& one, const RigidPrediction& found, const Trust& trust) {
+    const auto update = [&](const MarkerPoint& one, const RigidPrediction& found,
+                            const Accuracy& accuracy) {
       Marker& marker = markers.at(one.marker);
+      const Carried place =
+          carrier_.place(found, accuracy, Carrier::kLag, kNoise * square(noise_));
       const double gain =
-          carrier_.place(found, trust, Carrier::kLag, kNoise * square(noise_)).log_density(one.at, D_) -
+          place.log_density(one.at, D_) -
           s.background.log_density(one.at, s.frames.newest(), marker.tracklet);
-      marker.trust += 0.2 * (std::clamp(gain, -20.0, 20.0) - marker.trust);
-    });
+      marker.mean_gain += 0.2 * (std::clamp(gain, -20.0, 20.0) - marker.mean_gain);
+    };
+    carrier_.assess(seen, w_.places, w_.places_now, update);
   }
 
   // The positions of the markers in a frame.

@@ -108,7 +108,7 @@ class Stitcher {
   // average by the second. The new tracklet starts with an average lowered by the third.
   static constexpr double kContradicted = 3, kFall = 8, kCutPenalty = 3;
   // mean over the markers above which rigid prediction is considered reliable
-  static constexpr double kTrusted = 2;
+  static constexpr double kReliable = 2;
 
   std::int64_t now() const { return so_far_.frames.now(); }
   bool is_over(const Tracklet& f) const { return now() - f.last > opt_.max_gap; }
@@ -150,7 +150,7 @@ class Stitcher {
     const std::int32_t id = n_tracklets_++;
     Tracklet& f = so_far_.tracklets[id];
     f.label = label;
-    f.known = usual_gain_;
+    f.link_gain = usual_gain_;
     f.first = f.last = now();
     of_label_[label] = id;
     return id;
@@ -172,10 +172,10 @@ class Stitcher {
     std::size_t n = 0;
     for (const auto& [k, marker] : markers_)
       if (!marker.is_occluded) {
-        sum += marker.trust;
+        sum += marker.mean_gain;
         ++n;
       }
-    return n > 0 && sum > kTrusted * static_cast<double>(n);
+    return n > 0 && sum > kReliable * static_cast<double>(n);
   }
 
   // Cuts the links into the newest frame that neighbours contradict.
@@ -186,22 +186,22 @@ class Stitcher {
     for (Frame::One& one : now.seen) {
       Tracklet& f = so_far_.tracklets.at(one.tracklet);
       if (f.n == 0 || so_far_.frames.find(f.last) == nullptr) continue;
-      const double min_gain = std::min(kContradicted, f.known - kFall);
+      const double min_gain = std::min(kContradicted, f.link_gain - kFall);
       double gain = 0;
-      if (!neighbours_.link(so_far_, one, f, f.known, gain)) continue;
+      if (!neighbours_.link(so_far_, one, f, f.link_gain, gain)) continue;
       if (opt_.may_cut && gain < min_gain) {
         w_.cut.push_back(&one);
       } else {
-        f.known += 0.2 * (gain - f.known);
+        f.link_gain += 0.2 * (gain - f.link_gain);
         usual_gain_ += 0.01 * (gain - usual_gain_);
       }
     }
     if (w_.cut.empty()) return;
     n_cuts_ += static_cast<std::int64_t>(w_.cut.size());
     for (Frame::One* one : w_.cut) {
-      const double known = so_far_.tracklets.at(one->tracklet).known - kCutPenalty;
+      const double link_gain = so_far_.tracklets.at(one->tracklet).link_gain - kCutPenalty;
       one->tracklet = tracklet_of[one->point] = begin(labels[one->point]);
-      so_far_.tracklets.at(one->tracklet).known = known;
+      so_far_.tracklets.at(one->tracklet).link_gain = link_gain;
     }
     now.sort();
   }

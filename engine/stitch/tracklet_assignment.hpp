@@ -126,7 +126,7 @@ class TrackletAssignment {
     const Tracklet& f = s.tracklets.at(id);
     if (!marker.is_occluded || marker.last >= f.first) return kNever;
     const double body = neighbours.log_odds(s, f, id, k, marker), motion = by_motion(s, f, id, k);
-    const double at_rest = std::clamp(1 / (1 + std::exp(marker.trust)), kMinMotion, 0.5);
+    const double at_rest = std::clamp(1 / (1 + std::exp(marker.mean_gain)), kMinMotion, 0.5);
     const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
     const double both = log_sum(a, b);
     return both == kNever ? kNever : both + (is_short ? kShort : kLong) + advised(f, marker);

@@ -19,7 +19,7 @@
 namespace asterism {
 
 // The decision on a tree in the oldest frame.
-struct Fate {
+struct TreeDecision {
   bool exists = false;       // the tree is a marker
   std::int32_t column = -1;  // its detection in that frame, -1 for a missed detection
   double probability = 0;    // of that decision
@@ -75,7 +75,7 @@ struct HypothesisWindow : OpenWindow {
   }
 
   // Initiates a tree at each detection of the newest frame.
-  void sow() {
+  void begin_trees() {
     const WindowFrame& frame = *frames.back();
     for (std::size_t j = 0; j < frame.points.size(); ++j) {
       if (frame.claimed[j] > new_track_claim) continue;
@@ -94,32 +94,32 @@ struct HypothesisWindow : OpenWindow {
     }
   }
 
-  // Decides the oldest frame, given the fate of every tree and, for each detection, the probability
-  // that it belongs to none.
+  // Decides the oldest frame, given the decision on every tree and, for each detection, the
+  // probability that it belongs to none.
   template <typename Label>
-  void carry_out(std::span<const Fate> fates, std::span<const double> free, TreeStats& stats,
-                 Label&& label) {
+  void carry_out(std::span<const TreeDecision> decisions, std::span<const double> free,
+                 TreeStats& stats, Label&& label) {
     const std::shared_ptr<const WindowFrame> frame = pop();
     for (std::size_t j = 0; j < frame->points.size(); ++j)
       label(frame->first + static_cast<std::int64_t>(j), -1, std::clamp(free[j], 0.0, 1.0));
     const std::size_t n_live = live.size();
     for (std::size_t i = 0; i < n_live; ++i) {
-      const Fate& fate = fates[i];
-      const std::int32_t own = fate.exists ? fate.column : -1;
+      const TreeDecision& decision = decisions[i];
+      const std::int32_t own = decision.exists ? decision.column : -1;
       carry(*frame, i, own, stats);
       if (own >= 0) {
         const Point last = live[i].last;
-        live.take(i, own, last, frame->time, fate.probability, label);
-      } else if (fate.exists) {
+        live.take(i, own, last, frame->time, decision.probability, label);
+      } else if (decision.exists) {
         miss(*frame, i);
       } else {
         end(i);
       }
-      keep(*frame, i, fate.column, stats);
+      keep(*frame, i, decision.column, stats);
     }
     for (std::size_t k = 0; k < seeds.size(); ++k)
-      if (seeds[k].more.first == frame->number && fates[n_live + k].exists)
-        begin(*frame, seeds[k], fates[n_live + k].probability, stats);
+      if (seeds[k].more.first == frame->number && decisions[n_live + k].exists)
+        begin(*frame, seeds[k], decisions[n_live + k].probability, stats);
     std::erase_if(seeds, [&](const LiveTrack<Tree>& s) { return s.more.first == frame->number; });
     live.end_tracks();
     live.so_far.add(frame->time, frame->points.size());

@@ -49,7 +49,7 @@ class HypothesisForest {
     open_.push(frame, stats);
     BranchGrower grower(open_.live, open_.branches);
     for (LiveTrack<Tree>& seed : open_.seeds) grower.grow(*frame, seed, open_.n_open(), open_.max_grown, stats);
-    open_.sow();
+    open_.begin_trees();
     limit(stats);
     if (!open_.is_full()) return;
     decide(stats, label);
@@ -95,7 +95,7 @@ class HypothesisForest {
   void decide(TreeStats& stats, Label&& label) {
     leave_out_improbable();
     choose(stats);
-    open_.carry_out(s_.fates, s_.free, stats, label);
+    open_.carry_out(s_.decisions, s_.free, stats, label);
   }
 
   // Lists the branches of every tree as options, with the detections of all open frames as
@@ -103,7 +103,7 @@ class HypothesisForest {
   void list_options() {
     const BranchGrower grower(open_.live, open_.branches);
     s_.trees.assign(open_.n_all(), {});
-    s_.fates.assign(open_.n_all(), {});
+    s_.decisions.assign(open_.n_all(), {});
     for (std::size_t i = 0; i < s_.trees.size(); ++i) {
       const bool is_seed = open_.is_seed(i);
       const LiveTrack<Tree>& track = open_.tree(i);
@@ -297,7 +297,7 @@ class HypothesisForest {
     for (std::size_t c = 0; c < entangled.size(); ++c) {
       const Choice& best = s_.trees[entangled[c]].choices[own[c]];
       mark(entangled[c], best);
-      s_.fates[entangled[c]] = {best.branch != kNothing, best.column, 0};
+      s_.decisions[entangled[c]] = {best.branch != kNothing, best.column, 0};
     }
   }
 
@@ -341,7 +341,8 @@ class HypothesisForest {
         if (choice.branch != kNothing && choice.column >= 0)
           s_.taken[choice.column] += std::exp(-choice.loss);
       }
-      s_.fates[cluster[c]] = {best.branch != kNothing, best.column, std::min(own, 1.0) / (1 + left_out)};
+      s_.decisions[cluster[c]] = {best.branch != kNothing, best.column,
+                                  std::min(own, 1.0) / (1 + left_out)};
     }
   }
 
@@ -349,7 +350,7 @@ class HypothesisForest {
   struct Memory {
     std::vector<TreeOptions> trees;
     std::vector<Ranked> ranked;
-    std::vector<Fate> fates;
+    std::vector<TreeDecision> decisions;
     std::vector<double> free, taken;
   };
 

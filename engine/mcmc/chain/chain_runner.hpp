@@ -34,9 +34,9 @@ struct Halves {
 };
 
 template <typename Filter>
-class Walker {
+class ChainRunner {
  public:
-  Walker(Partition<Filter> empty, const ChainOptions& options)
+  ChainRunner(Partition<Filter> empty, const ChainOptions& options)
       : sampler_(std::move(empty), options, 0),
         marginals_(sampler_.partition()),
         hot_share_(options.share_at_ambiguous),

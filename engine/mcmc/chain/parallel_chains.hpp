@@ -21,9 +21,9 @@
 namespace asterism {
 
 template <typename Filter>
-class Walks {
+class ParallelChains {
  public:
-  Walks(const ChainOptions& chain, std::int32_t n_chains, std::int32_t n_threads)
+  ParallelChains(const ChainOptions& chain, std::int32_t n_chains, std::int32_t n_threads)
       : chain_(chain), n_chains_(n_chains), n_threads_(n_threads) {}
 
   // Sets each group to the best state that its chains find.
@@ -35,11 +35,11 @@ class Walks {
       std::optional<Partition<Filter>> part;
     };
     std::vector<Found> found(groups.size() * n_chains_);
-    each_walk(whole, found.size(), [&](Walker<Filter>& walker, std::size_t task) {
+    each_chain(whole, found.size(), [&](ChainRunner<Filter>& runner, std::size_t task) {
       const std::size_t g = task / n_chains_;
       Found& own = found[task];
-      own.gain = walker.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.stats);
-      if (own.gain > 0) own.part = walker.partition();
+      own.gain = runner.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.stats);
+      if (own.gain > 0) own.part = runner.partition();
     });
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const auto first = found.begin() + static_cast<std::ptrdiff_t>(g) * n_chains_;
@@ -57,9 +57,10 @@ class Walks {
                              const Budgets& budgets, std::uint64_t seed, ChainStats& stats) {
     std::vector<Halves> found(groups.size() * n_chains_);
     std::vector<ChainStats> counts(found.size());
-    each_walk(whole, found.size(), [&](Walker<Filter>& walker, std::size_t task) {
+    each_chain(whole, found.size(), [&](ChainRunner<Filter>& runner, std::size_t task) {
       const std::size_t g = task / n_chains_;
-      walker.sample(whole, groups[g], seed_of(seed, task), budgets.of(g), found[task], counts[task]);
+      runner.sample(whole, groups[g], seed_of(seed, task), budgets.of(g), found[task],
+                    counts[task]);
     });
     for (const ChainStats& one : counts) stats.add(one);
     std::vector<double> shares(whole.window().n_ids(), 1.0);
@@ -77,13 +78,13 @@ class Walks {
     return Random(seed ^ static_cast<std::uint64_t>(task)).next();
   }
 
-  template <typename Walk>
-  void each_walk(const Partition<Filter>& whole, std::size_t n, Walk&& walk) {
-    auto& walkers = s_.walkers;
-    while (static_cast<std::int32_t>(walkers.size()) < n_threads_)
-      walkers.push_back(std::make_unique<Walker<Filter>>(whole.empty(), chain_));
+  template <typename Run>
+  void each_chain(const Partition<Filter>& whole, std::size_t n, Run&& run) {
+    auto& runners = s_.runners;
+    while (static_cast<std::int32_t>(runners.size()) < n_threads_)
+      runners.push_back(std::make_unique<ChainRunner<Filter>>(whole.empty(), chain_));
     in_parallel(static_cast<std::int64_t>(n), n_threads_, [&](std::int32_t w, std::int64_t task) {
-      walk(*walkers[w], static_cast<std::size_t>(task));
+      run(*runners[w], static_cast<std::size_t>(task));
     });
   }
 
@@ -125,7 +126,7 @@ class Walks {
   }
 
   struct Memory {
-    std::vector<std::unique_ptr<Walker<Filter>>> walkers;
+    std::vector<std::unique_ptr<ChainRunner<Filter>>> runners;
   };
   ChainOptions chain_;
   std::int32_t n_chains_, n_threads_;

@@ -341,7 +341,7 @@ class Partition {
     put(k, i, state, score);
     filter_.adopt(state_[i]);
   }
-  // Adds a detection to the sets of what may change.
+  // Adds a detection to the sets from which moves draw.
   void list(std::int32_t i) {
     taken_.add(i);
     if (place_[i] == 0) return;

@@ -1,4 +1,4 @@
-// The filters that give the state of a track after each detection and the score of the next one.
+// The filters of tracks: the state after each detection, and the score of the next one.
 //
 // A filter has the types State and Expected (a prediction), and these functions:
 //

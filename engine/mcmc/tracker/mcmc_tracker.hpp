@@ -49,7 +49,7 @@ class McmcTracker {
         opt_(options),
         seed_(seed),
         start_(options.has_assignment, options.split.ambiguous_within),
-        walks_(chain, options.n_chains, options.n_threads),
+        chains_(chain, options.n_chains, options.n_threads),
         sweep_(options.block, sm.max_gap) {}
 
   template <typename Label>
@@ -103,11 +103,11 @@ class McmcTracker {
         const Budgets budgets(weights, moves, &watch);
         const std::uint64_t seed = seed_of(2 + n_sweeps * b + s);
         if (s == 0) {
-          walks_.search(part.partition, split.groups, budgets, seed, stats.chain);
+          chains_.search(part.partition, split.groups, budgets, seed, stats.chain);
           sweep_.put_back(blocks[b], part);
         } else {
           const auto shares =
-              walks_.sample(part.partition, split.groups, budgets, seed, stats.chain);
+              chains_.sample(part.partition, split.groups, budgets, seed, stats.chain);
           sweep_.keep_states(blocks[b], part);
           take_shares(blocks[b], part, shares, sure);
         }
@@ -176,7 +176,7 @@ class McmcTracker {
     const auto allowed = [&](std::span<const Group> groups, double moves, double share) {
       return budgets(groups, moves, arrival, share);
     };
-    walk(sure.is_sure, allowed, 0, stats, [&] { return has_confidence() && !opt_.is_whole; });
+    run_chains(sure.is_sure, allowed, 0, stats, [&] { return has_confidence() && !opt_.is_whole; });
     stats.n_confirmed = p.tracks().size();
     stats.n_pending = p.free().size() + p.taken().size();
     total_.add(stats);
@@ -186,16 +186,16 @@ class McmcTracker {
   // Searches for the best partition, and then estimates confidence if `wants_confidence`.
   // `allowed(groups, moves, fraction of the time)` returns the budgets.
   template <typename Allowed, typename WantsConfidence>
-  void walk(const std::vector<char>& is_sure, Allowed&& allowed, std::uint64_t phase,
+  void run_chains(const std::vector<char>& is_sure, Allowed&& allowed, std::uint64_t phase,
             SampledStats& stats, WantsConfidence&& wants_confidence) {
     const Split split = split_up(partition_, ambiguous_, is_sure, stats);
-    walks_.search(partition_, split.groups,
+    chains_.search(partition_, split.groups,
                   allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1), seed_of(phase),
                   stats.chain);
     if (!wants_confidence()) return;
     // The search may have changed the tracks.
     const Split now = Splitter<Filter>(partition_, opt_.split).split(ambiguous_, is_sure);
-    keep_shares(walks_.sample(partition_, now.groups, allowed(now.groups, opt_.confidence, 1),
+    keep_shares(chains_.sample(partition_, now.groups, allowed(now.groups, opt_.confidence, 1),
                               seed_of(phase + 1), stats.chain));
   }
 
@@ -345,7 +345,7 @@ class McmcTracker {
   McmcOptions opt_;
   std::uint64_t seed_;
   FrameStart<Filter> start_;
-  Walks<Filter> walks_;
+  ParallelChains<Filter> chains_;
   AmbiguousLinks ambiguous_;
   // By detection of the window: the probability of its link, and the label and confidence last
   // reported.
