@@ -106,7 +106,7 @@ class JointTracker {
     std::vector<WeightedPoint> mixture;
   };
 
-  // log weight relative to a miss below which a pairing is ignored
+  // Log weight relative to a miss below which a pairing is ignored.
   static constexpr double kNegligible = -20.7;
   static constexpr double kMaxOdds = 700;
 

@@ -15,14 +15,14 @@ namespace asterism {
 struct MatrixOptions {
   std::int64_t max_hypotheses = 1;  // of a cluster
   double drop = 0;  // hypotheses this many nats below the best of their cluster are dropped
-  // hypotheses are merged if their estimates differ by at most this many standard deviations
+  // Hypotheses are merged if their estimates differ by at most this many standard deviations.
   double merged_within = 0;
 };
 
 struct Hypothesis {
   double log_ratio = 0;   // of its branches
   double merged = 0;  // log factor of the probability gained from merged hypotheses
-  // of each tree of the cluster; -1: its detections belong to others
+  // Of each tree of the cluster; -1: its detections belong to others.
   std::vector<std::int32_t> branches;
 
   double log_weight() const { return log_ratio + merged; }

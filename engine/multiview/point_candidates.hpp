@@ -276,7 +276,7 @@ class PointCandidates {
   }
 
   void add_remainder(std::size_t i, std::size_t rival) {
-    // the position is less certain without the views, which the estimate neglects
+    // The position is less certain without the views, which the estimate neglects.
     constexpr double kMargin = 6;
     PointCandidate rest;
     rest.X = found_[i].X;
@@ -294,7 +294,7 @@ class PointCandidates {
     if (fit_.fit(rest)) keep(rest);
   }
 
-  // standard deviations, of an image point from its expected position
+  // Standard deviations, of an image point from its expected position.
   static constexpr double kFar = 30;
   std::span<const ImagePoints> cameras_;
   CandidateOptions options_;
@@ -305,7 +305,7 @@ class PointCandidates {
   std::vector<Seed> seeds_;
   std::vector<PointCandidate> found_;
   std::unordered_multimap<std::uint64_t, std::int32_t> by_hash_;
-  // candidates of three or more views, increasing
+  // Candidates of three or more views, increasing.
   std::vector<std::vector<std::int32_t>> strong_of_;
 };
 

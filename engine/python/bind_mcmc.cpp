@@ -67,7 +67,7 @@ void bind_mcmc(nb::module_& module) {
       .def_ro("n_cut", &ChainStats::n_cut)
       .def_ro("n_given", &ChainStats::n_given)
       .def_ro("n_refused", &ChainStats::n_refused)
-      .def_ro("n_doubtful", &ChainStats::n_doubtful)
+      .def_ro("n_disagreements", &ChainStats::n_disagreements)
       .def_ro("n_unmoved", &ChainStats::n_unmoved)
       .def_ro("rhat", &ChainStats::rhat)
       .def_ro("ess", &ChainStats::ess)
@@ -90,34 +90,36 @@ void bind_mcmc(nb::module_& module) {
   nb::class_<McmcOptions>(module, "McmcOptions")
       .def(
           "__init__",
-          [](McmcOptions* self, std::int32_t window, bool is_whole, std::int32_t block, double moves, double deadline,
-             bool has_assignment, double confidence, std::int32_t chains, std::int32_t threads,
-             SplitBy split_by, double doubt, double distance, std::int32_t bonds,
-             double tolerance) {
+          [](McmcOptions* self, std::int32_t window, bool is_whole, std::int32_t block,
+             double moves, double deadline, bool has_assignment, double confidence,
+             std::int32_t chains, std::int32_t threads, SplitBy split_by,
+             double ambiguous_within, double distance, std::int32_t bonds, double tolerance) {
             require(window >= 1 && block >= 1, "window and block: at least 1");
             require(chains >= 1 && threads >= 1, "chains and threads: at least 1");
             require(bonds == 0 || (bonds >= 2 && bonds <= 4), "bonds: 0, 2, 3 or 4");
             new (self) McmcOptions{
                 window,     is_whole, block,   moves,   deadline, has_assignment,
-                confidence, chains,   threads, {split_by, doubt, distance},
+                confidence, chains,   threads, {split_by, ambiguous_within, distance},
                 {bonds, window, tolerance}};
           },
-          nb::kw_only(), "window"_a, "is_whole"_a, "block"_a, "moves"_a, "deadline"_a, "has_assignment"_a,
-          "confidence"_a, "chains"_a, "threads"_a, "split_by"_a, "doubt"_a, "distance"_a, "bonds"_a, "tolerance"_a);
+          nb::kw_only(), "window"_a, "is_whole"_a, "block"_a, "moves"_a, "deadline"_a,
+          "has_assignment"_a, "confidence"_a, "chains"_a, "threads"_a, "split_by"_a,
+          "ambiguous_within"_a, "distance"_a, "bonds"_a, "tolerance"_a);
 
   nb::class_<ChainOptions>(module, "ChainOptions")
       .def(
           "__init__",
           [](ChainOptions* self, const In<double>& weights, bool is_informed, double stop,
-             double floor, bool has_first_rules, bool is_ascent, double share_at_doubts,
+             double floor, bool has_first_rules, bool is_ascent, double share_at_ambiguous,
              bool is_draw) {
             require(weights.ndim() == 1 && weights.size() == kMoves, "weights: one for each move");
             new (self) ChainOptions{
-                {is_informed, stop, floor}, {}, has_first_rules, is_ascent, share_at_doubts, is_draw};
+                {is_informed, stop, floor}, {}, has_first_rules, is_ascent, share_at_ambiguous,
+                is_draw};
             std::copy_n(weights.data(), kMoves, self->weights.begin());
           },
           nb::kw_only(), "weights"_a, "is_informed"_a, "stop"_a, "floor"_a, "has_first_rules"_a,
-          "is_ascent"_a, "share_at_doubts"_a = 0.0, "is_draw"_a = false);
+          "is_ascent"_a, "share_at_ambiguous"_a = 0.0, "is_draw"_a = false);
 
   bind_mcmc_tracker<OneMotion>(module, "OneMotionTracker");
   bind_mcmc_tracker<SeveralMotions>(module, "SeveralMotionsTracker");

@@ -165,9 +165,10 @@ void bind_solvers(nb::module_& module) {
   module.def("assign", &assign, "n_rows"_a, "n_columns"_a, "rows"_a, "columns"_a, "gains"_a);
   module.def("marry", &marry, "first"_a, "receivers"_a, "costs"_a, "n_receivers"_a);
   module.def("k_best", &k_best, "cost"_a, "k"_a);
-  module.def("pack", &pack, "first_option"_a, "worths"_a, "first_use"_a, "uses"_a, "k"_a, "drop"_a,
-             "max_nodes"_a);
-  module.def("packing_losses", &packing_losses, "first_option"_a, "worths"_a, "first_use"_a, "uses"_a);
+  module.def("pack", &pack, "first_option"_a, "log_weights"_a, "first_use"_a, "uses"_a, "k"_a,
+             "drop"_a, "max_nodes"_a);
+  module.def("packing_losses", &packing_losses, "first_option"_a, "log_weights"_a,
+             "first_use"_a, "uses"_a);
   module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a);
 
   nb::exception<FrontierLimit>(module, "FrontierLimit");

@@ -109,7 +109,7 @@ nb::tuple carried(const In<double>& a, const In<double>& b, const In<double>& we
 }
 
 // Background log density of each point of a frame, given earlier points.
-Out<double> densities_elsewhere(const In<double>& before, const In<double>& points, double noise,
+Out<double> background_densities(const In<double>& before, const In<double>& points, double noise,
                                 double ghost_radius) {
   require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
           "points: shape (n, D)");
@@ -184,7 +184,7 @@ void bind_stitcher(nb::module_& module) {
   module.def("judge_distances", &judge_distances, "means"_a, "variances"_a, "frames"_a);
   module.def("fit_rigid", &fit, "a"_a, "b"_a, "weights"_a);
   module.def("carried", &carried, "a"_a, "b"_a, "weights"_a, "then"_a, "r"_a, "points"_a);
-  module.def("densities_elsewhere", &densities_elsewhere, "before"_a, "points"_a, nb::kw_only(),
+  module.def("background_densities", &background_densities, "before"_a, "points"_a, nb::kw_only(),
              "noise"_a, "ghost_radius"_a);
   nb::class_<Neighbours>(module, "Neighbours")
       .def(nb::init<int, double>(), "n_axes"_a, "r"_a)
@@ -195,7 +195,7 @@ void bind_stitcher(nb::module_& module) {
           },
           "markers"_a, "points"_a)
       .def("of", &bonds_of, "marker"_a);
-  nb::class_<RigidCarrier>(module, "BodyCarrier")
+  nb::class_<RigidCarrier>(module, "RigidCarrier")
       .def(
           "__init__",
           [](RigidCarrier* self, int n_axes, double noise_sigma) {
@@ -219,7 +219,7 @@ void bind_stitcher(nb::module_& module) {
            "may_cut"_a);
   nb::class_<Stitcher>(module, "Stitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&>(), "motion"_a, "options"_a)
-      .def_prop_ro_static("WORTH", [](nb::handle) { return TrackletAssignment::kOddsFactor; })
+      .def_prop_ro_static("ODDS_FACTOR", [](nb::handle) { return TrackletAssignment::kOddsFactor; })
       .def("run", &run_stitcher, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a,
            "points"_a, "labels"_a)
       .def(

@@ -23,7 +23,7 @@ inline constexpr double kBend = 0.01;  // expected deformation as a fraction of 
 inline constexpr std::int64_t kMinTogether = 20;  // frames until a distance may be a bond
 inline constexpr double kSteady = 0.1;          // largest √V of a bond as a fraction of its length
 inline constexpr std::size_t kSteadiest = 6;    // number of bonds used for a marker
-// deviation in √V above which a distance is evidence against a bond
+// Deviation in √V above which a distance is evidence against a bond.
 inline constexpr double kFar = 2;
 
 struct Bond {

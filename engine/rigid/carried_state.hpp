@@ -84,14 +84,14 @@ class Expected {
 // the frame arrives.
 struct NeighbourAdvice {
   std::int64_t track = 0;    // key of the track
-  // the occluded track is predicted at `place` and may only take a detection of `may_take`
+  // The occluded track is predicted at `place` and may only take a detection of `may_take`.
   bool is_carried = false;
   bool is_uncertain = false;  // the variance of `place` is too large to keep the track alive
-  // the track is an occluded track reappearing, and is deleted in favour of the old one
+  // The track is an occluded track reappearing, and is deleted in favour of the old one.
   bool is_reappearance = false;
   Carried place;
   std::vector<std::int32_t> may_take;
-  // log-likelihood ratio from bonds, by detection
+  // Log-likelihood ratio from bonds, by detection.
   std::vector<std::pair<std::int32_t, double>> bond_gains;
 
   double of(std::int32_t column) const {

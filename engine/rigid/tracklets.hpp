@@ -44,7 +44,7 @@ struct Tracklet {
   std::vector<Continuation> continuations;
   double link_gain = 0;  // mean log-likelihood ratio of its links by neighbours
   std::int32_t guess = -1;  // best candidate among the occluded markers, while undecided
-  // all candidates with their log-likelihood ratios
+  // All candidates with their log-likelihood ratios.
   std::vector<std::pair<std::int32_t, double>> guesses;
 };
 struct Marker {

@@ -20,7 +20,7 @@ namespace asterism {
 class BestPermutations {
  public:
   static constexpr std::size_t kMaxEvents = 20'000;
-  // nats below the best event; events further below are ignored
+  // Nats below the best event; events further below are ignored.
   static constexpr double kNegligible = 25;
 
   // Computes the weights of the group's pairings after pruning. Returns false if the group has too

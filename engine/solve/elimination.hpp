@@ -157,7 +157,7 @@ class EliminationOrder {
 
   const MatchingGraph& graph_;
   std::vector<char> is_gone_, is_active_, is_near_;
-  // number of neighbours that are neither in the frontier nor eliminated
+  // Number of neighbours that are neither in the frontier nor eliminated.
   std::vector<std::int32_t> n_outside_;
   std::vector<std::int32_t> near_;   // candidates: the frontier and its neighbours
 };

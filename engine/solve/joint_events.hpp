@@ -27,7 +27,7 @@ struct FrontierLimit : std::runtime_error {
 
 struct JointSummary {
   double log_total = 0, bound = 0;
-  // largest number of states of a layer; groups that were not solved exactly
+  // Largest number of states of a layer; groups that were not solved exactly.
   std::int64_t n_states = 1, n_beams = 0;
 };
 

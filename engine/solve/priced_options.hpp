@@ -127,7 +127,7 @@ class PricedOptions {
       if (!(min_dual > known_.log_weight + kClosed)) break;
       double along = 0, own = 0;
       for (std::size_t r = 0; r < price.size(); ++r) {
-        // an unused resource of price zero needs no change
+        // An unused resource of price zero needs no change.
         if (used[r] < 1 && price[r] <= 0) used[r] = 1;
         along += (1 - used[r]) * way[r];
         own += way[r] * way[r];

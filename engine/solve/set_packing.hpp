@@ -111,7 +111,7 @@ class SetPacking : PricedOptions {
                                      const std::vector<std::int32_t>& best) const {
     constexpr double kNever = std::numeric_limits<double>::infinity();
     std::vector<std::int32_t> owner(price_.size(), -1);
-    // by resource, of its owner; of others
+    // By resource, of its owner; of others.
     std::vector<double> without(price_.size(), 0), taken(price_);
     for (std::int32_t i = 0; i < n_trees(); ++i)
       for (const std::int32_t r : options_[best[i]]->uses) {
@@ -196,7 +196,7 @@ class SetPacking : PricedOptions {
       for (const double x : price_) node.bound += x;
       for (const std::int32_t o : node.chosen) node.bound += reduced_[o];
     }
-    // the node contains no packing that would count
+    // The node contains no packing that would count.
     if (!known_.own.empty() && node.bound < known_.log_weight - drop_ - kBetter) return;
     node.number = n_pushed_++;
     heap_.push_back(std::move(node));

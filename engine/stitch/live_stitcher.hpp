@@ -65,7 +65,7 @@ class LiveStitcher {
     std::int64_t first = 0;  // number of its first detection
     bool is_taken = false;
     std::vector<Known> known;
-    // detections whose marker may change, once the frame is processed
+    // Detections whose marker may change, once the frame is processed.
     std::vector<std::int32_t> open;
     // While the frame waits.
     MotionStep step;

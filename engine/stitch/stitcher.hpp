@@ -107,7 +107,7 @@ class Stitcher {
   // A link is cut if its log-likelihood ratio is at most the first value, and below the tracklet's
   // average by the second. The new tracklet starts with an average lowered by the third.
   static constexpr double kContradicted = 3, kFall = 8, kCutPenalty = 3;
-  // mean over the markers above which rigid prediction is considered reliable
+  // Mean over the markers above which rigid prediction is considered reliable.
   static constexpr double kReliable = 2;
 
   std::int64_t now() const { return so_far_.frames.now(); }

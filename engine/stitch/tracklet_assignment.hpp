@@ -112,7 +112,7 @@ class TrackletAssignment {
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
   // Prior log odds that a tracklet is a reappearing marker: of a short one, and of others.
   static constexpr double kShort = -8, kLong = 2;
-  // smallest weight of the motion if rigid prediction is trusted
+  // Smallest weight of the motion if rigid prediction is trusted.
   static constexpr double kMinMotion = 0.005;
 
   // Errors of neighbours are correlated, and so are those of successive detections, so the sum of

@@ -30,7 +30,7 @@ namespace asterism {
 struct LifeOptions {
   double gate = 0;           // χ² gate of a pairing
   double confirm_score = 0;  // log odds at which a tentative track is confirmed
-  // a tentative track is deleted when its score falls this far below its maximum
+  // A tentative track is deleted when its score falls this far below its maximum.
   double delete_drop = 0;
   std::int64_t max_candidates = 0;
 };
@@ -51,7 +51,7 @@ struct LiveTrack {
   std::int32_t gap = 0;  // frames since the last detection
   std::int32_t carried = 0;  // of these, frames in which neighbours predicted its position
   double score = 0, best_score = 0;
-  // probability of a missed detection in the last frame if the track exists, for soft association
+  // Probability of a missed detection in the last frame if the track exists, for soft association.
   double p_missed = 0;
   double first_time = 0, last_time = 0;
   Point last{};
@@ -60,7 +60,7 @@ struct LiveTrack {
   [[no_unique_address]] More more;
 
   bool is_confirmed() const { return id >= 0; }
-  // missed frames without a prediction from neighbours
+  // Missed frames without a prediction from neighbours.
   std::int32_t unpredicted() const { return gap - carried; }
 };
 

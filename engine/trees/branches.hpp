@@ -61,7 +61,7 @@ struct TreeStats : FrameStats {
 struct BranchOptions {
   std::int32_t window = 1;        // frames until one is decided
   std::int32_t max_branches = 1;  // of a track
-  // branches with the same detections in this many last frames are merged
+  // Branches with the same detections in this many last frames are merged.
   std::int32_t merge_last = 1;
   double prune_drop = 0;          // a branch is pruned this many nats below the best of its tree
   double fading = 1;              // ρ
@@ -70,7 +70,7 @@ struct BranchOptions {
   // Whether tracks are evaluated jointly. The gain of a branch is then its term of the log
   // posterior, and conflicts between tracks are resolved by the joint choice instead of by claims.
   bool is_joint = false;
-  // for joint evaluation: log probability of no further detection in so many frames
+  // For joint evaluation: log probability of no further detection in so many frames.
   std::vector<double> log_end;
   std::int32_t max_carried = 0;  // frames for which neighbours may predict an occluded track
 };

@@ -29,10 +29,10 @@ struct HypothesisOptions {
   std::int64_t max_hypotheses = 1;  // of a cluster, for the probabilities
   std::int64_t max_nodes = 1;       // of the search for them
   double min_new_log_ratio = 0;       // smallest log-likelihood ratio of a branch of a new tree
-  // a tentative track is deleted if all its branches are this far below its best score
+  // A tentative track is deleted if all its branches are this far below its best score.
   double delete_drop = 0;
   double drop = 0;                  // hypotheses this many nats below the best are ignored
-  // options with a larger loss enter the probabilities by their loss alone
+  // Options with a larger loss enter the probabilities by their loss alone.
   double ambiguous_drop = 0;
   Packer packer;                    // replaces the search below, if set
 };
@@ -166,7 +166,7 @@ class HypothesisForest {
     std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::pair(r.tree, r.branch); });
     auto next = s_.ranked.begin();
     for (const std::int32_t i : cluster) {
-      // number of a branch that is kept
+      // Number of a branch that is kept.
       std::vector<std::int32_t> now(branches(i).size(), kNothing);
       std::int32_t n_kept = 0;
       for (; next != s_.ranked.end() && next->tree == i; ++next) {

@@ -56,7 +56,7 @@ class Forest {
   struct Way {
     std::int32_t column = -1;  // -1: missed
     double log_ratio = 0, crowding = 0;
-    // log-likelihood ratio if the detection initiates a new track instead
+    // Log-likelihood ratio if the detection initiates a new track instead.
     double new_track = -std::numeric_limits<double>::infinity();
     double log_weight = 0;   // of all its branches
     double probability = 0;  // marginal probability over all joint events of the frame
@@ -101,7 +101,7 @@ class Forest {
     const BranchGrower grower(open_.live, open_.branches);
     const LiveTrack<Tree>& track = open_.live[i];
     std::vector<Way>& ways = s_.ways[i];
-    // branches are sorted, the best first
+    // Branches are sorted, the best first.
     const double max_log_ratio = grower.log_ratio(track.more.branches.front());
     // If all branches with a missed detection were pruned, this is an upper bound for them.
     const double pruned = max_log_ratio - open_.branches.prune_drop;
@@ -260,7 +260,7 @@ class Forest {
     open_.keep(frame, i, own, stats);
   }
 
-  // log weight relative to a miss below which a pairing is ignored
+  // Log weight relative to a miss below which a pairing is ignored.
   static constexpr double kNegligible = -20.7;
   static constexpr std::int64_t kMaxStates = 4096;  // of the sum over joint events
 

@@ -31,7 +31,7 @@ class TreeTracker {
     std::map<std::int64_t, Reported> decided;
     TreeStats stats = add(time, step, points, decided);
     look_ahead(decided, label);
-    // the provisional labels are reported in this step, so their work counts here
+    // The provisional labels are reported in this step, so their work counts here.
     stats.add_work(ahead_);
     return stats;
   }

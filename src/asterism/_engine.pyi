@@ -105,7 +105,7 @@ class ChainStats:
     n_cut: Final[int]
     n_given: Final[int]
     n_refused: Final[int]
-    n_doubtful: Final[int]
+    n_disagreements: Final[int]
     n_unmoved: Final[int]
     rhat: Final[float]
     ess: Final[float]
@@ -127,7 +127,7 @@ class McmcOptions:
         chains: int,
         threads: int,
         split_by: SplitBy,
-        doubt: float,
+        ambiguous_within: float,
         distance: float,
         bonds: int,
         tolerance: float,
@@ -177,7 +177,7 @@ class CarryOptions:
         self, *, is_on: bool = False, max_carried: int = 0, bond_weight: float = 0.0
     ) -> None: ...
 
-class BodyCarrier:
+class RigidCarrier:
     def __init__(self, *, n_axes: int, noise_sigma: float) -> None: ...
     def see(self, markers: Ints, points: Floats) -> None: ...
     def carry(
@@ -298,7 +298,7 @@ def assign(n_rows: int, n_columns: int, rows: Shorts, columns: Shorts, gains: Fl
 def k_best(cost: Floats, k: int) -> Shorts: ...
 def pack(
     first_option: Ints,
-    worths: Floats,
+    log_weights: Floats,
     first_use: Ints,
     uses: Shorts,
     k: int,
@@ -306,7 +306,7 @@ def pack(
     max_nodes: int,
 ) -> tuple[Shorts, Floats, bool, float, int]: ...
 def packing_losses(
-    first_option: Ints, worths: Floats, first_use: Ints, uses: Shorts
+    first_option: Ints, log_weights: Floats, first_use: Ints, uses: Shorts
 ) -> tuple[float, Floats]: ...
 def joint_marginals(
     log_weights: Floats, log_miss: Floats, max_states: int
@@ -396,7 +396,7 @@ class ChainOptions:
         floor: float,
         has_first_rules: bool,
         is_ascent: bool,
-        share_at_doubts: float = 0.0,
+        share_at_ambiguous: float = 0.0,
         is_draw: bool = False,
     ) -> None: ...
 
@@ -444,20 +444,20 @@ def judge_distances(
 # (R, from, to, rms): b = R (a - from) + to, in three axes.
 def fit_rigid(a: Floats, b: Floats, weights: Floats) -> tuple[Floats, Floats, Floats, float]: ...
 
-# (where they carry what was at `then`, its variance beside `r`, log densities at some points)
+# (predicted position of what was at `then`, its variance beyond `r`, log densities of points)
 def carried(
     a: Floats, b: Floats, weights: Floats, then: Floats, r: float, points: Floats
 ) -> tuple[Floats, float, Floats]: ...
 
-# Log density of each of some points of a frame among the others, where some were seen before.
-def densities_elsewhere(
+# Background log density of each point of a frame, given earlier points.
+def background_densities(
     before: Floats, points: Floats, *, noise: float, ghost_radius: float
 ) -> Floats: ...
 
 class Neighbours:
     def __init__(self, n_axes: int, r: float) -> None: ...
     def add(self, markers: Ints, points: Floats) -> None: ...
-    # (the others, frames seen together, mean distances, their variances, predictive variances)
+    # (other markers, frames seen together, mean distances, their variances, predictive variances)
     def of(self, marker: int) -> tuple[Ints, Ints, Floats, Floats, Floats]: ...
 
 class StitchOptions:
@@ -473,10 +473,10 @@ class StitchOptions:
     ) -> None: ...
 
 class Stitcher:
-    WORTH: float
+    ODDS_FACTOR: float
     def __init__(self, motion: MotionModel, options: StitchOptions) -> None: ...
     def advise(self, labels: Ints, before: Ints, weights: Floats) -> None: ...
-    # (fragment of each point, and of each fragment its marker, the fragment before, how probably)
+    # (tracklet of each point; for each tracklet its marker, the previous tracklet, the probability)
     def run(
         self,
         motion: MotionModel,

@@ -56,7 +56,7 @@ def test_carried_places_are_those_by_hand(n_axes, n_seen, bend):
     rng = np.random.default_rng(7 + n_seen)
     _, seen = turning(rng, 110, n_axes, bend=bend)
     by_hand = BodyByHand(n_axes, SIGMA)
-    engine = _engine.BodyCarrier(n_axes=n_axes, noise_sigma=SIGMA)
+    engine = _engine.RigidCarrier(n_axes=n_axes, noise_sigma=SIGMA)
     n_told = 0
     for t, points in enumerate(seen):
         others = np.arange(1, n_seen + 1) if t >= 80 else np.arange(1, 7)
@@ -79,7 +79,7 @@ def normalised_errors(n_axes, bend, n_bodies=40):
     for seed in range(n_bodies):
         rng = np.random.default_rng(seed)
         truth, seen = turning(rng, 180, n_axes, bend=bend)
-        engine = _engine.BodyCarrier(n_axes=n_axes, noise_sigma=SIGMA)
+        engine = _engine.RigidCarrier(n_axes=n_axes, noise_sigma=SIGMA)
         ids = np.arange(7)
         for t, points in enumerate(seen):
             if (gap := t - 140) in found:
@@ -110,7 +110,7 @@ def test_neighbours_in_a_line_do_not_turn_a_marker():
     rng = np.random.default_rng(3)
     line = np.column_stack([np.linspace(0.1, 0.5, 5), np.zeros((5, 2))])
     shape = np.vstack([[0.3, 0.1, 0.0], line])
-    engine = _engine.BodyCarrier(n_axes=3, noise_sigma=SIGMA)
+    engine = _engine.RigidCarrier(n_axes=3, noise_sigma=SIGMA)
     for _ in range(80):
         engine.see(np.arange(6), shape + rng.normal(0, SIGMA, shape.shape))
     for _ in range(5):
@@ -125,7 +125,7 @@ def test_neighbours_in_a_line_do_not_turn_a_marker():
 
 def test_strangers_carry_nobody():
     rng = np.random.default_rng(4)
-    place, engine = rng.uniform(-1, 1, (6, 3)), _engine.BodyCarrier(n_axes=3, noise_sigma=SIGMA)
+    place, engine = rng.uniform(-1, 1, (6, 3)), _engine.RigidCarrier(n_axes=3, noise_sigma=SIGMA)
     for _ in range(100):
         place = place + rng.normal(0, 0.05, place.shape)
         engine.see(np.arange(6), place)
@@ -137,7 +137,7 @@ def test_strangers_carry_nobody():
 def test_who_is_forgotten_is_nobodys_neighbour():
     rng = np.random.default_rng(5)
     _, seen = turning(rng, 90, 3)
-    engine = _engine.BodyCarrier(n_axes=3, noise_sigma=SIGMA)
+    engine = _engine.RigidCarrier(n_axes=3, noise_sigma=SIGMA)
     for points in seen[:80]:
         engine.see(np.arange(7), points)
     before = sum(engine.n_bonds(k) for k in range(7))

@@ -105,7 +105,7 @@ def test_elsewhere_is_anywhere_or_beside_another(D):
     rng = np.random.default_rng(D)
     before, points = rng.uniform(-1, 1, (9, D)), rng.uniform(-0.05, 0.05, (5, D))
     volume = np.prod(np.ptp(before, axis=0))
-    found = _engine.densities_elsewhere(before, points, noise=NOISE, ghost_radius=0.03)
+    found = _engine.background_densities(before, points, noise=NOISE, ghost_radius=0.03)
     for k, y in enumerate(points):
         others = np.delete(points, k, axis=0)
         beside = [stats.multivariate_normal(at, 0.03**2 * np.eye(D)).pdf(y) for at in others]
@@ -149,7 +149,7 @@ def test_the_probability_is_that_of_body_and_elsewhere():
     assert (found.marker[9], found.after[9]) == (8, 8)
     carried = carried_density(dense, 60, BODY, PLACE)
     everything = np.concatenate([BODY, PLACE[None]])
-    else_ = _engine.densities_elsewhere(everything, everything, noise=NOISE, ghost_radius=0.03)
+    else_ = _engine.background_densities(everything, everything, noise=NOISE, ghost_radius=0.03)
     # Log odds of 2 for a marker come back, and 0.5 % for its own motion.
     assert found.logit(9) == pytest.approx(WORTH * (carried - else_[8] + 2 + np.log(0.995)))
 
@@ -169,7 +169,7 @@ def test_the_log_odds_of_a_body_are_those_of_its_steadiest_neighbours(seed):
         for t in (200, 205, 210):
             now = dense[t, [*range(8), 9]]
             carried = carried_density(dense, then, now[:8], now[8])
-            else_ = _engine.densities_elsewhere(so_far, now, noise=NOISE, ghost_radius=0.03)
+            else_ = _engine.background_densities(so_far, now, noise=NOISE, ghost_radius=0.03)
             looks.append(carried - else_[8])
         means.append(np.mean(sorted(looks)[1:]))
     gain = np.log(np.mean(np.exp(means))) + 2 + np.log(0.995)

@@ -24,7 +24,7 @@ namespace asterism {
 struct Halves {
   static constexpr int kN = 2;
   std::vector<std::int32_t> detections;      // numbers in the whole partition
-  // fraction of moves in which each has its reference predecessor
+  // Fraction of moves in which each has its reference predecessor.
   std::array<std::vector<double>, kN> shares;
   std::array<double, kN> mean{}, variance{};   // of the log posterior
   std::array<std::int64_t, kN> n_moves{};

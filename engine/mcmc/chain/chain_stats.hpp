@@ -14,15 +14,15 @@ namespace asterism {
 
 struct ChainStats {
   std::array<MoveCounts, kMoves> moves{};
-  // moves to find the best partition, and to estimate confidence
+  // Moves to find the best partition, and to estimate confidence.
   std::int64_t n_search = 0, n_sampled = 0;
   std::int64_t n_walked = 0;    // groups in which chains ran
   std::int64_t n_sure = 0;      // tracks excluded by distance bonds
   std::int64_t n_cut = 0;  // plausible links between different groups, which no chain could use
-  // initial links given by the caller; those that were impossible
+  // Initial links given by the caller; those that were impossible.
   std::int64_t n_given = 0, n_refused = 0;
-  // detections whose confidence differs by over 0.1 between halves or chains
-  std::int64_t n_doubtful = 0;
+  // Detections whose confidence differs by over 0.1 between halves or chains.
+  std::int64_t n_disagreements = 0;
   std::int64_t n_unmoved = 0;   // groups whose chains never moved, so that their mixing is unknown
   // Of the log posterior: the largest R̂ and the smallest effective sample size over the groups for
   // which they are defined. NaN if there is no such group.
@@ -38,7 +38,7 @@ struct ChainStats {
     n_cut += next.n_cut;
     n_given += next.n_given;
     n_refused += next.n_refused;
-    n_doubtful += next.n_doubtful;
+    n_disagreements += next.n_disagreements;
     n_unmoved += next.n_unmoved;
     add_mixing(next.rhat, next.ess);
   }

@@ -94,7 +94,7 @@ class ParallelChains {
   static void judge(std::span<const Halves> chains, std::vector<double>& shares, ChainStats& stats) {
     const auto n_halves = static_cast<double>(chains.size() * Halves::kN);
     double mean = 0, within = 0, between = 0, moves = 0;
-    // over the chains for which it is defined
+    // Over the chains for which it is defined.
     double ess = std::numeric_limits<double>::quiet_NaN();
     for (const Halves& chain : chains) {
       if (!std::isnan(chain.ess)) ess = std::isnan(ess) ? chain.ess : ess + chain.ess;
@@ -121,7 +121,7 @@ class ParallelChains {
           max_share = std::max(max_share, share);
         }
       shares[chains[0].detections[n]] = std::clamp(sum, 0.0, 1.0);
-      stats.n_doubtful += max_share - min_share > kUncertain;
+      stats.n_disagreements += max_share - min_share > kUncertain;
     }
   }
 

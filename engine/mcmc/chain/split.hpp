@@ -28,7 +28,7 @@ enum class SplitBy { whole, likelihood, cells, clusters };
 
 struct SplitOptions {
   SplitBy by = SplitBy::likelihood;
-  // nats; a link is ambiguous if its log likelihood is within this of the best alternative
+  // Nats; a link is ambiguous if its log likelihood is within this of the best alternative.
   double ambiguous_within = 10;
   double distance = 0;   // edge of a cell, or distance within a cluster
 };

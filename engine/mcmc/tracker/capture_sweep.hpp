@@ -251,7 +251,7 @@ class CaptureSweep {
   std::vector<std::int64_t> labels_, found_;  // initial and final
   std::vector<std::vector<Link>> ambiguous_;  // by the frame they lead into
   std::vector<std::int32_t> before_, after_;
-  // at the start of the next block
+  // At the start of the next block.
   std::unordered_map<std::int32_t, typename Filter::State> states_;
   std::unordered_map<std::int32_t, std::int32_t> local_;  // local numbers, while the block is taken
 };

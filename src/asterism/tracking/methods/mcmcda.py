@@ -173,7 +173,7 @@ class MCMCDA(EngineMethod):
             floor=FLOOR,
             has_first_rules=rules.first_rules,
             is_ascent=rules.acceptance == "ascent",
-            share_at_doubts=rules.ambiguous_share,
+            share_at_ambiguous=rules.ambiguous_share,
             is_draw=self.keep == "draw",
         )
         options = _engine.McmcOptions(
@@ -187,7 +187,7 @@ class MCMCDA(EngineMethod):
             chains=int(self.chains),
             threads=int(self.threads),
             split_by=getattr(_engine.SplitBy, rules.groups),
-            doubt=rules.ambiguous_within,
+            ambiguous_within=rules.ambiguous_within,
             distance=rules.distance or 0.0,
             bonds=rules.bonds,
             tolerance=rules.bond_tolerance or 6 * math.sqrt(2) * model.sensor.noise_sigma,
@@ -302,7 +302,7 @@ class MCMCDA(EngineMethod):
         if self.confidence > 0:
             about |= {
                 "confidence_moves": chain.n_sampled,
-                "disagreements": chain.n_doubtful,
+                "disagreements": chain.n_disagreements,
                 "unmoved_groups": chain.n_unmoved,
             }
             if not math.isnan(chain.rhat):

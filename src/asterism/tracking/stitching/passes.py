@@ -49,7 +49,9 @@ class Pass:
         """Tell a pass in the other direction, over these fragments, which of them were joined."""
         joined = np.flatnonzero((self.after >= 0) & (self.markers >= 0))
         p = np.clip(self.probabilities[joined], 1e-9, 1 - 1e-9)
-        weights = np.clip(np.log(p / (1 - p)) / _engine.Stitcher.WORTH, LEAST_ADVICE, MOST_ADVICE)
+        weights = np.clip(
+            np.log(p / (1 - p)) / _engine.Stitcher.ODDS_FACTOR, LEAST_ADVICE, MOST_ADVICE
+        )
         stitcher.advise(self.after[joined].astype(np.int64), joined.astype(np.int64), weights)
 
 
