@@ -108,7 +108,7 @@ def _lens(path: Path, place: str, entry: Any) -> Lens:
     if not isinstance(entry, dict):
         raise FormatError(path, place, "a table", repr(entry)[:60])
     with faults_at(path, place):
-        check_fields("kind", [entry.get("kind")], _LENSES)
+        check_fields("kind", [entry.get("kind", "")], _LENSES)
     kind = _LENSES[entry["kind"]]
     numbers = {key: value for key, value in entry.items() if key != "kind"}
     with faults_at(path, place):
