@@ -1,4 +1,4 @@
-"""What things are: detections, tracks and the one generative model that every method searches."""
+"""Data types: detections, tracks, captures and the generative model that every method searches."""
 
 from asterism.model.capture import Capture
 from asterism.model.detections import Detections

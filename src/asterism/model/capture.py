@@ -1,4 +1,4 @@
-"""Detections that came from a file, and what else the file knew."""
+"""Detections read from a file, together with the other content of the file."""
 
 from __future__ import annotations
 
@@ -26,52 +26,53 @@ _UNKNOWN.flags.writeable = False
 
 
 def _unknown() -> NDArray[np.int64]:
-    """Stand for -1 throughout, until the number of points is known."""
+    """Return the placeholder that `__post_init__` replaces by an array of -1, one a point."""
     return _UNKNOWN
 
 
 @record(eq=False)
 class Capture(Detections):
-    """Detections that were read from a file, with what else the file knew.
+    """Detections read from a file, with the file's labels, names, analog channels and events.
 
     Parameters
     ----------
     path : Path
-        The file; writing a result in the same format takes from it all that is not a point.
+        The file. When a result is written in the same format, all content of this file except the
+        points is copied from it.
     format : str
-        Its format, a key of `asterism.io.CAPTURE_FORMATS`.
+        Format of the file, a key of `asterism.io.CAPTURE_FORMATS`.
     rate : float
-        Frames a second as the file states it, 0 where it does not.
+        Frames per second as stated in the file, 0 if the file states none.
     first_frame : int
-        The file's number of its first frame.
+        Number of the first frame in the file's own numbering.
     units : str
-        The unit of length in the file, "mm" say; `points` are metres whatever it is.
+        Unit of length in the file, for example "mm". `points` are always metres.
     channels : array_like of int, shape (N,)
-        The file's own channel (column, trajectory) of each detection, -1 where there is none; -1
-        throughout unless given.
+        Channel (column, trajectory) of each detection in the file, -1 if it has none. All -1 by
+        default.
     labels : array_like of int, shape (N,)
-        The file's own identities: one for each named channel and one for each unbroken piece of
-        an unnamed channel, because recorders reuse those for other markers; -1 where none, and
-        throughout unless given.
+        Track of each detection according to the file, -1 if it has none. Each named channel is one
+        track; an unnamed channel is split at its gaps, because recording software reuses unnamed
+        channels for other markers. All -1 by default.
     names : tuple of str or None
-        Name of each identity, None where it has none.
+        Name of each track of `labels`, None if it has no name.
     modelled : tuple of str
-        Names of computed points (joint centres, angles, forces) that were left out.
+        Names of computed points (joint centres, angles, forces), which are not read as detections.
     analog : Analog, optional
-        Analog channels of a C3D file, None where there are none.
+        Analog channels of a C3D file, None if there are none.
     events : tuple of Event
-        Moments that a C3D file marks, by time.
+        Events of a C3D file, ordered by time.
     plates : tuple of ForcePlate
         Force plates of a C3D file.
     warnings : tuple of str
-        What was odd about the file and how it was taken.
+        Irregularities of the file, each with the way in which it was read.
     truncated : str
-        Where the file, or the one that it was made from, is cut off and what is missing; empty for
-        a whole file. The capture holds the complete frames.
+        Place where the file, or its source file, is cut off, and what is missing; empty for a
+        complete file. The capture holds the complete frames.
 
     See Also
     --------
-    asterism.read : makes one.
+    asterism.read : Read a capture from a file.
 
     Examples
     --------
@@ -109,7 +110,7 @@ class Capture(Detections):
 
     @property
     def tracks(self) -> Tracks:
-        """The file's own identities as `Tracks`: truth, where the file is labelled."""
+        """Tracks according to the file; they are the ground truth if the file is labelled."""
         return Tracks(detections=self, labels=self.labels, names=self.names)
 
     def __repr__(self) -> str:

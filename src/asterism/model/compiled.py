@@ -1,7 +1,7 @@
-"""A model in the form that the engine takes.
+"""Conversion of a model to the engine's arguments.
 
-What this file is not: a place for arithmetic. It names the engine's arguments once, so that the
-posterior, the filters and the methods cannot differ in them.
+The engine's arguments are made in this file alone, so that the posterior, the filters and the
+methods use the same ones. There is no other arithmetic here.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ __all__ = [
 ]
 
 SPEED_MARGIN_SIGMAS = 6.0
-"""A link may be longer than v̄ Δτ by so many σ, for the noise of its two ends."""
+"""Number of σ by which a link may exceed v̄ Δτ, because both of its ends are noisy."""
 
 
 @lru_cache(maxsize=64)
 def motion_model(model: TrackingModel, n_axes: int) -> _engine.MotionModel:
-    """Give the motion and noise of one axis, as the engine takes them."""
+    """Return the motion and noise of one axis as an engine object."""
     return _engine.MotionModel.make(
         n_axes,
         np.ascontiguousarray(model.motion.modes[0].observation),
@@ -47,7 +47,7 @@ def motion_model(model: TrackingModel, n_axes: int) -> _engine.MotionModel:
 
 @lru_cache(maxsize=64)
 def score_model(model: TrackingModel) -> _engine.ScoreModel:
-    """Give the parameters of s(τ), as the engine takes them."""
+    """Return the parameters of the track score s(τ) as an engine object."""
     return _engine.ScoreModel(
         birth_density=model.population.birth_density,
         clutter_density=model.sensor.clutter_density,
@@ -62,20 +62,20 @@ def score_model(model: TrackingModel) -> _engine.ScoreModel:
 
 
 def _to_nanosecond(dt: NDArray[np.float64]) -> NDArray[np.float64]:
-    # Times such as k / 120 differ in their last bits; rounded, equal spacings are equal, and a
-    # stream and a batch see the same numbers.
+    # Differences of times such as k / 120 differ in their last bits. Rounding makes equal spacings
+    # equal, so that a stream and a batch use the same numbers.
     return np.maximum(np.round(dt, 9), 1e-9)
 
 
 @lru_cache(maxsize=1024)
 def transition(motion: Motion, dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """F and Q of every mode, each (modes, n, n), over `dt` seconds."""
+    """Return F and Q of every mode over `dt` seconds, each of shape (modes, n, n)."""
     F, Q = _of_modes(motion, _to_nanosecond(np.array([dt])))
     return F[0], Q[0]
 
 
 def no_transition(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """F and Q of the step before the first frame, which moves nothing."""
+    """Return F = 1 and Q = 0 of every mode, for the first frame, which has no step before it."""
     n, M = len(motion.modes[0].observation), len(motion.modes)
     return np.broadcast_to(np.eye(n), (M, n, n)).copy(), np.zeros((M, n, n))
 
@@ -91,14 +91,14 @@ def _of_modes(
 def steps_of(
     motion: Motion, times: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-    """List the steps of a whole capture: which kind leads to each frame, and F and Q of each kind.
+    """Group the steps of a capture by duration, and compute F and Q once for each duration.
 
     Returns
     -------
     kind : ndarray of int32, shape (T,)
-        Kind of the step from frame t - 1 to t; 0 at the first frame, which nothing leads to.
+        Kind of the step from frame t - 1 to t; 0 at the first frame, which has no step.
     F, Q : ndarray, shape (kinds, modes, n, n)
-        Of each kind, of which there is at least one.
+        Transition and process noise of each kind; there is at least one kind.
     """
     if len(times) < 2:
         still, quiet = no_transition(motion)
@@ -111,22 +111,22 @@ def steps_of(
 def with_noise(
     points: NDArray[np.float64], covariances: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
-    """Give points as the engine takes them, with the noise that is theirs beyond the sensor's.
+    """Return points for the engine, with the variance of each point in a further column.
 
-    The axes of a track share one covariance, so of the covariance of a point the mean variance of
-    its coordinates is taken: exact for isotropic ones.
+    The axes of a track share one covariance. The covariance of a point is therefore replaced by the
+    mean variance of its coordinates, which is exact for isotropic covariances.
 
     Parameters
     ----------
     points : ndarray, shape (N, D)
-        Metres.
+        Positions, metres.
     covariances : ndarray, shape (N, D, D), or None
-        Of the points, m².
+        Covariance of each point, m², added to the sensor's noise.
 
     Returns
     -------
     ndarray, shape (N, D) or (N, D + 1)
-        With a column more where there are covariances.
+        D + 1 columns if there are covariances, otherwise `points` itself.
     """
     if covariances is None:
         return points

@@ -1,6 +1,6 @@
-"""What the cameras saw: points without names, frame by frame.
+"""Detections: measured points without names, ordered by frame.
 
-Nothing here says which point is which marker; that is a `Tracks`.
+A `Tracks` assigns detections to markers.
 """
 
 from __future__ import annotations
@@ -23,14 +23,15 @@ if TYPE_CHECKING:
 __all__ = ["FARTHEST", "Detections"]
 
 FARTHEST = 1e9
-"""Metres from the origin beyond which a coordinate is taken for a mistake."""
+"""Largest coordinate that is accepted, metres; larger values are refused as mistakes."""
 
 
 @record(eq=False)
 class Detections:
-    """Unnamed points over time: one struct of arrays, ordered by frame.
+    """Unnamed points over time, kept as one struct of arrays ordered by frame.
 
-    Make one with `from_frames` or `from_dense`; the constructor takes the arrays as they are kept.
+    Use `from_frames` or `from_dense` to make one; the constructor expects the arrays in the form
+    in which they are kept.
 
     Parameters
     ----------
@@ -41,16 +42,17 @@ class Detections:
     points : array_like, shape (N, D)
         Positions in metres, D = 2 or 3, all finite.
     cameras : array_like of int, shape (N,), optional
-        Which cameras saw each point, where known: bit i for camera i, up to 62.
+        Cameras that saw each point, if known: bit i is set for camera i, i ≤ 62.
     residuals : array_like, shape (N,), optional
-        How far their rays pass by each point, where known, metres.
+        Distance between each point and the rays of its cameras, if known, metres.
     filled : array_like of bool, shape (N,), optional
-        Which points were not measured but estimated, as `asterism.fill_gaps` does; none by default.
+        True for points that were estimated, not measured (see `asterism.fill_gaps`). All points
+        are measured by default.
     stds : array_like, shape (N,), optional
-        Standard deviation of each coordinate where it is known, metres; 0 where it is not.
+        Standard deviation of each point's coordinates, metres; 0 where it is unknown.
     covariances : array_like, shape (N, D, D), optional
-        Covariance of each point, m², where several cameras tell it; all zeros where not. Trackers
-        add it to the sensor's noise.
+        Covariance of each point, m², if several cameras determine it; all zeros where it is
+        unknown. Trackers add it to the sensor's noise.
 
     Raises
     ------
@@ -83,7 +85,7 @@ class Detections:
         "stds",
         "covariances",
     )
-    """Fields with an entry for each point: whoever adds or drops points does so in all of them."""
+    """Names of the fields with one entry a point; adding or dropping points changes all of them."""
 
     def __post_init__(self) -> None:
         times = keep_array("times", self.times, ("T",))
@@ -133,14 +135,14 @@ class Detections:
 
     @classmethod
     def from_frames(cls, times: ArrayLike, frames: Sequence[ArrayLike]) -> Self:
-        """Make detections from one array of points a frame.
+        """Make detections from one array of points for each frame.
 
         Parameters
         ----------
         times : array_like, shape (T,)
             Seconds.
         frames : sequence of T array_like, each of shape (n_t, D)
-            The points of each frame in metres; an empty list for a frame without points.
+            Points of each frame, metres; an empty list for a frame without points.
 
         Returns
         -------
@@ -150,10 +152,16 @@ class Detections:
         ------
         ParameterError
             If the numbers of times and frames differ, or a frame has the wrong shape.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.Detections.from_frames([0.0, 0.01], [[[0, 0, 1], [1, 0, 1]], []])
+        Detections(2 frames, 2 points, 3-D, 0 to 0.01 s)
         """
         times = check_array("times", times, ("T",))
         if len(frames) != len(times):
-            raise ParameterError("frames", f"{len(times)} arrays, one a time", len(frames))
+            raise ParameterError("frames", f"{len(times)} arrays, one for each time", len(frames))
         arrays: list[NDArray[np.float64]] = []
         n_axes = 0
         for t, frame in enumerate(frames):
@@ -169,24 +177,31 @@ class Detections:
             [np.empty((0, n_axes)), *(a.reshape(-1, n_axes) for a in arrays if a.size)]
         )
         offsets = np.concatenate([[0], np.cumsum([len(a) for a in arrays])]).astype(np.int64)
-        points.flags.writeable = False  # nobody else has it: no need to copy
+        points.flags.writeable = False  # a read-only array is kept without a copy
         return cls(times=times, offsets=offsets, points=points)
 
     @classmethod
     def from_dense(cls, times: ArrayLike, positions: ArrayLike) -> Self:
-        """Make detections from named positions, forgetting the names.
+        """Make detections from an array of positions by frame and marker, without the names.
 
         Parameters
         ----------
         times : array_like, shape (T,)
             Seconds.
         positions : array_like, shape (T, K, D)
-            Metres; NaN in any coordinate where a marker was not seen.
+            Metres; NaN in any coordinate if the marker was not detected.
 
         Returns
         -------
         Detections
-            The points of a frame in the order of the markers. `Tracks.from_dense` keeps the names.
+            Points of a frame in the order of the markers. `Tracks.from_dense` keeps the names.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> nan = float("nan")
+        >>> am.Detections.from_dense([0.0, 0.01], [[[0, 0, 1], [1, 0, 1]], [[0, 0, 1], [nan] * 3]])
+        Detections(2 frames, 3 points, 3-D, 0 to 0.01 s)
         """
         times = check_array("times", times, ("T",))
         dense = check_array("positions", positions, (len(times), "K", "D"), finite=False)
@@ -196,19 +211,27 @@ class Detections:
             points = dense.reshape(-1, dense.shape[2])
         else:
             points = dense[is_seen]
-            points.flags.writeable = False  # nobody else has it: no need to copy
+            points.flags.writeable = False  # a read-only array is kept without a copy
         return cls(times=times, offsets=offsets, points=points)
 
     def measured(self) -> Self:
-        """Leave out what was filled.
+        """Return the detections without filled points.
 
-        The one place where it is: whoever takes points for measurements (`estimate_model`,
-        `track`, `stitch`, `fill`, `simulate.corrupt`) asks for these.
+        Every function that needs measurements (`estimate_model`, `track`, `stitch`, `fill_gaps`,
+        `simulate.corrupt`) calls this method.
 
         Returns
         -------
         Detections
-            Of the same kind and frames; itself where nothing was filled.
+            Detections of the same class and frames; the object itself if no point is filled.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> d = am.Detections(
+        ...     times=[0], offsets=[0, 2], points=[[0, 0], [1, 1]], filled=[False, True])
+        >>> d.measured().points
+        array([[0., 0.]])
         """
         if self.filled is None or not self.filled.any():
             return self
@@ -222,11 +245,28 @@ class Detections:
         return replace(self, **changes | {"filled": None})
 
     def part(self, first: int, end: int) -> Detections:
-        """Give the frames from `first` to before `end`, with all that is known of their points."""
+        """Return the frames from `first` up to but without `end`, with all fields of their points.
+
+        Parameters
+        ----------
+        first, end : int
+            First frame, and the frame after the last.
+
+        Returns
+        -------
+        Detections
+            Of this class also for a `Capture`; its file and labels are left out.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.simulate.cube(frames=20, seed=1).detections.part(5, 10).n_frames
+        5
+        """
         a, b = self.offsets[first], self.offsets[end]
         known: dict[str, Any] = {
             name: getattr(self, name)[a:b]
-            for name in Detections.PER_POINT  # those of a capture are more
+            for name in Detections.PER_POINT  # without the further fields of a `Capture`
             if getattr(self, name) is not None
         }
         offsets = self.offsets[first : end + 1] - a
@@ -259,15 +299,23 @@ class Detections:
 
     @property
     def step(self) -> float:
-        """Usual time from frame to frame: the median spacing, seconds; 0 with under two frames."""
+        """Median time between frames, seconds; 0 with fewer than two frames."""
         return float(np.median(np.diff(self.times))) if self.n_frames > 1 else 0.0
 
     def frame(self, t: int) -> NDArray[np.float64]:
-        """Points of frame `t`, shape (n_t, D), metres."""
+        """Return the points of frame `t`, shape (n_t, D), metres.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.Detections.from_frames([0.0], [[[0, 0, 1], [1, 0, 1]]]).frame(0)
+        array([[0., 0., 1.],
+               [1., 0., 1.]])
+        """
         return self.points[self.offsets[t] : self.offsets[t + 1]]
 
     def __iter__(self) -> Iterator[tuple[float, NDArray[np.float64]]]:
-        """Give ``(time, points)`` frame by frame, as a live source would."""
+        """Iterate over ``(time, points)`` of each frame."""
         for t in range(self.n_frames):
             yield float(self.times[t]), self.frame(t)
 
@@ -275,7 +323,14 @@ class Detections:
         return self.n_frames
 
     def summary(self) -> str:
-        """Say in a few words how much there is."""
+        """Return a short text with the numbers of frames, points and axes and the time span.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.Detections.from_frames([0.0, 0.01], [[[0, 0, 1]], [[0, 0, 1]]]).summary()
+        '2 frames, 2 points, 3-D, 0 to 0.01 s'
+        """
         span = f", {self.times[0]:g} to {self.times[-1]:g} s" if self.n_frames else ""
         return f"{self.n_frames} frames, {self.n_points} points, {self.n_axes}-D{span}"
 
@@ -284,7 +339,7 @@ class Detections:
 
 
 def _check_covariances(P: NDArray[np.float64]) -> None:
-    """Raise unless all matrices are symmetric and none is negative, but for rounding."""
+    """Raise unless all matrices are symmetric and positive semi-definite up to rounding."""
     if not len(P):
         return
     size = np.abs(P).max(axis=(1, 2))

@@ -1,4 +1,4 @@
-"""Gaps: frames in which a track has no detection, between two detections of it."""
+"""Gaps: frames without a detection inside a track."""
 
 from __future__ import annotations
 
@@ -9,16 +9,22 @@ __all__ = ["Gap"]
 
 @record
 class Gap:
-    """Frames without a detection of a track, between two detections of it.
+    """Frames without a detection inside a track.
 
     Parameters
     ----------
     track : int
-        The track.
+        Number of the track.
     first, last : int
         First and last frame of the gap.
     seconds : float
-        Time from the detection before it to the one after.
+        Time between the detections before and after the gap.
+
+    Examples
+    --------
+    >>> gap = Gap(track=0, first=10, last=14, seconds=0.06)
+    >>> gap.length
+    5
     """
 
     track: int
@@ -28,5 +34,5 @@ class Gap:
 
     @property
     def length(self) -> int:
-        """Number of frames."""
+        """Number of frames of the gap."""
         return self.last - self.first + 1

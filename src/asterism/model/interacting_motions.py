@@ -1,4 +1,4 @@
-"""A marker that changes between motions."""
+"""Interacting multiple model: a marker that switches between motions."""
 
 from __future__ import annotations
 
@@ -20,19 +20,30 @@ __all__ = ["InteractingMotions"]
 
 @record(eq=False)
 class InteractingMotions(Motion):
-    """A marker that changes between motions: at rest, moving, thrown.
+    """Interacting multiple model (IMM): a marker that switches between motions.
 
-    The filter keeps a state for each and mixes them (interacting multiple model, Blom &
-    Bar-Shalom 1988); a detection is weighed against the mixture of their predictions, which is an
-    approximation of the exact sum over all sequences of modes.
+    Modes are for example rest, walking and free flight. The filter keeps one state for each mode
+    and mixes them in every step (Blom & Bar-Shalom 1988). The likelihood of a detection is that of
+    the mixture of the predictions, an approximation of the sum over all sequences of modes.
 
     Parameters
     ----------
     models : sequence of 2 or 3 motions
-        Single ones of one kind, differing in their noise. The prior of the first holds for new
-        tracks.
+        The modes: single motions of the same class with different noise. New tracks start with
+        the prior covariance of the first.
     transitions : array_like, shape (M, M)
-        Probability of going from mode (row) to mode (column) in a step; positive, rows sum to 1.
+        Probability of switching from mode (row) to mode (column) in a step; positive, rows sum
+        to 1.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> motion = am.InteractingMotions(
+    ...     models=[am.DWNA(acceleration_sigma=1), am.DWNA(acceleration_sigma=50)],
+    ...     transitions=[[0.98, 0.02], [0.05, 0.95]],
+    ... )
+    >>> len(motion.modes)
+    2
     """
 
     models: tuple[SingleMotion, ...]
@@ -79,10 +90,10 @@ class InteractingMotions(Motion):
 
     @property
     def modes(self) -> tuple[SingleMotion, ...]:
-        """The models."""
+        """The M modes, `models`."""
         return self.models
 
     @property
     def mode_transitions(self) -> NDArray[np.float64]:
-        """Probability of going from mode to mode in a step, shape (M, M)."""
+        """Probability of switching from mode (row) to mode (column) in a step, shape (M, M)."""
         return self.transitions

@@ -1,4 +1,4 @@
-"""Any linear motion of one axis, by its matrices."""
+"""Linear motion of one axis, given by its matrices."""
 
 from __future__ import annotations
 
@@ -16,27 +16,38 @@ if TYPE_CHECKING:
 
 __all__ = ["LinearMotion"]
 
-MOST_STEPS = 100_000
+MAX_STEPS = 100_000
 
 
 @record(eq=False)
 class LinearMotion(SingleMotion):
-    """Any linear model of one axis, by its matrices for one step.
+    """Linear motion of one axis, given by its matrices for one step.
 
-    A step of ``k`` times `step` applies F ``k`` times; a spacing that is no multiple (within 2 %)
-    is refused, because the matrices do not say what happens in between.
+    Over ``k`` times `step` seconds F is applied ``k`` times. A spacing that is not a multiple of
+    `step` within 2 % is refused, because the matrices do not define fractions of a step.
 
     Parameters
     ----------
     F, Q : array_like, shape (n, n)
-        Transition and process noise over `step`; n is 1, 2 or 3.
+        Transition and process noise over `step` seconds; n is 1, 2 or 3.
     H : array_like, shape (n,)
-        Observation: position = H · state.
+        Observation row: position = H · state.
     step : float
-        The spacing, seconds, for which F and Q hold.
+        Duration for which F and Q hold, seconds, > 0.
     prior_covariance : array_like, shape (n, n)
-        Covariance of the state when a track begins, given its position; the measurement noise is
-        added along H.
+        Covariance of the state at the start of a track, given its position. The measurement noise
+        is added along H.
+
+    Examples
+    --------
+    >>> from asterism.model import LinearMotion
+    >>> motion = LinearMotion(
+    ...     F=[[1, 0.01], [0, 1]], Q=[[0, 0], [0, 0.04]], H=[1, 0], step=0.01,
+    ...     prior_covariance=[[0, 0], [0, 4]],
+    ... )
+    >>> motion.transition([0.02])[0]
+    array([[1.  , 0.02],
+           [0.  , 1.  ]])
     """
 
     F: NDArray[np.float64]
@@ -80,32 +91,46 @@ class LinearMotion(SingleMotion):
 
     @property
     def observation(self) -> NDArray[np.float64]:
-        """The given H."""
+        """Observation row H, shape (n,)."""
         return self.H
 
     def _powers(self, dt: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         d = np.atleast_1d(np.asarray(dt, dtype=np.float64))
         k = np.rint(d / self.step).astype(np.int64)
         off = np.flatnonzero(
-            (np.abs(d - k * self.step) > 0.02 * self.step) | (k < 1) | (k > MOST_STEPS)
+            (np.abs(d - k * self.step) > 0.02 * self.step) | (k < 1) | (k > MAX_STEPS)
         )
         if len(off):
             raise ParameterError(
                 "times",
-                f"a spacing of 1 to {MOST_STEPS} times the motion model's step of {self.step:g} s",
+                f"a spacing of 1 to {MAX_STEPS} times the motion model's step of {self.step:g} s",
                 f"{d[off[0]]:g} s",
                 "give F and Q for the capture's own spacing",
             )
         return k, d
 
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """F to the power Δ / step for each Δ of `dt` (M,), shape (M, n, n)."""
+        """Return F to the power Δ / step for each Δ of `dt` (M,), shape (M, n, n).
+
+        Examples
+        --------
+        >>> motion = LinearMotion(F=[[0.5]], Q=[[1]], H=[1], step=0.01, prior_covariance=[[1]])
+        >>> motion.transition([0.01, 0.02]).ravel()
+        array([0.5 , 0.25])
+        """
         k, _ = self._powers(dt)
         unique, inverse = np.unique(k, return_inverse=True)
         return np.stack([np.linalg.matrix_power(self.F, int(p)) for p in unique])[inverse]
 
     def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """Q accumulated over Δ / step steps for each Δ of `dt` (M,), shape (M, n, n)."""
+        """Return Q accumulated over Δ / step steps for each Δ of `dt` (M,), shape (M, n, n).
+
+        Examples
+        --------
+        >>> motion = LinearMotion(F=[[0.5]], Q=[[1]], H=[1], step=0.01, prior_covariance=[[1]])
+        >>> motion.process_noise([0.01, 0.02]).ravel()
+        array([1.  , 1.25])
+        """
         k, _ = self._powers(dt)
         unique, inverse = np.unique(k, return_inverse=True)
         table: list[NDArray[np.float64]] = []
@@ -118,6 +143,13 @@ class LinearMotion(SingleMotion):
         return np.stack(table)[inverse]
 
     def initial_covariance(self, noise_sigma: float, velocity_sigma: float) -> NDArray[np.float64]:
-        """Prior covariance plus the measurement noise along H, shape (n, n)."""
+        """Return the prior covariance plus the measurement noise along H, shape (n, n).
+
+        Examples
+        --------
+        >>> motion = LinearMotion(F=[[0.5]], Q=[[1]], H=[1], step=0.01, prior_covariance=[[1]])
+        >>> motion.initial_covariance(noise_sigma=0.5, velocity_sigma=1)
+        array([[1.25]])
+        """
         along = self.H / (self.H @ self.H)
         return self.prior_covariance + noise_sigma**2 * np.outer(along, along)

@@ -1,7 +1,7 @@
-"""How a marker moves: linear motion models, the same on every axis.
+"""Linear motion models of a marker, the same on every axis.
 
-With isotropic noise the axes do not mix, so a model speaks of one axis: ``n`` states, a transition
-F, a process noise Q and an observation H. Symbols: Δ time from frame to frame in seconds.
+With isotropic noise the axes are independent, so a model describes one axis: ``n`` states, a
+transition F, a process noise Q and an observation H. Symbol: Δ, the time between frames in seconds.
 """
 
 from __future__ import annotations
@@ -21,62 +21,96 @@ __all__ = ["DWNA", "DWPA", "Motion", "RandomWalk", "SingleMotion"]
 
 
 class Motion(ABC):
-    """How a marker moves: one motion, or several among which it changes.
+    """Motion model of a marker: one motion, or several modes between which it switches.
 
     See `DWNA`, `RandomWalk`, `DWPA`, `LinearMotion`, `InteractingMotions`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> isinstance(am.DWNA(acceleration_sigma=30), am.model.Motion)
+    True
     """
 
     kind: ClassVar[str]
-    """The motion's name in a model file."""
+    """Name of the motion in a model file."""
 
     @property
     @abstractmethod
     def modes(self) -> tuple[SingleMotion, ...]:
-        """The M motions among which a marker changes, of equal states and observation."""
+        """The M motions between which a marker switches, all with equal states and observation."""
 
     @property
     @abstractmethod
     def mode_transitions(self) -> NDArray[np.float64]:
-        """Probability of going from mode (row) to mode (column) in a step, shape (M, M)."""
+        """Probability of switching from mode (row) to mode (column) in a step, shape (M, M)."""
 
 
 class SingleMotion(Motion):
-    """One linear motion of one axis with n states."""
+    """Linear motion of one axis with n states, the only mode.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.DWNA(acceleration_sigma=30).mode_transitions
+    array([[1.]])
+    """
 
     @property
     def modes(self) -> tuple[SingleMotion, ...]:
-        """Itself alone."""
+        """Tuple of this motion alone."""
         return (self,)
 
     @property
     def mode_transitions(self) -> NDArray[np.float64]:
-        """``[[1]]``."""
+        """Transition probability of the only mode, ``[[1]]``."""
         return np.ones((1, 1))
 
     @property
     @abstractmethod
     def observation(self) -> NDArray[np.float64]:
-        """The row H, shape (n,): position = H · state."""
+        """Observation row H, shape (n,): position = H · state."""
 
     @abstractmethod
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """F for each Δ of `dt` (M,), shape (M, n, n)."""
+        """Return F for each Δ of `dt` (M,), shape (M, n, n).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.RandomWalk(walk_sigma=0.1).transition([0.01])
+        array([[[1.]]])
+        """
 
     @abstractmethod
     def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """Q for each Δ of `dt` (M,), shape (M, n, n)."""
+        """Return Q for each Δ of `dt` (M,), shape (M, n, n).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.RandomWalk(walk_sigma=2).process_noise([0.25])
+        array([[[1.]]])
+        """
 
     @abstractmethod
     def initial_covariance(self, noise_sigma: float, velocity_sigma: float) -> NDArray[np.float64]:
-        """Covariance of the state right after the first detection, shape (n, n).
+        """Return the covariance of one axis' state after the first detection, shape (n, n).
 
         Parameters
         ----------
         noise_sigma : float
             Standard deviation of a measured coordinate, metres.
         velocity_sigma : float
-            Prior standard deviation of a velocity coordinate, m/s, where the model leaves its own
-            open.
+            Prior standard deviation of a velocity coordinate, m/s, used if the motion has no
+            `velocity_sigma` of its own.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.DWNA(acceleration_sigma=30).initial_covariance(noise_sigma=0.5, velocity_sigma=3)
+        array([[0.25, 0.  ],
+               [0.  , 9.  ]])
         """
 
 
@@ -90,18 +124,26 @@ def _stack(rows: list[list[NDArray[np.float64]]]) -> NDArray[np.float64]:
 
 @record
 class DWNA(SingleMotion):
-    """Discrete white noise acceleration: constant velocity, shaken once a step.
+    """Discrete white noise acceleration: nearly constant velocity.
 
+    The acceleration is constant within a step and independent from step to step:
     ``F = [1 Δ; 0 1]``, ``Q = σ_a² [Δ⁴/4 Δ³/2; Δ³/2 Δ²]``, ``H = [1 0]`` (Bar-Shalom, Li &
     Kirubarajan 2001, eq. 6.3.2-3; §5.6 of the report).
 
     Parameters
     ----------
     acceleration_sigma : float
-        σ_a, m/s².
+        σ_a, standard deviation of an acceleration coordinate, m/s², > 0. Larger values widen the
+        prediction and its gate.
     velocity_sigma : float, optional
-        Prior standard deviation of a velocity coordinate, m/s; the population's maximal speed
-        decides where it is left out.
+        Prior standard deviation of a velocity coordinate, m/s, > 0. Without it, it follows from
+        the population's `max_speed` (`TrackingModel.velocity_sigma`).
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.DWNA(acceleration_sigma=30)
+    DWNA(acceleration_sigma=30)
     """
 
     acceleration_sigma: float
@@ -116,33 +158,63 @@ class DWNA(SingleMotion):
 
     @property
     def observation(self) -> NDArray[np.float64]:
-        """``H = [1 0]``."""
+        """Observation row ``H = [1 0]``."""
         return np.array([1.0, 0.0])
 
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """F for each Δ of `dt` (M,), shape (M, 2, 2)."""
+        """Return F for each Δ of `dt` (M,), shape (M, 2, 2).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.DWNA(acceleration_sigma=2).transition([0.5])[0]
+        array([[1. , 0.5],
+               [0. , 1. ]])
+        """
         d = _steps(dt)
         one, zero = np.ones_like(d), np.zeros_like(d)
         return _stack([[one, d], [zero, one]])
 
     def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """Q for each Δ of `dt` (M,), shape (M, 2, 2)."""
+        """Return Q for each Δ of `dt` (M,), shape (M, 2, 2).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.DWNA(acceleration_sigma=2).process_noise([1])[0]
+        array([[1., 2.],
+               [2., 4.]])
+        """
         d = _steps(dt)
         return self.acceleration_sigma**2 * _stack([[d**4 / 4, d**3 / 2], [d**3 / 2, d**2]])
 
     def initial_covariance(self, noise_sigma: float, velocity_sigma: float) -> NDArray[np.float64]:
-        """``diag(σ², σ_v²)``, shape (2, 2)."""
+        """Return ``diag(σ², σ_v²)``, shape (2, 2).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.DWNA(acceleration_sigma=2).initial_covariance(noise_sigma=0.5, velocity_sigma=3)
+        array([[0.25, 0.  ],
+               [0.  , 9.  ]])
+        """
         return np.diag([noise_sigma**2, (self.velocity_sigma or velocity_sigma) ** 2])
 
 
 @record
 class RandomWalk(SingleMotion):
-    """Random walk: one state, ``F = 1``, ``Q = σ_w² Δ``.
+    """Random walk of the position: one state, ``F = 1``, ``Q = σ_w² Δ``.
 
     Parameters
     ----------
     walk_sigma : float
-        σ_w, m/√s: the standard deviation of a coordinate after one second.
+        σ_w, standard deviation of a coordinate's change in one second, m/√s, > 0.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.RandomWalk(walk_sigma=0.1)
+    RandomWalk(walk_sigma=0.1)
     """
 
     walk_sigma: float
@@ -154,25 +226,46 @@ class RandomWalk(SingleMotion):
 
     @property
     def observation(self) -> NDArray[np.float64]:
-        """``H = [1]``."""
+        """Observation row ``H = [1]``."""
         return np.array([1.0])
 
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """Ones, shape (M, 1, 1)."""
+        """Return F = 1 for each Δ of `dt` (M,), shape (M, 1, 1).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.RandomWalk(walk_sigma=2).transition([0.25])[0]
+        array([[1.]])
+        """
         return np.ones((len(_steps(dt)), 1, 1))
 
     def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """``σ_w² Δ``, shape (M, 1, 1)."""
+        """Return ``Q = σ_w² Δ`` for each Δ of `dt` (M,), shape (M, 1, 1).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.RandomWalk(walk_sigma=2).process_noise([0.25, 0.5]).ravel()
+        array([1., 2.])
+        """
         return self.walk_sigma**2 * _steps(dt)[:, None, None]
 
     def initial_covariance(self, noise_sigma: float, velocity_sigma: float) -> NDArray[np.float64]:
-        """``σ²``, shape (1, 1); there is no velocity."""
+        """Return ``σ²``, shape (1, 1); the state has no velocity.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.RandomWalk(walk_sigma=2).initial_covariance(noise_sigma=0.5, velocity_sigma=3)
+        array([[0.25]])
+        """
         return np.array([[noise_sigma**2]])
 
 
 @record
 class DWPA(SingleMotion):
-    """Discrete Wiener process acceleration: the acceleration itself walks.
+    """Discrete Wiener process acceleration: nearly constant acceleration.
 
     ``F = [1 Δ Δ²/2; 0 1 Δ; 0 0 1]``, ``Q = σ_j² g gᵀ`` with ``g = (Δ²/2, Δ, 1)`` (Bar-Shalom, Li &
     Kirubarajan 2001, eq. 6.3.3-2).
@@ -180,11 +273,18 @@ class DWPA(SingleMotion):
     Parameters
     ----------
     increment_sigma : float
-        Standard deviation of the change of acceleration in one step, m/s².
+        σ_j, standard deviation of the change of acceleration in one step, m/s², > 0. Larger
+        values widen the prediction and its gate.
     acceleration_prior_sigma : float
-        Prior standard deviation of an acceleration coordinate, m/s².
+        σ_α, prior standard deviation of an acceleration coordinate, m/s², > 0.
     velocity_sigma : float, optional
         Prior standard deviation of a velocity coordinate, m/s, as in `DWNA`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.DWPA(increment_sigma=2, acceleration_prior_sigma=20).kind
+    'dwpa'
     """
 
     increment_sigma: float
@@ -201,23 +301,51 @@ class DWPA(SingleMotion):
 
     @property
     def observation(self) -> NDArray[np.float64]:
-        """``H = [1 0 0]``."""
+        """Observation row ``H = [1 0 0]``."""
         return np.array([1.0, 0.0, 0.0])
 
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """F for each Δ of `dt` (M,), shape (M, 3, 3)."""
+        """Return F for each Δ of `dt` (M,), shape (M, 3, 3).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.DWPA(increment_sigma=2, acceleration_prior_sigma=20).transition([0.5])[0]
+        array([[1.   , 0.5  , 0.125],
+               [0.   , 1.   , 0.5  ],
+               [0.   , 0.   , 1.   ]])
+        """
         d = _steps(dt)
         one, zero = np.ones_like(d), np.zeros_like(d)
         return _stack([[one, d, d**2 / 2], [zero, one, d], [zero, zero, one]])
 
     def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
-        """Q for each Δ of `dt` (M,), shape (M, 3, 3)."""
+        """Return Q for each Δ of `dt` (M,), shape (M, 3, 3).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.DWPA(increment_sigma=2, acceleration_prior_sigma=20).process_noise([1])[0]
+        array([[1., 2., 2.],
+               [2., 4., 4.],
+               [2., 4., 4.]])
+        """
         d = _steps(dt)
         g = np.stack([d**2 / 2, d, np.ones_like(d)], axis=-1)
         return self.increment_sigma**2 * g[:, :, None] * g[:, None, :]
 
     def initial_covariance(self, noise_sigma: float, velocity_sigma: float) -> NDArray[np.float64]:
-        """``diag(σ², σ_v², σ_α²)``, shape (3, 3)."""
+        """Return ``diag(σ², σ_v², σ_α²)``, shape (3, 3).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> motion = am.DWPA(increment_sigma=2, acceleration_prior_sigma=20)
+        >>> motion.initial_covariance(noise_sigma=0.5, velocity_sigma=3)
+        array([[2.5e-01, 0.0e+00, 0.0e+00],
+               [0.0e+00, 9.0e+00, 0.0e+00],
+               [0.0e+00, 0.0e+00, 4.0e+02]])
+        """
         return np.diag(
             [
                 noise_sigma**2,

@@ -1,4 +1,4 @@
-"""How markers come and go, and the hard bounds on what may be one track."""
+"""Population model: births and deaths of markers, and the hard bounds of a track."""
 
 from __future__ import annotations
 
@@ -12,22 +12,31 @@ __all__ = ["Population"]
 
 @record
 class Population:
-    """The population side of the generative model.
+    """Births and deaths of markers, and the hard bounds on speed and gaps of a track.
 
     Parameters
     ----------
     birth_density : float
-        λ_b, new markers per volume (m³; m² in 2-D) and frame.
+        λ_b, new markers per volume (m³; m² in 2-D) and frame, > 0. Larger values start tracks on
+        weaker evidence.
     p_disappear : float
-        p_z, probability that a marker disappears for good from one frame to the next.
+        p_z, probability that a marker disappears permanently from one frame to the next. Larger
+        values terminate tracks after fewer missed detections.
     max_speed : float
-        v̄, m/s: no link of a track is faster (a margin for the noise is added).
+        v̄, largest speed of a link between two detections of a track, m/s; a margin for the noise
+        is added.
     max_gap : int
-        d̄: two consecutive detections of a track are at most so many frames apart, so that up to
-        ``max_gap - 1`` misses in a row are bridged.
+        d̄, largest number of frames between two consecutive detections of a track, ≥ 1. A track
+        survives up to ``max_gap - 1`` missed detections in a row.
     termination : {"marginal", "last"}
-        How the end of a track is scored: summed over the frames in which it may have died, or as
-        in the report, dead right after its last detection.
+        Score of the end of a track. "marginal" sums over all frames in which the marker may have
+        disappeared; "last" assumes, as in the 2010 report, the frame after its last detection.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.Population(birth_density=0.01, p_disappear=1e-3, max_speed=8, max_gap=10).termination
+    'marginal'
     """
 
     birth_density: float

@@ -1,13 +1,13 @@
-"""The log posterior of a partition: the one number that every method chases.
+"""Log posterior of a partition, which every method maximises or samples.
 
-``log π(ω) = Σ s(τ)`` over the tracks, relative to “everything is clutter”, with
+``log π(ω) = Σ s(τ)`` over the tracks, relative to the partition in which all is clutter, with
 
     s(τ) = log λ_b - n log λ_f + n log P_d + u log(1 - P_d) + a log(1 - p_z) + log E_r
            + Σ_{i ≥ 2} log N(y_i; ŷ_i, B_i)
 
-n detections, u undetected frames between the first and the last, a steps survived, r frames left,
-E_r the probability of seeing nothing more in them (eq. 4.6 of the report, with the time of death
-summed over). Tracks outside the space Ω (one detection, a gap over d̄, a link over v̄) score -inf.
+n detections, u missed detections between the first and the last, a steps survived, r frames left,
+E_r the probability of no detection in them (eq. 4.6 of the report, summed over the time of death).
+Tracks outside the space Ω (one detection, a gap over d̄, a link over v̄) score -inf.
 """
 
 from __future__ import annotations
@@ -28,19 +28,27 @@ __all__ = ["log_posterior", "track_scores"]
 
 
 def track_scores(tracks: Tracks, model: TrackingModel) -> NDArray[np.float64]:
-    """Score s(τ) of each track, in nats against its detections being clutter.
+    """Compute the score s(τ) of each track: its log-likelihood ratio against clutter, in nats.
 
     Parameters
     ----------
     tracks : Tracks
-        A partition.
+        Partition of the detections into tracks and clutter.
     model : TrackingModel
-        The model.
+        Model that assigns the scores.
 
     Returns
     -------
     ndarray, shape (K,)
-        -inf for a track that the model forbids; 0 for one without any detection.
+        -inf for a track that the model forbids; 0 for a track without a detection.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> model = am.estimate_model(truth.detections).model
+    >>> bool((am.model.track_scores(truth, model) > 0).all())
+    True
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
@@ -56,18 +64,26 @@ def track_scores(tracks: Tracks, model: TrackingModel) -> NDArray[np.float64]:
 
 
 def log_posterior(tracks: Tracks, model: TrackingModel) -> float:
-    """Log posterior of a partition, in nats above “everything is clutter”.
+    """Compute the log posterior of a partition, relative to all detections being clutter, in nats.
 
     Parameters
     ----------
     tracks : Tracks
-        A partition.
+        Partition of the detections into tracks and clutter.
     model : TrackingModel
-        The model.
+        Model that assigns the posterior.
 
     Returns
     -------
     float
         -inf if the model forbids one of the tracks.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> model = am.estimate_model(truth.detections).model
+    >>> am.log_posterior(truth, model) > 0
+    True
     """
     return float(track_scores(tracks, model).sum())

@@ -1,4 +1,4 @@
-"""What repeats a tracking bit for bit."""
+"""Recipe of a tracking result, from which it is repeated bit for bit."""
 
 from __future__ import annotations
 
@@ -22,33 +22,43 @@ if TYPE_CHECKING:
 __all__ = ["Recipe", "sha256_of", "versions"]
 
 NONE = "none"
-"""How an option that is None is written, here as on the command line."""
+"""Text for an option that is None, here and on the command line."""
 
 
 @record
 class Recipe:
-    """A tracking with everything decided; ``am.track(detections, recipe=recipe)`` repeats it.
+    """Complete settings of a tracking; ``am.track(detections, recipe=recipe)`` repeats it.
 
     Parameters
     ----------
     method : str
         Name of the method.
     options : dict
-        All its options.
+        All options of the method.
     model : TrackingModel
-        The model that is searched.
+        Model whose posterior is searched.
     stitch : bool
-        Whether tracks are stitched through gaps of any length.
+        Whether tracklets are stitched after the association.
     seed : int, optional
-        Of the methods that draw.
+        Seed of the methods that draw random numbers, None for the others.
     has_start : bool
-        Whether the method begins with given tracks, which a repeat must be given too.
+        Whether the method starts from given tracks, which are then needed to repeat it.
     reason : str
-        Why this method was chosen; empty where the caller named it.
+        Reason why this method was selected; empty if the caller named the method.
     sha256 : str
-        Hash of the detections and of the tracks to begin with (`sha256_of`).
+        Hash of the detections and of the initial labels (`sha256_of`).
     versions : dict of str
-        Versions on which the result may depend.
+        Versions of the software on which the result can depend.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.simulate.cube(frames=20, seed=1).detections
+    >>> recipe = am.track(d, "gnn").recipe
+    >>> recipe.method
+    'gnn'
+    >>> am.track(d, recipe=recipe).recipe == recipe
+    True
     """
 
     method: str
@@ -63,14 +73,22 @@ class Recipe:
 
     @property
     def chosen(self) -> str:
-        """Method and reason, one line; empty where the caller named the method."""
+        """Method and reason in one line; empty if the caller named the method."""
         window = self.options.get("window")
         options = f", window={window}" if self.method == "smp" and window else ""
         stitched = ", then stitched" if self.stitch else ""
         return f"{self.method}{options}{stitched}: {self.reason}" if self.reason else ""
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
-        """Return the recipe as nested plain values, as it stands in a TOML file."""
+        """Return the recipe as nested plain values, in the form of a TOML file.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> recipe = am.track(am.simulate.cube(frames=20, seed=1).detections, "gnn").recipe
+        >>> list(recipe.to_dict())
+        ['input', 'method', 'model', 'versions']
+        """
         return {
             "input": {"sha256": self.sha256},
             "method": {
@@ -79,7 +97,7 @@ class Recipe:
                 "start": self.has_start,
                 "stitch": self.stitch,
                 **({"reason": self.reason} if self.reason else {}),
-                # TOML has no null.
+                # TOML has no null value.
                 "options": _replaced(self.options, None, NONE),
             },
             "model": self.model.to_dict(),
@@ -93,7 +111,14 @@ class Recipe:
         Raises
         ------
         ParameterError
-            At an unknown, missing or impossible value.
+            If a value is unknown, missing or impossible.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> recipe = am.track(am.simulate.cube(frames=20, seed=1).detections, "gnn").recipe
+        >>> am.model.Recipe.from_dict(recipe.to_dict()) == recipe
+        True
         """
         check_fields("recipe", map(str, values), ("input", "method", "model", "versions"))
         method = _table(values, "method")
@@ -115,7 +140,14 @@ class Recipe:
 
 
 def sha256_of(detections: Detections, start: NDArray[np.int64] | None = None) -> str:
-    """Return the SHA-256, in hexadecimal, of detections and of labels to begin with."""
+    """Return the SHA-256 of detections and of optional initial labels, in hexadecimal.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> len(sha256_of(am.Detections.from_frames([0.0], [[[0, 0, 1]]])))
+    64
+    """
     d = detections.measured()
     arrays = [d.times, d.offsets, d.points, d.covariances, start]
     digest = hashlib.sha256()
@@ -127,7 +159,13 @@ def sha256_of(detections: Detections, start: NDArray[np.int64] | None = None) ->
 
 
 def versions() -> dict[str, str]:
-    """Return the versions on which a result may depend."""
+    """Return the versions of the software on which a result can depend.
+
+    Examples
+    --------
+    >>> "asterism" in versions()
+    True
+    """
     import scipy
 
     from asterism import __version__
@@ -142,7 +180,7 @@ def versions() -> dict[str, str]:
 
 
 def _replaced(options: Mapping[str, Any], old: object, new: object) -> dict[str, Any]:
-    """Return options, and tables among them, with one value in the place of another."""
+    """Return options, including nested tables, with one value replaced by another."""
     return {
         str(name): _replaced(cast("Mapping[str, Any]", value), old, new)
         if isinstance(value, Mapping)

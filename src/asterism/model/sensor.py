@@ -1,4 +1,4 @@
-"""What the system sees of a marker: noise, misses and clutter."""
+"""Sensor model: measurement noise, missed detections and clutter."""
 
 from __future__ import annotations
 
@@ -10,21 +10,29 @@ __all__ = ["Sensor"]
 
 @record
 class Sensor:
-    """The measurement side of the generative model.
+    """Measurement noise, missed detections and clutter of the capture system.
 
     Parameters
     ----------
     noise_sigma : float
-        σ, standard deviation of a measured coordinate, metres.
+        σ, standard deviation of a measured coordinate, metres, > 0.
     p_detection : float
-        P_d, probability that a marker is seen in a frame; with `p_redetection`, that of one that
-        was seen in the frame before.
+        P_d, probability that a marker is detected in a frame. With `p_redetection` it holds for
+        markers that were detected in the frame before.
     clutter_density : float
-        λ_f, false detections per volume (m³; m² in 2-D) and frame.
+        λ_f, false alarms per volume (m³; m² in 2-D) and frame, > 0. Larger values explain more
+        detections as clutter.
     p_redetection : float, optional
-        P_r, probability that a marker is seen that was missed in the frame before. Without it, it
-        is P_d: misses are independent. Markers that hide behind limbs are missed in runs, 1 / P_r
-        frames long in the mean (Gilbert 1960, *Capacity of a burst-noise channel*).
+        P_r, probability that a marker is detected that was missed in the frame before. By default
+        it is P_d, so missed detections are independent. Occluded markers are missed in bursts with
+        a mean length of 1 / P_r frames (Gilbert 1960, *Capacity of a burst-noise channel*).
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> sensor = am.Sensor(noise_sigma=3e-4, p_detection=0.95, clutter_density=0.1)
+    >>> sensor.p_after_miss
+    0.95
     """
 
     noise_sigma: float
@@ -35,7 +43,7 @@ class Sensor:
     def __post_init__(self) -> None:
         if self.p_redetection is not None:
             check_number("p_redetection", self.p_redetection, above=0, below=1)
-        # A picometre: far less and its square is no number that a filter can work with.
+        # One picometre. The square of a much smaller σ would underflow in the filter.
         check_number("noise_sigma", self.noise_sigma, above=1e-12, below=1e12, closed=True)
         check_number(
             "p_detection",
@@ -53,5 +61,5 @@ class Sensor:
 
     @property
     def p_after_miss(self) -> float:
-        """P_r: `p_redetection`, or P_d where misses are independent."""
+        """P_r: `p_redetection`, or P_d if missed detections are independent."""
         return self.p_detection if self.p_redetection is None else self.p_redetection

@@ -1,4 +1,4 @@
-"""What a laboratory records beside the points: analog channels, events, force plates."""
+"""Further data of a capture: analog channels, events and force plates."""
 
 from __future__ import annotations
 
@@ -16,20 +16,31 @@ __all__ = ["Analog", "Event", "ForcePlate"]
 
 @record(eq=False)
 class Analog:
-    """Analog channels of a capture: ``capture.analog["Fz1"]``.
+    """Analog channels of a capture, read by name: ``capture.analog["Fz1"]``.
 
     Parameters
     ----------
     names : tuple of str
         Name of each of the A channels.
     units : tuple of str
-        Unit of each channel as the file states it, "" where it does not.
+        Unit of each channel as stated in the file, "" if the file states none.
     rate : float
-        Samples a second. The first sample is of the first frame of the file.
+        Samples per second. The first sample belongs to the first frame of the file.
     stored : ndarray, shape (S, A)
         Samples as the file stores them.
     offset, scale : ndarray, shape (A,)
-        A value is ``(stored - offset) * scale``.
+        Conversion of the stored samples: a value is ``(stored - offset) * scale``.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> stored = np.array([[0.0], [2.0]], dtype=np.float32)
+    >>> analog = am.model.Analog(
+    ...     names=("Fz1",), units=("N",), rate=1000.0, stored=stored,
+    ...     offset=np.array([1.0]), scale=np.array([0.5]),
+    ... )
+    >>> analog["Fz1"]
+    array([-0.5,  0.5])
     """
 
     names: tuple[str, ...]
@@ -72,16 +83,22 @@ class Analog:
 
 @record
 class Event:
-    """A moment that the file marks.
+    """Event marked in a capture file, such as a foot strike.
 
     Parameters
     ----------
     time : float
         Seconds from the first frame of the file.
     label : str
-        What happened, "Foot Strike" for example.
+        Kind of event, for example "Foot Strike".
     context : str
-        Of what, "Left" for example; "" where the file does not say.
+        Side or subject, for example "Left"; "" if the file states none.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.model.Event(time=1.25, label="Foot Strike", context="Left")
+    Event(time=1.25, label='Foot Strike', context='Left')
     """
 
     time: float
@@ -91,18 +108,27 @@ class Event:
 
 @record(eq=False)
 class ForcePlate:
-    """A force plate.
+    """Force plate of a capture: its kind, its place and its analog channels.
 
     Parameters
     ----------
     kind : int
-        FORCE_PLATFORM:TYPE of the C3D file, which says what its channels measure.
+        FORCE_PLATFORM:TYPE of the C3D file, which defines what the channels measure.
     corners : ndarray, shape (4, 3)
         Corners of the working surface, metres.
     origin : ndarray, shape (3,)
-        From the middle of the surface to the origin of the sensors, in the plate's axes, metres.
+        Vector from the centre of the surface to the sensors' origin, in the plate's axes, metres.
     channels : tuple of str
-        Its analog channels, in the order that `kind` prescribes.
+        Names of its analog channels, in the order prescribed by `kind`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> corners = np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0.4, 0], [0, 0.4, 0]])
+    >>> plate = am.model.ForcePlate(
+    ...     kind=2, corners=corners, origin=np.zeros(3), channels=("Fx1", "Fy1", "Fz1"))
+    >>> plate.channels
+    ('Fx1', 'Fy1', 'Fz1')
     """
 
     kind: int

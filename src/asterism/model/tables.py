@@ -1,4 +1,4 @@
-"""The libraries of the extra ``tables``: pandas and xarray."""
+"""Import of the libraries of the extra ``tables``: pandas and xarray."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ __all__ = ["tables_module"]
 
 
 def tables_module(name: str) -> Any:
-    """Import pandas or xarray.
+    """Import pandas or xarray and return the module.
 
     Raises
     ------
     ParameterError
-        If it is not installed.
+        If the library is not installed.
     """
     try:
         return importlib.import_module(name)

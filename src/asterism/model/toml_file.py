@@ -1,4 +1,4 @@
-"""TOML files, read with errors that name the file and written as a whole."""
+"""Reading and writing of TOML files, with errors that name the file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["read_toml", "write_toml"]
 
 
 def write_toml(content: Mapping[str, Any], path: str | Path | None) -> str:
-    """Give TOML text, and write it to `path` where one is given."""
+    """Return `content` as TOML text, and write it to `path` if one is given."""
     import tomli_w
 
     text = tomli_w.dumps(content)
@@ -34,14 +34,14 @@ def write_toml(content: Mapping[str, Any], path: str | Path | None) -> str:
 
 
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:
-    """Read a TOML file that should hold `what`.
+    """Read a TOML file; errors name `what` it should contain.
 
     Raises
     ------
     ParameterError
-        If `path` is no path.
+        If `path` is not a path.
     FormatError
-        If the file cannot be read, or is not TOML.
+        If the file cannot be read or is not TOML.
     """
     path = check_path("path", path)
     check_file(path, what)

@@ -1,4 +1,4 @@
-"""The generative model: motion, sensor and population in one, read from and written to TOML."""
+"""Generative model of motion, sensor and population, read from and written to TOML files."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ __all__ = ["MOTIONS", "TrackingModel"]
 MOTIONS: dict[str, type[Motion]] = {
     motion.kind: motion for motion in (DWNA, RandomWalk, DWPA, LinearMotion, InteractingMotions)
 }
-"""Every motion by its name in a model file: the one place to register a new one."""
+"""Motion classes by their names in a model file; a new motion is registered here."""
 
 
 @record
 class TrackingModel:
-    """How detections come about; every method searches its posterior.
+    """Generative model of the detections, whose posterior every method searches.
 
     Parameters
     ----------
     motion : Motion
-        How a marker moves.
+        Motion of a marker.
     sensor : Sensor
-        What is seen of it, and what else is seen.
+        Measurement noise, missed detections and clutter.
     population : Population
-        How markers come and go.
+        Births and deaths of markers, and the bounds of a track.
 
     Examples
     --------
@@ -74,27 +74,55 @@ class TrackingModel:
                 raise ParameterError(name, f"a {kind.__name__}", repr(getattr(self, name)))
 
     def velocity_sigma(self, n_axes: int) -> float:
-        """Prior standard deviation of a velocity coordinate, m/s.
+        """Return the default prior standard deviation of a velocity coordinate, m/s.
 
-        Where the motion model leaves it open: that of velocities spread evenly over the ball of
-        radius v̄, ``v̄ / √(D + 2)``.
+        It is used if the motion has no `velocity_sigma`: ``v̄ / √(D + 2)``, the standard deviation
+        for velocities distributed uniformly in the ball of radius v̄.
 
         Parameters
         ----------
         n_axes : int
-            D, 2 or 3.
+            Number of coordinates D, 2 or 3.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> model = am.TrackingModel(
+        ...     motion=am.RandomWalk(walk_sigma=0.1),
+        ...     sensor=am.Sensor(noise_sigma=3e-4, p_detection=0.95, clutter_density=0.1),
+        ...     population=am.Population(
+        ...         birth_density=0.01, p_disappear=1e-3, max_speed=8, max_gap=10),
+        ... )
+        >>> model.velocity_sigma(2)
+        4.0
         """
         own = getattr(self.motion.modes[0], "velocity_sigma", None)
         return float(own) if own else self.population.max_speed / (n_axes + 2) ** 0.5
 
     def initial_covariance(self, n_axes: int) -> NDArray[np.float64]:
-        """Covariance of one axis' state after a first detection, shape (n, n)."""
+        """Return the covariance of one axis' state after a first detection, shape (n, n).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
+        >>> model.initial_covariance(3).shape
+        (2, 2)
+        """
         return self.motion.modes[0].initial_covariance(
             self.sensor.noise_sigma, self.velocity_sigma(n_axes)
         )
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
-        """Give the model as nested plain values, as it stands in a TOML file."""
+        """Return the model as nested plain values, in the form of a TOML file.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
+        >>> list(model.to_dict())
+        ['motion', 'sensor', 'population']
+        """
         return {name: _to_plain(getattr(self, name)) for name in _TABLES}
 
     @classmethod
@@ -104,7 +132,14 @@ class TrackingModel:
         Raises
         ------
         ParameterError
-            At an unknown, missing or impossible value.
+            If a value is unknown, missing or impossible.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
+        >>> am.TrackingModel.from_dict(model.to_dict()) == model
+        True
         """
         if not isinstance(values, dict):
             raise ParameterError("model", "a table", repr(values))
@@ -116,17 +151,24 @@ class TrackingModel:
         )
 
     def to_toml(self, path: str | Path | None = None) -> str:
-        """Give the model as TOML text, and write it to `path` where one is given.
+        """Return the model as TOML text, and write it to `path` if one is given.
 
         Parameters
         ----------
         path : path, optional
-            File to write; replaced as a whole.
+            File to write. An existing file is replaced.
 
         Returns
         -------
         str
             The text.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
+        >>> model.to_toml().splitlines()[0]
+        '[motion]'
         """
         return write_toml(self.to_dict(), path)
 
@@ -137,7 +179,17 @@ class TrackingModel:
         Raises
         ------
         FormatError
-            If the file is not TOML or does not hold a model.
+            If the file is not TOML or does not contain a model.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> from tempfile import TemporaryDirectory
+        >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
+        >>> with TemporaryDirectory() as folder:
+        ...     text = model.to_toml(f"{folder}/model.toml")
+        ...     am.TrackingModel.from_toml(f"{folder}/model.toml") == model
+        True
         """
         content = read_toml(path, "a model file")
         try:
@@ -152,7 +204,7 @@ _TABLES = ("motion", "sensor", "population")
 
 
 def _to_plain(part: Any) -> dict[str, Any]:
-    """Give a part of the model as TOML can hold it."""
+    """Return a part of the model as plain values that TOML can represent."""
     values: dict[str, Any] = {"kind": part.kind} if isinstance(part, Motion) else {}
     for f in dataclasses.fields(cast(Any, part)):
         value = getattr(part, f.name)

@@ -1,7 +1,7 @@
-"""Who is whom: one integer a detection.
+"""Tracks: a partition of detections, stored as one integer label for each detection.
 
-A `Tracks` is the result of every method and the form of every ground truth. It holds no copy of
-the points: the labels lie beside the detections that they speak of.
+Every method returns a `Tracks`, and ground truth is a `Tracks` too. It refers to its detections
+and holds no copy of the points.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
     from asterism.model.recipe import Recipe
 
-__all__ = ["MOST_TRACKS", "Tracks"]
+__all__ = ["MAX_TRACKS", "Tracks"]
 
-MOST_TRACKS = 10_000_000
-"""There is an entry for every track up to the largest number; a larger one is a mistake."""
+MAX_TRACKS = 10_000_000
+"""Largest number of tracks that is accepted; larger labels are refused as mistakes."""
 _MAX_ROWS = 100
 
 
@@ -42,19 +42,19 @@ class Tracks:
     Parameters
     ----------
     detections : Detections
-        The points, N in number.
+        The N detections.
     labels : array_like of int, shape (N,)
         Track of each detection, 0 … K - 1, or -1 for clutter. A track has at most one detection
         in a frame.
     names : sequence of (str or None), optional
-        Marker name of each track, None where it is not known. Their number is K; without names
-        K is the largest label + 1.
+        Marker name of each of the K tracks, None if it is unknown. Without names K is the largest
+        label + 1.
     confidence : array_like, shape (N,), optional
-        Probability in [0, 1] that the label is right, from methods that know it.
+        Probability in [0, 1] that each label is right, if the method estimates it.
     info : mapping, optional
-        Numbers from the method: what was approximated and by how much, and what the run took.
+        Numbers reported by the method: sizes of approximations, counts and running time.
     recipe : Recipe, optional
-        What repeats the tracking, from `track`.
+        Settings with which `track` repeats the result.
 
     Raises
     ------
@@ -83,10 +83,10 @@ class Tracks:
         )
         n = self.detections.n_points
         labels = keep_array("labels", self.labels, (n,), dtype=np.int64)
-        if labels.size and not -1 <= labels.min() <= labels.max() < MOST_TRACKS:
+        if labels.size and not -1 <= labels.min() <= labels.max() < MAX_TRACKS:
             wrong = labels.min() if labels.min() < -1 else labels.max()
             raise ParameterError(
-                "labels", f"track numbers from 0 to {MOST_TRACKS - 1}, or -1 for clutter", wrong
+                "labels", f"track numbers from 0 to {MAX_TRACKS - 1}, or -1 for clutter", wrong
             )
         n_tracks = int(labels.max()) + 1 if labels.size else 0
         names = tuple(self.names)
@@ -116,20 +116,26 @@ class Tracks:
     def from_dense(
         cls, times: ArrayLike, positions: ArrayLike, names: Sequence[str | None] = ()
     ) -> Self:
-        """Make tracks from named positions, a ground truth say.
+        """Make tracks, for example a ground truth, from an array of positions by frame and marker.
 
         Parameters
         ----------
         times : array_like, shape (T,)
             Seconds.
         positions : array_like, shape (T, K, D)
-            Metres; NaN where a marker was not seen.
+            Metres; NaN where a marker was not detected.
         names : sequence of str, optional
-            K marker names.
+            Names of the K markers; without them the tracks have no names.
 
         Returns
         -------
         Tracks
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.Tracks.from_dense([0, 0.01], [[[0, 0, 1]], [[0, 0, 2]]], ["LKNE"])
+        Tracks(1 tracks, 2 detections in them, 0 clutter, 2 frames)
         """
         detections = Detections.from_dense(times, positions)
         n_frames, n_markers = np.shape(positions)[:2]
@@ -159,7 +165,7 @@ class Tracks:
         Parameters
         ----------
         track : int or str
-            Number of the track, negative ones from the end; or its name.
+            Number of the track, counted from the end if negative, or its name.
 
         Raises
         ------
@@ -186,11 +192,11 @@ class Tracks:
 
     @property
     def display_names(self) -> tuple[str, ...]:
-        """Name of every track: its marker, or its number where it has none."""
+        """Name of each track: its marker name, or ``track k`` without one."""
         return tuple(name or f"track {k}" for k, name in enumerate(self.names))
 
     def gaps(self) -> tuple[Gap, ...]:
-        """Return the gaps of all tracks, by track and then by time.
+        """Return the gaps of all tracks, ordered by track and then by time.
 
         Examples
         --------
@@ -214,15 +220,22 @@ class Tracks:
         )
 
     def to_pandas(self) -> Any:
-        """Return a pandas ``DataFrame`` of one row a detection (extra ``asterism[tables]``).
+        """Return a pandas ``DataFrame`` with one row a detection (extra ``asterism[tables]``).
 
         Columns are ``frame``, ``time_s``, ``track`` (-1 for clutter), ``name``, ``x_m``, ``y_m``,
-        ``z_m`` and, where the method states it, ``confidence``.
+        ``z_m`` and, if the method estimates it, ``confidence``.
 
         Raises
         ------
         ParameterError
             If pandas is not installed.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> tracks = am.Tracks.from_dense([0, 0.01], [[[0, 0, 1]], [[0, 0, 2]]], ["LKNE"])
+        >>> list(tracks.to_pandas().columns)
+        ['frame', 'time_s', 'track', 'name', 'x_m', 'y_m', 'z_m']
         """
         d = self.detections
         names = np.array([*self.display_names, ""], dtype=object)
@@ -246,6 +259,13 @@ class Tracks:
         ------
         ParameterError
             If xarray is not installed.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> tracks = am.Tracks.from_dense([0, 0.01], [[[0, 0, 1]], [[0, 0, 2]]], ["LKNE"])
+        >>> tracks.to_xarray().dims
+        ('time', 'marker', 'axis')
         """
         d, axes = self.detections, list("xyz"[: self.detections.n_axes])
         return tables_module("xarray").DataArray(
@@ -257,7 +277,15 @@ class Tracks:
         )
 
     def measured(self) -> Self:
-        """Leave out what was filled, as `Detections.measured` does; itself where nothing was."""
+        """Return the tracks without filled detections; the object itself if there are none.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> truth = am.simulate.cube(frames=20, seed=1)
+        >>> truth.measured() is truth
+        True
+        """
         d = self.detections.measured()
         if d is self.detections or self.detections.filled is None:
             return self
@@ -267,7 +295,7 @@ class Tracks:
 
     @property
     def n_tracks(self) -> int:
-        """Number of tracks K, those without a detection included."""
+        """Number of tracks K, including tracks without a detection."""
         return len(self.names)
 
     @cached_property
@@ -291,7 +319,14 @@ class Tracks:
         return order, np.concatenate([[0], np.cumsum(self.lengths)]).astype(np.int64)
 
     def positions(self) -> NDArray[np.float64]:
-        """Positions by frame and track, shape (T, K, D), metres, NaN where a track was not seen."""
+        """Return positions by frame and track, shape (T, K, D), metres, NaN without a detection.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.Tracks.from_dense([0, 0.01], [[[0, 0, 1]], [[0, 0, 2]]], ["LKNE"]).positions().shape
+        (2, 1, 3)
+        """
         d = self.detections
         dense = np.full((d.n_frames, self.n_tracks, d.n_axes), np.nan)
         is_track = self.labels >= 0
@@ -299,7 +334,7 @@ class Tracks:
         return dense
 
     def _repr_html_(self) -> str:
-        """Show a notebook one row a track: name, detections, gaps, first and last frame."""
+        """Return an HTML table for notebooks, with one row of figures for each track."""
         order, offsets = self.by_track
         frames = self.detections.frame_of[order]
         n_gaps = np.bincount([gap.track for gap in self.gaps()], minlength=self.n_tracks)
@@ -325,7 +360,7 @@ class Tracks:
 def _first_twice(
     frames: NDArray[np.int64], labels: NDArray[np.int64], n_tracks: int
 ) -> tuple[int, int] | None:
-    """Give a frame and a track that has two detections in it, if there are any."""
+    """Return a frame and a track with two detections in it, or None if there are none."""
     if labels.size and labels.min() < 0:
         frames, labels = frames[labels >= 0], labels[labels >= 0]
     if not labels.size:
@@ -333,7 +368,7 @@ def _first_twice(
     key = frames * n_tracks
     key += labels
     n_cells = (int(frames[-1]) + 1) * n_tracks
-    if n_cells <= 16 * len(key):  # a mark for each frame and track, far faster than to sort
+    if n_cells <= 16 * len(key):  # marking frame and track is much faster than sorting
         is_taken = np.zeros(n_cells, dtype=bool)
         is_taken[key] = True
         if np.count_nonzero(is_taken) == len(key):
