@@ -1,4 +1,4 @@
-"""Kalman filter and smoother over many tracks at once, and the gates about what they foresee."""
+"""Kalman filter and smoother of many tracks at once, and the gates of their predictions."""
 
 from asterism.filter.expected import expected_positions
 from asterism.filter.gates import GateGroups, gate_groups

@@ -1,4 +1,4 @@
-"""Where tracks are expected to be: their predictions, frame by frame."""
+"""Predicted positions of tracks, frame by frame."""
 
 from __future__ import annotations
 
@@ -17,25 +17,33 @@ __all__ = ["expected_positions"]
 
 
 def expected_positions(tracks: Tracks, model: TrackingModel, *, coast: int = 5) -> Detections:
-    """Predict where the marker of each track is in each frame, from the frames before alone.
+    """Predict the position of each track in each frame from its earlier detections.
 
-    For `asterism.multiview`: where markers were heading may tell the image points of a frame
-    apart.
+    `asterism.multiview` uses the predictions to assign image points that several rays explain.
 
     Parameters
     ----------
     tracks : Tracks
-        Tracks of an earlier pass, say.
+        Tracks, for example of an earlier pass.
     model : TrackingModel
-        Its motion and noise are used.
+        Model whose motion and noise are used.
     coast : int
-        Frames after its last detection for which a track is still predicted.
+        Number of frames after its last detection for which a track is still predicted.
 
     Returns
     -------
     Detections
-        Of the same frames: in each the places of the tracks that began before it, by track, with
-        covariances (m², the same on every axis). Of several motions the middle one leads.
+        Predictions of the same frames, ordered by track, for the tracks that started before each
+        frame, with covariances (m², equal on every axis). With several motions the middle mode is
+        used.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> model = am.estimate_model(truth.detections).model
+    >>> expected_positions(truth, model).counts[:3]
+    array([0, 8, 8])
     """
     states = filter_states(tracks, model)
     d = tracks.detections
@@ -49,7 +57,7 @@ def expected_positions(tracks: Tracks, model: TrackingModel, *, coast: int = 5) 
         rows = slice(states.offsets[k], states.offsets[k + 1])
         first, n = int(states.first_frames[k]), int(states.offsets[k + 1] - states.offsets[k])
         means, P = states.means[rows], states.covariances[rows]
-        # The last state is led on by itself; each earlier one is one step from the next frame.
+        # The last state is predicted over all coasting frames; each earlier one over one step.
         beyond = min(coast, d.n_frames - first - n)
         step = kind[first + 1 : first + n + beyond]
         at = np.arange(first + 1, first + n + beyond)

@@ -1,6 +1,6 @@
-"""Which tracks compete: groups of tracks and detections that gates link, frame by frame.
+"""Groups of tracks and detections that compete, because gates link them, frame by frame.
 
-Symbols: D axes, ŷ where a track is foreseen, S its covariance on each axis.
+Symbols: D axes, ŷ the predicted position of a track, S its innovation covariance on each axis.
 """
 
 from __future__ import annotations
@@ -24,17 +24,25 @@ __all__ = ["GateGroups", "gate_groups"]
 
 @record(eq=False)
 class GateGroups:
-    """What `gate_groups` found: G groups, in the order of their frames.
+    """Result of `gate_groups`: G groups, in the order of their frames.
 
     Attributes
     ----------
     times : ndarray, shape (T,)
-        Of the frames, seconds.
+        Times of the frames, seconds.
     frames : ndarray of int, shape (G,)
         Frame of each group.
     n_tracks, n_detections : ndarray of int, shape (G,)
-        Its size. A track without a detection in its gate is a group of its own; detections that no
-        track reaches are in none.
+        Numbers of tracks and detections in each group. A track without a detection in its gate is
+        a group of its own; detections outside all gates belong to no group.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> groups = gate_groups(truth, am.estimate_model(truth.detections).model)
+    >>> len(groups.times)
+    20
     """
 
     times: NDArray[np.float64]
@@ -50,7 +58,7 @@ class GateGroups:
 
     @property
     def largest(self) -> NDArray[np.int64]:
-        """Tracks in the largest group of each frame, shape (T,); 0 where there is none."""
+        """Number of tracks in the largest group of each frame, shape (T,); 0 if there is none."""
         found = np.zeros(len(self.times), dtype=np.int64)
         np.maximum.at(found, self.frames, self.n_tracks)
         return found
@@ -59,20 +67,21 @@ class GateGroups:
 def gate_groups(
     tracks: Tracks, model: TrackingModel, *, gate_probability: float = 1e-9
 ) -> GateGroups:
-    """Group the tracks and detections of each frame that gates link, directly or through others.
+    """Group the tracks and detections of each frame that are linked by gates.
 
-    A track reaches the detections within its gate ``(y - ŷ)ᵀ (y - ŷ) / S < γ``, where it is
-    foreseen from its own detections before that frame; with several motions, within the gate of any
-    of them. Groups are independent: what belongs to whom can be decided in each alone.
+    The gate of a track holds the detections with ``(y - ŷ)ᵀ (y - ŷ) / S < γ``, predicted from the
+    track's detections before that frame. With several motions it is the union of their gates.
+    Association can be solved in each group alone, because groups share no track or detection.
 
     Parameters
     ----------
     tracks : Tracks
-        Who is foreseen: each from the frame after its first detection to that of its last.
+        Tracks to predict, each from the frame after its first detection to that of its last.
     model : TrackingModel
-        Its motion and its noise are used.
+        Model whose motion and noise are used.
     gate_probability : float
-        Probability that a gate misses the detection of its own track; gives γ.
+        Probability that a gate misses the detection of its own track, in (0, 1); it sets γ.
+        Smaller values make larger gates and groups.
 
     Returns
     -------
@@ -82,6 +91,14 @@ def gate_groups(
     ------
     ParameterError
         If the probability is not between 0 and 1.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> groups = gate_groups(truth, am.estimate_model(truth.detections).model)
+    >>> groups.largest.shape
+    (20,)
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -98,7 +115,7 @@ def gate_groups(
     ends = states.offsets[1:][lengths > 0] - 1
     goes_on = np.ones(len(states.means), dtype=bool)
     goes_on[ends] = False
-    rows = np.flatnonzero(goes_on)  # each foresees its track in the frame after its own
+    rows = np.flatnonzero(goes_on)  # each predicts its track into the next frame
     place = np.arange(len(states.means)) - np.repeat(states.offsets[:-1], lengths)
     frame = (np.repeat(states.first_frames, lengths) + place)[rows] + 1
     by_frame = np.argsort(frame, kind="stable")

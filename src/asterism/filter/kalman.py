@@ -1,4 +1,4 @@
-"""States of tracks: filtered forward, or smoothed with the whole take.
+"""States of tracks: filtered forward, or smoothed over the whole capture.
 
 Symbols: n states an axis, D axes, K tracks. The axes of a track share one covariance.
 """
@@ -28,16 +28,24 @@ class States:
     Parameters
     ----------
     means : ndarray, shape (M, D, n)
-        Of each axis: position, and velocity and acceleration where the motion has them; SI units.
+        State of each axis: position, and velocity and acceleration if the motion has them; SI
+        units.
     covariances : ndarray, shape (M, n, n)
-        Of each axis, the same on every one.
+        Covariance of the state, equal on every axis.
     offsets : ndarray of int, shape (K + 1,)
-        Track ``k`` has the rows ``offsets[k]:offsets[k + 1]``, one a frame.
+        Track ``k`` has the rows ``offsets[k]:offsets[k + 1]``, one for each frame.
     first_frames : ndarray of int, shape (K,)
         Frame of each track's first row.
     log_densities : ndarray, shape (N,)
-        ``log N(y; ŷ, S)`` of each detection given the track's earlier ones; 0 at a track's first
-        detection and for clutter.
+        ``log N(y; ŷ, S)`` of each detection given the track's earlier detections; 0 for the first
+        detection of a track and for clutter.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> filter_states(truth, am.estimate_model(truth.detections).model)
+    States(8 tracks, 160 states of 3 × 2)
     """
 
     means: NDArray[np.float64]
@@ -51,7 +59,16 @@ class States:
         return f"States({len(self.first_frames)} tracks, {len(self.means)} states of {D} × {n})"
 
     def positions(self, n_frames: int) -> NDArray[np.float64]:
-        """Positions by frame and track, shape (n_frames, K, D), NaN outside a track's span."""
+        """Return positions by frame and track, shape (n_frames, K, D), NaN outside a track's span.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> truth = am.simulate.cube(frames=20, seed=1)
+        >>> states = filter_states(truth, am.estimate_model(truth.detections).model)
+        >>> states.positions(20).shape
+        (20, 8, 3)
+        """
         K = len(self.first_frames)
         dense = np.full((n_frames, K, self.means.shape[1]), np.nan)
         track = np.repeat(np.arange(K), np.diff(self.offsets))
@@ -71,7 +88,7 @@ def _for_engine(tracks: Tracks, model: TrackingModel) -> tuple[Any, ...]:
 
 
 def _of_detections(tracks: Tracks, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Bring values of detections in tracks, by track, into the order of all; 0 of clutter."""
+    """Reorder values of tracked detections from track order to input order; 0 for clutter."""
     out = np.zeros(tracks.detections.n_points)
     out[tracks.by_track[0]] = values
     return out
@@ -95,37 +112,52 @@ def _states(tracks: Tracks, model: TrackingModel, *, smoothed: bool) -> States:
 
 
 def filter_states(tracks: Tracks, model: TrackingModel) -> States:
-    """Kalman filter of every track: its state given its past and present.
+    """Estimate the state of every track from its past and present by a Kalman filter.
 
     Parameters
     ----------
     tracks : Tracks
-        The tracks.
+        Tracks to filter.
     model : TrackingModel
-        Its motion and its noise are used.
+        Model whose motion and noise are used.
 
     Returns
     -------
     States
+        Filtered states.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> filter_states(truth, am.estimate_model(truth.detections).model).means.shape
+    (160, 3, 2)
     """
     return _states(tracks, model, smoothed=False)
 
 
 def smooth_states(tracks: Tracks, model: TrackingModel) -> States:
-    """Rauch-Tung-Striebel smoother of every track: its state given the whole take.
+    """Estimate the state of every track from the whole capture by a Rauch-Tung-Striebel smoother.
 
     Rauch, Tung & Striebel 1965, AIAA Journal 3(8).
 
     Parameters
     ----------
     tracks : Tracks
-        The tracks.
+        Tracks to smooth.
     model : TrackingModel
-        Its motion and its noise are used.
+        Model whose motion and noise are used.
 
     Returns
     -------
     States
-        The log densities are those of the forward filter.
+        Smoothed states, with the log densities of the forward filter.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> smooth_states(truth, am.estimate_model(truth.detections).model).means.shape
+    (160, 3, 2)
     """
     return _states(tracks, model, smoothed=True)
