@@ -1,4 +1,4 @@
-"""Combinatorial solvers on plain arrays: they know nothing of tracks, frames or models."""
+"""Combinatorial solvers on plain arrays, independent of tracks, frames and models."""
 
 from asterism.solve.joint_events import JointMarginals, joint_marginals
 from asterism.solve.k_best import KBestAssignments, k_best_assignments

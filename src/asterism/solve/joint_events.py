@@ -1,7 +1,6 @@
-"""Joint association events: who has which detection, over all the ways of sharing them out.
+"""Marginals of joint association events, as in joint probabilistic data association (JPDA).
 
-This is the sum at the heart of joint probabilistic data association. Gating and densities are the
-caller's; so is what to do with the marginals.
+The caller does the gating, computes the densities and uses the marginals.
 """
 
 from __future__ import annotations
@@ -20,13 +19,13 @@ if TYPE_CHECKING:
 
 __all__ = ["JointMarginals", "joint_marginals"]
 
-_LARGEST_LOG = 1e100
-_MOST_STATES = 2**30
+_MAX_LOG = 1e100
+_MAX_STATES = 2**30
 
 
 @record(eq=False)
 class JointMarginals:
-    """What `joint_marginals` found.
+    """Result of `joint_marginals`.
 
     Attributes
     ----------
@@ -34,20 +33,26 @@ class JointMarginals:
         ``marginals[i, j]`` is the probability that track i has detection j, ``marginals[i, -1]``
         that it has none. Rows sum to 1, the columns of detections to at most 1.
     log_total : float
-        Log of the weight of all joint events that were summed. With a beam it is too small by at
-        most ``-log(1 - bound)``.
+        Log of the total weight of the summed joint events. With a beam it is too small by at most
+        ``-log(1 - bound)``.
     best : ndarray of int, shape (n,)
-        Detection of each track in the heaviest joint event, -1 for a miss; one of them where
-        several weigh the same. Exact, also with a beam.
+        Detection of each track in the most probable joint event, -1 for a missed detection; one
+        of them if several are equally probable. Exact also with a beam.
     method : {"exact", "beam"}
-        Whether every joint event was summed.
+        "exact" if every joint event was summed, "beam" if not.
     bound : float
-        The distribution over joint events that the marginals belong to differs from the true one
-        by at most this in total variation, and so does every marginal; 0 when exact. It is 1,
-        and the marginals those of `best` alone, where the range of doubles does not do, which
-        takes a group of hundreds of tracks.
+        Upper bound of the total variation between the distribution behind the marginals and the
+        true one; it holds for each marginal too. 0 when exact. If the weights exceed the range
+        of doubles, which takes a group of hundreds of tracks, it is 1 and the marginals are
+        those of `best` alone.
     n_states : int
-        Most states that were held after a step.
+        Largest number of states held after a step.
+
+    Examples
+    --------
+    >>> found = joint_marginals([[0.0]], [0.0])
+    >>> found.method, found.n_states
+    ('exact', 1)
     """
 
     marginals: NDArray[np.float64]
@@ -61,27 +66,27 @@ class JointMarginals:
 def joint_marginals(
     log_weights: ArrayLike, log_miss: ArrayLike, *, max_states: int = 2**20
 ) -> JointMarginals:
-    """Sum over all joint events of n tracks and m detections.
+    """Compute association probabilities of n tracks and m detections over all joint events.
 
-    A joint event gives every track one detection or a miss, ``θ_i ∈ {1..m, 0}``, and no detection
-    to two tracks. It has the probability
+    A joint event assigns to every track one detection or a missed detection, ``θ_i ∈ {1..m, 0}``,
+    and no detection to two tracks. Its probability is
 
     ``P(θ) = Π_i w_{i θ_i} / Σ_θ' Π_i w_{i θ'_i}``
 
-    and wanted are the marginals ``β_ij = P(θ_i = j)``. In joint probabilistic data association [1]_
+    and the marginals are ``β_ij = P(θ_i = j)``. In joint probabilistic data association [1]_
     ``w_ij = N(y_j; ŷ_i, S_i) P_d / λ_f`` within the gate and ``w_i0 = 1 - P_d``.
 
-    Tracks that share no detection, directly or through others, are summed apart. In each group
-    tracks and detections are summed out one after the other, forward and backward, over the sets
-    that may be used of the *frontier*: those left that have a neighbour already gone. A group of n
-    tracks that all want the same m detections takes ``2^min(n, m)`` states, a chain of any length
-    two. Efficient hypothesis management [2]_ is another way to share work between events.
+    Groups of tracks that share no detection, directly or through others, are summed separately.
+    In each group tracks and detections are eliminated one by one, forward and backward. A state is
+    the used subset of the *frontier*: the remaining nodes with an eliminated neighbour. A group of
+    n tracks that share the same m detections needs ``2^min(n, m)`` states, a chain of any length
+    needs two. Efficient hypothesis management [2]_ is another way to share work between events.
 
-    A group whose frontier exceeds `max_states` is summed over a *beam*, the states that can weigh
-    most. The mass F(s) of each state dropped, times a bound U(s) of what could follow it, adds to
-    a bound D of the missing weight; with Z the weight that was summed, the total variation between
-    the distribution returned and the true one is at most ``D / (Z + D)``, and over groups
-    ``1 - Π (1 - D / (Z + D))``.
+    A group whose frontier exceeds `max_states` is summed over a *beam*: the states with the
+    largest upper bounds. The mass F(s) of each dropped state, times a bound U(s) of the remaining
+    weight, adds to a bound D of the missing weight. With the summed weight Z, the total variation
+    between the returned distribution and the true one is at most ``D / (Z + D)``, and over all
+    groups ``1 - Π (1 - D / (Z + D))``.
 
     Parameters
     ----------
@@ -90,9 +95,10 @@ def joint_marginals(
     log_miss : array_like, shape (n,)
         ``log w_i0``, finite.
     max_states : int
-        Most states of a layer, 1 to 2^30. An exact sum of 2^20 states takes about 90 MB for 20
-        tracks, a beam of as many about 110 MB for 60; both grow with the square root of the
-        number of tracks in the group.
+        Largest number of states of a layer, 1 to 2^30. Larger values keep larger groups exact,
+        at the cost of memory: an exact sum of 2^20 states takes about 90 MB for 20 tracks, a beam
+        of 2^20 states about 110 MB for 60. Both grow with the square root of the number of tracks
+        in the group.
 
     Returns
     -------
@@ -114,7 +120,7 @@ def joint_marginals(
 
     Examples
     --------
-    Two tracks want one detection; the first weighs it twice as much as the second does.
+    Two tracks compete for one detection; its weight for the first is twice that for the second.
 
     >>> found = joint_marginals(np.log([[2.0], [1.0]]), [0.0, 0.0])
     >>> found.marginals
@@ -123,15 +129,16 @@ def joint_marginals(
     >>> found.best
     array([ 0, -1])
     """
-    check_number("max_states", max_states, above=1, below=_MOST_STATES, closed=True, integer=True)
+    check_number("max_states", max_states, above=1, below=_MAX_STATES, closed=True, integer=True)
     miss = check_array("log_miss", log_miss, ("n",))
     weights = check_array("log_weights", log_weights, (len(miss), "m"), finite=False)
     for name, logs in (("log_weights", weights), ("log_miss", miss)):
-        # False for NaN too. Beyond this sums of logs could leave the doubles.
-        fits = (np.abs(logs) <= _LARGEST_LOG) | (np.isneginf(logs) & (name == "log_weights"))
+        # The comparison is False for NaN too. Sums of larger logs could exceed the range of
+        # doubles.
+        fits = (np.abs(logs) <= _MAX_LOG) | (np.isneginf(logs) & (name == "log_weights"))
         if not fits.all():
             place = tuple(int(i) for i in np.argwhere(~fits)[0])
-            expected = f"logs of at most {_LARGEST_LOG:g} in size"
+            expected = f"logs of at most {_MAX_LOG:g} in size"
             hint = "give -inf for what lies outside the gate" if name == "log_weights" else ""
             raise ParameterError(name, expected, f"{logs[place]} at index {place}", hint)
     try:

@@ -1,4 +1,4 @@
-"""The k best assignments, in order: what the best pairing is, and what it might be instead."""
+"""The k best assignments in order of their total gain."""
 
 from __future__ import annotations
 
@@ -17,20 +17,25 @@ if TYPE_CHECKING:
 __all__ = ["KBestAssignments", "k_best_assignments"]
 
 _LARGEST = 8192
-_GREATEST_GAIN = 1e100
+_MAX_GAIN = 1e100
 
 
 @record(eq=False)
 class KBestAssignments:
-    """What `k_best_assignments` found.
+    """Result of `k_best_assignments`: the best assignments and their totals.
 
     Attributes
     ----------
     matches : ndarray of int, shape (K, n)
-        Column of each row in each pairing, -1 where the row stays alone; the best pairing first.
-        K is less than k where there are no more.
+        Column of each row in each assignment, -1 for an unassigned row; the best assignment
+        first. K is less than k if fewer assignments exist.
     totals : ndarray, shape (K,)
-        Sum of gains of each pairing, falling.
+        Total gain of each assignment, in decreasing order.
+
+    Examples
+    --------
+    >>> k_best_assignments([[1.0, 0.5]], 2).totals
+    array([1. , 0.5])
     """
 
     matches: NDArray[np.int64]
@@ -38,25 +43,27 @@ class KBestAssignments:
 
 
 def k_best_assignments(gains: ArrayLike, k: int, *, complete: bool = False) -> KBestAssignments:
-    """Rank the pairings of n rows with m columns by their sum of gains.
+    """Find the k assignments of n rows to m columns with the largest total gains.
 
-    A pairing gives every row one column or none, and no column to two rows. Murty's partition [1]_
-    with the improvements of [2]_: a subproblem starts from the duals of the one it is part of,
-    takes one shortest augmenting path, and is solved when its lower bound comes to the front.
+    An assignment gives each row at most one column, and each column to at most one row. The
+    algorithm is Murty's partition [1]_ with the improvements of [2]_: a subproblem starts from the
+    dual prices of its parent, takes one shortest augmenting path, and is solved when its bound
+    comes to the front of the queue.
 
     Parameters
     ----------
     gains : array_like, shape (n, m)
-        Gain of each pair; -inf where it is forbidden.
+        Gain of each pair; -inf for a forbidden pair.
     k : int
-        So many pairings, where there are as many.
+        Number of assignments to find, ≥ 1; fewer are returned if fewer exist.
     complete : bool
-        Whether every row must have a column. Otherwise a row may stay alone, for a gain of 0.
+        Whether every row must have a column. Otherwise a row can stay unassigned, with a gain of
+        0.
 
     Returns
     -------
     KBestAssignments
-        Pairings of equal sums come in an order that depends on the gains alone.
+        Assignments with equal totals come in an order that depends on the gains alone.
 
     Raises
     ------
@@ -84,10 +91,10 @@ def k_best_assignments(gains: ArrayLike, k: int, *, complete: bool = False) -> K
     """
     check_number("k", k, above=1, closed=True, integer=True)
     g = check_array("gains", gains, ("n", "m"), finite=False)
-    fits = (np.abs(g) <= _GREATEST_GAIN) | np.isneginf(g)  # False for NaN too
+    fits = (np.abs(g) <= _MAX_GAIN) | np.isneginf(g)  # False for NaN too
     if not fits.all():
         place = tuple(int(i) for i in np.argwhere(~fits)[0])
-        expected = f"numbers of at most {_GREATEST_GAIN:g} in size, or -inf"
+        expected = f"numbers of at most {_MAX_GAIN:g} in size, or -inf"
         raise ParameterError("gains", expected, f"{g[place]} at index {place}")
     n, m = g.shape
     if n + m > _LARGEST:
@@ -99,11 +106,12 @@ def k_best_assignments(gains: ArrayLike, k: int, *, complete: bool = False) -> K
     elif complete:
         found = _engine.k_best(np.ascontiguousarray(-g), int(k))
     else:
-        # A column for each row to be alone in.
+        # Each row has a further column of its own, which stands for unassigned.
         cost = np.full((n, m + n), np.inf)
         cost[:, :m] = -g
         cost[np.arange(n), m + np.arange(n)] = 0.0
         found = _engine.k_best(cost, int(k))
     matches = np.where(found < m, found, -1).astype(np.int64)
-    won = np.concatenate([g, np.zeros((n, 1))], axis=1)  # alone is -1, the last
+    # The index -1 of an unassigned row addresses the last column.
+    won = np.concatenate([g, np.zeros((n, 1))], axis=1)
     return KBestAssignments(matches=matches, totals=won[np.arange(n), matches].sum(axis=1))

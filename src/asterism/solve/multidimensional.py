@@ -1,7 +1,7 @@
-"""Axial multidimensional assignment: the best set of tuples of which no two share an index.
+"""Axial multidimensional assignment: the best set of tuples without a shared index.
 
-The same problem ties scans to tracks (each dimension a frame) and cameras to points (each dimension
-a camera): a tuple takes one index of some of the dimensions and none of the others.
+The problem occurs in tracking (each dimension is a frame) and in multi-view correspondence (each
+dimension is a camera). A tuple takes one index in some of the dimensions and none in the others.
 """
 
 from __future__ import annotations
@@ -23,20 +23,26 @@ __all__ = ["MultidimensionalAssignment", "assign_multidimensional"]
 
 @record(eq=False)
 class MultidimensionalAssignment:
-    """What `assign_multidimensional` found.
+    """Result of `assign_multidimensional`: the chosen tuples, their value and its bound.
 
     Attributes
     ----------
     chosen : ndarray of int, shape (K,)
-        Which tuples, rising; no two of them share an index.
+        Indices of the chosen tuples, increasing; no two of them share an index.
     value : float
         Sum of their weights.
     bound : float
-        No choice is worth more.
+        Upper bound of the value of any choice.
     method : {"exact", "relaxed"}
-        How it was found.
+        Solver that was used.
     rounds : int
-        Rounds of the relaxation; 0 of the exact one.
+        Number of rounds of the relaxation; 0 for the exact solver.
+
+    Examples
+    --------
+    >>> found = assign_multidimensional([[0, 0], [0, 1]], [1.0, 2.0])
+    >>> found.chosen, found.gap
+    (array([1]), 0.0)
     """
 
     chosen: NDArray[np.int64]
@@ -47,7 +53,7 @@ class MultidimensionalAssignment:
 
     @property
     def gap(self) -> float:
-        """``bound - value``: by so much at most another choice could be better."""
+        """``bound - value``, the largest amount by which another choice could be better."""
         return self.bound - self.value
 
 
@@ -58,28 +64,28 @@ def assign_multidimensional(
     method: Literal["exact", "relaxed"] = "exact",
     max_rounds: int = 300,
 ) -> MultidimensionalAssignment:
-    """Choose tuples for the greatest sum of weights, no index of a dimension twice.
+    """Choose the tuples with the largest sum of weights that share no index of a dimension.
 
     With tuples ``c`` over S dimensions and their weights ``w_c``,
 
     ``max Σ w_c x_c,  Σ_{c: c_s = i} x_c ≤ 1 for each index i of each dimension s,  x_c ∈ {0, 1}``.
 
-    An index that no chosen tuple takes is left to the dummy, for nothing. With two dimensions this
-    is linear assignment, from three on it is NP-hard. ``"exact"`` is solved by HiGHS, to 1e-6 of
-    the value. ``"relaxed"`` prices the constraints of all dimensions but the two largest, solves
-    the assignment that is left, and moves the prices along the subgradient [1]_; each round gives
-    an upper bound and, repaired, a choice.
+    An index in no chosen tuple is assigned to the dummy at weight 0. With two dimensions this is
+    linear assignment; with three or more it is NP-hard. ``"exact"`` is solved by HiGHS, to 1e-6
+    of the value. ``"relaxed"`` puts dual prices on the constraints of all dimensions but the two
+    largest, solves the remaining assignment, and moves the prices along the subgradient [1]_. Each
+    round yields an upper bound and, after a repair, a feasible choice.
 
     Parameters
     ----------
     tuples : array_like of int, shape (C, S)
-        Index in each dimension, -1 for none; at least one in each tuple.
+        Index in each dimension, -1 for none; each tuple has at least one index.
     weights : array_like, shape (C,)
-        Weight of each tuple, against leaving its indices to the dummy.
+        Weight of each tuple, relative to assigning its indices to the dummy.
     method : {"exact", "relaxed"}
-        How to solve.
+        Solver: "exact" for the optimum, "relaxed" for a fast choice with a bound.
     max_rounds : int
-        Most rounds of the relaxation.
+        Largest number of rounds of the relaxation. More rounds tighten the bound.
 
     Returns
     -------
@@ -98,7 +104,7 @@ def assign_multidimensional(
 
     Examples
     --------
-    Three scans; the second tuple is the best, but the other two together are better.
+    Three frames; the second tuple has the largest weight, but the other two together exceed it.
 
     >>> found = assign_multidimensional([[0, 0, 0], [0, 1, 1], [1, 1, -1]], [2.0, 3.0, 2.0])
     >>> found.chosen, found.value, found.gap
@@ -131,7 +137,7 @@ def assign_multidimensional(
 
 
 def _resources(tuples: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give each index of each dimension a number of its own; -1 stays."""
+    """Assign consecutive numbers to the indices of all dimensions; -1 stays."""
     numbers = np.full(tuples.shape, -1)
     start = 0
     for s in range(tuples.shape[1]):
@@ -145,7 +151,7 @@ def _resources(tuples: NDArray[np.int64]) -> NDArray[np.int64]:
 def _solve_exactly(
     tuples: NDArray[np.int64], weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], float]:
-    """Solve by HiGHS what is entangled; what shares nothing is chosen at once."""
+    """Choose tuples that share no index directly, and solve the others by HiGHS."""
     from scipy.optimize import Bounds, LinearConstraint, milp
     from scipy.sparse import csr_array
 
@@ -177,14 +183,14 @@ def _solve_exactly(
     chosen = np.concatenate([alone, rest[found.x > 0.5]])
     value = float(weights[chosen].sum())
     bound = float(weights[alone].sum() - found.mip_dual_bound)
-    # HiGHS stops within 1e-6 of its bound.
+    # HiGHS stops when the value is within 1e-6 of its bound.
     return chosen, value if bound - value < 1e-6 * max(1.0, abs(value)) else bound
 
 
 def _relax(
     tuples: NDArray[np.int64], weights: NDArray[np.float64], max_rounds: int
 ) -> tuple[NDArray[np.int64], float, int]:
-    """Lagrangian relaxation of all dimensions but two."""
+    """Solve by Lagrangian relaxation of all dimensions but two."""
     resources = _resources(tuples)
     sizes = [len(np.unique(column[column >= 0])) for column in tuples.T]
     a, b, *others = np.argsort(sizes, kind="stable")[::-1].tolist() + [-1] * (2 - len(sizes))
@@ -231,7 +237,7 @@ def _relax(
 
 
 class _Plane:
-    """The assignment of two dimensions, each pair by its best tuple."""
+    """Linear assignment of two dimensions, with the best tuple for each pair."""
 
     def __init__(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> None:
         self.free = np.flatnonzero((rows < 0) & (columns < 0))
@@ -248,18 +254,18 @@ class _Plane:
         chosen = [self.free[reduced[self.free] > 0]]
         if len(self.starts):
             ranked = reduced[self.order]
-            most = np.maximum.reduceat(ranked, self.starts)
-            # The first best tuple of each pair.
-            pair = np.repeat(np.arange(len(most)), np.diff(np.append(self.starts, len(ranked))))
-            hits = np.flatnonzero(ranked == most[pair])
+            highest = np.maximum.reduceat(ranked, self.starts)
+            # Of equally good tuples of a pair, the first is used.
+            pair = np.repeat(np.arange(len(highest)), np.diff(np.append(self.starts, len(ranked))))
+            hits = np.flatnonzero(ranked == highest[pair])
             first = hits[np.unique(pair[hits], return_index=True)[1]]
             of_pair = self.order[first]
             row_alone, column_alone = np.zeros(self.n), np.zeros(self.n)
             has_no_column, has_no_row = self.column < 0, self.row < 0
-            row_alone[self.row[has_no_column]] = np.maximum(most[has_no_column], 0)
-            column_alone[self.column[has_no_row]] = np.maximum(most[has_no_row], 0)
+            row_alone[self.row[has_no_column]] = np.maximum(highest[has_no_column], 0)
+            column_alone[self.column[has_no_row]] = np.maximum(highest[has_no_row], 0)
             both = np.flatnonzero(~has_no_column & ~has_no_row)
-            gains = most[both] - row_alone[self.row[both]] - column_alone[self.column[both]]
+            gains = highest[both] - row_alone[self.row[both]] - column_alone[self.column[both]]
             match = _engine.assign(
                 self.n, self.n, self.row[both].astype(np.int32),
                 self.column[both].astype(np.int32), gains,
@@ -268,9 +274,9 @@ class _Plane:
             chosen.append(of_pair[both[taken]])
             is_matched = np.zeros(self.n, dtype=bool)
             is_matched[match[match >= 0]] = True
-            left = has_no_column & (match[self.row] < 0) & (most > 0)
+            left = has_no_column & (match[self.row] < 0) & (highest > 0)
             chosen.append(of_pair[left])
-            left = has_no_row & ~is_matched[self.column] & (most > 0)
+            left = has_no_row & ~is_matched[self.column] & (highest > 0)
             chosen.append(of_pair[left])
         return np.concatenate(chosen)
 
@@ -278,7 +284,7 @@ class _Plane:
 def _repair(
     resources: NDArray[np.int64], weights: NDArray[np.float64], order: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Take tuples in this order where they fit, then exchange one for those in its way."""
+    """Choose tuples greedily in this order, then exchange one tuple for those that block it."""
     owner: dict[int, int] = {}
     lists = [[r for r in row if r >= 0] for row in resources.tolist()]
     w = weights.tolist()
