@@ -1,4 +1,4 @@
-"""How good a result is: identities, misses, false labels, and whether confidence means anything."""
+"""Scores of tracks against ground truth, and the calibration of their confidence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Finding the same detections in two captures, so that labels can be compared by identity."""
+"""Alignment of tracks and truth, so that labels are compared detection by detection."""
 
 from __future__ import annotations
 
@@ -20,18 +20,25 @@ __all__ = ["Alignment", "align", "marker_labels"]
 
 @record(eq=False)
 class Alignment:
-    """Tracks and truth as two labels for each detection that either of them has.
+    """Tracks and truth as two labels for each detection of either side.
 
     Attributes
     ----------
     times : ndarray, shape (T,)
         Times of all frames, seconds.
     frame_of : ndarray of int, shape (N,)
-        Frame of each detection, never decreasing.
+        Frame of each detection, in increasing order.
     i_tracks, i_truth : ndarray of int, shape (N,)
-        Its index among the detections of either side, -1 where that side lacks it.
+        Index of each detection among the detections of that side, -1 if that side lacks it.
     labels, truth_labels : ndarray of int, shape (N,)
-        Its track and its marker, -1 for none.
+        Track and marker of each detection, -1 for none.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> align(truth, truth).labels.tolist() == truth.labels.tolist()
+    True
     """
 
     times: NDArray[np.float64]
@@ -50,23 +57,23 @@ class Alignment:
 
 
 def align(tracks: Tracks, truth: Tracks, *, tolerance: float = 1e-6) -> Alignment:
-    """Lay tracks and truth beside each other, detection by detection.
+    """Match the detections of tracks and truth, and pair their labels.
 
-    Frames are the same if their times differ by less than half the smallest spacing of either
-    side. In the same frame, detections are the same if each is the other's nearest and every
-    coordinate agrees to `tolerance`, over and above the rounding to 32-bit millimetres that files
-    do. Of several at one place the first belongs to the first, and so on. A detection that only
-    the truth has is unlabelled; one that only the tracks have is clutter.
+    Frames match if their times differ by less than half the smallest spacing of either side. In
+    matching frames, detections match if each is the nearest to the other and every coordinate
+    agrees to `tolerance`, in addition to the rounding of files to 32-bit millimetres. Several
+    detections at one place are matched in their order. A detection of the truth alone is
+    unlabelled; a detection of the tracks alone is clutter.
 
-    In the truth, tracks without a name are clutter as soon as one track has a name; where none
-    has, all are markers.
+    If any track of the truth has a name, the unnamed tracks are clutter; otherwise all tracks are
+    markers.
 
     Parameters
     ----------
     tracks, truth : Tracks
-        What was found and what is so.
+        Tracks to score, and the ground truth.
     tolerance : float
-        Greatest difference of a coordinate, metres.
+        Largest difference of a coordinate, metres.
 
     Returns
     -------
@@ -75,7 +82,14 @@ def align(tracks: Tracks, truth: Tracks, *, tolerance: float = 1e-6) -> Alignmen
     Raises
     ------
     ParameterError
-        If fewer than half of the detections of either side are found on the other.
+        If fewer than half of the detections of either side match.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> align(truth, truth).labels.shape
+    (160,)
     """
     check_number("tolerance", tolerance, above=0, closed=True)
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
@@ -109,7 +123,7 @@ def align(tracks: Tracks, truth: Tracks, *, tolerance: float = 1e-6) -> Alignmen
 
     order = np.argsort(frames, kind="stable")
     i_tracks, i_truth = i_tracks[order], i_truth[order]
-    # One more label at the end, so that the index -1 (not there) means -1 (none).
+    # A further label at the end makes the index -1 (absent) yield the label -1 (none).
     return Alignment(
         times=np.sort(times),
         frame_of=frames[order],
@@ -121,7 +135,14 @@ def align(tracks: Tracks, truth: Tracks, *, tolerance: float = 1e-6) -> Alignmen
 
 
 def marker_labels(truth: Tracks) -> NDArray[np.int64]:
-    """Give the labels of the truth with unnamed tracks as clutter, if any track has a name."""
+    """Return the truth's labels, with unnamed tracks as clutter if any track has a name.
+
+    Examples
+    --------
+    >>> truth = Tracks.from_dense([0], [[[0, 0, 0], [1, 0, 0]]], ["LKNE", None])
+    >>> marker_labels(truth)
+    array([ 0, -1])
+    """
     has_name = np.array([name is not None for name in truth.names], dtype=bool)
     if has_name.all() or not has_name.any():
         return truth.labels

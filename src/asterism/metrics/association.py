@@ -1,4 +1,4 @@
-"""The 2010 report's own percentages, and the links they come from."""
+"""Percentages of the 2010 report, and the links on which they are based."""
 
 from __future__ import annotations
 
@@ -17,32 +17,39 @@ __all__ = ["AssociationScores", "association_scores", "right_links"]
 
 @record(eq=False)
 class AssociationScores:
-    """What `association_scores` found. Percentages of nothing are NaN.
+    """Result of `association_scores`. A percentage of an empty set is NaN.
 
     Attributes
     ----------
     wrong_percent : float
-        Labelled detections whose marker is not their track's, the one it has most often (the
-        lowest of several). Labelled clutter is wrong.
+        Share of labelled detections whose marker differs from their track's most frequent marker
+        (the lowest if several are equally frequent). Labelled clutter is wrong.
     wrong_first_percent : float
-        The same where the track's marker is that of its first detection: once it has strayed, all
-        that follows is wrong. A track that starts with clutter is wrong throughout.
+        The same share, if the marker of a track is that of its first detection. All detections
+        after a switch are then wrong, and all of a track that starts with clutter.
     missing_percent : float
-        Detections of markers without a label.
+        Share of detections of markers that have no label.
     clutter_labelled_percent : float
-        Clutter (false points, ghosts) with a label.
+        Share of clutter (false alarms, ghosts) that has a label.
     n_markers, n_tracks : int
-        Markers seen at all, and tracks generated.
+        Number of markers with a detection, and number of tracks.
     tracks_per_marker : float
-        Their ratio, 1 at best.
+        Number of tracks per marker; 1 is best.
     wrong_links : int
-        Pairs of consecutive detections in a track that are not of one marker.
+        Number of pairs of consecutive detections in a track that are not of one marker.
     broken_links : int
-        Pairs of consecutive detections of a marker that are not consecutive in one track.
+        Number of pairs of consecutive detections of a marker that are not consecutive in one
+        track.
     frames_by_wrong : tuple of int
-        Number of frames with 0, 1, 2 … wrong associations, by the track's commonest marker.
+        Number of frames with 0, 1, 2 … wrong associations, by the track's most frequent marker.
     frame_wrong, frame_wrong_first : ndarray of int, shape (T,)
-        Wrong associations by frame, in both senses.
+        Number of wrong associations in each frame, as in `wrong_percent` and in
+        `wrong_first_percent`.
+
+    Examples
+    --------
+    >>> association_scores([0, 0, 1], [0, 0, 0], [0, 1, 2]).tracks_per_marker
+    2.0
     """
 
     wrong_percent: float
@@ -66,19 +73,19 @@ def association_scores(
     *,
     n_frames: int | None = None,
 ) -> AssociationScores:
-    """Score labels as the report does: wrong associations, generated tracks, missing labels.
+    """Compute the 2010 report's scores: wrong associations, number of tracks, missing labels.
 
-    The report also counts as wrong what is in a track beyond one for each marker, however pure it
-    is; that is ``100 · (1 − idp)`` of `asterism.metrics.identity_scores`.
+    The report also counts as wrong all detections in further tracks of a marker, even if these
+    tracks are pure; that share is ``100 · (1 − idp)`` of `asterism.metrics.identity_scores`.
 
     Parameters
     ----------
     labels, truth_labels : array_like of int, shape (N,)
         Track and marker of each detection, -1 for none.
     frame_of : array_like of int, shape (N,)
-        Frame of each detection, never decreasing.
+        Frame of each detection, in increasing order.
     n_frames : int, optional
-        Number of frames; up to the last detection unless given.
+        Number of frames. By default the last frame is that of the last detection.
 
     Returns
     -------
@@ -88,6 +95,11 @@ def association_scores(
     ------
     ParameterError
         If the arrays do not fit each other.
+
+    Examples
+    --------
+    >>> association_scores([0, 0, 0], [0, 0, 1], [0, 1, 2]).wrong_links
+    1
     """
     labels, truth_labels = check_labels(labels, truth_labels)
     frame_of, n_frames = check_frames(frame_of, len(labels), n_frames)
@@ -96,7 +108,7 @@ def association_scores(
     n_tracks = len(pairs.track_sizes)
 
     commonest = np.full(n_tracks, -1)
-    rising = np.lexsort((-pairs.markers, pairs.counts))  # the last one written stays
+    rising = np.lexsort((-pairs.markers, pairs.counts))  # the last one is kept
     commonest[pairs.tracks[rising]] = pairs.markers[rising]
     first = np.full(n_tracks, -1)
     members = np.flatnonzero(is_labelled)
@@ -135,7 +147,7 @@ def association_scores(
 def right_links(
     labels: ArrayLike, truth_labels: ArrayLike
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Tell for each detection that continues a track whether it is of the marker before it.
+    """Find the detections that continue a track, and whether each continues its marker.
 
     Parameters
     ----------
@@ -145,9 +157,14 @@ def right_links(
     Returns
     -------
     successors : ndarray of int, shape (L,)
-        The detections that have a predecessor in their track.
+        Indices of the detections with a predecessor in their track.
     is_right : ndarray of bool, shape (L,)
-        Whether it and its predecessor are of one marker.
+        Whether each of them and its predecessor belong to one marker.
+
+    Examples
+    --------
+    >>> right_links([0, 0, 0], [0, 0, 1])
+    (array([1, 2]), array([ True, False]))
     """
     labels, truth_labels = check_labels(labels, truth_labels)
     before, after = successions(labels)

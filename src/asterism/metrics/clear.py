@@ -1,4 +1,4 @@
-"""CLEAR-MOT: misses, false positives and switches, in one number and apart."""
+"""CLEAR-MOT scores: missed detections, false positives and identity switches."""
 
 from __future__ import annotations
 
@@ -18,31 +18,38 @@ __all__ = ["ClearScores", "clear_scores"]
 
 @record(eq=False)
 class ClearScores:
-    """What `clear_scores` found. Shares of nothing are NaN.
+    """Result of `clear_scores`. A share of an empty set is NaN.
 
     Attributes
     ----------
     n_true : int
-        Detections of markers.
+        Number of detections of markers.
     mota : float
         1 − (missed + false_labels + switches) / n_true; at most 1, may be negative.
     motp_mm : float
-        Mean distance of the labelled detections of markers from their true places, millimetres; 0
-        where the detections themselves are taken as true.
+        Mean distance of the labelled detections of markers from the true positions, millimetres;
+        0 if no true positions are given.
     missed : int
-        Detections of markers without a label (false negatives).
+        Number of detections of markers without a label (false negatives).
     false_labels : int
-        Labelled clutter (false positives).
+        Number of labelled clutter detections (false positives).
     switches : int
-        Times that a marker's track is another than when it was labelled last.
+        Number of times that the track of a marker differs from that of its last labelled
+        detection.
     switches_per_1000 : float
-        Switches in a thousand detections of markers.
+        Number of switches per 1000 detections of markers.
     fragments : int
-        Times that a marker's labels break off and resume, with an unlabelled detection between.
+        Number of times that a marker's labels end and resume, with an unlabelled detection
+        between.
     mostly_tracked, mostly_lost : int
-        Markers of whose detections at least 80 % are labelled; less than 20 %.
+        Number of markers of which at least 80 % of the detections are labelled; less than 20 %.
     frame_true, frame_missed, frame_false, frame_switches : ndarray of int, shape (T,)
-        The counts by frame; a switch counts in the frame of its second label.
+        Counts in each frame; a switch counts in the frame of its second label.
+
+    Examples
+    --------
+    >>> clear_scores([0, 0, 1], [0, 0, 0], [0, 1, 2]).switches
+    1
     """
 
     n_true: int
@@ -69,19 +76,19 @@ def clear_scores(
     n_frames: int | None = None,
     error: ArrayLike | None = None,
 ) -> ClearScores:
-    """Score labels by CLEAR-MOT, matching by identity of the detection.
+    """Compute the CLEAR-MOT scores of labels; labels are matched detection by detection.
 
     Parameters
     ----------
     labels, truth_labels : array_like of int, shape (N,)
         Track and marker of each detection, -1 for none.
     frame_of : array_like of int, shape (N,)
-        Frame of each detection, never decreasing.
+        Frame of each detection, in increasing order.
     n_frames : int, optional
-        Number of frames; up to the last detection unless given.
+        Number of frames. By default the last frame is that of the last detection.
     error : array_like, shape (N,), optional
-        Distance of each detection from the true place of its marker, metres; only those of
-        labelled detections of markers are used.
+        Distance of each detection from the true position of its marker, metres; 0 by default.
+        Only labelled detections of markers are used.
 
     Returns
     -------
@@ -96,6 +103,12 @@ def clear_scores(
     ----------
     K. Bernardin, R. Stiefelhagen: Evaluating multiple object tracking performance: the CLEAR MOT
     metrics. EURASIP Journal on Image and Video Processing, 2008.
+
+    Examples
+    --------
+    >>> scores = clear_scores([0, -1, 1], [0, 0, 0], [0, 1, 2])
+    >>> scores.missed, scores.switches
+    (1, 1)
     """
     labels, truth_labels = check_labels(labels, truth_labels)
     frame_of, n_frames = check_frames(frame_of, len(labels), n_frames)
@@ -110,11 +123,11 @@ def clear_scores(
     switched = after[labels[before] != labels[after]]
     before, after = successions(truth_labels)
     n_interrupted = np.count_nonzero(is_match[before] & ~is_match[after])
-    # The last interruption of a marker is no fragment where no label resumes: it ends unlabelled.
+    # The last interruption of a marker is not a fragment if no label follows it.
     seen = np.bincount(truth_labels[is_true])
     matched = np.bincount(truth_labels[is_match], minlength=len(seen))
     last = np.full(len(seen), -1)
-    last[truth_labels[is_true]] = np.flatnonzero(is_true)  # in time order, so the last one stays
+    last[truth_labels[is_true]] = np.flatnonzero(is_true)  # in time order: the last is kept
     last = last[matched > 0]
     fragments = n_interrupted - np.count_nonzero(~is_match[last])
 

@@ -1,4 +1,4 @@
-"""All scores of a result at once."""
+"""Evaluation of tracks by all scores at once."""
 
 from __future__ import annotations
 
@@ -26,24 +26,47 @@ __all__ = ["Evaluation", "evaluate"]
 
 @record(eq=False)
 class Evaluation(ClearScores, IdentityScores, HotaScores, GospaScores, AssociationScores):
-    """Every score of a result; the fields are described in the classes that it is made of.
+    """All scores of a result; the base classes describe their fields.
 
     Attributes
     ----------
     times : ndarray, shape (T,)
-        Times of the frames, seconds; all fields that start with ``frame_`` go by them.
+        Times of the frames, seconds, for all fields that start with ``frame_``.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> am.evaluate(truth, truth).idf1
+    1.0
     """
 
     times: NDArray[np.float64]
 
     def to_dict(self) -> dict[str, Any]:
-        """Give the overall scores by name, as plain numbers that JSON can hold."""
+        """Return the overall scores by name, as plain numbers for JSON.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> truth = am.simulate.cube(frames=20, seed=1)
+        >>> am.evaluate(truth, truth).to_dict()["switches"]
+        0
+        """
         fields = (f.name for f in dataclasses.fields(self))
         values = {name: getattr(self, name) for name in sorted(fields) if not _is_by_frame(name)}
         return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
 
     def by_frame(self) -> dict[str, NDArray[Any]]:
-        """Give the times and the scores by frame, as columns of one table, each of shape (T,)."""
+        """Return times and scores by frame, as columns of one table, each of shape (T,).
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> truth = am.simulate.cube(frames=20, seed=1)
+        >>> int(am.evaluate(truth, truth).by_frame()["missed"].sum())
+        0
+        """
         fields = (f.name for f in dataclasses.fields(self))
         return {"times": self.times} | {
             name.removeprefix("frame_"): getattr(self, name)
@@ -93,26 +116,26 @@ def evaluate(
     c: float = 0.1,
     tolerance: float = 1e-6,
 ) -> Evaluation:
-    """Score tracks against the truth.
+    """Score tracks against the ground truth.
 
-    Detections are the same by identity, not by distance from a marker: both must speak of the same
-    capture. If they do not share one `Detections`, equal times and positions tell which is which,
-    as `asterism.metrics.align` says. In the truth, tracks without a name are clutter as soon as
-    one track has a name. The names of `tracks` play no part.
+    Labels are compared detection by detection, so both must come from the same capture. If they do
+    not share one `Detections`, detections are matched by equal times and positions
+    (`asterism.metrics.align`). If any track of the truth has a name, its unnamed tracks are
+    clutter. The names of `tracks` are not used.
 
     Parameters
     ----------
     tracks : Tracks
-        What a method found.
+        Tracks to score.
     truth : Tracks
-        What is so.
+        Ground truth.
     truth_positions : array_like, shape (N, D), optional
-        Where the marker of each detection of `truth` truly was, metres; NaN for clutter. For
-        `motp_mm` and `gospa`; unless given, the detections are taken to be exact.
+        True position of the marker of each detection of `truth`, metres; NaN for clutter. Used
+        for `motp_mm` and `gospa`. By default the detections are assumed to be exact.
     c : float
-        Cut-off of GOSPA, metres.
+        Cut-off of GOSPA, metres, > 0. Larger values weigh missed and false labels more.
     tolerance : float
-        Greatest difference of a coordinate between the same detections, metres.
+        Largest difference of a coordinate between matching detections, metres.
 
     Returns
     -------
@@ -121,7 +144,7 @@ def evaluate(
     Raises
     ------
     ParameterError
-        If fewer than half of the detections of either side are found on the other, or an argument
+        If fewer than half of the detections of either side match, or an argument
         is out of range.
 
     Examples

@@ -1,4 +1,4 @@
-"""GOSPA: one distance a frame for misses, false labels and errors of place."""
+"""GOSPA: a distance for each frame, from missed labels, false labels and position errors."""
 
 from __future__ import annotations
 
@@ -18,14 +18,19 @@ __all__ = ["GospaScores", "gospa_scores"]
 
 @record(eq=False)
 class GospaScores:
-    """What `gospa_scores` found.
+    """Result of `gospa_scores`.
 
     Attributes
     ----------
     gospa : float
-        Mean over the frames, metres; NaN without a frame.
+        Mean GOSPA distance over the frames, metres; NaN without a frame.
     frame_gospa : ndarray, shape (T,)
-        Of each frame, metres.
+        GOSPA distance of each frame, metres.
+
+    Examples
+    --------
+    >>> gospa_scores([0, 0], [0, 0], [0, 1]).gospa
+    0.0
     """
 
     gospa: float
@@ -41,23 +46,24 @@ def gospa_scores(
     n_frames: int | None = None,
     error: ArrayLike | None = None,
 ) -> GospaScores:
-    """Score labels by GOSPA with p = 2 and α = 2, pairing by identity of the detection.
+    """Compute GOSPA with p = 2 and α = 2; labels are matched detection by detection.
 
-    A frame with errors of place e_i, m missed markers and f false labels has
-    ``sqrt(Σ min(e_i, c)² + c²/2 · (m + f))``. Which track a label names does not matter to it.
+    A frame with position errors e_i, m missed markers and f false labels has the distance
+    ``sqrt(Σ min(e_i, c)² + c²/2 · (m + f))``. The identity of the tracks has no effect.
 
     Parameters
     ----------
     labels, truth_labels : array_like of int, shape (N,)
         Track and marker of each detection, -1 for none.
     frame_of : array_like of int, shape (N,)
-        Frame of each detection, never decreasing.
+        Frame of each detection, in increasing order.
     c : float
-        Cut-off, metres: an error of place is no worse than this.
+        Cut-off, metres, > 0: larger position errors count as c. Larger values weigh missed and
+        false labels more.
     n_frames : int, optional
-        Number of frames; up to the last detection unless given.
+        Number of frames. By default the last frame is that of the last detection.
     error : array_like, shape (N,), optional
-        Distance of each detection from the true place of its marker, metres; 0 unless given.
+        Distance of each detection from the true position of its marker, metres; 0 by default.
 
     Returns
     -------
@@ -72,6 +78,12 @@ def gospa_scores(
     ----------
     A. S. Rahmathullah, Á. F. García-Fernández, L. Svensson: Generalized optimal sub-pattern
     assignment metric. FUSION, 2017.
+
+    Examples
+    --------
+    >>> scores = gospa_scores([0, -1], [0, 0], [0, 1], c=0.1)
+    >>> scores.frame_gospa.round(4)
+    array([0.    , 0.0707])
     """
     check_number("c", c, above=0)
     labels, truth_labels = check_labels(labels, truth_labels)

@@ -1,4 +1,4 @@
-"""HOTA: detecting and associating weighed alike."""
+"""HOTA: a score with equal weights for detection and association."""
 
 from __future__ import annotations
 
@@ -18,16 +18,23 @@ __all__ = ["HotaScores", "hota_scores"]
 
 @record(eq=False)
 class HotaScores:
-    """What `hota_scores` found. Shares of nothing are NaN; without a match the rest is 0.
+    """Result of `hota_scores`. A share of an empty set is NaN.
 
     Attributes
     ----------
     hota : float
-        √(deta · assa).
+        Higher-order tracking accuracy, √(deta · assa); 0 without a labelled detection of a marker.
     deta : float
-        Labelled detections of markers among all that are labelled or of a marker.
+        Detection accuracy: number of labelled detections of markers, divided by the number of
+        detections that are labelled or belong to a marker.
     assa : float
-        Mean, over those matches, of what their track and marker share among all that either has.
+        Association accuracy: mean over the labelled detections of markers of the number of
+        detections shared by the track and the marker, divided by the number in either.
+
+    Examples
+    --------
+    >>> hota_scores([0, 0, 1], [0, 0, 0]).deta
+    1.0
     """
 
     hota: float
@@ -36,7 +43,7 @@ class HotaScores:
 
 
 def hota_scores(labels: ArrayLike, truth_labels: ArrayLike) -> HotaScores:
-    """Score labels by HOTA; by identity of the detection, all its thresholds of place agree.
+    """Compute HOTA; labels are matched detection by detection, so localisation is exact.
 
     Parameters
     ----------
@@ -55,6 +62,11 @@ def hota_scores(labels: ArrayLike, truth_labels: ArrayLike) -> HotaScores:
     References
     ----------
     J. Luiten et al.: HOTA: a higher order metric for evaluating multi-object tracking. IJCV, 2021.
+
+    Examples
+    --------
+    >>> round(hota_scores([0, 0, 1], [0, 0, 0]).hota, 4)
+    0.7454
     """
     labels, truth_labels = check_labels(labels, truth_labels)
     pairs = overlap(labels, truth_labels)
@@ -63,5 +75,5 @@ def hota_scores(labels: ArrayLike, truth_labels: ArrayLike) -> HotaScores:
     union = pairs.marker_sizes[pairs.markers] + pairs.track_sizes[pairs.tracks] - pairs.counts
     deta = ratio(n_matches, n_either)
     shared = float(np.sum(pairs.counts * (pairs.counts / union)))
-    assa = shared / n_matches if n_matches else deta  # 0, or NaN if there is nothing at all
+    assa = shared / n_matches if n_matches else deta  # 0, or NaN if there are no detections
     return HotaScores(hota=math.sqrt(deta * assa), deta=deta, assa=assa)

@@ -1,4 +1,4 @@
-"""Finding the same frames and the same detections in two captures."""
+"""Search for the same frames and the same detections in two captures."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ __all__ = ["same_detections", "same_frames"]
 
 
 def same_frames(a: Detections, b: Detections) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find the frames that two captures share: ``(i_a, i_b)``, each of shape (M,).
+    """Find the frames that two captures share, as indices ``(i_a, i_b)``, each of shape (M,).
 
-    Times are the same if they differ by less than half the smallest spacing of either side, so
-    none is the same as two others. Two single frames must agree to a microsecond.
+    Times match if they differ by less than half the smallest spacing of either side, so that no
+    time matches two others. Two single frames must agree to a microsecond.
     """
     spacings = np.concatenate([np.diff(a.times), np.diff(b.times)])
     if not a.n_frames or not b.n_frames:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    reach = spacings.min() / 2 if len(spacings) else 1e-6  # two single frames have no spacing
+    reach = spacings.min() / 2 if len(spacings) else 1e-6  # single frames have no spacing
     right = np.minimum(np.searchsorted(a.times, b.times), a.n_frames - 1)
     left = np.maximum(right - 1, 0)
     is_left = np.abs(a.times[left] - b.times) <= np.abs(a.times[right] - b.times)
@@ -40,14 +40,14 @@ def same_detections(
     Parameters
     ----------
     a, b : Detections
-        The captures.
+        Captures to compare.
     tolerance : float
-        As in `align`.
+        Largest difference of a coordinate, metres, as in `align`.
 
     Returns
     -------
     i_a, i_b : ndarray of int, shape (M,)
-        Indices of each shared detection, rising in `i_a`.
+        Indices of each shared detection, increasing in `i_a`.
     """
     if a is b or (
         np.array_equal(a.times, b.times)
@@ -90,8 +90,8 @@ def _mutual_nearest(
     points_b: NDArray[np.float64],
     reach: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Give pairs of a frame that are each other's nearest within `reach` on every axis."""
-    # Frame and first coordinate make one sorted line, on which the reach is a short interval.
+    """Return pairs in the same frame that are mutual nearest neighbours within `reach`."""
+    # Frame and first coordinate form one sorted axis, on which candidates lie in a short interval.
     low = min(points_a[:, 0].min(), points_b[:, 0].min()) - 1
     width = max(points_a[:, 0].max(), points_b[:, 0].max()) + 1 - low
     line_a = frames_a * width + (points_a[:, 0] - low)
@@ -113,7 +113,7 @@ def _mutual_nearest(
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     i, j = np.concatenate(pairs_a), np.concatenate(pairs_b)
     distance = np.linalg.norm(points_a[i] - points_b[j], axis=1)
-    # Of equally near ones the first counts, on both sides.
+    # Of equally near neighbours the first is used, on both sides.
     nearest_b, nearest_a = np.full(len(points_a), -1), np.full(len(points_b), -1)
     far_first = np.lexsort((-j, -distance))
     nearest_b[i[far_first]] = j[far_first]

@@ -1,4 +1,4 @@
-"""The best that any tracker with a limit can do: the measure beside which a result is read."""
+"""Oracle: the true partition, broken at long gaps, as an upper bound of a tracker's scores."""
 
 from __future__ import annotations
 
@@ -13,22 +13,23 @@ __all__ = ["oracle_tracks"]
 
 
 def oracle_tracks(truth: Tracks, max_gap: int) -> Tracks:
-    """Break the truth where a marker was not seen for long.
+    """Break the tracks of the truth at gaps longer than a tracker can bridge.
 
-    A tracker that bridges at most `max_gap` frames cannot know that what comes back after a longer
-    gap is the same marker, nor make a track of a single detection.
+    A tracker that links detections over at most `max_gap` frames cannot identify a marker after a
+    longer gap, and cannot make a track of a single detection. The scores of the result are an
+    upper bound for such a tracker.
 
     Parameters
     ----------
     truth : Tracks
-        Who is whom; tracks without a name are clutter if any has a name, as in `evaluate`.
+        Ground truth. If any track has a name, the unnamed ones are clutter, as in `evaluate`.
     max_gap : int
-        Consecutive detections of a track are at most so many frames apart.
+        Largest number of frames between consecutive detections of a track, ≥ 1.
 
     Returns
     -------
     Tracks
-        The pieces, without names; those of a single detection are clutter.
+        Tracklets without names. Single detections are clutter.
 
     Raises
     ------
@@ -49,8 +50,8 @@ def oracle_tracks(truth: Tracks, max_gap: int) -> Tracks:
     before, after = successions(marker_labels(truth))
     is_short = frame_of[after] - frame_of[before] <= max_gap
     before, after = before[is_short], after[is_short]
-    # A piece starts where something follows but nothing precedes; successors come in the order of
-    # their tracks and times, so counting the starts before each numbers the pieces.
+    # A tracklet starts at a detection with a successor but no predecessor. Successors are ordered
+    # by track and time, so the number of starts before each numbers the tracklets.
     has_before = np.zeros(len(truth.labels), dtype=bool)
     has_before[after] = True
     piece = np.cumsum(~has_before[before]) - 1

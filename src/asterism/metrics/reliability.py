@@ -1,4 +1,4 @@
-"""Whether confidence means what it says: of labels held at 90 %, nine in ten should be right."""
+"""Calibration of confidence: of labels with a confidence of 90 %, nine in ten should be right."""
 
 from __future__ import annotations
 
@@ -19,22 +19,27 @@ __all__ = ["CalibrationCurve", "calibration_curve"]
 
 @record(eq=False)
 class CalibrationCurve:
-    """A reliability table and its two summaries.
+    """Result of `calibration_curve`: a reliability table, its calibration error and its AUC.
 
     Attributes
     ----------
     edges : ndarray, shape (B + 1,)
-        Ends of the bins of confidence; a bin holds its lower end, the last one both.
+        Edges of the bins of confidence. A bin includes its lower edge, the last bin both edges.
     counts : ndarray of int, shape (B,)
-        Labels in each bin.
+        Number of labels in each bin.
     confidence, right : ndarray, shape (B,)
-        Mean confidence and right share of each bin; NaN where it is empty.
+        Mean confidence and share of right labels of each bin; NaN for an empty bin.
     ece : float
         Expected calibration error: mean of ``|confidence − right|`` over the labels; NaN without
-        any.
+        labels.
     auc : float
-        Probability that a right label is held with more confidence than a wrong one, ties counting
-        half; NaN where all are right or all are wrong.
+        Probability that a right label has a higher confidence than a wrong one, with ties counted
+        half; NaN if all labels are right or all are wrong.
+
+    Examples
+    --------
+    >>> calibration_curve([0.9, 0.2], [True, False], bins=2).counts
+    array([1, 1])
     """
 
     edges: NDArray[np.float64]
@@ -60,16 +65,17 @@ class CalibrationCurve:
 def calibration_curve(
     confidence: ArrayLike, is_right: ArrayLike, bins: int = 10
 ) -> CalibrationCurve:
-    """Hold confidence against what turned out right.
+    """Compare confidence with the share of right labels, in bins of confidence.
 
     Parameters
     ----------
     confidence : array_like, shape (N,)
         Probability in [0, 1] that a label (or link) is right.
     is_right : array_like of bool, shape (N,)
-        Whether it is.
+        Whether the label (or link) is right.
     bins : int
-        Number of bins of equal width.
+        Number of bins of equal width. More bins resolve the curve finer, with fewer labels in
+        each.
 
     Returns
     -------
@@ -78,7 +84,7 @@ def calibration_curve(
     Raises
     ------
     ParameterError
-        If the arrays do not fit each other, or a confidence is no probability.
+        If the arrays do not fit each other, or a confidence is not in [0, 1].
 
     Examples
     --------
