@@ -55,7 +55,7 @@ def test_windows_have_all_that_they_need_and_no_other_has(seed):
         for a in range(60 - 12)
         if (helped & bridged)[a + frames - 16].all()
         and own[a + near - 16].all()
-        and own[a + span.hidden - 16].sum() >= 2
+        and own[a + span.frames - 16].sum() >= 2
     ]
     found = held_out(own, bridged, helped, frames, span, 1000)
     np.testing.assert_array_equal(found[:, 0], expected)
@@ -173,9 +173,9 @@ def test_weights_are_the_best_of_a_fine_grid(seed, J):
 
 def test_what_is_bridged_knows_nothing_of_what_is_hidden(monkeypatch):
     """A hole beside the hidden frame is bridged with its help: no window may begin there."""
-    monkeypatch.setattr(estimates, "MOST_WINDOWS", 1000)
+    monkeypatch.setattr(estimates, "MAX_WINDOWS", 1000)
     truth = rigid(frames=120, noise=1e-4)
-    take = estimates.Take(
+    take = estimates.DenseTracks(
         times=truth.detections.times,
         positions=hidden_at(truth, (0, 60, 60), (0, 40, 40), (3, 80, 84)).positions(),
         model=MODEL,
@@ -194,7 +194,7 @@ def test_what_is_bridged_is_no_truth(monkeypatch):
     truth = rigid(frames=90, noise=1e-4)
     holes = [(0, t, t) for t in (20, 40)]
     positions = hidden_at(truth, (0, 60, 66), *holes).positions()
-    take = estimates.Take(times=truth.detections.times, positions=positions, model=MODEL)
+    take = estimates.DenseTracks(times=truth.detections.times, positions=positions, model=MODEL)
     seen_by_carried = []
     carried = estimates.carried_estimate
     monkeypatch.setattr(

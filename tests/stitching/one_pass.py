@@ -20,14 +20,14 @@ MODEL = am.TrackingModel(
 )
 BODY = np.random.default_rng(1).uniform(-0.4, 0.4, (8, 3))
 PLACE = np.array([0.05, 0.02, 0.1])  # of the marker that is hidden
-WORTH = 0.25
+WEIGHT = 0.25
 
 
 @dataclasses.dataclass
 class Found:
     """Of each fragment, in order of its label: the marker, the label before, how probably."""
 
-    fragments: Any
+    tracklets: Any
     marker: list[int]
     after: list[int]
     probability: Any

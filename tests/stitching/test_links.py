@@ -13,7 +13,7 @@ from asterism import _engine
 from asterism.model.compiled import motion_model, transition
 from asterism.tracking.stitching.passes import Pass, go_through
 from asterism.tracking.stitching.whole import stitch_options
-from tests.stitching.one_pass import BODY, MODEL, PLACE, WORTH, one_pass, scene
+from tests.stitching.one_pass import BODY, MODEL, PLACE, WEIGHT, one_pass, scene
 
 
 @pytest.mark.parametrize("place", [PLACE, BODY[0] + [0, 0.04, 0]])
@@ -71,9 +71,9 @@ def test_cut_fragments_are_those_of_the_points():
     assert found.n_cuts >= 2
     frames, labels = np.divmod(np.arange(300 * 9), 9)
     late = frames >= 150
-    assert set(found.fragments[~late & (labels == 3)]) == {3}
-    assert len(set(found.fragments[late & (labels == 3)])) == 1
-    marker = np.array(found.marker)[found.fragments]
+    assert set(found.tracklets[~late & (labels == 3)]) == {3}
+    assert len(set(found.tracklets[late & (labels == 3)])) == 1
+    marker = np.array(found.marker)[found.tracklets]
     np.testing.assert_array_equal(marker[late & (labels == 3)], 8)
     np.testing.assert_array_equal(marker[late & (labels == 8)], 3)
 
@@ -118,7 +118,7 @@ def test_a_backward_pass_is_a_forward_one_through_the_take_reversed():
     options = stitch_options(model, 15, 0.03, None)
     back = go_through(d, labels, model, options, backward=True)
     there = go_through(turned, labels[::-1], model, options)
-    np.testing.assert_array_equal(back.fragments[::-1], there.fragments)
+    np.testing.assert_array_equal(back.tracklets[::-1], there.tracklets)
     np.testing.assert_array_equal(back.markers, there.markers)
     np.testing.assert_array_equal(back.after, there.after)
 
@@ -131,14 +131,14 @@ def test_a_pass_advises_whom_its_joins_come_from():
             told.extend(zip(labels.tolist(), before.tolist(), weights, strict=True))
 
     found = Pass(
-        fragments=np.zeros(0, np.int32), markers=np.array([0, 1, 0, 0, -2, 1], np.int32),
+        tracklets=np.zeros(0, np.int32), markers=np.array([0, 1, 0, 0, -2, 1], np.int32),
         after=np.array([-1, -1, 0, 2, -1, 1], np.int32),
         probabilities=np.array([1, 1, 1 / (1 + np.exp(-0.5)), 1, 0.9, 0.1]), n_cuts=0,
     )  # fmt: skip
     found.advise(Listener())  # pyright: ignore[reportArgumentType]
     # 2 went on with 0: in the other direction 0 goes on with 2.
     assert [(label, before) for label, before, _ in told] == [(0, 2), (2, 3), (1, 5)]
-    assert [weight for *_, weight in told] == pytest.approx([0.5 / WORTH, 5, 1])
+    assert [weight for *_, weight in told] == pytest.approx([0.5 / WEIGHT, 5, 1])
 
 
 def stream(dense, *, lag=2, confirm=15, revise=None, labels=None):

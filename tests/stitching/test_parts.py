@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from asterism import _engine
 from tests.references.rigid_body import BodyByHand
-from tests.stitching.one_pass import BODY, NOISE, PLACE, WORTH, one_pass, scene
+from tests.stitching.one_pass import BODY, NOISE, PLACE, WEIGHT, one_pass, scene
 
 BESIDE = 12 * NOISE**2  # variance that stitching adds to that of carried places
 
@@ -151,7 +151,7 @@ def test_the_probability_is_that_of_body_and_elsewhere():
     everything = np.concatenate([BODY, PLACE[None]])
     else_ = _engine.background_densities(everything, everything, noise=NOISE, ghost_radius=0.03)
     # Log odds of 2 for a marker come back, and 0.5 % for its own motion.
-    assert found.logit(9) == pytest.approx(WORTH * (carried - else_[8] + 2 + np.log(0.995)))
+    assert found.logit(9) == pytest.approx(WEIGHT * (carried - else_[8] + 2 + np.log(0.995)))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -175,7 +175,7 @@ def test_the_log_odds_of_a_body_are_those_of_its_steadiest_neighbours(seed):
     gain = np.log(np.mean(np.exp(means))) + 2 + np.log(0.995)
     found = one_pass(dense, may_cut=False)
     assert found.after[9] == 8
-    assert found.logit(9) == pytest.approx(WORTH * gain)
+    assert found.logit(9) == pytest.approx(WEIGHT * gain)
 
 
 @pytest.mark.parametrize("weight", [-2.0, 1.0, 5.0])
@@ -183,16 +183,16 @@ def test_advice_is_worth_its_weight_and_half_of_it_against_others(weight):
     dense = scene((0, 60, PLACE), (200, 299, PLACE))
     without = one_pass(dense).logit(9)
     advised = one_pass(dense, advice=[(9, 8, weight)])
-    assert advised.logit(9) - without == pytest.approx(WORTH * weight)
+    assert advised.logit(9) - without == pytest.approx(WEIGHT * weight)
     against = one_pass(dense, advice=[(9, 3, weight)])
-    assert against.logit(9) - without == pytest.approx(-0.5 * WORTH * weight)
+    assert against.logit(9) - without == pytest.approx(-0.5 * WEIGHT * weight)
 
 
 def test_a_short_fragment_is_less_probably_a_marker_come_back():
     long = one_pass(scene((0, 60, PLACE), (200, 299, PLACE)))
     short = one_pass(scene((0, 60, PLACE), (200, 208, PLACE)))
     assert short.after[9] == 8
-    assert long.logit(9) - short.logit(9) == pytest.approx(WORTH * 10)
+    assert long.logit(9) - short.logit(9) == pytest.approx(WEIGHT * 10)
 
 
 def test_what_was_seen_last_may_have_been_a_ghost():
@@ -202,7 +202,7 @@ def test_what_was_seen_last_may_have_been_a_ghost():
     # One of the three places that are remembered is wrong, and the bonds are less steady.
     lost = one_pass(dense, may_cut=False).logit(9) - right
     less = carried_density(dense, 56, BODY, PLACE) - before
-    assert lost == pytest.approx(WORTH * (np.log(2 / 3) + less), abs=1e-3)
+    assert lost == pytest.approx(WEIGHT * (np.log(2 / 3) + less), abs=1e-3)
 
 
 def test_the_worst_of_the_looks_at_a_fragment_does_not_count():

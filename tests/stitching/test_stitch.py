@@ -208,7 +208,7 @@ def test_no_two_markers_have_one_name():
 
 def test_labels_come_from_fragments_and_joins_from_both():
     _, _, found = person(4)
-    fragment, labels = found.fragments, found.tracks.labels
+    fragment, labels = found.tracklets, found.tracks.labels
     assert ((labels >= 0) <= (fragment >= 0)).all()
     assert (labels[fragment >= 0] == np.maximum(found.markers[fragment[fragment >= 0]], -1)).all()
     for join in found.joins:

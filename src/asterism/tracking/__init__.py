@@ -1,4 +1,4 @@
-"""Detections in, tracks of named markers out: one room for each step of the pipeline."""
+"""Tracking: from detections to tracks of named markers, one package for each step."""
 
 from asterism.tracking.choose import AUTO, Choice, choose_method
 from asterism.tracking.estimation import ModelEstimate, estimate_model

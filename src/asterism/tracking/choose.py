@@ -1,9 +1,8 @@
-"""Which method a clip needs, told from the clip.
+"""Selection of a method from measured properties of a capture.
 
-GNN goes over it once, which takes a fraction of any other method's time. Its tracks show whether
-markers sit on bodies, the number of detections within their gates how often it had to choose. The
-rules are few and their thresholds wide apart; what each is worth is measured in the docs
-(`Which method when`).
+GNN tracks the capture once, which takes a fraction of the time of any other method. Its tracks
+show whether markers keep their distances; the number of detections in their gates shows how often
+the association was ambiguous. The documentation (`Which method when`) measures each rule.
 """
 
 from __future__ import annotations
@@ -28,37 +27,38 @@ if TYPE_CHECKING:
 __all__ = ["AUTO", "Choice", "choose_method"]
 
 AUTO = "auto"
-"""The name, on the command line, of the method that the clip chooses."""
+"""Name on the command line for the automatic selection of a method."""
 
 SAMPLES = 200
-"""Frames, spread over the clip, in which distances are compared."""
-MOST_TRACKS = 150
-"""Tracks, the longest, that are compared."""
+"""Number of frames, spread over the capture, in which distances are compared."""
+MAX_TRACKS = 150
+"""Number of tracks that are compared, the longest ones."""
 RIGID = 0.05
-"""Greatest spread of a bond on a rigid segment, as a share of the spread of its markers' positions.
-Markers at rest keep their distances too, and so do all markers in a fraction of a second."""
+"""Largest spread of a bond on a rigid segment, as a share of the spread of its markers' positions.
+The relative measure is needed because markers at rest keep their distances too, as do all markers
+over a fraction of a second."""
 NEAREST = 6
-"""Partners are looked for among so many that were nearest: of a thousand independent markers over a
-few frames some pair always keeps its distance."""
+"""Number of nearest neighbours among which partners are searched. Among a thousand independent
+markers some pair keeps its distance over a few frames by chance."""
 ON_BODIES = 0.2
-"""Share of tracks with such a partner from which on the clip is one of bodies: wrong tracks, which
-bursts make, have none."""
+"""Smallest share of tracks with a rigid partner for a capture of bodies. It is well below 1,
+because the wrong tracks after bursts of missed detections have no partner."""
 CLEAR = 0.01
-"""Detections in a gate beside the right one, for each link, up to which nothing is in doubt."""
+"""Largest number of rival detections per link at which the association is unambiguous."""
 
 
 @record
 class Choice:
-    """The method for a clip, and why.
+    """Method selected for a capture, with the reason.
 
     Parameters
     ----------
     method : Method
-        With all its options.
+        Selected method with all its options.
     stitch : bool
-        Whether its tracks are to be made into markers, as `identify` does.
+        Whether the tracklets of the method are stitched.
     reason : str
-        What was measured and what follows, one line.
+        Measurement and conclusion in one line.
     """
 
     method: Method[Any]
@@ -69,27 +69,27 @@ class Choice:
 def choose_method(
     detections: Detections, model: TrackingModel, *, has_start: bool = False
 ) -> Choice:
-    """Choose a method by the clip.
+    """Select a method from measured properties of a capture.
 
-    - Tracks to begin with are for `MCMCDA`, which alone repairs them.
-    - Where markers keep their distance to another, they sit on bodies: `SMP` over three frames,
-      stitched, for a hidden marker comes back where its neighbours carry it.
-    - Markers that walk at random, or that come into each other's gates: `MCMCDA`.
-    - Anything else is clear: `GNN`.
+    - Given initial tracks: `MCMCDA`, the only method that repairs them.
+    - Markers that keep their distance to another one, as on bodies: `SMP` over three frames with
+      stitching, because neighbours predict where an occluded marker reappears.
+    - Markers that move by a random walk, or that enter each other's gates: `MCMCDA`.
+    - Any other capture is unambiguous: `GNN`.
 
     Parameters
     ----------
     detections : Detections
-        The clip.
+        Capture to measure.
     model : TrackingModel
-        Its model.
+        Tracking model of the capture.
     has_start : bool
-        Whether there are tracks to begin with.
+        Whether the tracking starts from given tracks.
 
     Returns
     -------
     Choice
-        The same for the same clip and model: nothing is drawn.
+        Selection; it is deterministic.
 
     Raises
     ------
@@ -119,8 +119,8 @@ def choose_method(
         return Choice(method=SMP(window=3), stitch=True, reason=reason)
     if any(isinstance(mode, RandomWalk) for mode in model.motion.modes):
         return Choice(method=MCMCDA(), stitch=False, reason="markers walk at random, no bodies")
-    # Of links, not of detections: the first of a track is in no gate, and short clips are full of
-    # first ones.
+    # The ratio is per link, not per detection: the first detection of a track is in no gate, and
+    # short captures consist largely of first detections.
     n_links = int(tracks.lengths.sum()) - tracks.n_tracks
     rivals = max(state.info["candidates"] / max(n_links, 1) - 1, 0.0)
     doubt = f"{100 * rivals:.1f} rivals within the gates for 100 links, no bodies"
@@ -130,14 +130,14 @@ def choose_method(
 
 
 def partners(tracks: Tracks, noise_sigma: float) -> tuple[int, int]:
-    """Count the tracks that keep their distance to a neighbour, and those that can be compared.
+    """Count the tracks with a neighbour at a stable distance, and the tracks compared.
 
     Parameters
     ----------
     tracks : Tracks
-        The tracks; the longest `MOST_TRACKS` are compared, in `SAMPLES` frames.
+        Tracks; the longest `MAX_TRACKS` are compared, in `SAMPLES` frames.
     noise_sigma : float
-        Standard deviation of a coordinate, metres: so much no distance can tell.
+        Standard deviation of a coordinate, metres; distances vary by it even on rigid bodies.
 
     Returns
     -------
@@ -160,13 +160,13 @@ def partners(tracks: Tracks, noise_sigma: float) -> tuple[int, int]:
 
 
 def _sampled(tracks: Tracks) -> NDArray[np.float64]:
-    """Positions of the longest tracks in frames spread over the clip, (S, K, D)."""
+    """Return positions of the longest tracks in frames spread over the capture, (S, K, D)."""
     d = tracks.detections
     frames = np.unique(np.linspace(0, d.n_frames - 1, SAMPLES).astype(np.int64))
-    longest = np.argsort(-tracks.lengths, kind="stable")[:MOST_TRACKS]
+    longest = np.argsort(-tracks.lengths, kind="stable")[:MAX_TRACKS]
     row = np.full(d.n_frames, -1)
     row[frames] = np.arange(len(frames))
-    column = np.full(tracks.n_tracks + 1, -1)  # the last is clutter's
+    column = np.full(tracks.n_tracks + 1, -1)  # the last element is for clutter
     column[longest] = np.arange(len(longest))
     i, j = row[d.frame_of], column[tracks.labels]
     is_in = (i >= 0) & (j >= 0)

@@ -1,4 +1,4 @@
-"""The pipeline: model, method, association, stitching."""
+"""Tracking pipeline: model, method, association, stitching."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def track(
     recipe: Recipe | None = None,
     progress: Callable[[int], Any] | None = None,
 ) -> Tracks:
-    """Decide which detection is which marker.
+    """Track the markers of a capture: assign each detection to a track or to clutter.
 
     Parameters
     ----------
@@ -47,37 +47,37 @@ def track(
         The method of association, or its name for the default options. By default `choose_method`
         selects one from measured properties of the capture.
     model : TrackingModel, optional
-        The model that is searched; by default it is estimated from the capture.
+        Tracking model; by default it is estimated from the capture.
     stitch : bool or "auto"
         Whether tracks are joined through gaps of any length. The method then terminates tracklets
-        after `MAX_TRACKLET_GAP` missed frames, and `stitch` joins them by the markers around them.
-        "auto" stitches where no method is given and the markers sit on bodies.
+        after `MAX_TRACKLET_GAP` missed frames, and `stitch` joins them.
+        "auto" stitches if no method is given and the markers keep their distances, as on bodies.
     seed : int, optional
-        Seed of the methods that draw; 0 by default.
+        Seed of the methods that draw random numbers; 0 by default.
     start : Tracks, optional
-        Tracks of the same detections to begin with, the tracklets of a file for example; `MCMCDA`
-        repairs them by merging, splitting and switching.
+        Initial tracks of the same detections, for example those of a file. `MCMCDA` repairs them
+        by merging, splitting and switching.
     recipe : Recipe, optional
-        ``tracks.recipe`` of an earlier call, which is repeated bit for bit. It stands in the place
-        of `method`, `model`, `stitch` and `seed`.
+        ``tracks.recipe`` of an earlier call, which is repeated bit for bit. It replaces `method`,
+        `model`, `stitch` and `seed`.
     progress : callable, optional
-        Called now and then with the number of frames done.
+        Called from time to time with the number of finished frames.
 
     Returns
     -------
     Tracks
-        Labels for the same detections, without those that were filled; tracks are numbered in the
-        order of confirmation. ``recipe`` repeats the call (None for a method that is not in
-        `METHODS`); ``recipe.chosen`` names the method and
-        the reason, where none was given. ``info["log_posterior"]`` is the number by which methods
-        are compared (`log_posterior`); stitched tracks have none, because the model excludes gaps
-        of that length. The rest of ``info`` depends on the method.
+        Labels for the same detections, without filled ones; tracks are numbered in the order of
+        confirmation. ``recipe`` repeats the call (None for a method that is not in `METHODS`). If
+        no method was given, ``recipe.chosen`` is the selected method and the reason.
+        ``info["log_posterior"]`` is the score by which methods are compared (`log_posterior`);
+        stitched tracks have none, because the model excludes gaps of that length. The rest of
+        ``info`` depends on the method.
 
     Raises
     ------
     ParameterError
-        If there is nothing from which to estimate a model, an argument has the wrong type, or the
-        recipe is of other detections.
+        If no model can be estimated, an argument has the wrong type, or the recipe belongs to
+        other detections.
 
     Examples
     --------
@@ -108,11 +108,11 @@ def track(
 def _check_recipe(
     recipe: Recipe, given: dict[str, Any], detections: Detections, start: Tracks | None
 ) -> None:
-    """Raise `ParameterError` unless the recipe stands alone and is of the same input."""
+    """Raise `ParameterError` unless the recipe is the only setting and has the same input."""
     check_kind("recipe", recipe, Recipe, "tracks.recipe")
-    beside = [name for name, value in given.items() if value is not None]
-    if beside:
-        raise ParameterError("recipe", "nothing that it decides itself", ", ".join(beside))
+    extra = [name for name, value in given.items() if value is not None]
+    if extra:
+        raise ParameterError("recipe", "nothing that it decides itself", ", ".join(extra))
     check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     if recipe.has_start != (start is not None):
         expected = "the tracks to begin with" if recipe.has_start else "none"

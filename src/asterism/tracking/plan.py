@@ -1,4 +1,4 @@
-"""Everything that a tracking decides before it begins: model, method, stitching."""
+"""Plan of a tracking: model, method and stitching, decided before the association."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ __all__ = ["Plan", "plan_tracking"]
 
 @record
 class Plan:
-    """A tracking that is decided and not yet done.
+    """Settings of a tracking before it is run.
 
     Parameters
     ----------
     recipe : Recipe
-        What to do; ``am.track(detections, recipe=plan.recipe)`` does it.
+        Complete settings; ``am.track(detections, recipe=plan.recipe)`` runs them.
     method : Method
-        The method, with its options.
+        Method with its options.
     estimate : ModelEstimate, optional
-        How the model was estimated; None where it was given.
+        Estimate of the model; None for a given model.
     """
 
     recipe: Recipe
@@ -62,7 +62,7 @@ def plan_tracking(
     Raises
     ------
     ParameterError
-        If there is nothing from which to estimate a model, or an argument has the wrong type.
+        If no model can be estimated, or an argument has the wrong type.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def plan_tracking(
         raise ParameterError("stitch", 'True, False or "auto"', repr(stitch))
     if seed is not None:
         check_number("seed", seed, above=0, closed=True, integer=True)
-    if method is not None:  # before the model is estimated, which takes its time
+    if method is not None:  # checked before the slow estimation of the model
         method = _checked(method)
     estimate = None
     if model is None:

@@ -1,11 +1,11 @@
-"""The model from the clip: what the detections themselves say of noise, motion, misses and clutter.
+"""Estimation of the tracking model from unlabelled detections.
 
-Unambiguous links (mutual nearest neighbours far from any other choice) give the first scales. Then,
-a few times over: track with the model so far, and re-estimate each parameter from the tracks. The
-motion and the noise are those that make the tracks' detections most likely one step ahead. Where
-markers come and go, stochastic EM follows: partitions drawn from the posterior in place of tracks.
+Unambiguous links (mutual nearest neighbours far from any alternative) yield the first scales. Then
+two steps alternate: track with the current model, and re-estimate each parameter from the tracks.
+Motion and noise maximise the one-step predictive likelihood of the tracks' detections. For an open
+population stochastic EM follows, with partitions drawn from the posterior instead of tracks.
 
-What this file is not: a fit to truth. Names in the capture are never looked at.
+Names in the capture are not used.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from asterism.model.posterior import track_scores
 from asterism.tracking.estimation.evidence import Evidence, Region, gather_evidence
 from asterism.tracking.estimation.model_estimate import ModelEstimate, motion_levels, reasons_for
 from asterism.tracking.estimation.motion_fit import (
-    WORTH,
+    MIN_GAIN,
     FitBounds,
     MotionFit,
     fit_motion,
@@ -52,25 +52,25 @@ __all__ = ["ModelEstimate", "estimate_model"]
 
 log = logging.getLogger(__name__)
 
-LARGEST = 100.0
-"""Metres from the middle of a capture to its points, beyond which these are hardly metres."""
+MAX_EXTENT = 100.0
+"""Distance from a capture's centre, metres, beyond which points are probably not in metres."""
 SAMPLE_POINTS = 60_000
-"""Longer captures are read in pieces, spread evenly, of so many detections in all."""
+"""Number of detections used; of longer captures evenly spread pieces are used."""
 N_PIECES = 8
-LEAST_FRAMES = 30
+MIN_FRAMES = 30
 N_ROUNDS = 2
 WIDER = 3.0
-"""Tracks to learn the motion from are found with the strongest motion so many times stronger."""
-LEAST_NOISE = 2e-4
-"""Metres. Smoothed captures show less noise than that, but what the smoothing left of every jerk is
-no white acceleration, and a tighter filter breaks on it; who is whom never hangs on a fifth of a
-millimetre, unless points are so close that a hundredth of their spacing is less."""
+"""Factor on the strongest motion of the model that finds the tracks for the motion fit."""
+MIN_NOISE = 2e-4
+"""Lower bound of the noise, metres. Smoothed captures show less noise, but their residual
+accelerations are not white, and a filter with less noise loses tracks. Association does not depend
+on a fifth of a millimetre, unless a hundredth of the points' spacing is smaller."""
 SAFE_SHARE = 1 / 6
-"""A jolt's σ may move a marker by this share of the points' spacing in a frame."""
+"""Largest displacement of a marker by one σ of a jolt in a frame, as a share of the spacing."""
 BLIND = 1.1
-"""One motion may leave so many times as many misses and false points as three motions do."""
-LONGEST_GAP = 60
-"""Frames; a longer gap is not bridged for the motion's sake."""
+"""Largest ratio of missed detections and false alarms of one motion to those of three motions."""
+MAX_GAP = 60
+"""Largest d̄ that follows from the motion, frames."""
 
 
 def estimate_model(
@@ -84,17 +84,17 @@ def estimate_model(
     Parameters
     ----------
     detections : Detections
-        A capture of at least a few frames in which markers can be followed; points that were filled
-        are left out.
+        Capture of at least a few frames in which markers can be followed. Filled points are left
+        out.
     population : {"closed", "open"}
-        Whether the markers are the same throughout, or come and go for good. A marker that goes
-        cannot be told from one that hides for long, so this is not estimated: closed, the clip is
-        taken to have one birth and one death, and tracks are held through long gaps; open, their
-        rates are learnt with the rest by stochastic EM.
+        Whether all markers are present throughout ("closed") or appear and disappear permanently
+        ("open"). It is not estimated, because a marker that disappears cannot be distinguished
+        from a long occlusion. "closed" assumes one birth and one death in the capture and keeps
+        tracks through long gaps; "open" estimates birth and death rates by stochastic EM.
     misses : {"independent", "runs"}
-        Whether a marker that was missed is as likely as any other to be seen in the next frame, or
-        misses may come in runs, as those of markers behind limbs do: then
-        `Sensor.p_redetection` is learnt as well, where the clip is sure that it is not P_d.
+        Whether missed detections are independent or may come in bursts ("runs"), as occlusions by
+        limbs do. "runs" also estimates `Sensor.p_redetection`, if it differs significantly from
+        P_d.
 
     Returns
     -------
@@ -102,12 +102,12 @@ def estimate_model(
 
     Warns
     -----
-    In the log, where the points lie so far apart that they are hardly metres.
+    By a log message, if the points lie too far apart for coordinates in metres.
 
     Raises
     ------
     ParameterError
-        If there are too few detections, or none that can be linked from frame to frame.
+        If there are too few detections, or none can be linked from frame to frame.
     """
     check_fields("population", [population], ("closed", "open"))
     check_fields("misses", [misses], ("independent", "runs"))
@@ -121,7 +121,7 @@ def estimate_model(
             f"{detections.n_frames} frames with {detections.n_points} points",
             "give a model",
         )
-    _doubt_units(detections)
+    _check_units(detections)
     pieces = list(_pieces(detections))
     scales = first_scales(pieces)
     region = Region.of(detections)
@@ -130,7 +130,7 @@ def estimate_model(
         return _counts(evidence).rates(in_runs=in_runs)
 
     fit, evidence, bounds = _fitted(pieces, scales, region, rates_of)
-    reach, least_noise = scales.spacing / 2, bounds.least_noise
+    reach, min_noise = scales.spacing / 2, bounds.min_noise
     counts = (_counts(evidence),)
     rates = rates_of(evidence)
     if population == "open":
@@ -149,12 +149,12 @@ def estimate_model(
     fit, sure = polish(evidence.tracks, _model(fit, rates, evidence, scales, region), fit, bounds)
     model = _model(fit, rates, evidence, scales, region)
     stds = _stds(counts, region, is_open=population == "open", in_runs=in_runs)
-    stds |= _motion_stds(fit, model, sure, least_noise)
+    stds |= _motion_stds(fit, model, sure, min_noise)
     mean = sum(counts, Counts()) * (1 / len(counts))
     reasons = reasons_for(
         model, stds, n_axes=region.n_axes, n_links=evidence.n_links,
         n_misses=mean.misses + mean.remisses, in_runs=in_runs, n_clutter=mean.clutter,
-        n_frames=evidence.n_frames, least_noise=least_noise,
+        n_frames=evidence.n_frames, min_noise=min_noise,
         events=(mean.births, mean.deaths) if population == "open" else None,
     )  # fmt: skip
     return ModelEstimate(model=model, reasons=reasons, stds=stds)
@@ -166,12 +166,12 @@ def _fitted(
     region: Region,
     rates_of: Callable[[Evidence], Rates],
 ) -> tuple[MotionFit, Evidence, FitBounds]:
-    """Fit one motion and three, and choose; with the tracks of the choice and its bounds."""
+    """Fit one motion and three motions, and return the better fit with its tracks and bounds."""
     reach = scales.spacing / 2
     low, high = scales.acceleration_low, scales.acceleration_high
     bounds = FitBounds(
-        least_noise=scales.noise_floor,
-        most_acceleration=2 * SAFE_SHARE * scales.spacing / scales.step**2,
+        min_noise=scales.noise_floor,
+        max_acceleration=2 * SAFE_SHARE * scales.spacing / scales.step**2,
     )
     fit = bounds.fit(
         math.log(scales.noise), (math.log(low), math.log(low * high) / 2, math.log(high)), 0.95
@@ -185,41 +185,42 @@ def _fitted(
         fits.append(fit)
         model = _model(fit, rates_of(evidence), evidence, scales, region)
         evidence = gather_evidence(pieces, _wider(model), reach)
-    least_noise = max(scales.noise_floor, min(LEAST_NOISE, scales.spacing / 100))
-    bounds = replace(bounds, least_noise=least_noise)
+    min_noise = max(scales.noise_floor, min(MIN_NOISE, scales.spacing / 100))
+    bounds = replace(bounds, min_noise=min_noise)
 
-    # Motion is learnt with a wider model, but the rates are those of the model itself, and so are
-    # the tracks by which motions are compared.
+    # The motion is fitted to tracks of a wider model. The rates, and the tracks by which motions
+    # are compared, are those of the model itself.
     def tried(trial: MotionFit, evidence: Evidence) -> tuple[float, MotionFit, Evidence]:
-        trial = replace(trial, noise=max(trial.noise, least_noise))
+        trial = replace(trial, noise=max(trial.noise, min_noise))
         by = _model(trial, rates_of(evidence), evidence, scales, region)
         found = gather_evidence(pieces, by, reach)
         model = _model(trial, rates_of(found), found, scales, region)
-        # The bounds are those that the tracks were found within.
+        # The bounds are those with which the tracks were found.
         bounds = {"max_speed": by.population.max_speed, "max_gap": by.population.max_gap}
         model = replace(model, population=replace(model.population, **bounds))
         return _log_evidence(found, model, region), trial, found
 
-    # A fit sees a sample of the tracks, and may miss the few that move most: then it loses them.
+    # A fit uses a sample of the tracks. If it misses the few fastest ones, it loses them.
     three = min((tried(fit, evidence) for fit in reversed(fits)), key=lambda trial: trial[2].n_lost)
-    # One motion is learnt from tracks of its own, from the quietest on: those of three have jolts,
-    # true or wrong, that it would have to explain.
+    # One motion is fitted to tracks of its own, starting from the quietest. Tracks of three
+    # motions contain jolts, true or wrong, that a single motion would have to explain.
     one = tried(replace(fit, levels=fit.levels[:1], stay=1.0), evidence)
     for _ in range(N_ROUNDS):
         one = tried(fit_one_motion(one[2].tracks, model, one[1], bounds), one[2])
-    # One that loses what three hold is not simpler but blind, however well it foresees the rest.
+    # One motion is rejected if it loses markers that three motions keep, however well it predicts
+    # the remaining ones.
     is_blind = one[2].n_lost > BLIND * three[2].n_lost + 1
-    is_worth = three[0] - one[0] > WORTH * sum(p.n_points for p in pieces)
-    _, fit, evidence = three if is_blind or is_worth else one
+    gains_enough = three[0] - one[0] > MIN_GAIN * sum(p.n_points for p in pieces)
+    _, fit, evidence = three if is_blind or gains_enough else one
     return fit, evidence, bounds
 
 
-def _doubt_units(detections: Detections) -> None:
-    """Say so where a tenth of the points is too far from the middle for a volume in metres."""
+def _check_units(detections: Detections) -> None:
+    """Log a warning if a tenth of the points is too far from the centre for metres."""
     points = detections.points[:: 1 + detections.n_points // SAMPLE_POINTS]
     spread = np.abs(points - np.median(points, axis=0)).max(axis=1)
     far = float(np.quantile(spread, 0.9))
-    if far > LARGEST:
+    if far > MAX_EXTENT:
         log.warning(
             "a tenth of the points is more than %.3g m from their middle: "
             "if these are millimetres, divide them by 1000", far,
@@ -227,13 +228,13 @@ def _doubt_units(detections: Detections) -> None:
 
 
 def _pieces(detections: Detections) -> Iterator[Detections]:
-    """Up to `N_PIECES` runs of consecutive frames with `SAMPLE_POINTS` detections in all."""
+    """Yield up to `N_PIECES` runs of consecutive frames with `SAMPLE_POINTS` detections in all."""
     if detections.n_points <= SAMPLE_POINTS:
         yield detections
         return
     T, n = detections.n_frames, detections.n_points
-    length = max(T * SAMPLE_POINTS // n // N_PIECES, min(T, LEAST_FRAMES))
-    # Spread over the points, not over the frames, which may be empty for long.
+    length = max(T * SAMPLE_POINTS // n // N_PIECES, min(T, MIN_FRAMES))
+    # The pieces are spread over the points, because many frames in a row may be empty.
     seeds = np.linspace(0, n - 1, max(1, min(N_PIECES, T // length))).astype(int)
     for start in np.unique(np.minimum(detections.frame_of[seeds], T - length)):
         yield detections.part(int(start), int(start) + length)
@@ -254,10 +255,10 @@ def _first_model(fit: MotionFit, scales: Scales, region: Region) -> TrackingMode
 
 
 def _wider(model: TrackingModel) -> TrackingModel:
-    """Give a model whose strongest motion is stronger still.
+    """Return a copy of the model with a stronger strongest motion.
 
-    Tracks found with a model hold no jolt that the model would have lost, and a model fitted to
-    them would lose more and more. Looking with a wider one than was fitted breaks the circle.
+    Tracks found with a model contain no jolt that the model would have lost, so repeated fits
+    would shrink the motion. Tracking with a wider model than the fitted one prevents this.
     """
     motion = model.motion
     if isinstance(motion, DWNA):
@@ -271,7 +272,7 @@ def _wider(model: TrackingModel) -> TrackingModel:
 
 
 def _counts(evidence: Evidence) -> Counts:
-    """Count as of a closed population, in which a track that ends is one that broke."""
+    """Count as for a closed population, in which the end of a track is a lost track."""
     return Counts(
         **evidence.sightings._asdict(),
         steps=evidence.n_links,
@@ -304,7 +305,7 @@ def _model(
 def _stds(
     counts: tuple[Counts, ...], region: Region, *, is_open: bool, in_runs: bool
 ) -> dict[str, float]:
-    """Give what rates vary by within a partition, and from one drawn partition to the next."""
+    """Return the standard deviations of rates, within and between drawn partitions."""
     within = (sum(counts, Counts()) * (1 / len(counts))).stds(in_runs=in_runs)
     each = [c.rates(in_runs=in_runs) for c in counts]
 
@@ -321,36 +322,36 @@ def _stds(
 
 
 def _log_evidence(evidence: Evidence, model: TrackingModel, region: Region) -> float:
-    """Log of the joint density of points and tracks, clutter included, under a model."""
+    """Return the log joint density of points and tracks, including clutter, under a model."""
     sensor, population = model.sensor, model.population
     log_clutter = math.log(sensor.clutter_density)
     events = (sensor.clutter_density + population.birth_density) * region.volume
     total = -events * evidence.n_frames
     for found in evidence.tracks:
         scores = track_scores(found, model)
-        # A track of one detection, forbidden by the model, counts as the clutter that it is.
+        # The model forbids a track of one detection, so it counts as clutter.
         total += float(scores[np.isfinite(scores)].sum()) + log_clutter * len(found.labels)
     return total
 
 
 def _motion_stds(
-    fit: MotionFit, model: TrackingModel, sure: tuple[float, ...] | None, least_noise: float
+    fit: MotionFit, model: TrackingModel, sure: tuple[float, ...] | None, min_noise: float
 ) -> dict[str, float]:
     if sure is None:
         return {}
     levels = motion_levels(model)[2]
     names = ["motion"] if len(levels) == 1 else [f"motion_{k + 1}" for k in range(len(levels))]
     stds = {n: s * x for n, s, x in zip(names, sure[1:], levels, strict=True)}
-    return stds if fit.noise <= least_noise else {"noise_sigma": sure[0] * fit.noise} | stds
+    return stds if fit.noise <= min_noise else {"noise_sigma": sure[0] * fit.noise} | stds
 
 
 def _bridgeable(fit: MotionFit, p_seen: float, n_links: int, scales: Scales) -> int:
-    """Find d̄: how many frames a track can coast before it may be where its neighbour is.
+    """Compute d̄: the number of frames for which a track can coast before it is ambiguous.
 
-    The position of a marker that coasts for k frames is known to ``σ_a Δ² √(k³ / 3)`` (DWNA) or
-    ``σ_w √(k Δ)`` (random walk); d̄ is where that reaches the spacing of the points, at most
-    `LONGEST_GAP`, and long enough that less than one run of independent misses in the clip is
-    longer.
+    After k frames without a detection the position of a marker is known to ``σ_a Δ² √(k³ / 3)``
+    (DWNA) or ``σ_w √(k Δ)`` (random walk). d̄ is the k at which this reaches the spacing of the
+    points, at most `MAX_GAP`, and large enough that fewer than one burst of independent missed
+    detections in the capture is longer.
     """
     level = fit.levels[len(fit.levels) // 2]
     if fit.kind == "random_walk":
@@ -358,4 +359,4 @@ def _bridgeable(fit: MotionFit, p_seen: float, n_links: int, scales: Scales) -> 
     else:
         reach = (3 * (scales.spacing / (level * scales.step**2)) ** 2) ** (1 / 3)
     needed = 1 - math.log(2 * n_links) / math.log(1 - p_seen)
-    return max(3, round(max(min(reach, LONGEST_GAP), min(needed, 2 * LONGEST_GAP))))
+    return max(3, round(max(min(reach, MAX_GAP), min(needed, 2 * MAX_GAP))))

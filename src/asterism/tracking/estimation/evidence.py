@@ -1,4 +1,4 @@
-"""What tracking a clip with a model shows: where the points are, links, misses, clutter, speeds."""
+"""Counts from tracks of a capture: region, links, missed detections, clutter and speeds."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 __all__ = ["Evidence", "Region", "gather_evidence"]
 
-LEAST_LINKS = 10
+MIN_LINKS = 10
 
 
 @record
 class Region:
-    """Where the points are, for the densities per volume.
+    """Volume of a capture and its points, for densities per volume.
 
     Parameters
     ----------
     volume : float
-        m³, or m² in the plane.
+        Volume, m³, or area, m² in 2-D.
     points_a_frame : float
-        Their mean number.
+        Mean number of points in a frame.
     n_axes : int
-        2 or 3.
+        Number of coordinates, 2 or 3.
     """
 
     volume: float
@@ -41,9 +41,9 @@ class Region:
 
     @classmethod
     def of(cls, detections: Detections) -> Region:
-        """Take the bounding box of all points, no axis thinner than a tenth of the longest.
+        """Measure the bounding box of all points, with axes of at least a tenth of the longest.
 
-        A flat volume would make every density of clutter enormous.
+        The lower bound keeps the clutter density of a flat scene finite.
         """
         extent = np.ptp(detections.points, axis=0)
         longest = max(float(extent.max()), 1e-3)
@@ -56,24 +56,24 @@ class Region:
 
 @record
 class Evidence:
-    """What tracking found, over all pieces of a clip.
+    """Counts from tracks, over all pieces of a capture.
 
     Parameters
     ----------
     tracks : list of Tracks
-        Those of each piece.
+        Tracks of each piece.
     n_misses : int
-        Frames without a detection inside tracks.
+        Number of missed detections inside tracks.
     sightings : Sightings
-        How often markers were seen and missed; what was lost is no miss.
+        Counts of detected and missed markers. A lost marker is not a missed one.
     n_clutter : int
-        Points in no track.
+        Number of points in no track.
     n_frames : int
-        Of all pieces.
+        Number of frames of all pieces.
     speeds : ndarray, shape (L,)
-        Of each link, m/s.
+        Speed of each link, m/s.
     velocity_rms : float
-        Of a velocity coordinate, m/s.
+        Root mean square of a velocity coordinate, m/s.
     """
 
     tracks: list[Tracks]
@@ -86,17 +86,17 @@ class Evidence:
 
     @property
     def n_lost(self) -> int:
-        """Misses and points in no track: what is left unexplained."""
+        """Number of missed detections and points in no track."""
         return self.n_misses + self.n_clutter
 
     @classmethod
     def of(cls, tracks: list[Tracks], reach: float) -> Evidence:
-        """Count in the tracks of each piece; `reach` as in `count_sightings`.
+        """Count in the tracks of each piece, with `reach` as in `count_sightings`.
 
         Raises
         ------
         ParameterError
-            If they have hardly any links.
+            If the tracks have too few links.
         """
         misses = clutter = 0
         speeds: list[NDArray[np.float64]] = []
@@ -114,10 +114,10 @@ class Evidence:
             squares.append(((moves / dt[:, None]) ** 2).mean(axis=1))
         seen = [count_sightings(found, reach) for found in tracks]
         n_links = sum(map(len, speeds))
-        if n_links < LEAST_LINKS:
+        if n_links < MIN_LINKS:
             raise ParameterError(
                 "detections",
-                f"tracks with at least {LEAST_LINKS} links in all, to estimate a model from",
+                f"tracks with at least {MIN_LINKS} links in all, to estimate a model from",
                 f"{n_links}",
                 "give a model",
             )
@@ -138,12 +138,12 @@ class Evidence:
 
 
 def gather_evidence(pieces: list[Detections], model: TrackingModel, reach: float) -> Evidence:
-    """Track the pieces of a clip and count.
+    """Track the pieces of a capture and count.
 
     Raises
     ------
     ParameterError
-        If hardly anything could be followed.
+        If too few points could be linked.
     """
     method = GNN()
     found: list[Tracks] = []

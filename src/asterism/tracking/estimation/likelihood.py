@@ -1,6 +1,6 @@
-"""The likelihood of motion and noise, given tracks: what a fit of the motion maximises.
+"""Likelihood of motion and noise given tracks, the objective of the motion fit.
 
-Equal to the mean of `asterism.filter.filter_states(...).log_densities`. The engine holds the data
+It equals the mean of `asterism.filter.filter_states(...).log_densities`. The engine holds the data
 and evaluates a fit in a millisecond, because a search evaluates some hundred.
 """
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 __all__ = ["TrackLikelihood"]
 
 SAMPLE_POINTS = 4000
-"""Detections, in pieces of tracks spread evenly over the capture, that the likelihood is of."""
+"""Number of detections in the sample, in pieces of tracks spread over the capture."""
 PIECE_POINTS = 60
 
 
 class TrackLikelihood:
-    """Mean log density of a detection given the earlier ones of its track.
+    """Mean log density of a detection given the earlier detections of its track.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class TrackLikelihood:
 
         def engine(unit: DWNA | RandomWalk) -> _engine.MotionLikelihood:
             kind, F, Q = steps_of(unit, d.times)
-            steps = np.zeros((len(F), 4))  # a random walk has no velocity that could move it
+            steps = np.zeros((len(F), 4))  # a random walk has no velocity
             if isinstance(unit, DWNA):
                 steps[:] = np.stack([F[:, 0, 0, 1], Q[:, 0, 0, 0], Q[:, 0, 0, 1], Q[:, 0, 1, 1]], 1)
             else:
@@ -64,7 +64,7 @@ class TrackLikelihood:
         }
 
     def mean(self, fit: MotionFit) -> float:
-        """Return the mean over all detections of the sample under a motion and a noise."""
+        """Return the mean over the sampled detections, given a motion and a noise."""
         total = self._engines[fit.kind].sum(
             squares=np.square(fit.levels),
             transitions=fit.transitions,
@@ -75,10 +75,10 @@ class TrackLikelihood:
 
 
 def _sample(tracks: list[Tracks]) -> Tracks:
-    """Cut the tracks into pieces of `PIECE_POINTS` and give evenly spread ones, as one capture.
+    """Cut the tracks into pieces of `PIECE_POINTS` and return evenly spread ones as one capture.
 
-    The runs of frames are laid one after the other; no piece of a track reaches from one to the
-    next, so what lies between them does not matter.
+    The runs of frames are placed one after the other. No piece of a track extends over two runs,
+    so the time between runs has no effect.
     """
     total = sum(int(found.lengths.sum()) for found in tracks)
     stride = max(1, round(total / SAMPLE_POINTS))

@@ -1,4 +1,4 @@
-"""What is told of an estimated model: each value, how sure it is, and why."""
+"""Report of an estimated model: each value with its standard deviation and reason."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ __all__ = ["ModelEstimate", "motion_levels", "reasons_for"]
 
 @record
 class ModelEstimate:
-    """A model estimated from a clip, with the reason for each value.
+    """Model estimated from a capture, with the reason for each value.
 
     Parameters
     ----------
     model : TrackingModel
-        The model.
+        Estimated model.
     reasons : tuple of (str, str, str)
-        Parameter, value with unit and standard deviation, and why.
+        Parameter, value with unit and standard deviation, and reason.
     stds : mapping of str to float
-        Standard deviation of each parameter that the clip tells of, in the parameter's unit:
-        ``noise_sigma``, ``motion`` (of its σ; ``motion_1`` and so on of several), ``p_detection``,
-        ``p_redetection`` where misses come in runs, ``clutter_density``, and of an open population
-        ``birth_density`` and ``p_disappear``. Parameters at a bound, and bounds themselves, are not
-        in it.
+        Standard deviation of each estimated parameter, in the parameter's unit: ``noise_sigma``,
+        ``motion`` (of its σ; ``motion_1`` and so on for several modes), ``p_detection``,
+        ``p_redetection`` for bursts of missed detections, ``clutter_density``, and for an open
+        population ``birth_density`` and ``p_disappear``. Parameters at a bound, and bounds, have
+        none.
     """
 
     model: TrackingModel
@@ -42,7 +42,7 @@ class ModelEstimate:
         return f"ModelEstimate({len(self.stds)} stds, {self.model!r})"
 
     def __str__(self) -> str:
-        from rich.cells import cell_len, set_cell_size  # a bar over v takes no place of its own
+        from rich.cells import cell_len, set_cell_size  # the combining bar over v has no width
 
         width = max(cell_len(name) for name, _, _ in self.reasons)
         value = max(cell_len(text) for _, text, _ in self.reasons)
@@ -53,7 +53,7 @@ class ModelEstimate:
 
 
 def motion_levels(model: TrackingModel) -> tuple[str, str, tuple[float, ...]]:
-    """Name the σ of a motion, its unit, and give that of each mode."""
+    """Return the symbol of a motion's σ, its unit, and its value for each mode."""
     modes = model.motion.modes
     if isinstance(modes[0], RandomWalk):
         return "walk σ_w", "m/√s", (modes[0].walk_sigma,)
@@ -72,26 +72,26 @@ def reasons_for(
     n_clutter: float,
     n_frames: int,
     events: tuple[float, float] | None,
-    least_noise: float,
+    min_noise: float,
 ) -> tuple[tuple[str, str, str], ...]:
-    """Say why each value is what it is.
+    """Return the reason for each value of an estimated model.
 
     Parameters
     ----------
     model : TrackingModel
-        The model.
+        Estimated model.
     stds : mapping of str to float
-        As in `ModelEstimate`.
+        Standard deviations, as in `ModelEstimate`.
     n_axes : int
-        2 or 3.
+        Number of coordinates, 2 or 3.
     n_links, n_misses, n_clutter, n_frames
-        What was counted.
+        Counts on which the estimates are based.
     in_runs : bool
-        Whether misses might come in runs.
+        Whether missed detections may come in bursts.
     events : (float, float) or None
-        Births and deaths that were counted; None of a closed population.
-    least_noise : float
-        The least that is believed, metres.
+        Numbers of births and deaths; None for a closed population.
+    min_noise : float
+        Lower bound of the noise, metres.
     """
     sensor, population = model.sensor, model.population
     name, unit, levels = motion_levels(model)
@@ -101,7 +101,7 @@ def reasons_for(
         return f" ± {stds[key] * scale:.1g}" if key in stds else ""
 
     why_noise = f"most likely one step ahead, {n_links} links"
-    if sensor.noise_sigma <= least_noise:
+    if sensor.noise_sigma <= min_noise:
         why_noise = "the least that is believed; the capture shows less, as smoothed ones do"
     keys = ["motion"] if len(levels) == 1 else [f"motion_{k + 1}" for k in range(len(levels))]
     values = ", ".join(f"{x:.3g}{sure(key)}" for x, key in zip(levels, keys, strict=True))

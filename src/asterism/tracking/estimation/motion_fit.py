@@ -1,10 +1,10 @@
-"""Motion and noise that make tracks most likely one step ahead.
+"""Maximum-likelihood fit of motion and noise to tracks.
 
-Maximum likelihood through the very filter that will be used: the log densities of the innovations
-are summed over the tracks and climbed by a simplex search. A marker may have one motion (DWNA
-or a random walk), or change between three DWNA: quiet, busy, and the short jolts of an impact that
-would otherwise lose it. How sharply the likelihood falls about the parameters tells how sure they
-are.
+The likelihood is that of the filter used for tracking: the log densities of the innovations are
+summed over the tracks and maximised by a simplex search. A marker has one motion (DWNA or a random
+walk), or switches between three DWNA: quiet, busy, and the short jolts of impacts, which one
+motion
+would lose. The observed information yields the standard deviations of the parameters.
 """
 
 from __future__ import annotations
@@ -31,36 +31,36 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["WORTH", "FitBounds", "MotionFit", "fit_motion", "fit_one_motion", "polish"]
+__all__ = ["MIN_GAIN", "FitBounds", "MotionFit", "fit_motion", "fit_one_motion", "polish"]
 
 Kind = Literal["dwna", "random_walk"]
 KINDS: tuple[Kind, ...] = ("dwna", "random_walk")
-WORTH = 0.05
-"""Nats a detection that a motion must win over a simpler one. The few wrong links that tracks
-contain are jolts to the fit; where there are no others they win less than this."""
+MIN_GAIN = 0.05
+"""Smallest gain of a motion over a simpler one, nats per detection. The few wrong links in tracks
+look like jolts to the fit; on their own they gain less than this."""
 ROUGH = 0.1
-"""Step, of a logarithm, over which the likelihood of several motions is taken for smooth."""
-FARTHEST = 0.3
-"""Longest step, of a logarithm, that is taken to the summit of a likelihood."""
+"""Step of a logarithm over which the likelihood of several motions is assumed to be smooth."""
+MAX_NEWTON_STEP = 0.3
+"""Largest Newton step of a logarithm towards the maximum of the likelihood."""
 JOLT = 0.1
-"""Of the changes from quiet or busy, the share that are jolts; a jolt lasts two frames."""
+"""Share of jolts among the transitions from quiet or busy; a jolt lasts two frames on average."""
 
 
 @record
 class MotionFit:
-    """The most likely motion.
+    """Fitted motion and noise.
 
     Parameters
     ----------
     noise : float
-        σ, metres.
+        σ, standard deviation of a measured coordinate, metres.
     levels : tuple of float
-        One or, of DWNA, three: quiet, busy, jolt. σ_a of DWNA, rising, m/s²; σ_w of a random walk,
-        m/√s.
+        Strength of each mode. DWNA: σ_a, m/s², of one mode or increasing of three (quiet, busy,
+        jolt). Random walk: σ_w, m/√s, of one mode.
     stay : float
-        Probability that a marker stays quiet, or busy, for another frame; 1 with one motion.
+        Probability that a marker stays quiet, or busy, for another frame; 1 for one mode.
     kind : {"dwna", "random_walk"}
-        Of motion.
+        Class of the motion.
     """
 
     noise: float
@@ -70,7 +70,7 @@ class MotionFit:
 
     @property
     def transitions(self) -> NDArray[np.float64]:
-        """Probability of changing from motion (row) to motion (column) in a step."""
+        """Probability of switching from mode (row) to mode (column) in a step."""
         if len(self.levels) == 1:
             return np.ones((1, 1))
         leave = 1 - self.stay
@@ -83,7 +83,7 @@ class MotionFit:
         )
 
     def motion(self, velocity_sigma: float) -> Motion:
-        """Make the motion model; `velocity_sigma` is the prior of a velocity coordinate, m/s."""
+        """Return the motion model with a prior velocity σ of `velocity_sigma`, m/s."""
         if self.kind == "random_walk":
             return RandomWalk(walk_sigma=self.levels[0])
         models = tuple(
@@ -96,25 +96,25 @@ class MotionFit:
 
 @record
 class FitBounds:
-    """What is believed of noise and motion, whatever the tracks say.
+    """Bounds of the fitted noise and motion.
 
     Parameters
     ----------
-    least_noise : float
-        σ is at least this, metres.
-    most_acceleration : float
-        σ_a of any motion is at most this, m/s². A jolt that carries a marker a good part of the
-        way to its neighbour cannot be told from a wrong link, and must not be learnt from one.
+    min_noise : float
+        Lower bound of σ, metres.
+    max_acceleration : float
+        Upper bound of σ_a of any mode, m/s². A jolt over much of the distance to a neighbour
+        cannot be distinguished from a wrong link, so it must not be learnt from one.
     """
 
-    least_noise: float
-    most_acceleration: float
+    min_noise: float
+    max_acceleration: float
 
     def fit(self, log_noise: float, log_levels: tuple[float, ...], stay: float) -> MotionFit:
-        """Make a fit within the bounds."""
+        """Return the fit with these parameters, limited to the bounds."""
         return MotionFit(
-            noise=max(math.exp(log_noise), self.least_noise),
-            levels=tuple(min(math.exp(x), self.most_acceleration) for x in log_levels),
+            noise=max(math.exp(log_noise), self.min_noise),
+            levels=tuple(min(math.exp(x), self.max_acceleration) for x in log_levels),
             stay=stay,
         )
 
@@ -127,13 +127,13 @@ def fit_motion(
     Parameters
     ----------
     tracks : list of Tracks
-        Tracks of runs of frames.
+        Tracks of runs of consecutive frames.
     model : TrackingModel
-        What else the filter needs; its motion and noise are replaced.
+        Model for the filter; its motion and noise are replaced.
     start : MotionFit
-        Where the search begins.
+        Start of the search.
     bounds : FitBounds
-        What is believed at least and at most.
+        Bounds of noise and motion.
 
     Returns
     -------
@@ -162,10 +162,10 @@ def fit_motion(
 def fit_one_motion(
     tracks: list[Tracks], model: TrackingModel, start: MotionFit, bounds: FitBounds
 ) -> MotionFit:
-    """Fit one motion of each kind to tracks, and give the kind that explains them best.
+    """Fit one motion of each class to tracks, and return the best fit.
 
-    A random walk must win `WORTH`. DWPA is left out: on smoothed captures it foresees the next
-    frame better, and loses every gap.
+    A random walk must gain `MIN_GAIN`. DWPA is excluded: on smoothed captures it predicts the next
+    frame better, but loses the track in every gap.
     """
     velocity = model.velocity_sigma(tracks[0].detections.n_axes)
     middle = math.log(start.levels[len(start.levels) // 2])
@@ -181,7 +181,7 @@ def fit_one_motion(
         if kind == "random_walk":
             level = math.log(velocity) + math.log(tracks[0].detections.step or 1.0) / 2
         plain, cost = _search(tracks, model, unpack, [math.log(start.noise), level], [0.4, 0.7])
-        if cost < best_cost - WORTH:
+        if cost < best_cost - MIN_GAIN:
             best, best_cost = plain, cost
     return best
 
@@ -189,15 +189,15 @@ def fit_one_motion(
 def polish(
     tracks: list[Tracks], model: TrackingModel, fit: MotionFit, bounds: FitBounds
 ) -> tuple[MotionFit, tuple[float, ...] | None]:
-    """Take a Newton step to the summit of the likelihood, and tell how sure the parameters are.
+    """Refine a fit by a Newton step, and estimate the standard deviations of its parameters.
 
     Returns
     -------
     fit : MotionFit
-        At the summit, within the bounds.
+        Fit at the maximum, within the bounds.
     stds : tuple of float or None
         Standard deviations of the logarithms of the noise and of each level, from the inverse of
-        the observed information; None where the likelihood has no summit.
+        the observed information; None if the likelihood has no maximum.
     """
     likelihood = TrackLikelihood(tracks, model.velocity_sigma(tracks[0].detections.n_axes))
     first = np.log([fit.noise, *fit.levels])
@@ -209,8 +209,8 @@ def polish(
     def cost(x: NDArray[np.float64]) -> float:
         return -likelihood.n_points * likelihood.mean(at(x))
 
-    # About a standard deviation. Of several motions the likelihood is rough at that scale: a link
-    # that none of them foresees is taken by one or by another.
+    # The step is about one standard deviation. With several motions the likelihood is rough at
+    # that scale, because links that no mode predicts change from mode to mode.
     h = 1 / math.sqrt(likelihood.n_links) if len(fit.levels) == 1 else ROUGH
     steps = h * np.eye(len(first))
     middle = cost(first)
@@ -227,15 +227,15 @@ def polish(
         return fit, None
     stds = tuple(map(float, np.sqrt(np.diag(np.linalg.inv(information)))))
     step = np.linalg.solve(information, gradient).astype(np.float64)
-    if np.abs(step).max() > FARTHEST or cost(first - step) > middle:
+    if np.abs(step).max() > MAX_NEWTON_STEP or cost(first - step) > middle:
         return fit, stds
     summit = at(first - step)
     return replace(
         summit,
-        noise=max(summit.noise, bounds.least_noise),
+        noise=max(summit.noise, bounds.min_noise),
         levels=summit.levels
         if fit.kind == "random_walk"
-        else tuple(min(a, bounds.most_acceleration) for a in summit.levels),
+        else tuple(min(a, bounds.max_acceleration) for a in summit.levels),
     ), stds
 
 

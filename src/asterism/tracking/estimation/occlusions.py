@@ -1,9 +1,8 @@
-"""How often markers are seen: the gaps in the tracks of a clip, less those where they were lost.
+"""Counts of detected and missed markers: the gaps of tracks, without those of lost markers.
 
-A tracker that loses a marker at a jolt and takes up another one, or the same again, leaves a gap
-like that of a marker which was hidden. But the point that it missed is there, near where it was
-expected, in no track or in one that begins within the gap; or, seen backwards from the end of the
-gap, in one that ends within it. Such gaps say nothing of misses.
+A tracker that loses a marker at a jolt leaves a gap like that of an occluded marker. In such a gap
+the marker was detected: a point lies near the predicted position, in no track, or in a track that
+starts within the gap (backward in time: that ends within it). These gaps are not counted.
 """
 
 from __future__ import annotations
@@ -21,14 +20,14 @@ __all__ = ["Sightings", "count_sightings"]
 
 
 class Sightings(NamedTuple):
-    """How often markers that are there were seen and missed.
+    """Numbers of frames in which present markers were detected and missed.
 
     Parameters
     ----------
     hits, misses : int
-        Of those that were seen in the frame before.
+        Counts for markers that were detected in the frame before.
     rehits, remisses : int
-        Of those that were missed there.
+        Counts for markers that were missed in the frame before.
     """
 
     hits: int
@@ -38,14 +37,15 @@ class Sightings(NamedTuple):
 
 
 def count_sightings(tracks: Tracks, reach: float) -> Sightings:
-    """Count from each track's first detection to its last.
+    """Count detections and missed detections between the first and the last of each track.
 
     Parameters
     ----------
     tracks : Tracks
-        Those that were found.
+        Tracks to count in.
     reach : float
-        Metres from where a marker is expected, within which a point that is left over is it.
+        Largest distance between the predicted position and an unassigned point of the marker,
+        metres.
 
     Returns
     -------
@@ -56,9 +56,9 @@ def count_sightings(tracks: Tracks, reach: float) -> Sightings:
     frame = d.frame_of[order]
     is_link = np.diff(tracks.labels[order]) == 0
     missed = (np.diff(frame) - 1) * is_link
-    gaps = np.flatnonzero(missed > 0)  # after the detection order[gap]
+    gaps = np.flatnonzero(missed > 0)  # each gap follows the detection order[gap]
     first, last = frame[offsets[:-1]], frame[offsets[1:] - 1]
-    begins = np.append(first, d.n_frames)[tracks.labels]  # of clutter: as if after the gap's start
+    begins = np.append(first, d.n_frames)[tracks.labels]  # clutter: after any gap's start
     ends = np.append(last, -1)[tracks.labels]
     was_lost = _is_left_over(tracks, order, gaps, begins, +1, reach)
     was_lost |= _is_left_over(tracks, order, gaps + 1, ends, -1, reach)
@@ -75,25 +75,25 @@ def _is_left_over(
     way: int,
     reach: float,
 ) -> NDArray[np.bool_]:
-    """Say whether the next point of a track was there though the track has none.
+    """Find the gaps in which the marker was detected but not assigned to the track.
 
     Parameters
     ----------
     tracks, reach
-        As above.
+        As in `count_sightings`.
     order : ndarray of int, shape (M,)
-        Detections by track.
+        Detections ordered by track.
     at : ndarray of int, shape (G,)
-        Where in `order` tracks have a gap.
+        Positions in `order` at which tracks have a gap.
     limits : ndarray of int, shape (N,)
-        Frame in which the track of each detection begins, or seen backwards ends.
+        Frame in which the track of each detection starts (backward: ends).
     way : {1, -1}
-        Forwards from the gap's start, or backwards from its end.
+        1: forward from the start of the gap; -1: backward from its end.
     """
     from scipy.spatial import KDTree
 
     d = tracks.detections
-    free = np.flatnonzero(way * limits > way * (d.frame_of - way))  # where their frame is the next
+    free = np.flatnonzero(way * limits > way * (d.frame_of - way))  # in the next frame
     if not len(at) or not len(free):
         return np.zeros(len(at), dtype=bool)
     now = order[at]
@@ -104,7 +104,7 @@ def _is_left_over(
         is_steady, d.times[t] - d.times[d.frame_of[before]], np.inf
     )
     places = d.points[now] + (d.points[now] - d.points[before]) * step[:, None]
-    # Frames far apart along an axis of their own, so that one tree does for all.
+    # Frames are far apart on a further axis, so that one tree serves all of them.
     apart = 1.0 + 4.0 * reach
     tree: Any = KDTree(np.column_stack([d.points[free], d.frame_of[free] * apart]))
     distance = tree.query(np.column_stack([places, (t + way) * apart]))[0]

@@ -1,7 +1,8 @@
-"""Rates of a clip from a partition of it: misses, clutter, births and deaths.
+"""Rates of missed detections, clutter, births and deaths from a partition of a capture.
 
-A partition does not tell when a track died, nor whether it was there before it was first seen; both
-are averaged over under the rates so far.
+A partition does not determine when a marker disappeared, nor whether it was present before its
+first
+detection. Both are replaced by their expectations under the current rates.
 """
 
 from __future__ import annotations
@@ -17,27 +18,28 @@ if TYPE_CHECKING:
 
 __all__ = ["Counts", "Rates", "count"]
 
-SHORTEST = 4
-"""Detections of a track that counts as one. Two or three false points that fit are a track now and
-then; believed, they would make the next model readier to believe more of them, and so on."""
-MOST_SURE = 0.999
-"""P_d at most: where nothing was ever missed, a miss is still possible."""
+MIN_LENGTH = 4
+"""Smallest number of detections of a counted track. Two or three false alarms can form a track by
+chance; counting them would make the next model accept more of them."""
+MAX_P_DETECTION = 0.999
+"""Upper bound of P_d: a missed detection stays possible even if the capture has none."""
 SURE_OF_RUNS = 10.0
-"""Misses come in runs where twice the log likelihood ratio is more: by chance once in 600 clips."""
+"""Twice the log-likelihood ratio above which missed detections come in bursts; one of 600 captures
+exceeds it by chance."""
 
 
 @record
 class Rates:
-    """How often things happen.
+    """Detection, clutter, birth and death rates of a capture.
 
     Parameters
     ----------
     p_detection, p_redetection : float
-        P_d and P_r, the same where misses are independent.
+        P_d and P_r; equal if missed detections are independent.
     p_disappear : float
-        p_z, a frame.
+        p_z, probability per frame.
     births, clutter : float
-        New markers and false points a frame, in the whole region.
+        Numbers of new markers and false alarms per frame in the whole region.
     """
 
     p_detection: float
@@ -48,27 +50,27 @@ class Rates:
 
     @property
     def p_seen(self) -> float:
-        """Share of the frames in which a marker is seen."""
+        """Share of the frames in which a marker is detected."""
         return self.p_redetection / (1 - self.p_detection + self.p_redetection)
 
 
 @record
 class Counts:
-    """What a partition shows: events, and chances of them.
+    """Counts of events in a partition, and of the opportunities for them.
 
     Parameters
     ----------
     hits, misses : float
-        Frames in which a marker that is there, seen in the frame before, was seen again, and was
-        not.
+        Numbers of frames in which a present marker, detected in the frame before, was detected
+        and missed.
     rehits, remisses : float
-        The same of a marker that was missed in the frame before.
+        The same numbers for markers that were missed in the frame before.
     deaths, steps : float
-        Disappearances, and steps in which a marker might have.
+        Numbers of disappearances, and of steps in which a marker could disappear.
     births, clutter : float
-        Markers that came after the first frame, and false points.
+        Numbers of markers that appeared after the first frame, and of false alarms.
     frames : float
-        Frames.
+        Number of frames.
     """
 
     hits: float = 0.0
@@ -88,19 +90,19 @@ class Counts:
         return Counts(**{name: value * share for name, value in vars(self).items()})
 
     def rates(self, *, in_runs: bool) -> Rates:
-        """Give the rates, each with one event more: nothing is impossible after a finite clip.
+        """Estimate the rates with one pseudo-event each, so that none is 0 after a finite capture.
 
         Parameters
         ----------
         in_runs : bool
-            Whether P_r may differ from P_d; it does where the counts are sure of it.
+            Whether P_r may differ from P_d; it does if the difference is significant.
         """
         p = q = _share(*self._seen)
         if in_runs and self._sure_of_runs > SURE_OF_RUNS:
             p, q = _share(self.hits, self.misses), _share(self.rehits, self.remisses)
         return Rates(
-            p_detection=min(p, MOST_SURE),
-            p_redetection=min(q, MOST_SURE),
+            p_detection=min(p, MAX_P_DETECTION),
+            p_redetection=min(q, MAX_P_DETECTION),
             p_disappear=(self.deaths + 1) / (self.steps + 2),
             births=(self.births + 1) / self.frames,
             clutter=(self.clutter + 1) / self.frames,
@@ -112,16 +114,16 @@ class Counts:
 
     @property
     def _sure_of_runs(self) -> float:
-        """Twice the log likelihood ratio of P_r apart from P_d against one for both."""
+        """Return twice the log-likelihood ratio of separate P_r and P_d against a common one."""
         each = _log_likelihood(self.hits, self.misses) + _log_likelihood(self.rehits, self.remisses)
         return 2 * (each - _log_likelihood(*self._seen))
 
     def stds(self, *, in_runs: bool) -> Rates:
-        """Give the standard deviation of each rate: of a beta, and of gamma distributions."""
+        """Return the standard deviation of each rate, of a beta or a gamma distribution."""
         rates = self.rates(in_runs=in_runs)
         p, q, z = rates.p_detection, rates.p_redetection, rates.p_disappear
         chances, again = self.hits + self.misses, self.rehits + self.remisses
-        if p == q:  # one rate, from all
+        if p == q:  # one rate from all counts
             chances = again = sum(self._seen)
         return Rates(
             p_detection=float(np.sqrt(p * (1 - p) / (chances + 3))),
@@ -137,7 +139,7 @@ def _share(hits: float, misses: float) -> float:
 
 
 def _log_likelihood(hits: float, misses: float) -> float:
-    """Of a run of chances at the share that fits it best."""
+    """Return the maximum log likelihood of Bernoulli trials."""
     from scipy.special import xlogy
 
     n = hits + misses
@@ -145,14 +147,14 @@ def _log_likelihood(hits: float, misses: float) -> float:
 
 
 def count(tracks: Tracks, rates: Rates) -> Counts:
-    """Count events in a partition, and the expectation of what it leaves open.
+    """Count the events in a partition, with expectations for events that it leaves open.
 
     Parameters
     ----------
     tracks : Tracks
-        The partition.
+        Partition to count in.
     rates : Rates
-        The rates so far.
+        Current rates, for the expectations.
 
     Returns
     -------
@@ -161,27 +163,27 @@ def count(tracks: Tracks, rates: Rates) -> Counts:
     d = tracks.detections
     T = d.n_frames
     order, offsets = tracks.by_track
-    there = np.flatnonzero(tracks.lengths >= SHORTEST)
+    there = np.flatnonzero(tracks.lengths >= MIN_LENGTH)
     frame = d.frame_of[order]
     first, last = frame[offsets[there]], frame[offsets[there + 1] - 1]
     links = float((tracks.lengths[there] - 1).sum())
     inside = float((last - first).sum())
     is_link = (np.diff(tracks.labels[order]) == 0) & np.isin(tracks.labels[order][:-1], there)
     gaps = float((np.diff(frame)[is_link] > 1).sum())
-    # After the last detection, over the r frames that are left: dead in the j-th of them, or alive
-    # and unseen in all.
+    # After the last detection, over the r remaining frames: the marker disappears in the j-th, or
+    # is present and missed in all of them.
     p, q, z = rates.p_detection, rates.p_redetection, rates.p_disappear
     j = np.arange(T)
-    alive = np.power((1 - z) * (1 - q), j)  # and unseen, for j frames
+    alive = np.power((1 - z) * (1 - q), j)  # present and missed for j frames
     alive[1:] *= (1 - p) / (1 - q)
-    died = np.concatenate([[0.0], np.cumsum(alive[:-1] * z)])  # by the r-th frame
-    lived = np.concatenate([[0.0], np.cumsum(j[:-1] * alive[:-1] * z)])  # frames before, times that
+    died = np.concatenate([[0.0], np.cumsum(alive[:-1] * z)])  # disappeared by the r-th frame
+    lived = np.concatenate([[0.0], np.cumsum(j[:-1] * alive[:-1] * z)])  # expected frames before
     r = T - 1 - last
     total = died[r] + alive[r]
     p_died = died[r] / total
     frames_alive = (lived[r] + r * alive[r]) / total
     first_misses = float((1 - z / total)[r > 0].sum())
-    # Before the first detection, over the f frames before it: there from the start, or new.
+    # Before the first detection, over the f frames before it: present from the start, or new.
     n_start = float((first == 0).sum()) / rates.p_seen
     old = n_start * (1 - rates.p_seen) * q * np.power(1 - q, first[first > 0] - 1)
     return Counts(

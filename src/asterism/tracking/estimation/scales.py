@@ -1,7 +1,7 @@
-"""First scales of a clip, from links that admit no doubt.
+"""First scales of a capture, from unambiguous links.
 
-Mutual nearest neighbours in consecutive frames, much nearer than the second nearest, are taken for
-one marker. They favour slow markers; that is good enough to begin with.
+Mutual nearest neighbours in consecutive frames, much nearer than the second nearest, are linked.
+They are biased towards slow markers, which is accurate enough for a start.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ if TYPE_CHECKING:
 __all__ = ["Scales", "first_scales"]
 
 LINKED_POINTS = 15_000
-"""Points that are linked to the next frames, in frames spread over the clip."""
+"""Number of points that are linked to the next frames, in frames spread over the capture."""
 
 
 @record
 class Scales:
-    """Rough sizes of things, SI units.
+    """First estimates of step, noise, speed, acceleration and spacing, in SI units.
 
     Parameters
     ----------
     step : float
-        Seconds from frame to frame.
+        Time between frames, seconds.
     noise, noise_floor : float
-        Standard deviation of a coordinate, and the least that is believed of it.
+        Standard deviation of a coordinate, and its lower bound, metres.
     speed, top_speed : float
-        Of a velocity coordinate, root mean square; and the fastest link.
+        Root mean square of a velocity coordinate, and speed of the fastest link, m/s.
     acceleration_low, acceleration_high : float
-        Of a coordinate in quiet and in busy moments.
+        Acceleration of a coordinate in quiet and in busy motion, m/s².
     spacing : float
-        Usual distance of a point from its nearest neighbour in the frame.
+        Median distance of a point from its nearest neighbour in the frame, metres.
     """
 
     step: float
@@ -58,7 +58,7 @@ def first_scales(pieces: list[Detections]) -> Scales:
     Raises
     ------
     ParameterError
-        If no point can be linked to the next frame without doubt.
+        If no point has an unambiguous link to the next frame.
     """
     steps: list[NDArray[np.float64]] = []
     jolts: list[NDArray[np.float64]] = []
@@ -71,7 +71,7 @@ def first_scales(pieces: list[Detections]) -> Scales:
         for i in range(0, len(filled) - 2, stride):
             a, b, c = frames[i : i + 3]
             dt1, dt2 = np.diff(piece.times[filled[i : i + 3]])
-            for pair in (i, i + 1):  # where the stride is 1, all but the last are known
+            for pair in (i, i + 1):  # with a stride of 1 all but the last are known already
                 if pair not in linked:
                     linked[pair] = _sure_links(frames[pair], frames[pair + 1])
             forward, spacing = linked[i]
@@ -97,7 +97,8 @@ def first_scales(pieces: list[Detections]) -> Scales:
     floor = max(extent, 1e-3) * 1e-6
     speeds = np.linalg.norm(velocities, axis=1)
     quiet, busy = np.quantile(bends, [0.3, 0.99])
-    # White noise of σ bends a line by √6 σ; the median of |N(0, 1)| is 0.67, its 30 % point 0.39.
+    # White noise of σ gives second differences of √6 σ. The median of |N(0, 1)| is 0.67, its 30 %
+    # quantile 0.39.
     noise = max(float(quiet) / 0.39 / np.sqrt(6.0), floor)
     low = max(float(np.median(bends)) / 0.67, noise) / step**2
     known = np.concatenate(spacings)
@@ -117,21 +118,21 @@ def first_scales(pieces: list[Detections]) -> Scales:
 def _sure_links(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Link points to the next frame where there is no doubt.
+    """Link points to the next frame if the link is unambiguous.
 
     Returns
     -------
     link : ndarray of int, shape (len(a),)
-        Index into `b`, -1 where in doubt.
+        Index into `b`, -1 for an ambiguous link.
     spacing : ndarray, shape (len(a),)
-        Distance to the nearest other point of `a`, inf where there is none.
+        Distance to the nearest other point of `a`, inf if there is none.
     """
     from scipy.spatial import KDTree
 
     link = np.full(len(a), -1, dtype=np.int64)
     if not len(a) or not len(b):
         return link, np.full(len(a), np.inf)
-    # With fewer points than neighbours asked for, SciPy gives inf for the distance.
+    # If there are fewer points than neighbours, SciPy returns inf for the distance.
     neighbours: Any = KDTree(b)
     distance, nearest = neighbours.query(a, k=2)
     own: Any = KDTree(a)

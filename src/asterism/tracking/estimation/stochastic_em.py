@@ -1,8 +1,9 @@
-"""Markers that come and go: stochastic EM (Celeux & Diebolt 1985).
+"""Stochastic EM (Celeux & Diebolt 1985) for an open population of markers.
 
-Partitions of the clip are drawn from the posterior under the model so far (Oh, Russell & Sastry
-2009), and the model is estimated anew from each as if it were the truth. The best partition would
-be a biased teacher: it has every false point that fits.
+Partitions of the capture are drawn from the posterior under the current model (Oh, Russell &
+Sastry
+2009), and the model is re-estimated from each of them. The most probable partition would bias the
+estimate, because it contains every false alarm that fits a track.
 """
 
 from __future__ import annotations
@@ -24,26 +25,26 @@ __all__ = ["Drawn", "draw_rates"]
 
 N_ROUNDS = 6
 N_KEPT = 3
-"""Of the last rounds, whose differences tell how much the partition itself is in doubt."""
+"""Number of last rounds; their differences measure the uncertainty of the partition."""
 DRAWN_POINTS = 15_000
-"""Detections in the pieces from whose partitions is drawn."""
+"""Number of detections in the pieces whose partitions are drawn."""
 _WALK = MCMCDA(keep="draw", confidence=0.0, end_odds=1.0)
 
 
 @record
 class Drawn:
-    """What stochastic EM came to.
+    """Result of stochastic EM.
 
     Parameters
     ----------
     tracks : list of Tracks
-        The last partition of each piece.
+        Last partition of each piece.
     counts : tuple of Counts
-        Of the last rounds.
+        Counts of the last rounds.
     rates : Rates
-        From the mean of these.
+        Rates from the mean of these counts.
     fit : MotionFit
-        From the last partition.
+        Fit to the last partition.
     """
 
     tracks: list[Tracks]
@@ -61,22 +62,22 @@ def draw_rates(
     *,
     in_runs: bool,
 ) -> Drawn:
-    """Estimate rates and motion from drawn partitions.
+    """Estimate rates and motion from partitions drawn from the posterior.
 
     Parameters
     ----------
     pieces : list of Detections
-        Runs of frames of the clip.
+        Runs of consecutive frames of the capture.
     fit : MotionFit
-        Motion to begin with.
+        Initial motion.
     rates : Rates
-        Rates to begin with.
+        Initial rates.
     bounds : FitBounds
-        What is believed of the motion.
+        Bounds of noise and motion.
     model_of : callable
-        Makes the model of a motion, rates and the tracks so far.
+        Function that returns the model for a motion, rates and the current tracks.
     in_runs : bool
-        As of `Counts.rates`.
+        As for `Counts.rates`.
 
     Returns
     -------
@@ -96,13 +97,13 @@ def draw_rates(
 
 
 def _draw(piece: Detections, model: TrackingModel, seed: int) -> Tracks:
-    """Draw a partition; frames are drawn given those before and the nine after."""
+    """Draw a partition; each frame is drawn given the frames before it and the nine after it."""
     state = _WALK.init(model, n_axes=piece.n_axes, seed=seed)
     return Tracks(detections=piece, labels=_WALK.run(state, piece)[1])
 
 
 def _some(pieces: list[Detections]) -> list[Detections]:
-    """Take pieces of `DRAWN_POINTS` detections in all, spread evenly; of a single one the start."""
+    """Select evenly spread pieces of `DRAWN_POINTS` detections, or the start of a single one."""
     total = sum(piece.n_points for piece in pieces)
     n = max(1, min(len(pieces), len(pieces) * DRAWN_POINTS // max(total, 1)))
     chosen = [pieces[k] for k in np.unique(np.linspace(0, len(pieces) - 1, n).astype(int))]

@@ -1,6 +1,7 @@
-"""Fills that meet their ends: what an estimate misses there is carried through the gap.
+"""Interpolation of an estimate's residuals from the ends of a gap, so that a fill is continuous.
 
-Symbols: W frames, n of them at the ends and L hidden; k the covariance over time of what is missed.
+Symbols: W frames, n of them at the ends and L missing; k the covariance over time of the
+residuals.
 """
 
 from __future__ import annotations
@@ -18,59 +19,60 @@ if TYPE_CHECKING:
 __all__ = ["CAREFUL", "Bridges", "bridges", "is_steady"]
 
 SPANS = (0.15, 0.4, 1.0, 3.0, 10.0)
-"""Times in which what is missed changes, that are tried; in lengths of the gap."""
+"""Correlation times of the residuals that are tried, in lengths of the gap."""
 NOISES = (1e-8, 1e-4, 1e-2)
-"""Shares of its variance that are noise, that are tried."""
+"""Shares of noise in the variance of the residuals that are tried."""
 OFFSETS = (1.0, 1e3)
-"""Variances of a constant beside it, that are tried."""
+"""Variances of a constant offset that are tried, relative to that of the residuals."""
 CAREFUL = SPANS.index(0.4) * len(NOISES) * len(OFFSETS) + NOISES.index(1e-4) * len(OFFSETS)
-"""The way that is taken where nothing tells which is best: it promises little in the middle."""
+"""Index of the default combination, with a short correlation time and a large variance mid-gap."""
 
-LEAST_ENDS = 4
-"""Frames at each end that are believed whatever they do."""
+MIN_ENDS = 4
+"""Number of frames at each end that are always used."""
 JUMP = 8.0
-"""A marker has flickered that jumps so many times farther than is usual."""
+"""Ratio of a jump to the usual jump from which a marker has flickered."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Bridges:
-    """Several ways of carrying what is missed at the ends through a gap.
+    """Several interpolators of residuals from the ends through a gap.
 
     Parameters
     ----------
     weights : ndarray, shape (M, B, L, n)
-        Of the frames at the ends, for each hidden frame; B = 1 where all windows have equal times.
+        Weights of the frames at the ends for each missing frame; B = 1 if all windows have equal
+        times.
     left : ndarray, shape (L,)
-        How the variance of what is missed rises from the ends to 1, by the careful way, in the last
-        window.
+        Variance of the residuals in the last window relative to their prior variance, by the
+        default interpolator: it increases from the ends to 1.
     """
 
     weights: NDArray[np.float64]
     left: NDArray[np.float64]
 
     def carry(self, missed: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Foretell what is missed, shape (M, B, L, D), from that at the ends (B, n, D)."""
+        """Interpolate the residuals at the ends (B, n, D) to the missing frames, (M, B, L, D)."""
         M, same, L, n = self.weights.shape
         if same > 1:
             return self.weights @ missed
         B, _, D = missed.shape
-        # One product of two matrices is several times faster than one for each window.
+        # One matrix product is several times faster than one for each window.
         flat = self.weights.reshape(M * L, n) @ missed.swapaxes(0, 1).reshape(n, B * D)
         return flat.reshape(M, L, B, D).swapaxes(1, 2)
 
 
 def bridges(times: NDArray[np.float64], is_end: NDArray[np.bool_]) -> Bridges:
-    """Make the ways: Gaussian processes that are known at the ends.
+    """Make the interpolators: Gaussian processes that are known at the ends.
 
-    Their covariance is ``(1 + r + r²/3) exp(-r) + β`` with ``r = √5 Δ / τ`` (Matérn 5/2: twice
+    The covariance is ``(1 + r + r²/3) exp(-r) + β`` with ``r = √5 Δ / τ`` (Matérn 5/2: twice
     differentiable, so that a fill has no kink), for several τ, β and shares of noise.
 
     Parameters
     ----------
     times : ndarray, shape (B, W)
-        Seconds, of each window.
+        Times of each window, seconds.
     is_end : ndarray of bool, shape (W,)
-        Which frames are at the ends.
+        True for frames at the ends.
 
     References
     ----------
@@ -83,7 +85,7 @@ def bridges(times: NDArray[np.float64], is_end: NDArray[np.bool_]) -> Bridges:
     length = (t[:, -1] - t[:, 0]) * (~is_end).mean()
     between = np.abs(ends[:, :, None] - ends[:, None, :])
     across = np.abs(hidden[:, :, None] - ends[:, None, :])
-    # All ways at once: (span, noise, offset) before (B, L, n).
+    # All interpolators at once: axes (span, noise, offset) before (B, L, n).
     tau = np.array(SPANS)[:, None, None, None, None, None] * length[:, None, None]
     noise = np.array(NOISES)[:, None, None, None, None] * np.eye(ends.shape[1])
     offset = np.array(OFFSETS)[:, None, None, None]
@@ -104,22 +106,22 @@ def _matern(ratio: NDArray[np.float64]) -> NDArray[np.float64]:
 def is_steady(
     places: NDArray[np.float64], frames: NDArray[np.int64], span: Span, usual: float
 ) -> NDArray[np.bool_]:
-    """Tell which frames at the ends to believe: a marker may flicker before it is lost.
+    """Find the reliable frames at the ends; a marker may flicker before it is lost.
 
-    Where a place is far from what the two before it foretell (those farther from the gap), all
-    from there to the gap is left out.
+    If a position is far from its extrapolation from the two positions farther from the gap, all
+    frames from there to the gap are left out.
 
     Parameters
     ----------
     places : ndarray, shape (n, D)
-        Of the marker, within its body where there is one, metres.
+        Positions of the marker, relative to its body if there is one, metres.
     frames : ndarray of int, shape (n,)
-        Those at both ends, in order of time.
+        Frames at both ends, in order of time.
     span : Span
-        The gap.
+        Gap between the ends.
     usual : float
-        How far a place is from what the two before it foretell in the worst of ten frames, metres;
-        of a hundred would be worse, but a marker that flickers often would set its own measure.
+        90th percentile of the distance between a position and its extrapolation from the two
+        before, metres. A higher percentile would include the flicker itself.
 
     Returns
     -------
@@ -131,7 +133,7 @@ def is_steady(
         missed = np.linalg.norm(y[2:] - 2 * y[1:-1] + y[:-2], axis=1)
         jumps = (missed > JUMP * usual) & (gaps[1:] == 1) & (gaps[:-1] == 1)
         found = 2 + np.flatnonzero(jumps)
-        found = found[found >= LEAST_ENDS]
+        found = found[found >= MIN_ENDS]
         if len(found):
             kept[side[found[0] :]] = False
     return kept

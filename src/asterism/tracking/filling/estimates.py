@@ -1,9 +1,9 @@
-"""Three ways of telling where a hidden marker was: its own motion, its body, and the pattern.
+"""Three estimators of an occluded marker: its own motion, its rigid body, and the pattern.
 
-Each tells it for the gap and for windows in which the same was hidden on purpose: as many frames,
-the same ends known, the same helpers seen.
+Each estimates the marker in the gap and in held-out windows of the same length, with the same
+frames known at the ends and the same helper markers detected.
 
-Symbols: T frames, K tracks, D axes, H windows, W frames of a window, L of them hidden.
+Symbols: T frames, K tracks, D axes, H windows, W frames of a window, L of them missing.
 """
 
 from __future__ import annotations
@@ -28,42 +28,42 @@ if TYPE_CHECKING:
     from asterism.model import TrackingModel
     from asterism.tracking.filling.spans import Span
 
-__all__ = ["Estimate", "Estimates", "Take", "estimate"]
+__all__ = ["DenseTracks", "Estimate", "Estimates", "estimate"]
 
-MOST_WINDOWS, LEAST_WINDOWS, MOST_HIDDEN = 40, 16, 1200
-"""Windows that are wanted, fewer of long gaps: so many that they hide `MOST_HIDDEN` frames."""
-MOST_HELPERS = 14
-"""Markers that the pattern looks at; the steadiest `MOST_NEIGHBOURS` of them are the body."""
-MOST_NEIGHBOURS = 6
-LEAST_SHARE = 0.5
-"""Share of the marker's frames in which a helper must have been seen beside it: for a helper seen
-rarely, much else would go unused."""
-LEAST_PATTERN = 40
-"""Frames from which a pattern may be learnt."""
-MOST_LEARNT = 500
-"""Frames spread over the take, from which body and pattern are learnt beside the windows'."""
-MOST_COMPARED = 400
-"""Frames in which distances are compared."""
-STEADIEST = 1e-4
-"""Metres; a neighbour is not believed to be steadier."""
+MAX_WINDOWS, MIN_WINDOWS, MAX_WITHHELD = 40, 16, 1200
+"""Largest and smallest number of windows, and largest number of frames withheld in all of them."""
+MAX_HELPERS = 14
+"""Number of helper markers of the pattern; the `MAX_NEIGHBOURS` steadiest ones form the body."""
+MAX_NEIGHBOURS = 6
+MIN_SHARE = 0.5
+"""Smallest share of the marker's frames in which a helper was detected too, because a rarely
+detected helper would exclude many frames."""
+MIN_PATTERN = 40
+"""Smallest number of frames from which a pattern is learnt."""
+MAX_LEARNT = 500
+"""Number of frames, spread over the capture, from which body and pattern are learnt in addition to
+the windows' frames."""
+MAX_COMPARED = 400
+"""Number of frames in which distances are compared."""
+MIN_SPREAD = 1e-4
+"""Lower bound of the spread of a neighbour's distance, metres."""
 BRIDGED = 3
-"""A marker that is missing for so many frames is taken to be where its own motion leads, but where
-that is the question: points that go missing at random leave hardly a frame in which all were
-seen."""
+"""Longest gap of a helper, frames, that is filled by the smoother before the estimation. With
+independent missed detections there is hardly a frame with detections of all helpers."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Take:
-    """All tracks over time.
+class DenseTracks:
+    """Positions of all tracks in all frames, with the tracking model.
 
     Parameters
     ----------
     times : ndarray, shape (T,)
-        Seconds.
+        Times of the frames, seconds.
     positions : ndarray, shape (T, K, D)
-        Metres, NaN where not measured.
+        Positions, metres, NaN where not measured.
     model : TrackingModel
-        Its motion and noise are used.
+        Model whose motion and noise are used.
     """
 
     times: NDArray[np.float64]
@@ -72,12 +72,12 @@ class Take:
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
-        """Where each track was measured, shape (T, K)."""
+        """True where each track was measured, shape (T, K)."""
         return np.isfinite(self.positions[..., 0])
 
     @cached_property
     def bridged(self) -> NDArray[np.float64]:
-        """Positions, and those of gaps of up to `BRIDGED` frames by the smoother."""
+        """Positions with gaps of up to `BRIDGED` frames smoothed over, shape (T, K, D)."""
         short = [span for span in find_gaps(self.seen) if span.length <= BRIDGED]
         if not short:
             return self.positions
@@ -87,27 +87,27 @@ class Take:
         at = states.offsets[:-1] - states.first_frames
         H = self.model.motion.modes[0].observation
         for span in short:
-            found[span.hidden, span.track] = states.means[at[span.track] + span.hidden] @ H
+            found[span.frames, span.track] = states.means[at[span.track] + span.frames] @ H
         return found
 
     @cached_property
     def known(self) -> NDArray[np.bool_]:
-        """Where each track was measured or bridged, shape (T, K)."""
+        """True where each track was measured or bridged, shape (T, K)."""
         return np.isfinite(self.bridged[..., 0])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Estimate:
-    """Where one estimator puts the marker.
+    """Positions of the marker by one estimator.
 
     Parameters
     ----------
     name : str
-        The estimator.
+        Name of the estimator.
     values : ndarray, shape (H + 1, L, D)
-        In each window and, last, in the gap; metres.
+        Estimated positions in each window and, last, in the gap, metres.
     variances : ndarray, shape (L,)
-        Of a coordinate in the gap, as the estimator itself has it, m².
+        Variance of a coordinate in the gap according to the estimator itself, m².
     """
 
     name: str
@@ -117,18 +117,18 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Estimates:
-    """What all estimators say of one gap.
+    """Estimates of one gap by all estimators.
 
     Parameters
     ----------
     each : tuple of Estimate
-        One to three.
+        One to three estimates.
     truth : ndarray, shape (H, L, D)
-        What was hidden in the windows, metres; NaN where the marker was not seen in truth.
+        Withheld positions in the windows, metres; NaN where the marker was not detected.
     windows : ndarray of int, shape (H, W)
-        Their frames.
+        Frames of the windows.
     n_neighbours : int
-        Markers of the body.
+        Number of markers of the body.
     """
 
     each: tuple[Estimate, ...]
@@ -137,24 +137,24 @@ class Estimates:
     n_neighbours: int
 
 
-def estimate(take: Take, span: Span) -> Estimates:
-    """Estimate a marker through a gap and through windows like it."""
+def estimate(dense: DenseTracks, span: Span) -> Estimates:
+    """Estimate a marker in a gap and in held-out windows of the same length."""
     k = span.track
-    X, own = take.bridged, take.seen[:, k]
+    X, own = dense.bridged, dense.seen[:, k]
     ends = usable_ends(own, span)
-    helpers, spreads = _helpers(take, span, ends)
-    helped = np.logical_and.reduce(take.known[:, helpers], axis=1)
+    helpers, spreads = _helpers(dense, span, ends)
+    helped = np.logical_and.reduce(dense.known[:, helpers], axis=1)
     known = own & helped
     ends = ends[helped[ends]]
-    frames = np.sort(np.concatenate([ends, span.hidden]))
+    frames = np.sort(np.concatenate([ends, span.frames]))
     is_end = (frames < span.first) | (frames > span.last)
-    most = max(LEAST_WINDOWS, min(MOST_WINDOWS, MOST_HIDDEN // span.length))
-    windows = held_out(own, take.known[:, k], helped, frames, span, most)
+    max_windows = max(MIN_WINDOWS, min(MAX_WINDOWS, MAX_WITHHELD // span.length))
+    windows = held_out(own, dense.known[:, k], helped, frames, span, max_windows)
     spread = np.flatnonzero(known)
-    spread = spread[:: -(-len(spread) // MOST_LEARNT)]
+    spread = spread[:: -(-len(spread) // MAX_LEARNT)]
     rows = np.unique(np.concatenate([windows.ravel(), frames, spread]))
-    neighbours = helpers[:MOST_NEIGHBOURS]
-    weights = 1 / (spreads[:MOST_NEIGHBOURS] ** 2 + max(spreads.min(initial=1.0), STEADIEST) ** 2)
+    neighbours = helpers[:MAX_NEIGHBOURS]
+    weights = 1 / (spreads[:MAX_NEIGHBOURS] ** 2 + max(spreads.min(initial=1.0), MIN_SPREAD) ** 2)
     body = fit_body(X[rows][:, neighbours], weights)
     places = body.to_body(X[rows, k])
     is_known = known[rows]
@@ -164,25 +164,25 @@ def estimate(take: Take, span: Span) -> Estimates:
     )
     frames, is_end, windows = frames[believed], is_end[believed], windows[:, believed]
     every = np.concatenate([windows, frames[None]])
-    found = [_smoother(take, every, is_end, k)]
+    found = [_smoother(dense, every, is_end, k)]
     if len(helpers):
         at = np.searchsorted(rows, every)
         mean = places[is_known].mean(axis=0)
-        ways = bridges(take.times[every], is_end)
+        ways = bridges(dense.times[every], is_end)
         room = _Room(body=body.of(at[:, ~is_end].ravel()), mean=mean)
         places = places - mean
         rigid = np.full(span.length, (places[is_known] ** 2).mean())
         rigid *= _caution(is_known.sum() / span.length)
         there = places[at]
-        there[~own[every] & ~is_end] = np.nan  # what is bridged is no truth to choose a way by
+        there[~own[every] & ~is_end] = np.nan  # bridged positions are no ground truth
         found.append(
             carried_estimate("body", np.zeros((*every.shape, X.shape[2])), there, is_end, ways,
                      room, rigid)
         )  # fmt: skip
-        if is_known.sum() >= LEAST_PATTERN:
+        if is_known.sum() >= MIN_PATTERN:
             Z = body.to_body(X[rows][:, helpers]).reshape(len(rows), -1)
             pattern = learn_pattern(Z, places, is_known, span.length)
-            # A window is predicted as a whole by what was learnt without its middle.
+            # A window is predicted as a whole from the fold that excludes its middle.
             fold = pattern.fold[at[:-1, at.shape[1] // 2]]
             base = [pattern.by_fold[fold[:, None], at[:-1]], pattern.by_all[at[-1:]]]
             variances = pattern.variances[at[-1, ~is_end]]
@@ -193,43 +193,44 @@ def estimate(take: Take, span: Span) -> Estimates:
             )
     return Estimates(
         each=tuple(found),
-        truth=take.positions[windows[:, ~is_end], k],
+        truth=dense.positions[windows[:, ~is_end], k],
         windows=windows,
         n_neighbours=len(neighbours),
     )
 
 
 def _helpers(
-    take: Take, span: Span, ends: NDArray[np.int64]
+    dense: DenseTracks, span: Span, ends: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Markers that are known throughout, at both ends and often beside this one; steadiest first.
+    """Find the helpers of a gap, steadiest first, and the spread of their distances, metres.
 
-    Also by how much their distance from it varies, metres.
+    Helpers are known throughout the gap and at both ends, and often detected together with the
+    marker.
     """
-    k, known = span.track, take.known
+    k, known = span.track, dense.known
     before, after = ends[ends < span.first], ends[ends > span.last]
-    needed = np.concatenate([before[-NEAREST_ENDS:], span.hidden, after[:NEAREST_ENDS]])
-    mine = np.flatnonzero(take.seen[:, k])
+    needed = np.concatenate([before[-NEAREST_ENDS:], span.frames, after[:NEAREST_ENDS]])
+    mine = np.flatnonzero(dense.seen[:, k])
     n_together = known[mine].sum(axis=0)
     is_there = known[needed].all(axis=0)
-    is_there &= n_together >= max(LEAST_SHARE * len(mine), MIN_TOGETHER)
+    is_there &= n_together >= max(MIN_SHARE * len(mine), MIN_TOGETHER)
     is_there[k] = False
     others = np.flatnonzero(is_there)
-    compared = mine[:: -(-len(mine) // MOST_COMPARED)]
-    theirs = take.bridged[compared][:, others]
-    spreads = distances_from(take.positions[compared, k], theirs).spread
-    steadiest = np.argsort(spreads, kind="stable")[:MOST_HELPERS]
+    compared = mine[:: -(-len(mine) // MAX_COMPARED)]
+    theirs = dense.bridged[compared][:, others]
+    spreads = distances_from(dense.positions[compared, k], theirs).spread
+    steadiest = np.argsort(spreads, kind="stable")[:MAX_HELPERS]
     others, spreads = others[steadiest], spreads[steadiest]
-    # As many as leave most of the frames in which they are all known.
+    # The number of helpers is limited so that most frames in which all are known remain.
     n_all = np.logical_and.accumulate(known[mine][:, others], axis=1).sum(axis=0)
-    n = int((n_all >= LEAST_SHARE * n_all.max(initial=0)).sum())
+    n = int((n_all >= MIN_SHARE * n_all.max(initial=0)).sum())
     return others[:n], spreads[:n]
 
 
 def _usual_jump(
     places: NDArray[np.float64], rows: NDArray[np.int64], is_known: NDArray[np.bool_]
 ) -> float:
-    """How far a place is off what the two before it foretell, in the worst of ten frames."""
+    """Return the 90th percentile of the error of a linear extrapolation of the position."""
     y = places[is_known]
     is_next = np.diff(rows[is_known]) == 1
     missed = np.linalg.norm(y[2:] - 2 * y[1:-1] + y[:-2], axis=1)[is_next[1:] & is_next[:-1]]
@@ -237,30 +238,30 @@ def _usual_jump(
 
 
 def _caution(m: float) -> float:
-    """Give the factor of a variance learnt from m stretches for another: ``(m + 1) / (m - 1)``.
+    """Return the factor of a variance estimated from m stretches: ``(m + 1) / (m - 1)``.
 
-    As long as the gap, stretches are taken to be independent; of less than one nothing is known,
-    and 0.2 in the denominator stands for that.
+    Stretches as long as the gap are assumed to be independent. For m near 1 and below, the
+    denominator is limited to 0.2.
     """
     return (m + 1) / max(m - 1, 0.2)
 
 
 def _smoother(
-    take: Take, every: NDArray[np.int64], is_end: NDArray[np.bool_], track: int
+    dense: DenseTracks, every: NDArray[np.int64], is_end: NDArray[np.bool_], track: int
 ) -> Estimate:
-    """Smooth the ends of each window as a track of its own; one call does them all."""
+    """Smooth the ends of all windows in one call, each as a track of its own."""
     ends = every[:, is_end]
     frames, labels = ends.ravel(), np.repeat(np.arange(len(ends)), ends.shape[1])
     order = np.argsort(frames, kind="stable")
-    counts = np.bincount(frames, minlength=len(take.times))
+    counts = np.bincount(frames, minlength=len(dense.times))
     pieces = Detections(
-        times=take.times,
+        times=dense.times,
         offsets=np.concatenate([[0], np.cumsum(counts)]),
-        points=take.bridged[frames[order], track],
+        points=dense.bridged[frames[order], track],
     )
-    states = smooth_states(Tracks(detections=pieces, labels=labels[order]), take.model)
+    states = smooth_states(Tracks(detections=pieces, labels=labels[order]), dense.model)
     at = states.offsets[:-1, None] + every[:, ~is_end] - states.first_frames[:, None]
-    H = take.model.motion.modes[0].observation
+    H = dense.model.motion.modes[0].observation
     return Estimate(
         name="smoother",
         values=states.means[at] @ H,
@@ -270,7 +271,7 @@ def _smoother(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Room:
-    """The way back from places in the body to the room, for the hidden frames of all windows."""
+    """Transformation from body to room coordinates for the missing frames of all windows."""
 
     body: Body
     mean: NDArray[np.float64]
@@ -289,7 +290,7 @@ def carried_estimate(
     room: _Room,
     variances: NDArray[np.float64],
 ) -> Estimate:
-    """Add to an estimate what it misses at the ends, by the way that does best in the windows."""
+    """Correct an estimate by its residuals at the ends, with the best interpolator."""
     missed = places - base
     carried = ways.carry(missed[:, is_end])
     way = CAREFUL

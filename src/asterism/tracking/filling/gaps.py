@@ -1,10 +1,10 @@
-"""Gaps of tracks filled: where a marker was while nobody saw it, and how sure that is.
+"""Filling of gaps: positions of occluded markers with their standard deviations.
 
-Three estimators (`estimates.py`) are tried where the truth is known, on stretches
-of the same take in which as much is hidden on purpose; their errors there decide how they are
-weighed, and how far the fill may be off.
+Three estimators (`estimates.py`) are evaluated on stretches of the same capture in which the
+marker
+is withheld. Their errors there determine the weights and the standard deviation of the fill.
 
-What this file is not: a guess of what came before a track, or after it.
+Frames before the first and after the last detection of a track are not filled.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from asterism.checks import check_kind, check_number
 from asterism.model import TrackingModel, Tracks
 from asterism.records import record
 from asterism.tracking.estimation import estimate_model
-from asterism.tracking.filling.estimates import Take, estimate
+from asterism.tracking.filling.estimates import DenseTracks, estimate
 from asterism.tracking.filling.scores import Fill, settle
 from asterism.tracking.filling.spans import Span, find_gaps
 
@@ -36,30 +36,30 @@ ESTIMATORS = ("smoother", "body", "pattern")
 
 @record
 class FilledGap:
-    """A gap of a track, and what was made of it.
+    """Gap of a track and the result of its filling.
 
     Parameters
     ----------
     track : int
-        The track.
+        Number of the track.
     first, last : int
-        Frames that are missing, the first and the last.
+        First and last missing frame.
     seconds : float
-        From the detection before to the one after.
+        Time between the detections before and after the gap.
     weights : mapping of str to float
-        What each estimator counted for, adding to 1; empty where the gap was left.
+        Weight of each estimator, with sum 1; empty for a gap that was not filled.
     rms : mapping of str to float
-        How far each estimator was off where as much was hidden on purpose: root of the mean square
-        distance, metres. Empty where the take is too short to tell.
+        Root mean square distance of each estimator from withheld detections in stretches of
+        the same length, metres. Empty if the capture is too short.
     n_windows : int
-        Stretches, none overlapping another, that this was measured on; 0 where the take is too
-        short. Then the estimator that is surest of itself was taken, at its word.
+        Number of disjoint stretches on which this was measured. 0 if the capture is too short;
+        then the estimator with the smallest variance of its own is used.
     std : float
-        Largest standard deviation of a coordinate, metres; NaN where the gap was left.
+        Largest standard deviation of a coordinate, metres; NaN for a gap that was not filled.
     n_neighbours : int
-        Markers of the body that carried it.
+        Number of markers of the rigid body from which the gap was filled.
     reason : str
-        Why the gap was left, "" where it was filled.
+        Reason why the gap was not filled, "" for a filled gap.
     """
 
     track: int
@@ -75,12 +75,12 @@ class FilledGap:
 
     @property
     def is_filled(self) -> bool:
-        """Whether it was filled."""
+        """Whether the gap was filled."""
         return not self.reason
 
     @property
     def estimator(self) -> str:
-        """The estimator that counted for most, "" where the gap was left."""
+        """Name of the estimator with the largest weight, "" for a gap that was not filled."""
         return max(self.weights, key=lambda name: self.weights[name], default="")
 
     def __len__(self) -> int:
@@ -89,15 +89,15 @@ class FilledGap:
 
 @record(eq=False)
 class Filling:
-    """Tracks with their gaps filled.
+    """Tracks with filled gaps, and a report of every gap.
 
     Parameters
     ----------
     tracks : Tracks
-        Over what was measured, unchanged, and what was filled: flagged in ``detections.filled``,
-        with ``detections.stds``.
+        Tracks with the measured detections, unchanged, and the filled ones, which are marked in
+        ``detections.filled`` and have standard deviations in ``detections.stds``.
     gaps : tuple of FilledGap
-        Every gap, by track and time, those that were left too.
+        Every gap, by track and time, including those that were not filled.
     """
 
     tracks: Tracks
@@ -120,33 +120,35 @@ def fill_gaps(
     longest: float = 1.0,
     progress: Callable[[int], Any] | None = None,
 ) -> Filling:
-    """Fill the gaps of tracks from their own motion, the body they sit on, and all that is seen.
+    """Fill the gaps of tracks from their own motion, their rigid body and the other markers.
 
     *smoother*: the motion of the model through the gap (Rauch-Tung-Striebel). *body*: neighbours
-    that keep their distance are fitted rigidly in every frame [1]_ and carry the marker along.
-    *pattern*: within that body, ridge regression on the places of up to 14 markers, learnt where
-    all were seen [2]_ [3]_. What the last two miss at the ends of the gap is carried through it by
-    a Gaussian process, so that a fill meets its ends without a kink.
+    at stable distances are fitted as a rigid body in every frame [1]_, which predicts the marker.
+    *pattern*: in the frame of that body, ridge regression on the positions of up to 14 markers,
+    learnt from frames in which all were detected [2]_ [3]_. A Gaussian process interpolates the
+    residuals of body and pattern at the ends of the gap, so that the fill joins them smoothly.
 
-    Stretches of the take in which the marker and the same helpers were seen are hidden on purpose.
-    The mean of the three that has the least error there fills the gap, and that error, frame by
-    frame from end to end, is its standard deviation: larger where the three disagree more than in
-    the stretches.
+    For validation the marker is withheld in stretches of the capture in which it and its helpers
+    were detected. The weighted mean of the three with the smallest error there fills the gap. That
+    error, frame by frame, is the standard deviation of the fill; it is inflated if the three
+    disagree more in the gap than in the stretches.
 
     Parameters
     ----------
     tracks : Tracks
-        Points that were filled before are left out first, and filled anew.
+        Tracks to fill. Filled points of an earlier call are removed first.
     model : TrackingModel, optional
-        Its motion and its noise are used; estimated from the detections where none is given.
+        Model whose motion and noise are used. By default it is estimated from the detections.
     longest : float
-        Longer gaps are left, seconds from the detection before to the one after.
+        Longest gap that is filled, seconds between the detections before and after it, > 0.
+        Larger values fill more gaps, with larger standard deviations.
     progress : callable, optional
-        Called with the number of gaps done.
+        Called with the number of finished gaps.
 
     Returns
     -------
     Filling
+        Filled tracks and a report of every gap.
 
     Raises
     ------
@@ -164,8 +166,8 @@ def fill_gaps(
     --------
     >>> import asterism as am
     >>> truth = am.simulate.person(seed=1)
-    >>> hidden = am.simulate.corrupt(truth, burst=am.simulate.Burst(), seed=1)
-    >>> filling = am.fill_gaps(hidden, longest=0.5)
+    >>> corrupted = am.simulate.corrupt(truth, burst=am.simulate.Burst(), seed=1)
+    >>> filling = am.fill_gaps(corrupted, longest=0.5)
     >>> filling  # doctest: +ELLIPSIS
     Filling(... of ... gaps, ... points)
     """
@@ -177,19 +179,19 @@ def fill_gaps(
     d = tracks.detections
     positions = tracks.positions()
     spans = find_gaps(np.isfinite(positions[..., 0]))
-    # To the nanosecond: times such as k / 120 differ in their last bits.
+    # Rounded to nanoseconds, because times such as k / 120 differ in their last bits.
     seconds = [round(float(d.times[s.last + 1] - d.times[s.first - 1]), 9) for s in spans]
     is_short = [value <= longest for value in seconds]
     if model is None and any(is_short):
         model = estimate_model(d).model
-    take = None if model is None else Take(times=d.times, positions=positions, model=model)
+    dense = None if model is None else DenseTracks(times=d.times, positions=positions, model=model)
     gaps: list[FilledGap] = []
     fills: list[tuple[Span, Fill]] = []
     for n, (span, length) in enumerate(zip(spans, seconds, strict=True), start=1):
-        if take is None or length > longest:
+        if dense is None or length > longest:
             gaps.append(_gap(span, length, None, f"longer than {longest:g} s"))
         else:
-            found = estimate(take, span)
+            found = estimate(dense, span)
             fills.append((span, settle(found)))
             gaps.append(_gap(span, length, (found, fills[-1][1]), ""))
         if progress is not None:
@@ -198,7 +200,7 @@ def fill_gaps(
 
 
 def _gap(span: Span, seconds: float, made: tuple[Estimates, Fill] | None, reason: str) -> FilledGap:
-    """Say what was made of a gap."""
+    """Return the report of a gap."""
     weights: dict[str, float] = {}
     rms: dict[str, float] = {}
     if made is not None:
@@ -221,12 +223,12 @@ def _gap(span: Span, seconds: float, made: tuple[Estimates, Fill] | None, reason
 
 
 def _with(tracks: Tracks, fills: Sequence[tuple[Span, Fill]]) -> Tracks:
-    """Add filled points to tracks, in each frame after those that were measured."""
+    """Add filled points to tracks, after the measured points of each frame."""
     if not fills:
         return tracks
     d = tracks.detections
     D, n = d.n_axes, d.n_points
-    frames = np.concatenate([span.hidden for span, _ in fills])
+    frames = np.concatenate([span.frames for span, _ in fills])
     labels = np.repeat([span.track for span, _ in fills], [span.length for span, _ in fills])
     before, after = _ends(tracks, fills)
     stds = np.concatenate([made.stds for _, made in fills])
@@ -244,7 +246,7 @@ def _with(tracks: Tracks, fills: Sequence[tuple[Span, Fill]]) -> Tracks:
     }
     old = {"filled": np.zeros(n, dtype=bool), "stds": np.zeros(n)} | old
     if "labels" in old:
-        # What the file itself calls the marker, if it does so on both sides.
+        # The file's own label of the marker, if it is the same on both sides of the gap.
         own = old["labels"]
         new["labels"] = np.where(own[before] == own[after], own[before], -1)
     order = np.argsort(np.concatenate([d.frame_of, frames]), kind="stable")
@@ -269,7 +271,7 @@ def _with(tracks: Tracks, fills: Sequence[tuple[Span, Fill]]) -> Tracks:
 def _ends(
     tracks: Tracks, fills: Sequence[tuple[Span, Fill]]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find the detections at both ends of the gap, for every filled point."""
+    """Find the detections at both ends of the gap for every filled point."""
     order, offsets = tracks.by_track
     frame_of = tracks.detections.frame_of
     before: list[int] = []

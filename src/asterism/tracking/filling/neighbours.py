@@ -1,6 +1,6 @@
-"""The body beside a hidden marker: who keeps its distance, and how these neighbours moved.
+"""Rigid body of an occluded marker, fitted to its neighbours in every frame.
 
-Symbols: F frames, n neighbours, D axes, R turns the body's axes into the room's, c its middle.
+Symbols: F frames, n neighbours, D axes, R rotation from body to room axes, c centre of the body.
 """
 
 from __future__ import annotations
@@ -16,44 +16,44 @@ if TYPE_CHECKING:
 __all__ = ["Body", "fit_body"]
 
 ROUNDS = 2
-"""Times that the shape of the body is averaged anew; a third changes it by nothing to speak of."""
+"""Number of times that the shape of the body is averaged; a third round has no visible effect."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Body:
-    """How a body stood in some frames.
+    """Pose of a body in each of F frames.
 
     Parameters
     ----------
     turns : ndarray, shape (F, D, D)
-        R.
+        Rotations R.
     middles : ndarray, shape (F, D)
-        c, metres.
+        Centres c, metres.
     """
 
     turns: NDArray[np.float64]
     middles: NDArray[np.float64]
 
     def to_body(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Room to body, ``Rᵀ (x - c)``; `points` has shape (F, D) or (F, n, D)."""
+        """Transform points (F, D) or (F, n, D) from room to body coordinates, ``Rᵀ (x - c)``."""
         arms = points.reshape(len(points), -1, points.shape[-1]) - self.middles[:, None]
         return (arms @ self.turns).reshape(points.shape)
 
     def to_room(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Body to room, ``R x + c``; the inverse of `to_body`."""
+        """Transform points from body to room coordinates, ``R x + c``."""
         arms = points.reshape(len(points), -1, points.shape[-1])
         there = arms @ self.turns.swapaxes(1, 2) + self.middles[:, None]
         return there.reshape(points.shape)
 
     def of(self, frames: NDArray[np.int64]) -> Body:
-        """Give the body of some of the frames, in any order."""
+        """Return the poses of some of the frames, in any order."""
         return Body(turns=self.turns[frames], middles=self.middles[frames])
 
 
 def fit_body(points: NDArray[np.float64], weights: NDArray[np.float64]) -> Body:
     """Fit a rigid body to its markers in every frame by weighted least squares.
 
-    Its shape is the mean over the frames. With fewer than D markers it is moved and not turned.
+    The shape is the mean over the frames. With fewer than D markers the body is translated only.
 
     Parameters
     ----------
@@ -76,11 +76,11 @@ def fit_body(points: NDArray[np.float64], weights: NDArray[np.float64]) -> Body:
     arms = points - middles[:, None]
     shape = arms[F // 2]
     for i in range(ROUNDS + 1):
-        # A few frames are enough for the shape; all are turned by it.
+        # A few frames are enough for the shape; the rotation is fitted in every frame.
         chosen = arms[:: max(1, F // 200)] if i < ROUNDS else arms
         U, _, Vt = np.linalg.svd(chosen.swapaxes(1, 2) @ (w[:, None] * shape))
         flip = np.ones((len(chosen), D))
-        flip[:, -1] = np.sign(np.linalg.det(U) * np.linalg.det(Vt))  # a body is never mirrored
+        flip[:, -1] = np.sign(np.linalg.det(U) * np.linalg.det(Vt))  # excludes reflections
         turns = (U * flip[:, None]) @ Vt
         if i < ROUNDS:
             shape = (chosen @ turns).mean(axis=0)

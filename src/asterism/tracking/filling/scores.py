@@ -1,6 +1,6 @@
-"""How far estimates are off where the truth is known: what to make of them, and how sure it is.
+"""Weights and standard deviations of a fill from the estimators' errors in held-out windows.
 
-Symbols: J estimators, H windows, L frames, D axes, C the covariance of their errors.
+Symbols: J estimators, H windows, L frames, D axes, C the covariance of the estimators' errors.
 """
 
 from __future__ import annotations
@@ -20,35 +20,35 @@ if TYPE_CHECKING:
 
 __all__ = ["Fill", "disagreement_factor", "error_profile", "minimum_variance_weights", "settle"]
 
-LEAST_WINDOWS, LEAST_APART = 8, 2
-"""Windows that are needed, and so many of them may hide nothing that another hides."""
+MIN_WINDOWS, MIN_APART = 8, 2
+"""Smallest number of windows, and of disjoint windows among them."""
 OWN_WINDOWS = 0.25
-"""What estimators say of themselves counts for this part of a window that is apart."""
+"""Weight of the estimators' own variances, in disjoint windows."""
 CAUTION = 4.0
-"""Squared logarithms that it takes to believe half of what the windows tell of disagreement: as
-long as they all disagree alike, errors are taken to grow as it does."""
-FARTHEST = 4.0
-"""Logarithm of how much more or less than the windows a gap can disagree and be believed."""
+"""Sum of squared log disagreements at which the regression slope has half of its weight; with less
+variation the slope stays near its prior of 1."""
+MAX_LOG_RATIO = 4.0
+"""Largest log ratio of a gap's disagreement to that of the windows."""
 TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fill:
-    """A gap filled.
+    """Fill of one gap.
 
     Parameters
     ----------
     points : ndarray, shape (L, D)
-        Metres.
+        Filled positions, metres.
     stds : ndarray, shape (L,)
         Standard deviation of a coordinate, metres.
     weights : ndarray, shape (J,)
-        Of the estimators, summing to 1.
+        Weights of the estimators, with sum 1.
     rms : ndarray, shape (J,)
-        How far each is off in the windows, root of the mean square distance, metres; NaN where
-        there are too few.
+        Root mean square distance of each estimator in the windows, metres; NaN with too few
+        windows.
     n_windows : int
-        Windows of which none hides what another hides; 0 where there are too few to go by.
+        Number of disjoint windows; 0 if there are too few.
     """
 
     points: NDArray[np.float64]
@@ -59,13 +59,13 @@ class Fill:
 
 
 def settle(found: Estimates) -> Fill:
-    """Weigh the estimators by their errors in the windows, and say how far the fill may be off."""
+    """Combine the estimators by their errors in the windows, with a standard deviation."""
     values = np.stack([one.values for one in found.each])
     own = np.stack([one.variances for one in found.each])
     H, L, _ = found.truth.shape
     n = n_apart(found.windows, L)
-    if H < LEAST_WINDOWS or n < LEAST_APART:
-        return _at_their_word(values[:, -1], own)
+    if H < MIN_WINDOWS or n < MIN_APART:
+        return _by_own_variance(values[:, -1], own)
     errors = values[:, :-1] - found.truth
     weights = minimum_variance_weights(errors)
     mixed = np.einsum("j,jhld->hld", weights, values)
@@ -82,11 +82,11 @@ def settle(found: Estimates) -> Fill:
     )
 
 
-def _at_their_word(values: NDArray[np.float64], own: NDArray[np.float64]) -> Fill:
-    """Take the estimator that is surest of itself, and doubt it where another says otherwise.
+def _by_own_variance(values: NDArray[np.float64], own: NDArray[np.float64]) -> Fill:
+    """Return the estimate with the smallest own variance, inflated by the others' disagreement.
 
-    The first, the smoother, is not asked where there are others: over a gap that is long for its
-    take it is sure of what it cannot know.
+    The smoother, which is the first, is used only without others: over a gap that is long for its
+    capture its variance is too small.
     """
     J = len(own)
     asked = np.arange(J)[min(1, J - 1) :]
@@ -102,9 +102,9 @@ def _at_their_word(values: NDArray[np.float64], own: NDArray[np.float64]) -> Fil
 
 
 def minimum_variance_weights(errors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weights ≥ 0 summing to 1 whose mean has the least variance: ``C⁻¹1 / 1ᵀC⁻¹1``.
+    """Return the weights ≥ 0 with sum 1 of the minimum-variance mean: ``C⁻¹1 / 1ᵀC⁻¹1``.
 
-    Of up to three estimators every subset is tried, and the best taken that needs none below 0.
+    Every subset of the estimators is tried; the best one without a negative weight is used.
     """
     J = len(errors)
     flat = errors.reshape(J, -1)
@@ -114,7 +114,7 @@ def minimum_variance_weights(errors: NDArray[np.float64]) -> NDArray[np.float64]
     best, least = np.eye(J)[int(np.argmin(np.diag(C)))], np.inf
     for n in range(1, J + 1):
         for chosen in map(list, itertools.combinations(range(J), n)):
-            scale = np.sqrt(np.diag(C)[chosen])  # errors may differ by a factor of millions
+            scale = np.sqrt(np.diag(C)[chosen])  # errors can differ by a factor of millions
             w = np.linalg.solve(C[np.ix_(chosen, chosen)] / np.outer(scale, scale), 1 / scale)
             w /= scale
             if (w >= 0).all() and 1 / w.sum() < least:
@@ -125,9 +125,9 @@ def minimum_variance_weights(errors: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def error_profile(off: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean square error of a coordinate in each hidden frame, shape (L,).
+    """Return the mean square error of a coordinate in each missing frame, shape (L,).
 
-    Where no window knows the truth, by the frames around it.
+    A frame that no window covers is interpolated from the frames around it.
     """
     every = np.arange(off.shape[1])
     is_known = np.isfinite(off[..., 0])
@@ -137,7 +137,7 @@ def error_profile(off: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _smoothed(profile: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Take the running mean over an eighth of the gap, so that chance makes no waves."""
+    """Return the running mean over an eighth of the gap, which suppresses random variation."""
     k = len(profile) // 16
     padded = np.pad(profile, k, mode="edge")
     total = np.concatenate([[0], np.cumsum(padded)])
@@ -145,17 +145,17 @@ def _smoothed(profile: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def disagreement_factor(apart: NDArray[np.float64], z: NDArray[np.float64]) -> float:
-    """How much farther off this fill may be than the windows: as the estimators disagree more.
+    """Return the factor on the errors that follows from the estimators' disagreement in the gap.
 
-    The log of a window's error is regressed on the log of how far the estimators are apart; before
-    any window is seen the slope is 1.
+    The log error of a window is regressed on the log disagreement of the estimators, with a prior
+    slope of 1.
 
     Parameters
     ----------
     apart : ndarray, shape (J, H + 1, L, D)
-        Estimates from their mean, in the windows and, last, in the gap.
+        Differences of the estimates from their mean, in the windows and, last, in the gap.
     z : ndarray, shape (H, L, D)
-        Errors in the windows, relative to their usual size; NaN where the truth is not known.
+        Errors in the windows, relative to their usual size; NaN without a true position.
     """
     spread = np.log((apart**2).mean(axis=(0, 2, 3)) + TINY) / 2
     square = np.nanmean(z**2, axis=(1, 2))
@@ -163,6 +163,6 @@ def disagreement_factor(apart: NDArray[np.float64], z: NDArray[np.float64]) -> f
         return 1.0
     x, y = spread - spread[:-1].mean(), np.log(square) / 2
     slope = (x[:-1] @ (y - y.mean()) + CAUTION) / (x[:-1] @ x[:-1] + CAUTION)
-    factors = np.exp(slope * x.clip(-FARTHEST, FARTHEST))
-    # The windows as a whole must come out with their own mean square.
+    factors = np.exp(slope * x.clip(-MAX_LOG_RATIO, MAX_LOG_RATIO))
+    # The factor is normalised so that the windows as a whole keep their mean square error.
     return float(factors[-1] * np.sqrt((square / factors[:-1] ** 2).mean() / square.mean()))

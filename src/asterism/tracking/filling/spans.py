@@ -1,4 +1,4 @@
-"""Where tracks have gaps, what is known at their ends, and where else the same could be hidden.
+"""Gaps of tracks, the frames at their ends, and held-out windows of the same length.
 
 Symbols: L frames of a gap, n frames at its ends, W = n + L, H held-out windows.
 """
@@ -16,16 +16,17 @@ if TYPE_CHECKING:
 __all__ = ["NEAREST_ENDS", "N_ENDS", "Span", "find_gaps", "held_out", "n_apart", "usable_ends"]
 
 N_ENDS = 10
-"""Frames at each end of a gap that are looked at: enough for a slope, too few for the past."""
+"""Number of frames used at each end of a gap: enough for a slope, few enough to be local."""
 REACH = 2
-"""They lie within so many times `N_ENDS` frames of the gap, for there may be others beside it."""
+"""Largest distance of these frames from the gap, in multiples of `N_ENDS` frames; other gaps
+may lie in between."""
 NEAREST_ENDS = 3
-"""Frames on each side in which all must have been seen, or the helpers known."""
+"""Number of frames on each side in which the marker must be detected and its helpers known."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Span:
-    """A gap of a track: its frames from `first` to `last` are missing, those around it are not."""
+    """Gap of a track: the frames `first` to `last` are missing, those before and after are not."""
 
     track: int
     first: int
@@ -37,18 +38,18 @@ class Span:
         return self.last - self.first + 1
 
     @property
-    def hidden(self) -> NDArray[np.int64]:
+    def frames(self) -> NDArray[np.int64]:
         """Frames of the gap, shape (L,)."""
         return np.arange(self.first, self.last + 1)
 
 
 def find_gaps(seen: NDArray[np.bool_]) -> list[Span]:
-    """Find every gap that has both ends, by track and then by time.
+    """Find every gap with a detection at both ends, by track and then by time.
 
     Parameters
     ----------
     seen : ndarray of bool, shape (T, K)
-        Where each track was measured.
+        True where each track was measured.
     """
     change = np.diff(seen.T.astype(np.int8), axis=1)
     lost_track, lost = np.nonzero(change < 0)
@@ -56,7 +57,7 @@ def find_gaps(seen: NDArray[np.bool_]) -> list[Span]:
     spans: list[Span] = []
     for track in np.unique(lost_track):
         begins, stops = lost[lost_track == track] + 1, found[found_track == track]
-        # What comes before the first detection is no gap, nor what comes after the last.
+        # Frames before the first and after the last detection are not gaps.
         stops = stops[stops >= begins[0]]
         for first, last in zip(begins.tolist(), stops.tolist(), strict=False):
             spans.append(Span(track=int(track), first=first, last=last))
@@ -64,14 +65,14 @@ def find_gaps(seen: NDArray[np.bool_]) -> list[Span]:
 
 
 def usable_ends(seen: NDArray[np.bool_], span: Span) -> NDArray[np.int64]:
-    """Give up to `N_ENDS` frames on each side in which the track was seen, in order of time.
+    """Return up to `N_ENDS` frames on each side in which the track was detected, by time.
 
     Parameters
     ----------
     seen : ndarray of bool, shape (T,)
-        Where the track was measured.
+        True where the track was measured.
     span : Span
-        Its gap.
+        Gap of the track.
 
     Returns
     -------
@@ -90,26 +91,26 @@ def held_out(
     helped: NDArray[np.bool_],
     frames: NDArray[np.int64],
     span: Span,
-    most: int,
+    max_windows: int,
 ) -> NDArray[np.int64]:
-    """Move the frames of a gap and its ends to where all that they need is known.
+    """Find windows, shifted copies of a gap and its ends, in which marker and helpers are known.
 
     Parameters
     ----------
     own : ndarray of bool, shape (T,)
-        Where the marker was seen: needed in the `NEAREST_ENDS` frames on each side, for what is
-        bridged there would know of what is hidden, and in half of what is hidden.
+        True where the marker was detected. Required in the `NEAREST_ENDS` frames on each side,
+        because bridged positions there depend on withheld ones, and in half of the withheld
+        frames.
     bridged : ndarray of bool, shape (T,)
-        Where it was seen or bridged: needed in all other frames, for a stretch of which a long part
-        is not known tells little.
+        True where the marker was detected or bridged. Required in all other frames.
     helped : ndarray of bool, shape (T,)
-        Where all its helpers are known: needed throughout.
+        True where all helpers are known. Required in all frames.
     frames : ndarray of int, shape (W,)
         Frames of the gap and of its ends, in order of time.
     span : Span
-        The gap.
-    most : int
-        Windows that are wanted at most; they are spread evenly over those there are.
+        Gap to imitate.
+    max_windows : int
+        Largest number of windows; they are spread evenly over the possible ones.
 
     Returns
     -------
@@ -121,7 +122,7 @@ def held_out(
         return np.empty((0, len(frames)), dtype=np.int64)
 
     def count(mask: NDArray[np.bool_], frames: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Count from each start those of the frames that the mask has, a run at a time."""
+        """Count the frames within the mask for each shift, one run of frames at a time."""
         total = np.concatenate([[0], np.cumsum(mask)])
         found = np.zeros(n_starts, dtype=np.int64)
         for shift, length in _runs(frames - first):
@@ -132,15 +133,15 @@ def held_out(
     nearest = np.concatenate([before[-NEAREST_ENDS:], after[:NEAREST_ENDS]])
     fits = count(helped & bridged, frames) == len(frames)
     fits &= count(own, nearest) == len(nearest)
-    fits &= 2 * count(own, span.hidden) >= span.length
+    fits &= 2 * count(own, span.frames) >= span.length
     starts = np.flatnonzero(fits)
-    if len(starts) > most:
-        starts = starts[np.linspace(0, len(starts) - 1, most).round().astype(int)]
+    if len(starts) > max_windows:
+        starts = starts[np.linspace(0, len(starts) - 1, max_windows).round().astype(int)]
     return starts[:, None] + (frames - first)
 
 
 def _runs(shifts: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """Give begin and length of each unbroken run of some numbers."""
+    """Return start and length of each run of consecutive numbers."""
     if not len(shifts):
         return []
     ordered = np.sort(shifts)
@@ -149,7 +150,7 @@ def _runs(shifts: NDArray[np.int64]) -> list[tuple[int, int]]:
 
 
 def n_apart(windows: NDArray[np.int64], length: int) -> int:
-    """Count windows of which none hides a frame that another hides, greedily in time."""
+    """Count windows without a common withheld frame, greedily in order of time."""
     n, free = 0, -1
     for start in windows.min(axis=1, initial=np.iinfo(np.int64).max).tolist():
         if start >= free:

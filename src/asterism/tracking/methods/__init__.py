@@ -1,4 +1,4 @@
-"""Methods of association: one file a method, and what methods share."""
+"""Methods of association, one file for each, and their common parts."""
 
 from asterism.tracking.methods.base import Method, Update
 from asterism.tracking.methods.chain_options import ChainOptions

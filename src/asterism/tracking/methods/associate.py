@@ -1,4 +1,4 @@
-"""Run one method over a capture: detections in, tracks out."""
+"""Association of a capture by one method."""
 
 from __future__ import annotations
 
@@ -29,27 +29,27 @@ def associate(
     start: Tracks | None = None,
     progress: Callable[[int], Any] | None = None,
 ) -> Tracks:
-    """Run a method over a capture.
+    """Associate the detections of a capture by one method.
 
     Parameters
     ----------
     method : Method
-        The way of searching.
+        Method of association, with its options.
     detections : Detections
-        Unnamed points; those that were filled are left out.
+        Unnamed points; filled points are left out.
     model : TrackingModel
-        The model that is searched.
+        Model whose posterior is searched.
     seed : int, optional
-        For the methods that draw.
+        Seed of the methods that draw random numbers.
     start : Tracks, optional
-        Tracks of the same detections that `MCMCDA` begins with.
+        Tracks of the same detections from which `MCMCDA` starts.
     progress : callable, optional
-        Called now and then with the number of frames done.
+        Called from time to time with the number of finished frames.
 
     Returns
     -------
     Tracks
-        ``info["log_posterior"]`` and what the method tells.
+        Tracks with ``info["log_posterior"]`` and the method's own counts.
 
     Raises
     ------
@@ -73,14 +73,14 @@ def associate(
     state, labels, confidence = method.run(state, detections, progress=progress)
     info = dict(state.info)
     if detections.covariances is not None:
-        info["isotropic_noise"] = True  # tracks have one variance for all axes
+        info["isotropic_noise"] = True  # a track has one variance for all axes
     tracks = Tracks(detections=detections, labels=labels, confidence=confidence, info=info)
     info["log_posterior"] = log_posterior(tracks, model)
     return tracks
 
 
 def check_method(method: object) -> None:
-    """Raise `ParameterError` unless it is a method; a name and a class are the usual mistakes."""
+    """Raise `ParameterError` unless the object is a method, and not a name or a class."""
     check_kind("method", method, Method, 'am.GNN(), or am.tracking.method_by_name("gnn")')
 
 

@@ -1,7 +1,7 @@
-"""The contract of every method: `init` makes a state, `step` takes the next frame.
+"""Interface of every method: `init` makes a state, `step` processes the next frame.
 
-A state is a value: `step` gives a new one and leaves the old one as it was, so a run can be forked
-or taken back. `run` is the same over many frames.
+A state is a value: `step` returns a new one and leaves the old one unchanged, so a run can be
+forked or resumed from an earlier frame. `run` is equivalent to a loop over `step`.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ __all__ = ["Method", "MethodState", "Update", "checked_covariances", "checked_fr
 
 @runtime_checkable
 class MethodState(Protocol):
-    """What every method's state tells."""
+    """Properties of the state of every method."""
 
     @property
     def n_seen(self) -> int:
-        """Number of detections taken so far."""
+        """Number of detections processed so far."""
         ...
 
     @property
     def info(self) -> Mapping[str, float]:
-        """Numbers about the run so far; what was approximated, and by how much, among them."""
+        """Counts of the run so far, including the sizes of approximations."""
         ...
 
 
@@ -50,22 +50,22 @@ def _nothing() -> NDArray[np.int64]:
 
 @record(eq=False)
 class Update:
-    """What one frame decided.
+    """Labels decided or revised by one frame.
 
     Parameters
     ----------
     labels : ndarray of int, shape (n,)
-        Track of each point of the frame as known now; -1 for clutter or not yet believed.
+        Current track of each point of the frame; -1 for clutter or a tentative track.
     revised : ndarray of int, shape (r,)
         Earlier detections whose label changes, numbered from 0 in order of arrival.
     revised_labels : ndarray of int, shape (r,)
-        Their labels.
+        New labels of these detections.
     confidence : ndarray, shape (n,), or None
-        Probability that each label is right, from methods that know it.
+        Probability that each label is right, if the method estimates it.
     revised_confidence : ndarray, shape (r,), or None
-        The same of the revised labels.
+        Probability that each revised label is right.
     info : mapping
-        Numbers about the step: counts of tracks, groups, candidates.
+        Counts of the step: tracks, groups, candidates.
     """
 
     labels: NDArray[np.int64]
@@ -84,23 +84,23 @@ class Update:
 
 
 class Method(ABC, Generic[State]):
-    """A way of telling which detection is which marker."""
+    """Method of association, which assigns detections to tracks frame by frame."""
 
     name: ClassVar[str]
-    """The method's name on the command line."""
+    """Name of the method on the command line."""
 
     @abstractmethod
     def init(self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None) -> State:
-        """Make the state before the first frame.
+        """Return the state before the first frame.
 
         Parameters
         ----------
         model : TrackingModel
-            The model that is searched.
+            Model whose posterior is searched.
         n_axes : int
-            2 or 3 coordinates.
+            Number of coordinates, 2 or 3.
         seed : int, optional
-            For the methods that draw; the others give the same whatever it is.
+            Seed of the methods that draw random numbers; the others ignore it.
         """
 
     @abstractmethod
@@ -112,29 +112,29 @@ class Method(ABC, Generic[State]):
         *,
         covariances: ArrayLike | None = None,
     ) -> tuple[State, Update]:
-        """Take the next frame.
+        """Process the next frame.
 
         Parameters
         ----------
         state : State
-            From `init` or the step before; it is not changed.
+            State from `init` or the previous step; it is not changed.
         time : float
-            Seconds, later than the frame before.
+            Time of the frame, seconds, later than the previous frame.
         points : array_like, shape (n, D)
-            Metres; may be empty.
+            Points of the frame, metres; may be empty.
         covariances : array_like, shape (n, D, D), optional
-            Of the points, m²: noise that is theirs beyond the sensor's. Tracks have one variance
-            for all axes, so the mean over the axes is taken.
+            Covariance of each point, m², added to the sensor's noise. Its mean variance over the
+            axes is used, because a track has one variance for all axes.
 
         Returns
         -------
         state, update
-            The next state and what was decided.
+            Next state, and the labels decided by the frame.
 
         Raises
         ------
         ParameterError
-            If the state is none of this method's, the time does not advance, or the points are
+            If the state belongs to another method, the time does not advance, or the points are
             not finite numbers.
         """
 
@@ -145,22 +145,22 @@ class Method(ABC, Generic[State]):
         *,
         progress: Callable[[int], Any] | None = None,
     ) -> tuple[State, NDArray[np.int64], NDArray[np.float64] | None]:
-        """Take all frames of `detections`: the loop over `step`, with its revisions applied.
+        """Process all frames of `detections`, equivalent to a loop over `step` with its revisions.
 
         Parameters
         ----------
         state : State
-            From `init`.
+            State from `init`.
         detections : Detections
-            The frames.
+            Frames to process.
         progress : callable, optional
-            Called now and then with the number of frames done.
+            Called from time to time with the number of finished frames.
 
         Returns
         -------
         state, labels, confidence
-            The last state, the label of every detection (N,), and the confidences if the method
-            has any.
+            Last state, label of every detection (N,), and confidences if the method estimates
+            them.
         """
         check_kind("state", state, MethodState, "method.init(model)")
         first = state.n_seen
@@ -188,7 +188,7 @@ class Method(ABC, Generic[State]):
 def checked_frame(
     time: float, last_time: float, points: ArrayLike, n_axes: int
 ) -> NDArray[np.float64]:
-    """Check one frame of a stream and give its points as an (n, D) array.
+    """Check one frame of a stream and return its points as an (n, D) array.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def checked_frame(
 
 
 def checked_covariances(covariances: ArrayLike, frame: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Check the covariances of a frame's points.
+    """Check the covariances of a frame's points and return them.
 
     Raises
     ------

@@ -1,11 +1,11 @@
-"""How the chain of Markov chain Monte Carlo data association draws and weighs its moves.
+"""Options of the Markov chain of MCMCDA: its proposals, its acceptance and its groups.
 
-The defaults are what measured best; the other choices are those of the 2010 report.
+The defaults scored best in measurements; the alternatives are those of the 2010 report.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping  # noqa: TC003 - options are read off the annotations
+from collections.abc import Mapping  # noqa: TC003 - options are read from the annotations
 from typing import Literal
 
 from asterism.checks import check_fields, check_number
@@ -19,41 +19,44 @@ __all__ = ["ChainOptions"]
 
 @record
 class ChainOptions:
-    """The rules of a walk over partitions.
+    """Options of the Markov chain over partitions.
 
     Parameters
     ----------
     proposal : {"informed", "uniform"}
-        How moves lengthen a track: detections drawn by what they add to the score, or all alike
-        with a fixed probability to stop, as in the report.
+        Proposal distribution of moves that extend a track. "informed" draws detections by their
+        gain in score; "uniform" draws all with equal probability and stops with a fixed
+        probability, as in the 2010 report.
     move_weights : {"uniform", "report"} or mapping
-        How often each kind of move is drawn: all alike, by equation 4.7 of the report (whose eight
-        these are), or weights by kind.
+        Relative frequency of each kind of move: equal for all kinds, by equation 4.7 of the 2010
+        report (its eight kinds), or weights by kind.
     ambiguous_share : float
-        Share of the moves that are drawn at the ambiguous links, where two tracks change what they
-        have; 0 for none, as in the report.
+        Share of the moves drawn at ambiguous links, which exchange detections between two tracks,
+        in [0, 1]. 0 for none, as in the 2010 report.
     ambiguous_within : float
-        Nats. A link that is less plausible by more is not ambiguous.
+        Largest log-likelihood ratio between the alternatives of an ambiguous link, nats. Larger
+        values make more links ambiguous.
     acceptance : {"metropolis", "ascent"}
-        The report draws from the best partition so far and weighs against the last one taken
-        ("ascent"): that climbs and does not sample.
+        Acceptance rule: "metropolis" samples the posterior. "ascent", of the 2010 report, draws
+        from the best partition so far and compares with the last accepted one: it maximises and
+        does not sample.
     first_rules : bool
-        The report's: nothing but births while there is no track, and neither merge nor switch while
-        there is one.
+        Whether the 2010 report's rules for the first tracks apply: only births without a track,
+        and neither merge nor switch with a single track.
     assignment : bool
-        Whether the walk begins at the exact assignment of a new frame; otherwise its detections are
-        in no track at first, as in the report.
+        Whether the chain starts from the exact assignment of a new frame. Otherwise its detections
+        are initially in no track, as in the 2010 report.
     groups : {"likelihood", "clusters", "cells", "whole"}
-        What is walked over apart: tracks and detections that no plausible link joins; that are
-        further than `distance` from each other; that are in different cells of space with that
-        edge, which are shifted by half a cell in every other frame; or nothing.
+        Groups of tracks and detections with separate chains. "likelihood" separates what no
+        plausible link joins; "clusters" what is farther apart than `distance`; "cells" uses cells
+        of space with that edge, shifted by half a cell in every other frame; "whole" is one group.
     distance : float, optional
-        Metres; for "clusters" and "cells" alone.
+        Distance of "clusters", or edge of "cells", metres; None for the other groups.
     bonds : {0, 2, 3, 4}
-        Tracks that were seen in every frame of the window, so many of which kept their distances
-        two by two, are certain: the walk leaves them as they are. 0 for none.
+        Number of tracks with stable mutual distances that fix each other. Tracks detected in every
+        frame of the window that form such a group are not changed by the chain. 0 for none.
     bond_tolerance : float, optional
-        Metres by which a distance that is kept may vary; by default 6√2 times the noise.
+        Largest variation of a stable distance, metres; by default 6√2 times the noise.
     """
 
     proposal: Literal["informed", "uniform"] = "informed"

@@ -1,4 +1,4 @@
-"""What methods share whose loop is in the engine: a state that is a value, many frames at once."""
+"""Base class of the methods whose loop over frames runs in the engine."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ if TYPE_CHECKING:
 __all__ = ["EngineMethod", "EngineState"]
 
 FRAMES_A_CALL = 1000
-"""The engine takes so many frames at a time: few enough to show progress and to be stopped."""
+"""Number of frames of one call, small enough to report progress and to interrupt the run."""
 
 
 @record(eq=False)
 class EngineState:
-    """The state of a method in the engine.
+    """State of a method in the engine.
 
     Parameters
     ----------
     model : TrackingModel
-        The model.
+        Tracking model.
     n_axes : int
-        2 or 3.
+        Number of coordinates, 2 or 3.
     tracker : one of the engine's trackers
-        The live tracks, in the engine.
+        Current tracks in the engine.
     about : callable
-        What the method tells of a frame or of all so far.
+        Function that returns the method's counts of a frame or of all frames so far.
     """
 
     model: TrackingModel
@@ -68,7 +68,7 @@ class EngineState:
 
     @property
     def n_ids(self) -> int:
-        """Number of identities given so far."""
+        """Number of confirmed tracks so far."""
         return self.tracker.n_ids
 
     @property
@@ -78,11 +78,11 @@ class EngineState:
 
     @property
     def info(self) -> dict[str, float]:
-        """Sums of what is counted and the worst of what is a size or a bound, over all frames."""
+        """Counts summed over all frames, and the largest of sizes and bounds."""
         return self.about(self.tracker.total)
 
     def live(self) -> dict[str, NDArray[Any]]:
-        """Return the confirmed tracks as they are now, for a display.
+        """Return the current confirmed tracks, for example for a display.
 
         Returns
         -------
@@ -101,20 +101,20 @@ class EngineState:
 
 @record
 class EngineMethod(Method[EngineState]):
-    """A method whose frames are taken by one of the engine's trackers."""
+    """Method whose frames are processed by one of the engine's trackers."""
 
     @abstractmethod
     def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> Tracker:
-        """Make the engine's tracker."""
+        """Return the engine's tracker."""
 
     @abstractmethod
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
-        """Tell what a frame, or a run of them, took."""
+        """Return the counts of a frame or of a run of frames."""
 
     def init(
         self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None
     ) -> EngineState:
-        """Make the state before the first frame; see `Method.init`."""
+        """Return the state before the first frame; see `Method.init`."""
         if n_axes not in (2, 3):
             raise ParameterError("n_axes", "2 or 3", repr(n_axes))
         check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
@@ -129,7 +129,7 @@ class EngineMethod(Method[EngineState]):
         *,
         covariances: ArrayLike | None = None,
     ) -> tuple[EngineState, Update]:
-        """Take the next frame; see `Method.step`."""
+        """Process the next frame; see `Method.step`."""
         from asterism import _engine
         from asterism.model.compiled import no_transition, transition, with_noise
 
@@ -138,7 +138,7 @@ class EngineMethod(Method[EngineState]):
         frame = checked_frame(time, before.last_time, points, state.n_axes)
         if covariances is not None:
             frame = with_noise(frame, checked_covariances(covariances, frame))
-        # The first frame has no step before it, and no track that would take it.
+        # The first frame has no step before it and no tracks, so no transition is needed.
         dt = time - before.last_time if before.n_frames else None
         motion = state.model.motion
         F, Q = transition(motion, dt) if dt else no_transition(motion)
@@ -164,7 +164,7 @@ class EngineMethod(Method[EngineState]):
         *,
         progress: Callable[[int], Any] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
-        """Take all frames in the engine; the same labels as the loop over `step`."""
+        """Process all frames in the engine, with the same labels as a loop over `step`."""
         from asterism import _engine
         from asterism.model.compiled import steps_of, with_noise
 
@@ -177,7 +177,7 @@ class EngineMethod(Method[EngineState]):
         sure = np.zeros(len(labels) if tracker.has_confidence else 0)
         if detections.n_frames:
             checked_frame(float(times[0]), tracker.last_time, [], state.n_axes)
-        # A state that has seen frames before is led on from the last of them.
+        # A state with earlier frames is continued from the last of them.
         n_before = min(tracker.n_frames, 1)
         known = np.concatenate([np.full(n_before, tracker.last_time), times])
         kind, F, Q = steps_of(state.model.motion, known)

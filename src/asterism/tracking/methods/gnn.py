@@ -1,4 +1,4 @@
-"""Global nearest neighbour: the most likely joint pairing of tracks and detections, exactly.
+"""Global nearest neighbour: the most likely assignment of detections to tracks in each frame.
 
 Blackman & Popoli 1999, ch. 6; §2.4 of the report (linear assignment).
 """
@@ -28,22 +28,23 @@ __all__ = ["GNN"]
 
 @record
 class GNN(EngineMethod):
-    """Global nearest neighbour: each frame by one exact linear assignment.
+    """Global nearest neighbour: one exact linear assignment in each frame.
 
-    A pairing of track and detection wins ``log P_d N(y; ŷ, S) / (λ_f + P_d λ_b) - log(1 - P_d)``
-    over a missed detection and a point left over as clutter or a new marker; for a tentative track
-    the gain is weighed with the odds that it is a marker at all. The pairing with the greatest sum
-    is found exactly (shortest augmenting paths, group by group): first for the confirmed tracks,
-    then for the tentative ones among the points that are still free.
+    The gain of assigning a detection to a track is ``log P_d N(y; ŷ, S) / (λ_f + P_d λ_b) - log(1
+    - P_d)``, relative to a missed detection and a point that is clutter or a new marker. For a
+    tentative track it includes the odds that the track is a marker. The assignment with the
+    largest total gain is computed exactly (shortest augmenting paths, group by group): first for
+    confirmed
+    tracks, then for tentative tracks among the remaining points.
 
     Parameters
     ----------
     gate : Gate
-        Which detections a track may take.
+        Gate, the region in which a track can be assigned a detection.
     lifecycle : Lifecycle
-        When a tentative track is confirmed or deleted.
+        Confirmation and deletion of tentative tracks.
     rigid : Rigidity, optional
-        How neighbours predict occluded markers; None where they do not.
+        Prediction of occluded markers by their neighbours; None for no such prediction.
 
     Examples
     --------

@@ -27,43 +27,43 @@ __all__ = ["JPDA"]
 
 @record
 class JPDA(EngineMethod):
-    """Joint probabilistic data association: each frame averaged over all that it may mean.
+    """Joint probabilistic data association: an average over all associations of a frame.
 
-    Every way of sharing the detections out among the confirmed tracks has a probability, and so has
-    every pairing: ``β_ij``, summed over all of them, exactly where a group takes no more than
-    `max_states` (`joint_marginals`). A pairing a billion times less likely than a miss is none. A
-    track is moved by all its detections, each with its probability, and brought back to one
-    Gaussian; the axes share one covariance, so what the detections differ by is shared out evenly
-    among them.
+    Every joint event assigns the detections to the confirmed tracks in one way. The marginal
+    ``β_ij`` of a pairing is summed over all events, exactly if a group needs at most `max_states`
+    states (`joint_marginals`). Pairings a billion times less likely than a missed detection are
+    excluded. A track is updated by all its detections with these weights, and the mixture is
+    reduced to one Gaussian. The axes share one covariance, so the spread of the means is averaged
+    over them.
 
-    Each track has a probability ``r`` to exist (JIPDA; Musicki & Evans 2004): it is missed with
-    probability ``1 - r P_d``, and what it is seen or missed with changes it. Tentative tracks take
-    what the confirmed ones leave over by the likeliest event; the confidence of each label
-    supposes that those of the other tentative tracks are right.
+    Each track has an existence probability ``r`` (JIPDA; Musicki & Evans 2004): it is missed with
+    probability ``1 - r P_d``, and every frame updates ``r``. Tentative tracks are assigned the
+    remaining detections of the most probable event; the confidence of such a label assumes that
+    the labels of the other tentative tracks are right.
 
-    Labels are those of the most probable joint event; their confidence is the marginal of the
-    pairing. Where there is no label, it is the probability that the point is of no track.
+    Labels are those of the most probable joint event, and their confidence is the marginal of the
+    pairing. Without a label it is the probability that the point belongs to no track.
 
     Parameters
     ----------
     max_states : int
-        Most states of the exact sum over a group's events, 1 to 2^30; beyond that it is taken over
-        a beam of as many, and ``info`` says how far off it can be.
+        Largest number of states of the exact sum over a group's events, 1 to 2^30. Larger groups
+        are summed over a beam of that size, and ``info["bound"]`` bounds the error. Larger values
+        need more time and memory.
     guard : bool
-        Whether to guard against coalescence: of all events that differ only by who is who, the
-        likeliest alone moves the tracks (JPDA*; Blom & Bloem 2000). Marginals and labels are the
-        same with it and without.
+        Whether to prevent coalescence of tracks. Of all events that differ only by a permutation
+        of tracks, only the most probable one updates them (JPDA*; Blom & Bloem 2000). Marginals
+        and labels of the frame are not affected.
     sure_until_gap : bool
-        Whether a confirmed track counts as existing until its gap exceeds d̄: occlusions come in
-        bursts, of which a probability of detection knows nothing. Otherwise, as in JIPDA, each miss
-        makes it less likely to exist and to take a detection, and it ends below
-        ``1 - confirm_probability``.
+        Whether a confirmed track keeps existence probability 1 until its gap exceeds d̄, because
+        missed detections come in bursts. Otherwise, as in JIPDA, each missed detection lowers the
+        existence probability, and the track is terminated below ``1 - confirm_probability``.
     gate : Gate
-        Which detections a track may take.
+        Gate, the region in which a track can be assigned a detection.
     lifecycle : Lifecycle
-        When a tentative track is confirmed or deleted.
+        Confirmation and deletion of tentative tracks.
     rigid : Rigidity, optional
-        How neighbours predict occluded markers; None where they do not.
+        Prediction of occluded markers by their neighbours; None for no such prediction.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The kinds of moves of Markov chain Monte Carlo data association, and how often each is drawn."""
+"""Kinds of moves of Markov chain Monte Carlo data association, and their weights."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ MOVES = (
     "exchange",
     "relocation",
 )
-"""Kinds of moves; the last six are not the report's."""
+"""Kinds of moves; the last six are not in the 2010 report."""
 
 WEIGHTS: dict[str, dict[str, float]] = {
     "uniform": dict.fromkeys(MOVES, 1.0),
-    # Equation 4.7 of the report, its bounds taken apart.
+    # Equation 4.7 of the report, one weight for each kind.
     "report": {
         "birth": 1.0,
         "death": 1.0,
@@ -60,7 +60,7 @@ def checked_weights(weights: str | Mapping[str, float]) -> Mapping[str, float]:
     Raises
     ------
     ParameterError
-        If a kind is unknown, a weight is no number ≥ 0, or moves could not be taken back.
+        If a kind is unknown, a weight is not a number ≥ 0, or a move lacks its reverse move.
     """
     if isinstance(weights, str):
         check_fields("chain.move_weights", [weights], WEIGHTS)

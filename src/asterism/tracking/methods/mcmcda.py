@@ -27,61 +27,61 @@ if TYPE_CHECKING:
 
 __all__ = ["MCMCDA"]
 
-MOST = 1_000_000
-"""Of moves for a marker in a frame, which are then some seconds, and of frames in a window."""
+MAX_COUNT = 1_000_000
+"""Largest number of moves per marker and frame, which take some seconds, and of window frames."""
 FIRST_PASS = 10
-"""Window of the pass over a whole capture from which the chains over all of it begin."""
+"""Window of the first pass over a whole capture, which provides the start of the chains."""
 BLOCK = 100
-"""Frames of a whole capture that are open at a time; blocks overlap by half."""
+"""Number of frames of a block of a whole capture; blocks overlap by half."""
 FLOOR = 1e-4
-"""Least weight of a step of informed growth; to end in the last frame weighs 1."""
+"""Smallest weight of a step of an informed extension; ending in the last frame has weight 1."""
 
 
 @record
 class MCMCDA(EngineMethod):
-    """Markov chain Monte Carlo data association: a walk over the partitions of a window.
+    """Markov chain Monte Carlo data association: sampling of the partitions of a window.
 
-    A move draws a new partition from the present one and is taken with the probability of
-    Metropolis and Hastings, so that partitions are visited as often as the posterior has them
-    (`log_posterior`). In each frame the walk begins at the exact assignment of the new detections
-    and the best partition met is kept. A frame that leaves the window is settled by it; behind the
-    window only the filter states of the tracks are kept: the past informs, and costs nothing.
+    A move proposes a new partition and is accepted with the Metropolis-Hastings probability, so
+    the chain samples the posterior of partitions (`log_posterior`). In each frame the chain starts
+    from
+    the exact assignment of the new detections, and the best visited partition is kept. It decides
+    the frame that leaves the window. Of decided frames only the filter states of the tracks are
+    kept, so the cost of a frame does not grow with time.
 
-    Until a frame is settled its labels are those of the best partition so far, and may change.
+    Until a frame is decided its labels are those of the best partition so far, and can change.
 
     Parameters
     ----------
     window : int or None
-        Frames until one is settled; 1 is the single-scan form. None is for whole captures: when
-        all frames have come, the chains go over them again in blocks of 100 frames that overlap by
-        half, each block given all that is before and after it, with `moves` for each detection.
-        The time is linear in the length of the capture.
+        Number of frames after which a frame is decided; 1 is the single-scan form. None is for
+        whole captures: after the last frame the chains process all frames again in blocks of 100
+        that overlap by half, each conditional on the frames before and after it. The time is
+        linear in the length of the capture.
     moves : float or None
-        Moves in a frame, for each of its detections (or each track, if these are more) that is in
-        doubt; None with a `deadline` alone. Tracks begin by moves alone, so 0 is only for labels to
-        start from: it leaves them as they are, and says how sure they are.
+        Monte Carlo moves per frame and ambiguous detection (or track, if there are more tracks).
+        None for a `deadline` alone. 0 requires initial labels: it keeps them and estimates their
+        confidence.
     deadline : float or None
-        Seconds after the arrival of a frame at which the walk stops; then results depend on the
-        machine, and ``info["moves"]`` says how far it came.
+        Time after the arrival of a frame at which the chain stops, seconds. Results then depend on
+        the machine; ``info["moves"]`` counts the moves.
     confidence : float
-        Moves for the confidence of labels, counted as above; 0 for none. A confidence is the share
-        of a walk in which a detection follows the one that it follows (the first of a track: in
-        which the next follows it; clutter: in which it is in no track).
+        Monte Carlo moves for the confidence of labels, counted as `moves`; 0 for no confidence. A
+        confidence is the share of the chain in which a detection has the same predecessor (first
+        detection of a track: the same successor; clutter: no track).
     end_odds : float
-        A track counts as so many times less likely to end than the model has it, so that it is not
-        broken where a marker moves as the model does not foresee; 1 samples the model's own
-        posterior.
+        Factor by which the termination probability is divided. Values above 1 keep a track through
+        motion that the model does not predict; 1 samples the model's own posterior.
     chains : int
-        Walks beside each other in each frame: the best partition of all counts, and their
-        agreement tells whether they found the same confidence.
+        Number of parallel chains in each frame. The best partition of all is used, and their
+        agreement measures the convergence of the confidence.
     threads : int
-        Walks at the same time. The result does not depend on it.
+        Number of chains that run at the same time. The result does not depend on it.
     keep : {"best", "draw"}
-        What is kept of a walk: the best partition that it met, or the one where it ends, which is
-        drawn from the posterior of the open frames given the settled ones. Draws with different
-        seeds show what the data leave open; a model is estimated from them.
+        Partition of a chain that is kept: the best visited one, or the last one, which is drawn
+        from the posterior of the open frames given the decided ones. Draws with different seeds
+        show the remaining uncertainty; stochastic EM uses them.
     chain : ChainOptions
-        How a walk draws and weighs its moves, and what is walked over apart.
+        Options of the chain: proposals, acceptance and groups.
 
     Examples
     --------
@@ -105,16 +105,16 @@ class MCMCDA(EngineMethod):
 
     def __post_init__(self) -> None:
         if self.window is not None:
-            check_number("window", self.window, above=1, below=MOST, closed=True, integer=True)
+            check_number("window", self.window, above=1, below=MAX_COUNT, closed=True, integer=True)
         elif self.deadline is not None:
-            raise ParameterError("deadline", "none for a whole take", repr(self.deadline))
+            raise ParameterError("deadline", "none for a whole capture", repr(self.deadline))
         if self.moves is not None:
-            check_number("moves", self.moves, above=0, below=MOST, closed=True)
+            check_number("moves", self.moves, above=0, below=MAX_COUNT, closed=True)
         elif self.deadline is None:
-            raise ParameterError("moves", "a number, or a deadline beside it", "None")
+            raise ParameterError("moves", "a number, or a deadline", "None")
         if self.deadline is not None:
             check_number("deadline", self.deadline, above=0)
-        check_number("confidence", self.confidence, above=0, below=MOST, closed=True)
+        check_number("confidence", self.confidence, above=0, below=MAX_COUNT, closed=True)
         check_number("end_odds", self.end_odds, above=1, below=1e12, closed=True)
         check_number("chains", self.chains, above=1, below=1024, closed=True, integer=True)
         check_number("threads", self.threads, above=1, below=1024, closed=True, integer=True)
@@ -129,14 +129,14 @@ class MCMCDA(EngineMethod):
 
     @classmethod
     def report_2010(cls, *, window: int = 10, moves: float = 25.0, **changes: Any) -> Self:
-        """Make the chain of the 2010 report.
+        """Return the method with the chain of the 2010 report.
 
         Parameters
         ----------
         window, moves
             As for the class.
         **changes
-            Fields of `ChainOptions` that differ from the report's.
+            Fields of `ChainOptions` that differ from those of the report.
 
         Returns
         -------
@@ -145,7 +145,7 @@ class MCMCDA(EngineMethod):
         Raises
         ------
         ParameterError
-            At an unknown or impossible option.
+            If an option is unknown or impossible.
 
         Examples
         --------
@@ -207,19 +207,19 @@ class MCMCDA(EngineMethod):
         seed: int | None = None,
         start: ArrayLike | None = None,
     ) -> EngineState:
-        """Make the state before the first frame; see `Method.init`.
+        """Return the state before the first frame; see `Method.init`.
 
         Parameters
         ----------
         model, n_axes, seed
-            As there.
+            As for `Method.init`.
         start : array_like of int, shape (N,), optional
-            Labels of the detections to come, -1 for none, from which the walk begins.
+            Initial labels of the detections to come, -1 for none, from which the chain starts.
 
         Raises
         ------
         ParameterError
-            Where no track could ever begin, neither by a move nor with a label.
+            If no track can start, neither by a move nor from a label.
         """
         if self.moves == 0 and start is None:
             hint = "tracks begin by moves alone; gnn pairs frame by frame without any"
@@ -238,7 +238,7 @@ class MCMCDA(EngineMethod):
         *,
         covariances: ArrayLike | None = None,
     ) -> tuple[EngineState, Update]:
-        """Take the next frame; see `Method.step`."""
+        """Process the next frame; see `Method.step`."""
         if self.window is None:
             raise ParameterError("window", "a number of frames", "None", "a stream has no end")
         return super().step(state, time, points, covariances=covariances)
@@ -250,7 +250,7 @@ class MCMCDA(EngineMethod):
         *,
         progress: Callable[[int], Any] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
-        """Take all frames in the engine; see `Method.run`."""
+        """Process all frames in the engine; see `Method.run`."""
         check_kind("state", state, EngineState, "method.init(model)")
         if self.window is not None:
             return super().run(state, detections, progress=progress)
@@ -262,7 +262,7 @@ class MCMCDA(EngineMethod):
                 progress(int(T * share))
             return True
 
-        # Most of the work comes after the last frame.
+        # Most of the work is done after the last frame.
         part = 1 / (1 + FIRST_PASS)
         state, labels, sure = super().run(
             state, detections, progress=lambda t: tell(part * t / max(T, 1))

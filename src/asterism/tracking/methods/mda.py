@@ -31,36 +31,37 @@ __all__ = ["MDA"]
 
 @record
 class MDA(EngineMethod):
-    """Multidimensional assignment: the best way to share out all detections of a window at once.
+    """Multidimensional assignment: the best association of all detections of a window at once.
 
-    A tuple takes a track, or none for a new one, and a detection or none of each frame of the
-    window; it is worth its part of the log posterior (`log_posterior`). The best set of tuples of
-    which no two share a track or a detection is found by `assign_multidimensional`, and the oldest
-    frame is decided by it. Until then labels are what would be decided now, and may change.
+    A tuple holds a track, or none for a new one, and a detection or none of each frame of the
+    window. Its weight is its part of the log posterior (`log_posterior`).
+    `assign_multidimensional` finds the best set of tuples that share no track or detection, and
+    decides the oldest frame by
+    it. Until then labels are those of the current best set, and can change.
 
     Parameters
     ----------
     window : int
-        Frames that are shared out at once, 2 to 16.
+        Number of frames of the window, 2 to 16. Larger windows use more evidence and more time.
     solver : {"exact", "relaxed"}
-        By HiGHS, or by Lagrangian relaxation; ``info["gap"]`` says by how many nats the choice of
-        a window may be below the best.
+        Solver of the assignment: HiGHS ("exact"), or Lagrangian relaxation ("relaxed").
+        ``info["gap"]`` bounds the loss of a window against the optimum, nats.
     max_branches : int
-        Tuples of a group of tracks that compete, for each track of the best choice; every track and
-        every detection that may begin one keeps one besides. They are kept in the order of what
-        the best choice of the whole group loses with them.
+        Largest number of tuples of a group of competing tracks, per track of its best choice.
+        Every track, and every detection that can start one, keeps one more. Tuples are ranked by
+        the loss of the group's best choice that contains them.
     prune_odds : float
-        Odds by which a tuple may be worse. A tuple is left out when the best choice that holds it
-        is less probable than the best of all by more than these odds times the odds of ending the
-        track and beginning another.
+        Odds below which a tuple is pruned. A tuple is left out if the best choice that contains it
+        is less probable than the best of all by more than these odds times the odds of terminating
+        the track and starting another. Larger values keep more tuples.
     new_track_odds : float
-        A detection that a confirmed track expects by more than these odds begins no track.
+        Odds above which a detection of a confirmed track cannot start a new track.
     gate : Gate
-        Which detections a track may take.
+        Gate, the region in which a track can be assigned a detection.
     lifecycle : Lifecycle
-        When a tentative track is confirmed or deleted.
+        Confirmation and deletion of tentative tracks.
     rigid : Rigidity, optional
-        How neighbours predict occluded markers; None where they do not.
+        Prediction of occluded markers by their neighbours; None for no such prediction.
 
     Notes
     -----
@@ -104,7 +105,7 @@ class MDA(EngineMethod):
             *engine_model(self, model, n_axes),
             branches,
             max_hypotheses=1,
-            max_nodes=1000,  # of tracks that share nothing: one suffices
+            max_nodes=1000,  # tracks that share nothing need one node
             new_track_claim=self.new_track_odds,
             carry=carry_options(self.rigid),
             choose=self._choose,
@@ -113,31 +114,31 @@ class MDA(EngineMethod):
     def _choose(
         self,
         first_option: NDArray[np.int64],
-        worths: NDArray[np.float64],
+        gains: NDArray[np.float64],
         first_use: NDArray[np.int64],
         uses: NDArray[np.int32],
         first_resource: NDArray[np.int32],
     ) -> tuple[NDArray[np.int32], float]:
-        """Choose an option of each tree; every tree has one that uses nothing."""
+        """Choose an option of each tree; every tree has an option without a detection."""
         n_trees = len(first_option) - 1
         tree = np.repeat(np.arange(n_trees), np.diff(first_option))
         n_uses = np.diff(first_use)
-        # The best option that uses nothing is what a tree has where no tuple of it is chosen.
+        # A tree without a chosen tuple has its best option without a detection.
         free = np.full(n_trees, -1)
         for o in np.flatnonzero(n_uses == 0):
-            if free[tree[o]] < 0 or worths[o] > worths[free[tree[o]]]:
+            if free[tree[o]] < 0 or gains[o] > gains[free[tree[o]]]:
                 free[tree[o]] = o
-        tuples = np.full((len(worths), 1 + len(first_resource)), -1)
+        tuples = np.full((len(gains), 1 + len(first_resource)), -1)
         tuples[:, 0] = tree
         frame = np.searchsorted(first_resource, uses, side="right") - 1
-        tuples[np.repeat(np.arange(len(worths)), n_uses), 1 + frame] = uses
+        tuples[np.repeat(np.arange(len(gains)), n_uses), 1 + frame] = uses
         takes = np.flatnonzero(n_uses > 0)
         found = assign_multidimensional(
-            tuples[takes], worths[takes] - worths[free[tree[takes]]], method=self.solver
+            tuples[takes], gains[takes] - gains[free[tree[takes]]], method=self.solver
         )
         own = free.copy()
         own[tree[takes[found.chosen]]] = takes[found.chosen]
-        return (own - first_option[:-1]).astype(np.int32), found.bound + float(worths[free].sum())
+        return (own - first_option[:-1]).astype(np.int32), found.bound + float(gains[free].sum())
 
     def _about(self, stats: _engine.FrameStats) -> dict[str, float]:
         counts = tree_counts(stats)

@@ -32,21 +32,21 @@ __all__ = ["MHT", "HypothesisCluster"]
 
 @record(eq=False)
 class HypothesisCluster:
-    """The hypothesis matrix of a cluster: who has which detection, in each of its hypotheses.
+    """Hypothesis matrix of a cluster: the target of each detection in each hypothesis.
 
     Parameters
     ----------
     targets : ndarray, shape (k,)
-        Numbers of the cluster's targets, in order of birth; not identities, which only confirmed
-        targets have.
+        Numbers of the cluster's targets in order of birth. They are not track labels, which only
+        confirmed targets have.
     detections : ndarray, shape (n,)
-        Detections of the frames that are not decided yet which its hypotheses differ about, or
-        which its targets have; numbered from 0 in order of arrival.
+        Detections of the undecided frames on which its hypotheses differ, or that belong to its
+        targets, numbered from 0 in order of arrival.
     origins : ndarray, shape (h, n)
-        By hypothesis the target that a detection comes from, or -1: clutter, or the first of a
-        marker that has no other detection so far.
+        Target of each detection in each hypothesis, or -1 for clutter and for the only detection
+        of a new marker.
     probabilities : ndarray, shape (h,)
-        Of the hypotheses, the likeliest first; their sum is 1.
+        Probabilities of the hypotheses, in decreasing order, with sum 1.
     """
 
     targets: NDArray[np.int64]
@@ -57,40 +57,41 @@ class HypothesisCluster:
 
 @record
 class MHT(EngineMethod):
-    """Reid's multiple hypotheses: whole explanations of all detections, from frame to frame.
+    """Multiple hypothesis tracking of Reid: global hypotheses about all detections.
 
-    Targets that compete for detections form a cluster, which keeps its own hypotheses. CLUSTER
-    joins clusters that a new frame makes compete; HYPGEN makes the best hypotheses about the frame
-    out of those so far, by Murty's k best assignments; REDUCE keeps few of them, the likely and
-    different ones, decides what is older than the window by the likeliest (N-scan pruning), and
-    parts what competes no longer; MASH takes out the detections of which all hypotheses say the
-    same and confirms the targets that they come from. A hypothesis has the log posterior of its
-    partition (`log_posterior`).
+    Targets that compete for detections form a cluster with its own hypotheses. CLUSTER joins
+    clusters that compete in a new frame. HYPGEN extends the hypotheses to the frame by Murty's k
+    best assignments. REDUCE keeps the most probable distinct ones, decides frames older than the
+    window by the most probable one (N-scan pruning), and separates targets that no longer compete.
+    MASH removes the detections on which all hypotheses agree and confirms their targets. The score
+    of a hypothesis is the log posterior of its partition (`log_posterior`).
 
-    Until a frame is decided its labels are those of the likeliest hypotheses, and may change. The
-    confidence of a label is its probability over the hypotheses of its cluster.
+    Until a frame is decided its labels are those of the most probable hypotheses, and can change.
+    The confidence of a label is its probability over the hypotheses of its cluster.
 
     Parameters
     ----------
     window : int
-        Frames until one is decided, 2 to 16.
+        Number of frames after which a frame is decided, 2 to 16. Larger windows use more evidence
+        and more time.
     max_hypotheses : int
-        Most hypotheses of a cluster. ``info["limited"]`` counts where there would have been more,
-        and ``info["most_dropped_odds"]`` is the greatest odds, against the cluster's likeliest, of
-        any that was left out.
+        Largest number of hypotheses of a cluster. ``info["limited"]`` counts the clusters with
+        more, and ``info["most_dropped_odds"]`` is the largest odds of a dropped hypothesis against
+        the most probable one of its cluster.
     prune_odds : float
-        A hypothesis is dropped when it is so many times less likely than its cluster's likeliest.
+        Odds against a cluster's most probable hypothesis beyond which a hypothesis is dropped.
+        Larger values keep more hypotheses.
     merged_within : float
-        Of hypotheses with the same targets, whose estimates differ by less than so many standard
-        deviations, the likeliest stands for all; 0 merges none.
+        Difference of estimates, in standard deviations, below which hypotheses with the same
+        targets are merged into the most probable one; 0 merges none.
     new_track_odds : float
-        A detection that a confirmed track expects by more than these odds begins no track.
+        Odds above which a detection of a confirmed track cannot start a new track.
     gate : Gate
-        Which detections a track may take.
+        Gate, the region in which a track can be assigned a detection.
     lifecycle : Lifecycle
-        When a tentative track is confirmed or deleted.
+        Confirmation and deletion of tentative tracks.
     rigid : Rigidity, optional
-        How neighbours predict occluded markers; None where they do not.
+        Prediction of occluded markers by their neighbours; None for no such prediction.
 
     Examples
     --------
@@ -117,15 +118,15 @@ class MHT(EngineMethod):
         check_number("merged_within", self.merged_within, above=0, closed=True)
 
     def hypotheses(self, state: EngineState) -> list[HypothesisCluster]:
-        """Give what the method holds possible after the last frame, cluster by cluster.
+        """Return the hypotheses after the last frame, cluster by cluster.
 
-        Clusters are independent: the probability of a choice of one hypothesis of each is the
-        product of theirs.
+        Clusters are independent: the probability of one hypothesis of each cluster is the product
+        of their probabilities.
 
         Parameters
         ----------
         state : EngineState
-            From `init` or `step` of this method.
+            State from `init` or `step` of this method.
 
         Returns
         -------
@@ -134,7 +135,7 @@ class MHT(EngineMethod):
         Raises
         ------
         ParameterError
-            If the state is another method's.
+            If the state belongs to another method.
         """
         from asterism import _engine
 
@@ -160,7 +161,7 @@ class MHT(EngineMethod):
 
         return _engine.MatrixTracker(
             *engine_model(self, model, n_axes),
-            # The hypotheses are limited, not the branches of a target.
+            # The number of hypotheses is limited, not that of a target's branches.
             branch_options(window=self.window, max_branches=1, prune_odds=self.prune_odds),
             max_hypotheses=int(self.max_hypotheses),
             merged_within=self.merged_within,

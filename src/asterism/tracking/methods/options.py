@@ -1,4 +1,4 @@
-"""Options that several methods share: the gate, the life of a track, rigid bodies."""
+"""Options common to several methods: gate, confirmation and deletion, rigid bodies."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ __all__ = [
 ]
 
 MAX_CANDIDATES = 50_000_000
-"""Pairs of track and detection within the gates of one frame (1.2 GB of them)."""
+"""Largest number of pairs of track and detection in the gates of one frame (1.2 GB)."""
 
 
 @record
 class Gate:
-    """Which detections a track may take.
+    """Gate, the region in which a track can be assigned a detection.
 
     Parameters
     ----------
     probability : float
-        Probability that the gate misses the detection of its own track, were the model exact; the
-        level of the χ² test.
+        Probability that the gate misses the detection of its own track under an exact model: the
+        level of the χ² test. Smaller values make larger gates.
     """
 
     probability: float = 1e-9
@@ -49,19 +49,21 @@ class Gate:
 
 @record
 class Lifecycle:
-    """When a tentative track is confirmed or deleted.
+    """Confirmation and deletion of tentative tracks.
 
-    A track begins tentative at a detection that no track took. Its score is the log odds of marker
-    against clutter. Once confirmed it gets the next identity, together with all its detections so
-    far; a deleted track leaves its detections as clutter. A confirmed track ends when its gap
-    exceeds the model's maximal gap.
+    A tentative track starts at a detection that is assigned to no track. Its score is the log odds
+    of marker against clutter. A confirmed track gets the next label, which all its detections so
+    far receive; the detections of a deleted track become clutter. A confirmed track is terminated
+    when its gap exceeds the model's `max_gap`.
 
     Parameters
     ----------
     confirm_probability : float
-        Probability of a marker at which a tentative track is confirmed.
+        Existence probability at which a tentative track is confirmed, in (0, 1). Larger values
+        delay the confirmation and prevent false tracks.
     delete_odds : float
-        A tentative track is deleted when its odds fall by this factor from their best.
+        Factor of the decrease of a tentative track's odds from their maximum at which it is
+        deleted. Larger values keep tentative tracks for longer.
     """
 
     confirm_probability: float = 0.999
@@ -74,35 +76,36 @@ class Lifecycle:
 
 @record
 class Rigidity:
-    """How markers that keep their distances predict an occluded one, while frames arrive.
+    """Prediction of occluded markers by neighbours at stable distances, frame by frame.
 
-    Which tracks keep their distances is learnt while they are seen. An occluded track is expected
-    where its neighbours carry it, for longer than the model's maximal gap too, and a detection that
-    disagrees with the neighbours counts for less.
+    Stable distances are learnt while both markers are detected. An occluded track is predicted by
+    a rigid fit of its neighbours, also beyond the model's `max_gap`. A detection that disagrees
+    with
+    the neighbours has a lower likelihood.
 
     Parameters
     ----------
     max_gap : int
-        Most frames of an occlusion that neighbours carry a track through, 1 to 100000; after that
-        the model's maximal gap counts.
+        Longest occlusion through which neighbours predict a track, frames, 1 to 100000. Beyond it
+        the model's `max_gap` applies.
     bond_weight : float
-        Greatest effect, in nats, of the neighbours on an ambiguous pairing, 0 to 100; at 0 they
-        carry occluded tracks only.
+        Largest effect of the neighbours on an ambiguous pairing, nats, 0 to 100. At 0 they only
+        predict occluded tracks.
     """
 
     max_gap: int = 60
     bond_weight: float = 2.0
 
     def __post_init__(self) -> None:
-        at_most = 100_000
+        max_frames = 100_000
         check_number(
-            "rigid.max_gap", self.max_gap, above=1, below=at_most, closed=True, integer=True
+            "rigid.max_gap", self.max_gap, above=1, below=max_frames, closed=True, integer=True
         )
         check_number("rigid.bond_weight", self.bond_weight, above=0, below=100, closed=True)
 
 
 class SharedOptions(Protocol):
-    """What every method has that predicts, gates and confirms tracks frame by frame."""
+    """Options of every method that predicts, gates and confirms tracks frame by frame."""
 
     @property
     def gate(self) -> Gate: ...  # noqa: D102
@@ -113,7 +116,7 @@ class SharedOptions(Protocol):
 
 
 def check_shared(options: SharedOptions) -> None:
-    """Raise `ParameterError` where an option is none of its record."""
+    """Raise `ParameterError` if an option is not a record of its class."""
     check_kind("gate", options.gate, Gate, "am.tracking.Gate()")
     check_kind("lifecycle", options.lifecycle, Lifecycle, "am.tracking.Lifecycle()")
     if options.rigid is not None:
@@ -121,7 +124,7 @@ def check_shared(options: SharedOptions) -> None:
 
 
 def check_flags(options: object, *names: str) -> None:
-    """Raise `ParameterError` where an option is neither True nor False."""
+    """Raise `ParameterError` if an option is neither True nor False."""
     for name in names:
         value = getattr(options, name)
         if not isinstance(value, bool):
@@ -131,7 +134,7 @@ def check_flags(options: object, *names: str) -> None:
 def engine_model(
     options: SharedOptions, model: TrackingModel, n_axes: int
 ) -> tuple[_engine.MotionModel, _engine.ScoreModel, _engine.LifeOptions]:
-    """Make what each of the engine's trackers takes first."""
+    """Return the first arguments of each of the engine's trackers."""
     from scipy.special import chdtri
 
     from asterism import _engine
@@ -148,7 +151,7 @@ def engine_model(
 
 
 def carry_options(rigid: Rigidity | None) -> _engine.CarryOptions:
-    """Make the engine's options of rigid bodies."""
+    """Return the engine's options of rigid bodies."""
     from asterism import _engine
 
     if rigid is None:
@@ -159,7 +162,7 @@ def carry_options(rigid: Rigidity | None) -> _engine.CarryOptions:
 
 
 def shared_counts(options: SharedOptions, stats: _engine.FrameStats) -> dict[str, float]:
-    """Tell what a frame, or a run of them, took, as far as all these methods count it."""
+    """Return the counts of a frame, or of a run of frames, that all these methods have."""
     counts: dict[str, float] = {
         "tracks": stats.n_confirmed,
         "tentative": stats.n_tentative,

@@ -1,4 +1,4 @@
-"""What the methods share that keep several branches of each track over a window of frames."""
+"""Common parts of the methods that keep several branches of each track over a window."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 __all__ = ["branch_options", "check_hypotheses", "check_window", "tree_counts"]
 
 
-def check_window(window: float, least: int) -> None:
-    """Raise `ParameterError` where the engine cannot keep so many frames open."""
-    check_number("window", window, above=least, below=16, closed=True, integer=True)
+def check_window(window: float, minimum: int) -> None:
+    """Raise `ParameterError` if the engine cannot keep that many frames open."""
+    check_number("window", window, above=minimum, below=16, closed=True, integer=True)
 
 
 def branch_options(
@@ -33,7 +33,7 @@ def branch_options(
     limits: NDArray[np.float64] | None = None,
     z: float = 0.0,
 ) -> _engine.BranchOptions:
-    """Make the engine's options of branches; without `limits` there is no χ² test."""
+    """Return the engine's options of branches; without `limits` there is no χ² test."""
     from asterism import _engine
 
     return _engine.BranchOptions(
@@ -48,7 +48,7 @@ def branch_options(
 
 
 class HypothesisOptions(SharedOptions, Protocol):
-    """What every method has that explains all detections of a window at once."""
+    """Options of every method that explains all detections of a window at once."""
 
     @property
     def window(self) -> int: ...
@@ -59,7 +59,7 @@ class HypothesisOptions(SharedOptions, Protocol):
 
 
 def check_hypotheses(options: HypothesisOptions) -> None:
-    """Raise `ParameterError` where an option of such a method is out of range."""
+    """Raise `ParameterError` if an option of such a method is out of range."""
     check_shared(options)
     check_window(options.window, 2)
     check_number("prune_odds", options.prune_odds, above=1)
@@ -67,7 +67,7 @@ def check_hypotheses(options: HypothesisOptions) -> None:
 
 
 def tree_counts(stats: _engine.FrameStats) -> _engine.TreeStats:
-    """Narrow the counts to those of a tracker of trees."""
+    """Return the counts as those of a tracker of hypothesis trees."""
     from asterism import _engine
 
     assert isinstance(stats, _engine.TreeStats)

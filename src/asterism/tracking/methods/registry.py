@@ -1,4 +1,4 @@
-"""Every method by its name: the one place to register a new one."""
+"""Registry of all methods by name; a new method is added here."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ __all__ = ["METHODS", "method_by_name", "options_of", "record_in"]
 METHODS: dict[str, type[Method[Any]]] = Registry(
     {method.name: method for method in (GNN, SMP, JPDA, TrackSplitting, TOMHT, MDA, MHT, MCMCDA)}
 )
-"""Method by name, as the command line knows it."""
+"""Method classes by their names on the command line."""
 
 
 def method_by_name(name: str, **options: Any) -> Method[Any]:
-    """Make a method from its name and options.
+    """Return a method by its name and options.
 
     Raises
     ------
     ParameterError
-        At an unknown name or option.
+        If the name or an option is unknown.
     """
     check_fields("method", [name], METHODS)
     kind: type[Any] = METHODS[name]
@@ -44,7 +44,7 @@ def method_by_name(name: str, **options: Any) -> Method[Any]:
 
 
 def _made(kind: type[Any], options: Mapping[str, Any]) -> Any:
-    """Make a record, and those that are among its options, which may be given as tables."""
+    """Return a record made from its options; nested records may be given as tables."""
     kinds = typing.get_type_hints(kind)
     made = dict(options)
     for name, value in options.items():
@@ -55,7 +55,7 @@ def _made(kind: type[Any], options: Mapping[str, Any]) -> Any:
 
 
 def record_in(kind: Any) -> type[Any] | None:
-    """Return the record among the types that an option may have, None where there is none."""
+    """Return the record class among an option's types, None if there is none."""
     for inner in (kind, *typing.get_args(kind)):
         if isinstance(inner, type) and dataclasses.is_dataclass(inner):
             return inner
@@ -63,7 +63,7 @@ def record_in(kind: Any) -> type[Any] | None:
 
 
 def options_of(method: object) -> dict[str, Any]:
-    """Return all options of a method by name, records as tables; none of one that is no record."""
+    """Return all options of a method by name, records as tables; {} if it is not a record."""
     if not dataclasses.is_dataclass(method):
         return {}
     options = {field.name: getattr(method, field.name) for field in dataclasses.fields(method)}

@@ -1,4 +1,4 @@
-"""The stable marriage of tracks and detections (§5 of the report; Gale & Shapley 1962)."""
+"""Stable marriage of tracks and detections (§5 of the report; Gale & Shapley 1962)."""
 
 from __future__ import annotations
 
@@ -36,42 +36,44 @@ __all__ = ["SMP"]
 
 MAX_WAYS = 30
 PRUNE_ODDS = 1e6
-"""With a window: so many ways on are followed of each track, none so many times less likely."""
+"""With a window: largest number of branches of a track, and odds beyond which one is pruned."""
 
 
 @record
 class SMP(EngineMethod):
-    """Stable marriage: no track and detection would both rather have each other.
+    """Stable marriage: a matching without a pair that prefer each other to their partners.
 
-    Tracks (the report's men) rank the detections by their predictive density N(ŷ, S); detections
-    rank the tracks by distance, nearest first. Confirmed tracks marry before tentative ones.
-    Whoever is outside the gate is unacceptable, so numbers may differ: a track left alone is a
-    missed detection, a detection left alone a new track or clutter. Ties go to the lower index.
+    Tracks (the men of the 2010 report) rank detections by their predictive density N(ŷ, S);
+    detections rank tracks by distance. Confirmed tracks are matched before tentative ones. Pairs
+    outside the gate are excluded, so numbers may differ: an unmatched track has a missed
+    detection, an unmatched detection is a new track or clutter. Ties go to the lower index.
 
     Parameters
     ----------
     proposers : {"tracks", "detections"}
-        Who proposes, and so for whom the matching is best among the stable ones.
+        Side that proposes; the result is the best stable matching for that side.
     strict : bool
-        The report's own method: as many detections in every frame as in the first, all of markers;
-        everyone ranks everyone, without a gate. It refuses a frame with another number.
+        Whether to use the method of the 2010 report: all frames have the same number of
+        detections, all of markers, and there is no gate. A frame with another number is refused.
     capacity : int
-        So many detections may marry one track (hospitals and residents, §5.6): a marker seen as
-        two blobs. They are merged by their likelihood; the likeliest bears the label.
+        Largest number of detections of a track in a frame (hospitals and residents, §5.6), for
+        markers that are detected as two points. They are merged by their likelihood; the most
+        likely one gets the label.
     merged_within : float
-        With a capacity above 1, greatest distance of a further detection from the one that the
-        track likes best, metres.
+        Largest distance of a further detection from the track's preferred one, metres, with a
+        capacity above 1.
     window : int
-        Preferences from so many frames, 1 to 16 (past history, §5.6): a frame is decided when
-        `window` frames have come. A track then ranks the frame's detections by the likelihood of
-        the best way on from each through the window, a detection ranks tracks by their mean squared
-        distance along it. Until then labels are what would be decided now, and may change.
+        Number of frames from which preferences are computed, 1 to 16 (past history, §5.6). A frame
+        is decided after `window` frames. A track ranks its detections by the likelihood of the
+        best continuation through the window, a detection ranks tracks by their mean squared
+        distance
+        along it. Until then labels are those of the current decision, and can change.
     gate : Gate
-        Which detections a track may take.
+        Gate, the region in which a track can be assigned a detection.
     lifecycle : Lifecycle
-        When a tentative track is confirmed or deleted.
+        Confirmation and deletion of tentative tracks.
     rigid : Rigidity, optional
-        How neighbours predict occluded markers; None where they do not.
+        Prediction of occluded markers by their neighbours; None for no such prediction.
     """
 
     proposers: Literal["tracks", "detections"] = "tracks"
@@ -138,12 +140,12 @@ class SMP(EngineMethod):
         *,
         covariances: ArrayLike | None = None,
     ) -> tuple[EngineState, Update]:
-        """Take the next frame; see `Method.step`.
+        """Process the next frame; see `Method.step`.
 
         Raises
         ------
         ParameterError
-            If `strict` and the number of points is not that of the first frame.
+            If `strict` is set and the number of points differs from that of the first frame.
         """
         if self.strict and state.tracker.n_frames:
             _check_number(len(np.asarray(points)), state.n_ids, f"in the frame at {time:g} s")
@@ -156,7 +158,7 @@ class SMP(EngineMethod):
         *,
         progress: Callable[[int], Any] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
-        """Take all frames in the engine; the same labels as the loop over `step`."""
+        """Process all frames in the engine, with the same labels as a loop over `step`."""
         if self.strict and detections.n_frames:
             wanted = state.n_ids if state.tracker.n_frames else int(detections.counts[0])
             for t in np.flatnonzero(detections.counts != wanted):

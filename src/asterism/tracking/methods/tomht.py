@@ -26,55 +26,58 @@ __all__ = ["TOMHT"]
 
 @record
 class TOMHT(EngineMethod):
-    """Track-oriented multiple hypotheses: the best compatible set of track hypotheses.
+    """Track-oriented multiple hypothesis tracking: the best compatible set of track hypotheses.
 
-    Each track is a tree: a branch for every detection in its gate and one for a miss, over a window
-    of frames; every detection may begin a new one. A hypothesis takes one branch of each tree, no
-    detection twice, and is worth its log posterior (`log_posterior`). In each cluster of trees that
-    share detections the best one is found by exact set packing, and the oldest frame is decided by
-    it (N-scan pruning). Until then labels are what would be decided now, and may change.
+    Each track is a hypothesis tree over a window of frames: a branch for every detection in its
+    gate and one for a missed detection. Every detection can start a new tree. A global hypothesis
+    holds one branch of each tree without a common detection; its score is its log posterior
+    (`log_posterior`). In each cluster of trees that share detections the best one is found by
+    exact set packing and decides the oldest frame (N-scan pruning). Until then labels are those of
+    the
+    current best hypothesis, and can change.
 
-    The confidence of a label is its probability. Options of a tree that the best hypothesis of its
-    cluster takes at odds worse than `prune_odds` count by a bound on that hypothesis alone. The
-    trees that the other options join are enumerated: `max_hypotheses` hypotheses of each such set,
-    so that independent ambiguities multiply. The confidence is exact where no option is left out
-    and no set has more hypotheses; elsewhere it is an approximation.
+    The confidence of a label is its probability. For branches at odds worse than `prune_odds` a
+    bound of their best hypothesis is used. Trees joined by the other branches are enumerated, with
+    `max_hypotheses` hypotheses of each set of trees, so that independent ambiguities multiply. The
+    confidence is exact if no branch is left out and no set has more hypotheses; otherwise it is an
+    approximation.
 
     Parameters
     ----------
     window : int
-        Frames until one is decided, 2 to 16.
+        Number of frames after which a frame is decided, 2 to 16. Larger windows use more evidence
+        and more time.
     max_branches : int
-        Branches of a cluster, for each track of its best hypothesis; every tree keeps one besides.
-        This bounds memory and time. Branches are kept in the order of what the best hypothesis of
-        the whole cluster loses with them; ``info["dropped_branches"]`` counts the branches beyond
-        the limit.
+        Largest number of branches of a cluster, per track of its best hypothesis; every tree keeps
+        one more. This bounds memory and time. Branches are ranked by the loss of the cluster's
+        best hypothesis that contains them; ``info["dropped_branches"]`` counts the dropped ones.
     prune_odds : float
-        Odds by which a branch may be worse. A branch is dropped when the best hypothesis of its
-        cluster that holds it is less probable than the best of all by more than these odds times
-        the odds of ending the track and beginning another.
+        Odds below which a branch is pruned. A branch is dropped if the best hypothesis of its
+        cluster that contains it is less probable than the best of all by more than these odds
+        times the odds of terminating the track and starting another. Larger values keep more
+        branches.
     max_hypotheses : int
-        Most hypotheses of a set of trees that probable options join, for the confidence; of these
-        only those count that are not e^25 times less likely than the best.
+        Largest number of hypotheses of a set of joined trees, for the confidence. Hypotheses that
+        are e^25 times less likely than the best are not counted.
     max_nodes : int
-        Most nodes of the search in a cluster; where it is cut short, a compatible set is made of
-        what was found, and ``info`` says by how many nats it may be below the best.
+        Largest number of search nodes in a cluster. Beyond it a compatible set is made from the
+        search so far, and ``info["gap"]`` bounds its loss against the optimum, nats.
     new_track_odds : float
-        A detection that a confirmed track expects by more than these odds begins no track.
+        Odds above which a detection of a confirmed track cannot start a new track.
     gate : Gate
-        Which detections a track may take.
+        Gate, the region in which a track can be assigned a detection.
     lifecycle : Lifecycle
-        When a tentative track is confirmed or deleted.
+        Confirmation and deletion of tentative tracks.
     rigid : Rigidity, optional
-        How neighbours predict occluded markers; None where they do not.
+        Prediction of occluded markers by their neighbours; None for no such prediction.
 
     Notes
     -----
-    With a window that covers the capture the result is the most probable partition of all
+    With a window that covers the capture, the result is the most probable partition of all
     (`log_posterior`) if no option excludes it: `prune_odds`, `max_branches` and `max_nodes` large
     enough, the probability of the `gate` near 0, `new_track_odds` and the `delete_odds` of the
     `lifecycle` large, and its `confirm_probability` near 0.5. A track whose odds are below those of
-    `confirm_probability` is left out even where the most probable partition holds it.
+    `confirm_probability` is left out even if the most probable partition contains it.
 
     Examples
     --------

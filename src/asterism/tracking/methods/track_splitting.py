@@ -1,4 +1,4 @@
-"""The track-splitting filter (§2.2 of the report; Smith & Buechler 1975)."""
+"""Track-splitting filter (§2.2 of the report; Smith & Buechler 1975)."""
 
 from __future__ import annotations
 
@@ -32,60 +32,62 @@ if TYPE_CHECKING:
 
 __all__ = ["TrackSplitting", "chi2_limits"]
 
-MOST_FADING = 0.99
+MAX_FADING = 0.99
 _EXACT_LIMITS = 4096
 
 
 @record
 class TrackSplitting(EngineMethod):
-    """Track splitting: a branch for every detection in the gate and one for a miss.
+    """Track splitting: a branch for every detection in the gate and one for a missed detection.
 
-    Each track is a tree. Along a branch ``λ(k) = ρ λ(k-1) + νᵀ S⁻¹ ν`` sums how far the detections
-    lay from where they were expected; the branch is cut when ``λ(k) > δ(k)``, which for the right
-    branch has the probability α. With ``ρ = 1``, as in the report, ``δ(k)`` is the χ² quantile of
-    ``k D`` degrees of freedom. Over a whole life the test loses every track at last where the noise
-    is but slightly greater than the model's, so by default the past fades: ``δ(k)`` is then the
-    quantile of a weighted sum of χ² variables. The report's α is 0.01:
-    of right branches one in a hundred is beyond the limit in any frame.
+    Each track is a hypothesis tree. Along a branch ``λ(k) = ρ λ(k-1) + νᵀ S⁻¹ ν`` accumulates the
+    NIS of the detections. The branch is pruned if ``λ(k) > δ(k)``, which has the probability α for
+    the right branch. With ``ρ = 1``, as in the 2010 report, ``δ(k)`` is the χ² quantile of ``k D``
+    degrees of freedom. That test eventually loses every track if the noise is slightly larger than
+    the model's, so by default the past fades: ``δ(k)`` is the quantile of a weighted sum of χ²
+    variables. The report's α is 0.01: one right branch in a hundred exceeds the limit in a frame.
 
-    Branches also end when they are far less likely than the tree's best, when their last detections
-    are those of a likelier one, and beyond a number. A frame is decided when `window` frames have
-    come: trees that want the same detection are resolved by assignment over their best branches.
-    Until then labels are what would be decided now, and may change. What other trees expect of a
-    frame that is not decided yet counts against taking it (linear multitarget; Musicki & La Scala
-    2008).
+    Branches are also pruned if they are far less likely than the best branch of the tree, if they
+    share their last detections with a more likely one, and beyond `max_branches`. A frame is
+    decided after `window` frames: trees that compete for a detection are resolved by assignment
+    over their best branches. Until then labels are those of the current decision, and can change.
+    Detections expected by other trees have a lower likelihood (linear multitarget; Musicki &
+    La Scala 2008).
 
     The confidence of a label is its probability when the frame is decided: the marginal over all
-    ways of sharing it out, each pairing weighed with the tree's branches through it
-    (`joint_marginals`). ``info["bound"]`` says how far off it may be where a group was too large to
-    be summed exactly.
+    joint events, with pairings weighted by the tree's branches through them (`joint_marginals`).
+    ``info["bound"]`` bounds its error if a group was too large for an exact sum.
 
     Parameters
     ----------
     alpha : float
-        α, the share of right branches that the χ² test cuts in a frame.
+        α, probability that the χ² test prunes the right branch in a frame, in (0, 1). Smaller
+        values keep more branches.
     fading : float
-        ρ, what is left of λ after a frame: 1 as in the report, or above 0 to 0.99.
+        ρ, factor on λ in each frame: 1 as in the 2010 report, or above 0 to 0.99. Smaller values
+        forget the past faster.
     window : int
-        Frames until one is decided, 1 to 16.
+        Number of frames after which a frame is decided, 1 to 16. Larger windows use more evidence
+        and more time.
     max_branches : int
-        Most branches of a tree.
+        Largest number of branches of a tree.
     merge_last : int
-        Of branches that share their last so many frames the likeliest is kept. Fewer than `window`
-        saves time; but what is decided next may have lost its alternatives then, and the confidence
-        is too high.
+        Number of last frames whose equality merges branches into the most likely one. Fewer than
+        `window` saves time, but removes alternatives of the next decision, and the confidence is
+        then too high.
     prune_odds : float
-        A branch ends when it is so many times less likely than its tree's best.
+        Odds against the tree's best branch beyond which a branch is pruned. Larger values keep
+        more branches.
     independent : bool
-        Whether each tree goes on with what it likes best though another has it, as in the report:
-        then only the labels are resolved, trees know nothing of each other, and two may follow one
-        marker. Not with `rigid`.
+        Whether trees keep detections that are assigned to other trees, as in the 2010 report. Only
+        the labels are then resolved, and two trees can follow one marker. Not possible with
+        `rigid`.
     gate : Gate
-        Which detections a track may take.
+        Gate, the region in which a track can be assigned a detection.
     lifecycle : Lifecycle
-        When a tentative track is confirmed or deleted.
+        Confirmation and deletion of tentative tracks.
     rigid : Rigidity, optional
-        How neighbours predict occluded markers; None where they do not.
+        Prediction of occluded markers by their neighbours; None for no such prediction.
 
     Examples
     --------
@@ -112,8 +114,8 @@ class TrackSplitting(EngineMethod):
         check_shared(self)
         check_number("alpha", self.alpha, above=0, below=1)
         check_number("fading", self.fading, above=0)
-        if not (self.fading <= MOST_FADING or self.fading == 1):
-            raise ParameterError("fading", f"1, or at most {MOST_FADING}", repr(self.fading))
+        if not (self.fading <= MAX_FADING or self.fading == 1):
+            raise ParameterError("fading", f"1, or at most {MAX_FADING}", repr(self.fading))
         check_window(self.window, 1)
         check_number("max_branches", self.max_branches, above=1, closed=True, integer=True)
         check_number("merge_last", self.merge_last, above=1, closed=True, integer=True)
@@ -159,7 +161,7 @@ class TrackSplitting(EngineMethod):
 
 @lru_cache(maxsize=16)
 def chi2_limits(alpha: float, n_axes: int, fading: float) -> NDArray[np.float64]:
-    """Give δ(k) of the test of a branch with k detections.
+    """Return the limits δ(k) of the χ² test of a branch with k detections.
 
     Without fading ``P[χ²_{k D} > δ(k)] = α``. With fading λ(k) is a weighted sum of χ² variables,
     whose tail is taken from its saddlepoint (Lugannani & Rice 1980; Kuonen 1999).
@@ -167,16 +169,16 @@ def chi2_limits(alpha: float, n_axes: int, fading: float) -> NDArray[np.float64]
     Parameters
     ----------
     alpha : float
-        α.
+        α, probability that the test prunes the right branch.
     n_axes : int
-        D, 2 or 3.
+        Number of coordinates D, 2 or 3.
     fading : float
-        ρ.
+        ρ, factor on λ in each frame.
 
     Returns
     -------
     ndarray, shape (K,)
-        For k = 1 to K; with fading the last one is that of all further k.
+        Limits for k = 1 to K; with fading the last one holds for all larger k.
     """
     from scipy.special import chdtri
 
@@ -187,12 +189,12 @@ def chi2_limits(alpha: float, n_axes: int, fading: float) -> NDArray[np.float64]
         weights = np.asarray(fading ** np.arange(n), dtype=np.float64)
         further = [_upper_quantile(alpha, weights[:k], n_axes) for k in range(2, n + 1)]
         limits = np.array([float(chdtri(n_axes, alpha)), *further])
-    limits.flags.writeable = False  # shared by all who ask
+    limits.flags.writeable = False  # the cached array is shared by all callers
     return limits
 
 
 def _upper_quantile(alpha: float, weights: NDArray[np.float64], n_axes: int) -> float:
-    """Value that ``Σ w_i χ²_D`` exceeds with probability α; the weights fall from 1."""
+    """Return the value that ``Σ w_i χ²_D`` exceeds with probability α; weights decrease from 1."""
     from scipy.optimize import brentq
     from scipy.special import log_ndtr
 
@@ -208,8 +210,7 @@ def _upper_quantile(alpha: float, weights: NDArray[np.float64], n_axes: int) -> 
         w = math.copysign(math.sqrt(2 * (s * first - K)), s)
         return float(log_ndtr(-(w + math.log(s * math.sqrt(second) / w) / w)))
 
-    # Around s = 0, which is the mean, the formula is 0/0; there, as far as the tail is concerned,
-    # a little to the side is as good.
+    # At s = 0, which is the mean, the formula is 0/0. A nearby s is accurate enough for the tail.
     low, high = -1e3, 0.5 * (1 - 1e-9)
     target = math.log(alpha)
     if log_tail(1e-4) < target:

@@ -1,4 +1,4 @@
-"""Tracks named after the markers of an earlier capture."""
+"""Naming of tracks after the markers of an earlier capture."""
 
 from asterism.tracking.naming.name import Naming, name_tracks
 

@@ -1,4 +1,4 @@
-"""Which track is which marker of an earlier take: by the distances that they keep."""
+"""Naming of tracks after the markers of an earlier capture, by their stable distances."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from asterism.checks import check_kind
 from asterism.errors import ParameterError
 from asterism.model import Tracks
 from asterism.records import record
-from asterism.tracking.rigidity.bonds import MOST_FRAMES, Bonds
+from asterism.tracking.rigidity.bonds import MAX_FRAMES, Bonds
 from asterism.tracking.rigidity.distances import MIN_TOGETHER, distances_between
 
 if TYPE_CHECKING:
@@ -20,39 +20,40 @@ if TYPE_CHECKING:
 __all__ = ["Naming", "name_tracks"]
 
 BEAM = 400
-"""Ways of naming the tracks that are followed at once."""
+"""Number of partial assignments of names that the beam search keeps."""
 LOOKED_AT = 12
-"""Named tracks that an unnamed one is compared with, the steadiest first."""
+"""Number of named tracks with which an unnamed one is compared, the steadiest first."""
 REPLACED = 0.004, 0.015
-"""Markers may be stuck on anew between takes: metres, and share of the distance …"""
+"""Standard deviation of a distance if markers were attached again between captures: metres, and
+share of the distance."""
 LEFT = 0.0005, 0.0
-"""… or be left where they were. What fits better counts."""
+"""The same if the markers were left in place. The better fit of the two is used."""
 POSED = 0.02, 0.25
-"""What the distance of two that have no bond may differ by from that in the pose: metres, share."""
+"""Standard deviation of a distance without a bond from that in the pose: metres, and share."""
 ANYWHERE = 2.0
-"""Metres over which the distances of markers that are not the ones meant are spread."""
-LEAST, MOST = -3.0, 7.0
-"""What one distance, or one side, says at most: log odds …"""
+"""Range over which the distances of wrong pairs are spread, metres."""
+MIN_LOG_ODDS, MAX_LOG_ODDS = -3.0, 7.0
+"""Bounds of the log odds of one distance or one side."""
 UNBONDED = -0.5, 0.0
-"""… and where there is no bond: bodies move apart."""
+"""Bounds of the log odds of a distance without a bond, which varies because bodies move apart."""
 ENOUGH = 10.0
-"""Log odds from which a track that is left over is a piece of a named one."""
-WORTH = 0.25
-"""Distances bend together: what they say is worth less than their sum."""
+"""Smallest log odds at which a remaining track is a piece of a named one."""
+WEIGHT = 0.25
+"""Factor on the sum of the log odds, because the distances of a body vary together."""
 
 
 @record(eq=False)
 class Naming:
-    """Tracks named after the markers of an earlier take.
+    """Tracks named after the markers of an earlier capture.
 
     Parameters
     ----------
     tracks : Tracks
-        Tracks that are the same marker made one, and named.
+    Named tracks; tracks with the same marker are merged.
     markers : ndarray of int, shape (K,)
-        Of each track that came in, its marker in the bonds, -1 where none is named.
+    Marker of each input track in the bonds, -1 for a track without a name.
     probabilities : ndarray, shape (K,)
-        That it is that one, against the others that were weighed; 0 where none is named.
+    Probability of each name among the names considered; 0 for a track without a name.
     """
 
     tracks: Tracks
@@ -69,23 +70,24 @@ class Naming:
 
 
 def name_tracks(tracks: Tracks, bonds: Bonds) -> Naming:
-    """Name tracks after the markers of an earlier take of the same body.
+    """Name tracks after the markers of an earlier capture of the same body.
 
-    Two tracks that keep a distance are two markers that kept about the same. Tracks are named one
-    by one, each beside those to which it keeps its distance best, and the best few hundred ways of
-    naming all so far are followed (beam search). On which side of three others a marker lies tells
-    a body from its mirror image. Names that the tracks have play no part.
+    Two tracks with a stable distance are matched to two markers with about the same distance.
+    Tracks are named one by one, each from the named tracks with the most stable distances to it.
+    A beam search keeps the few hundred best assignments. The side of three other markers on which
+    a marker lies distinguishes a body from its mirror image. Existing names are not used.
 
     Parameters
     ----------
     tracks : Tracks
-        From `identify` or `stitch` say; short pieces are told from longer ones.
+    Tracks, for example from `track` or `stitch`. Short tracks are named after longer ones.
     bonds : Bonds
-        From `learn_bonds`.
+    Bonds of the markers, from `learn_bonds`.
 
     Returns
     -------
     Naming
+    Named tracks with the probability of each name.
 
     Raises
     ------
@@ -94,39 +96,41 @@ def name_tracks(tracks: Tracks, bonds: Bonds) -> Naming:
 
     Notes
     -----
-    A distance says ``log t(z) / s - log 1/R`` with three degrees of freedom, z what it is off in
-    units of s: what it varied by in both takes and what a marker moves when it is stuck on anew.
-    It is bounded, so that one wrong distance is outvoted.
+    The log odds of a distance are ``log t(z) / s - log 1/R``: Student's t with three degrees of
+    freedom of its error z in units of s, against a uniform distribution over the range R. The
+    scale s combines the variation in both captures and the displacement of a marker that is
+    attached
+    again. The log odds are bounded, so that one wrong distance is outvoted.
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_kind("bonds", bonds, Bonds, "am.learn_bonds(tracks)")
     if tracks.detections.n_axes != bonds.places.shape[1]:
         expected = f"{bonds.places.shape[1]} axes, as the bonds have"
         raise ParameterError("tracks", expected, tracks.detections.n_axes)
-    take = _Take.of(tracks)
-    named, probabilities = _search(take, _Known.of(bonds))
-    _name_pieces(take, _Known.of(bonds), named, probabilities)
+    long = _LongTracks.of(tracks)
+    named, probabilities = _search(long, _Known.of(bonds))
+    _name_pieces(long, _Known.of(bonds), named, probabilities)
     markers = np.full(tracks.n_tracks, -1, dtype=np.int64)
     sure = np.zeros(tracks.n_tracks)
-    markers[take.tracks], sure[take.tracks] = named, probabilities
+    markers[long.tracks], sure[long.tracks] = named, probabilities
     return Naming(tracks=_renamed(tracks, markers, bonds), markers=markers, probabilities=sure)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Take:
-    """The tracks that are long enough: n of them."""
+class _LongTracks:
+    """The n tracks that are long enough, with their mutual distances."""
 
     tracks: NDArray[np.int64]
     positions: NDArray[np.float64]  # (F, n, D)
-    middle: NDArray[np.float64]  # (n, n), NaN where two were not seen together for long
+    middle: NDArray[np.float64]  # (n, n), NaN for two with too few common frames
     spread: NDArray[np.float64]
-    variance: NDArray[np.float64]  # predictive; infinite where they were not
+    variance: NDArray[np.float64]  # predictive; infinite for these
     seen: NDArray[np.bool_]  # (T, n)
 
     @classmethod
-    def of(cls, tracks: Tracks) -> _Take:
+    def of(cls, tracks: Tracks) -> _LongTracks:
         d = tracks.detections
-        every = max(1, -(-d.n_frames // MOST_FRAMES))
+        every = max(1, -(-d.n_frames // MAX_FRAMES))
         chosen = np.flatnonzero(tracks.lengths >= MIN_TOGETHER)
         dense = tracks.positions()[:, chosen]
         seen = np.isfinite(dense[..., 0])
@@ -143,7 +147,7 @@ class _Take:
         )
 
     def order(self) -> list[int]:
-        """Give the order of naming: each track as steady as can be beside those before."""
+        """Return the order of naming: each track by its distances to earlier ones."""
         cost = np.sqrt(self.variance)
         n = len(cost)
         if n == 0:
@@ -159,13 +163,13 @@ class _Take:
             best[order] = np.nan
         return order
 
-    def beside(self, k: int, others: list[int]) -> list[int]:
-        """Give those of `others` to which a track keeps its distance best."""
+    def steadiest(self, k: int, others: list[int]) -> list[int]:
+        """Return those of `others` with the most stable distances to a track."""
         known = [b for b in others if np.isfinite(self.middle[k, b])]
         return [known[b] for b in np.argsort(self.variance[k, known], kind="stable")[:LOOKED_AT]]
 
     def height(self, k: int, three: list[int]) -> tuple[float, float]:
-        """Measure how high a track lies over the plane of three others: median and spread."""
+        """Return median and spread of a track's height over the plane of three others."""
         a, b, c = (self.positions[:, i] for i in three)
         values = _height(self.positions[:, k], a, b, c)
         values = np.sort(values[np.isfinite(values)])
@@ -177,7 +181,7 @@ class _Take:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Known:
-    """The bonds as tables over K markers; of pairs without one, what the pose says."""
+    """Bonds as tables over K markers, with distances of the pose for pairs without a bond."""
 
     is_bond: NDArray[np.bool_]  # (K, K)
     distance: NDArray[np.float64]
@@ -196,7 +200,7 @@ class _Known:
         return cls(is_bond=is_bond, distance=distance, spread=spread, places=bonds.places)
 
     def log_odds(self, middle: float, spread: float) -> NDArray[np.float64]:
-        """Tell for all pairs of markers whether two tracks are these, (K, K)."""
+        """Return the log odds that two tracks are each pair of markers, (K, K)."""
         varied = spread**2 + self.spread**2
         said = np.nan_to_num(_log_odds(middle - self.distance, varied, self.distance))
         return np.where(self.is_bond, said, said.clip(*UNBONDED))
@@ -205,11 +209,11 @@ class _Known:
 def _log_odds(
     off: NDArray[np.float64], varied: NDArray[np.float64], size: NDArray[np.float64] | float
 ) -> NDArray[np.float64]:
-    """Student's t with three degrees of freedom against anywhere, bounded."""
+    """Return bounded log odds of Student's t with three degrees of freedom against uniform."""
     scale2 = np.stack([varied + (fixed + share * size) ** 2 for fixed, share in (LEFT, REPLACED)])
     log_t = -2 * np.log1p(off**2 / scale2 / 3) - 0.5 * np.log(scale2) - 1.0  # log t(0) = -1.0
     said = log_t.max(axis=0) + np.log(ANYWHERE)
-    return np.clip(said, LEAST, MOST)
+    return np.clip(said, MIN_LOG_ODDS, MAX_LOG_ODDS)
 
 
 def _height(
@@ -218,23 +222,23 @@ def _height(
     b: NDArray[np.float64],
     c: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """How high x lies over the plane through a, b and c, on its right-handed side."""
+    """Return the signed height of x over the plane through a, b and c, right-handed."""
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return ((x - a) * normal).sum(axis=-1) / length
 
 
-def _search(take: _Take, known: _Known) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Name the tracks: the best way, and how probable each name is among the ways left."""
-    n, K = len(take.tracks), len(known.places)
+def _search(long: _LongTracks, known: _Known) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Name the tracks by the best assignment, with each name's probability in the final beam."""
+    n, K = len(long.tracks), len(known.places)
     named = np.full((1, n), -1, dtype=np.int64)
     is_used = np.zeros((1, K), dtype=bool)
     score = np.zeros(1)
     done: list[int] = []
-    for k in take.order():
-        others = take.beside(k, done)
-        more = _evidence(take, known, k, others, named)
+    for k in long.order():
+        others = long.steadiest(k, done)
+        more = _evidence(long, known, k, others, named)
         more[is_used] = -np.inf
         total = np.concatenate([score[:, None] + more, score[:, None]], axis=1)
         best = np.argsort(-total, axis=None, kind="stable")[:BEAM]
@@ -245,7 +249,7 @@ def _search(take: _Take, known: _Known) -> tuple[NDArray[np.int64], NDArray[np.f
         named[is_named, k] = marker[is_named]
         is_used[np.flatnonzero(is_named), marker[is_named]] = True
         done.append(k)
-    weights = np.exp(WORTH * (score - score.max()))
+    weights = np.exp(WEIGHT * (score - score.max()))
     weights /= weights.sum()
     best_way = named[int(np.argmax(score))]
     probabilities = ((named == best_way) * weights[:, None]).sum(axis=0)
@@ -253,30 +257,30 @@ def _search(take: _Take, known: _Known) -> tuple[NDArray[np.int64], NDArray[np.f
 
 
 def _evidence(
-    take: _Take, known: _Known, k: int, others: list[int], named: NDArray[np.int64]
+    long: _LongTracks, known: _Known, k: int, others: list[int], named: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Log odds of each marker for a track, in each way of naming the others, shape (ways, K)."""
+    """Return the log odds of each marker for a track, for each assignment, (assignments, K)."""
     ways, K = len(named), len(known.places)
     out = np.zeros((ways, K))
     for b in others:
-        table = known.log_odds(float(take.middle[k, b]), float(take.spread[k, b]))
+        table = known.log_odds(float(long.middle[k, b]), float(long.spread[k, b]))
         has = named[:, b] >= 0
         out[has] += table[:, named[has, b]].T
     if known.places.shape[1] == 3 and len(others) >= 3:
-        out += _sides(take, known, k, others, named)
+        out += _sides(long, known, k, others, named)
     return out
 
 
 def _sides(
-    take: _Take, known: _Known, k: int, others: list[int], named: NDArray[np.int64]
+    long: _LongTracks, known: _Known, k: int, others: list[int], named: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Log odds by the side of three others on which a track lies, reversed in a mirror image."""
+    """Return log odds from the side of three others on which a track lies."""
     out = np.zeros((len(named), len(known.places)))
     for three in ([0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]):
         if max(three) >= len(others):
             continue
         chosen = [others[i] for i in three]
-        height, spread = take.height(k, chosen)
+        height, spread = long.height(k, chosen)
         if not spread < 0.5 * abs(height):
             continue
         own = named[:, chosen]
@@ -289,31 +293,34 @@ def _sides(
 
 
 def _name_pieces(
-    take: _Take,
+    long: _LongTracks,
     known: _Known,
     named: NDArray[np.int64],
     probabilities: NDArray[np.float64],
 ) -> None:
-    """Tell of what is left over which named track it is a piece of, in place."""
-    counts = take.seen.sum(axis=0)
+    """Name remaining tracks that are pieces of named ones, in place."""
+    counts = long.seen.sum(axis=0)
     for k in sorted(np.flatnonzero(named < 0), key=lambda k: -counts[k]):
         has = np.flatnonzero(named >= 0)
-        others = take.beside(int(k), has.tolist())
+        others = long.steadiest(int(k), has.tolist())
         if not others:
             continue
-        said = _evidence(take, known, int(k), others, named[None])[0]
-        # Whoever is seen at the same time is another.
-        at_once = (take.seen[:, has] & take.seen[:, [k]]).any(axis=0)
+        said = _evidence(long, known, int(k), others, named[None])[0]
+        # Tracks with a common frame are different markers.
+        at_once = (long.seen[:, has] & long.seen[:, [k]]).any(axis=0)
         said[named[has[at_once]]] = -np.inf
         best = int(np.argmax(said))
         if said[best] < ENOUGH:
             continue
-        weights = np.exp(WORTH * (said - said[best]))
-        named[k], probabilities[k] = best, 1 / (weights.sum() + np.exp(-WORTH * said[best]))
+        weights = np.exp(WEIGHT * (said - said[best]))
+        named[k], probabilities[k] = (
+            best,
+            1 / (weights.sum() + np.exp(-WEIGHT * said[best])),
+        )
 
 
 def _renamed(tracks: Tracks, markers: NDArray[np.int64], bonds: Bonds) -> Tracks:
-    """Make one of the tracks that are the same marker, and give them its name."""
+    """Merge the tracks of each marker and name them."""
     into = np.arange(tracks.n_tracks)
     for marker in np.unique(markers[markers >= 0]):
         same = np.flatnonzero(markers == marker)

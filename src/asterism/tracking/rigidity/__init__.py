@@ -1,4 +1,4 @@
-"""Which markers keep their distance: learnt from tracks, used by stitching, naming and filling."""
+"""Bonds: stable distances between markers, used by stitching, naming and filling."""
 
 from asterism.tracking.rigidity.bonds import Bonds, learn_bonds
 

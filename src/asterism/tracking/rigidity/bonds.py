@@ -1,4 +1,4 @@
-"""Which markers keep their distances: learnt from one take, used in the next."""
+"""Bonds: stable distances between markers, learnt from one capture and used in the next."""
 
 from __future__ import annotations
 
@@ -28,32 +28,32 @@ if TYPE_CHECKING:
 
 __all__ = ["Bonds", "learn_bonds"]
 
-MOST_FRAMES = 1000
-"""Frames of a take, evenly spread, in which distances are measured."""
+MAX_FRAMES = 1000
+"""Number of evenly spread frames of a capture in which distances are measured."""
 LOOSE = 2.5
-"""Greatest spread of a rigid pair, as a multiple of that of the steadiest pairs of the capture; the
-share `BEND` of its distance is the other bound. Bonds may bend more than a segment does."""
+"""Largest spread of a rigid pair, as a multiple of that of the steadiest pairs of the capture. The
+share `BEND` of its distance is the other bound. Other bonds may vary more than a segment does."""
 FORMAT = "asterism bonds"
 
 
 @record(eq=False)
 class Bonds:
-    """Pairs of markers that keep their distance, and one pose of them all.
+    """Pairs of markers with a stable distance (bonds), and one pose of all markers.
 
     Parameters
     ----------
     names : tuple of str
-        Of the K markers, all different.
+        Names of the K markers, all different.
     places : array_like, shape (K, D)
-        One pose, metres, about its middle; NaN for markers that were not seen in it.
+        Positions in one pose, metres, relative to its centre; NaN for markers missing in it.
     pairs : array_like of int, shape (M, 2)
-        The bonded markers, the lower first.
+        Bonded markers, the lower index first.
     distances : array_like, shape (M,)
-        Medians, metres.
+        Median distance of each pair, metres.
     spreads : array_like, shape (M,)
-        What each distance varied by, as a standard deviation, metres.
+        Standard deviation of each distance, metres.
     frames : array_like of int, shape (M,)
-        Frames that this was learnt from.
+        Number of frames from which each distance was measured.
 
     Raises
     ------
@@ -100,12 +100,12 @@ class Bonds:
 
     @cached_property
     def steady(self) -> NDArray[np.bool_]:
-        """Pairs that are bonds as the engine has them, shape (M,)."""
+        """True for pairs that are bonds by the engine's criterion, shape (M,)."""
         return Distances(middle=self.distances, spread=self.spreads, n_frames=self.frames).is_bond
 
     @cached_property
     def rigid(self) -> NDArray[np.bool_]:
-        """Pairs that are rigid within what the steadiest pairs of this take vary by, shape (M,)."""
+        """True for pairs that are as rigid as the steadiest pairs of the capture, shape (M,)."""
         if not len(self.pairs):
             return np.zeros(0, dtype=bool)
         steadiest = np.full(len(self.names), np.inf)
@@ -116,7 +116,7 @@ class Bonds:
 
     @cached_property
     def clusters(self) -> tuple[tuple[int, ...], ...]:
-        """Rigid clusters: three markers or more, all rigid pairs, none in two of them."""
+        """Rigid clusters: disjoint groups of at least three markers with rigid pairs only."""
         friends: list[set[int]] = [set() for _ in self.names]
         for i, j in self.pairs[self.rigid]:
             friends[i].add(int(j))
@@ -131,7 +131,7 @@ class Bonds:
         return tuple(found)
 
     def to_toml(self, path: str | Path | None = None) -> str:
-        """Give the bonds as TOML text, and write it to `path` where one is given."""
+        """Return the bonds as TOML text, and write it to `path` if one is given."""
         markers: list[dict[str, Any]] = []
         for name, place in zip(self.names, self.places, strict=True):
             own: dict[str, Any] = {"name": name}
@@ -159,7 +159,7 @@ class Bonds:
         Raises
         ------
         FormatError
-            If the file cannot be read, is not TOML, or holds no bonds.
+            If the file cannot be read, is not TOML, or contains no bonds.
         """
         content = read_toml(path, "bonds in TOML")
         path = Path(path)
@@ -178,22 +178,22 @@ class Bonds:
         )
 
 
-def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = MIN_TOGETHER) -> Bonds:
-    """Learn which markers keep their distances.
+def learn_bonds(tracks: Tracks, *, neighbours: int = 12, min_frames: int = MIN_TOGETHER) -> Bonds:
+    """Learn the bonds of a capture: the pairs of markers with stable distances.
 
-    Of each marker the `neighbours` steadiest are kept: those whose distance has the least
-    predictive variance.
+    For each marker the `neighbours` steadiest pairs are kept: those whose distance has the
+    smallest predictive variance.
 
     Parameters
     ----------
     tracks : Tracks
-        A capture with the names of its markers. Tracks without a name are left out, and so are
-        tracks that carry a recorder's placeholder (``*12``, ``Unlabeled 7``). If no track has a
-        name, all are learnt as ``T000``, ``T001`` … by their number.
+        Tracks with the names of the markers. Tracks without a name, or with a placeholder of a
+        recording software (``*12``, ``Unlabeled 7``), are left out. If no track has a name, all
+        are used under the names ``T000``, ``T001`` … by their number.
     neighbours : int
-        Bonds that each marker has at least, where there are so many.
-    least : int
-        Frames in which two must have been seen together.
+        Smallest number of pairs of each marker, if there are that many.
+    min_frames : int
+        Smallest number of frames in which both markers of a pair are detected.
 
     Returns
     -------
@@ -212,10 +212,10 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = MIN_TOGETH
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_number("neighbours", neighbours, above=1, below=1000, closed=True, integer=True)
-    check_number("least", least, above=2, below=1e6, closed=True, integer=True)
+    check_number("min_frames", min_frames, above=2, below=1e6, closed=True, integer=True)
     tracks = tracks.measured()
     d = tracks.detections
-    every = max(1, -(-d.n_frames // MOST_FRAMES))
+    every = max(1, -(-d.n_frames // MAX_FRAMES))
     named = [k for k, name in enumerate(tracks.names) if name and not is_unlabelled(name)]
     names = [str(tracks.names[k]) for k in named]
     if not named:
@@ -224,7 +224,7 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = MIN_TOGETH
     between = distances_between(positions)
     K = len(named)
     cost = between.predictive_variance
-    cost[(between.n_frames * every < least) | np.eye(K, dtype=bool)] = np.inf
+    cost[(between.n_frames * every < min_frames) | np.eye(K, dtype=bool)] = np.inf
     order = np.argsort(cost, axis=1, kind="stable")[:, :neighbours]
     chosen = np.zeros((K, K), dtype=bool)
     np.put_along_axis(chosen, order, values=True, axis=1)
@@ -241,7 +241,7 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, least: int = MIN_TOGETH
 
 
 def _pose(positions: NDArray[np.float64], usual: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Choose the frame in which most markers are seen, and most nearly at their usual distances."""
+    """Choose the frame with the most markers, and of these the one nearest to usual distances."""
     if not positions.size:
         return np.zeros(positions.shape[1:])
     counts = np.isfinite(positions[..., 0]).sum(axis=1)
@@ -256,14 +256,14 @@ def _pose(positions: NDArray[np.float64], usual: NDArray[np.float64]) -> NDArray
 
 
 def _largest_clique(friends: list[set[int]]) -> tuple[int, ...] | None:
-    """Find a clique of three or more that cannot grow, the largest of one grown from each pair."""
+    """Find the largest of the maximal cliques grown greedily from each pair, of at least three."""
     best: tuple[int, ...] | None = None
     for i in range(len(friends)):
         for j in sorted(friends[i]):
             if j < i or (best is not None and len(friends[i]) < len(best)):
                 continue
             own, common = [i, j], friends[i] & friends[j]
-            while common:  # whoever leaves most to go on with
+            while common:  # the candidate that keeps the most others
                 more = max(sorted(common), key=lambda k: len(common & friends[k]))
                 own.append(more)
                 common &= friends[more]
@@ -273,7 +273,7 @@ def _largest_clique(friends: list[set[int]]) -> tuple[int, ...] | None:
 
 
 def _from_plain(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Give the fields of `Bonds` from what a file holds."""
+    """Return the fields of `Bonds` from the content of a file."""
     axes = content.get("axes")
     if axes not in (2, 3):
         raise ParameterError("axes", "2 or 3", axes)

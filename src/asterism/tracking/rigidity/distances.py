@@ -1,9 +1,8 @@
-"""Distances between markers over a capture, judged as the engine judges those of a stream.
+"""Distances between markers over a capture, with the engine's criterion for bonds.
 
-The engine keeps a running mean and variance of each distance. Here all frames are there at once,
-and the median and the middle 68 % stand in their place: a track that holds another marker for a
-while would spoil a mean, and with means fewer markers are named right. Everything after that is
-the engine's (`engine/rigid/bond.hpp`).
+For a stream the engine keeps a running mean and variance of each distance. For a whole capture the
+median and the central 68 % are used instead: they are robust against a track that holds another
+marker for a while. The criterion itself is the engine's (`engine/rigid/bond.hpp`).
 """
 
 from __future__ import annotations
@@ -21,23 +20,23 @@ if TYPE_CHECKING:
 __all__ = ["BEND", "MIN_TOGETHER", "Distances", "distances_between", "distances_from"]
 
 BEND = _engine.BEND
-"""Share of a distance by which a body may bend that was not seen to bend."""
+"""Share of a distance by which a body may still bend if it did not bend so far."""
 MIN_TOGETHER = _engine.MIN_TOGETHER
-"""Frames in which two markers must have been seen together."""
+"""Smallest number of frames in which both markers of a pair are detected."""
 
 
 @record(eq=False)
 class Distances:
-    """Distances over some frames.
+    """Statistics of distances over some frames.
 
     Parameters
     ----------
     middle : ndarray, shape (..., n)
-        Their medians, metres; NaN where two were never seen together.
+        Median distances, metres; NaN for two markers without a common frame.
     spread : ndarray, shape (..., n)
-        Half the middle 68 %, which is the standard deviation where they are Gaussian, metres.
+        Half the width of the central 68 %, metres: the standard deviation of a Gaussian.
     n_frames : ndarray of int, shape (..., n)
-        Frames in which both were seen.
+        Number of frames in which both markers were detected.
     """
 
     middle: NDArray[np.float64]
@@ -46,12 +45,12 @@ class Distances:
 
     @property
     def predictive_variance(self) -> NDArray[np.float64]:
-        """Variance of each distance when it is measured next, m²."""
+        """Predictive variance of each distance in the next frame, m²."""
         return self._judged()[0]
 
     @property
     def is_bond(self) -> NDArray[np.bool_]:
-        """Whether each distance was seen for long enough and is known to a tenth of itself."""
+        """True for distances with enough frames that are known to a tenth of their length."""
         return self._judged()[1]
 
     def _judged(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -62,13 +61,14 @@ class Distances:
 
 
 def distances_from(marker: NDArray[np.float64], others: NDArray[np.float64]) -> Distances:
-    """Measure from one marker to others.
+    """Measure the distances from one marker to others.
 
     Parameters
     ----------
     marker : ndarray, shape (F, D)
-        Positions, NaN where not seen.
+        Positions, metres, NaN where not detected.
     others : ndarray, shape (F, n, D)
+        Positions of the other markers.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def distances_from(marker: NDArray[np.float64], others: NDArray[np.float64]) -> 
     """
     distance = np.sqrt(((others - marker[:, None]) ** 2).sum(axis=2))
     n = np.isfinite(distance).sum(axis=0)
-    ordered = np.sort(distance, axis=0)  # NaN goes last
+    ordered = np.sort(distance, axis=0)  # NaN is sorted last
     low, middle, high = (
         ordered[np.minimum((share * n).astype(int), len(ordered) - 1), np.arange(len(n))]
         for share in (0.16, 0.5, 0.84)
@@ -86,12 +86,12 @@ def distances_from(marker: NDArray[np.float64], others: NDArray[np.float64]) -> 
 
 
 def distances_between(positions: NDArray[np.float64]) -> Distances:
-    """Measure between all markers of a take.
+    """Measure the distances between all markers of a capture.
 
     Parameters
     ----------
     positions : ndarray, shape (F, K, D)
-        NaN where not seen.
+        Positions, metres, NaN where not detected.
 
     Returns
     -------

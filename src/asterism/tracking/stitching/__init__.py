@@ -1,4 +1,4 @@
-"""Tracklets made into tracks of markers, for whole captures and for streams."""
+"""Stitching of tracklets into tracks of markers, for whole captures and for streams."""
 
 from asterism.tracking.stitching.stream import Stitched, StitchedState
 from asterism.tracking.stitching.tracklets import MAX_TRACKLET_GAP, tracklet_model

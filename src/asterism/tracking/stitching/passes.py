@@ -1,4 +1,4 @@
-"""One pass of stitching through a take, forward or backward in time."""
+"""One pass of stitching through a capture, forward or backward in time."""
 
 from __future__ import annotations
 
@@ -17,41 +17,41 @@ if TYPE_CHECKING:
 
 __all__ = ["Pass", "go_through"]
 
-LEAST_ADVICE, MOST_ADVICE = 1.0, 5.0
-"""Log odds that a join of the pass before is worth to the next."""
+MIN_ADVICE, MAX_ADVICE = 1.0, 5.0
+"""Bounds of the log odds that a join of one pass adds in the next."""
 
 
 @record(eq=False)
 class Pass:
-    """What a pass found.
+    """Result of a pass.
 
     Parameters
     ----------
-    fragments : ndarray of int, shape (N,)
-        Fragment of each detection, -1 for clutter.
+    tracklets : ndarray of int, shape (N,)
+        Tracklet of each detection, -1 for clutter.
     markers : ndarray of int, shape (F,)
-        Marker of each fragment, -2 for a ghost.
+        Marker of each tracklet, -2 for a ghost.
     after : ndarray of int, shape (F,)
-        The fragment that each goes on with in the pass's direction, -1 where a marker begins.
+        Predecessor of each tracklet in the direction of the pass, -1 for the first of a
+        marker.
     probabilities : ndarray, shape (F,)
-        Of what was decided of each fragment.
+        Probability of the decision about each tracklet.
     n_cuts : int
-        Links that the neighbours contradict.
+        Number of links that were cut because the neighbours contradict them.
     """
 
-    fragments: NDArray[np.int32]
+    tracklets: NDArray[np.int32]
     markers: NDArray[np.int32]
     after: NDArray[np.int32]
     probabilities: NDArray[np.float64]
     n_cuts: int
 
     def advise(self, stitcher: _engine.Stitcher) -> None:
-        """Tell a pass in the other direction, over these fragments, which of them were joined."""
+        """Pass the joins of these tracklets as prior log odds to a pass in the other direction."""
         joined = np.flatnonzero((self.after >= 0) & (self.markers >= 0))
         p = np.clip(self.probabilities[joined], 1e-9, 1 - 1e-9)
-        weights = np.clip(
-            np.log(p / (1 - p)) / _engine.Stitcher.ODDS_FACTOR, LEAST_ADVICE, MOST_ADVICE
-        )
+        log_odds = np.log(p / (1 - p)) / _engine.Stitcher.ODDS_FACTOR
+        weights = np.clip(log_odds, MIN_ADVICE, MAX_ADVICE)
         stitcher.advise(self.after[joined].astype(np.int64), joined.astype(np.int64), weights)
 
 
@@ -64,22 +64,22 @@ def go_through(
     before: Pass | None = None,
     backward: bool = False,
 ) -> Pass:
-    """Stitch once.
+    """Run one pass of stitching.
 
     Parameters
     ----------
     detections : Detections
-        The take.
+        Detections of the capture.
     labels : ndarray of int, shape (N,)
-        Tracks to make markers of; the fragments of `before`, where that is given.
+        Tracklets to stitch; those of `before`, if it is given.
     model : TrackingModel
-        Motion and noise.
+        Model whose motion and noise are used.
     options : StitchOptions
-        Of the engine.
+        Options of the engine.
     before : Pass, optional
-        What was found in the other direction.
+        Result of the pass in the other direction.
     backward : bool
-        Begin at the end.
+        Whether to go backward in time.
 
     Returns
     -------
@@ -97,10 +97,10 @@ def go_through(
     if before is not None:
         before.advise(stitcher)
     kind, F, Q = steps_of(model.motion, times)
-    fragments, markers, after, probabilities = stitcher.run(
+    tracklets, markers, after, probabilities = stitcher.run(
         motion, times, kind, F, Q, offsets, points, labels
     )
     return Pass(
-        fragments=fragments[::-1] if backward else fragments,
+        tracklets=tracklets[::-1] if backward else tracklets,
         markers=markers, after=after, probabilities=probabilities, n_cuts=stitcher.n_cuts,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Stitching frame by frame: markers of a stream, through gaps of any length."""
+"""Stitching frame by frame, for streams, through gaps of any length."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ __all__ = ["Stitched", "StitchedState"]
 
 @record(eq=False)
 class StitchedState:
-    """The state of `Stitched`.
+    """State of `Stitched`.
 
     Parameters
     ----------
-    fragments : MethodState
-        Of the method that makes them.
+    tracklets : MethodState
+        State of the method that tracks the tracklets.
     stitcher : LiveStitcher
-        The markers, in the engine.
+        Markers in the engine.
     model : TrackingModel
-        That of the fragments.
+        Model of the tracklets.
     n_axes : int
-        2 or 3.
+        Number of coordinates, 2 or 3.
     last_time : float
-        Of the last frame, seconds; -inf before the first.
+        Time of the last frame, seconds; -inf before the first.
     """
 
-    fragments: MethodState
+    tracklets: MethodState
     stitcher: _engine.LiveStitcher
     model: TrackingModel
     n_axes: int
@@ -54,14 +54,14 @@ class StitchedState:
 
     @property
     def n_seen(self) -> int:
-        """Number of detections taken so far."""
+        """Number of detections processed so far."""
         return self.stitcher.n_seen
 
     @property
     def info(self) -> dict[str, float]:
-        """What the method tells of the fragments, and what was made of them."""
+        """Counts of the method, and of the joins, cuts and ghosts of the stitching."""
         return {
-            **self.fragments.info,
+            **self.tracklets.info,
             "joins": self.stitcher.n_joins,
             "cuts": self.stitcher.n_cuts,
             "ghosts": self.stitcher.n_ghosts,
@@ -74,24 +74,25 @@ def _over_three_frames() -> Method[Any]:
 
 @record
 class Stitched(Method[StitchedState]):
-    """A method whose tracks are stitched as they come, for streams.
+    """Method for streams that stitches the tracklets of another method frame by frame.
 
-    What `identify` does with a whole take, with what is known by now. What comes back has the
-    marker that it may be as soon as the method believes it and `lag` frames have passed, and its
-    final label when it has been seen for `confirm` frames; earlier detections are revised. What
-    was never seen before is -1 until then.
+    It corresponds to `stitch` for a whole capture, with the frames so far. A reappearing marker
+    gets its most probable label when the method has confirmed its tracklet and `lag` frames have
+    passed.
+    The label is final after `confirm` detections, and earlier detections are revised. A marker
+    that was never detected before has the label -1 until then.
 
     Parameters
     ----------
     method : Method
-        What makes the fragments.
+        Method that tracks the tracklets.
     confirm, ghost_radius
         As for `stitch`.
     max_hidden : int
-        Frames after which a hidden marker is forgotten, which bounds the memory of endless runs.
+        Longest occlusion of a marker that is kept, frames; it bounds the memory of endless runs.
     lag : int, optional
-        Frames for which the method may change its mind; what it revises later is not taken up.
-        By default one less than its `window`, 2 where it has none.
+        Number of frames within which the method's revisions are used; later ones are ignored.
+        By default one less than its `window`, or 2 for a method without a window.
 
     Raises
     ------
@@ -102,10 +103,10 @@ class Stitched(Method[StitchedState]):
     --------
     >>> import asterism as am
     >>> truth = am.simulate.person(seed=1)
-    >>> hidden = am.simulate.corrupt(truth, burst=am.simulate.Burst(), seed=1).detections
+    >>> d = am.simulate.corrupt(truth, burst=am.simulate.Burst(), seed=1).detections
     >>> method = am.tracking.Stitched()
-    >>> state = method.init(am.estimate_model(hidden).model)
-    >>> for time, points in hidden:
+    >>> state = method.init(am.estimate_model(d).model)
+    >>> for time, points in d:
     ...     state, update = method.step(state, time, points)
     >>> bool((update.labels >= 0).all())
     True
@@ -128,14 +129,14 @@ class Stitched(Method[StitchedState]):
     def init(
         self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None
     ) -> StitchedState:
-        """Make the state before the first frame; see `Method.init`."""
+        """Return the state before the first frame; see `Method.init`."""
         check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
         model = tracklet_model(model)
-        fragments = self.method.init(model, n_axes=n_axes, seed=seed)
+        tracklets = self.method.init(model, n_axes=n_axes, seed=seed)
         options = stitch_options(model, self.confirm, self.ghost_radius, self.max_hidden)
         lag = getattr(self.method, "window", 3) - 1 if self.lag is None else self.lag
         stitcher = _engine.LiveStitcher(motion_model(model, n_axes), options, lag=lag)
-        return StitchedState(fragments=fragments, stitcher=stitcher, model=model, n_axes=n_axes)
+        return StitchedState(tracklets=tracklets, stitcher=stitcher, model=model, n_axes=n_axes)
 
     def step(
         self,
@@ -145,17 +146,17 @@ class Stitched(Method[StitchedState]):
         *,
         covariances: ArrayLike | None = None,
     ) -> tuple[StitchedState, Update]:
-        """Take the next frame; see `Method.step`."""
+        """Process the next frame; see `Method.step`."""
         check_kind("state", state, StitchedState, "method.init(model)")
         frame = checked_frame(time, state.last_time, points, state.n_axes)
-        fragments, found = self.method.step(state.fragments, time, frame, covariances=covariances)
+        tracklets, found = self.method.step(state.tracklets, time, frame, covariances=covariances)
         motion, dt = state.model.motion, time - state.last_time
         F, Q = no_transition(motion) if dt == float("inf") else transition(motion, dt)
         stitcher, labels, revised, revised_labels = state.stitcher.step(
             F, Q, frame, found.labels, found.revised, found.revised_labels
         )
         after = StitchedState(
-            fragments=fragments, stitcher=stitcher, model=state.model, n_axes=state.n_axes,
+            tracklets=tracklets, stitcher=stitcher, model=state.model, n_axes=state.n_axes,
             last_time=time,
         )  # fmt: skip
         return after, Update(

@@ -1,4 +1,4 @@
-"""Tracklets: tracks that end early, so that each is of one marker."""
+"""Tracklets: short tracks that are terminated early, so that each belongs to one marker."""
 
 from __future__ import annotations
 

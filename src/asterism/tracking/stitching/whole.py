@@ -1,7 +1,7 @@
-"""Fragments of tracks made into markers.
+"""Stitching of the tracklets of a whole capture into tracks of markers.
 
-A marker that was hidden comes back as a stranger. Which it is, its neighbours know: bodies move
-almost rigidly, so that those that keep their distance carry a hidden marker with them.
+After a long occlusion a marker's own motion no longer predicts where it reappears. Neighbours at
+stable distances do, because body segments move almost rigidly.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ GHOST = -2
 
 @record
 class Join:
-    """Two fragments that are one marker.
+    """Join of two tracklets of one marker.
 
     Parameters
     ----------
     marker : int
-        The track of the result.
+        Track of the result.
     last, first : int
-        Frames in which it was seen last, and first again.
+        Last frame before and first frame after the occlusion.
     probability : float
-        That it is the same marker, against all others that were hidden, a new one and a ghost.
+        Probability of the join, against all other occluded markers, a new marker and a ghost.
     """
 
     marker: int
@@ -48,26 +48,27 @@ class Join:
 
 @record(eq=False)
 class Stitching:
-    """What was made of fragments.
+    """Result of `stitch`.
 
     Parameters
     ----------
     tracks : Tracks
-        The markers: labels for the same detections, without those that were filled.
-    fragments : ndarray of int, shape (N,)
-        Fragment of each detection, -1 for clutter.
+        Tracks of the markers: labels for the same detections, without filled ones.
+    tracklets : ndarray of int, shape (N,)
+        Tracklet of each detection, -1 for clutter.
     markers : ndarray of int, shape (F,)
-        Track of each fragment; -2 for a ghost, which is clutter now.
+        Track of each tracklet; -2 for a ghost, which is clutter in the result.
     after : ndarray of int, shape (F,)
-        The fragment that each goes on with, -1 where a marker begins.
+        Preceding tracklet of each tracklet, -1 for the first of a marker.
     probabilities : ndarray, shape (F,)
-        Of what was decided of each fragment.
+        Probability of the decision about each tracklet.
     n_cuts : int
-        Links inside the tracks that came in which the neighbours contradict.
+        Number of links of the input tracks that were cut because the neighbours contradict
+        them.
     """
 
     tracks: Tracks
-    fragments: NDArray[np.int32]
+    tracklets: NDArray[np.int32]
     markers: NDArray[np.int32]
     after: NDArray[np.int32]
     probabilities: NDArray[np.float64]
@@ -75,19 +76,19 @@ class Stitching:
 
     @property
     def n_ghosts(self) -> int:
-        """Fragments that were found to be no marker."""
+        """Number of tracklets that are ghosts."""
         return int((self.markers == GHOST).sum())
 
     @cached_property
     def joins(self) -> tuple[Join, ...]:
-        """Every join, in order of time."""
+        """All joins, in order of time."""
         frame = self.tracks.detections.frame_of
-        inside = self.fragments >= 0
+        inside = self.tracklets >= 0
         n = len(self.markers)
         first = np.full(n, np.iinfo(np.int64).max)
         last = np.full(n, -1)
-        np.minimum.at(first, self.fragments[inside], frame[inside])
-        np.maximum.at(last, self.fragments[inside], frame[inside])
+        np.minimum.at(first, self.tracklets[inside], frame[inside])
+        np.maximum.at(last, self.tracklets[inside], frame[inside])
         found = np.flatnonzero((self.after >= 0) & (self.markers >= 0))
         order = found[np.lexsort((found, first[found]))]
         return tuple(
@@ -102,7 +103,7 @@ class Stitching:
 
     @cached_property
     def bonds(self) -> Bonds:
-        """Which of the markers keep their distances, and rigid clusters of them."""
+        """Bonds and rigid clusters of the stitched markers."""
         return learn_bonds(self.tracks)
 
     def __repr__(self) -> str:
@@ -120,33 +121,36 @@ def stitch(
     ghost_radius: float = 0.03,
     max_hidden: int | None = None,
 ) -> Stitching:
-    """Make markers of fragments: tell which track goes on with which, through gaps of any length.
+    """Stitch tracklets into tracks of markers, through gaps of any length.
 
-    A track that has been seen for `confirm` frames, or is over, is weighed against every marker
-    that is hidden. Its *body*: neighbours that keep their distance, seen before and now, are
-    fitted rigidly, and carry the hidden marker to where it must be now, as surely as they fit and
-    as they did before while it could be seen. Its *motion*: the filter of the model through the
-    gap. Against both stands that it is new, or a ghost beside a marker. Tracks that are open at
-    the same time compete. Inside a track, a link that the neighbours contradict is cut first.
+    A tracklet with `confirm` frames, or a terminated one, is compared with every occluded marker
+    by two predictions. *Body*: neighbours at stable distances, detected before and now, are fitted
+    rigidly and predict the occluded marker; the uncertainty follows from the residuals of the fit
+    and from earlier predictions while the marker was detected. *Motion*: the filter of the model
+    through the gap. The alternatives are a new marker and a ghost. Tracklets that are open at the
+    same time compete for markers. Links inside a track that the neighbours contradict are cut
+    first.
 
-    The take is gone through forward, backward and forward again; what one pass finds advises the
-    next.
+    Three passes go through the capture, forward, backward and forward again; the joins of each
+    pass are prior information for the next.
 
-    Short tracks are the better fragments: let the tracker give up early, as `identify` does.
+    Short pure tracklets give the best result: limit the model's gap by `tracklet_model`, as
+    `track` does.
 
     Parameters
     ----------
     tracks : Tracks
-        Fragments, from any method or from a file; points that were filled are left out.
+        Tracklets from any method or from a file; filled points are left out.
     model : TrackingModel
-        Motion, noise, and the longest gap within a fragment.
+        Model of motion and noise, with the longest gap within a tracklet.
     confirm : int
-        Frames until it is decided what a fragment is. One that is over sooner, goes on with
-        nothing, and is beside a marker or among bodies, is a ghost.
+        Number of frames after which a tracklet is assigned to a marker. A shorter tracklet that
+        continues no marker and is near a marker or among bodies is a ghost. Larger values use
+        more evidence and delete more short tracklets.
     ghost_radius : float
-        Ghosts are about so far from their marker, metres.
+        Typical distance of a ghost from its marker, metres, > 0.
     max_hidden : int, optional
-        Frames after which a hidden marker is forgotten; never by default.
+        Longest occlusion of a marker that is kept, frames; unlimited by default.
 
     Returns
     -------
@@ -159,8 +163,8 @@ def stitch(
 
     Notes
     -----
-    Rigid fits are weighted least squares [1]_. How far a body carries a marker wrongly is taken as
-    Student's t with three degrees of freedom, whose scale is what the fit leaves.
+    Rigid fits are weighted least squares [1]_. The prediction error of a body has Student's t
+    distribution with three degrees of freedom, whose scale follows from the residuals of the fit.
 
     References
     ----------
@@ -170,10 +174,10 @@ def stitch(
     --------
     >>> import asterism as am
     >>> truth = am.simulate.person(seed=1)
-    >>> hidden = am.simulate.corrupt(truth, burst=am.simulate.Burst(), seed=1)
-    >>> model = am.tracking.tracklet_model(am.estimate_model(hidden.detections).model)
-    >>> pieces = am.track(hidden.detections, am.GNN(), model=model)
-    >>> am.stitch(pieces, model)  # doctest: +ELLIPSIS
+    >>> corrupted = am.simulate.corrupt(truth, burst=am.simulate.Burst(), seed=1)
+    >>> model = am.tracking.tracklet_model(am.estimate_model(corrupted.detections).model)
+    >>> tracklets = am.track(corrupted.detections, am.GNN(), model=model)
+    >>> am.stitch(tracklets, model)  # doctest: +ELLIPSIS
     Stitching(... tracks, ... joins, ... cuts, ... ghosts)
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
@@ -181,28 +185,29 @@ def stitch(
     check_options(confirm, ghost_radius, max_hidden)
     tracks = tracks.measured()
     d = tracks.detections
-    # What is learnt late helps early: each pass advises the next, in the other direction. The last
-    # leaves the fragments as they are.
+    # Bonds learnt late in the capture help early in it, so each pass informs the next one in the
+    # other direction. The last pass does not cut tracklets.
     limits = (model, confirm, ghost_radius, max_hidden)
     options = stitch_options(*limits)
     first = go_through(d, tracks.labels, model, options)
-    back = go_through(d, first.fragments, model, options, before=first, backward=True)
+    back = go_through(d, first.tracklets, model, options, before=first, backward=True)
     options = stitch_options(*limits, may_cut=False)
-    found = go_through(d, back.fragments, model, options, before=back)
-    fragments, markers, after = found.fragments, found.markers, found.after
+    found = go_through(d, back.tracklets, model, options, before=back)
+    tracklets, markers, after = found.tracklets, found.markers, found.after
     n_cuts = first.n_cuts + back.n_cuts
     labels = np.full(d.n_points, -1, dtype=np.int64)
-    inside = fragments >= 0
-    labels[inside] = np.maximum(markers[fragments[inside]], -1)
+    inside = tracklets >= 0
+    labels[inside] = np.maximum(markers[tracklets[inside]], -1)
     n_markers = int(markers.max(initial=-1)) + 1
     n_joins = int(((after >= 0) & (markers >= 0)).sum())
     result = Tracks(
         detections=d,
         labels=labels,
-        names=_names(tracks, fragments, markers, n_markers),
-        confidence=_confidence(tracks, fragments, after, found.probabilities),
+        names=_names(tracks, tracklets, markers, n_markers),
+        confidence=_confidence(tracks, tracklets, after, found.probabilities),
         info={
-            # The model knows no gap so long: the fragments' posterior is not that of the markers.
+            # The model excludes gaps of that length, so the tracklets' posterior is not that of
+            # the markers.
             **{name: value for name, value in tracks.info.items() if name != "log_posterior"},
             "joins": n_joins,
             "cuts": n_cuts,
@@ -210,7 +215,7 @@ def stitch(
         },
     )
     return Stitching(
-        tracks=result, fragments=fragments, markers=markers, after=after,
+        tracks=result, tracklets=tracklets, markers=markers, after=after,
         probabilities=found.probabilities, n_cuts=n_cuts,
     )  # fmt: skip
 
@@ -230,7 +235,7 @@ def stitch_options(
     max_hidden: int | None,
     may_cut: bool = True,
 ) -> _engine.StitchOptions:
-    """Give the options of `stitch` as the engine takes them."""
+    """Return the options of `stitch` as an engine object."""
     return _engine.StitchOptions(
         noise=model.sensor.noise_sigma,
         ghost_radius=ghost_radius,
@@ -242,16 +247,16 @@ def stitch_options(
 
 
 def _names(
-    tracks: Tracks, fragments: NDArray[np.int32], markers: NDArray[np.int32], n_markers: int
+    tracks: Tracks, tracklets: NDArray[np.int32], markers: NDArray[np.int32], n_markers: int
 ) -> tuple[str | None, ...]:
-    """Give each marker the first name that any of its fragments has and no other marker."""
+    """Return for each marker the first name of its tracklets that no other marker has."""
     names: list[str | None] = [None] * n_markers
     if any(tracks.names):
         track = np.full(len(markers), -1)
-        inside = fragments >= 0
-        track[fragments[inside]] = tracks.labels[inside]
-        for fragment in np.flatnonzero(markers >= 0):
-            marker, name = markers[fragment], tracks.names[track[fragment]]
+        inside = tracklets >= 0
+        track[tracklets[inside]] = tracks.labels[inside]
+        for tracklet in np.flatnonzero(markers >= 0):
+            marker, name = markers[tracklet], tracks.names[track[tracklet]]
             if names[marker] is None and name not in names:
                 names[marker] = name
     return tuple(names)
@@ -259,17 +264,17 @@ def _names(
 
 def _confidence(
     tracks: Tracks,
-    fragments: NDArray[np.int32],
+    tracklets: NDArray[np.int32],
     after: NDArray[np.int32],
     probabilities: NDArray[np.float64],
 ) -> NDArray[np.float64] | None:
-    """Where the method has any, the first detection of a join is held no surer than the join."""
+    """Return the confidence, limited at the first detection of each join to its probability."""
     if tracks.confidence is None:
         return None
     confidence = tracks.confidence.copy()
-    inside = np.flatnonzero(fragments >= 0)
-    _, at = np.unique(fragments[inside], return_index=True)
+    inside = np.flatnonzero(tracklets >= 0)
+    _, at = np.unique(tracklets[inside], return_index=True)
     first = inside[at]
-    joined = first[after[fragments[first]] >= 0]
-    confidence[joined] = np.minimum(confidence[joined], probabilities[fragments[joined]])
+    joined = first[after[tracklets[first]] >= 0]
+    confidence[joined] = np.minimum(confidence[joined], probabilities[tracklets[joined]])
     return confidence
