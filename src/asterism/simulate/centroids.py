@@ -27,7 +27,7 @@ _CHUNK = 256  # frames at a time
 
 @record
 class Seeing:
-    """What a camera makes of the markers before it.
+    """Image formation of markers in a camera: occlusion, merging and centroid noise.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def see(
 def _discs(
     camera: Camera, positions: NDArray[np.float64], surfaces: Sequence[Surface], seeing: Seeing
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give centroid (T, K, 2) and share (T, K) of the part of each marker that is seen."""
+    """Return centroid (T, K, 2) and share (T, K) of the part of each marker that is seen."""
     r = seeing.marker_radius
     middle = camera.project(positions, surfaces)
     in_view = np.isin(middle.reason, (Reason.VISIBLE, Reason.HIDDEN))
@@ -227,7 +227,7 @@ def _discs(
 
 
 def _velocity(times: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the velocity of each marker, from the frames beside; 0 where it has no neighbour."""
+    """Return the velocity of each marker, from the frames beside; 0 where it has no neighbour."""
     if len(times) < 2:
         return np.zeros_like(positions)
     steps = np.diff(positions, axis=0) / np.diff(times)[:, None, None]

@@ -20,12 +20,12 @@ class Points(NamedTuple):
     markers: NDArray[np.int64]
 
     def where(self, chosen: NDArray[np.bool_]) -> Points:
-        """Give those that are chosen."""
+        """Return those that are chosen."""
         return Points(self.frames[chosen], self.places[chosen], self.markers[chosen])
 
 
 def false_points(frames: NDArray[np.int64], places: NDArray[np.float64]) -> Points:
-    """Give points that are of no marker."""
+    """Return points that are of no marker."""
     return Points(frames, places, np.full(len(frames), -1))
 
 

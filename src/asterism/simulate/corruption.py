@@ -1,4 +1,4 @@
-"""What goes wrong in a recording, done to a scene or a capture whose truth is known.
+"""Corruption of a scene or a capture with known truth: missed detections, clutter and noise.
 
 Real failures come in kinds, and trackers fail on them differently: points missing here and there,
 markers hidden for a while, false points anywhere, ghosts near a marker, noise, a low rate. Each is
@@ -259,7 +259,7 @@ def _check(truth: Tracks, switches: dict[str, Any]) -> None:
 
 
 def _record(switches: dict[str, Any]) -> dict[str, Any]:
-    """Say which switches were on, in words and numbers alone."""
+    """Return the corruptions that were applied, as plain words and numbers."""
     defaults: dict[str, Any] = corrupt.__kwdefaults__ or {}
     # What only says how another switch works is worth telling when that one is on.
     details = {"nearby_within": "nearby", "doubled_apart": "doubled", "views": "rig"}
@@ -282,7 +282,7 @@ def _views(
     by_cameras: NDArray[np.int64] | None,
     sigma: NDArray[np.float64],
 ) -> dict[str, Any]:
-    """Say which cameras saw each point, and how far their rays pass by it.
+    """Find which cameras saw each point, and how far their rays pass by it.
 
     The misfit of n rays, each off by `sigma` across, that were fitted by least squares has 2 n - 3
     degrees of freedom and is independent of the error of the point: so it is drawn, and tells
@@ -323,7 +323,7 @@ def _shuffled(rng: np.random.Generator, parts: list[Points]) -> Points:
 def _markers(
     truth: Tracks, chosen: NDArray[np.int64], keep_unnamed: bool
 ) -> tuple[Points, NDArray[np.int64]]:
-    """Give the points that take part, in the frames that stay, and the tracks of the markers."""
+    """Return the points that take part, in the frames that stay, and the tracks of the markers."""
     has_name = np.array([name is not None for name in truth.names], dtype=bool)
     if not has_name.any():
         has_name[:] = True
@@ -339,7 +339,7 @@ def _markers(
 
 
 def _names(truth: Tracks, origin: NDArray[np.int64], *, is_anew: bool) -> tuple[str | None, ...]:
-    """Give the names of the markers; those of one after the other with the number of the visit."""
+    """Return the names of the markers, with the number of the visit for successive visitors."""
     names = [truth.names[i] for i in origin]
     if not is_anew:
         return tuple(names)
@@ -359,7 +359,7 @@ def _detections(
     stride: int,
     switches: dict[str, Any],
 ) -> Detections:
-    """Give the points as detections that know of their file what `source` knew."""
+    """Return the points as detections that know of their file what `source` knew."""
     counts = np.bincount(mixed.frames, minlength=len(times))
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     if not isinstance(source, Capture):

@@ -1,4 +1,4 @@
-"""What comes and goes in a recording: hidden markers, ghosts, visitors; and when."""
+"""Episodes of a capture: bursts of missed detections, ghosts and visitors, with their times."""
 
 from __future__ import annotations
 

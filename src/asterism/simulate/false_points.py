@@ -1,4 +1,4 @@
-"""What a recording shows that is no marker."""
+"""False alarms and ghosts of a capture."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ __all__ = ["Film", "film"]
 
 @record(eq=False)
 class Film:
-    """What a rig makes of moving markers.
+    """Filming of moving markers by a rig: image points of every camera.
 
     Parameters
     ----------

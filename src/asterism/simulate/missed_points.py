@@ -1,4 +1,4 @@
-"""What of the markers a recording does not show."""
+"""Missed detections of a capture."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def in_runs(
 def shadowed(
     rng: np.random.Generator, burst: Burst, points: Points, n_frames: int, n_markers: int
 ) -> NDArray[np.bool_]:
-    """Say which points fall into the shadows of a burst."""
+    """Find the points in the occluded regions of a burst."""
     is_dark = np.zeros((n_frames, n_markers), dtype=bool)
     for start, stop in episodes(rng, burst, n_frames):
         is_dark[start:stop, rng.integers(n_markers)] = True
@@ -62,7 +62,7 @@ def shadowed(
 def seen_by_rig(
     points: Points, rig: Rig, surfaces: Sequence[Surface], n_frames: int
 ) -> NDArray[np.int64]:
-    """Say which cameras see each marker past the surfaces: bit i for camera i, shape (N,)."""
+    """Return the cameras that see each marker past the surfaces: bit i for camera i, shape (N,)."""
     is_marker = points.markers >= 0
     n_markers = int(points.markers.max(initial=-1)) + 1
     result = np.zeros(len(is_marker), dtype=np.int64)

@@ -301,7 +301,7 @@ def wander(
 
 
 def _cube(first: int, colour: int) -> list[tuple[int, int, int]]:
-    """Give the lines along the edges of a cube whose first corner is a certain marker."""
+    """Return the lines along the edges of a cube whose first corner is a certain marker."""
     return [(first + i, first + j, colour) for i, j in _EDGES]
 
 
@@ -312,7 +312,7 @@ def _named(
     colours: Sequence[int] = (),
 ) -> Truth:
     names = [f"M{i:02d}" for i in range(positions.shape[1])]
-    positions.flags.writeable = False  # nobody else has them: no need to copy
+    positions.flags.writeable = False  # a read-only array is kept without a copy
     return Truth.of(times, positions, names, lines=lines, colours=colours)
 
 

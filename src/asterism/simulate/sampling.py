@@ -1,4 +1,4 @@
-"""Which moments of a scene a recording holds."""
+"""Sampling of a scene: frames that a capture keeps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["kept_frames", "shaken"]
 def kept_frames(
     rng: np.random.Generator, n_frames: int, stride: int, dropped: float
 ) -> NDArray[np.int64]:
-    """Give the frames that a recording keeps: every so many, less those that are lost."""
+    """Return the frames that a recording keeps: every so many, less those that are lost."""
     frames = np.arange(0, n_frames, stride)
     return frames[rng.random(len(frames)) >= dropped] if dropped else frames
 

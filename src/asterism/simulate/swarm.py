@@ -92,7 +92,7 @@ def swarm(
 
 
 def _lattice(n: int, pitch: float) -> NDArray[np.float64]:
-    """Give the `n` places nearest to the origin of a cubic lattice."""
+    """Return the `n` places nearest to the origin of a cubic lattice."""
     side = int(np.ceil(n ** (1 / 3))) + 2
     axis = np.arange(side) - (side - 1) / 2
     grid = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)

@@ -54,17 +54,17 @@ class Walker:
     is_run: bool = False
 
     def carriage(self, t: Array) -> Carriage:
-        """Give pelvis, trunk, head and arms at times (T,)."""
+        """Return pelvis, trunk, head and arms at times (T,)."""
         phase = t * self.gait.cadence + self.style.phase
         heading, vigour = self.course.heading(t), self.course.vigour(t)
         return upright(phase, heading, vigour, self.style, is_run=self.is_run)
 
     def feet(self, t: Array) -> Feet:
-        """Give the feet at times (T,)."""
+        """Return the feet at times (T,)."""
         return feet_on(t, self.body, self.course, self.gait, self.swings)
 
     def root(self, t: Array, carriage: Carriage) -> Array:
-        """Give the middle of the hip joints, (T, 3)."""
+        """Return the middle of the hip joints, (T, 3)."""
         root = self._flat(t, carriage)
         highest = reached(self.course, self.body, self._hips, self.feet)
         if not self.is_run:
@@ -77,7 +77,7 @@ class Walker:
         return root
 
     def pose(self, t: Array) -> Pose:
-        """Give the pose at times (T,)."""
+        """Return the pose at times (T,)."""
         c, feet = self.carriage(t), self.feet(t)
         return self.body.pose(
             root=self.root(t, c), pelvis=c.pelvis, trunk=c.trunk, head=c.head,

@@ -1,4 +1,4 @@
-"""Where somebody goes: speed and heading over time, and the place on the ground that they give."""
+"""Course of a person: speed and heading over time, and the resulting position on the ground."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PAD = 1.5  # seconds of it before and after the clip
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Course:
-    """Where somebody goes.
+    """Course of a person: position, heading and speed over time.
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ class Carriage:
 
 
 def walking(height: float, style: Style) -> Gait:
-    """Give the gait of a walk.
+    """Return the gait of a walk.
 
     Steps of 0.40 of the height, 112 a minute (Perry 1992: strides of 1.41 m, 113 steps a minute,
     1.36 m/s). Time goes with the square root of the length.
@@ -110,7 +110,7 @@ def walking(height: float, style: Style) -> Gait:
 
 
 def running(height: float, style: Style) -> Gait:
-    """Give the gait of a run.
+    """Return the gait of a run.
 
     About 3 m/s at 172 steps a minute, with a foot on the ground for 36 % of the cycle (Novacheck
     1998: 3.2 m/s, and under 40 %).
@@ -204,7 +204,7 @@ def arm_turns(
 
 
 def bounce(phase: Array, gait: Gait) -> Array:
-    """Give the height of a runner's hips, up to a constant: a parabola while no foot stands.
+    """Return the height of a runner's hips, up to a constant: a parabola while no foot stands.
 
     Over the stance the ground pushes with ``A sin²``, which carries the weight over the step:
     ``A T_stance / 2 = g T_step``.

@@ -159,7 +159,7 @@ def _moving(t: Array, size: float, rng: np.random.Generator) -> Pose:
 
 
 def _tubes(size: float) -> dict[str, list[tuple[Array, float]]]:
-    """Give the capsules of each segment in its frame, metres."""
+    """Return the capsules of each segment in its frame, metres."""
     tubes = {"palm": [(np.array([a, b]) * size, r * size) for a, b, r in _PALM]}
     for name, finger in _FINGERS.items():
         for k, (bone, radius) in enumerate(zip(finger.bones, finger.radii, strict=True)):

@@ -71,7 +71,7 @@ class _Jump:
         return self.body["thigh"] + self.body["shank"]
 
     def pose(self, t: Array, facing: Array) -> Pose:
-        """Give the pose; `facing` (T, 3, 3) turns the person to the world."""
+        """Return the pose; `facing` (T, 3, 3) turns the person to the world."""
 
         def turned(local: Array) -> Array:
             return np.einsum("tij,tj->ti", facing, local)

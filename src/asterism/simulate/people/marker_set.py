@@ -144,7 +144,7 @@ class MarkerSet:
         return [_COLOURS[_side(name)] for name in self.names]
 
     def at(self, pose: Pose) -> Array:
-        """Give the markers of a pose, world metres (T, K, 3)."""
+        """Return the markers of a pose, world metres (T, K, 3)."""
         places, segments = self.places, self.segments
         out = np.empty((len(pose.origins["pelvis"]), self.n_markers, 3))
         for segment in dict.fromkeys(segments):
@@ -154,7 +154,7 @@ class MarkerSet:
 
 
 def lines_between(names: Sequence[str]) -> list[tuple[int, int, int]]:
-    """Give the lines of the stick figure among some markers: (marker, marker, colour)."""
+    """Return the lines of the stick figure among some markers: (marker, marker, colour)."""
     number = {name: k for k, name in enumerate(names)}
     lines: list[tuple[int, int, int]] = []
     for line in _LINES:
@@ -166,7 +166,7 @@ def lines_between(names: Sequence[str]) -> list[tuple[int, int, int]]:
 
 
 def on_skin(tubes: Sequence[tuple[Array, float]], start: Array, towards: Array) -> Array:
-    """Give the place `LIFT` above the flesh where a ray from inside leaves it for good.
+    """Return the place `LIFT` above the flesh where a ray from inside leaves it for good.
 
     Parameters
     ----------

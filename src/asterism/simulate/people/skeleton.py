@@ -123,18 +123,18 @@ class Body:
         return LENGTHS[length] * self.height
 
     def tubes(self, segment: str) -> list[tuple[Array, float]]:
-        """Give the ends (2, 3) and the radius of the capsules of a segment, its frame, metres."""
+        """Return the ends (2, 3) and the radius of the capsules of a segment, its frame, metres."""
         return [
             (np.array([start, end]) * self.height, radius * self.height)
             for start, end, radius in FLESH[segment.lstrip("LR")]
         ]
 
     def hips(self, root: Array, pelvis: Array) -> dict[str, Array]:
-        """Give the hip joints, (T, 3) each, for the point between them and the pelvis' turn."""
+        """Return the hip joints, (T, 3) each, for the point between them and the pelvis' turn."""
         return {s: root + sign * self["hip"] * pelvis[:, :, 1] for s, sign in SIDES.items()}
 
     def shoulders(self, root: Array, pelvis: Array, trunk: Array) -> dict[str, Array]:
-        """Give the shoulder joints, (T, 3) each."""
+        """Return the shoulder joints, (T, 3) each."""
         waist = root + self["waist"] * pelvis[:, :, 2]
         middle = waist + self["shoulder"] * trunk[:, :, 2]
         return {
@@ -189,7 +189,7 @@ class Body:
         return Pose(origins=origins, turns=turns)
 
     def capsules(self, pose: Pose, prefix: str = "") -> list[Capsule]:
-        """Give the capsules of a pose, named by their segments."""
+        """Return the capsules of a pose, named by their segments."""
         return [
             Capsule(ends=pose.place(segment, ends), radius=radius, name=prefix + segment)
             for segment in SEGMENTS

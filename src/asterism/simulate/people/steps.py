@@ -115,7 +115,7 @@ class Feet:
 
 
 def swings_of(course: Course, gait: Gait, phase: float) -> dict[str, Array]:
-    """Give the swings of a steady gait, by side: times of leaving and landing, (n, 2).
+    """Return the swings of a steady gait, by side: times of leaving and landing, (n, 2).
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def reached(
     hips_at: Callable[[Array], dict[str, Array]],
     feet_at: Callable[[Array], Feet],
 ) -> Array:
-    """Give the greatest height of the hips at which both legs reach the feet, at `course.times`.
+    """Return the greatest height of the hips at which both legs reach the feet, at `course.times`.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def reached(
 
 
 def carried(t: Array, course: Course, highest: Array, smoothing: float = 0.15) -> Array:
-    """Give the height that legs carry the hips at, (T,): smooth and never out of their reach.
+    """Return the height that legs carry the hips at, (T,): smooth and never out of their reach.
 
     Parameters
     ----------
