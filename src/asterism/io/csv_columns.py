@@ -81,7 +81,7 @@ def columns_of(
 def whole(
     path: Path, column: str, values: NDArray[np.float64], lines: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Give numbers that must be whole as such.
+    """Return numbers that must be whole as such.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def whole(
 
 
 def source_unit(path: Path, texts: Sequence[str]) -> str:
-    """Give the unit that the rows of a file name, "m" where none does.
+    """Return the unit that the rows of a file name, "m" where none does.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def source_unit(path: Path, texts: Sequence[str]) -> str:
 
 
 def quoted(text: str) -> str:
-    """Give a text as a cell, in quotes where it needs them."""
+    """Return a text as a cell, in quotes where it needs them."""
     if _TO_QUOTE.isdisjoint(text):
         return text
     return '"' + text.replace('"', '""') + '"'

@@ -123,7 +123,7 @@ def _faults_of(path: Path) -> Generator[None, None, None]:
 
 
 def _texts(observations: Observations, first_frame: int) -> Iterator[str]:
-    """Give the file in pieces."""
+    """Return the file in pieces."""
     o = observations
     has_truth = o.markers is not None
     yield ",".join(_COLUMNS if has_truth else _COLUMNS[:-1]) + "\n"
@@ -219,7 +219,7 @@ def _assemble(
 def _indices(
     path: Path, column: str, texts: list[str], is_declaration: NDArray[np.bool_]
 ) -> tuple[tuple[str, ...], NDArray[np.int64]]:
-    """Give the names of a column and the number of each row's, -1 where it is blank."""
+    """Return the names of a column and the number of each row's, -1 where it is blank."""
     declared = np.flatnonzero(is_declaration).tolist()
     names: dict[str, int] = {}
     for i in declared:

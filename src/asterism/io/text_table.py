@@ -22,7 +22,7 @@ _GAPS = {"", "null", "nan", "none"}
 
 
 def as_utf8(head: bytes) -> bytes:
-    """Give the first bytes of a file in UTF-8 where they say that they are UTF-16."""
+    """Return the first bytes of a file in UTF-8 where they say that they are UTF-16."""
     return head.decode("utf-16", "ignore").encode() if head[:2] in _UTF16 else head
 
 

@@ -31,7 +31,7 @@ _MOST_POINTS = 100_000  # that are looked at, evenly spread
 
 
 def parse_unit(text: str) -> str | None:
-    """Give a key of `PER_METRE` for its spelling in a file, None for anything else.
+    """Return a key of `PER_METRE` for its spelling in a file, None for anything else.
 
     Examples
     --------

@@ -114,7 +114,7 @@ def _camera(path: Path, key: str, entry: dict[str, Any], warnings: list[str]) ->
 
 
 def _flat(value: Any) -> Any:
-    """Give a row or a column, as some versions of caliscope nest them, as a plain list."""
+    """Return a row or a column, as some versions of caliscope nest them, as a plain list."""
     if not isinstance(value, list):
         return value
     if len(value) == 1 and isinstance(value[0], list):

@@ -127,7 +127,7 @@ def _write_folder(path: Path, content: dict[str, bytes], *, overwrite: bool) -> 
 
 
 def format_to_write(path: Path, format: str | None) -> CalibrationFormat:
-    """Give the format to write, as asked or by the ending of the name.
+    """Return the format to write, as asked or by the ending of the name.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ _KINDS: dict[str, type[Lens]] = {
 
 
 def fit_to_format(camera: Camera, format: CalibrationFormat) -> LensFit | None:
-    """Give a camera the lens, and if need be the K, that a format can hold.
+    """Return a camera the lens, and if need be the K, that a format can hold.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def fit_to_format(camera: Camera, format: CalibrationFormat) -> LensFit | None:
 
 
 def fit_kind(camera: Camera, kind: type[Lens] | None, format: CalibrationFormat) -> LensFit:
-    """Give a camera another kind of lens, and no coefficient for which a format has no place.
+    """Return a camera another kind of lens, and no coefficient for which a format has no place.
 
     Where the lens has coordinates of its own (``K_lens``), or K a skew that must go, K and the
     direction of sight are fitted as well. The place of the camera never changes.

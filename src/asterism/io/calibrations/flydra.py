@@ -109,7 +109,7 @@ def read(path: Path, units: str | None) -> Rig:
 
 
 def _by_number(folder: Path, pattern: re.Pattern[str]) -> dict[int, Path]:
-    """Give the files of a kind by the number in their names, in its order."""
+    """Return the files of a kind by the number in their names, in its order."""
     found: dict[int, Path] = {}
     for file in sorted(folder.iterdir()):
         match = pattern.fullmatch(file.name)

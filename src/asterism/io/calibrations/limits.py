@@ -18,7 +18,7 @@ __all__ = ["brown_coefficients", "names_of", "no_skew", "refuse_lens"]
 
 
 def names_of(rig: Rig) -> list[str]:
-    """Give the cameras' names, and ``camera1``, ``camera2`` … to those without one."""
+    """Return the cameras' names, and ``camera1``, ``camera2`` … to those without one."""
     names = [camera.name for camera in rig]
     given = [name or f"camera{i + 1}" for i, name in enumerate(names)]
     for i, name in enumerate(given):
@@ -60,7 +60,7 @@ def no_skew(camera: Camera, format: str) -> None:
 
 
 def brown_coefficients(camera: Camera, format: str) -> NDArray[np.float64]:
-    """Give the coefficients of a lens in the manner of OpenCV.
+    """Return the coefficients of a lens in the manner of OpenCV.
 
     Parameters
     ----------

@@ -133,7 +133,7 @@ def _rotation(x: float, y: float, z: float) -> NDArray[np.float64]:
 
 
 def _angles(R: NDArray[np.float64]) -> list[float]:
-    """Give the angles of `_rotation`; where y is a right angle, z is free and becomes what it may.
+    """Return the angles of `_rotation`; with y a right angle, z is free and has any value.
 
     The first angle is taken from what the other two leave of the rotation, and not from its own
     entries: beside a right angle those are too small to tell it.

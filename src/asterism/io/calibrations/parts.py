@@ -180,7 +180,7 @@ def whole_size(path: Path, place: str, width: float, height: float) -> tuple[int
 def nearest_rotation(
     path: Path, place: str, matrix: NDArray[np.float64], *, slack: float = _SLACK
 ) -> NDArray[np.float64]:
-    """Give the rotation next to a matrix that was written with few decimals.
+    """Return the rotation next to a matrix that was written with few decimals.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def drop_skew(place: str, K: NDArray[np.float64], warnings: list[str]) -> NDArra
 
 
 def pose(R: NDArray[np.float64], t: Iterable[float]) -> NDArray[np.float64]:
-    """Give the 4 × 4 matrix that rotates by `R` and then shifts by `t`."""
+    """Return the 4 × 4 matrix that rotates by `R` and then shifts by `t`."""
     T = np.eye(4)
     T[:3, :3] = R
     T[:3, 3] = list(t)

@@ -86,7 +86,7 @@ def read(path: Path) -> Capture:
 
     labels, identity_names = _labels(file, seen, modelled)
     for array in (points, labels):
-        array.flags.writeable = False  # nobody else has them: no need to copy
+        array.flags.writeable = False  # a read-only array is kept without a copy
     cameras, residuals = _seen_by(file, seen, PER_METRE[unit])
     ours = file.group(OURS)
     filled = file.points[..., 3][seen] == 0 if ours.counts("FILLED")[:1] == [1] else None
@@ -129,12 +129,12 @@ def _overflowing(file: C3DFile, name: str) -> list[str]:
 
 
 def channel_names(file: C3DFile) -> list[str]:
-    """Give the name of each channel, "" where the file has none."""
+    """Return the name of each channel, "" where the file has none."""
     return _overflowing(file, "LABELS")
 
 
 def channel_descriptions(file: C3DFile) -> list[str]:
-    """Give the description of each channel, "" where the file has none."""
+    """Return the description of each channel, "" where the file has none."""
     return _overflowing(file, "DESCRIPTIONS")
 
 

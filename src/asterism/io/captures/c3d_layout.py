@@ -63,7 +63,7 @@ class C3DFile:
     truncated: str = ""
 
     def group(self, name: str) -> Group:
-        """Give a group, an empty one where there is none."""
+        """Return a group, an empty one where there is none."""
         return self.groups.get(name, Group())
 
 

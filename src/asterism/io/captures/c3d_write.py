@@ -184,7 +184,7 @@ def _source(d: Detections) -> C3DFile | None:
 
 
 def _words(d: Detections, rows: NDArray[np.int64], step: float) -> NDArray[np.float64]:
-    """Give cameras and residual of some detections as C3D has them: 7 bits and 8 bits."""
+    """Return cameras and residual of some detections as C3D has them: 7 bits and 8 bits."""
     words = np.zeros(len(rows))
     if d.cameras is not None:
         words += 256 * (d.cameras[rows] & 0x7F)
@@ -233,7 +233,7 @@ def _mark_filled(
     channels: NDArray[np.int64],
     filled: NDArray[np.bool_],
 ) -> None:
-    """Give filled points the word 0, and measured ones a residual of at least a step."""
+    """Return filled points the word 0, and measured ones a residual of at least a step."""
     words = block[rows, channels, 3]
     words[words % 256 == 0] += 1
     words[filled] = 0

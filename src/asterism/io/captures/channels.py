@@ -58,7 +58,7 @@ def identities(
 
 
 def to_channels(tracks: Tracks) -> tuple[NDArray[np.int64], list[str], int]:
-    """Give every detection a channel of a file: each track its own, clutter as few as hold it.
+    """Return every detection a channel of a file: each track its own, clutter as few as hold it.
 
     Parameters
     ----------

@@ -166,7 +166,7 @@ def format_of(path: Path) -> CaptureFormat:
 
 
 def format_to_write(path: Path, format: str | None) -> CaptureFormat:
-    """Give the format to write, as asked or by the ending of the name.
+    """Return the format to write, as asked or by the ending of the name.
 
     Parameters
     ----------
