@@ -1,4 +1,4 @@
-"""From many views to points: 2-D detections of several cameras become 3-D detections."""
+"""Multi-view reconstruction: from 2-D image points of several cameras to 3-D detections."""
 
 from __future__ import annotations
 

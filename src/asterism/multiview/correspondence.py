@@ -1,4 +1,4 @@
-"""Which image points of several cameras are one point in space, and where: frame by frame."""
+"""Correspondence of image points in several cameras, and their triangulation, by frame."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["match_views", "matched_rig"]
 
-_CHUNK = 128  # frames at a time: progress is told, and a stop heard, between them
+_CHUNK = 128  # frames of one call, between which progress is reported and an interrupt is handled
 
 
 def match_views(
@@ -94,7 +94,7 @@ def match_views(
 
 
 def matched_rig(observations: Observations, rig: Rig) -> tuple[Rig, NDArray[np.int64]]:
-    """Give the cameras that observed, in the observations' order, and their numbers in the rig.
+    """Return the cameras of the observations, in their order, and their numbers in the rig.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def matched_rig(observations: Observations, rig: Rig) -> tuple[Rig, NDArray[np.i
 
 
 class _Found(NamedTuple):
-    """What the engine matched: points, their scores, how many by frame, and their views (CSR)."""
+    """Matches of the engine: points, scores, number of points by frame, and views (CSR)."""
 
     points: NDArray[np.float64]
     scores: NDArray[np.float64]
@@ -127,7 +127,7 @@ class _Found(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """What was found in some frames: an entry for each point, frame or view."""
+    """Result for some frames, with an entry for each point, frame or view."""
 
     points: NDArray[np.float64]
     covariances: NDArray[np.float64]
@@ -163,7 +163,7 @@ def _expected(prior: Detections | None, observations: Observations) -> Detection
 def _piece(
     found: _Found, observations: Observations, rig: Rig, sigma: NDArray[np.float64], merge_px: float
 ) -> _Piece:
-    """Triangulate what the engine matched, on the pixels as they were measured."""
+    """Triangulate the engine's matches from the measured pixels."""
     points, scores, counts, starts, blobs = found
     cameras = observations.camera_of[blobs]
     views = Views(offsets=starts, cameras=cameras, blobs=blobs)
@@ -200,7 +200,7 @@ def _joined(
     info: dict[str, float],
 ) -> Reconstruction:
     all_of = _Piece(*(np.concatenate(parts) for parts in zip(*pieces, strict=True)))
-    # What the pixels themselves leave without a place or a depth is none.
+    # Points without a position or a depth in the measured pixels are left out.
     is_known = np.isfinite(all_of.covariances).reshape(-1, 9).all(axis=-1)
     is_sound = np.logical_and(is_known, (np.abs(all_of.points) <= FARTHEST).all(axis=-1))
     of = np.repeat(np.arange(len(is_sound)), all_of.n_views)

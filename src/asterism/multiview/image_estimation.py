@@ -1,4 +1,4 @@
-"""What the images of a clip are like, from the clip itself: nobody has to guess.
+"""Estimation of the image model of a capture from its image points alone.
 
 Points are made with what is known so far, and what they show is taken for known in the next round:
 how far image points lie from their places, how often a camera misses one that stands in its view,
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 __all__ = ["estimate_images"]
 
-_STARTS_PX = (0.5, 2.0, 8.0)  # of the noise; the next one where the last explained too little
-_ENOUGH = 0.5  # share of the image points in some point in space
-_ROUNDS = (0.25, 0.25, 0.25, 1.0, 1.0)  # shares of the frames: the first rounds are the slow ones
-_LEAST_PX = 0.01
-_TRIM = 3.0  # standard deviations: beyond it is what was merged or mixed up
+_STARTS_PX = (0.5, 2.0, 8.0)  # initial noise, tried until enough image points match
+_ENOUGH = 0.5  # smallest share of image points that belong to a point in space
+_ROUNDS = (0.25, 0.25, 0.25, 1.0, 1.0)  # shares of the frames; early rounds are slow
+_MIN_PX = 0.01
+_TRIM = 3.0  # standard deviations beyond which image points are merged or wrongly matched
 _KEPT = 1 - _TRIM**2 / 2 * np.exp(-(_TRIM**2) / 2) / -np.expm1(-(_TRIM**2) / 2)
-"""What is left of the mean square of two coordinates when it is trimmed so."""
+"""Share of the mean square of two coordinates that remains after the trimming."""
 
 
 def estimate_images(
@@ -41,7 +41,7 @@ def estimate_images(
     gate: float = 4.0,
     n_frames: int = 24,
 ) -> ImageModel:
-    """Say what the images of a clip are like.
+    """Estimate the image model of a capture from its image points.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def estimate_images(
 
 
 def _sample(observations: Observations, n: int) -> Observations:
-    """Cut out frames in which two cameras saw something, spread evenly."""
+    """Select evenly spread frames with image points in at least two cameras."""
     o, C = observations, observations.n_cameras
     useful = np.flatnonzero((o.counts > 0).sum(axis=1) >= 2)
     n = min(n, len(useful))
@@ -133,7 +133,7 @@ def _learnt(
 def _where(
     points: NDArray[np.float64], base: float
 ) -> tuple[tuple[float, ...], tuple[float, ...], float]:
-    """Give the box of points, as wide again on each side, and its volume."""
+    """Return the bounding box of points, extended by its size on each side, and its volume."""
     if not len(points):
         points = np.zeros((1, 3))
     low, high = np.percentile(points, [1, 99], axis=0)
@@ -143,7 +143,7 @@ def _where(
 
 
 def _detection(made: Reconstruction, rig: Rig) -> tuple[float, ...]:
-    """Give how often each camera saw what stands in its view and two others see."""
+    """Return each camera's share of detected points among those that two others see."""
     visible = rig.project(made.detections.points).visible
     views = made.views
     has = np.zeros(visible.shape, dtype=bool)
@@ -151,13 +151,13 @@ def _detection(made: Reconstruction, rig: Rig) -> tuple[float, ...]:
     visible = visible | has
     others = views.counts - has
     counted = visible & (others >= 2)
-    # One in two before anything was seen.
+    # The prior share is one half.
     shares = ((counted & has).sum(axis=1) + 1) / (counted.sum(axis=1) + 2)
     return tuple(np.clip(shares, 0.05, 0.995).tolist())
 
 
 def _noise(made: Reconstruction, seen: Observations, rig: Rig) -> tuple[float, ...]:
-    """Give the noise of each camera from how far its image points are off, less what it bent."""
+    """Return the noise of each camera from its residuals, corrected for degrees of freedom."""
     d, views = made.detections, made.views
     assert d.covariances is not None
     sigma, _, _ = made.model.of(rig)
@@ -176,6 +176,6 @@ def _noise(made: Reconstruction, seen: Observations, rig: Rig) -> tuple[float, .
     total = np.bincount(views.cameras, np.where(usable, squares, 0), len(rig))
     free = np.bincount(views.cameras, np.where(usable, freedom, 0), len(rig))
     everywhere = total.sum() / max(free.sum(), 1e-9)
-    # A camera with little to go by is like the others.
+    # A camera with few image points gets the value of the others.
     ratio = (total + 4 * everywhere) / (free + 4) / _KEPT
-    return tuple(np.maximum(sigma * np.sqrt(ratio), _LEAST_PX).tolist())
+    return tuple(np.maximum(sigma * np.sqrt(ratio), _MIN_PX).tolist())

@@ -1,4 +1,4 @@
-"""What images are like: noise, misses, clutter, and how many points there are to be seen."""
+"""Image model: noise, missed detections, clutter and density of the points."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 __all__ = ["CameraNumbers", "ImageModel", "widest_base"]
 
-_REACH = 10  # base lines; beyond, depth is worth nothing
+_REACH = 10  # base lines; beyond this distance the depth is not determined
 
 CameraNumbers = float | tuple[float, ...]
-"""One number for all cameras, or one for each."""
+"""A number for all cameras, or one for each camera."""
 
 
 @record
 class ImageModel:
-    """What the images of a rig are like.
+    """Image model of a rig: noise, missed detections and clutter of its images.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class ImageModel:
             object.__setattr__(self, "volume", (tuple(low), tuple(high)))
 
     def of(self, rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Give noise, probability of detection and clutter by pixel², each of shape (C,)."""
+        """Return noise, probability of detection and clutter per pixel², each of shape (C,)."""
         area = np.array([float(np.prod(camera.size_px)) for camera in rig])
         return (
             per_camera("sigma_px", self.sigma_px, rig),
@@ -86,7 +86,7 @@ class ImageModel:
         )
 
     def box(self, rig: Rig) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Give the corners of the volume, world metres, whether it is given or not."""
+        """Return the corners of the given or default volume, world metres."""
         if self.volume is not None:
             low, high = (np.asarray(corner).tolist() for corner in self.volume)
         else:
@@ -98,6 +98,6 @@ class ImageModel:
 
 
 def widest_base(rig: Rig) -> float:
-    """Give the distance between the two cameras that are farthest apart, metres."""
+    """Return the largest distance between two cameras, metres."""
     centers = np.stack([camera.center for camera in rig])
     return float(np.linalg.norm(centers[:, None] - centers, axis=-1).max())

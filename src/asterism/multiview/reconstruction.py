@@ -1,4 +1,4 @@
-"""Points in space with what made them: the image points, the cameras, the covariance."""
+"""Reconstructed points with their image points, cameras and covariances."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["Reconstruction", "Views"]
 
 @record(eq=False)
 class Views:
-    """Which image points each point in space was made of.
+    """Views of the reconstructed points: the image points from which each was triangulated.
 
     Parameters
     ----------
@@ -65,21 +65,21 @@ class Views:
 
     @property
     def is_shared(self) -> NDArray[np.bool_]:
-        """Whether another point was made of the same image point too, shape (V,)."""
+        """True for views whose image point belongs to another point too, shape (V,)."""
         if not len(self.blobs):
             return np.zeros(0, dtype=bool)
         first = int(self.blobs.min())
         return np.bincount(self.blobs - first)[self.blobs - first] > 1
 
     def of(self, point: int) -> list[tuple[int, int]]:
-        """Give (camera, blob) of each view of a point."""
+        """Return (camera, image point) of each view of a point."""
         rows = slice(int(self.offsets[point]), int(self.offsets[point + 1]))
         return list(zip(self.cameras[rows].tolist(), self.blobs[rows].tolist(), strict=True))
 
 
 @record(eq=False)
 class Reconstruction:
-    """What `reconstruct` made of observations.
+    """Result of `reconstruct`: points, their views, and the image model.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Reconstruction:
         return f"Reconstruction({self.detections.summary()}, of {len(self.views.blobs)} views)"
 
     def markers(self, observations: Observations) -> NDArray[np.int64]:
-        """Say whose each point is, where the truth of the image points is known.
+        """Return the true marker of each point from the true labels of the image points.
 
         Parameters
         ----------

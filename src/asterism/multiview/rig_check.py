@@ -1,4 +1,4 @@
-"""Whether a calibration can be right: what is true of every sound rig, and known points."""
+"""Checks of a calibration: plausibility of a rig, and reprojection of known points."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Check", "check_points", "check_rig"]
 
-# What a check may say: the last ends the command with 1.
+# Results of a check; the last one ends the command with exit code 1.
 PASSES, IS_ODD, FAILS = "passes", "is odd", "fails"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """What a check found.
+    """Result of a check.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Check:
 
 
 def check_rig(rig: Rig) -> list[Check]:
-    """Look at what is true of every sound rig.
+    """Check a rig for implausible values.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def check_rig(rig: Rig) -> list[Check]:
 
 
 def _worst(rig: Rig, name: str, figure: Any, text: str, limits: tuple[float, float]) -> Check:
-    """Judge each camera by a figure that is odd above one limit and wrong above another."""
+    """Rate each camera by a value with a limit for a warning and a limit for an error."""
     values = [float(figure(camera)) for camera in rig]
     status = PASSES
     for limit, worse in zip(limits, (IS_ODD, FAILS), strict=True):
@@ -144,7 +144,7 @@ def _common(rig: Rig) -> Check:
 def check_points(
     rig: Rig, sightings: Sequence[Sightings], most: float
 ) -> tuple[list[Check], list[dict[str, Any]]]:
-    """Compare known points with where the cameras saw them.
+    """Check a rig by the reprojection errors of known points.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Figures of a rig for people: what each camera sees, and what they see together."""
+"""Summary of a rig: optics and view of each camera, and distances between cameras."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 __all__ = ["CameraInfo", "describe_rig", "image_grid", "meeting_point"]
 
-_SIDE = 61  # pixels along each side of the image at which a lens is looked at
+_SIDE = 61  # pixels along each side of the image at which a lens is evaluated
 
 
 @dataclass(frozen=True, kw_only=True)
 class CameraInfo:
-    """Figures of a camera.
+    """Summary of a camera: position, field of view and distortion.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class CameraInfo:
 
 
 def describe_rig(rig: Rig) -> tuple[list[CameraInfo], dict[str, Any]]:
-    """Give the figures of each camera, and of the rig.
+    """Summarise each camera and the rig.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def describe_rig(rig: Rig) -> tuple[list[CameraInfo], dict[str, Any]]:
 
 
 def meeting_point(rig: Rig) -> NDArray[np.float64] | None:
-    """Give the place with the least squared distance to all optical axes.
+    """Return the position with the smallest squared distance to all optical axes.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def meeting_point(rig: Rig) -> NDArray[np.float64] | None:
     ndarray, shape (3,), or None
         World metres; None where all axes are parallel, or there is one only.
     """
-    # Each axis measures what is across it: the sum of (1 - a aᵀ)(x - c) is zero.
+    # The distance is measured across each axis, so the sum of (1 - a aᵀ)(x - c) is zero.
     across = [np.eye(3) - np.outer(c.axis, c.axis) for c in rig]
     normal = np.sum(across, axis=0)
     if len(rig) < 2 or np.linalg.cond(normal) > 1e9:
@@ -107,7 +107,7 @@ def meeting_point(rig: Rig) -> NDArray[np.float64] | None:
 
 
 def image_grid(camera: Camera) -> NDArray[np.float64]:
-    """Give pixels all over an image, to its edges, shape (N, 2)."""
+    """Return a grid of pixels over an image, including its edges, shape (N, 2)."""
     u, v = (np.linspace(-0.5, n - 0.5, _SIDE) for n in camera.size_px)
     return np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
 

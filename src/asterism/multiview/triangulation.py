@@ -1,4 +1,4 @@
-"""Places from their images in cameras: linear start, Gauss-Newton on pixels, covariance.
+"""Triangulation of points: linear start, Gauss-Newton on pixels, covariance.
 
 The matches are given here; `asterism.multiview.correspondence` finds them.
 """
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 __all__ = ["Triangulation", "per_camera", "triangulate"]
 
 _ROUNDS = 20
-_LEAST_STEP = 1e-13  # of a place's distance from the cameras: smaller ones are rounding
-_FLATTEST = 1e12  # condition of the information beyond which depth is open, as in `Rig.coverage`
+_MIN_STEP = 1e-13  # share of a point's distance; smaller steps are rounding
+_FLATTEST = 1e12  # largest condition of the information, as in `Rig.coverage`
 
 
 @record(eq=False)
 class Triangulation:
-    """Places that were seen by several cameras.
+    """Result of `triangulate`: points in space with their covariances and residuals.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Triangulation:
 def triangulate(
     pixels: ArrayLike, rig: Rig, *, sigma_px: ArrayLike = 0.3, start: ArrayLike | None = None
 ) -> Triangulation:
-    """Find the places whose images are nearest to those that cameras saw.
+    """Triangulate points by minimising their squared reprojection errors.
 
     The linear start is the place nearest to all rays; from there
     ``Σ_c |z_c - h_c(X)|² / σ_c²`` is brought to its minimum by Gauss-Newton steps, damped where a
@@ -123,7 +123,7 @@ def triangulate(
 def per_camera(
     name: str, value: ArrayLike, rig: Rig, *, below: float = np.inf, closed: bool = False
 ) -> NDArray[np.float64]:
-    """Give a number for each camera, above 0 (or from 0 if closed); from one or from as many."""
+    """Return a number > 0 (or ≥ 0 if closed) for each camera, from one or from as many."""
     numbers = np.asarray(value)
     if numbers.ndim == 0:
         numbers = np.full(len(rig), numbers)
@@ -144,7 +144,7 @@ def _checked(rig: Rig) -> Rig:
 def _nearest_to_rays(
     rig: Rig, rays: NDArray[np.float64], is_seen: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Give the place with the least sum of squared distances to the rays of each point, (N, 3)."""
+    """Return the points with the smallest sum of squared distances to their rays, (N, 3)."""
     N = rays.shape[1]
     A, b = np.zeros((N, 3, 3)), np.zeros((N, 3))
     for camera, d, seen in zip(rig, rays, is_seen, strict=True):
@@ -161,7 +161,7 @@ def _nearest_to_rays(
 def _descended(
     points: NDArray[np.float64], z: NDArray[np.float64], weights: NDArray[np.float64], rig: Rig
 ) -> NDArray[np.float64]:
-    """Bring places to the least cost. Each goes on until its steps are rounding."""
+    """Minimise the cost of each point until its steps are below rounding."""
     points = points.copy()
     reach = np.stack([np.linalg.norm(points - camera.center, axis=1) for camera in rig]).max(axis=0)
     damping = np.zeros(len(points))
@@ -172,7 +172,7 @@ def _descended(
             break
         A, g = _normal_equations(points[active], z[:, active], weights[:, active], rig)
         diagonal = np.trace(A, axis1=1, axis2=2) / 3
-        # 1e-13 keeps what all rays leave open (one line) where it is.
+        # The damping of 1e-13 keeps directions that no ray determines (rays on one line).
         A += ((damping[active] + 1e-13) * diagonal)[:, None, None] * np.eye(3)
         step = np.linalg.solve(A, g[..., None])[..., 0]
         there = points[active] + step
@@ -182,7 +182,7 @@ def _descended(
         points[chosen], cost[chosen] = there[descends], new[descends]
         damping[chosen] /= 10
         damping[active[~descends]] = np.maximum(10 * damping[active[~descends]], 1e-3)
-        is_large = np.linalg.norm(step, axis=1) > _LEAST_STEP * reach[active]
+        is_large = np.linalg.norm(step, axis=1) > _MIN_STEP * reach[active]
         active = active[is_large]
     return points
 
@@ -190,7 +190,7 @@ def _descended(
 def _cost(
     points: NDArray[np.float64], z: NDArray[np.float64], weights: NDArray[np.float64], rig: Rig
 ) -> NDArray[np.float64]:
-    """Give the weighted sum of squares in pixels; infinite where a camera cannot see a place."""
+    """Return the weighted sum of squares, pixels; infinite if a camera cannot see a point."""
     off = ((z - rig.project(points).pixels) ** 2).sum(axis=-1) * weights
     cost = np.where(weights > 0, off, 0.0).sum(axis=0)
     return np.where(np.isfinite(cost) & np.isfinite(points[:, 0]), cost, np.inf)
@@ -199,7 +199,7 @@ def _cost(
 def _normal_equations(
     points: NDArray[np.float64], z: NDArray[np.float64], weights: NDArray[np.float64], rig: Rig
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the information ``Σ w Jᵀ J`` (N, 3, 3) and the slope ``Σ w Jᵀ (z - h)`` (N, 3)."""
+    """Return the information ``Σ w Jᵀ J`` (N, 3, 3) and gradient ``Σ w Jᵀ (z - h)`` (N, 3)."""
     A, g = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
     projected = rig.project(points).pixels
     for camera, seen_at, h, w in zip(rig, z, projected, weights, strict=True):

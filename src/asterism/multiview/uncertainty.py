@@ -1,4 +1,4 @@
-"""How exactly a rig can place a point in its volume, and where one more camera helps most."""
+"""Accuracy of a rig over its volume, and the best position of a further camera."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 __all__ = ["CameraSuggestion", "TriangulationMap", "suggest_cameras", "triangulation_map"]
 
-_RING, _LEVELS = 24, 3  # places tried around the volume, at so many heights
-_CELLS = 12  # of the longest side of the volume, where no spacing is given
+_RING, _LEVELS = 24, 3  # candidate positions around the volume, and number of heights
+_CELLS = 12  # cells along the longest side of the volume by default
 
 
 @record(eq=False)
 class CameraSuggestion:
-    """A camera that is not there yet.
+    """Candidate for a further camera.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class CameraSuggestion:
 
 @record(eq=False)
 class TriangulationMap:
-    """How exactly a rig places a point, all over its volume.
+    """Accuracy of a rig over its volume.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ def triangulation_map(
     surfaces: Sequence[Surface] = (),
     n_suggestions: int = 1,
 ) -> TriangulationMap:
-    """Say how exactly a rig can place a point in a box, and where one more camera helps most.
+    """Compute the accuracy of a rig in a box, and the best position of a further camera.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def suggest_cameras(
     surfaces: Sequence[Surface] = (),
     width: float = 1.0,
 ) -> list[CameraSuggestion]:
-    """Order cameras by how much each would help a rig, the best first.
+    """Rank candidate cameras by the accuracy that each adds to a rig, the best first.
 
     The measure is the mean square error of a point over the places (A-optimality), each place
     known beforehand to `width`, so that those that are not seen count as well.
@@ -192,7 +192,7 @@ def suggest_cameras(
 
 
 def around(rig: Rig, low: NDArray[np.float64], high: NDArray[np.float64]) -> list[Camera]:
-    """Give cameras like those of a rig, in rings about a box at their heights, looking into it."""
+    """Return cameras like those of a rig, on rings around a box at their heights."""
     middle = (low + high) / 2
     centers = np.stack([camera.center for camera in rig])
     radius = float(np.median(np.linalg.norm((centers - middle)[:, :2], axis=1)))
@@ -213,7 +213,7 @@ def around(rig: Rig, low: NDArray[np.float64], high: NDArray[np.float64]) -> lis
 def _information(
     rig: Rig, places: NDArray[np.float64], surfaces: Sequence[Surface], sigma_px: float
 ) -> NDArray[np.float64]:
-    """Give what the cameras that see each place tell of it, (N, 3, 3), 1/m²."""
+    """Return the information of all cameras about each position, (N, 3, 3), 1/m²."""
     A = np.zeros((len(places), 3, 3))
     for camera, seen in zip(rig, rig.project(places, surfaces).visible, strict=True):
         J = camera.jacobian(places[seen])

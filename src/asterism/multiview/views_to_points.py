@@ -1,4 +1,4 @@
-"""Points in space from the image points of several cameras: estimate the images, then match."""
+"""Reconstruction: estimate the image model, then match and triangulate image points."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def reconstruct(
     n_threads: int = 1,
     advance: Callable[[int], None] | None = None,
 ) -> Reconstruction:
-    """Make points in space of unnamed image points.
+    """Reconstruct points in space from unnamed image points of several cameras.
 
     A set of image points of different cameras is weighed by the likelihood that one point made
     them, its place integrated out, against that of their being clutter; a camera that could see
