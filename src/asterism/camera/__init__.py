@@ -1,4 +1,4 @@
-"""Cameras: lens, pin-hole, rig, the surfaces that hide points, and what is seen of all that."""
+"""Cameras: lenses, rigs, occluding surfaces, projection and image points."""
 
 from asterism.camera.camera import Camera
 from asterism.camera.depth_image import DepthImage

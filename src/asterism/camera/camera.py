@@ -1,4 +1,4 @@
-"""One camera: a pin-hole, a lens, a place in the world, an image of a certain size."""
+"""Camera: pin-hole, lens, pose in the world and image size."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ __all__ = ["Camera"]
 
 @record(eq=False)
 class Camera:
-    """A camera that can be trusted to the last digit.
+    """Pin-hole camera with a lens model, a pose in the world and an image size.
 
     A point goes to camera coordinates by ``T_camera_world``, to ``(x, y) = (X / Z, Y / Z)``,
     through the lens, and to the pixel ``K (x, y, 1)``. The camera looks along +z; pixels count from
@@ -128,7 +128,7 @@ class Camera:
         up: ArrayLike = (0.0, 0.0, 1.0),
         **options: Any,
     ) -> Self:
-        """Place a camera and turn it to a target, its image upright.
+        """Place a camera that looks at a target with an upright image.
 
         Parameters
         ----------
@@ -149,7 +149,7 @@ class Camera:
 
     @classmethod
     def from_matrix(cls, P: ArrayLike, *, size_px: tuple[int, int], **options: Any) -> Self:
-        """Take a projection matrix apart.
+        """Decompose a projection matrix into a camera.
 
         Parameters
         ----------
@@ -172,12 +172,12 @@ class Camera:
 
     @property
     def center(self) -> NDArray[np.float64]:
-        """Where the camera stands: its optical centre, shape (3,), world metres."""
+        """Optical centre of the camera, shape (3,), world metres."""
         return -self.T_camera_world[:3, :3].T @ self.T_camera_world[:3, 3]
 
     @property
     def axis(self) -> NDArray[np.float64]:
-        """Where it looks: unit vector of the optical axis, shape (3,), world."""
+        """Unit vector of the optical axis, shape (3,), world axes."""
         return self.T_camera_world[2, :3].copy()
 
     def project(
@@ -187,7 +187,7 @@ class Camera:
         *,
         clearance: float = CLEARANCE,
     ) -> Projection:
-        """Say where points fall in the image, and why some are not seen.
+        """Project points into the image, with the reason for each point that is not seen.
 
         Parameters
         ----------
@@ -211,7 +211,7 @@ class Camera:
         return project_points([self.engine], points, surfaces, clearance)[0]
 
     def undistort(self, pixels: ArrayLike) -> NDArray[np.float64]:
-        """Give the normalised coordinates ``(X / Z, Y / Z)`` of pixels, the lens undone.
+        """Return undistorted normalised coordinates ``(X / Z, Y / Z)`` of pixels.
 
         Parameters
         ----------
@@ -226,7 +226,7 @@ class Camera:
         return self.engine.undistort(p.reshape(-1, 2)).reshape(p.shape)
 
     def distort(self, normalised: ArrayLike) -> NDArray[np.float64]:
-        """Give the pixels of normalised coordinates; the inverse of `undistort`.
+        """Return the pixels of normalised coordinates; the inverse of `undistort`.
 
         Parameters
         ----------
@@ -242,7 +242,7 @@ class Camera:
         return self.engine.distort(p.reshape(-1, 2)).reshape(p.shape)
 
     def rays(self, pixels: ArrayLike) -> NDArray[np.float64]:
-        """Give the direction in which each pixel looks, from `center`.
+        """Return the viewing direction of each pixel from `center`.
 
         Parameters
         ----------
@@ -259,7 +259,7 @@ class Camera:
         return d @ self.T_camera_world[:3, :3]
 
     def jacobian(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Give the derivative of pixels by the coordinates of their points.
+        """Return the derivatives of pixels with respect to the coordinates of their points.
 
         Parameters
         ----------
@@ -275,7 +275,7 @@ class Camera:
         return self.engine.jacobian(p.reshape(-1, 3)).reshape(*p.shape[:-1], 2, 3)
 
     def depth_image(self, surfaces: Sequence[Surface], moment: int = 0) -> DepthImage:
-        """Draw surfaces into a z-buffer: at every pixel the nearest one on its ray.
+        """Render surfaces into a z-buffer, with the nearest surface on the ray of every pixel.
 
         Parameters
         ----------
@@ -296,7 +296,7 @@ class Camera:
         return DepthImage(depth=depth, surface=owner)
 
     def paint(self, surfaces: Sequence[Surface], moment: int = 0) -> Painting:
-        """Draw surfaces by the painter's algorithm, the farthest first, and say where it fails.
+        """Order surfaces by the painter's algorithm, the farthest first, and report conflicts.
 
         Parameters
         ----------
@@ -333,12 +333,12 @@ class Camera:
         )
 
     def replace(self, **changes: Any) -> Self:
-        """Give the camera with some of its fields changed."""
+        """Return a copy of the camera with some fields changed."""
         return replace(self, **changes)
 
     @property
     def lens_matrix(self) -> NDArray[np.float64]:
-        """The matrix between pixels and lens coordinates in use: `K_lens` or its default."""
+        """Matrix between pixels and lens coordinates: `K_lens` or its default."""
         if self.K_lens is not None:
             return self.K_lens
         if self.lens is None or not self.lens.in_pixels:
@@ -347,7 +347,7 @@ class Camera:
 
     @cached_property
     def engine(self) -> _engine.Camera:
-        """The camera as the engine has it."""
+        """Camera as an engine object."""
         return compile_camera(
             K=self.K,
             lens_matrix=self.lens_matrix,
@@ -363,7 +363,7 @@ class Camera:
         return _engine.RayGrid(self.engine)
 
     def __getstate__(self) -> dict[str, Any]:
-        # What the engine has of a camera is made again where it is needed.
+        # The engine's object is not pickled; it is made again when it is needed.
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""A camera as the engine has it: matrices and a lens, ready to be used point by point."""
+"""Conversion of a camera to the engine's object."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def compile_camera(
     far: float,
     size_px: tuple[int, int],
 ) -> _engine.Camera:
-    """Make the engine's camera from the fields of a `Camera`."""
+    """Return the engine's camera for the fields of a `Camera`."""
     B = lens_matrix if lens is not None else K
     A = np.eye(3) if B is K else np.asarray(np.linalg.solve(B, K), np.float64)
     is_quadratic = lens is not None and lens.kind == "quadratic"
@@ -61,7 +61,7 @@ def middle_of_image(
 def _table_extent(
     lens: Lens | None, lens_matrix: NDArray[np.float64], size_px: tuple[int, int]
 ) -> float:
-    """Squared radius of the image in the coordinates from which a radial lens is solved."""
+    """Return the squared radius of the image in the coordinates that a radial lens maps from."""
     if lens is None or lens.kind == "quadratic":
         return 0.0
     w, h = size_px

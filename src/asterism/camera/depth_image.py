@@ -1,4 +1,4 @@
-"""Which surface every pixel sees, and how deep: the z-buffer of the 2010 report (§3.4)."""
+"""Depth image: depth and surface of every pixel, by the z-buffer of the 2010 report (§3.4)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class DepthImage:
     surface: NDArray[np.int32]
 
     def hides(self, projection: Projection, clearance: float = 1e-6) -> NDArray[np.bool_]:
-        """Say which points lie behind what their nearest pixel sees.
+        """Find the points that lie behind the surface of their nearest pixel.
 
         The answer of a z-buffer: as fine as the pixels, so at the edges of a surface it may differ
         from the exact test of `Camera.project`.

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["BrownConrady", "Lens", "QuadraticCorrection", "ReportRadial", "ViconRadial"]
 
-LEAST_STRETCH = 1e-2
-"""As kLeastStretch of engine/camera/lens.hpp."""
+MIN_STRETCH = 1e-2
+"""Equal to kLeastStretch of engine/camera/lens.hpp."""
 
 
 class Lens(ABC):
@@ -34,14 +34,14 @@ class Lens(ABC):
     is_backward: ClassVar[bool] = True
     """Whether the model maps distorted to undistorted coordinates."""
     in_pixels: ClassVar[bool] = False
-    """Whether it works in pixels about the principal point, not in normalised coordinates."""
+    """Whether the model uses pixels about the principal point, not normalised coordinates."""
     kind: ClassVar[Literal["radial", "quadratic"]] = "radial"
-    """As Lens::Kind of engine/camera/lens.hpp."""
+    """Equal to Lens::Kind of engine/camera/lens.hpp."""
 
     @property
     @abstractmethod
     def coefficients(self) -> NDArray[np.float64]:
-        """The numbers of the model as the engine takes them: k1, k2, k3, p1, p2, or ex and ey."""
+        """Coefficients in the engine's order: k1, k2, k3, p1, p2, or ex and ey."""
 
     @property
     def radius(self) -> float:
@@ -51,14 +51,14 @@ class Lens(ABC):
         symmetric, this is the largest disc in which both its eigenvalues exceed 0.01.
         """
         k, p = self.coefficients[:3], float(np.hypot(*self.coefficients[3:]))
-        # What changes nothing within a billion pixels, let alone units, is left out.
+        # Coefficients without an effect within a billion pixels are left out.
         k = np.where(np.abs(k) * 1e18 ** np.arange(1, 4) < 1e-6, 0.0, k)
         return _end_of_disc(k, p if p > 1e-15 else 0.0)
 
 
 @record(kw_only=False)
 class BrownConrady(Lens):
-    """The common model, undistorted to distorted, as OpenCV has it.
+    """Brown-Conrady model, undistorted to distorted, as in OpenCV.
 
     ``x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²)``, and with x and y, p1 and p2
     exchanged for y_d; normalised coordinates.
@@ -90,13 +90,13 @@ class BrownConrady(Lens):
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
-        """``(k1, k2, k3, p1, p2)``."""
+        """Coefficients ``(k1, k2, k3, p1, p2)``."""
         return np.array([self.k1, self.k2, self.k3, self.p1, self.p2])
 
 
 @record(kw_only=False)
 class ReportRadial(Lens):
-    """The radial model of the 2010 report (§3.2), distorted to undistorted.
+    """Radial model of the 2010 report (§3.2), distorted to undistorted.
 
     ``x = x_d (1 + a1 r_d² + a2 r_d⁴)`` in normalised coordinates, so projecting solves for r_d.
     ``a1 > 0`` is barrel, ``a1 < 0`` pincushion distortion. Coefficients for an image plane in
@@ -116,7 +116,7 @@ class ReportRadial(Lens):
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
-        """``(a1, a2, 0, 0, 0)``."""
+        """Coefficients ``(a1, a2, 0, 0, 0)``."""
         return np.array([self.a1, self.a2, 0.0, 0.0, 0.0])
 
 
@@ -143,13 +143,13 @@ class ViconRadial(Lens):
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
-        """``(k1, k2, k3, 0, 0)``."""
+        """Coefficients ``(k1, k2, k3, 0, 0)``."""
         return np.array([self.k1, self.k2, self.k3, 0.0, 0.0])
 
 
 @record(kw_only=False)
 class QuadraticCorrection(Lens):
-    """A quadratic correction of each axis, measured to ideal, as MyPTV fits it.
+    """Quadratic correction of each axis, measured to ideal, as in MyPTV.
 
     ``x = u + ex · (u, v, u², v², u v)`` and ``y = v + ey · (u, v, u², v², u v)``.
 
@@ -170,7 +170,7 @@ class QuadraticCorrection(Lens):
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
-        """The five of ex, the five of ey."""
+        """Coefficients: five of ex, then five of ey."""
         return np.array([*self.ex, *self.ey])
 
     @property
@@ -179,12 +179,12 @@ class QuadraticCorrection(Lens):
         return float("inf")
 
     def reaches(self, u: float, v: float) -> bool:
-        """Whether the point lies in the domain: the derivative's symmetric part exceeds 0.01."""
+        """Return whether a point is in the domain: the derivative's symmetric part exceeds 0.01."""
         a, b = self.ex, self.ey
         xx = 1 + a[0] + 2 * a[2] * u + a[4] * v
         yy = 1 + b[1] + 2 * b[3] * v + b[4] * u
         xy = (a[1] + 2 * a[3] * v + a[4] * u + b[0] + 2 * b[2] * u + b[4] * v) / 2
-        p, q = xx - LEAST_STRETCH, yy - LEAST_STRETCH
+        p, q = xx - MIN_STRETCH, yy - MIN_STRETCH
         return p > 0 and p * q > xy * xy
 
 
@@ -196,19 +196,19 @@ def _check(lens: BrownConrady | ReportRadial | ViconRadial) -> None:
 
 
 def _end_of_disc(k: NDArray[np.float64], p: float) -> float:
-    """Radius to which the least eigenvalue of the map's derivative exceeds the least stretch.
+    """Return the radius within which the map's derivative has eigenvalues above the minimum.
 
     With A and B the stretch along and across the radius less the least one, and Q = p r, the
     determinant at angle φ to the tangential vector is
     ``(A + 6 Q cos φ)(B + 2 Q cos φ) - 4 Q² sin² φ``: least at cos φ = -1, or in between where
     A + 3 B < 16 Q.
     """
-    along = np.array([1 - LEAST_STRETCH, -6 * p, 3 * k[0], 0, 5 * k[1], 0, 7 * k[2]])
-    across = np.array([1 - LEAST_STRETCH, -2 * p, k[0], 0, k[1], 0, k[2]])
+    along = np.array([1 - MIN_STRETCH, -6 * p, 3 * k[0], 0, 5 * k[1], 0, 7 * k[2]])
+    across = np.array([1 - MIN_STRETCH, -2 * p, k[0], 0, k[1], 0, k[2]])
     ends = [_first_root(along), _first_root(across)]
     if p > 0:
 
-        def least_between(r: NDArray[np.float64]) -> NDArray[np.float64]:
+        def smallest_between(r: NDArray[np.float64]) -> NDArray[np.float64]:
             Q = p * r
             a = np.polynomial.polynomial.polyval(r, along) + 6 * Q
             b = np.polynomial.polynomial.polyval(r, across) + 2 * Q
@@ -217,10 +217,10 @@ def _end_of_disc(k: NDArray[np.float64], p: float) -> float:
 
         radii = np.geomspace(1e-3 / p, 1e3 / p, 6001)
         radii = radii[radii < min(ends)]
-        below = np.flatnonzero(least_between(radii) <= 0)
+        below = np.flatnonzero(smallest_between(radii) <= 0)
         if len(below):
             i = int(below[0])
-            ends.append(_zero(least_between, radii[i - 1], radii[i]) if i else 0.0)
+            ends.append(_zero(smallest_between, radii[i - 1], radii[i]) if i else 0.0)
     return min(ends)
 
 
@@ -236,7 +236,7 @@ def _zero(
 
 
 def _first_root(coefficients: NDArray[np.float64]) -> float:
-    """Least positive real root of a polynomial, rising powers, the first above zero.
+    """Return the smallest positive real root of a polynomial, rising powers, the first above zero.
 
     Infinity if there is none, or none within ten powers of ten of the least that could be.
     """

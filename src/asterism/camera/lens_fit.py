@@ -1,4 +1,4 @@
-"""From one lens model to another: by fit, with what it leaves over."""
+"""Conversion between lens models by a fit, with the residuals."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 __all__ = ["LensFit", "fit_lens"]
 
 FITTED, JUDGED = 31, 151
-"""Pixels along the longer side of the image at which two lenses are fitted, and compared."""
+"""Number of pixels along the longer image side at which lenses are fitted and compared."""
 
 FEWEST = 25
-"""Of the fitted pixels that the old lens must reach, or there is nothing to fit to."""
+"""Smallest share of the fitted pixels in the domain of the old lens."""
 
 _POWERS = {"k1": 2, "k2": 4, "k3": 6, "a1": 2, "a2": 4, "p1": 1, "p2": 1}
-"""Power of the radius that each coefficient comes with, beyond the first."""
+"""Power of the radius of each coefficient, beyond the first."""
 
 
 @record
 class LensFit:
-    """A camera with another lens, and how far it is from the old one.
+    """Result of `fit_lens`: the camera with the new lens, and its deviation from the old one.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def fit_lens(
     refit_camera: bool = False,
     without: Collection[str] = (),
 ) -> LensFit:
-    """Give a camera another kind of lens, fitted to its own over the image.
+    """Fit another lens model to a camera over its image.
 
     There is no exact conversion: the models bend in different directions, and a changed sign is
     right to first order only. So the new one is fitted, and what it leaves over is told.
@@ -106,14 +106,14 @@ def fit_lens(
     fitted = start
     if len(start):
         fitted = np.asarray(least_squares(residual, start, x_scale="jac", xtol=1e-15, ftol=1e-15).x)
-    # Where a lens that bends at all would not reach the corners, a straight one may be better.
+    # A lens without distortion may be better if no other one reaches the corners.
     tries = (fitted, np.zeros(len(start)))
     best = tries[int(np.argmin([np.sum(residual(x) ** 2) for x in tries]))]
     return _judged(camera, free.camera(best))
 
 
 def _image(camera: Camera, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give pixels all over the image that the lens reaches, and their normalised coordinates."""
+    """Return pixels in the domain of the lens, all over the image, and normalised coordinates."""
     w, h = camera.size_px
     step = max((max(w, h) - 1) / (n - 1), 1e-9)
     across, down = (

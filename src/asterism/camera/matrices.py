@@ -1,4 +1,4 @@
-"""The matrices of a camera: built, checked, taken apart."""
+"""Matrices of a camera: construction, checks and decomposition."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def intrinsics(
 
 
 def checked_intrinsics(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """Give an intrinsic matrix, read-only, or raise a ParameterError."""
+    """Return an intrinsic matrix, read-only, or raise a ParameterError."""
     K = keep_array(name, value, (3, 3))
     if K[0, 0] <= 0 or K[1, 1] <= 0:
         raise ParameterError(
@@ -72,7 +72,7 @@ def checked_intrinsics(name: str, value: ArrayLike) -> NDArray[np.float64]:
 
 
 def checked_pose(value: ArrayLike) -> NDArray[np.float64]:
-    """Give world to camera coordinates, read-only, or raise unless it is a rotation and a shift."""
+    """Return a world-to-camera matrix, read-only, or raise unless it is a rigid transformation."""
     T = keep_array("T_camera_world", value, (4, 4))
     R = T[:3, :3]
     if (T[3] != (0.0, 0.0, 0.0, 1.0)).any():
@@ -91,7 +91,7 @@ def checked_pose(value: ArrayLike) -> NDArray[np.float64]:
 
 
 def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> NDArray[np.float64]:
-    """Give world to camera coordinates of a camera that looks at a target; see `Camera.look_at`."""
+    """Return the world-to-camera matrix of a camera that looks at a target."""
     position, target, up = (
         check_array(name, value, (3,))
         for name, value in (("position", position), ("target", target), ("up", up))
@@ -113,7 +113,7 @@ def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> NDArray
 
 
 def decomposed(P: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Take a projection matrix apart into K and world to camera; see `Camera.from_matrix`."""
+    """Decompose a projection matrix into K and world to camera; see `Camera.from_matrix`."""
     from scipy.linalg import rq
 
     matrix = check_array("P", P, (3, 4))

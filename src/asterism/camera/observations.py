@@ -1,4 +1,4 @@
-"""What several cameras saw over time: image points without names, in two dimensions."""
+"""Observations: unnamed image points of several cameras over time."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class Observations:
         return np.repeat(np.tile(np.arange(self.n_cameras), self.n_frames), self.counts.ravel())
 
     def points(self, t: int, camera: int) -> NDArray[np.float64]:
-        """Give what one camera saw in frame `t`, shape (n, 2), pixels."""
+        """Return the image points of one camera in frame `t`, shape (n, 2), pixels."""
         cell = t * self.n_cameras + camera
         return self.pixels[self.offsets[cell] : self.offsets[cell + 1]]
 

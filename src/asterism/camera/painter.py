@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Face", "Painting", "in_painters_order"]
 
-MOST_FACES = 2000
-"""Every pair of faces is compared."""
+MAX_FACES = 2000
+"""Largest number of faces, because every pair of faces is compared."""
 
 NEAREST = 1e-6
-"""Metres before the camera at which faces are cut off before they are compared."""
+"""Distance in front of the camera at which faces are clipped, metres."""
 
 
 class Face(NamedTuple):
-    """What the painter draws at once: a polygon (face 0), or one triangle of a mesh."""
+    """Unit of the painting order: a polygon (face 0), or one triangle of a mesh."""
 
     surface: int
     face: int
@@ -41,7 +41,7 @@ class Face(NamedTuple):
 
 @record(eq=False)
 class Painting(DepthImage):
-    """A picture made by the painter's algorithm.
+    """Result of the painter's algorithm: the painting order and its conflicts.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class _Faces(NamedTuple):
 def in_painters_order(
     surfaces: Sequence[Surface], moment: int, T_camera_world: NDArray[np.float64]
 ) -> tuple[_Faces, list[int], list[list[int]]]:
-    """Find the order in which to paint.
+    """Compute the painting order.
 
     Parameters
     ----------
@@ -99,8 +99,8 @@ def in_painters_order(
 
     faces = _faces(surfaces, moment, T_camera_world)
     n = len(faces.names)
-    if n > MOST_FACES:
-        raise SolverLimit("faces to paint", n, MOST_FACES, "use the z-buffer: Camera.depth_image")
+    if n > MAX_FACES:
+        raise SolverLimit("faces to paint", n, MAX_FACES, "use the z-buffer: Camera.depth_image")
     behind, front = _relations(faces.triangles)
     graph = coo_array((np.ones(len(behind)), (behind, front)), shape=(n, n))
     n_groups, group = connected_components(graph, directed=True, connection="strong")
@@ -108,7 +108,7 @@ def in_painters_order(
     members: list[list[int]] = [[] for _ in range(n_groups)]
     for i in np.argsort(-depth, kind="stable"):
         members[group[i]].append(int(i))
-    # Groups in topological order; among those that may come next, the farthest.
+    # Groups in topological order; of the possible next ones the farthest is first.
     after: list[set[int]] = [set() for _ in range(n_groups)]
     for b, f in zip(group[behind], group[front], strict=True):
         if b != f:
@@ -151,7 +151,7 @@ def _faces(surfaces: Sequence[Surface], moment: int, T_camera_world: NDArray[np.
 
 
 def _relations(faces: list[NDArray[np.float64]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Give the pairs of faces (behind, in front) that overlap in the image."""
+    """Return the pairs of faces (behind, in front) that overlap in the image."""
     flat = [[_project(t) for t in face] for face in faces]
     boxes = np.array(
         [
@@ -180,13 +180,13 @@ def _relations(faces: list[NDArray[np.float64]]) -> tuple[NDArray[np.int64], NDA
 
 
 def _project(triangle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the part of a triangle before the camera in normalised coordinates, shape (n, 2)."""
+    """Return the part of a triangle in front of the camera, normalised coordinates (n, 2)."""
     kept = _cut(triangle, triangle[:, 2] - NEAREST)
     return kept[:, :2] / kept[:, 2:]
 
 
 def _cut(polygon: NDArray[np.float64], inside: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cut a convex polygon to where a linear function, given at its corners, is positive."""
+    """Clip a convex polygon to where a linear function, given at its corners, is positive."""
     kept: list[NDArray[np.float64]] = []
     for i in range(len(polygon)):
         j = (i + 1) % len(polygon)
@@ -204,7 +204,7 @@ def _compare(
     b: NDArray[np.float64],
     flat_b: NDArray[np.float64],
 ) -> tuple[bool, bool]:
-    """Say whether triangle a is somewhere nearer than b, and somewhere farther."""
+    """Return whether triangle a is somewhere nearer than b, and whether somewhere farther."""
     common = flat_a
     turn = _doubled_area(flat_b)
     for i in range(len(flat_b)):
@@ -216,7 +216,7 @@ def _compare(
     smallest = 1e-9 * min(abs(_doubled_area(flat_a)), abs(turn))
     if len(common) < 3 or abs(_doubled_area(common)) <= smallest:
         return False, False
-    # The inverse depth of a plane is linear in the image, so its corners tell everything.
+    # The inverse depth of a plane is linear in the image, so its corners suffice.
     rays = np.column_stack([common, np.ones(len(common))])
     difference = rays @ _inverse_depth(a) - rays @ _inverse_depth(b)
     margin = 1e-9 * float(np.abs(rays @ _inverse_depth(a)).max())
@@ -224,7 +224,7 @@ def _compare(
 
 
 def _inverse_depth(triangle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give m with ``1 / z = m · (x, y, 1)`` on the plane of a triangle."""
+    """Return m with ``1 / z = m · (x, y, 1)`` on the plane of a triangle."""
     normal = np.asarray(np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0]))
     offset = float(normal @ triangle[0])
     return normal / offset if offset != 0 else np.zeros(3)

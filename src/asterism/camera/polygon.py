@@ -1,4 +1,4 @@
-"""A planar polygon, convex or concave, cut into triangles."""
+"""Triangulation of a planar polygon, convex or concave."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["triangulate"]
 
 FLATNESS = 1e-6
-"""Farthest that a corner may lie from the plane, as a share of the polygon's size."""
+"""Largest distance of a corner from the plane, as a share of the polygon's size."""
 
 
 def triangulate(corners: NDArray[np.float64]) -> NDArray[np.int32]:
@@ -79,7 +79,7 @@ def triangulate(corners: NDArray[np.float64]) -> NDArray[np.int32]:
 
 
 def _flatten(points: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give coordinates in the plane, counter-clockwise about the normal."""
+    """Return coordinates in the plane, counter-clockwise about the normal."""
     axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
     x = np.asarray(np.cross(normal, axis), dtype=np.float64)
     x /= np.linalg.norm(x)
@@ -106,7 +106,7 @@ def _clip_ears(p: NDArray[np.float64]) -> list[tuple[int, int, int]]:
     left = list(range(len(p)))
     faces: list[tuple[int, int, int]] = []
     while len(left) > 3:
-        # Among the ears the one that turns most sharply, so that slivers come late.
+        # The ear with the sharpest corner is cut first, which delays slivers.
         best, best_turn = -1, -1.0
         for k in range(len(left)):
             i, j, m = left[k - 1], left[k], left[(k + 1) % len(left)]

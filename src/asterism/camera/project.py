@@ -1,4 +1,4 @@
-"""Points through several cameras at once."""
+"""Projection of points through several cameras at once."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["CLEARANCE", "as_coordinates", "project_points"]
 
 CLEARANCE = 1e-6
-"""Metres before a point in which a surface does not hide it: a marker may lie on its surface."""
+"""Distance in front of a point, metres, in which a surface does not occlude it."""
 
 
 def project_points(
@@ -64,7 +64,7 @@ def project_points(
 
 
 def as_coordinates(name: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
-    """Give an array of shape (..., n), or raise. NaN passes: there is no such point."""
+    """Return an array of shape (..., n), or raise. NaN is accepted for an absent point."""
     try:
         array = np.asarray(value)
     except ValueError as error:  # rows of different lengths

@@ -1,4 +1,4 @@
-"""What cameras make of points: where they fall, how deep, and why some are not seen."""
+"""Projection of points: pixels, depths, and reasons why points are not seen."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["Projection", "Reason"]
 
 
 class Reason(IntEnum):
-    """Why a camera does not see a point. The first that applies, in this order."""
+    """Reason why a camera does not see a point: the first one that applies, in this order."""
 
     VISIBLE = 0
-    """It does see it."""
+    """The point is seen."""
     ABSENT = 1
-    """There is no point: a coordinate is NaN."""
+    """The point is absent: a coordinate is NaN."""
     BEHIND = 2
     """Not in front of the camera."""
     NEAR = 3
@@ -30,7 +30,7 @@ class Reason(IntEnum):
     LENS = 5
     """Beyond the domain of the lens model."""
     OUTSIDE = 6
-    """Beside the image."""
+    """Outside the image."""
     HIDDEN = 7
     """Behind a surface."""
 
@@ -67,7 +67,7 @@ class Projection:
         return self.reason == Reason.VISIBLE
 
     def counts(self) -> dict[Reason, int]:
-        """Say how many points there are of each reason."""
+        """Return the number of points for each reason."""
         return {reason: int((self.reason == reason).sum()) for reason in Reason}
 
     def __getitem__(self, key: int) -> Projection:

@@ -1,4 +1,4 @@
-"""Several cameras that look at one volume."""
+"""Rig: several cameras in one world."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SIZE_PX, FOCAL_PX = (1280, 1024), 900.0
 
 @record(eq=False)
 class Coverage:
-    """How well a rig sees places.
+    """Coverage of positions by a rig: number of cameras and triangulation accuracy.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Rig:
         size_px: tuple[int, int] = SIZE_PX,
         **options: Any,
     ) -> Self:
-        """Place cameras evenly on a circle, all looking at one place; z is up.
+        """Place cameras evenly on a circle, all looking at one point; z is up.
 
         Parameters
         ----------
@@ -155,7 +155,7 @@ class Rig:
         size_px: tuple[int, int] = SIZE_PX,
         **options: Any,
     ) -> Self:
-        """Place cameras in a row along a wall, all looking at one place; z is up.
+        """Place cameras in a row along a wall, all looking at one point; z is up.
 
         Parameters
         ----------
@@ -201,7 +201,7 @@ class Rig:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name of each camera; its number from 1 where it has none."""
+        """Name of each camera, or its number from 1 without a name."""
         return tuple(c.name or str(i + 1) for i, c in enumerate(self.cameras))
 
     def project(
@@ -211,7 +211,7 @@ class Rig:
         *,
         clearance: float = CLEARANCE,
     ) -> Projection:
-        r"""Say where points fall in every image, and why some are not seen.
+        r"""Project points into every image, with the reason for each point that is not seen.
 
         Parameters
         ----------
@@ -228,7 +228,7 @@ class Rig:
     def coverage(
         self, points: ArrayLike, surfaces: Sequence[Surface] = (), *, sigma_px: float = 0.3
     ) -> Coverage:
-        """Say how many cameras see each place, and how exactly a point there is triangulated.
+        """Compute for each position the number of cameras and the accuracy of triangulation.
 
         Parameters
         ----------
@@ -248,7 +248,7 @@ class Rig:
             information[seen] += np.swapaxes(J, -1, -2) @ J / sigma_px**2
         n_cameras = projection.visible.sum(axis=0)
         covariance = np.full(information.shape, np.nan)
-        # Two rays along one line leave the depth open: the information is singular.
+        # Two rays along one line do not determine the depth: the information is singular.
         is_known = (n_cameras >= 2) & (np.linalg.cond(information) < 1e12)
         covariance[is_known] = np.linalg.inv(information[is_known])
         return Coverage(
@@ -256,7 +256,7 @@ class Rig:
         )
 
     def replace(self, **changes: Any) -> Self:
-        """Give the rig with some of its fields changed."""
+        """Return a copy of the rig with some fields changed."""
         return replace(self, **changes)
 
     def __len__(self) -> int:
@@ -282,7 +282,7 @@ class Rig:
 
 
 def volume_grid(low: ArrayLike, high: ArrayLike, spacing: float) -> NDArray[np.float64]:
-    """Give the places of an even grid in a box.
+    """Return the points of a regular grid in a box.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Surfaces that hide points: polygons, meshes, capsules; standing still or moving with the scene.
+"""Surfaces that occlude points: polygons, meshes and capsules, fixed or moving.
 
 They are seen by nobody themselves: curtains of the 2010 report (§3.4). Both sides hide.
 """
@@ -27,22 +27,22 @@ __all__ = ["Capsule", "Mesh", "Polygon", "Surface", "check_surfaces", "compile_s
 
 
 class Surface(ABC):
-    """A surface that hides what lies behind it: `Polygon`, `Mesh` or `Capsule`."""
+    """Surface that occludes points behind it: `Polygon`, `Mesh` or `Capsule`."""
 
     name: str
 
     @property
     @abstractmethod
     def n_moments(self) -> int:
-        """1 for a surface that stands still, else the number of frames T."""
+        """1 for a fixed surface, otherwise the number of frames T."""
 
     @abstractmethod
     def during(self, frames: NDArray[np.int64]) -> Self:
-        """Give the surface in some of its frames, shape (n,); itself where it stands still."""
+        """Return the surface in some of its frames, shape (n,); a fixed surface returns itself."""
 
 
 def _points(name: str, value: ArrayLike, n: int | str) -> NDArray[np.float64]:
-    """Give ``(n, 3)`` or ``(T, n, 3)`` as a read-only ``(moments, n, 3)``."""
+    """Return ``(n, 3)`` or ``(T, n, 3)`` as a read-only ``(moments, n, 3)``."""
     array = np.asarray(value)
     if array.ndim == 2:
         array = array[None]
@@ -81,17 +81,17 @@ class Polygon(Surface):
 
     @property
     def n_moments(self) -> int:
-        """1, or the number of frames."""
+        """1 for a fixed surface, otherwise the number of frames."""
         return len(self.corners)
 
     def during(self, frames: NDArray[np.int64]) -> Self:
-        """Give the polygon in some of its frames."""
+        """Return the polygon in some of its frames."""
         return self if self.n_moments == 1 else replace(self, corners=self.corners[frames])
 
 
 @record(eq=False)
 class Mesh(Surface):
-    """Triangles that share corners.
+    """Triangle mesh with shared corners.
 
     Parameters
     ----------
@@ -128,17 +128,17 @@ class Mesh(Surface):
 
     @property
     def n_moments(self) -> int:
-        """1, or the number of frames."""
+        """1 for a fixed surface, otherwise the number of frames."""
         return len(self.vertices)
 
     def during(self, frames: NDArray[np.int64]) -> Self:
-        """Give the mesh in some of its frames."""
+        """Return the mesh in some of its frames."""
         return self if self.n_moments == 1 else replace(self, vertices=self.vertices[frames])
 
 
 @record(eq=False)
 class Capsule(Surface):
-    """All within a distance of a segment: a limb; a sphere where the ends are one.
+    """Capsule: all points within a distance of a segment, such as a limb.
 
     Parameters
     ----------
@@ -160,16 +160,16 @@ class Capsule(Surface):
 
     @property
     def n_moments(self) -> int:
-        """1, or the number of frames."""
+        """1 for a fixed surface, otherwise the number of frames."""
         return len(self.ends)
 
     def during(self, frames: NDArray[np.int64]) -> Self:
-        """Give the capsule in some of its frames."""
+        """Return the capsule in some of its frames."""
         return self if self.n_moments == 1 else replace(self, ends=self.ends[frames])
 
 
 def check_surfaces(surfaces: Sequence[Surface]) -> None:
-    """Raise a ParameterError if something else is among the surfaces."""
+    """Raise a ParameterError unless all objects are surfaces."""
     if not isinstance(surfaces, (list, tuple)):
         raise ParameterError("surfaces", "a list or tuple of surfaces", type(surfaces).__name__)
     for i, surface in enumerate(surfaces):
@@ -180,7 +180,7 @@ def check_surfaces(surfaces: Sequence[Surface]) -> None:
 
 
 def compile_surfaces(surfaces: Sequence[Surface], n_frames: int) -> list[_engine.Surfaces]:
-    """Hand surfaces to the engine: those that stand together, those that move together.
+    """Convert surfaces to engine objects, one for the fixed and one for the moving ones.
 
     Raises
     ------
