@@ -198,7 +198,7 @@ def test_methods_and_scenes_are_those_of_the_library(capsys):
     assert all(option["about"] for option in options.values())
     text = run("methods", capsys)
     assert "tracks|detections" in text
-    assert "deleted when its odds fall" in text
+    assert "Factor of the decrease of a tentative track's odds" in text
     assert list(json.loads(run("scenes --json", capsys))) == list(am.simulate.SCENES)
 
 

@@ -224,7 +224,7 @@ def test_two_axes_will_do():
     np.testing.assert_array_equal(am.name_tracks(take, bonds).markers, was)
 
 
-@pytest.mark.parametrize("wrong", [{"neighbours": 0}, {"least": 1}, {"neighbours": 2.5}])
+@pytest.mark.parametrize("wrong", [{"neighbours": 0}, {"min_frames": 1}, {"neighbours": 2.5}])
 def test_options_out_of_range_are_refused(wrong):
     with pytest.raises(am.ParameterError, match=next(iter(wrong))):
         am.learn_bonds(am.simulate.cube(seed=1), **wrong)
