@@ -225,27 +225,28 @@ def test_the_profile_is_the_mean_over_what_is_known():
     np.testing.assert_allclose(error_profile(off), [*expected[:3], between, expected[3]])
 
 
-def test_doubt_grows_as_estimators_disagree():
+def test_the_deviation_grows_as_estimators_disagree():
     rng = np.random.default_rng(0)
     z = rng.normal(size=(200, 5, 3))
     apart = rng.normal(size=(2, 201, 5, 3))
     alike = apart / np.sqrt((apart**2).mean(axis=(0, 2, 3)))[:, None, None]
 
-    def doubt(apart, z, factor):
+    def growth(apart, z, factor):
         last = np.append(np.ones(200), factor)[:, None, None]
         return disagreement_factor(apart * last, z)
 
-    # Windows that disagree alike tell nothing: errors are taken to grow with disagreement.
-    assert doubt(alike, z, 10) == pytest.approx(10)
-    assert doubt(alike, z, 0.1) == pytest.approx(0.1)
-    # Windows that tell of it are believed: errors as the root of it, or none the larger.
+    # Equal disagreement in all windows determines nothing: errors are assumed to grow with it.
+    assert growth(alike, z, 10) == pytest.approx(10)
+    assert growth(alike, z, 0.1) == pytest.approx(0.1)
+    # If the windows determine the relation, it is used: errors grow as the root of the
+    # disagreement, or not at all.
     spread = np.exp(rng.normal(size=200))
     varied = alike * np.append(spread, 1.0)[:, None, None]
     even = z / np.sqrt((z**2).mean(axis=(1, 2)))[:, None, None]
-    assert doubt(varied, even * np.sqrt(spread)[:, None, None], 10) == pytest.approx(
+    assert growth(varied, even * np.sqrt(spread)[:, None, None], 10) == pytest.approx(
         np.sqrt(10 / spread.mean()), rel=0.1
     )
-    assert doubt(varied, even, 10) == pytest.approx(1, rel=0.1)
+    assert growth(varied, even, 10) == pytest.approx(1, rel=0.1)
 
 
 def test_points_filled_before_are_no_measurements():

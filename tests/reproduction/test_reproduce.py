@@ -211,7 +211,7 @@ def test_the_worst_lists_take_as_many_proposals_as_any():
 
 def test_the_test_of_a_stable_matching_finds_the_blocking_pairs_of_figure_5_1():
     assert blocking_pairs(marry(MEN, WOMEN)[0], MEN, WOMEN) == []
-    # By hand: A-b, B-a, C-c. A and a, B and b prefer each other; so do C and a, who has her last.
+    # By hand: A-b, B-a, C-c. The blocking pairs are A and a, B and b, and C and a.
     assert blocking_pairs(UNSTABLE, MEN, WOMEN) == [(0, 0), (1, 1), (2, 0)]
 
 

@@ -159,7 +159,7 @@ def stream(dense, *, lag=2, confirm=15, revise=None, labels=None):
         final.extend(markers)
         for detection, marker in zip(changed, now, strict=True):
             assert detection < first
-            assert final[detection] != marker  # only what changes is told
+            assert final[detection] != marker  # a revision reports changed labels only
             final[detection] = marker
         told.append(list(zip(changed.tolist(), now.tolist(), strict=True)))
     return np.array(final), told

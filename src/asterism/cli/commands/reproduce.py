@@ -71,7 +71,7 @@ def reproduce(
                 write_part(part, outcome, out)
             done[part] = outcome
     finally:
-        # Also on the way out after a signal: the finished parts are worth reading.
+        # After a signal too: the finished parts are complete.
         missing = names[len(done) :]
         if done:
             write_page(done, missing, seeds, out)
