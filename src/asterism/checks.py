@@ -27,6 +27,8 @@ __all__ = [
     "keep_array",
 ]
 
+_MAX_LISTED = 20  # known names in a message
+
 
 def check_number(
     name: str,
@@ -286,7 +288,9 @@ def check_fields(name: str, given: Iterable[str], known: Iterable[str]) -> None:
         if field not in known:
             near = _nearest(str(field), list(map(str, known)))
             hint = f"did you mean {near!r}?" if near else ""
-            expected = f"one of {', '.join(known)}" if len(known) > 1 else "".join(known)
+            more = f" and {len(known) - _MAX_LISTED} more" if len(known) > _MAX_LISTED else ""
+            those = ", ".join(known[:_MAX_LISTED]) + more
+            expected = f"one of {those}" if len(known) > 1 else those
             raise ParameterError(name, expected, repr(field), hint)
 
 

@@ -138,7 +138,7 @@ def test_help_lists_every_kind(capsys, monkeypatch):
         ("projections truth.csv", "--rig: expected"),
         ("confidence truth.csv", "tracks with a confidence"),
         ("reliability run truth.csv --truth truth.csv", "truth.csv, which has none"),
-        ("presence truth.csv --truth truth.csv", "for errors, reliability, compare"),
+        ("presence truth.csv --truth truth.csv", "takes it: errors, reliability, compare"),
         ("presence truth.csv in.csv", "one file for presence"),
         ("presence truth.csv -o a.jpg", "a name ending in .pdf, .svg or .png"),
         ("presence truth.csv -o a", "a name ending in .pdf, .svg or .png"),
@@ -176,3 +176,37 @@ def test_an_input_is_not_overwritten(work, capsys):
     shutil.copy(work / "run/in.tracked.csv", work / "a.csv")
     err = refused("plot errors a.csv --truth truth.pdf -o truth.pdf", capsys)
     assert "the input truth.pdf" in err
+
+
+def test_markers_and_times_can_be_chosen(work, capsys):
+    scene = am.io.read_tracks("truth.csv")
+    asked = {
+        "--markers 3,M00 --time 0 0.2": ([3, 0], 11),
+        "--markers M1*": (range(10, 16), 20),
+    }
+    for line, (there, end) in asked.items():
+        run(f"plot presence truth.csv -o part.svg {line} --overwrite", capsys)
+        chosen = scene.select(there).part(0, end)
+        assert (work / "part.svg").read_bytes() == am.plot.figure_bytes(
+            am.plot.plot_presence(chosen), "svg"
+        )
+
+
+def test_size_and_resolution_can_be_chosen(work, capsys):
+    run("plot axes truth.csv -o small.png --size 4 3 --dpi 100", capsys)
+    assert (work / "small.png").read_bytes()[16:24] == (400).to_bytes(4, "big") + (300).to_bytes(
+        4, "big"
+    )
+
+
+def test_many_tracks_are_coloured_by_segment(work, capsys):
+    truth = am.simulate.person(seed=1).part(0, 60)
+    am.write(truth, "person.csv")
+    read = am.io.read_tracks("person.csv")
+    run("plot axes person.csv -o axes.svg", capsys)
+    segments = am.learn_bonds(read).segments(read.names)
+    expected = am.plot.figure_bytes(am.plot.plot_axes(read, segments=segments), "svg")
+    assert (work / "axes.svg").read_bytes() == expected
+    run("plot trajectories person.csv -o time.png --by-time", capsys)
+    expected = am.plot.figure_bytes(am.plot.plot_trajectories(read), "png")
+    assert (work / "time.png").read_bytes() == expected

@@ -244,6 +244,41 @@ def test_tracks_are_a_sequence_of_positions_by_number_and_by_name():
         tracks[2]
 
 
+def test_selected_tracks_have_their_own_detections_in_the_order_asked_for():
+    scene = am.simulate.corrupt(am.simulate.cube(seed=1), missing=0.2, clutter=0.2, seed=1)
+    whole = dataclasses.replace(scene, confidence=np.linspace(0, 1, len(scene.labels)))
+    few = whole.select([5, 2])
+    assert (few.labels >= 0).all()
+    np.testing.assert_array_equal(few.positions(), whole.positions()[:, [5, 2]])
+    for k, original in enumerate((5, 2)):
+        np.testing.assert_array_equal(
+            few.confidence[few.labels == k], whole.confidence[whole.labels == original]
+        )
+    with pytest.raises(KeyError, match="no track named 'LKNE'"):
+        whole.select(["LKNE"])
+    with pytest.raises(IndexError):
+        whole.select([99])
+
+
+def test_a_part_has_the_same_tracks_in_fewer_frames():
+    whole = am.simulate.corrupt(am.simulate.cube(seed=1), missing=0.2, clutter=0.2, seed=1)
+    part = whole.part(3, 9)
+    assert part.names == whole.names
+    np.testing.assert_array_equal(part.positions(), whole.positions()[3:9])
+    np.testing.assert_array_equal(part.detections.counts, whole.detections.counts[3:9])
+
+
+def test_kept_detections_stay_in_their_frames():
+    d = am.simulate.cube(seed=1).detections
+    is_kept = np.random.default_rng(1).random(d.n_points) < 0.5
+    kept = d.keep(is_kept)
+    np.testing.assert_array_equal(kept.points, d.points[is_kept])
+    np.testing.assert_array_equal(kept.frame_of, d.frame_of[is_kept])
+    np.testing.assert_array_equal(kept.times, d.times)
+    with pytest.raises(am.ParameterError, match="is_kept"):
+        d.keep([True])
+
+
 def test_gaps_are_between_detections_of_a_track():
     assert _named_tracks().gaps() == (am.model.Gap(track=0, first=1, last=1, seconds=0.02),)
     rng = np.random.default_rng(3)

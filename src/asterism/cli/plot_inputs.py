@@ -1,15 +1,22 @@
-"""What ``asterism plot`` reads: tracks, the folders of runs, what kinds of figures ask of them."""
+"""Inputs of ``asterism plot``: tracks, run folders, models and selections of tracks."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from asterism.checks import check_fields
 from asterism.errors import FormatError, ParameterError, not_read
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     import asterism as am
 
@@ -17,6 +24,8 @@ __all__ = [
     "is_observations",
     "model_for",
     "named",
+    "segments_of",
+    "selected",
     "solid_tracks",
     "summary_of",
     "sure_tracks",
@@ -29,6 +38,48 @@ def tracks_of(path: Path) -> am.Tracks:
     from asterism.cli.outputs import read_labels
 
     return read_labels(_result(path))
+
+
+def selected(
+    tracks: am.Tracks, markers: Sequence[str] | None, time: tuple[float, float] | None
+) -> am.Tracks:
+    """Select markers, by name or else by track number, and a time window in seconds."""
+    if markers is not None:
+        tracks = tracks.select([k for marker in markers for k in _matching(tracks, marker)])
+    if time is not None:
+        times = tracks.detections.times
+        first, end = np.searchsorted(times, time[0]), np.searchsorted(times, time[1], side="right")
+        if first >= end:
+            those = f"{times[0]:g} to {times[-1]:g} s" if len(times) else "no frame"
+            found = f"{time[0]:g} to {time[1]:g} s"
+            raise ParameterError("--time", f"a part of the capture, {those}", found)
+        tracks = tracks.part(int(first), int(end))
+    return tracks
+
+
+def _matching(tracks: am.Tracks, marker: str) -> list[int]:
+    """Return the tracks with a name that matches a pattern, or with a number."""
+    names = [name or f"{k}" for k, name in enumerate(tracks.names)]
+    found = [k for k, name in enumerate(names) if fnmatchcase(name, marker)]
+    if not found:
+        check_fields("--markers", [marker], [*names, *map(str, range(len(tracks)))])
+    return found or [int(marker)]
+
+
+def segments_of(tracks: am.Tracks) -> NDArray[np.int64] | None:
+    """Return the rigid segment of each track, -1 for none; None where colours suffice.
+
+    Tracks in less than a tenth of the frames are too short to have one.
+    """
+    import asterism as am
+    from asterism.plot.style import CYCLE
+
+    if np.count_nonzero(tracks.lengths) <= len(CYCLE):
+        return None
+    names = [f"{k}" for k in range(len(tracks))]
+    long = np.flatnonzero(tracks.lengths >= max(0.1 * tracks.detections.n_frames, 2)).tolist()
+    renamed = dataclasses.replace(tracks, names=names).select(long)
+    return am.learn_bonds(renamed).segments(names)
 
 
 def sure_tracks(path: Path) -> am.Tracks:

@@ -10,6 +10,8 @@ from asterism.cli.plot_inputs import (
     is_observations,
     model_for,
     named,
+    segments_of,
+    selected,
     solid_tracks,
     summary_of,
     sure_tracks,
@@ -37,11 +39,18 @@ class Request:
     camera: str | None = None
     moves: Sequence[float] | None = None
     seeds: int | None = None
+    markers: Sequence[str] | None = None
+    time: tuple[float, float] | None = None
+    by_time: bool | None = None
 
     @property
     def file(self) -> Path:
         """The one file of kinds that take one."""
         return self.files[0]
+
+    def tracks(self) -> am.Tracks:
+        """Read the chosen markers and times of the file."""
+        return selected(tracks_of(self.file), self.markers, self.time)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,25 +79,29 @@ class Kind:
 def _trajectories(asked: Request) -> Any:
     import asterism as am
 
-    return am.plot.plot_trajectories(tracks_of(asked.file))
+    tracks = asked.tracks()
+    segments = None if asked.by_time else segments_of(tracks)
+    return am.plot.plot_trajectories(tracks, segments=segments)
 
 
 def _axes(asked: Request) -> Any:
     import asterism as am
 
-    return am.plot.plot_axes(tracks_of(asked.file))
+    tracks = asked.tracks()
+    return am.plot.plot_axes(tracks, segments=segments_of(tracks))
 
 
 def _presence(asked: Request) -> Any:
     import asterism as am
 
-    return am.plot.plot_presence(tracks_of(asked.file))
+    return am.plot.plot_presence(asked.tracks())
 
 
 def _confidence(asked: Request) -> Any:
     import asterism as am
 
-    return am.plot.plot_confidence(sure_tracks(asked.file))
+    tracks = selected(sure_tracks(asked.file), asked.markers, asked.time)
+    return am.plot.plot_confidence(tracks)
 
 
 def _errors(asked: Request) -> Any:
@@ -226,12 +239,23 @@ def _truth(asked: Request) -> am.Tracks:
 
 _TRUTH, _RIG = frozenset({"truth"}), frozenset({"rig"})
 _MODEL = frozenset({"model"})
+_PART = frozenset({"markers", "time"})
 
 KINDS: dict[str, Kind] = {
-    "trajectories": Kind(about="the paths of all tracks in space", draw=_trajectories),
-    "axes": Kind(about="x, y and z of every track over time", draw=_axes),
-    "presence": Kind(about="when each track was there, and the clutter", draw=_presence),
-    "confidence": Kind(about="the same, shaded by the confidence of each link", draw=_confidence),
+    "trajectories": Kind(
+        about="paths of the tracks in space, coloured by rigid segment",
+        draw=_trajectories, takes=_PART | {"by_time"},
+    ),
+    "axes": Kind(
+        about="x, y and z of the tracks over time, coloured by rigid segment",
+        draw=_axes, takes=_PART,
+    ),
+    "presence": Kind(
+        about="frames with a detection of each track, and the clutter", draw=_presence, takes=_PART
+    ),
+    "confidence": Kind(
+        about="the same, shaded by the confidence of each link", draw=_confidence, takes=_PART
+    ),
     "errors": Kind(about="where labels are wrong", draw=_errors, needs=_TRUTH),
     "reliability": Kind(
         about="how often labels are right, by their confidence; of one tracking or more",
@@ -242,23 +266,24 @@ KINDS: dict[str, Kind] = {
         draw=_compare, many=True, needs=_TRUTH,
     ),
     "projections": Kind(
-        about="what every camera sees in the course of a capture or of a film's observations",
+        about="image points of a capture, or of a film's observations, in every camera",
         draw=_projections, needs=_RIG,
     ),
     "image": Kind(
-        about="what every camera sees in one frame of a capture, by default the middle one",
+        about="image of every camera in one frame of a capture",
         draw=_image, needs=_RIG, takes=frozenset({"frame"}),
     ),
     "posterior": Kind(
-        about="how far mcmcda climbs with the number of its moves, beside gnn",
+        about="log posterior of mcmcda by its number of moves, beside gnn",
         draw=_posterior, takes=_MODEL | {"moves", "seeds"},
     ),
     "groups": Kind(
-        about="how many tracks are in each other's gates, over time", draw=_groups, takes=_MODEL
+        about="sizes of the groups of tracks with common gated detections, over time",
+        draw=_groups, takes=_MODEL,
     ),
-    "rig": Kind(about="the cameras of a calibration in their world", draw=_rig),
+    "rig": Kind(about="positions and views of the cameras of a calibration", draw=_rig),
     "lens": Kind(
-        about="what a camera's lens does to a square grid; by default the first camera's",
+        about="distortion of a square grid by the lens of a camera",
         draw=_lens, takes=frozenset({"camera"}),
     ),
 }  # fmt: skip

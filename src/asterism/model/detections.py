@@ -235,14 +235,36 @@ class Detections:
         """
         if self.filled is None or not self.filled.any():
             return self
-        kept = ~self.filled
+        return replace(self.keep(~self.filled), filled=None)
+
+    def keep(self, is_kept: ArrayLike) -> Self:
+        """Return the detections that are marked, in the same frames.
+
+        Parameters
+        ----------
+        is_kept : array_like of bool, shape (N,)
+            Whether each detection stays.
+
+        Returns
+        -------
+        Detections
+            Detections of the same class and frames, with all fields of the points that stay.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> d = am.simulate.cube(frames=20, seed=1).detections
+        >>> d.keep(d.points[:, 2] > 1).n_frames
+        20
+        """
+        kept = keep_array("is_kept", is_kept, (self.n_points,), dtype=np.bool_)
         changes: dict[str, Any] = {
             name: getattr(self, name)[kept]
             for name in self.PER_POINT
             if getattr(self, name) is not None
         }
         changes["offsets"] = np.concatenate([[0], np.cumsum(kept)])[self.offsets]
-        return replace(self, **changes | {"filled": None})
+        return replace(self, **changes)
 
     def part(self, first: int, end: int) -> Detections:
         """Return the frames from `first` up to but without `end`, with all fields of their points.

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+import numpy as np
+
 from asterism.records import record
 
-__all__ = ["Gap"]
+if TYPE_CHECKING:
+    from asterism.model.tracks import Tracks
+
+__all__ = ["Gap", "gaps_of"]
 
 
 @record
@@ -36,3 +43,20 @@ class Gap:
     def length(self) -> int:
         """Number of frames of the gap."""
         return self.last - self.first + 1
+
+
+def gaps_of(tracks: Tracks) -> tuple[Gap, ...]:
+    """Return the gaps of all tracks, ordered by track and then by time."""
+    order, _ = tracks.by_track
+    frame, track = tracks.detections.frame_of[order], tracks.labels[order]
+    before = np.flatnonzero((np.diff(track) == 0) & (np.diff(frame) > 1))
+    times = tracks.detections.times
+    return tuple(
+        Gap(
+            track=int(track[i]),
+            first=int(frame[i]) + 1,
+            last=int(frame[i + 1]) - 1,
+            seconds=float(times[frame[i + 1]] - times[frame[i]]),
+        )
+        for i in before
+    )

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import field, replace
 from functools import cached_property
-from html import escape
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -17,8 +15,8 @@ import numpy as np
 from asterism.checks import check_kind, keep_array
 from asterism.errors import ParameterError
 from asterism.model.detections import Detections
-from asterism.model.gap import Gap
-from asterism.model.tables import tables_module
+from asterism.model.gap import Gap, gaps_of
+from asterism.model.tables import data_array, data_frame, html_table
 from asterism.records import record
 
 if TYPE_CHECKING:
@@ -32,7 +30,6 @@ __all__ = ["MAX_TRACKS", "Tracks"]
 
 MAX_TRACKS = 10_000_000
 """Largest number of tracks that is accepted; larger labels are refused as mistakes."""
-_MAX_ROWS = 100
 
 
 @record(eq=False)
@@ -144,12 +141,9 @@ class Tracks:
         else:
             is_seen = np.isfinite(np.asarray(positions, dtype=np.float64)).all(axis=2)
             labels = np.broadcast_to(np.arange(n_markers), is_seen.shape)[is_seen]
-        labels.flags.writeable = False  # nobody else has it: no need to copy
-        return cls(
-            detections=detections,
-            labels=labels,
-            names=tuple(names) if names else (None,) * n_markers,
-        )
+        labels.flags.writeable = False  # no other object refers to it: no need to copy
+        own = tuple(names) if names else (None,) * n_markers
+        return cls(detections=detections, labels=labels, names=own)
 
     def __len__(self) -> int:
         """Return the number of tracks."""
@@ -180,15 +174,17 @@ class Tracks:
         array([[0., 0., 1.],
                [0., 0., 2.]])
         """
-        if isinstance(track, str):
-            if track not in self.names:
-                raise KeyError(f"no track named {track!r}: {', '.join(self.display_names)}")
-            track = self.names.index(track)
-        k = range(self.n_tracks)[track]
-        own = np.flatnonzero(self.labels == k)
+        own = self.labels == self._number(track)
         positions = np.full((self.detections.n_frames, self.detections.n_axes), np.nan)
         positions[self.detections.frame_of[own]] = self.detections.points[own]
         return positions
+
+    def _number(self, track: int | str) -> int:
+        if not isinstance(track, str):
+            return range(self.n_tracks)[track]
+        if track not in self.names:
+            raise KeyError(f"no track named {track!r}: {', '.join(self.display_names)}")
+        return self.names.index(track)
 
     @property
     def display_names(self) -> tuple[str, ...]:
@@ -205,19 +201,7 @@ class Tracks:
         >>> am.Tracks.from_dense([0, 0.01, 0.02], at).gaps()
         (Gap(track=0, first=1, last=1, seconds=0.02),)
         """
-        order, _ = self.by_track
-        frame, track = self.detections.frame_of[order], self.labels[order]
-        before = np.flatnonzero((np.diff(track) == 0) & (np.diff(frame) > 1))
-        times = self.detections.times
-        return tuple(
-            Gap(
-                track=int(track[i]),
-                first=int(frame[i]) + 1,
-                last=int(frame[i + 1]) - 1,
-                seconds=float(times[frame[i + 1]] - times[frame[i]]),
-            )
-            for i in before
-        )
+        return gaps_of(self)
 
     def to_pandas(self) -> Any:
         """Return a pandas ``DataFrame`` with one row a detection (extra ``asterism[tables]``).
@@ -237,18 +221,7 @@ class Tracks:
         >>> list(tracks.to_pandas().columns)
         ['frame', 'time_s', 'track', 'name', 'x_m', 'y_m', 'z_m']
         """
-        d = self.detections
-        names = np.array([*self.display_names, ""], dtype=object)
-        columns = {
-            "frame": d.frame_of,
-            "time_s": d.times[d.frame_of],
-            "track": self.labels,
-            "name": names[self.labels],
-            **{f"{axis}_m": d.points[:, k] for k, axis in enumerate("xyz"[: d.n_axes])},
-        }
-        if self.confidence is not None:
-            columns["confidence"] = self.confidence
-        return tables_module("pandas").DataFrame(columns)
+        return data_frame(self)
 
     def to_xarray(self) -> Any:
         """Return an xarray ``DataArray`` of time, marker and axis (extra ``asterism[tables]``).
@@ -267,14 +240,7 @@ class Tracks:
         >>> tracks.to_xarray().dims
         ('time', 'marker', 'axis')
         """
-        d, axes = self.detections, list("xyz"[: self.detections.n_axes])
-        return tables_module("xarray").DataArray(
-            self.positions(),
-            dims=("time", "marker", "axis"),
-            coords={"time": d.times, "marker": list(self.display_names), "axis": axes},
-            name="position",
-            attrs={"units": "m"},
-        )
+        return data_array(self)
 
     def measured(self) -> Self:
         """Return the tracks without filled detections; the object itself if there are none.
@@ -292,6 +258,66 @@ class Tracks:
         kept = ~self.detections.filled
         confidence = None if self.confidence is None else self.confidence[kept]
         return replace(self, detections=d, labels=self.labels[kept], confidence=confidence)
+
+    def part(self, first: int, end: int) -> Tracks:
+        """Return the tracks in the frames from `first` up to but without `end`.
+
+        Parameters
+        ----------
+        first, end : int
+            First frame, and the frame after the last.
+
+        Returns
+        -------
+        Tracks
+            All tracks keep their numbers and names; report and recipe are left out.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> am.simulate.cube(frames=20, seed=1).part(5, 10).positions().shape[0]
+        5
+        """
+        d = self.detections
+        own = slice(d.offsets[first], d.offsets[end])
+        confidence = None if self.confidence is None else self.confidence[own]
+        labels, part = self.labels[own], d.part(first, end)
+        return Tracks(detections=part, labels=labels, names=self.names, confidence=confidence)
+
+    def select(self, tracks: Sequence[int | str]) -> Tracks:
+        """Return some of the tracks, in the order given, without other tracks and clutter.
+
+        Parameters
+        ----------
+        tracks : sequence of int or str
+            Numbers or names, each once.
+
+        Returns
+        -------
+        Tracks
+            Report and recipe, which are of the whole, are left out.
+
+        Raises
+        ------
+        IndexError, KeyError
+            If there is no track of a number or name.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> tracks = am.Tracks.from_dense([0], [[[0, 0, 1], [0, 0, 2]]], ["LKNE", "RKNE"])
+        >>> tracks.select(["RKNE"]).names
+        ('RKNE',)
+        """
+        chosen = [self._number(track) for track in tracks]
+        label_of = np.full(self.n_tracks + 1, -1)  # the last is of clutter
+        label_of[chosen] = np.arange(len(chosen))
+        labels = label_of[self.labels]
+        kept = labels >= 0
+        confidence = None if self.confidence is None else self.confidence[kept]
+        names = tuple(self.names[k] for k in chosen)
+        d = self.detections.keep(kept)
+        return Tracks(detections=d, labels=labels[kept], names=names, confidence=confidence)
 
     @property
     def n_tracks(self) -> int:
@@ -335,19 +361,7 @@ class Tracks:
 
     def _repr_html_(self) -> str:
         """Return an HTML table for notebooks, with one row of figures for each track."""
-        order, offsets = self.by_track
-        frames = self.detections.frame_of[order]
-        n_gaps = np.bincount([gap.track for gap in self.gaps()], minlength=self.n_tracks)
-        rows = [
-            f"<tr><th>{escape(self.display_names[k])}</th><td>{self.lengths[k]}</td>"
-            f"<td>{n_gaps[k]}</td><td>{frames[a]}</td><td>{frames[b - 1]}</td></tr>"
-            for k, (a, b) in enumerate(pairwise(offsets.tolist()))
-            if b > a
-        ]
-        heads = "".join(f"<th>{h}</th>" for h in ("track", "detections", "gaps", "first", "last"))
-        more = f"<p>… and {len(rows) - _MAX_ROWS} more</p>" * (len(rows) > _MAX_ROWS)
-        body = "".join(rows[:_MAX_ROWS])
-        return f"<p>{escape(repr(self))}</p><table><tr>{heads}</tr>{body}</table>{more}"
+        return html_table(self)
 
     def __repr__(self) -> str:
         n_clutter = int((self.labels < 0).sum())

@@ -30,7 +30,13 @@ _METADATA: dict[str, dict[str, Any]] = {
 _OPTIONS: Any = {"svg.hashsalt": "asterism", "pdf.fonttype": 42}
 
 
-def figure_bytes(picture: Figure | Axes | Sequence[Axes], ending: str) -> bytes:
+def figure_bytes(
+    picture: Figure | Axes | Sequence[Axes],
+    ending: str,
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+) -> bytes:
     """Render a picture; one that is made anew from the same data gives the same bytes.
 
     Parameters
@@ -39,6 +45,11 @@ def figure_bytes(picture: Figure | Axes | Sequence[Axes], ending: str) -> bytes:
         What a plot function gave, or the figure that holds it.
     ending : {"pdf", "png", "svg"}
         The format.
+    size : (float, float), optional
+        Width and height in inches; by default those of the figure.
+    dpi : float, optional
+        Dots per inch of a PNG, and of the parts of a PDF or SVG that are images; by default those
+        of the figure.
 
     Returns
     -------
@@ -64,12 +75,20 @@ def figure_bytes(picture: Figure | Axes | Sequence[Axes], ending: str) -> bytes:
     figure = getattr(figure, "figure", figure)  # of a part of a figure the whole
     file = io.BytesIO()
     with matplotlib.rc_context(_OPTIONS):
-        figure.savefig(file, format=ending, metadata=_METADATA[ending])
+        if size is not None:
+            figure.set_size_inches(size)
+        figure.savefig(file, format=ending, dpi=dpi or "figure", metadata=_METADATA[ending])
     return file.getvalue()
 
 
-def write_figure(picture: Figure | Axes | Sequence[Axes], path: Path) -> None:
+def write_figure(
+    picture: Figure | Axes | Sequence[Axes],
+    path: Path,
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+) -> None:
     """Write a picture, as a whole or not at all, in the format of the path's ending."""
-    content = figure_bytes(picture, path.suffix.lower().removeprefix("."))
+    content = figure_bytes(picture, path.suffix.lower().removeprefix("."), size=size, dpi=dpi)
     with replacing(path) as file:
         file.write(content)

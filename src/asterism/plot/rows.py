@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["axes_for", "frame_rows", "legend_above", "rows_of", "strip_above"]
 
-_MOST_NAMES = 60  # rows that can be named legibly
+_MAX_NAMES = 120  # rows with legible names on the highest figure
 
 
 def rows_of(tracks: Tracks) -> NDArray[np.int64]:
@@ -32,7 +32,7 @@ def rows_of(tracks: Tracks) -> NDArray[np.int64]:
 
 def axes_for(rows: NDArray[np.int64]) -> Axes:
     """Make axes high enough for so many rows."""
-    return new_axes(height=float(np.clip(2.0 + 0.16 * (rows.max(initial=0) + 1), 3.5, 11.0)))
+    return new_axes(height=float(np.clip(2.0 + 0.16 * (rows.max(initial=0) + 1), 3.5, 20.0)))
 
 
 def frame_rows(axes: Any, tracks: Tracks, rows: NDArray[np.int64]) -> None:
@@ -46,7 +46,7 @@ def frame_rows(axes: Any, tracks: Tracks, rows: NDArray[np.int64]) -> None:
     axes.set_xlabel("time [s]", color=INK)
     axes.grid(axis="x", color=GRID, linewidth=0.8)
     tidy(axes)
-    if n_rows <= _MOST_NAMES:
+    if n_rows <= _MAX_NAMES:
         there = np.flatnonzero(rows >= 0)
         names = [tracks.names[k] or f"{k}" for k in there]
         axes.set_yticks(rows[there], names, fontsize=7, parse_math=False)

@@ -13,13 +13,13 @@ from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.cli.plot_kinds import KINDS, Kind, Request
 from asterism.errors import ParameterError
 
-_Kind = Annotated[str, typer.Argument(metavar="KIND", help="What to draw, one of the kinds above.")]
+_Kind = Annotated[str, typer.Argument(metavar="KIND", help="Kind of figure, see above.")]
 _Files = Annotated[
     list[Path],
     typer.Argument(
         metavar="FILES...",
-        help="What to draw it of: a file with tracks, or the folder of a run; a capture, a film's "
-        "observations or a calibration where the kind says so.",
+        help="File with tracks or run folder; for some kinds a capture, the observations of a "
+        "film, or a calibration.",
     ),
 ]
 _Out = Annotated[
@@ -28,35 +28,68 @@ _Out = Annotated[
         "--out",
         "-o",
         metavar="FILE",
-        help="File to write, .pdf, .svg or .png; by default FILES with .KIND.pdf in its name.",
+        help="File to write: .pdf, .svg or .png.",
+        show_default="FILES with .KIND.pdf",
     ),
 ]
-_Truth = Annotated[Path | None, typer.Option(help="What is so: errors, reliability, compare.")]
+_Truth = Annotated[
+    Path | None, typer.Option(help="True tracks, for errors, reliability and compare.")
+]
 _Rig = Annotated[
     str | None,
     typer.Option(
-        metavar="RIG", help="A calibration, or ring8, wall4 and the like: projections, image."
+        metavar="RIG",
+        help="Calibration, or a layout such as ring8 or wall4, for projections and image.",
     ),
 ]
 _Model = Annotated[
     Path | None,
-    typer.Option(help="Model, TOML: posterior, groups.", show_default="estimated from the capture"),
+    typer.Option(
+        help="Model (TOML), for posterior and groups.", show_default="estimated from the capture"
+    ),
 ]
 _Frame = Annotated[
-    int | None, typer.Option(help="Which frame: image.", show_default="the middle one")
+    int | None, typer.Option(help="Frame, for image.", show_default="the middle one")
 ]
 _Camera = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Which camera: lens.", show_default="the first")
+    str | None, typer.Option(metavar="NAME", help="Camera, for lens.", show_default="the first")
 ]
 _Moves = Annotated[
     list[float] | None,
     typer.Option(
-        help="Moves for each detection in doubt: posterior; may be repeated.",
+        help="Moves for each ambiguous detection, for posterior; may be repeated.",
         show_default="0.3, 1, 3, 10, 30, 100",
     ),
 ]
 _Seeds = Annotated[
-    int | None, typer.Option(help="How many walks with each: posterior.", show_default="3")
+    int | None,
+    typer.Option(help="Number of chains for each --moves, for posterior.", show_default="3"),
+]
+_Markers = Annotated[
+    str | None,
+    typer.Option(
+        metavar="A,B,…",
+        help="Markers by name (* stands for any characters) or track number, for the kinds of "
+        "tracks.",
+        show_default="all",
+    ),
+]
+_Time = Annotated[
+    tuple[float, float] | None,
+    typer.Option(
+        metavar="START END", help="Seconds, for the kinds of tracks.", show_default="all frames"
+    ),
+]
+_ByTime = Annotated[
+    bool, typer.Option("--by-time", help="Colour by time and not by segment, for trajectories.")
+]
+_Size = Annotated[
+    tuple[float, float] | None,
+    typer.Option(metavar="WIDTH HEIGHT", help="Inches.", show_default="by kind and content"),
+]
+_Dpi = Annotated[
+    int | None,
+    typer.Option(help="Dots per inch of a .png, and of images in a .pdf.", show_default="by kind"),
 ]
 
 
@@ -71,6 +104,11 @@ def plot(
     camera: _Camera = None,
     moves: _Moves = None,
     seeds: _Seeds = None,
+    markers: _Markers = None,
+    time: _Time = None,
+    by_time: _ByTime = False,
+    size: _Size = None,
+    dpi: _Dpi = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -83,7 +121,7 @@ def plot(
 
     For example:
 
-        asterism plot presence trial.tracked.c3d
+        asterism plot trajectories trial.tracked.c3d --markers LKNE,RKNE --time 1 3
 
         asterism plot errors trial.tracked.c3d --truth truth.c3d -o errors.svg
 
@@ -98,9 +136,14 @@ def plot(
     chosen = KINDS[kind]
     asked = Request(
         files=files, truth=truth, rig=rig, model=model, frame=frame, camera=camera,
-        moves=moves or None, seeds=seeds,
+        moves=moves or None, seeds=seeds, markers=markers.split(",") if markers else None,
+        time=time, by_time=by_time or None,
     )  # fmt: skip
     _check(kind, chosen, asked)
+    for inches in size or ():
+        check_number("--size", inches, above=1, below=60, closed=True)
+    if dpi is not None:
+        check_number("--dpi", dpi, above=30, below=1200, closed=True, integer=True)
     out = _default_output(files[0], kind) if out is None else out
     _check_ending(out)
     check_outputs(
@@ -108,7 +151,7 @@ def plot(
         [*files, truth, model, None if rig is None else Path(rig)],
         overwrite=overwrite,
     )
-    write_figure(chosen.draw(asked), out)
+    write_figure(chosen.draw(asked), out, size=size, dpi=dpi)
     if json:
         print_json({"kind": kind, "files": [str(f) for f in files], "output": str(out)})
     elif not quiet:
@@ -126,7 +169,7 @@ def _check(name: str, kind: Kind, asked: Request) -> None:
     if len(asked.files) > 1 and not kind.many:
         raise ParameterError("FILES", f"one file for {name}", f"{len(asked.files)}")
     for field in dataclasses.fields(asked):
-        option = f"--{field.name}"
+        option = f"--{field.name.replace('_', '-')}"
         is_given = getattr(asked, field.name) is not None
         if field.name == "files" or is_given == (field.name in kind.needs):
             continue
@@ -134,9 +177,7 @@ def _check(name: str, kind: Kind, asked: Request) -> None:
             raise ParameterError(option, f"a file, which {name} needs", "nothing")
         if field.name not in kind.takes:
             fit = [k for k, other in KINDS.items() if field.name in other.needs | other.takes]
-            raise ParameterError(
-                option, f"nothing for {name}", "one", f"it is for {', '.join(fit)}"
-            )
+            raise ParameterError(option, f"a kind that takes it: {', '.join(fit)}", name)
     for n in asked.moves or ():
         check_number("--moves", n, above=0, below=1e6, closed=True)
     if asked.seeds is not None:

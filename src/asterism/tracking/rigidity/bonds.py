@@ -22,7 +22,7 @@ from asterism.tracking.rigidity.distances import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -129,6 +129,29 @@ class Bonds:
                     friends[j].discard(i)
                 friends[i] = set()
         return tuple(found)
+
+    def segments(self, names: Sequence[str | None]) -> NDArray[np.int64]:
+        """Return the rigid cluster of each marker name, -1 for a name in none.
+
+        Parameters
+        ----------
+        names : sequence of (str or None), length K
+            For example `Tracks.names`.
+
+        Returns
+        -------
+        ndarray of int, shape (K,)
+            Indices in `clusters`.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> truth = am.simulate.person(seed=1)
+        >>> am.learn_bonds(truth).segments(["LFHD", "RFHD", "LKNE", None]).tolist()
+        [0, 0, 5, -1]
+        """
+        of = {self.names[k]: s for s, cluster in enumerate(self.clusters) for k in cluster}
+        return np.array([of.get(name or "", -1) for name in names], dtype=np.int64)
 
     def to_toml(self, path: str | Path | None = None) -> str:
         """Return the bonds as TOML text, and write it to `path` if one is given."""
