@@ -59,8 +59,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/tuned.py --markdown docs/tables/tuned.md
 
 # The engine under the address and undefined-behaviour sanitizers, with asserts on. It is built
-# beside the package, never installed: all its files as one, which takes less time, and where a type
-# or function that two files define differently is an error.
+# beside the package and never installed.
 sanitize: sanitized $(VENV)/.test
 	build/sanitize/engine_checks
 	$(BIN)/python tests/tools/run_sanitized.py build/sanitize
@@ -68,7 +67,6 @@ sanitize: sanitized $(VENV)/.test
 sanitized: $(VENV)/.python
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake -S . -B build/sanitize -G Ninja \
 	  -DASTERISM_SANITIZE=ON -DASTERISM_WERROR=ON -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
-	  -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=0 \
 	  -Dnanobind_DIR="$$($(BIN)/python -m nanobind --cmake_dir)"
 	PATH="$(CURDIR)/$(BIN):$$PATH" cmake --build build/sanitize
 

@@ -105,7 +105,7 @@ def fit_lens(
 
     fitted = start
     if len(start):
-        fitted = np.asarray(least_squares(residual, start, x_scale="jac", xtol=1e-15, ftol=1e-15).x)
+        fitted = np.asarray(least_squares(residual, start, x_scale="jac", xtol=1e-10, ftol=1e-10).x)
     # A lens without distortion may be better if no other one reaches the corners.
     tries = (fitted, np.zeros(len(start)))
     best = tries[int(np.argmin([np.sum(residual(x) ** 2) for x in tries]))]
