@@ -55,7 +55,7 @@ def test_corrupt_track_evaluate_in_every_format(scene, capsys, ending):
 
 def test_track_says_what_it_did(scene, capsys):
     text = run("track in.csv -o out.csv", capsys)
-    for word in ("noise σ", "most likely", "detections labelled", "longest gaps", "frames/s"):
+    for word in ("noise σ", "maximum likelihood", "detections labelled", "longest gaps", "frames/s"):
         assert word in text
     tracks = am.io.read_tracks("out.csv")
     assert f"tracks               {tracks.n_tracks}" in text
@@ -198,7 +198,7 @@ def test_methods_and_scenes_are_those_of_the_library(capsys):
     assert all(option["about"] for option in options.values())
     text = run("methods", capsys)
     assert "tracks|detections" in text
-    assert "Factor of the decrease of a tentative track's odds" in text
+    assert "A tentative track is deleted when its odds" in text
     assert list(json.loads(run("scenes --json", capsys))) == list(am.simulate.SCENES)
 
 

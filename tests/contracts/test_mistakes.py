@@ -179,7 +179,7 @@ def test_millimetres_for_metres_are_doubted(caplog):
         assert not caplog.records
         am.estimate_model(spoilt)
     (told,) = caplog.records
-    assert "if these are millimetres, divide them by 1000" in told.getMessage()
+    assert "expected metres; divide millimetres by 1000" in told.getMessage()
 
 
 def test_a_few_points_far_away_are_not_doubted(caplog):

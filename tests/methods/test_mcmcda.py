@@ -117,7 +117,7 @@ def test_a_deadline_stops_the_walk_and_is_told():
         start = time.perf_counter()
         state, update = method.step(state, now, points)
         taken.append(time.perf_counter() - start)
-        if update.info["groups_in_doubt"] > 0:
+        if update.info["ambiguous_groups"] > 0:
             walked.append(update.info["moves"] > 0)
     assert np.mean(walked) > 0.5  # on a busy machine a frame may pass by
     assert np.median(taken) < 0.05

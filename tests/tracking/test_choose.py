@@ -21,7 +21,7 @@ def sensed(truth, noise=0.005, **more):
 
 
 CLIPS = {
-    "bodies": (lambda: sensed(am.simulate.cube(seed=1)), "smp", True, "8 of 8 markers keep"),
+    "bodies": (lambda: sensed(am.simulate.cube(seed=1)), "smp", True, "8 of 8 tracks have"),
     "a person in bursts": (
         lambda: am.simulate.corrupt(
             am.simulate.person(seed=1), burst=Burst(), noise=3e-4, seed=1
@@ -32,13 +32,13 @@ CLIPS = {
     ),
     "walkers": (lambda: sensed(am.simulate.SCENES["walk"].make(seed=1)), "mcmcda", False, "random"),
     "independent and sparse": (
-        lambda: sensed(am.simulate.SCENES["wander"].make(seed=1)), "gnn", False, "rivals"
+        lambda: sensed(am.simulate.SCENES["wander"].make(seed=1)), "gnn", False, "rival"
     ),
     "independent and dense": (
         lambda: sensed(am.simulate.smooth(n_markers=200, frames=50, seed=1)),
         "mcmcda",
         False,
-        "rivals within the gates",
+        "rival detections in the gates",
     ),
 }  # fmt: skip
 
@@ -78,7 +78,7 @@ def test_no_method_is_the_one_that_was_chosen():
 def test_tracks_to_begin_with_are_for_mcmcda():
     truth = CLIPS["bodies"][0]()
     tracks = am.track(truth.detections, start=truth, seed=1)
-    assert tracks.recipe.chosen.startswith("mcmcda: there are tracks to begin with")
+    assert tracks.recipe.chosen.startswith("mcmcda: initial tracks are given")
     assert am.evaluate(tracks, truth).idf1 > 0.99
 
 
@@ -150,7 +150,7 @@ def test_the_command_line_says_why_and_a_repeat_does_not_choose_again(person, ca
     assert main(["track", "p.csv", "--run", "first"]) == 0
     out = capsys.readouterr().out
     assert "smp, window=3, then stitched:" in out
-    assert "keep their distance" in out
+    assert "have a stable distance" in out
     job = tomllib.loads((person / "first/run.toml").read_text())
     assert job["method"]["name"] == "smp"
     assert job["method"]["options"]["window"] == 3

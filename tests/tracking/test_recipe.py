@@ -42,7 +42,7 @@ def test_a_recipe_in_toml_repeats_the_tracking(method):
 
 def test_a_recipe_stands_alone_and_is_of_one_input():
     recipe = am.track(DETECTIONS, "gnn", model=small_model()).recipe
-    with pytest.raises(am.ParameterError, match="recipe: expected nothing that it decides itself"):
+    with pytest.raises(am.ParameterError, match="recipe: expected no setting beside it"):
         am.track(DETECTIONS, "gnn", recipe=recipe)
     with pytest.raises(am.ParameterError, match="detections: expected SHA-256"):
         am.track(DETECTIONS.part(0, 20), recipe=recipe)

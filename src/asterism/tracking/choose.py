@@ -54,11 +54,21 @@ class Choice:
     Parameters
     ----------
     method : Method
-        Selected method with all its options.
+        Selected method with all its options, for `track` or `Method.init`.
     stitch : bool
-        Whether the tracklets of the method are stitched.
+        Whether the tracklets of the method are to be stitched.
     reason : str
-        Measurement and conclusion in one line.
+        What was measured in the capture and what follows from it, in one line.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.simulate.smooth(n_markers=10, frames=40, seed=1).detections
+    >>> choice = am.tracking.choose_method(d, am.estimate_model(d).model)
+    >>> choice.method
+    GNN()
+    >>> choice.reason
+    '0.0 rival detections in the gates per 100 links, no bodies'
     """
 
     method: Method[Any]
@@ -82,9 +92,9 @@ def choose_method(
     detections : Detections
         Capture to measure.
     model : TrackingModel
-        Tracking model of the capture.
+        Tracking model of the capture, with which GNN tracks it once.
     has_start : bool
-        Whether the tracking starts from given tracks.
+        Whether the tracking starts from given tracks; then nothing is measured.
 
     Returns
     -------
@@ -99,7 +109,7 @@ def choose_method(
     Examples
     --------
     >>> import asterism as am
-    >>> truth = am.simulate.person(seed=1)
+    >>> truth = am.simulate.cube(frames=40, seed=1)
     >>> model = am.estimate_model(truth.detections).model
     >>> choice = am.tracking.choose_method(truth.detections, model)
     >>> choice.method.name, choice.stitch
@@ -108,25 +118,27 @@ def choose_method(
     check_kind("detections", detections, Detections)
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     if has_start:
-        return Choice(method=MCMCDA(), stitch=False, reason="there are tracks to begin with")
+        return Choice(method=MCMCDA(), stitch=False, reason="initial tracks are given")
     detections = detections.measured()
     method = GNN()
     state, labels, _ = method.run(method.init(model, n_axes=detections.n_axes), detections)
     tracks = Tracks(detections=detections, labels=labels)
     n_rigid, n_compared = partners(tracks, model.sensor.noise_sigma)
     if n_compared and n_rigid >= ON_BODIES * n_compared:
-        reason = f"{n_rigid} of {n_compared} markers keep their distance to another: bodies"
+        reason = f"{n_rigid} of {n_compared} tracks have a stable distance to another: bodies"
         return Choice(method=SMP(window=3), stitch=True, reason=reason)
     if any(isinstance(mode, RandomWalk) for mode in model.motion.modes):
-        return Choice(method=MCMCDA(), stitch=False, reason="markers walk at random, no bodies")
+        return Choice(
+            method=MCMCDA(), stitch=False, reason="the motion is a random walk, no bodies"
+        )
     # The ratio is per link, not per detection: the first detection of a track is in no gate, and
     # short captures consist largely of first detections.
     n_links = int(tracks.lengths.sum()) - tracks.n_tracks
     rivals = max(state.info["candidates"] / max(n_links, 1) - 1, 0.0)
-    doubt = f"{100 * rivals:.1f} rivals within the gates for 100 links, no bodies"
+    rate = f"{100 * rivals:.1f} rival detections in the gates per 100 links, no bodies"
     if rivals > CLEAR:
-        return Choice(method=MCMCDA(), stitch=False, reason=doubt)
-    return Choice(method=method, stitch=False, reason=doubt)
+        return Choice(method=MCMCDA(), stitch=False, reason=rate)
+    return Choice(method=method, stitch=False, reason=rate)
 
 
 def partners(tracks: Tracks, noise_sigma: float) -> tuple[int, int]:
@@ -142,6 +154,7 @@ def partners(tracks: Tracks, noise_sigma: float) -> tuple[int, int]:
     Returns
     -------
     n_rigid, n_compared : int
+        Number of tracks with a rigid partner, and of tracks with any partner to compare.
     """
     positions = _sampled(tracks)
     n_rigid = n_compared = 0

@@ -44,14 +44,14 @@ def track(
     detections : Detections
         Unnamed points; names that a `Capture` carries are not used.
     method : Method or str, optional
-        The method of association, or its name for the default options. By default `choose_method`
+        Method of association, or its name for the default options. By default `choose_method`
         selects one from measured properties of the capture.
     model : TrackingModel, optional
-        Tracking model; by default it is estimated from the capture.
+        Tracking model; by default `estimate_model` estimates it from the capture.
     stitch : bool or "auto"
         Whether tracks are joined through gaps of any length. The method then terminates tracklets
-        after `MAX_TRACKLET_GAP` missed frames, and `stitch` joins them.
-        "auto" stitches if no method is given and the markers keep their distances, as on bodies.
+        after `MAX_TRACKLET_GAP` missed frames, and `stitch` joins them. "auto", the default,
+        stitches if no method is given and markers have stable distances, as on bodies.
     seed : int, optional
         Seed of the methods that draw random numbers; 0 by default.
     start : Tracks, optional
@@ -85,7 +85,7 @@ def track(
     >>> truth = am.simulate.cube(seed=1)
     >>> tracks = am.track(truth.detections)
     >>> tracks.recipe.chosen
-    'smp, window=3, then stitched: 8 of 8 markers keep their distance to another: bodies'
+    'smp, window=3, then stitched: 8 of 8 tracks have a stable distance to another: bodies'
     >>> again = am.track(truth.detections, recipe=tracks.recipe)
     >>> bool((again.labels == tracks.labels).all())
     True
@@ -112,16 +112,18 @@ def _check_recipe(
     check_kind("recipe", recipe, Recipe, "tracks.recipe")
     extra = [name for name, value in given.items() if value is not None]
     if extra:
-        raise ParameterError("recipe", "nothing that it decides itself", ", ".join(extra))
+        raise ParameterError("recipe", "no setting beside it", ", ".join(extra))
     check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     if recipe.has_start != (start is not None):
-        expected = "the tracks to begin with" if recipe.has_start else "none"
+        expected = "the initial tracks of that run" if recipe.has_start else "none"
         raise ParameterError("start", expected, "none" if start is None else "tracks")
     found = sha256_of(detections, None if start is None else start.labels)
     if found != recipe.sha256:
-        hint = "a recipe repeats a tracking of the same input only"
+        hint = "track the same input, or plan a new run"
         raise ParameterError("detections", f"SHA-256 {recipe.sha256}", found, hint)
     for name, version in versions().items():
         before = recipe.versions.get(name)
         if before != version:
-            log.warning("the recipe was made with %s %s, this is %s", name, before, version)
+            log.warning(
+                "the recipe was made with %s %s, and this run uses %s", name, before, version
+            )

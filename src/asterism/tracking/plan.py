@@ -32,6 +32,14 @@ class Plan:
         Method with its options.
     estimate : ModelEstimate, optional
         Estimate of the model; None for a given model.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.simulate.cube(frames=40, seed=1).detections
+    >>> plan = am.tracking.plan_tracking(d, "gnn")
+    >>> plan.method, plan.recipe.stitch, plan.estimate.model.sensor.noise_sigma
+    (GNN(), False, 0.0002)
     """
 
     recipe: Recipe
@@ -48,7 +56,7 @@ def plan_tracking(
     seed: int | None = None,
     start: Tracks | None = None,
 ) -> Plan:
-    """Decide the model, the method and the stitching of a tracking.
+    """Decide the model, the method and the stitching of a tracking, without running it.
 
     Parameters
     ----------
@@ -58,6 +66,7 @@ def plan_tracking(
     Returns
     -------
     Plan
+        Settings with which `track` would run, for a look at them before a long run.
 
     Raises
     ------
@@ -69,7 +78,7 @@ def plan_tracking(
     >>> import asterism as am
     >>> plan = am.tracking.plan_tracking(am.simulate.cube(seed=1).detections)
     >>> plan.recipe.method, plan.recipe.stitch, plan.recipe.reason
-    ('smp', True, '8 of 8 markers keep their distance to another: bodies')
+    ('smp', True, '8 of 8 tracks have a stable distance to another: bodies')
     """
     check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     if stitch not in (True, False, "auto"):
@@ -85,7 +94,7 @@ def plan_tracking(
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     reason = ""
     if method is None and stitch is True and start is None:
-        method, reason = SMP(window=3), "tracks are to be stitched"
+        method, reason = SMP(window=3), "stitching is requested"
     elif method is None:
         choice = choose_method(detections, model, has_start=start is not None)
         method, reason = choice.method, choice.reason

@@ -99,15 +99,24 @@ def estimate_model(
     Returns
     -------
     ModelEstimate
-
-    Warns
-    -----
-    By a log message, if the points lie too far apart for coordinates in metres.
+        Model, the reason for each value, and standard deviations. A log message warns if the points
+        lie too far apart for coordinates in metres.
 
     Raises
     ------
     ParameterError
         If there are too few detections, or none can be linked from frame to frame.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.wander(frames=100, rate=100, seed=1)
+    >>> corrupted = am.simulate.corrupt(truth, missing=0.1, noise=1e-3, seed=1)
+    >>> estimate = am.estimate_model(corrupted.detections)
+    >>> type(estimate.model.motion).__name__
+    'DWNA'
+    >>> round(estimate.model.sensor.p_detection, 2)
+    0.9
     """
     check_fields("population", [population], ("closed", "open"))
     check_fields("misses", [misses], ("independent", "runs"))
@@ -222,8 +231,8 @@ def _check_units(detections: Detections) -> None:
     far = float(np.quantile(spread, 0.9))
     if far > MAX_EXTENT:
         log.warning(
-            "a tenth of the points is more than %.3g m from their middle: "
-            "if these are millimetres, divide them by 1000", far,
+            "a tenth of the points is more than %.3g m from their median: "
+            "expected metres; divide millimetres by 1000", far,
         )  # fmt: skip
 
 

@@ -44,6 +44,15 @@ class Region:
         """Measure the bounding box of all points, with axes of at least a tenth of the longest.
 
         The lower bound keeps the clutter density of a flat scene finite.
+
+        Parameters
+        ----------
+        detections : Detections
+            Capture to measure.
+
+        Returns
+        -------
+        Region
         """
         extent = np.ptp(detections.points, axis=0)
         longest = max(float(extent.max()), 1e-3)
@@ -91,7 +100,18 @@ class Evidence:
 
     @classmethod
     def of(cls, tracks: list[Tracks], reach: float) -> Evidence:
-        """Count in the tracks of each piece, with `reach` as in `count_sightings`.
+        """Count in the tracks of each piece.
+
+        Parameters
+        ----------
+        tracks : list of Tracks
+            Tracks of each piece.
+        reach : float
+            As in `count_sightings`, metres.
+
+        Returns
+        -------
+        Evidence
 
         Raises
         ------
@@ -138,7 +158,20 @@ class Evidence:
 
 
 def gather_evidence(pieces: list[Detections], model: TrackingModel, reach: float) -> Evidence:
-    """Track the pieces of a capture and count.
+    """Track the pieces of a capture with GNN and count the events in the tracks.
+
+    Parameters
+    ----------
+    pieces : list of Detections
+        Runs of consecutive frames of the capture.
+    model : TrackingModel
+        Model for the tracking.
+    reach : float
+        As in `count_sightings`, metres.
+
+    Returns
+    -------
+    Evidence
 
     Raises
     ------

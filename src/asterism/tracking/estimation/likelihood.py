@@ -64,7 +64,18 @@ class TrackLikelihood:
         }
 
     def mean(self, fit: MotionFit) -> float:
-        """Return the mean over the sampled detections, given a motion and a noise."""
+        """Return the mean over the sampled detections, given a motion and a noise.
+
+        Parameters
+        ----------
+        fit : MotionFit
+            Motion and noise.
+
+        Returns
+        -------
+        float
+            Nats per detection.
+        """
         total = self._engines[fit.kind].sum(
             squares=np.square(fit.levels),
             transitions=fit.transitions,

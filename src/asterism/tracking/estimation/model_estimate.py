@@ -25,13 +25,26 @@ class ModelEstimate:
     model : TrackingModel
         Estimated model.
     reasons : tuple of (str, str, str)
-        Parameter, value with unit and standard deviation, and reason.
+        Parameter, value with unit and standard deviation, and reason; ``print(estimate)`` shows
+        them as a table.
     stds : mapping of str to float
         Standard deviation of each estimated parameter, in the parameter's unit: ``noise_sigma``,
         ``motion`` (of its σ; ``motion_1`` and so on for several modes), ``p_detection``,
         ``p_redetection`` for bursts of missed detections, ``clutter_density``, and for an open
         population ``birth_density`` and ``p_disappear``. Parameters at a bound, and bounds, have
         none.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> estimate = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections)
+    >>> for parameter, value, reason in estimate.reasons[-3:]:
+    ...     print(parameter, value, reason, sep=" | ")
+    births λ_b | 0.053 /m³ | assumed: one in the capture
+    deaths p_z | 0.0065 | assumed: one in the capture
+    maximal gap d̄ | 28 frames | until a coasting track may be as far off as the nearest neighbour
+    >>> sorted(estimate.stds)[:2]
+    ['clutter_density', 'motion_1']
     """
 
     model: TrackingModel
@@ -53,7 +66,25 @@ class ModelEstimate:
 
 
 def motion_levels(model: TrackingModel) -> tuple[str, str, tuple[float, ...]]:
-    """Return the symbol of a motion's σ, its unit, and its value for each mode."""
+    """Return the symbol of a motion's σ, its unit, and its value for each mode.
+
+    Parameters
+    ----------
+    model : TrackingModel
+        Model with a random walk or DWNA modes.
+
+    Returns
+    -------
+    symbol, unit : str
+    values : tuple of float
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
+    >>> motion_levels(model)[:2]
+    ('acceleration σ_a', 'm/s²')
+    """
     modes = model.motion.modes
     if isinstance(modes[0], RandomWalk):
         return "walk σ_w", "m/√s", (modes[0].walk_sigma,)
@@ -84,14 +115,28 @@ def reasons_for(
         Standard deviations, as in `ModelEstimate`.
     n_axes : int
         Number of coordinates, 2 or 3.
-    n_links, n_misses, n_clutter, n_frames
-        Counts on which the estimates are based.
+    n_links, n_misses, n_clutter, n_frames : float
+        Numbers of links, missed detections, detections in no track, and frames that were counted.
     in_runs : bool
         Whether missed detections may come in bursts.
     events : (float, float) or None
         Numbers of births and deaths; None for a closed population.
     min_noise : float
         Lower bound of the noise, metres.
+
+    Returns
+    -------
+    tuple of (str, str, str)
+        As in `ModelEstimate.reasons`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
+    >>> counts = {"n_links": 152, "n_misses": 0, "n_clutter": 0, "n_frames": 20}
+    >>> settings = {"n_axes": 3, "in_runs": False, "events": None, "min_noise": 2e-4}
+    >>> reasons_for(model, {}, **counts, **settings)[0]
+    ('noise σ', '0.2 mm', 'lower bound; the capture shows less, as smoothed captures do')
     """
     sensor, population = model.sensor, model.population
     name, unit, levels = motion_levels(model)
@@ -100,24 +145,26 @@ def reasons_for(
     def sure(key: str, scale: float = 1.0) -> str:
         return f" ± {stds[key] * scale:.1g}" if key in stds else ""
 
-    why_noise = f"most likely one step ahead, {n_links} links"
+    why_noise = f"maximum likelihood of one-step predictions, {n_links} links"
     if sensor.noise_sigma <= min_noise:
-        why_noise = "the least that is believed; the capture shows less, as smoothed ones do"
+        why_noise = "lower bound; the capture shows less, as smoothed captures do"
     keys = ["motion"] if len(levels) == 1 else [f"motion_{k + 1}" for k in range(len(levels))]
     values = ", ".join(f"{x:.3g}{sure(key)}" for x, key in zip(levels, keys, strict=True))
-    one = f"one {type(model.motion).__name__} explains them as well as three motions"
-    many = f"{len(levels)} motions that a marker changes between, together most likely"
+    one = f"one {type(model.motion).__name__} explains the tracks as well as three motions"
+    many = f"{len(levels)} motions between which a marker switches, fitted together"
     again: list[tuple[str, str, str]] = []
     if sensor.p_redetection is not None:
         value = f"{sensor.p_redetection:.4f}{sure('p_redetection')}"
-        length = f"misses come in runs, {1 / sensor.p_redetection:.1f} frames long in the mean"
+        length = (
+            f"missed detections come in bursts of {1 / sensor.p_redetection:.1f} frames on average"
+        )
         again = [("redetection P_r", value, length)]
     elif in_runs:
-        again = [("redetection P_r", "P_d", "misses come in runs no more than by chance")]
-    births, deaths = ("one in the clip",) * 2
+        again = [("redetection P_r", "P_d", "no more bursts of missed detections than by chance")]
+    births, deaths = ("assumed: one in the capture",) * 2
     if events is not None:
-        births = f"about {events[0]:.0f} after the first frame, in drawn partitions"
-        deaths = f"about {events[1]:.0f} in drawn partitions"
+        births = f"about {events[0]:.0f} after the first frame, in sampled partitions"
+        deaths = f"about {events[1]:.0f} in sampled partitions"
     return (
         (
             "noise σ",
@@ -133,13 +180,13 @@ def reasons_for(
         (
             "detection P_d",
             f"{sensor.p_detection:.4f}{sure('p_detection')}",
-            f"{n_misses:.0f} misses inside tracks of {n_links} links",
+            f"{n_misses:.0f} missed detections inside tracks of {n_links} links",
         ),
         *again,
         (
             "clutter λ_f",
             f"{sensor.clutter_density:.3g}{sure('clutter_density')} /{volume}",
-            f"{n_clutter:.0f} points in no track, {n_frames} frames",
+            f"{n_clutter:.0f} detections in no track, {n_frames} frames",
         ),
         (
             "births λ_b",
@@ -150,6 +197,6 @@ def reasons_for(
         (
             "maximal gap d̄",
             f"{population.max_gap} frames",
-            "until a coasting marker may be as far off as its neighbour is",
+            "until a coasting track may be as far off as the nearest neighbour",
         ),
     )

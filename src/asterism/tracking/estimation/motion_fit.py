@@ -2,8 +2,7 @@
 
 The likelihood is that of the filter used for tracking: the log densities of the innovations are
 summed over the tracks and maximised by a simplex search. A marker has one motion (DWNA or a random
-walk), or switches between three DWNA: quiet, busy, and the short jolts of impacts, which one
-motion
+walk), or switches between three DWNA: quiet, busy, and the short jolts of impacts, which one motion
 would lose. The observed information yields the standard deviations of the parameters.
 """
 
@@ -83,7 +82,17 @@ class MotionFit:
         )
 
     def motion(self, velocity_sigma: float) -> Motion:
-        """Return the motion model with a prior velocity σ of `velocity_sigma`, m/s."""
+        """Return the motion model.
+
+        Parameters
+        ----------
+        velocity_sigma : float
+            Prior standard deviation of a velocity coordinate, m/s.
+
+        Returns
+        -------
+        Motion
+        """
         if self.kind == "random_walk":
             return RandomWalk(walk_sigma=self.levels[0])
         models = tuple(
@@ -104,14 +113,28 @@ class FitBounds:
         Lower bound of σ, metres.
     max_acceleration : float
         Upper bound of σ_a of any mode, m/s². A jolt over much of the distance to a neighbour
-        cannot be distinguished from a wrong link, so it must not be learnt from one.
+        cannot be distinguished from a wrong link, so no jolt may be estimated from one.
     """
 
     min_noise: float
     max_acceleration: float
 
     def fit(self, log_noise: float, log_levels: tuple[float, ...], stay: float) -> MotionFit:
-        """Return the fit with these parameters, limited to the bounds."""
+        """Return the fit with these parameters, limited to the bounds.
+
+        Parameters
+        ----------
+        log_noise : float
+            Logarithm of σ in metres.
+        log_levels : tuple of float
+            Logarithm of σ_a in m/s² for each mode.
+        stay : float
+            As for `MotionFit`.
+
+        Returns
+        -------
+        MotionFit
+        """
         return MotionFit(
             noise=max(math.exp(log_noise), self.min_noise),
             levels=tuple(min(math.exp(x), self.max_acceleration) for x in log_levels),
@@ -166,6 +189,15 @@ def fit_one_motion(
 
     A random walk must gain `MIN_GAIN`. DWPA is excluded: on smoothed captures it predicts the next
     frame better, but loses the track in every gap.
+
+    Parameters
+    ----------
+    tracks, model, start, bounds
+        As for `fit_motion`.
+
+    Returns
+    -------
+    MotionFit
     """
     velocity = model.velocity_sigma(tracks[0].detections.n_axes)
     middle = math.log(start.levels[len(start.levels) // 2])
@@ -190,6 +222,13 @@ def polish(
     tracks: list[Tracks], model: TrackingModel, fit: MotionFit, bounds: FitBounds
 ) -> tuple[MotionFit, tuple[float, ...] | None]:
     """Refine a fit by a Newton step, and estimate the standard deviations of its parameters.
+
+    Parameters
+    ----------
+    tracks, model, bounds
+        As for `fit_motion`.
+    fit : MotionFit
+        Fit to refine.
 
     Returns
     -------

@@ -1,8 +1,7 @@
 """Rates of missed detections, clutter, births and deaths from a partition of a capture.
 
 A partition does not determine when a marker disappeared, nor whether it was present before its
-first
-detection. Both are replaced by their expectations under the current rates.
+first detection. Both are replaced by their expectations under the current rates.
 """
 
 from __future__ import annotations
@@ -119,7 +118,17 @@ class Counts:
         return 2 * (each - _log_likelihood(*self._seen))
 
     def stds(self, *, in_runs: bool) -> Rates:
-        """Return the standard deviation of each rate, of a beta or a gamma distribution."""
+        """Return the standard deviation of each rate, of a beta or a gamma distribution.
+
+        Parameters
+        ----------
+        in_runs : bool
+            As for `rates`.
+
+        Returns
+        -------
+        Rates
+        """
         rates = self.rates(in_runs=in_runs)
         p, q, z = rates.p_detection, rates.p_redetection, rates.p_disappear
         chances, again = self.hits + self.misses, self.rehits + self.remisses

@@ -55,6 +55,15 @@ class Scales:
 def first_scales(pieces: list[Detections]) -> Scales:
     """Estimate the scales from runs of consecutive frames.
 
+    Parameters
+    ----------
+    pieces : list of Detections
+        Runs of consecutive frames of the capture.
+
+    Returns
+    -------
+    Scales
+
     Raises
     ------
     ParameterError

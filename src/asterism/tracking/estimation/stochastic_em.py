@@ -1,7 +1,6 @@
 """Stochastic EM (Celeux & Diebolt 1985) for an open population of markers.
 
-Partitions of the capture are drawn from the posterior under the current model (Oh, Russell &
-Sastry
+Partitions of the capture are drawn from the posterior under the current model (Oh, Russell & Sastry
 2009), and the model is re-estimated from each of them. The most probable partition would bias the
 estimate, because it contains every false alarm that fits a track.
 """

@@ -51,7 +51,17 @@ class Bridges:
     left: NDArray[np.float64]
 
     def carry(self, missed: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Interpolate the residuals at the ends (B, n, D) to the missing frames, (M, B, L, D)."""
+        """Interpolate the residuals at the ends to the missing frames.
+
+        Parameters
+        ----------
+        missed : ndarray, shape (B, n, D)
+            Residuals at the ends of each window, metres.
+
+        Returns
+        -------
+        ndarray, shape (M, B, L, D)
+        """
         M, same, L, n = self.weights.shape
         if same > 1:
             return self.weights @ missed
@@ -74,6 +84,10 @@ def bridges(times: NDArray[np.float64], is_end: NDArray[np.bool_]) -> Bridges:
     is_end : ndarray of bool, shape (W,)
         True for frames at the ends.
 
+    Returns
+    -------
+    Bridges
+
     References
     ----------
     Rasmussen & Williams 2006, Gaussian Processes for Machine Learning, eq. 2.23 to 2.26, 4.17.
@@ -81,10 +95,10 @@ def bridges(times: NDArray[np.float64], is_end: NDArray[np.bool_]) -> Bridges:
     t = times - times[:, :1]
     if np.abs(t - t[-1]).max() < 1e-3 * t[-1, -1] / len(is_end):
         t = t[-1:]
-    ends, hidden = t[:, is_end], t[:, ~is_end]
+    ends, missing = t[:, is_end], t[:, ~is_end]
     length = (t[:, -1] - t[:, 0]) * (~is_end).mean()
     between = np.abs(ends[:, :, None] - ends[:, None, :])
-    across = np.abs(hidden[:, :, None] - ends[:, None, :])
+    across = np.abs(missing[:, :, None] - ends[:, None, :])
     # All interpolators at once: axes (span, noise, offset) before (B, L, n).
     tau = np.array(SPANS)[:, None, None, None, None, None] * length[:, None, None]
     noise = np.array(NOISES)[:, None, None, None, None] * np.eye(ends.shape[1])

@@ -39,10 +39,10 @@ MIN_SHARE = 0.5
 """Smallest share of the marker's frames in which a helper was detected too, because a rarely
 detected helper would exclude many frames."""
 MIN_PATTERN = 40
-"""Smallest number of frames from which a pattern is learnt."""
-MAX_LEARNT = 500
-"""Number of frames, spread over the capture, from which body and pattern are learnt in addition to
-the windows' frames."""
+"""Smallest number of frames from which a pattern is estimated."""
+MAX_SPREAD = 500
+"""Number of frames, spread over the capture, from which body and pattern are estimated, besides
+the frames of the windows."""
 MAX_COMPARED = 400
 """Number of frames in which distances are compared."""
 MIN_SPREAD = 1e-4
@@ -138,7 +138,19 @@ class Estimates:
 
 
 def estimate(dense: DenseTracks, span: Span) -> Estimates:
-    """Estimate a marker in a gap and in held-out windows of the same length."""
+    """Estimate a marker in a gap and in held-out windows of the same length.
+
+    Parameters
+    ----------
+    dense : DenseTracks
+        Positions of all tracks.
+    span : Span
+        Gap of one of them.
+
+    Returns
+    -------
+    Estimates
+    """
     k = span.track
     X, own = dense.bridged, dense.seen[:, k]
     ends = usable_ends(own, span)
@@ -151,18 +163,18 @@ def estimate(dense: DenseTracks, span: Span) -> Estimates:
     max_windows = max(MIN_WINDOWS, min(MAX_WINDOWS, MAX_WITHHELD // span.length))
     windows = held_out(own, dense.known[:, k], helped, frames, span, max_windows)
     spread = np.flatnonzero(known)
-    spread = spread[:: -(-len(spread) // MAX_LEARNT)]
+    spread = spread[:: -(-len(spread) // MAX_SPREAD)]
     rows = np.unique(np.concatenate([windows.ravel(), frames, spread]))
     neighbours = helpers[:MAX_NEIGHBOURS]
     weights = 1 / (spreads[:MAX_NEIGHBOURS] ** 2 + max(spreads.min(initial=1.0), MIN_SPREAD) ** 2)
     body = fit_body(X[rows][:, neighbours], weights)
     places = body.to_body(X[rows, k])
     is_known = known[rows]
-    believed = np.ones(len(frames), dtype=bool)
-    believed[is_end] = is_steady(
+    is_reliable = np.ones(len(frames), dtype=bool)
+    is_reliable[is_end] = is_steady(
         places[np.searchsorted(rows, ends)], ends, span, _usual_jump(places, rows, is_known)
     )
-    frames, is_end, windows = frames[believed], is_end[believed], windows[:, believed]
+    frames, is_end, windows = frames[is_reliable], is_end[is_reliable], windows[:, is_reliable]
     every = np.concatenate([windows, frames[None]])
     found = [_smoother(dense, every, is_end, k)]
     if len(helpers):

@@ -35,18 +35,48 @@ class Body:
     middles: NDArray[np.float64]
 
     def to_body(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transform points (F, D) or (F, n, D) from room to body coordinates, ``Rᵀ (x - c)``."""
+        """Transform points from room to body coordinates, ``Rᵀ (x - c)``.
+
+        Parameters
+        ----------
+        points : ndarray, shape (F, D) or (F, n, D)
+            Points in room coordinates, metres.
+
+        Returns
+        -------
+        ndarray, of the same shape
+        """
         arms = points.reshape(len(points), -1, points.shape[-1]) - self.middles[:, None]
         return (arms @ self.turns).reshape(points.shape)
 
     def to_room(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transform points from body to room coordinates, ``R x + c``."""
+        """Transform points from body to room coordinates, ``R x + c``.
+
+        Parameters
+        ----------
+        points : ndarray, shape (F, D) or (F, n, D)
+            Points in body coordinates, metres.
+
+        Returns
+        -------
+        ndarray, of the same shape
+        """
         arms = points.reshape(len(points), -1, points.shape[-1])
         there = arms @ self.turns.swapaxes(1, 2) + self.middles[:, None]
         return there.reshape(points.shape)
 
     def of(self, frames: NDArray[np.int64]) -> Body:
-        """Return the poses of some of the frames, in any order."""
+        """Return the poses of some of the frames, in any order.
+
+        Parameters
+        ----------
+        frames : ndarray of int, shape (f,)
+            Frames to select; a frame may occur several times.
+
+        Returns
+        -------
+        Body
+        """
         return Body(turns=self.turns[frames], middles=self.middles[frames])
 
 
@@ -58,8 +88,13 @@ def fit_body(points: NDArray[np.float64], weights: NDArray[np.float64]) -> Body:
     Parameters
     ----------
     points : ndarray, shape (F, n, D)
-        All finite.
+        Positions of the markers, metres, all finite.
     weights : ndarray, shape (n,)
+        Weight of each marker in the fit, > 0.
+
+    Returns
+    -------
+    Body
 
     References
     ----------

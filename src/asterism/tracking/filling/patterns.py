@@ -34,7 +34,7 @@ class Pattern:
         Fold to which each frame belongs, or is nearest.
     variances : ndarray, shape (F,)
         Variance of a coordinate, m²: the mean square error of each fold predicted without it,
-        inflated for poses far from those of the learning frames.
+        inflated for poses far from those of the frames used in the regression.
     """
 
     by_fold: NDArray[np.float64]
@@ -46,7 +46,7 @@ class Pattern:
 def learn_pattern(
     Z: NDArray[np.float64], y: NDArray[np.float64], is_known: NDArray[np.bool_], length: int
 ) -> Pattern:
-    """Learn to predict a marker's position from other markers by ridge regression.
+    """Estimate the regression of a marker's position on other markers, with a ridge.
 
     The frames are cut into up to `MAX_FOLDS` folds no shorter than the gap, if there are two of
     them. Each fold is predicted from the others, and the ridge with the smallest error is used.
@@ -64,6 +64,10 @@ def learn_pattern(
     length : int
         Number of frames of the gap.
 
+    Returns
+    -------
+    Pattern
+
     References
     ----------
     .. [1] Gløersen & Federolf 2016, Predicting missing marker trajectories in human motion data
@@ -75,7 +79,7 @@ def learn_pattern(
     fold = np.searchsorted(rows, np.arange(len(Z))).clip(max=n - 1) * n_folds // n
     in_fold = fold[rows]
     begins = np.searchsorted(in_fold, np.arange(n_folds))
-    # A column of ones without a ridge learns the mean. Features are centred for numerical
+    # A column of ones without a ridge represents the mean. Features are centred for numerical
     # accuracy.
     mean_Z, mean_y = Z[rows].mean(axis=0), y[rows].mean(axis=0)
     A = np.concatenate([Z - mean_Z, np.ones((len(Z), 1))], axis=1)

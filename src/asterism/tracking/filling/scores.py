@@ -59,7 +59,17 @@ class Fill:
 
 
 def settle(found: Estimates) -> Fill:
-    """Combine the estimators by their errors in the windows, with a standard deviation."""
+    """Combine the estimators by their errors in the windows, with a standard deviation.
+
+    Parameters
+    ----------
+    found : Estimates
+        Estimates of the gap and of the windows.
+
+    Returns
+    -------
+    Fill
+    """
     values = np.stack([one.values for one in found.each])
     own = np.stack([one.variances for one in found.each])
     H, L, _ = found.truth.shape
@@ -89,9 +99,9 @@ def _by_own_variance(values: NDArray[np.float64], own: NDArray[np.float64]) -> F
     capture its variance is too small.
     """
     J = len(own)
-    asked = np.arange(J)[min(1, J - 1) :]
-    best = int(asked[np.argmin(own[asked].mean(axis=1))])
-    apart = ((values[asked] - values[best]) ** 2).mean(axis=(0, 2))
+    candidates = np.arange(J)[min(1, J - 1) :]
+    best = int(candidates[np.argmin(own[candidates].mean(axis=1))])
+    apart = ((values[candidates] - values[best]) ** 2).mean(axis=(0, 2))
     return Fill(
         points=values[best],
         stds=np.sqrt(own[best] + _smoothed(apart)),
@@ -105,6 +115,15 @@ def minimum_variance_weights(errors: NDArray[np.float64]) -> NDArray[np.float64]
     """Return the weights ≥ 0 with sum 1 of the minimum-variance mean: ``C⁻¹1 / 1ᵀC⁻¹1``.
 
     Every subset of the estimators is tried; the best one without a negative weight is used.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (J, H, L, D)
+        Errors of each estimator in the windows, metres; NaN without a true position.
+
+    Returns
+    -------
+    ndarray, shape (J,)
     """
     J = len(errors)
     flat = errors.reshape(J, -1)
@@ -128,6 +147,16 @@ def error_profile(off: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean square error of a coordinate in each missing frame, shape (L,).
 
     A frame that no window covers is interpolated from the frames around it.
+
+    Parameters
+    ----------
+    off : ndarray, shape (H, L, D)
+        Errors in the windows, metres; NaN without a true position.
+
+    Returns
+    -------
+    ndarray, shape (L,)
+        Mean squares, m².
     """
     every = np.arange(off.shape[1])
     is_known = np.isfinite(off[..., 0])
@@ -156,6 +185,10 @@ def disagreement_factor(apart: NDArray[np.float64], z: NDArray[np.float64]) -> f
         Differences of the estimates from their mean, in the windows and, last, in the gap.
     z : ndarray, shape (H, L, D)
         Errors in the windows, relative to their usual size; NaN without a true position.
+
+    Returns
+    -------
+    float
     """
     spread = np.log((apart**2).mean(axis=(0, 2, 3)) + TINY) / 2
     square = np.nanmean(z**2, axis=(1, 2))

@@ -26,7 +26,15 @@ NEAREST_ENDS = 3
 
 @dataclass(frozen=True, kw_only=True)
 class Span:
-    """Gap of a track: the frames `first` to `last` are missing, those before and after are not."""
+    """Gap of a track.
+
+    Parameters
+    ----------
+    track : int
+        Number of the track.
+    first, last : int
+        First and last missing frame; the track has a detection before and after them.
+    """
 
     track: int
     first: int
@@ -50,6 +58,10 @@ def find_gaps(seen: NDArray[np.bool_]) -> list[Span]:
     ----------
     seen : ndarray of bool, shape (T, K)
         True where each track was measured.
+
+    Returns
+    -------
+    list of Span
     """
     change = np.diff(seen.T.astype(np.int8), axis=1)
     lost_track, lost = np.nonzero(change < 0)
@@ -150,7 +162,19 @@ def _runs(shifts: NDArray[np.int64]) -> list[tuple[int, int]]:
 
 
 def n_apart(windows: NDArray[np.int64], length: int) -> int:
-    """Count windows without a common withheld frame, greedily in order of time."""
+    """Count windows without a common withheld frame, greedily in order of time.
+
+    Parameters
+    ----------
+    windows : ndarray of int, shape (H, W)
+        Frames of the windows.
+    length : int
+        Number of withheld frames of a window.
+
+    Returns
+    -------
+    int
+    """
     n, free = 0, -1
     for start in windows.min(axis=1, initial=np.iinfo(np.int64).max).tolist():
         if start >= free:

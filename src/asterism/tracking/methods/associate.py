@@ -55,6 +55,15 @@ def associate(
     ------
     ParameterError
         If an argument has the wrong type.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> from asterism.tracking.methods.associate import associate
+    >>> d = am.simulate.cube(frames=20, seed=1).detections
+    >>> tracks = associate(am.GNN(), d, am.estimate_model(d).model)
+    >>> tracks.n_tracks, tracks.info["log_posterior"] > 0
+    (8, True)
     """
     check_method(method)
     if start is not None:
@@ -69,7 +78,8 @@ def associate(
     elif isinstance(method, MCMCDA):
         state = method.init(model, n_axes=detections.n_axes, seed=seed, start=labels)
     else:
-        raise ParameterError("start", "none", "tracks", "only mcmcda begins with given tracks")
+        hint = "use mcmcda, the only method that starts from given tracks"
+        raise ParameterError("start", "none", "tracks", hint)
     state, labels, confidence = method.run(state, detections, progress=progress)
     info = dict(state.info)
     if detections.covariances is not None:
@@ -80,7 +90,21 @@ def associate(
 
 
 def check_method(method: object) -> None:
-    """Raise `ParameterError` unless the object is a method, and not a name or a class."""
+    """Raise `ParameterError` unless the object is a method, and not a name or a class.
+
+    Parameters
+    ----------
+    method : object
+        Object to check.
+
+    Examples
+    --------
+    >>> check_method("gnn")
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: method: expected a Method, found 'gnn'. Try am.GNN(), or
+    am.tracking.method_by_name("gnn").
+    """
     check_kind("method", method, Method, 'am.GNN(), or am.tracking.method_by_name("gnn")')
 
 

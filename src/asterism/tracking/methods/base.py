@@ -28,7 +28,16 @@ __all__ = ["Method", "MethodState", "Update", "checked_covariances", "checked_fr
 
 @runtime_checkable
 class MethodState(Protocol):
-    """Properties of the state of every method."""
+    """Properties of the state of every method.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.simulate.cube(frames=20, seed=1).detections
+    >>> state = am.GNN().init(am.estimate_model(d).model)
+    >>> state.n_seen, state.info["tracks"]
+    (0, 0)
+    """
 
     @property
     def n_seen(self) -> int:
@@ -55,7 +64,8 @@ class Update:
     Parameters
     ----------
     labels : ndarray of int, shape (n,)
-        Current track of each point of the frame; -1 for clutter or a tentative track.
+        Current track of each point of the frame; -1 for clutter or a tentative track. A tentative
+        track gets its label at confirmation, by `revised`.
     revised : ndarray of int, shape (r,)
         Earlier detections whose label changes, numbered from 0 in order of arrival.
     revised_labels : ndarray of int, shape (r,)
@@ -65,7 +75,20 @@ class Update:
     revised_confidence : ndarray, shape (r,), or None
         Probability that each revised label is right.
     info : mapping
-        Counts of the step: tracks, groups, candidates.
+        Counts of the step, such as tracks, groups and candidates.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.simulate.cube(frames=20, seed=1).detections
+    >>> method = am.GNN()
+    >>> state = method.init(am.estimate_model(d).model)
+    >>> for time, points in d:
+    ...     state, update = method.step(state, time, points)
+    >>> update
+    Update(8 detections, 8 in tracks, 0 earlier labels revised)
+    >>> update.labels.tolist()
+    [0, 1, 2, 3, 4, 5, 6, 7]
     """
 
     labels: NDArray[np.int64]
@@ -84,7 +107,22 @@ class Update:
 
 
 class Method(ABC, Generic[State]):
-    """Method of association, which assigns detections to tracks frame by frame."""
+    """Method of association, which assigns detections to tracks frame by frame.
+
+    A method of your own derives from this class, with `name`, `init` and `step`; `run` and
+    `asterism.track` then work with it.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.simulate.cube(frames=20, seed=1).detections
+    >>> method = am.tracking.method_by_name("gnn")
+    >>> state = method.init(am.estimate_model(d).model, n_axes=d.n_axes)
+    >>> state, update = method.step(state, d.times[0], d.frame(0))
+    >>> state, labels, confidence = method.run(state, d.part(1, d.n_frames))
+    >>> int(labels.max()) + 1
+    8
+    """
 
     name: ClassVar[str]
     """Name of the method on the command line."""
@@ -100,7 +138,16 @@ class Method(ABC, Generic[State]):
         n_axes : int
             Number of coordinates, 2 or 3.
         seed : int, optional
-            Seed of the methods that draw random numbers; the others ignore it.
+            Seed of the methods that draw random numbers, 0 by default; the others ignore it.
+
+        Returns
+        -------
+        State
+
+        Raises
+        ------
+        ParameterError
+            If an argument has the wrong type, or `n_axes` is neither 2 nor 3.
         """
 
     @abstractmethod
@@ -150,9 +197,9 @@ class Method(ABC, Generic[State]):
         Parameters
         ----------
         state : State
-            State from `init`.
+            State from `init`, or from an earlier call, which is then continued.
         detections : Detections
-            Frames to process.
+            Frames to process, later than those of the state.
         progress : callable, optional
             Called from time to time with the number of finished frames.
 
@@ -190,10 +237,35 @@ def checked_frame(
 ) -> NDArray[np.float64]:
     """Check one frame of a stream and return its points as an (n, D) array.
 
+    Parameters
+    ----------
+    time : float
+        Time of the frame, seconds.
+    last_time : float
+        Time of the previous frame, seconds; -inf before the first.
+    points : array_like, shape (n, D)
+        Points of the frame, metres; may be empty.
+    n_axes : int
+        Number of coordinates D, 2 or 3.
+
+    Returns
+    -------
+    ndarray, shape (n, D)
+
     Raises
     ------
     ParameterError
         If the time does not advance or the points are not finite (n, D) numbers.
+
+    Examples
+    --------
+    >>> checked_frame(0.01, 0.0, [[0, 0, 1]], 3)
+    array([[0., 0., 1.]])
+    >>> checked_frame(0.01, 0.01, [[0, 0, 1]], 3)
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: time: expected later than the frame before (0.01 s), found 0.01
+    s. Sort the frames by time and drop repeated ones.
     """
     check_number("time", time)
     if time <= last_time:
@@ -201,7 +273,7 @@ def checked_frame(
             "time",
             f"later than the frame before ({last_time:g} s)",
             f"{time:g} s",
-            "frames must come in order; drop repeated ones",
+            "sort the frames by time and drop repeated ones",
         )
     array = np.asarray(points)
     if array.size == 0:
@@ -212,10 +284,26 @@ def checked_frame(
 def checked_covariances(covariances: ArrayLike, frame: NDArray[np.float64]) -> NDArray[np.float64]:
     """Check the covariances of a frame's points and return them.
 
+    Parameters
+    ----------
+    covariances : array_like, shape (n, D, D)
+        Covariance of each point, m².
+    frame : ndarray, shape (n, D)
+        Points of the frame, metres.
+
+    Returns
+    -------
+    ndarray, shape (n, D, D)
+
     Raises
     ------
     ParameterError
         If they are not finite matrices, one for each point, or a variance is negative.
+
+    Examples
+    --------
+    >>> checked_covariances([[[1e-6, 0], [0, 1e-6]]], np.zeros((1, 2))).shape
+    (1, 2, 2)
     """
     n, D = frame.shape
     array = np.asarray(covariances, dtype=np.float64)

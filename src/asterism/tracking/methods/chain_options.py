@@ -1,7 +1,4 @@
-"""Options of the Markov chain of MCMCDA: its proposals, its acceptance and its groups.
-
-The defaults scored best in measurements; the alternatives are those of the 2010 report.
-"""
+"""Options of the Markov chain of MCMCDA: its proposals, its acceptance and its groups."""
 
 from __future__ import annotations
 
@@ -21,6 +18,8 @@ __all__ = ["ChainOptions"]
 class ChainOptions:
     """Options of the Markov chain over partitions.
 
+    The defaults scored best in measurements; `MCMCDA.report_2010` sets those of the 2010 report.
+
     Parameters
     ----------
     proposal : {"informed", "uniform"}
@@ -32,10 +31,11 @@ class ChainOptions:
         report (its eight kinds), or weights by kind.
     ambiguous_share : float
         Share of the moves drawn at ambiguous links, which exchange detections between two tracks,
-        in [0, 1]. 0 for none, as in the 2010 report.
+        in [0, 0.99]. Larger values search there more often; 0 for none, as in the 2010 report.
     ambiguous_within : float
-        Largest log-likelihood ratio between the alternatives of an ambiguous link, nats. Larger
-        values make more links ambiguous.
+        Largest log-likelihood ratio between the alternatives of an ambiguous link, nats, ≥ 0. At
+        the default of 10 an alternative is at most e¹⁰ times less likely. Larger values make more
+        links ambiguous.
     acceptance : {"metropolis", "ascent"}
         Acceptance rule: "metropolis" samples the posterior. "ascent", of the 2010 report, draws
         from the best partition so far and compares with the last accepted one: it maximises and
@@ -56,7 +56,15 @@ class ChainOptions:
         Number of tracks with stable mutual distances that fix each other. Tracks detected in every
         frame of the window that form such a group are not changed by the chain. 0 for none.
     bond_tolerance : float, optional
-        Largest variation of a stable distance, metres; by default 6√2 times the noise.
+        Largest variation of a stable distance, metres, > 0; by default 6√2 times the noise, which
+        is six standard deviations of a difference of two coordinates.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> chain = am.tracking.ChainOptions(groups="clusters", distance=0.3)
+    >>> am.MCMCDA(chain=chain).chain.groups
+    'clusters'
     """
 
     proposal: Literal["informed", "uniform"] = "informed"
@@ -95,6 +103,6 @@ class ChainOptions:
             expected = "a length in metres" if is_by_distance else "none, or groups by distance"
             raise ParameterError("chain.distance", expected, repr(self.distance))
         if self.acceptance == "ascent" and self.ambiguous_share > 0:
-            hint = "only the metropolis chain samples"
+            hint = "use metropolis, the only acceptance that samples the posterior"
             name = "chain.ambiguous_share"
             raise ParameterError(name, "0 with the ascent", self.ambiguous_share, hint)

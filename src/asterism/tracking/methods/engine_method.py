@@ -53,6 +53,19 @@ class EngineState:
         Current tracks in the engine.
     about : callable
         Function that returns the method's counts of a frame or of all frames so far.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.simulate.cube(frames=20, seed=1).detections
+    >>> method = am.GNN()
+    >>> state, labels, _ = method.run(method.init(am.estimate_model(d).model), d)
+    >>> state
+    EngineState(3-D, 20 frames and 160 detections taken, 8 tracks so far)
+    >>> state.n_ids, state.n_seen, state.info["tracks"]
+    (8, 160, 8)
+    >>> state.live()["means"].shape  # track, axis, and position or velocity
+    (8, 3, 2)
     """
 
     model: TrackingModel
@@ -101,7 +114,22 @@ class EngineState:
 
 @record
 class EngineMethod(Method[EngineState]):
-    """Method whose frames are processed by one of the engine's trackers."""
+    """Method whose frames are processed by one of the engine's trackers.
+
+    Examples
+    --------
+    A state is a value, so a stream can be forked, here into two continuations:
+
+    >>> import asterism as am
+    >>> d = am.simulate.cube(frames=20, seed=1).detections
+    >>> method = am.GNN()
+    >>> state = method.init(am.estimate_model(d).model)
+    >>> half, _, _ = method.run(state, d.part(0, 10))
+    >>> one, update = method.step(half, d.times[10], d.frame(10))
+    >>> other, update = method.step(half, d.times[10], d.frame(10)[:4])
+    >>> one.n_seen, other.n_seen
+    (88, 84)
+    """
 
     @abstractmethod
     def _tracker(self, model: TrackingModel, n_axes: int, seed: int | None) -> Tracker:
@@ -114,7 +142,17 @@ class EngineMethod(Method[EngineState]):
     def init(
         self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None
     ) -> EngineState:
-        """Return the state before the first frame; see `Method.init`."""
+        """Return the state before the first frame.
+
+        Parameters
+        ----------
+        model, n_axes, seed
+            As for `Method.init`.
+
+        Returns
+        -------
+        EngineState
+        """
         if n_axes not in (2, 3):
             raise ParameterError("n_axes", "2 or 3", repr(n_axes))
         check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
@@ -129,7 +167,25 @@ class EngineMethod(Method[EngineState]):
         *,
         covariances: ArrayLike | None = None,
     ) -> tuple[EngineState, Update]:
-        """Process the next frame; see `Method.step`."""
+        """Process the next frame.
+
+        Parameters
+        ----------
+        state, time, points, covariances
+            As for `Method.step`.
+
+        Returns
+        -------
+        state, update
+            Next state, and the labels decided by the frame.
+
+        Raises
+        ------
+        ParameterError
+            As for `Method.step`.
+        SolverLimit
+            If a gate contains too many detections for the memory.
+        """
         from asterism import _engine
         from asterism.model.compiled import no_transition, transition, with_noise
 
@@ -146,13 +202,13 @@ class EngineMethod(Method[EngineState]):
             found = before.step(time, F, Q, frame)
         except (_engine.CandidateLimit, _engine.FrontierLimit) as error:
             raise _too_many(error) from error
-        knows = before.has_confidence
+        has_confidence = before.has_confidence
         update = Update(
             labels=found.labels,
             revised=found.revised,
             revised_labels=found.revised_labels,
-            confidence=found.confidence if knows else None,
-            revised_confidence=found.revised_confidence if knows else None,
+            confidence=found.confidence if has_confidence else None,
+            revised_confidence=found.revised_confidence if has_confidence else None,
             info=self._about(found.stats),
         )
         return replace(state, tracker=found.tracker), update
@@ -164,7 +220,18 @@ class EngineMethod(Method[EngineState]):
         *,
         progress: Callable[[int], Any] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
-        """Process all frames in the engine, with the same labels as a loop over `step`."""
+        """Process all frames in the engine, with the same labels as a loop over `step`.
+
+        Parameters
+        ----------
+        state, detections, progress
+            As for `Method.run`.
+
+        Returns
+        -------
+        state, labels, confidence
+            Last state, label of every detection (N,), and confidences if the method estimates them.
+        """
         from asterism import _engine
         from asterism.model.compiled import steps_of, with_noise
 
@@ -200,8 +267,13 @@ def _too_many(error: Exception) -> SolverLimit:
     from asterism import _engine
 
     if isinstance(error, _engine.FrontierLimit):
-        return SolverLimit("tracks that compete at once", 1025, 1024, "gate more narrowly")
+        return SolverLimit(
+            "tracks that compete at once",
+            1025,
+            1024,
+            "reduce the gate by a larger gate.probability",
+        )
     limit = options.MAX_CANDIDATES
     what = "pairs of track and detection within the gates of one frame"
-    hint = "the model's maximal speed or noise is too large for points so dense"
+    hint = "reduce the model's max_speed or noise_sigma, which is too large for points so dense"
     return SolverLimit(what, limit + 1, limit, hint)

@@ -32,9 +32,8 @@ class GNN(EngineMethod):
 
     The gain of assigning a detection to a track is ``log P_d N(y; ŷ, S) / (λ_f + P_d λ_b) - log(1
     - P_d)``, relative to a missed detection and a point that is clutter or a new marker. For a
-    tentative track it includes the odds that the track is a marker. The assignment with the
-    largest total gain is computed exactly (shortest augmenting paths, group by group): first for
-    confirmed
+    tentative track it includes the odds that the track is a marker. The assignment with the largest
+    total gain is computed exactly (shortest augmenting paths, group by group): first for confirmed
     tracks, then for tentative tracks among the remaining points.
 
     Parameters

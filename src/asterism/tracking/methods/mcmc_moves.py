@@ -57,10 +57,25 @@ def checked_weights(weights: str | Mapping[str, float]) -> Mapping[str, float]:
     weights : str or mapping
         "uniform", "report", or weights by kind.
 
+    Returns
+    -------
+    mapping of str to float
+        Weights by kind; kinds that are not in it are never proposed.
+
     Raises
     ------
     ParameterError
         If a kind is unknown, a weight is not a number ≥ 0, or a move lacks its reverse move.
+
+    Examples
+    --------
+    >>> checked_weights({"birth": 1, "death": 1, "update": 2})
+    {'birth': 1, 'death': 1, 'update': 2}
+    >>> checked_weights({"birth": 1})
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: chain.move_weights: expected birth and death both or neither,
+    found {'birth': 1}. A move without its reverse is never accepted.
     """
     if isinstance(weights, str):
         check_fields("chain.move_weights", [weights], WEIGHTS)
@@ -78,6 +93,6 @@ def checked_weights(weights: str | Mapping[str, float]) -> Mapping[str, float]:
         if bool(weights.get(one)) != bool(weights.get(other)):
             raise ParameterError(
                 "chain.move_weights", f"{one} and {other} both or neither", dict(weights),
-                "a move that cannot be taken back is never taken",
+                "a move without its reverse is never accepted",
             )  # fmt: skip
     return weights

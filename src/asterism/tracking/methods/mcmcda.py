@@ -41,9 +41,8 @@ FLOOR = 1e-4
 class MCMCDA(EngineMethod):
     """Markov chain Monte Carlo data association: sampling of the partitions of a window.
 
-    A move proposes a new partition and is accepted with the Metropolis-Hastings probability, so
-    the chain samples the posterior of partitions (`log_posterior`). In each frame the chain starts
-    from
+    A move proposes a new partition and is accepted with the Metropolis-Hastings probability, so the
+    chain samples the posterior of partitions (`log_posterior`). In each frame the chain starts from
     the exact assignment of the new detections, and the best visited partition is kept. It decides
     the frame that leaves the window. Of decided frames only the filter states of the tracks are
     kept, so the cost of a frame does not grow with time.
@@ -53,29 +52,32 @@ class MCMCDA(EngineMethod):
     Parameters
     ----------
     window : int or None
-        Number of frames after which a frame is decided; 1 is the single-scan form. None is for
-        whole captures: after the last frame the chains process all frames again in blocks of 100
-        that overlap by half, each conditional on the frames before and after it. The time is
-        linear in the length of the capture.
+        Number of frames after which a frame is decided, ≥ 1; 1 is the single-scan form. Larger
+        windows use more evidence and more time. None is for whole captures: after the last frame
+        the chains process all frames again in blocks of 100 that overlap by half, each conditional
+        on the frames before and after it. The time is linear in the length of the capture.
     moves : float or None
-        Monte Carlo moves per frame and ambiguous detection (or track, if there are more tracks).
-        None for a `deadline` alone. 0 requires initial labels: it keeps them and estimates their
-        confidence.
+        Monte Carlo moves per frame and ambiguous detection (or track, if there are more tracks),
+        ≥ 0. Larger values search longer. None for a `deadline` alone. 0 requires initial labels:
+        it keeps them and estimates their confidence.
     deadline : float or None
-        Time after the arrival of a frame at which the chain stops, seconds. Results then depend on
-        the machine; ``info["moves"]`` counts the moves.
+        Time after the arrival of a frame at which the chain stops, seconds, > 0. Results then
+        depend on the machine; None, the default, keeps them reproducible. ``info["moves"]`` counts
+        the moves.
     confidence : float
-        Monte Carlo moves for the confidence of labels, counted as `moves`; 0 for no confidence. A
-        confidence is the share of the chain in which a detection has the same predecessor (first
-        detection of a track: the same successor; clutter: no track).
+        Monte Carlo moves for the confidence of labels, counted as `moves`; larger values make it
+        more precise, and 0 switches it off. A confidence is the share of the chain in which a
+        detection has the same predecessor (first detection of a track: the same successor; clutter:
+        no track).
     end_odds : float
         Factor by which the termination probability is divided. Values above 1 keep a track through
-        motion that the model does not predict; 1 samples the model's own posterior.
+        motion that the model does not predict, hence the default; 1 samples the model's own
+        posterior.
     chains : int
-        Number of parallel chains in each frame. The best partition of all is used, and their
-        agreement measures the convergence of the confidence.
+        Number of parallel chains in each frame, 1 to 1024. The best partition of all is used, and
+        with several chains ``info["rhat"]`` measures the convergence of the confidence.
     threads : int
-        Number of chains that run at the same time. The result does not depend on it.
+        Number of chains that run at the same time, 1 to 1024. The result does not depend on it.
     keep : {"best", "draw"}
         Partition of a chain that is kept: the best visited one, or the last one, which is drawn
         from the posterior of the open frames given the decided ones. Draws with different seeds
@@ -86,9 +88,20 @@ class MCMCDA(EngineMethod):
     Examples
     --------
     >>> import asterism as am
-    >>> truth = am.simulate.cube(seed=1)
-    >>> am.track(truth.detections, am.MCMCDA(), seed=1).n_tracks
-    8
+    >>> truth = am.simulate.cube(frames=40, seed=1)
+    >>> tracks = am.track(truth.detections, am.MCMCDA(window=5), seed=1)
+    >>> tracks.n_tracks, bool(tracks.confidence.min() > 0.99)
+    (8, True)
+
+    Frame by frame, with new tracks that get their labels by `Update.revised`:
+
+    >>> method = am.MCMCDA()
+    >>> state = method.init(tracks.recipe.model, seed=1)
+    >>> for time, points in truth.detections.part(0, 20):
+    ...     state, update = method.step(state, time, points)
+    >>> update
+    Update(8 detections, 8 in tracks, 0 earlier labels revised, with confidence)
+    >>> state, labels, confidence = method.run(state, truth.detections.part(20, 40))
     """
 
     window: int | None = 10
@@ -121,7 +134,7 @@ class MCMCDA(EngineMethod):
         check_fields("keep", [self.keep], ("best", "draw"))
         check_kind("chain", self.chain, ChainOptions, "am.tracking.ChainOptions()")
         if self.chain.acceptance == "ascent":
-            hint = "only the metropolis chain samples"
+            hint = "use metropolis, the only acceptance that samples the posterior"
             if self.keep == "draw":
                 raise ParameterError("keep", "'best' with the ascent", "'draw'", hint)
             if self.confidence > 0:
@@ -133,8 +146,10 @@ class MCMCDA(EngineMethod):
 
         Parameters
         ----------
-        window, moves
-            As for the class.
+        window : int
+            Number of frames after which a frame is decided.
+        moves : float
+            Monte Carlo moves per frame and ambiguous detection.
         **changes
             Fields of `ChainOptions` that differ from those of the report.
 
@@ -216,13 +231,28 @@ class MCMCDA(EngineMethod):
         start : array_like of int, shape (N,), optional
             Initial labels of the detections to come, -1 for none, from which the chain starts.
 
+        Returns
+        -------
+        EngineState
+
         Raises
         ------
         ParameterError
             If no track can start, neither by a move nor from a label.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> truth = am.simulate.cube(frames=20, seed=1)
+        >>> method = am.MCMCDA(moves=0)  # keeps the labels and estimates their confidence
+        >>> model = am.estimate_model(truth.detections).model
+        >>> state = method.init(model, seed=1, start=truth.labels)
+        >>> state, labels, confidence = method.run(state, truth.detections)
+        >>> bool((labels == truth.labels).all()), float(confidence.min())
+        (True, 1.0)
         """
         if self.moves == 0 and start is None:
-            hint = "tracks begin by moves alone; gnn pairs frame by frame without any"
+            hint = "use gnn to associate frame by frame without moves"
             raise ParameterError("moves", "a number > 0, or labels to start from", "0", hint)
         state = super().init(model, n_axes=n_axes, seed=seed)
         if start is not None:
@@ -238,9 +268,26 @@ class MCMCDA(EngineMethod):
         *,
         covariances: ArrayLike | None = None,
     ) -> tuple[EngineState, Update]:
-        """Process the next frame; see `Method.step`."""
+        """Process the next frame.
+
+        Parameters
+        ----------
+        state, time, points, covariances
+            As for `Method.step`.
+
+        Returns
+        -------
+        state, update
+            Next state, and the labels decided by the frame.
+
+        Raises
+        ------
+        ParameterError
+            If the method has no window, or as for `Method.step`.
+        """
         if self.window is None:
-            raise ParameterError("window", "a number of frames", "None", "a stream has no end")
+            hint = "window=None is for whole captures, by run"
+            raise ParameterError("window", "a number of frames", "None", hint)
         return super().step(state, time, points, covariances=covariances)
 
     def run(
@@ -250,7 +297,18 @@ class MCMCDA(EngineMethod):
         *,
         progress: Callable[[int], Any] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
-        """Process all frames in the engine; see `Method.run`."""
+        """Process all frames in the engine.
+
+        Parameters
+        ----------
+        state, detections, progress
+            As for `Method.run`.
+
+        Returns
+        -------
+        state, labels, confidence
+            Last state, label of every detection (N,), and confidences unless switched off.
+        """
         check_kind("state", state, EngineState, "method.init(model)")
         if self.window is not None:
             return super().run(state, detections, progress=progress)
@@ -287,7 +345,7 @@ class MCMCDA(EngineMethod):
             "candidates": stats.n_candidates,
             "groups": stats.n_groups,
             "largest_group": stats.largest_group,
-            "groups_in_doubt": chain.n_walked,
+            "ambiguous_groups": chain.n_walked,
             "cut_links": chain.n_cut,
             "moves": chain.n_search,
         }

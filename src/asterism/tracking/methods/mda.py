@@ -34,9 +34,8 @@ class MDA(EngineMethod):
     """Multidimensional assignment: the best association of all detections of a window at once.
 
     A tuple holds a track, or none for a new one, and a detection or none of each frame of the
-    window. Its weight is its part of the log posterior (`log_posterior`).
-    `assign_multidimensional` finds the best set of tuples that share no track or detection, and
-    decides the oldest frame by
+    window. Its weight is its part of the log posterior (`log_posterior`). `assign_multidimensional`
+    finds the best set of tuples that share no track or detection, and decides the oldest frame by
     it. Until then labels are those of the current best set, and can change.
 
     Parameters
@@ -55,7 +54,8 @@ class MDA(EngineMethod):
         is less probable than the best of all by more than these odds times the odds of terminating
         the track and starting another. Larger values keep more tuples.
     new_track_odds : float
-        Odds above which a detection of a confirmed track cannot start a new track.
+        Odds above which a detection of a confirmed track cannot start a new track, > 0. Larger
+        values allow more hypotheses with new tracks, and need more time.
     gate : Gate
         Gate, the region in which a track can be assigned a detection.
     lifecycle : Lifecycle

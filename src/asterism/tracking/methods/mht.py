@@ -36,17 +36,39 @@ class HypothesisCluster:
 
     Parameters
     ----------
-    targets : ndarray, shape (k,)
+    targets : ndarray of int, shape (k,)
         Numbers of the cluster's targets in order of birth. They are not track labels, which only
         confirmed targets have.
-    detections : ndarray, shape (n,)
+    detections : ndarray of int, shape (n,)
         Detections of the undecided frames on which its hypotheses differ, or that belong to its
         targets, numbered from 0 in order of arrival.
-    origins : ndarray, shape (h, n)
+    origins : ndarray of int, shape (h, n)
         Target of each detection in each hypothesis, or -1 for clutter and for the only detection
         of a new marker.
     probabilities : ndarray, shape (h,)
         Probabilities of the hypotheses, in decreasing order, with sum 1.
+
+    Examples
+    --------
+    Two markers for which there is one detection half-way between them in the last frame:
+
+    >>> import asterism as am
+    >>> times = np.arange(11) / 100
+    >>> frames = [[[0, 0, 0], [0.02, 0, 0]]] * 10 + [[[0.01, 0, 0]]]
+    >>> model = am.TrackingModel(
+    ...     motion=am.DWNA(acceleration_sigma=20),
+    ...     sensor=am.Sensor(noise_sigma=2e-3, p_detection=0.9, clutter_density=0.01),
+    ...     population=am.Population(
+    ...         birth_density=0.01, p_disappear=1e-3, max_speed=5, max_gap=10
+    ...     ),
+    ... )
+    >>> method = am.MHT()
+    >>> state = method.init(model)
+    >>> for time, points in am.Detections.from_frames(times, frames):
+    ...     state, update = method.step(state, time, points)
+    >>> (cluster,) = method.hypotheses(state)
+    >>> cluster.origins[:2, -1].tolist(), cluster.probabilities[:2].round(2)
+    ([0, 1], array([0.5, 0.5]))
     """
 
     targets: NDArray[np.int64]
@@ -75,9 +97,9 @@ class MHT(EngineMethod):
         Number of frames after which a frame is decided, 2 to 16. Larger windows use more evidence
         and more time.
     max_hypotheses : int
-        Largest number of hypotheses of a cluster. ``info["limited"]`` counts the clusters with
-        more, and ``info["most_dropped_odds"]`` is the largest odds of a dropped hypothesis against
-        the most probable one of its cluster.
+        Largest number of hypotheses of a cluster, ≥ 1. Larger values need more time;
+        ``info["limited"]`` counts the clusters with more, and ``info["most_dropped_odds"]`` is the
+        largest odds of a dropped hypothesis against the most probable one of its cluster.
     prune_odds : float
         Odds against a cluster's most probable hypothesis beyond which a hypothesis is dropped.
         Larger values keep more hypotheses.
@@ -85,7 +107,8 @@ class MHT(EngineMethod):
         Difference of estimates, in standard deviations, below which hypotheses with the same
         targets are merged into the most probable one; 0 merges none.
     new_track_odds : float
-        Odds above which a detection of a confirmed track cannot start a new track.
+        Odds above which a detection of a confirmed track cannot start a new track, > 0. Larger
+        values allow more hypotheses with new tracks, and need more time.
     gate : Gate
         Gate, the region in which a track can be assigned a detection.
     lifecycle : Lifecycle
@@ -131,11 +154,21 @@ class MHT(EngineMethod):
         Returns
         -------
         list of HypothesisCluster
+            Clusters of the undecided frames; a cluster without ambiguity has one hypothesis.
 
         Raises
         ------
         ParameterError
             If the state belongs to another method.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> d = am.simulate.cube(frames=20, seed=1).detections
+        >>> method = am.MHT()
+        >>> state, labels, confidence = method.run(method.init(am.estimate_model(d).model), d)
+        >>> [len(cluster.probabilities) for cluster in method.hypotheses(state)]
+        [1, 1, 1, 1, 1, 1, 1, 1]
         """
         from asterism import _engine
 

@@ -37,8 +37,16 @@ class Gate:
     Parameters
     ----------
     probability : float
-        Probability that the gate misses the detection of its own track under an exact model: the
-        level of the χ² test. Smaller values make larger gates.
+        Probability in (0, 1) that a detection of the track lies outside the gate, if the model is
+        exact: the level of the χ² test. Smaller values make larger gates, with more candidates
+        and more time. The default is small so that motion that exceeds the model stays in
+        the gate.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.GNN(gate=am.tracking.Gate(probability=1e-4))
+    GNN(gate=Gate(probability=0.0001))
     """
 
     probability: float = 1e-9
@@ -59,11 +67,18 @@ class Lifecycle:
     Parameters
     ----------
     confirm_probability : float
-        Existence probability at which a tentative track is confirmed, in (0, 1). Larger values
-        delay the confirmation and prevent false tracks.
+        Existence probability at which a tentative track is confirmed, in (0.5, 1). Larger values
+        delay the confirmation and prevent false tracks; at the default at most one confirmed track
+        in a thousand is false, under the model.
     delete_odds : float
-        Factor of the decrease of a tentative track's odds from their maximum at which it is
-        deleted. Larger values keep tentative tracks for longer.
+        A tentative track is deleted when its odds have fallen by this factor from their maximum,
+        > 1. Larger values keep tentative tracks for longer.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.GNN(lifecycle=am.tracking.Lifecycle(confirm_probability=0.99))
+    GNN(lifecycle=Lifecycle(confirm_probability=0.99))
     """
 
     confirm_probability: float = 0.999
@@ -78,19 +93,24 @@ class Lifecycle:
 class Rigidity:
     """Prediction of occluded markers by neighbours at stable distances, frame by frame.
 
-    Stable distances are learnt while both markers are detected. An occluded track is predicted by
-    a rigid fit of its neighbours, also beyond the model's `max_gap`. A detection that disagrees
-    with
-    the neighbours has a lower likelihood.
+    Stable distances are estimated while both markers are detected. An occluded track is predicted
+    by a rigid fit of its neighbours, also beyond the model's `max_gap`. A detection that disagrees
+    with the neighbours has a lower likelihood.
 
     Parameters
     ----------
     max_gap : int
         Longest occlusion through which neighbours predict a track, frames, 1 to 100000. Beyond it
-        the model's `max_gap` applies.
+        the model's `max_gap` applies. Larger values keep tracks through longer occlusions.
     bond_weight : float
         Largest effect of the neighbours on an ambiguous pairing, nats, 0 to 100. At 0 they only
-        predict occluded tracks.
+        predict occluded tracks. The default of 2 can reverse likelihood ratios up to e² ≈ 7.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.GNN(rigid=am.tracking.Rigidity(max_gap=120))
+    GNN(rigid=Rigidity(max_gap=120))
     """
 
     max_gap: int = 60
@@ -105,18 +125,47 @@ class Rigidity:
 
 
 class SharedOptions(Protocol):
-    """Options of every method that predicts, gates and confirms tracks frame by frame."""
+    """Options of every method that predicts, gates and confirms tracks frame by frame.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.SMP().gate, am.SMP().lifecycle, am.SMP().rigid
+    (Gate(), Lifecycle(), None)
+    """
 
     @property
-    def gate(self) -> Gate: ...  # noqa: D102
+    def gate(self) -> Gate:
+        """Region in which a track can be assigned a detection."""
+        ...
+
     @property
-    def lifecycle(self) -> Lifecycle: ...  # noqa: D102
+    def lifecycle(self) -> Lifecycle:
+        """Confirmation and deletion of tentative tracks."""
+        ...
+
     @property
-    def rigid(self) -> Rigidity | None: ...  # noqa: D102
+    def rigid(self) -> Rigidity | None:
+        """Prediction of occluded markers by their neighbours; None for no such prediction."""
+        ...
 
 
 def check_shared(options: SharedOptions) -> None:
-    """Raise `ParameterError` if an option is not a record of its class."""
+    """Raise `ParameterError` if an option is not a record of its class.
+
+    Parameters
+    ----------
+    options : SharedOptions
+        Method, or any object with these options.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.GNN(gate=0.99)
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: gate: expected a Gate, found float. Try am.tracking.Gate().
+    """
     check_kind("gate", options.gate, Gate, "am.tracking.Gate()")
     check_kind("lifecycle", options.lifecycle, Lifecycle, "am.tracking.Lifecycle()")
     if options.rigid is not None:
@@ -124,7 +173,23 @@ def check_shared(options: SharedOptions) -> None:
 
 
 def check_flags(options: object, *names: str) -> None:
-    """Raise `ParameterError` if an option is neither True nor False."""
+    """Raise `ParameterError` if an option is neither True nor False.
+
+    Parameters
+    ----------
+    options : object
+        Record of options.
+    *names : str
+        Names of the options to check.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.SMP(strict="yes")
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: strict: expected True or False, found 'yes'
+    """
     for name in names:
         value = getattr(options, name)
         if not isinstance(value, bool):
@@ -134,7 +199,29 @@ def check_flags(options: object, *names: str) -> None:
 def engine_model(
     options: SharedOptions, model: TrackingModel, n_axes: int
 ) -> tuple[_engine.MotionModel, _engine.ScoreModel, _engine.LifeOptions]:
-    """Return the first arguments of each of the engine's trackers."""
+    """Return the first arguments of each of the engine's trackers.
+
+    Parameters
+    ----------
+    options : SharedOptions
+        Gate and lifecycle of the method.
+    model : TrackingModel
+        Model whose posterior is searched.
+    n_axes : int
+        Number of coordinates, 2 or 3.
+
+    Returns
+    -------
+    motion, score, life
+        Motion model, score model, and options of the gate and the lifecycle.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
+    >>> [type(part).__name__ for part in engine_model(am.GNN(), model, 3)]
+    ['MotionModel', 'ScoreModel', 'LifeOptions']
+    """
     from scipy.special import chdtri
 
     from asterism import _engine
@@ -151,7 +238,22 @@ def engine_model(
 
 
 def carry_options(rigid: Rigidity | None) -> _engine.CarryOptions:
-    """Return the engine's options of rigid bodies."""
+    """Return the engine's options of the prediction by neighbours.
+
+    Parameters
+    ----------
+    rigid : Rigidity or None
+        Options of the method; None switches the prediction off.
+
+    Returns
+    -------
+    CarryOptions
+
+    Examples
+    --------
+    >>> type(carry_options(Rigidity())).__name__
+    'CarryOptions'
+    """
     from asterism import _engine
 
     if rigid is None:
@@ -162,7 +264,27 @@ def carry_options(rigid: Rigidity | None) -> _engine.CarryOptions:
 
 
 def shared_counts(options: SharedOptions, stats: _engine.FrameStats) -> dict[str, float]:
-    """Return the counts of a frame, or of a run of frames, that all these methods have."""
+    """Return the counts that all frame-by-frame methods have.
+
+    Parameters
+    ----------
+    options : SharedOptions
+        Options of the method.
+    stats : FrameStats
+        Counts of the engine, of one frame or summed over several.
+
+    Returns
+    -------
+    dict of str to float
+        Counts by name, as in ``tracks.info``.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> tracks = am.track(am.simulate.cube(frames=20, seed=1).detections, am.GNN())
+    >>> tracks.info["tracks"], tracks.info["largest_group"]
+    (8, 1)
+    """
     counts: dict[str, float] = {
         "tracks": stats.n_confirmed,
         "tentative": stats.n_tentative,

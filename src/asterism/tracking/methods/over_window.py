@@ -19,7 +19,15 @@ __all__ = ["branch_options", "check_hypotheses", "check_window", "tree_counts"]
 
 
 def check_window(window: float, minimum: int) -> None:
-    """Raise `ParameterError` if the engine cannot keep that many frames open."""
+    """Raise `ParameterError` if the engine cannot keep that many frames open.
+
+    Parameters
+    ----------
+    window : int
+        Number of frames, `minimum` to 16.
+    minimum : int
+        Smallest number of frames of the method.
+    """
     check_number("window", window, above=minimum, below=16, closed=True, integer=True)
 
 
@@ -33,7 +41,21 @@ def branch_options(
     limits: NDArray[np.float64] | None = None,
     z: float = 0.0,
 ) -> _engine.BranchOptions:
-    """Return the engine's options of branches; without `limits` there is no χ² test."""
+    """Return the engine's options of branches; without `limits` there is no χ² test.
+
+    Parameters
+    ----------
+    window, max_branches, prune_odds, merge_last, fading
+        As for `TrackSplitting`; `merge_last` is the window by default.
+    limits : ndarray, shape (K,), optional
+        Limits of the χ² test, from `chi2_limits`.
+    z : float
+        Standard normal quantile of the test, for branches with more than K detections.
+
+    Returns
+    -------
+    BranchOptions
+    """
     from asterism import _engine
 
     return _engine.BranchOptions(
@@ -59,7 +81,13 @@ class HypothesisOptions(SharedOptions, Protocol):
 
 
 def check_hypotheses(options: HypothesisOptions) -> None:
-    """Raise `ParameterError` if an option of such a method is out of range."""
+    """Raise `ParameterError` if an option of such a method is out of range.
+
+    Parameters
+    ----------
+    options : HypothesisOptions
+        Method to check.
+    """
     check_shared(options)
     check_window(options.window, 2)
     check_number("prune_odds", options.prune_odds, above=1)
@@ -67,7 +95,17 @@ def check_hypotheses(options: HypothesisOptions) -> None:
 
 
 def tree_counts(stats: _engine.FrameStats) -> _engine.TreeStats:
-    """Return the counts as those of a tracker of hypothesis trees."""
+    """Return the counts as those of a tracker of hypothesis trees.
+
+    Parameters
+    ----------
+    stats : FrameStats
+        Counts of the engine.
+
+    Returns
+    -------
+    TreeStats
+    """
     from asterism import _engine
 
     assert isinstance(stats, _engine.TreeStats)

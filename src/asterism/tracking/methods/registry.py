@@ -32,10 +32,29 @@ METHODS: dict[str, type[Method[Any]]] = Registry(
 def method_by_name(name: str, **options: Any) -> Method[Any]:
     """Return a method by its name and options.
 
+    Parameters
+    ----------
+    name : str
+        Name on the command line, a key of `METHODS`.
+    **options
+        Options of the method by name; an option that is a record may be given as a mapping.
+
+    Returns
+    -------
+    Method
+
     Raises
     ------
     ParameterError
         If the name or an option is unknown.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.tracking.method_by_name("smp", window=3, gate={"probability": 1e-6})
+    SMP(window=3, gate=Gate(probability=1e-06))
+    >>> sorted(am.tracking.METHODS)
+    ['gnn', 'jpda', 'mcmcda', 'mda', 'mht', 'smp', 'splitting', 'tomht']
     """
     check_fields("method", [name], METHODS)
     kind: type[Any] = METHODS[name]
@@ -55,7 +74,23 @@ def _made(kind: type[Any], options: Mapping[str, Any]) -> Any:
 
 
 def record_in(kind: Any) -> type[Any] | None:
-    """Return the record class among an option's types, None if there is none."""
+    """Return the record class among an option's types, None if there is none.
+
+    Parameters
+    ----------
+    kind : type
+        Annotation of the option, such as ``Rigidity | None``.
+
+    Returns
+    -------
+    type or None
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> record_in(am.tracking.Rigidity | None).__name__
+    'Rigidity'
+    """
     for inner in (kind, *typing.get_args(kind)):
         if isinstance(inner, type) and dataclasses.is_dataclass(inner):
             return inner
@@ -63,7 +98,24 @@ def record_in(kind: Any) -> type[Any] | None:
 
 
 def options_of(method: object) -> dict[str, Any]:
-    """Return all options of a method by name, records as tables; {} if it is not a record."""
+    """Return all options of a method by name, those that are records as dictionaries.
+
+    Parameters
+    ----------
+    method : object
+        Method, or one of its records of options.
+
+    Returns
+    -------
+    dict
+        Options by name, as in ``tracks.recipe.options``; empty if `method` is not a record.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> options_of(am.GNN())["gate"]
+    {'probability': 1e-09}
+    """
     if not dataclasses.is_dataclass(method):
         return {}
     options = {field.name: getattr(method, field.name) for field in dataclasses.fields(method)}

@@ -54,19 +54,18 @@ class SMP(EngineMethod):
         Side that proposes; the result is the best stable matching for that side.
     strict : bool
         Whether to use the method of the 2010 report: all frames have the same number of
-        detections, all of markers, and there is no gate. A frame with another number is refused.
+        detections, all of markers, and there is no gate. A frame with another number is an error.
     capacity : int
-        Largest number of detections of a track in a frame (hospitals and residents, §5.6), for
-        markers that are detected as two points. They are merged by their likelihood; the most
+        Largest number of detections of a track in a frame, 1 to 64 (hospitals and residents, §5.6),
+        for markers that are detected as two points. They are merged by their likelihood; the most
         likely one gets the label.
     merged_within : float
-        Largest distance of a further detection from the track's preferred one, metres, with a
-        capacity above 1.
+        Largest distance of a further detection from the track's preferred one, metres, > 0, used
+        with a capacity above 1. The default of 20 mm is the diameter of a large marker.
     window : int
         Number of frames from which preferences are computed, 1 to 16 (past history, §5.6). A frame
-        is decided after `window` frames. A track ranks its detections by the likelihood of the
-        best continuation through the window, a detection ranks tracks by their mean squared
-        distance
+        is decided after `window` frames. A track ranks its detections by the likelihood of the best
+        continuation through the window, a detection ranks tracks by their mean squared distance
         along it. Until then labels are those of the current decision, and can change.
     gate : Gate
         Gate, the region in which a track can be assigned a detection.
@@ -74,6 +73,23 @@ class SMP(EngineMethod):
         Confirmation and deletion of tentative tracks.
     rigid : Rigidity, optional
         Prediction of occluded markers by their neighbours; None for no such prediction.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=40, seed=1)
+    >>> tracks = am.track(truth.detections, am.SMP(window=3))
+    >>> tracks.n_tracks
+    8
+
+    The method of the 2010 report, one frame and then all others:
+
+    >>> method = am.SMP(strict=True)
+    >>> state = method.init(tracks.recipe.model)
+    >>> state, update = method.step(state, truth.detections.times[0], truth.detections.frame(0))
+    >>> state, labels, _ = method.run(state, truth.detections.part(1, 40))
+    >>> update.labels.tolist(), labels[-8:].tolist()
+    ([0, 1, 2, 3, 4, 5, 6, 7], [0, 1, 2, 3, 4, 5, 6, 7])
     """
 
     proposers: Literal["tracks", "detections"] = "tracks"
@@ -140,7 +156,17 @@ class SMP(EngineMethod):
         *,
         covariances: ArrayLike | None = None,
     ) -> tuple[EngineState, Update]:
-        """Process the next frame; see `Method.step`.
+        """Process the next frame.
+
+        Parameters
+        ----------
+        state, time, points, covariances
+            As for `Method.step`.
+
+        Returns
+        -------
+        state, update
+            Next state, and the labels decided by the frame.
 
         Raises
         ------
@@ -158,7 +184,18 @@ class SMP(EngineMethod):
         *,
         progress: Callable[[int], Any] | None = None,
     ) -> tuple[EngineState, NDArray[np.int64], NDArray[np.float64] | None]:
-        """Process all frames in the engine, with the same labels as a loop over `step`."""
+        """Process all frames in the engine, with the same labels as a loop over `step`.
+
+        Parameters
+        ----------
+        state, detections, progress
+            As for `Method.run`.
+
+        Returns
+        -------
+        state, labels, confidence
+            Last state, label of every detection (N,), and None, as there is no confidence.
+        """
         if self.strict and detections.n_frames:
             wanted = state.n_ids if state.tracker.n_frames else int(detections.counts[0])
             for t in np.flatnonzero(detections.counts != wanted):
@@ -170,5 +207,5 @@ def _check_number(n: int, wanted: int, where: str) -> None:
     if n != wanted:
         raise ParameterError(
             "points", f"{wanted} {where}, as many as in the first (strict=True)", n,
-            "use strict=False, which knows misses, clutter, and markers that come and go",
+            "use strict=False, which allows missed detections, clutter and new markers",
         )  # fmt: skip

@@ -31,9 +31,8 @@ class TOMHT(EngineMethod):
     Each track is a hypothesis tree over a window of frames: a branch for every detection in its
     gate and one for a missed detection. Every detection can start a new tree. A global hypothesis
     holds one branch of each tree without a common detection; its score is its log posterior
-    (`log_posterior`). In each cluster of trees that share detections the best one is found by
-    exact set packing and decides the oldest frame (N-scan pruning). Until then labels are those of
-    the
+    (`log_posterior`). In each cluster of trees that share detections the best one is found by exact
+    set packing and decides the oldest frame (N-scan pruning). Until then labels are those of the
     current best hypothesis, and can change.
 
     The confidence of a label is its probability. For branches at odds worse than `prune_odds` a
@@ -63,7 +62,8 @@ class TOMHT(EngineMethod):
         Largest number of search nodes in a cluster. Beyond it a compatible set is made from the
         search so far, and ``info["gap"]`` bounds its loss against the optimum, nats.
     new_track_odds : float
-        Odds above which a detection of a confirmed track cannot start a new track.
+        Odds above which a detection of a confirmed track cannot start a new track, > 0. Larger
+        values allow more hypotheses with new tracks, and need more time.
     gate : Gate
         Gate, the region in which a track can be assigned a detection.
     lifecycle : Lifecycle

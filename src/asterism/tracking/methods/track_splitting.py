@@ -64,13 +64,13 @@ class TrackSplitting(EngineMethod):
         α, probability that the χ² test prunes the right branch in a frame, in (0, 1). Smaller
         values keep more branches.
     fading : float
-        ρ, factor on λ in each frame: 1 as in the 2010 report, or above 0 to 0.99. Smaller values
+        ρ, factor on λ in each frame: 1 as in the 2010 report, or in (0, 0.99]. Smaller values
         forget the past faster.
     window : int
         Number of frames after which a frame is decided, 1 to 16. Larger windows use more evidence
         and more time.
     max_branches : int
-        Largest number of branches of a tree.
+        Largest number of branches of a tree, ≥ 1. Larger values need more time and memory.
     merge_last : int
         Number of last frames whose equality merges branches into the most likely one. Fewer than
         `window` saves time, but removes alternatives of the next decision, and the confidence is
@@ -179,6 +179,12 @@ def chi2_limits(alpha: float, n_axes: int, fading: float) -> NDArray[np.float64]
     -------
     ndarray, shape (K,)
         Limits for k = 1 to K; with fading the last one holds for all larger k.
+
+    Examples
+    --------
+    >>> from asterism.tracking.methods.track_splitting import chi2_limits
+    >>> chi2_limits(0.01, 3, 1.0)[:3].round(2)
+    array([11.34, 16.81, 21.67])
     """
     from scipy.special import chdtri
 

@@ -49,11 +49,20 @@ class Naming:
     Parameters
     ----------
     tracks : Tracks
-    Named tracks; tracks with the same marker are merged.
+        Named tracks; tracks with the same marker are merged.
     markers : ndarray of int, shape (K,)
-    Marker of each input track in the bonds, -1 for a track without a name.
+        Marker of each input track in the bonds, -1 for a track without a name.
     probabilities : ndarray, shape (K,)
-    Probability of each name among the names considered; 0 for a track without a name.
+        Probability of each name among the names considered; 0 for a track without a name. Check
+        names with a probability well below 1 by eye.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.fingers(frames=40, seed=1)
+    >>> naming = am.name_tracks(truth, am.learn_bonds(truth))
+    >>> naming.n_named, naming.tracks.names[:3]
+    (23, ('T1', 'T2', 'T3'))
     """
 
     tracks: Tracks
@@ -80,14 +89,14 @@ def name_tracks(tracks: Tracks, bonds: Bonds) -> Naming:
     Parameters
     ----------
     tracks : Tracks
-    Tracks, for example from `track` or `stitch`. Short tracks are named after longer ones.
+        Tracks, for example from `track` or `stitch`. Short tracks are named after longer ones.
     bonds : Bonds
-    Bonds of the markers, from `learn_bonds`.
+        Bonds of the markers, from `learn_bonds`.
 
     Returns
     -------
     Naming
-    Named tracks with the probability of each name.
+        Named tracks with the probability of each name.
 
     Raises
     ------
@@ -97,10 +106,20 @@ def name_tracks(tracks: Tracks, bonds: Bonds) -> Naming:
     Notes
     -----
     The log odds of a distance are ``log t(z) / s - log 1/R``: Student's t with three degrees of
-    freedom of its error z in units of s, against a uniform distribution over the range R. The
-    scale s combines the variation in both captures and the displacement of a marker that is
-    attached
+    freedom of its error z in units of s, against a uniform distribution over the range R. The scale
+    s combines the variation in both captures and the displacement of a marker that is attached
     again. The log odds are bounded, so that one wrong distance is outvoted.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> bonds = am.learn_bonds(am.simulate.fingers(frames=40, seed=1))
+    >>> later = am.simulate.fingers(frames=40, seed=2).detections
+    >>> naming = am.name_tracks(am.track(later, am.GNN()), bonds)
+    >>> naming
+    Naming(23 of 23 tracks)
+    >>> naming.tracks.names[:3]
+    ('T1', 'T2', 'T3')
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_kind("bonds", bonds, Bonds, "am.learn_bonds(tracks)")
@@ -181,7 +200,7 @@ class _LongTracks:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Known:
-    """Bonds as tables over K markers, with distances of the pose for pairs without a bond."""
+    """Bonds as tables over K markers; pairs without a bond have their distance in the pose."""
 
     is_bond: NDArray[np.bool_]  # (K, K)
     distance: NDArray[np.float64]
@@ -202,8 +221,8 @@ class _Known:
     def log_odds(self, middle: float, spread: float) -> NDArray[np.float64]:
         """Return the log odds that two tracks are each pair of markers, (K, K)."""
         varied = spread**2 + self.spread**2
-        said = np.nan_to_num(_log_odds(middle - self.distance, varied, self.distance))
-        return np.where(self.is_bond, said, said.clip(*UNBONDED))
+        log_odds = np.nan_to_num(_log_odds(middle - self.distance, varied, self.distance))
+        return np.where(self.is_bond, log_odds, log_odds.clip(*UNBONDED))
 
 
 def _log_odds(
@@ -212,8 +231,8 @@ def _log_odds(
     """Return bounded log odds of Student's t with three degrees of freedom against uniform."""
     scale2 = np.stack([varied + (fixed + share * size) ** 2 for fixed, share in (LEFT, REPLACED)])
     log_t = -2 * np.log1p(off**2 / scale2 / 3) - 0.5 * np.log(scale2) - 1.0  # log t(0) = -1.0
-    said = log_t.max(axis=0) + np.log(ANYWHERE)
-    return np.clip(said, MIN_LOG_ODDS, MAX_LOG_ODDS)
+    log_odds = log_t.max(axis=0) + np.log(ANYWHERE)
+    return np.clip(log_odds, MIN_LOG_ODDS, MAX_LOG_ODDS)
 
 
 def _height(
@@ -305,17 +324,17 @@ def _name_pieces(
         others = long.steadiest(int(k), has.tolist())
         if not others:
             continue
-        said = _evidence(long, known, int(k), others, named[None])[0]
+        log_odds = _evidence(long, known, int(k), others, named[None])[0]
         # Tracks with a common frame are different markers.
         at_once = (long.seen[:, has] & long.seen[:, [k]]).any(axis=0)
-        said[named[has[at_once]]] = -np.inf
-        best = int(np.argmax(said))
-        if said[best] < ENOUGH:
+        log_odds[named[has[at_once]]] = -np.inf
+        best = int(np.argmax(log_odds))
+        if log_odds[best] < ENOUGH:
             continue
-        weights = np.exp(WEIGHT * (said - said[best]))
+        weights = np.exp(WEIGHT * (log_odds - log_odds[best]))
         named[k], probabilities[k] = (
             best,
-            1 / (weights.sum() + np.exp(-WEIGHT * said[best])),
+            1 / (weights.sum() + np.exp(-WEIGHT * log_odds[best])),
         )
 
 

@@ -1,4 +1,4 @@
-"""Bonds: stable distances between markers, learnt from one capture and used in the next."""
+"""Bonds: stable distances between markers, estimated from one capture and used in the next."""
 
 from __future__ import annotations
 
@@ -59,6 +59,18 @@ class Bonds:
     ------
     ParameterError
         If the arrays do not fit each other.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> bonds = am.learn_bonds(am.simulate.person(frames=60, seed=1))
+    >>> bonds
+    Bonds(53 markers, 412 pairs, 206 rigid, 10 clusters)
+    >>> trunk = bonds.clusters[0]  # the largest rigid cluster
+    >>> [bonds.names[k] for k in trunk]
+    ['RFHD', 'RBHD', 'C7', 'T10', 'CLAV', 'STRN', 'RBAK', 'LSHO', 'ARIEL']
+    >>> int(bonds.steady.sum()), int(bonds.rigid.sum())
+    (409, 206)
     """
 
     names: tuple[str, ...]
@@ -154,7 +166,30 @@ class Bonds:
         return np.array([of.get(name or "", -1) for name in names], dtype=np.int64)
 
     def to_toml(self, path: str | Path | None = None) -> str:
-        """Return the bonds as TOML text, and write it to `path` if one is given."""
+        """Return the bonds as TOML text, and write it to a file if a path is given.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            File to write; an existing one is replaced.
+
+        Returns
+        -------
+        str
+            Text of the file; distances are rounded to micrometres.
+
+        Raises
+        ------
+        FormatError
+            If the file cannot be written.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> bonds = am.learn_bonds(am.simulate.cube(frames=40, seed=1))
+        >>> print(bonds.to_toml()[:26])
+        format = "asterism bonds"
+        """
         markers: list[dict[str, Any]] = []
         for name, place in zip(self.names, self.places, strict=True):
             own: dict[str, Any] = {"name": name}
@@ -177,18 +212,39 @@ class Bonds:
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
-        """Read bonds from a TOML file.
+        """Read bonds from a TOML file, as `to_toml` writes it.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to read.
+
+        Returns
+        -------
+        Bonds
 
         Raises
         ------
         FormatError
             If the file cannot be read, is not TOML, or contains no bonds.
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> from tempfile import TemporaryDirectory
+        >>> bonds = am.learn_bonds(am.simulate.cube(frames=40, seed=1))
+        >>> with TemporaryDirectory() as folder:
+        ...     text = bonds.to_toml(f"{folder}/cube.toml")
+        ...     am.tracking.Bonds.from_toml(f"{folder}/cube.toml")
+        Bonds(8 markers, 28 pairs, 28 rigid, 1 clusters)
         """
         content = read_toml(path, "bonds in TOML")
         path = Path(path)
         if content.get("format") != FORMAT:
             got = content.get("format", "none")
-            raise FormatError(path, "format", f'"{FORMAT}"', got, "write one by asterism bonds")
+            raise FormatError(
+                path, "format", f'"{FORMAT}"', got, "write such a file with asterism bonds"
+            )
         try:
             return cls(**_from_plain(content))
         except ParameterError as error:
@@ -211,16 +267,20 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, min_frames: int = MIN_T
     ----------
     tracks : Tracks
         Tracks with the names of the markers. Tracks without a name, or with a placeholder of a
-        recording software (``*12``, ``Unlabeled 7``), are left out. If no track has a name, all
+        capture software (``*12``, ``Unlabeled 7``), are left out. If no track has a name, all
         are used under the names ``T000``, ``T001`` … by their number.
     neighbours : int
-        Smallest number of pairs of each marker, if there are that many.
+        Smallest number of pairs of each marker, if there are that many, 1 to 1000. The default of
+        12 is several times the number of markers on a segment. Larger values add pairs of
+        different segments, which identify a marker less.
     min_frames : int
-        Smallest number of frames in which both markers of a pair are detected.
+        Smallest number of frames in which both markers of a pair are detected, ≥ 2. With fewer
+        frames a distance can be stable by chance.
 
     Returns
     -------
     Bonds
+        Pairs with their distances, and one pose of all markers.
 
     Raises
     ------
@@ -230,8 +290,11 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, min_frames: int = MIN_T
     Examples
     --------
     >>> import asterism as am
-    >>> am.learn_bonds(am.simulate.person(seed=1))  # doctest: +ELLIPSIS
-    Bonds(53 markers, ... pairs, ... rigid, ... clusters)
+    >>> bonds = am.learn_bonds(am.simulate.cube(frames=40, seed=1))
+    >>> bonds
+    Bonds(8 markers, 28 pairs, 28 rigid, 1 clusters)
+    >>> bonds.pairs[0].tolist(), round(float(bonds.distances[0]), 3)
+    ([0, 1], 0.3)
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_number("neighbours", neighbours, above=1, below=1000, closed=True, integer=True)

@@ -47,7 +47,13 @@ class Pass:
     n_cuts: int
 
     def advise(self, stitcher: _engine.Stitcher) -> None:
-        """Pass the joins of these tracklets as prior log odds to a pass in the other direction."""
+        """Pass the joins of these tracklets as prior log odds to a pass in the other direction.
+
+        Parameters
+        ----------
+        stitcher : Stitcher
+            Engine object of the other pass.
+        """
         joined = np.flatnonzero((self.after >= 0) & (self.markers >= 0))
         p = np.clip(self.probabilities[joined], 1e-9, 1 - 1e-9)
         log_odds = np.log(p / (1 - p)) / _engine.Stitcher.ODDS_FACTOR

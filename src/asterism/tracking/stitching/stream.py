@@ -23,7 +23,7 @@ __all__ = ["Stitched", "StitchedState"]
 
 @record(eq=False)
 class StitchedState:
-    """State of `Stitched`.
+    """State of `Stitched`: the tracklets of its method, and the markers they belong to.
 
     Parameters
     ----------
@@ -37,6 +37,17 @@ class StitchedState:
         Number of coordinates, 2 or 3.
     last_time : float
         Time of the last frame, seconds; -inf before the first.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.simulate.cube(frames=20, seed=1).detections
+    >>> method = am.tracking.Stitched()
+    >>> state, labels, _ = method.run(method.init(am.estimate_model(d).model), d)
+    >>> state
+    StitchedState(3-D, 160 detections taken, 0 joins, 0 cuts, 0 ghosts)
+    >>> state.n_seen, state.info["joins"]
+    (160, 0)
     """
 
     tracklets: MethodState
@@ -78,21 +89,24 @@ class Stitched(Method[StitchedState]):
 
     It corresponds to `stitch` for a whole capture, with the frames so far. A reappearing marker
     gets its most probable label when the method has confirmed its tracklet and `lag` frames have
-    passed.
-    The label is final after `confirm` detections, and earlier detections are revised. A marker
-    that was never detected before has the label -1 until then.
+    passed. The label is final after `confirm` detections, and earlier detections are revised. A
+    marker that was never detected before has the label -1 until then.
 
     Parameters
     ----------
     method : Method
-        Method that tracks the tracklets.
-    confirm, ghost_radius
-        As for `stitch`.
+        Method that tracks the tracklets; `SMP` over three frames by default.
+    confirm : int
+        Number of frames after which a tracklet is assigned to a marker, 2 to 100000. Larger values
+        use more evidence and decide later.
+    ghost_radius : float
+        Typical distance of a ghost from its marker, metres, > 0.
     max_hidden : int
-        Longest occlusion of a marker that is kept, frames; it bounds the memory of endless runs.
+        Longest occlusion after which a marker can reappear under its old label, frames. It bounds
+        the memory of endless streams; the default of 20000 frames is over a minute at 300 Hz.
     lag : int, optional
-        Number of frames within which the method's revisions are used; later ones are ignored.
-        By default one less than its `window`, or 2 for a method without a window.
+        Number of frames within which the method's revisions are used, 0 to 10000; later ones are
+        ignored. By default one less than its `window`, or 2 for a method without a window.
 
     Raises
     ------
@@ -102,14 +116,15 @@ class Stitched(Method[StitchedState]):
     Examples
     --------
     >>> import asterism as am
-    >>> truth = am.simulate.person(seed=1)
-    >>> d = am.simulate.corrupt(truth, burst=am.simulate.Burst(), seed=1).detections
+    >>> truth = am.simulate.cube(frames=60, seed=1)
+    >>> burst = am.simulate.Burst(n=2, shortest=10, longest=20)
+    >>> d = am.simulate.corrupt(truth, burst=burst, seed=1).detections
     >>> method = am.tracking.Stitched()
     >>> state = method.init(am.estimate_model(d).model)
     >>> for time, points in d:
     ...     state, update = method.step(state, time, points)
-    >>> bool((update.labels >= 0).all())
-    True
+    >>> state
+    StitchedState(3-D, 426 detections taken, 1 joins, 0 cuts, 0 ghosts)
     """
 
     name: ClassVar[str] = "stitched"
@@ -129,7 +144,17 @@ class Stitched(Method[StitchedState]):
     def init(
         self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None
     ) -> StitchedState:
-        """Return the state before the first frame; see `Method.init`."""
+        """Return the state before the first frame.
+
+        Parameters
+        ----------
+        model, n_axes, seed
+            As for `Method.init`.
+
+        Returns
+        -------
+        StitchedState
+        """
         check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
         model = tracklet_model(model)
         tracklets = self.method.init(model, n_axes=n_axes, seed=seed)
@@ -146,7 +171,18 @@ class Stitched(Method[StitchedState]):
         *,
         covariances: ArrayLike | None = None,
     ) -> tuple[StitchedState, Update]:
-        """Process the next frame; see `Method.step`."""
+        """Process the next frame.
+
+        Parameters
+        ----------
+        state, time, points, covariances
+            As for `Method.step`.
+
+        Returns
+        -------
+        state, update
+            Next state, and the labels of markers that the frame decides or revises.
+        """
         check_kind("state", state, StitchedState, "method.init(model)")
         frame = checked_frame(time, state.last_time, points, state.n_axes)
         tracklets, found = self.method.step(state.tracklets, time, frame, covariances=covariances)

@@ -38,6 +38,18 @@ class Join:
         Last frame before and first frame after the occlusion.
     probability : float
         Probability of the join, against all other occluded markers, a new marker and a ghost.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=60, seed=1)
+    >>> burst = am.simulate.Burst(n=2, shortest=10, longest=20)
+    >>> corrupted = am.simulate.corrupt(truth, burst=burst, seed=1)
+    >>> model = am.tracking.tracklet_model(am.estimate_model(corrupted.detections).model)
+    >>> stitching = am.stitch(am.track(corrupted.detections, am.GNN(), model=model), model)
+    >>> join = stitching.joins[0]
+    >>> join.marker, join.last, join.first, join.probability > 0.9
+    (3, 26, 43, True)
     """
 
     marker: int
@@ -65,6 +77,19 @@ class Stitching:
     n_cuts : int
         Number of links of the input tracks that were cut because the neighbours contradict
         them.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=60, seed=1)
+    >>> burst = am.simulate.Burst(n=2, shortest=10, longest=20)
+    >>> corrupted = am.simulate.corrupt(truth, burst=burst, seed=1)
+    >>> model = am.tracking.tracklet_model(am.estimate_model(corrupted.detections).model)
+    >>> stitching = am.stitch(am.track(corrupted.detections, am.GNN(), model=model), model)
+    >>> stitching.tracks.n_tracks, len(stitching.joins), stitching.n_ghosts
+    (8, 2, 0)
+    >>> stitching.bonds
+    Bonds(8 markers, 28 pairs, 28 rigid, 1 clusters)
     """
 
     tracks: Tracks
@@ -144,17 +169,20 @@ def stitch(
     model : TrackingModel
         Model of motion and noise, with the longest gap within a tracklet.
     confirm : int
-        Number of frames after which a tracklet is assigned to a marker. A shorter tracklet that
-        continues no marker and is near a marker or among bodies is a ghost. Larger values use
-        more evidence and delete more short tracklets.
+        Number of frames after which a tracklet is assigned to a marker, 2 to 100000. A shorter
+        tracklet that continues no marker and is near a marker or among bodies is a ghost. Larger
+        values use more evidence and delete more short tracklets.
     ghost_radius : float
-        Typical distance of a ghost from its marker, metres, > 0.
+        Typical distance of a ghost from its marker, metres, > 0. Larger values take more short
+        tracklets near markers for ghosts.
     max_hidden : int, optional
-        Longest occlusion of a marker that is kept, frames; unlimited by default.
+        Longest occlusion after which a marker can reappear under its old track, frames; unlimited
+        by default.
 
     Returns
     -------
     Stitching
+        Tracks of the markers, with the probability of every join.
 
     Raises
     ------
@@ -173,19 +201,22 @@ def stitch(
     Examples
     --------
     >>> import asterism as am
-    >>> truth = am.simulate.person(seed=1)
-    >>> corrupted = am.simulate.corrupt(truth, burst=am.simulate.Burst(), seed=1)
+    >>> truth = am.simulate.cube(frames=60, seed=1)
+    >>> burst = am.simulate.Burst(n=2, shortest=10, longest=20)
+    >>> corrupted = am.simulate.corrupt(truth, burst=burst, seed=1)
     >>> model = am.tracking.tracklet_model(am.estimate_model(corrupted.detections).model)
     >>> tracklets = am.track(corrupted.detections, am.GNN(), model=model)
-    >>> am.stitch(tracklets, model)  # doctest: +ELLIPSIS
-    Stitching(... tracks, ... joins, ... cuts, ... ghosts)
+    >>> tracklets.n_tracks
+    10
+    >>> am.stitch(tracklets, model)
+    Stitching(8 tracks, 2 joins, 0 cuts, 0 ghosts)
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
     check_options(confirm, ghost_radius, max_hidden)
     tracks = tracks.measured()
     d = tracks.detections
-    # Bonds learnt late in the capture help early in it, so each pass informs the next one in the
+    # Bonds found late in the capture help early in it, so each pass informs the next one in the
     # other direction. The last pass does not cut tracklets.
     limits = (model, confirm, ghost_radius, max_hidden)
     options = stitch_options(*limits)
@@ -221,7 +252,20 @@ def stitch(
 
 
 def check_options(confirm: int, ghost_radius: float, max_hidden: int | None) -> None:
-    """Raise `ParameterError` if an option of `stitch` is out of range."""
+    """Raise `ParameterError` if an option of `stitch` is out of range.
+
+    Parameters
+    ----------
+    confirm, ghost_radius, max_hidden
+        As for `stitch`.
+
+    Examples
+    --------
+    >>> check_options(confirm=1, ghost_radius=0.03, max_hidden=None)
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: confirm: expected a whole number in [2, 100000], found 1
+    """
     check_number("confirm", confirm, above=2, below=100_000, closed=True, integer=True)
     check_number("ghost_radius", ghost_radius, above=0, below=1e6)
     if max_hidden is not None:
@@ -235,7 +279,26 @@ def stitch_options(
     max_hidden: int | None,
     may_cut: bool = True,
 ) -> _engine.StitchOptions:
-    """Return the options of `stitch` as an engine object."""
+    """Return the options of `stitch` as an engine object.
+
+    Parameters
+    ----------
+    model, confirm, ghost_radius, max_hidden
+        As for `stitch`.
+    may_cut : bool
+        Whether links that the neighbours contradict are cut.
+
+    Returns
+    -------
+    StitchOptions
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
+    >>> type(stitch_options(model, 15, 0.03, None)).__name__
+    'StitchOptions'
+    """
     return _engine.StitchOptions(
         noise=model.sensor.noise_sigma,
         ghost_radius=ghost_radius,
