@@ -343,5 +343,5 @@ def test_a_fold_is_refused_at_the_centre_of_the_image_and_nowhere_else():
     assert np.isnan(top).all()
     np.testing.assert_allclose(middle, [0, 0, 1], atol=1e-12)
     low = [[800, 0, 639.5], [0, 800, 1100.0], [0, 0, 1]]
-    with pytest.raises(am.ParameterError, match="no fold at the centre of the image"):
+    with pytest.raises(am.ParameterError, match="a lens that does not fold the centre"):
         am.Camera(K=low, T_camera_world=np.eye(4), size_px=(1280, 1024), lens=lens)

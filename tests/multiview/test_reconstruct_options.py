@@ -118,7 +118,7 @@ def test_what_is_expected_must_be_of_these_frames():
         am.reconstruct(o, rig, prior=am.Detections.from_frames(o.times, list(X)))
     with pytest.raises(am.ParameterError, match="prior: expected the times"):
         am.reconstruct(o, rig, prior=am.Detections.from_frames([0.0], [X[0]]))
-    with pytest.raises(am.ParameterError, match="prior: expected places in 3-D"):
+    with pytest.raises(am.ParameterError, match="prior: expected 3-D positions"):
         am.reconstruct(o, rig, prior=am.Detections.from_frames(o.times, list(X[..., :2])))
 
 
@@ -174,7 +174,7 @@ def test_bad_input():
         am.reconstruct(3, rig)
     with pytest.raises(am.ParameterError, match="rig"):
         am.reconstruct(o, [1])
-    with pytest.raises(am.ParameterError, match="the truth"):
+    with pytest.raises(am.ParameterError, match="the true markers"):
         am.reconstruct(o, rig).markers(o)
 
 

@@ -35,34 +35,33 @@ __all__ = ["Camera"]
 class Camera:
     """Pin-hole camera with a lens model, a pose in the world and an image size.
 
-    A point goes to camera coordinates by ``T_camera_world``, to ``(x, y) = (X / Z, Y / Z)``,
-    through the lens, and to the pixel ``K (x, y, 1)``. The camera looks along +z; pixels count from
-    the centre of the top left one, u to the right, v down: the image spans -0.5 to width - 0.5.
+    ``T_camera_world`` takes a point to camera coordinates, which become ``(X / Z, Y / Z)``, then
+    pass the lens, then become the pixel ``K (x, y, 1)``. The camera looks along +z. Pixels count
+    from the centre of the top left pixel, u to the right, v down; the image spans -0.5 to w - 0.5.
 
     Parameters
     ----------
     K : array_like, shape (3, 3)
         ``[[f_u, s, u0], [0, f_v, v0], [0, 0, 1]]``, pixels; s is the skew.
     T_camera_world : array_like, shape (4, 4)
-        Takes world to camera coordinates, metres; a rotation and a shift.
+        World to camera coordinates, metres: a rotation and a translation.
     size_px : (int, int)
-        Width and height of the image.
+        Width and height of the image, pixels.
     lens : Lens, optional
-        How the image is bent; None for a pin-hole.
+        Lens model; None for a pin-hole without distortion.
     K_lens : array_like, shape (3, 3), optional
-        Where a calibration keeps them apart, the matrix between pixels and the coordinates in which
-        the lens works: an ideal pixel p becomes ``K_lens distort(K_lens⁻¹ p)``. By default K, or
-        for a lens in pixels the shift to the principal point.
+        Matrix between pixels and lens coordinates, if a calibration has one apart from K: an ideal
+        pixel p becomes ``K_lens distort(K_lens⁻¹ p)``. By default K, or for a lens in pixels the
+        translation to the principal point.
     near, far : float
-        Range of depths along the optical axis in which points are seen, metres.
+        Range of depths along the optical axis in which points are seen, metres; all by default.
     name : str
-        For people and files.
+        Name in files, messages and figures.
 
     Raises
     ------
     ParameterError
-        If a matrix is singular, not finite or not of its form, the rotation is none, or a size or
-        range makes no sense.
+        If a matrix has not its form, or a size or range is impossible.
 
     References
     ----------
@@ -77,6 +76,21 @@ class Camera:
     array([[639.5, 511.5],
            [739.5, 411.5],
            [  nan,   nan]])
+    >>> camera.center, camera.axis, camera.rays([639.5, 511.5])
+    (array([ 0., -4.,  1.]), array([0., 1., 0.]), array([0., 1., 0.]))
+    >>> camera.distort(camera.undistort([100.0, 50.0]))
+    array([100.,  50.])
+    >>> camera.jacobian([0, 0, 1])  # pixels per metre
+    array([[ 200.,    0.,    0.],
+           [   0.,    0., -200.]])
+    >>> bool((camera.lens_matrix == K).all()), camera.replace(name="cam1").name, type(camera.engine)
+    (True, 'cam1', <class 'asterism._engine.Camera'>)
+    >>> from asterism.camera import Polygon
+    >>> wall = Polygon(corners=[[-1, 1, 0], [1, 1, 0], [0, 1, 2]])
+    >>> float(camera.depth_image([wall]).depth.min()), camera.paint([wall]).order
+    (5.0, (Face(surface=0, face=0),))
+    >>> Camera.from_matrix(K @ camera.T_camera_world[:3], size_px=(1280, 1024))
+    Camera(1280 × 1024 px, f 800 px, at (0, -4, 1) m)
     """
 
     K: NDArray[np.float64]
@@ -115,7 +129,9 @@ class Camera:
         if isinstance(self.lens, QuadraticCorrection) and not self.lens.reaches(
             *middle_of_image(self.lens_matrix, self.size_px)
         ):
-            raise ParameterError("lens", "no fold at the centre of the image", self.lens)
+            raise ParameterError(
+                "lens", "a lens that does not fold the centre of the image", self.lens
+            )
 
     @classmethod
     def look_at(
@@ -133,7 +149,7 @@ class Camera:
         Parameters
         ----------
         position, target : array_like, shape (3,)
-            World metres.
+            Position of the camera, and point at which it looks, world metres.
         K, size_px, **options
             As for the class.
         up : array_like, shape (3,)
@@ -142,7 +158,7 @@ class Camera:
         Raises
         ------
         ParameterError
-            If position and target are one, or `up` is the direction of sight.
+            If position and target coincide, or `up` is the direction of sight.
         """
         T = looking_at(position, target, up)
         return cls(K=np.asarray(K), T_camera_world=T, size_px=size_px, **options)
@@ -154,7 +170,7 @@ class Camera:
         Parameters
         ----------
         P : array_like, shape (3, 4)
-            Takes homogeneous world metres to homogeneous pixels, up to scale and sign.
+            Homogeneous world metres to homogeneous pixels, up to scale and sign.
         size_px, **options
             As for the class.
 
@@ -192,11 +208,11 @@ class Camera:
         Parameters
         ----------
         points : array_like, shape (..., 3)
-            World metres; NaN where there is none. With moving surfaces (T, ..., 3).
+            World metres; NaN for an absent point. With moving surfaces (T, ..., 3).
         surfaces : sequence of Surface
-            What may hide them. A point is hidden if the segment from the camera to it meets one.
+            Occluding surfaces. A point is occluded if its segment to the camera meets one.
         clearance : float
-            Metres before the point where a surface does not count, as the point may lie on it.
+            Distance before the point in which no surface occludes it, metres, as it may lie on one.
 
         Returns
         -------
@@ -216,11 +232,12 @@ class Camera:
         Parameters
         ----------
         pixels : array_like, shape (..., 2)
+            (u, v), in the image or not.
 
         Returns
         -------
         ndarray, shape (..., 2)
-            NaN where no ray leads to the pixel: the lens model does not reach so far.
+            NaN for pixels beyond the lens model.
         """
         p = as_coordinates("pixels", pixels, 2)
         return self.engine.undistort(p.reshape(-1, 2)).reshape(p.shape)
@@ -247,11 +264,12 @@ class Camera:
         Parameters
         ----------
         pixels : array_like, shape (..., 2)
+            (u, v), in the image or not.
 
         Returns
         -------
         ndarray, shape (..., 3)
-            Unit vectors in the world; NaN where the lens model does not reach.
+            Unit vectors, world axes; NaN for pixels beyond the lens model.
         """
         n = self.undistort(pixels)
         d = np.concatenate([n, np.ones((*n.shape[:-1], 1))], axis=-1)
@@ -280,14 +298,14 @@ class Camera:
         Parameters
         ----------
         surfaces : sequence of Surface
-            What is drawn. Both sides are seen, at any depth before the camera.
+            Surfaces to draw. Both sides are seen, at any depth in front of the camera.
         moment : int
-            Which frame of those that move.
+            Frame of moving surfaces.
 
         Returns
         -------
         DepthImage
-            Exact at the centre of each pixel, through the lens.
+            Depths at the centre of each pixel, through the lens; the class has an example.
         """
         n = _check_moment(surfaces, moment)
         depth, owner = self._ray_grid.depth_image(
@@ -301,21 +319,21 @@ class Camera:
         Parameters
         ----------
         surfaces : sequence of Polygon or Mesh
-            What is painted; up to 2000 faces.
+            Surfaces to paint; up to 2000 faces.
         moment : int
-            Which frame of those that move.
+            Frame of moving surfaces.
 
         Returns
         -------
         Painting
-            Equal to `depth_image` but where faces overlap in a circle; those are its `cycles`.
+            Equal to `depth_image` except in `cycles`; the class has an example.
 
         Raises
         ------
         ParameterError
-            If there is a capsule among them.
+            If a surface is a capsule.
         SolverLimit
-            If there are more faces.
+            If there are more than 2000 faces.
         """
         _check_moment(surfaces, moment)
         faces, order, cycles = in_painters_order(surfaces, moment, self.T_camera_world)

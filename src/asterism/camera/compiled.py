@@ -26,7 +26,19 @@ def compile_camera(
     far: float,
     size_px: tuple[int, int],
 ) -> _engine.Camera:
-    """Return the engine's camera for the fields of a `Camera`."""
+    """Return the engine's camera for the fields of a `Camera`.
+
+    Parameters
+    ----------
+    K, T_camera_world, lens, near, far, size_px
+        As for `Camera`.
+    lens_matrix : ndarray, shape (3, 3)
+        `Camera.lens_matrix`.
+
+    Returns
+    -------
+    _engine.Camera
+    """
     B = lens_matrix if lens is not None else K
     A = np.eye(3) if B is K else np.asarray(np.linalg.solve(B, K), np.float64)
     is_quadratic = lens is not None and lens.kind == "quadratic"
@@ -52,7 +64,19 @@ def compile_camera(
 def middle_of_image(
     lens_matrix: NDArray[np.float64], size_px: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return the centre of the image in lens coordinates, shape (2,)."""
+    """Return the centre of the image in lens coordinates.
+
+    Parameters
+    ----------
+    lens_matrix : ndarray, shape (3, 3)
+        Matrix between pixels and lens coordinates.
+    size_px : (int, int)
+        Width and height.
+
+    Returns
+    -------
+    ndarray, shape (2,)
+    """
     w, h = size_px
     middle = np.array([(w - 1) / 2, (h - 1) / 2, 1.0])
     return np.asarray(np.linalg.solve(lens_matrix, middle)[:2], dtype=np.float64)

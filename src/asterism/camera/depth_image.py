@@ -24,9 +24,21 @@ class DepthImage:
     Parameters
     ----------
     depth : ndarray, shape (height, width)
-        Along the optical axis, metres; infinite where no surface is seen.
+        Depth along the optical axis, metres; infinite where no surface is seen.
     surface : ndarray of int32, shape (height, width)
-        Which surface is seen there, -1 where none is.
+        Number of the surface that is seen, -1 where none is.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> K = am.camera.intrinsics(focal_length=40, principal_point=(31.5, 23.5))
+    >>> camera = am.Camera.look_at((0, -4, 1), (0, 0, 1), K=K, size_px=(64, 48))
+    >>> arm = am.camera.Capsule(ends=[[-0.5, 0, 1], [0.5, 0, 1]], radius=0.1)
+    >>> image = camera.depth_image([arm])
+    >>> round(float(image.depth[24, 32]), 2), int((image.surface == 0).sum())
+    (3.91, 24)
+    >>> image.hides(camera.project([[0, 1, 1], [0, -1, 1]]))  # behind the arm, and in front
+    array([ True, False])
     """
 
     depth: NDArray[np.float64]
@@ -35,20 +47,20 @@ class DepthImage:
     def hides(self, projection: Projection, clearance: float = 1e-6) -> NDArray[np.bool_]:
         """Find the points that lie behind the surface of their nearest pixel.
 
-        The answer of a z-buffer: as fine as the pixels, so at the edges of a surface it may differ
-        from the exact test of `Camera.project`.
+        The test of a z-buffer has the resolution of the pixels: at the edges of a surface it may
+        differ from the exact test of `Camera.project`.
 
         Parameters
         ----------
         projection : Projection
-            Of points by the same camera.
+            Projection of the points by the same camera.
         clearance : float
-            Metres of depth that a point may lie behind a surface and still be seen.
+            Largest depth of a visible point behind the surface, metres; it allows for rounding.
 
         Returns
         -------
         ndarray of bool, shape (...)
-            False for points that fall beside the image.
+            True for occluded points; False for points outside the image.
         """
         in_image = np.isin(projection.reason, (Reason.VISIBLE, Reason.HIDDEN))
         h, w = self.depth.shape

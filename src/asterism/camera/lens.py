@@ -1,9 +1,9 @@
-"""Lenses: how a camera bends the ideal image, each in the direction in which its model is written.
+"""Lens models: distortion of the ideal image, in the direction in which each model is defined.
 
-A model maps undistorted to distorted coordinates (Brown-Conrady) or the other way (the rest). The
-other direction is solved, to the last digit. Every model has a domain, the region about the centre
-in which it stretches by a hundredth at least; beyond it the polynomial would fold the image over,
-so nothing is seen there.
+A model maps undistorted to distorted coordinates (Brown-Conrady) or the reverse (all others). The
+other direction is solved numerically to machine precision. Every model has a domain, the region
+about the centre in which its derivative stretches by at least 0.01. Beyond it the polynomial folds
+the image over, so points there are not seen.
 """
 
 from __future__ import annotations
@@ -29,7 +29,17 @@ MIN_STRETCH = 1e-2
 
 
 class Lens(ABC):
-    """A lens model: `BrownConrady`, `ReportRadial`, `ViconRadial` or `QuadraticCorrection`."""
+    """Lens model: `BrownConrady`, `ReportRadial`, `ViconRadial` or `QuadraticCorrection`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> lens = am.camera.ReportRadial(a1=-0.1)
+    >>> lens.coefficients, round(lens.radius, 2)
+    (array([-0.1,  0. ,  0. ,  0. ,  0. ]), 1.82)
+    >>> isinstance(lens, am.camera.Lens)
+    True
+    """
 
     is_backward: ClassVar[bool] = True
     """Whether the model maps distorted to undistorted coordinates."""
@@ -45,10 +55,10 @@ class Lens(ABC):
 
     @property
     def radius(self) -> float:
-        """Where the model ends, in its own coordinates, on the side from which it maps.
+        """Radius of the model's domain, in the coordinates from which it maps.
 
-        Infinite where it never folds over. For radial and tangential terms, whose derivative is
-        symmetric, this is the largest disc in which both its eigenvalues exceed 0.01.
+        It is infinite if the model never folds over. The derivative of radial and tangential terms
+        is symmetric; the domain is the largest disc in which both its eigenvalues exceed 0.01.
         """
         k, p = self.coefficients[:3], float(np.hypot(*self.coefficients[3:]))
         # Coefficients without an effect within a billion pixels are left out.
@@ -66,7 +76,7 @@ class BrownConrady(Lens):
     Parameters
     ----------
     k1, k2, p1, p2, k3 : float
-        Radial and tangential coefficients in OpenCV's order.
+        Radial (k) and tangential (p) coefficients in OpenCV's order, for normalised coordinates.
 
     References
     ----------
@@ -74,7 +84,10 @@ class BrownConrady(Lens):
 
     Examples
     --------
-    >>> round(BrownConrady(k1=-0.3).radius, 3)  # the fold of r - 0.3 r³, a little before it
+    >>> lens = BrownConrady(k1=-0.3)
+    >>> lens.coefficients
+    array([-0.3,  0. ,  0. ,  0. ,  0. ])
+    >>> round(lens.radius, 3)  # a little before the fold of r - 0.3 r³
     1.049
     """
 
@@ -99,13 +112,18 @@ class ReportRadial(Lens):
     """Radial model of the 2010 report (§3.2), distorted to undistorted.
 
     ``x = x_d (1 + a1 r_d² + a2 r_d⁴)`` in normalised coordinates, so projecting solves for r_d.
-    ``a1 > 0`` is barrel, ``a1 < 0`` pincushion distortion. Coefficients for an image plane in
-    metres are to be multiplied by f² and f⁴.
+    ``a1 > 0`` is barrel, ``a1 < 0`` pincushion distortion. Multiply coefficients for an image
+    plane in metres by f² and f⁴.
 
     Parameters
     ----------
     a1, a2 : float
-        Radial coefficients.
+        Radial coefficients, for normalised coordinates.
+
+    Examples
+    --------
+    >>> ReportRadial(a1=0.05).coefficients
+    array([0.05, 0.  , 0.  , 0.  , 0.  ])
     """
 
     a1: float = 0.0
@@ -124,13 +142,18 @@ class ReportRadial(Lens):
 class ViconRadial(Lens):
     """Vicon's radial model, measured to ideal pixels about the principal point.
 
-    ``u - u0 = (u_d - u0) (1 + k1 r² + k2 r⁴ + k3 r⁶)`` with r in pixels. Another centre than the
-    principal point is given by the camera's ``K_lens``.
+    ``u - u0 = (u_d - u0) (1 + k1 r² + k2 r⁴ + k3 r⁶)`` with r in pixels. The camera's
+    ``K_lens`` holds a distortion centre other than the principal point.
 
     Parameters
     ----------
     k1, k2, k3 : float
-        Radial coefficients, per pixel squared and so on.
+        Radial coefficients, px⁻², px⁻⁴ and px⁻⁶.
+
+    Examples
+    --------
+    >>> ViconRadial(k1=4e-8, k2=1e-14).coefficients[:2]
+    array([4.e-08, 1.e-14])
     """
 
     in_pixels: ClassVar[bool] = True
@@ -156,7 +179,15 @@ class QuadraticCorrection(Lens):
     Parameters
     ----------
     ex, ey : sequence of 5 float
-        Coefficients of each axis.
+        Coefficients of each axis, for lens coordinates (`Camera.K_lens`).
+
+    Examples
+    --------
+    >>> lens = QuadraticCorrection(ex=(0, 0, 1e-5, 0, 0), ey=(0, 0, 0, 1e-5, 0))
+    >>> lens.coefficients[:5], lens.radius
+    (array([0.e+00, 0.e+00, 1.e-05, 0.e+00, 0.e+00]), inf)
+    >>> lens.reaches(100, 100), lens.reaches(-60_000, 100)
+    (True, False)
     """
 
     kind: ClassVar[Literal["radial", "quadratic"]] = "quadratic"
@@ -175,11 +206,21 @@ class QuadraticCorrection(Lens):
 
     @property
     def radius(self) -> float:
-        """Infinite: the domain is no disc. See `reaches`."""
+        """Infinite, because the domain is not a disc; see `reaches`."""
         return float("inf")
 
     def reaches(self, u: float, v: float) -> bool:
-        """Return whether a point is in the domain: the derivative's symmetric part exceeds 0.01."""
+        """Return whether a point is in the domain: the derivative's symmetric part exceeds 0.01.
+
+        Parameters
+        ----------
+        u, v : float
+            Point in lens coordinates.
+
+        Returns
+        -------
+        bool
+        """
         a, b = self.ex, self.ey
         xx = 1 + a[0] + 2 * a[2] * u + a[4] * v
         yy = 1 + b[1] + 2 * b[3] * v + b[4] * u
@@ -198,10 +239,10 @@ def _check(lens: BrownConrady | ReportRadial | ViconRadial) -> None:
 def _end_of_disc(k: NDArray[np.float64], p: float) -> float:
     """Return the radius within which the map's derivative has eigenvalues above the minimum.
 
-    With A and B the stretch along and across the radius less the least one, and Q = p r, the
+    A and B are the stretch along and across the radius minus the minimum, and Q = p r. The
     determinant at angle φ to the tangential vector is
-    ``(A + 6 Q cos φ)(B + 2 Q cos φ) - 4 Q² sin² φ``: least at cos φ = -1, or in between where
-    A + 3 B < 16 Q.
+    ``(A + 6 Q cos φ)(B + 2 Q cos φ) - 4 Q² sin² φ``. Its minimum is at cos φ = -1, or in between
+    if A + 3 B < 16 Q.
     """
     along = np.array([1 - MIN_STRETCH, -6 * p, 3 * k[0], 0, 5 * k[1], 0, 7 * k[2]])
     across = np.array([1 - MIN_STRETCH, -2 * p, k[0], 0, k[1], 0, k[2]])
@@ -236,17 +277,18 @@ def _zero(
 
 
 def _first_root(coefficients: NDArray[np.float64]) -> float:
-    """Return the smallest positive real root of a polynomial, rising powers, the first above zero.
+    """Return the smallest positive root of a polynomial, given by ascending powers.
 
-    Infinity if there is none, or none within ten powers of ten of the least that could be.
+    The constant coefficient is positive. The result is infinite if there is no such root, or none
+    within a factor of 1e10 of the smallest possible one.
     """
     powers = np.arange(1, len(coefficients))
     ratios = np.abs(coefficients[1:] / coefficients[0])
     powers, ratios = powers[ratios > 0], ratios[ratios > 0]
     if not len(powers):
         return float("inf")
-    # In units of the least size that a root can have no coefficient exceeds the constant one. Of
-    # the inverse roots the largest is sought, which is the one that is found exactly.
+    # In units of the smallest possible root no coefficient exceeds the constant one. The smallest
+    # root is the largest inverse root, which is found most accurately.
     scale = float(np.exp(np.min(-np.log(ratios) / powers)))
     with np.errstate(under="ignore"):
         scaled = coefficients / coefficients[0] * scale ** np.arange(len(coefficients), dtype=float)

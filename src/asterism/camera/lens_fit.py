@@ -26,7 +26,7 @@ FITTED, JUDGED = 31, 151
 """Number of pixels along the longer image side at which lenses are fitted and compared."""
 
 FEWEST = 25
-"""Smallest share of the fitted pixels in the domain of the old lens."""
+"""Smallest number of fitted pixels in the domain of the old lens."""
 
 _POWERS = {"k1": 2, "k2": 4, "k3": 6, "a1": 2, "a2": 4, "p1": 1, "p2": 1}
 """Power of the radius of each coefficient, beyond the first."""
@@ -39,10 +39,19 @@ class LensFit:
     Parameters
     ----------
     camera : Camera
-        The camera with the fitted lens.
+        Camera with the fitted lens.
     rms_px, max_px : float
-        Root mean square and greatest distance between where the two see the same ray, over the
-        image, pixels. A ray that the new lens does not reach counts as far as the image is wide.
+        Root mean square and largest distance between the pixels of the two cameras for the same
+        ray, over the image. A ray that the new lens does not reach counts with the image width.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> lens = am.camera.BrownConrady(k1=-0.1)
+    >>> camera = am.Rig.ring(1, radius=4, height=2, lens=lens)[0]
+    >>> fit = am.camera.fit_lens(camera, None)  # a pin-hole without distortion
+    >>> fit.camera.lens, fit.max_px > 10
+    (None, True)
     """
 
     camera: Camera
@@ -59,31 +68,40 @@ def fit_lens(
 ) -> LensFit:
     """Fit another lens model to a camera over its image.
 
-    There is no exact conversion: the models bend in different directions, and a changed sign is
-    right to first order only. So the new one is fitted, and what it leaves over is told.
+    There is no exact conversion: the models map in different directions, and an inverted sign is
+    correct to first order only. The new model is therefore fitted, and its deviation reported.
 
     Parameters
     ----------
     camera : Camera
-        The camera.
+        Camera whose lens is replaced.
     kind : type of Lens or None
-        `BrownConrady`, `ReportRadial`, `ViconRadial`, None for a pin-hole; or
-        `QuadraticCorrection`, which will be one of raw pixels and may shift the principal point.
+        `BrownConrady`, `ReportRadial`, `ViconRadial`, None for a pin-hole, or
+        `QuadraticCorrection`. The last applies to raw pixels and may shift the principal point.
     refit_camera : bool
-        Whether K and the direction of sight may change too; the place never does. For a camera
-        with a `K_lens`, which the result has not, or a skew that is left out.
+        Whether K and the direction of the camera may change too, for a better fit; the position
+        never does. Useful for a camera with a `K_lens` or a skew that the result does not have.
     without : collection of str
-        Coefficients that stay zero, "skew" among them.
+        Coefficients that stay 0, such as "k3" or "skew".
 
     Returns
     -------
     LensFit
-        The camera, and its distance from the given one in pixels.
+        Camera with the new lens, and its deviation in pixels.
 
     Raises
     ------
     ParameterError
-        If the kind is another, or the old lens reaches next to nothing of the image.
+        If the kind is unknown, or the old lens reaches less than 25 of the fitted pixels.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> lens = am.camera.BrownConrady(k1=-0.1)
+    >>> camera = am.Rig.ring(1, radius=4, height=2, lens=lens)[0]
+    >>> fit = am.camera.fit_lens(camera, am.camera.ReportRadial)
+    >>> round(fit.camera.lens.a1, 2), round(fit.rms_px, 1), round(fit.max_px, 1)
+    (0.09, 0.1, 1.1)
     """
     from scipy.optimize import least_squares
 
@@ -93,7 +111,7 @@ def fit_lens(
     check_fields("without", without, ("skew", *_POWERS))
     pixels, rays = _image(camera, FITTED)
     if len(pixels) < FEWEST:
-        expected = "a lens that reaches a part of the image, to fit another to"
+        expected = f"a lens that reaches at least {FEWEST} pixels of the grid"
         raise ParameterError(f"camera {camera.name!r}", expected, camera.lens)
     if kind is QuadraticCorrection:
         return _judged(camera, _quadratic(camera, pixels, rays))
@@ -113,7 +131,7 @@ def fit_lens(
 
 
 def _image(camera: Camera, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return pixels in the domain of the lens, all over the image, and normalised coordinates."""
+    """Return a grid of pixels in the domain of the lens, and their normalised coordinates."""
     w, h = camera.size_px
     step = max((max(w, h) - 1) / (n - 1), 1e-9)
     across, down = (
@@ -128,7 +146,7 @@ def _image(camera: Camera, n: int) -> tuple[NDArray[np.float64], NDArray[np.floa
 def _apart(
     old: Camera, new: Camera, pixels: NDArray[np.float64], rays: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Where the new camera sees the rays of the old one, less where that saw them, shape (n, 2)."""
+    """Return the pixels of the rays in the new camera minus those in the old one, (n, 2)."""
     turned = np.column_stack([rays, np.ones(len(rays))]) @ (
         old.T_camera_world[:3, :3] @ new.T_camera_world[:3, :3].T
     )
@@ -147,7 +165,7 @@ def _judged(old: Camera, new: Camera) -> LensFit:
 
 
 def _quadratic(camera: Camera, pixels: NDArray[np.float64], rays: NDArray[np.float64]) -> Camera:
-    """Fit a correction of raw pixels; linear in its coefficients and in the principal point."""
+    """Fit a correction of raw pixels, which is linear in all its unknowns."""
     u, v = pixels.T
     size = float(max(camera.size_px))
     scale = np.array([size, size, size**2, size**2, size**2, 1.0])
@@ -161,11 +179,11 @@ def _quadratic(camera: Camera, pixels: NDArray[np.float64], rays: NDArray[np.flo
 
 
 class _Free:
-    """What may change: the coefficients, and on request K and the direction of sight.
+    """Free parameters of the fit: the coefficients, and on request K and the direction.
 
-    A coefficient is counted by what it does at the corner of the image, so that all are alike; then
-    come the logarithms of the focal lengths, the principal point and the skew in focal lengths, and
-    a rotation vector.
+    A coefficient is scaled by its effect at the corner of the image, so that all have similar
+    sizes. The logarithms of the focal lengths, the principal point and the skew in focal lengths,
+    and a rotation vector follow.
     """
 
     def __init__(
@@ -188,7 +206,7 @@ class _Free:
         self.K = camera.K.copy()
         if "skew" in without:
             self.K[0, 1] = 0.0
-        # Entries of K that move, and how many numbers are free besides the coefficients.
+        # Free entries of K, and the number of free parameters besides the coefficients.
         self.moving = ([0, 1], [2, 2]) if "skew" in without else ([0, 1, 0], [2, 2, 1])
         self.n_camera = 2 + len(self.moving[0]) + 3 if refit else 0
 

@@ -28,13 +28,13 @@ class Observations:
     cameras : tuple of str
         Names of the C cameras, all different, in the order of the rig.
     offsets : array_like of int, shape (T * C + 1,)
-        Camera c in frame t saw the points ``offsets[t * C + c]:offsets[t * C + c + 1]``.
+        Camera c has in frame t the points ``offsets[t * C + c]:offsets[t * C + c + 1]``.
     pixels : array_like, shape (N, 2)
-        (u, v) from the centre of the top left pixel, all finite.
+        Pixels (u, v) from the centre of the top left pixel, all finite.
     markers : array_like of int, shape (N,), optional
-        The truth where it is known: which marker each point is of, -1 for none of them.
+        True marker of each point, -1 for clutter, if it is known.
     marker_names : tuple of str
-        Names of the markers, where known.
+        Names of the markers, if they are known.
 
     Raises
     ------
@@ -50,6 +50,10 @@ class Observations:
     Observations(2 cameras, 1 frames, 3 points)
     >>> seen.points(0, 1)
     array([[5., 6.]])
+    >>> seen.n_frames, seen.n_cameras, seen.n_points, seen.counts.tolist()
+    (1, 2, 3, [[2, 1]])
+    >>> seen.frame_of.tolist(), seen.camera_of.tolist()
+    ([0, 0, 0], [0, 0, 1])
     """
 
     times: NDArray[np.float64]
@@ -68,7 +72,7 @@ class Observations:
         offsets = keep_array("offsets", self.offsets, (n_cells + 1,), dtype=np.int64)
         pixels = keep_array("pixels", self.pixels, ("N", 2))
         if (np.diff(times) <= 0).any():
-            raise ParameterError("times", "strictly increasing seconds", "others")
+            raise ParameterError("times", "strictly increasing seconds", "equal or decreasing ones")
         if offsets[0] != 0 or offsets[-1] != len(pixels) or (np.diff(offsets) < 0).any():
             expected = f"a rising sequence from 0 to {len(pixels)} (the number of points)"
             raise ParameterError("offsets", expected, f"{offsets[0]} … {offsets[-1]}")
@@ -116,7 +120,18 @@ class Observations:
         return np.repeat(np.tile(np.arange(self.n_cameras), self.n_frames), self.counts.ravel())
 
     def points(self, t: int, camera: int) -> NDArray[np.float64]:
-        """Return the image points of one camera in frame `t`, shape (n, 2), pixels."""
+        """Return the image points of one camera in one frame.
+
+        Parameters
+        ----------
+        t, camera : int
+            Numbers of the frame and of the camera.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Pixels.
+        """
         cell = t * self.n_cameras + camera
         return self.pixels[self.offsets[cell] : self.offsets[cell + 1]]
 

@@ -1,7 +1,7 @@
-"""The painter's algorithm (2010 report, §3.4): faces drawn over each other, the farthest first.
+"""Painter's algorithm (2010 report, §3.4): faces drawn over each other, the farthest first.
 
-It fails where faces overlap in a circle, each in front of the next, or pass through each other:
-then no order is right. The circles are found and told; the z-buffer has no such trouble.
+It fails if faces overlap in a circle, each in front of the next, or intersect: then no order is
+right. Such groups are reported as cycles. The z-buffer of `Camera.depth_image` has no such cases.
 """
 
 from __future__ import annotations
@@ -33,7 +33,21 @@ NEAREST = 1e-6
 
 
 class Face(NamedTuple):
-    """Unit of the painting order: a polygon (face 0), or one triangle of a mesh."""
+    """Unit of the painting order: a polygon (face 0), or one triangle of a mesh.
+
+    Parameters
+    ----------
+    surface : int
+        Number of the surface.
+    face : int
+        Number of the triangle in its mesh; 0 for a polygon.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.camera.Face(surface=1, face=0)
+    Face(surface=1, face=0)
+    """
 
     surface: int
     face: int
@@ -46,12 +60,23 @@ class Painting(DepthImage):
     Parameters
     ----------
     depth, surface
-        As in `DepthImage`: of the face that was painted last on each pixel.
+        As in `DepthImage`, for the face that was painted last on each pixel.
     order : tuple of Face
-        In which the faces were painted.
+        Faces in the order of painting, the farthest first.
     cycles : tuple of tuple of Face
-        Groups of faces for which no order is right: each is, directly or by way of others, both
-        in front of and behind each other one. Where there are any, the picture may be wrong.
+        Groups of faces without a right order: each face is, directly or through others, both in
+        front of and behind every other one. The image may be wrong in these faces.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> K = am.camera.intrinsics(focal_length=40, principal_point=(31.5, 23.5))
+    >>> camera = am.Camera.look_at((0, -4, 0), (0, 0, 0), K=K, size_px=(64, 48))
+    >>> square = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
+    >>> near, far = (am.camera.Polygon(corners=square + [0, y, 0]) for y in (-1, 1))
+    >>> painting = camera.paint([near, far])
+    >>> [face.surface for face in painting.order], painting.cycles
+    ([1, 0], ())
     """
 
     order: tuple[Face, ...]
@@ -68,24 +93,25 @@ class _Faces(NamedTuple):
 def in_painters_order(
     surfaces: Sequence[Surface], moment: int, T_camera_world: NDArray[np.float64]
 ) -> tuple[_Faces, list[int], list[list[int]]]:
-    """Compute the painting order.
+    """Compute the painting order of surfaces.
 
     Parameters
     ----------
     surfaces : sequence of Polygon or Mesh
-        What is painted.
+        Surfaces to paint.
     moment : int
-        Of moving surfaces.
+        Frame of moving surfaces.
     T_camera_world : ndarray, shape (4, 4)
-        Of the camera that looks.
+        Pose of the camera.
 
     Returns
     -------
-    faces : the faces with their triangles
+    faces : _Faces
+        Faces with their triangles in camera coordinates.
     order : list of int
         Faces from the farthest to the nearest.
     cycles : list of list of int
-        Groups of faces without an order; in `order` they stand by their mean depth.
+        Groups of faces without a right order; in `order` they are sorted by their mean depth.
 
     Raises
     ------
@@ -93,6 +119,15 @@ def in_painters_order(
         If there is a capsule among them.
     SolverLimit
         If there are more than 2000 faces.
+
+    Examples
+    --------
+    >>> from asterism.camera import Polygon
+    >>> corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    >>> squares = [Polygon(corners=corners + [0, 0, depth]) for depth in (2, 5, 3)]
+    >>> _, order, cycles = in_painters_order(squares, 0, np.eye(4))
+    >>> order, cycles
+    ([1, 2, 0], [])
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -100,7 +135,7 @@ def in_painters_order(
     faces = _faces(surfaces, moment, T_camera_world)
     n = len(faces.names)
     if n > MAX_FACES:
-        raise SolverLimit("faces to paint", n, MAX_FACES, "use the z-buffer: Camera.depth_image")
+        raise SolverLimit("faces to paint", n, MAX_FACES, "use Camera.depth_image, the z-buffer")
     behind, front = _relations(faces.triangles)
     graph = coo_array((np.ones(len(behind)), (behind, front)), shape=(n, n))
     n_groups, group = connected_components(graph, directed=True, connection="strong")
@@ -142,7 +177,7 @@ def _faces(surfaces: Sequence[Surface], moment: int, T_camera_world: NDArray[np.
         else:
             raise ParameterError(
                 f"surfaces[{i}]", "a Polygon or a Mesh, made of flat faces", type(surface).__name__,
-                "the z-buffer draws capsules: Camera.depth_image",
+                "use Camera.depth_image, which draws capsules too",
             )  # fmt: skip
         seen = points[moment if surface.n_moments > 1 else 0] @ R.T + t
         names += [Face(i, f) for f in range(len(groups))]

@@ -23,22 +23,29 @@ def triangulate(corners: NDArray[np.float64]) -> NDArray[np.int32]:
     Parameters
     ----------
     corners : ndarray, shape (T, M, 3)
-        The polygon over time.
+        Corners of the polygon in each of T frames, metres.
 
     Returns
     -------
     ndarray of int32, shape (M - 2, 3)
-        Three corners each, the same at all moments. Fewer where corners lie on a straight edge.
+        Corners of each triangle, the same in all frames. There are fewer triangles if corners lie
+        on a straight edge.
 
     Raises
     ------
     ParameterError
-        If there are under three corners, they do not lie in a plane, two edges cross, the area is
-        zero, or the triangles of the first moment turn over at another.
+        If there are fewer than three corners, they do not lie in a plane, two edges cross, the area
+        is zero, or the triangles of the first moment turn over at another.
 
     References
     ----------
     G. H. Meisters, Polygons have ears, American Mathematical Monthly 82 (1975).
+
+    Examples
+    --------
+    >>> arrow = np.array([[0, 0, 0], [2, 1, 0], [0, 2, 0], [1, 1, 0]])  # concave
+    >>> len(triangulate(arrow[None].astype(float)))
+    2
     """
     n = corners.shape[1]
     if n < 3:
@@ -58,7 +65,7 @@ def triangulate(corners: NDArray[np.float64]) -> NDArray[np.int32]:
             "corners",
             f"a plane, within {FLATNESS:g} of the polygon's size",
             f"corner {i} {heights[t, i]:g} m off it at moment {t}",
-            "a Mesh may bend",
+            "use a Mesh, which may bend",
         )
     flat = _flatten(centred[0], normals[0])
     crossing = _crossing_edges(flat)
@@ -73,7 +80,7 @@ def triangulate(corners: NDArray[np.float64]) -> NDArray[np.int32]:
     if sides[t, f] < -1e-9 * size[t] ** 2:
         raise ParameterError(
             "corners", "a polygon that keeps its shape", f"triangle {f} turned over at moment {t}",
-            "a Mesh may bend",
+            "use a Mesh, which may bend",
         )  # fmt: skip
     return faces
 

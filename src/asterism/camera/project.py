@@ -31,7 +31,14 @@ def project_points(
     surfaces: Sequence[Surface],
     clearance: float,
 ) -> Projection:
-    """Project points ``(..., 3)`` through several cameras; see `Camera.project`.
+    """Project points through several cameras.
+
+    Parameters
+    ----------
+    cameras : sequence of _engine.Camera
+        Cameras of the engine.
+    points, surfaces, clearance
+        As for `Camera.project`.
 
     Returns
     -------
@@ -64,7 +71,27 @@ def project_points(
 
 
 def as_coordinates(name: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
-    """Return an array of shape (..., n), or raise. NaN is accepted for an absent point."""
+    """Return an array of coordinates, or raise. NaN is accepted for an absent point.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for the message.
+    value : array_like, shape (..., n)
+        The coordinates.
+    n : int
+        Number of coordinates of a point.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        C-contiguous; masked items are NaN.
+
+    Raises
+    ------
+    ParameterError
+        If the shape or the type is another.
+    """
     try:
         array = np.asarray(value)
     except ValueError as error:  # rows of different lengths

@@ -15,41 +15,66 @@ __all__ = ["Projection", "Reason"]
 
 
 class Reason(IntEnum):
-    """Reason why a camera does not see a point: the first one that applies, in this order."""
+    """Reason why a camera does not see a point: the first one that applies, in this order.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(2, radius=4, height=2)
+    >>> behind = rig[0].project([9.0, 0.0, 2.0])
+    >>> am.camera.Reason(int(behind.reason)).name
+    'BEHIND'
+    """
 
     VISIBLE = 0
     """The point is seen."""
     ABSENT = 1
     """The point is absent: a coordinate is NaN."""
     BEHIND = 2
-    """Not in front of the camera."""
+    """The point is not in front of the camera."""
     NEAR = 3
-    """Nearer than the camera's range."""
+    """The point is nearer than the camera's range."""
     FAR = 4
-    """Farther than the camera's range."""
+    """The point is farther than the camera's range."""
     LENS = 5
-    """Beyond the domain of the lens model."""
+    """The point is beyond the domain of the lens model."""
     OUTSIDE = 6
-    """Outside the image."""
+    """The point is outside the image."""
     HIDDEN = 7
-    """Behind a surface."""
+    """The point is occluded by a surface."""
 
 
 @record(eq=False)
 class Projection:
-    """Points as cameras see them; all arrays have the shape of the points, cameras first for a rig.
+    """Image points and visibility of projected points.
+
+    All arrays have the shape of the points, with a leading axis of cameras for a rig.
 
     Parameters
     ----------
     pixels : ndarray, shape (..., 2)
-        (u, v) from the centre of the top left pixel, u to the right, v down. Also of points beside
-        the image or hidden; NaN where there is no image at all (absent, behind, beyond the lens).
+        (u, v) from the centre of the top left pixel, u to the right, v down. Points outside the
+        image and occluded points have pixels too; absent points, points behind the camera and
+        points beyond the lens have NaN.
     depth : ndarray, shape (...)
         Distance along the optical axis, metres.
     reason : ndarray of uint8, shape (...)
-        Each a `Reason`.
+        `Reason` of each point.
     hidden_by : ndarray of int32, shape (...)
-        Which surface hides the point: the one nearest to the camera; -1 if none.
+        Number of the occluding surface nearest to the camera, -1 without one.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(2, radius=4, height=2)
+    >>> seen = rig.project([[0, 0, 1], [0, 9, 1]])
+    >>> seen
+    Projection(2 of 4 visible, shape (2, 2))
+    >>> seen.visible
+    array([[ True, False],
+           [ True, False]])
+    >>> {reason.name: n for reason, n in seen.counts().items() if n}
+    {'VISIBLE': 2, 'OUTSIDE': 2}
     """
 
     pixels: NDArray[np.float64]
@@ -63,7 +88,7 @@ class Projection:
 
     @property
     def visible(self) -> NDArray[np.bool_]:
-        """Whether each point is seen."""
+        """True for points that are seen, shape (...)."""
         return self.reason == Reason.VISIBLE
 
     def counts(self) -> dict[Reason, int]:
@@ -71,7 +96,7 @@ class Projection:
         return {reason: int((self.reason == reason).sum()) for reason in Reason}
 
     def __getitem__(self, key: int) -> Projection:
-        """One entry of the first axis: of a rig's projection, one camera's."""
+        """Return one entry of the first axis, for a rig the projection of one camera."""
         return Projection(
             pixels=self.pixels[key],
             depth=self.depth[key],

@@ -1,4 +1,4 @@
-"""Rig: several cameras in one world."""
+"""Rig: several calibrated cameras in one world frame."""
 
 from __future__ import annotations
 
@@ -35,15 +35,24 @@ class Coverage:
     Parameters
     ----------
     points : ndarray, shape (..., 3)
-        The places, world metres.
+        Positions, world metres.
     n_cameras : ndarray of int, shape (...)
-        How many cameras see each.
+        Number of cameras that see each position.
     covariance : ndarray, shape (..., 3, 3)
-        Of a point triangulated there from all cameras that see it, m²: the inverse of the summed
-        information ``JᵀJ / σ²`` (the Cramér-Rao bound). NaN where under two cameras see it, or
-        where they and the place are on one line.
+        Covariance of a point triangulated there from all cameras that see it, m²: the inverse of
+        the summed information ``JᵀJ / σ²`` (the Cramér-Rao bound). NaN if fewer than two cameras
+        see the position, or if they and the position lie on one line.
     sigma_px : float
-        Standard deviation of an image point that was taken, pixels per axis.
+        Standard deviation of an image point in the computation, pixels per axis.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> coverage = am.Rig.ring(4, radius=4, height=2).coverage([[0, 0, 1], [0, 0, 9]])
+    >>> coverage
+    Coverage(2 positions, 1 seen by two cameras or more, noise 0.3 px)
+    >>> coverage.error.round(4)  # metres
+    array([0.0015,    nan])
     """
 
     points: NDArray[np.float64]
@@ -54,26 +63,31 @@ class Coverage:
     def __repr__(self) -> str:
         n = self.n_cameras
         return (
-            f"Coverage({n.size} places, {int((n >= 2).sum())} of them seen by two cameras or more, "
+            f"Coverage({n.size} positions, {int((n >= 2).sum())} seen by two cameras or more, "
             f"noise {self.sigma_px:g} px)"
         )
 
     @property
     def error(self) -> NDArray[np.float64]:
-        """Root mean square distance of a triangulated point from its place, metres, shape (...)."""
+        """Root mean square error of a triangulated point, metres, shape (...)."""
         return np.sqrt(np.trace(self.covariance, axis1=-2, axis2=-1))
 
 
 @record(eq=False, kw_only=False)
 class Rig:
-    """Cameras in one world; a sequence, by number or by name.
+    """Cameras in one world frame; a sequence, indexed by number or by name.
 
     Parameters
     ----------
     cameras : sequence of Camera
-        At least one. Their names are different; one without a name goes by its number.
+        At least one camera. The names differ; a camera without a name has its number from 1.
     warnings : tuple of str
-        What was odd in the file that it came from.
+        Unusual values in the file from which the rig was read.
+
+    Raises
+    ------
+    ParameterError
+        If there is no camera, or two have the same name.
 
     Examples
     --------
@@ -82,6 +96,12 @@ class Rig:
     (8, 1, 2)
     >>> int(rig.coverage([0.0, 0.0, 1.0]).n_cameras)
     8
+    >>> rig["cam2"].name, rig[:3].names
+    ('cam2', ('cam1', 'cam2', 'cam3'))
+    >>> rig.replace(warnings=("cam3 was moved",)).warnings
+    ('cam3 was moved',)
+    >>> Rig.wall(3, width=4, height=2, distance=5)
+    Rig(3 cameras: cam1, cam2, cam3)
     """
 
     cameras: tuple[Camera, ...]
@@ -118,13 +138,34 @@ class Rig:
         Parameters
         ----------
         n : int
-            Number of cameras, named ``cam1`` and so on; the first stands at +x of the target.
-        radius, height : float
-            Of the circle about the target's vertical; above the ground z = 0. Metres.
+            Number of cameras, ≥ 1, named ``cam1`` and so on; the first is at +x of the target.
+        radius : float
+            Radius of the circle about the target's vertical, metres, > 0.
+        height : float
+            Height of the cameras above z = 0, metres.
         target : array_like, shape (3,)
-            Where they look, metres.
-        focal_px, size_px, **options
-            Of every camera: focal length in pixels, image size, and what `Camera` takes.
+            Point at which all cameras look, metres.
+        focal_px : float
+            Focal length of every camera, pixels. The defaults of 900 px and 1280 × 1024 px are a
+            typical motion-capture camera with a field of view of 71°.
+        size_px : (int, int)
+            Width and height of every image.
+        **options
+            Further fields of every `Camera`, except its name.
+
+        Returns
+        -------
+        Rig
+
+        Raises
+        ------
+        ParameterError
+            If a number is out of range.
+
+        Examples
+        --------
+        >>> Rig.ring(3, radius=4, height=2.5)[0]
+        Camera('cam1', 1280 × 1024 px, f 900 px, at (4, 0, 2.5) m)
         """
         check_number("n", n, above=1, closed=True, integer=True)
         check_number("radius", radius, above=0)
@@ -160,13 +201,20 @@ class Rig:
         Parameters
         ----------
         n : int
-            Number of cameras, named ``cam1`` and so on from left to right as seen from the target.
+            Number of cameras, ≥ 1, named ``cam1`` and so on from left to right as seen from the
+            target.
         width : float
-            Of the row, metres; it runs along x, centred on the target.
-        height, distance : float
-            Above the ground; from the target, towards -y. Metres.
+            Length of the row, metres, ≥ 0; it runs along x, centred on the target.
+        height : float
+            Height of the cameras above z = 0, metres.
+        distance : float
+            Distance of the row from the target, towards -y, metres, > 0.
         target, focal_px, size_px, **options
             As for `ring`.
+
+        Returns
+        -------
+        Rig
         """
         check_number("n", n, above=1, closed=True, integer=True)
         check_number("width", width, above=0, closed=True)
@@ -233,11 +281,15 @@ class Rig:
         Parameters
         ----------
         points : array_like, shape (..., 3)
-            World metres; see `volume_grid`.
+            Positions, world metres; `volume_grid` makes a grid of them.
         surfaces : sequence of Surface
-            What may hide them.
+            Surfaces that may occlude the positions.
         sigma_px : float
-            Standard deviation of an image point, pixels per axis.
+            Standard deviation of an image point, pixels per axis, > 0; errors are proportional.
+
+        Returns
+        -------
+        Coverage
         """
         check_number("sigma_px", sigma_px, above=0)
         projection = self.project(points, surfaces)
@@ -256,7 +308,17 @@ class Rig:
         )
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy of the rig with some fields changed."""
+        """Return a copy of the rig with some fields changed.
+
+        Parameters
+        ----------
+        **changes
+            Fields of `Rig` by name.
+
+        Returns
+        -------
+        Rig
+        """
         return replace(self, **changes)
 
     def __len__(self) -> int:
@@ -287,9 +349,9 @@ def volume_grid(low: ArrayLike, high: ArrayLike, spacing: float) -> NDArray[np.f
     Parameters
     ----------
     low, high : array_like, shape (3,)
-        Corners of the box, metres; both belong to it as far as the spacing allows.
+        Corners of the box, metres; the grid starts at `low` and ends at or before `high`.
     spacing : float
-        Between neighbours, metres.
+        Distance between neighbours, metres, > 0.
 
     Returns
     -------
@@ -306,6 +368,8 @@ def volume_grid(low: ArrayLike, high: ArrayLike, spacing: float) -> NDArray[np.f
         raise ParameterError("high", f"a corner beyond {low.tolist()}", high.tolist())
     n = np.floor((high - low) / spacing + 1e-9).astype(int) + 1
     if n.prod(dtype=np.float64) > 1e8:
-        raise ParameterError("spacing", "under 100 million places", f"{n.prod(dtype=float):g}")
+        raise ParameterError(
+            "spacing", "a grid of at most 1e8 positions", f"{n.prod(dtype=float):g}"
+        )
     axes = [low[d] + spacing * np.arange(n[d]) for d in range(3)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)

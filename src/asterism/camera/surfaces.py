@@ -1,6 +1,6 @@
 """Surfaces that occlude points: polygons, meshes and capsules, fixed or moving.
 
-They are seen by nobody themselves: curtains of the 2010 report (§3.4). Both sides hide.
+Surfaces are the curtains of the 2010 report (§3.4). Both sides occlude; no camera reports them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,21 @@ __all__ = ["Capsule", "Mesh", "Polygon", "Surface", "check_surfaces", "compile_s
 
 
 class Surface(ABC):
-    """Surface that occludes points behind it: `Polygon`, `Mesh` or `Capsule`."""
+    """Surface that occludes points behind it: `Polygon`, `Mesh` or `Capsule`.
+
+    Attributes
+    ----------
+    name : str
+        Name in messages and figures.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.person(frames=10, seed=1)
+    >>> limb = truth.surfaces[0]
+    >>> isinstance(limb, am.camera.Surface), limb.n_moments, limb.during(np.array([0, 1])).n_moments
+    (True, 10, 2)
+    """
 
     name: str
 
@@ -38,7 +52,17 @@ class Surface(ABC):
 
     @abstractmethod
     def during(self, frames: NDArray[np.int64]) -> Self:
-        """Return the surface in some of its frames, shape (n,); a fixed surface returns itself."""
+        """Return the surface in some of its frames; a fixed surface returns itself.
+
+        Parameters
+        ----------
+        frames : ndarray of int, shape (n,)
+            Frames to select.
+
+        Returns
+        -------
+        Surface
+        """
 
 
 def _points(name: str, value: ArrayLike, n: int | str) -> NDArray[np.float64]:
@@ -55,20 +79,30 @@ def _points(name: str, value: ArrayLike, n: int | str) -> NDArray[np.float64]:
 
 @record(eq=False)
 class Polygon(Surface):
-    """A planar polygon, convex or concave, without holes; a triangle has three corners.
+    """Planar polygon, convex or concave, without holes.
 
     Parameters
     ----------
     corners : array_like, shape (M, 3) or (T, M, 3)
-        In order along the edge, world metres; with T moments, one a frame.
+        Corners in order along the edge, at least three, world metres; for a moving polygon in each
+        of T frames.
     name : str
-        For messages and pictures.
+        Name in messages and figures.
+    faces : ndarray of int32, shape (M - 2, 3)
+        Triangles of the polygon, which are computed.
 
     Raises
     ------
     ParameterError
         If the corners do not lie in a plane, edges cross, or the polygon has no area; or if it
-        bends so much while moving that its triangles turn over.
+        deforms so much while moving that its triangles turn over.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> wall = am.camera.Polygon(corners=[[-1, 2, 0], [1, 2, 0], [1, 2, 2], [-1, 2, 2]])
+    >>> wall.n_moments, wall.faces.shape, wall.during(np.arange(5)) is wall
+    (1, (2, 3), True)
     """
 
     corners: NDArray[np.float64]
@@ -85,7 +119,17 @@ class Polygon(Surface):
         return len(self.corners)
 
     def during(self, frames: NDArray[np.int64]) -> Self:
-        """Return the polygon in some of its frames."""
+        """Return the polygon in some of its frames.
+
+        Parameters
+        ----------
+        frames : ndarray of int, shape (n,)
+            Frames to select.
+
+        Returns
+        -------
+        Polygon
+        """
         return self if self.n_moments == 1 else replace(self, corners=self.corners[frames])
 
 
@@ -96,16 +140,25 @@ class Mesh(Surface):
     Parameters
     ----------
     vertices : array_like, shape (V, 3) or (T, V, 3)
-        World metres; with T moments, one a frame.
+        Vertices, world metres; for a moving mesh in each of T frames.
     faces : array_like of int, shape (F, 3)
-        Three vertices a triangle.
+        Numbers of the three vertices of each triangle.
     name : str
-        For messages and pictures.
+        Name in messages and figures.
 
     Raises
     ------
     ParameterError
-        If a face names a vertex that is not there.
+        If a face has the number of a vertex that does not exist.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> rising = np.stack([corners, corners + [0, 0, 0.1], corners + [0, 0, 0.2]])
+    >>> mesh = am.camera.Mesh(vertices=rising, faces=[[0, 1, 2], [0, 1, 3]])
+    >>> mesh.n_moments, mesh.during(np.array([0])).n_moments
+    (3, 1)
     """
 
     vertices: NDArray[np.float64]
@@ -132,7 +185,17 @@ class Mesh(Surface):
         return len(self.vertices)
 
     def during(self, frames: NDArray[np.int64]) -> Self:
-        """Return the mesh in some of its frames."""
+        """Return the mesh in some of its frames.
+
+        Parameters
+        ----------
+        frames : ndarray of int, shape (n,)
+            Frames to select.
+
+        Returns
+        -------
+        Mesh
+        """
         return self if self.n_moments == 1 else replace(self, vertices=self.vertices[frames])
 
 
@@ -143,11 +206,26 @@ class Capsule(Surface):
     Parameters
     ----------
     ends : array_like, shape (2, 3) or (T, 2, 3)
-        Ends of the axis, world metres; with T moments, one a frame.
+        Ends of the axis, world metres; for a moving capsule in each of T frames.
     radius : float
-        Metres.
+        Distance of the surface from the axis, metres, > 0.
     name : str
-        For messages and pictures.
+        Name in messages and figures.
+
+    Raises
+    ------
+    ParameterError
+        If an array has another shape, or the radius is not positive.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> arm = am.camera.Capsule(ends=[[0, 0, 1], [0.3, 0, 1]], radius=0.05, name="arm")
+    >>> arm.n_moments, arm.during(np.arange(5)) is arm
+    (1, True)
+    >>> rig = am.Rig.ring(4, radius=4, height=1)
+    >>> rig.project([0.15, 0.2, 1], surfaces=[arm]).visible  # the arm occludes one view
+    array([ True,  True,  True, False])
     """
 
     ends: NDArray[np.float64]
@@ -164,12 +242,35 @@ class Capsule(Surface):
         return len(self.ends)
 
     def during(self, frames: NDArray[np.int64]) -> Self:
-        """Return the capsule in some of its frames."""
+        """Return the capsule in some of its frames.
+
+        Parameters
+        ----------
+        frames : ndarray of int, shape (n,)
+            Frames to select.
+
+        Returns
+        -------
+        Capsule
+        """
         return self if self.n_moments == 1 else replace(self, ends=self.ends[frames])
 
 
 def check_surfaces(surfaces: Sequence[Surface]) -> None:
-    """Raise a ParameterError unless all objects are surfaces."""
+    """Raise a ParameterError unless all objects are surfaces.
+
+    Parameters
+    ----------
+    surfaces : list or tuple of Surface
+        Objects to check.
+
+    Examples
+    --------
+    >>> check_surfaces(["wall"])
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: surfaces[0]: expected a Polygon, Mesh or Capsule, found str
+    """
     if not isinstance(surfaces, (list, tuple)):
         raise ParameterError("surfaces", "a list or tuple of surfaces", type(surfaces).__name__)
     for i, surface in enumerate(surfaces):
@@ -182,10 +283,27 @@ def check_surfaces(surfaces: Sequence[Surface]) -> None:
 def compile_surfaces(surfaces: Sequence[Surface], n_frames: int) -> list[_engine.Surfaces]:
     """Convert surfaces to engine objects, one for the fixed and one for the moving ones.
 
+    Parameters
+    ----------
+    surfaces : sequence of Surface
+        Surfaces to convert.
+    n_frames : int
+        Number of frames T of the points.
+
+    Returns
+    -------
+    list of _engine.Surfaces
+
     Raises
     ------
     ParameterError
-        If a moving one has not `n_frames` moments.
+        If a moving surface has another number of moments than `n_frames`.
+
+    Examples
+    --------
+    >>> wall = Polygon(corners=[[-1, 2, 0], [1, 2, 0], [1, 2, 2], [-1, 2, 2]])
+    >>> len(compile_surfaces([wall], n_frames=10))
+    1
     """
     for i, surface in enumerate(surfaces):
         if surface.n_moments not in (1, n_frames):

@@ -28,7 +28,8 @@ def expected_positions(tracks: Tracks, model: TrackingModel, *, coast: int = 5) 
     model : TrackingModel
         Model whose motion and noise are used.
     coast : int
-        Number of frames after its last detection for which a track is still predicted.
+        Number of frames after its last detection for which a track is still predicted, ≥ 0. Larger
+        values predict through longer occlusions, with larger covariances.
 
     Returns
     -------

@@ -44,8 +44,12 @@ class States:
     --------
     >>> import asterism as am
     >>> truth = am.simulate.cube(frames=20, seed=1)
-    >>> filter_states(truth, am.estimate_model(truth.detections).model)
+    >>> states = filter_states(truth, am.estimate_model(truth.detections).model)
+    >>> states
     States(8 tracks, 160 states of 3 × 2)
+    >>> first = slice(states.offsets[0], states.offsets[1])  # the rows of track 0
+    >>> states.means[first].shape
+    (20, 3, 2)
     """
 
     means: NDArray[np.float64]
@@ -59,7 +63,17 @@ class States:
         return f"States({len(self.first_frames)} tracks, {len(self.means)} states of {D} × {n})"
 
     def positions(self, n_frames: int) -> NDArray[np.float64]:
-        """Return positions by frame and track, shape (n_frames, K, D), NaN outside a track's span.
+        """Return positions by frame and track, NaN outside a track's span.
+
+        Parameters
+        ----------
+        n_frames : int
+            Number of frames of the capture.
+
+        Returns
+        -------
+        ndarray, shape (n_frames, K, D)
+            Positions, metres; gaps inside a track hold the estimated position.
 
         Examples
         --------
@@ -117,7 +131,7 @@ def filter_states(tracks: Tracks, model: TrackingModel) -> States:
     Parameters
     ----------
     tracks : Tracks
-        Tracks to filter.
+        Tracks to filter, each from its first detection to its last.
     model : TrackingModel
         Model whose motion and noise are used.
 
@@ -130,8 +144,10 @@ def filter_states(tracks: Tracks, model: TrackingModel) -> States:
     --------
     >>> import asterism as am
     >>> truth = am.simulate.cube(frames=20, seed=1)
-    >>> filter_states(truth, am.estimate_model(truth.detections).model).means.shape
-    (160, 3, 2)
+    >>> states = filter_states(truth, am.estimate_model(truth.detections).model)
+    >>> position, velocity = states.means[19].T  # of the first track in the last frame
+    >>> velocity.shape
+    (3,)
     """
     return _states(tracks, model, smoothed=False)
 
@@ -157,7 +173,9 @@ def smooth_states(tracks: Tracks, model: TrackingModel) -> States:
     --------
     >>> import asterism as am
     >>> truth = am.simulate.cube(frames=20, seed=1)
-    >>> smooth_states(truth, am.estimate_model(truth.detections).model).means.shape
-    (160, 3, 2)
+    >>> model = am.estimate_model(truth.detections).model
+    >>> smoothed, filtered = smooth_states(truth, model), filter_states(truth, model)
+    >>> bool((smoothed.covariances[10] <= filtered.covariances[10]).all())
+    True
     """
     return _states(tracks, model, smoothed=True)

@@ -41,7 +41,19 @@ def match_views(
     n_threads: int = 1,
     advance: Callable[[int], None] | None = None,
 ) -> Reconstruction:
-    """Match and triangulate with a given image model; `reconstruct` describes the options."""
+    """Match and triangulate image points with a given image model.
+
+    Parameters
+    ----------
+    observations, rig, min_views, gate, merge_px, prior, max_nodes, n_threads, advance
+        As for `reconstruct`.
+    model : ImageModel
+        Noise, missed detections and clutter of the images.
+
+    Returns
+    -------
+    Reconstruction
+    """
     used, numbers = matched_rig(observations, rig)
     check_number("min_views", min_views, above=2, below=len(used), closed=True, integer=True)
     check_number("gate", gate, above=0)
@@ -96,10 +108,24 @@ def match_views(
 def matched_rig(observations: Observations, rig: Rig) -> tuple[Rig, NDArray[np.int64]]:
     """Return the cameras of the observations, in their order, and their numbers in the rig.
 
+    Parameters
+    ----------
+    observations : Observations
+        Image points of C cameras.
+    rig : Rig
+        Calibrated cameras.
+
+    Returns
+    -------
+    rig : Rig
+        The C cameras of the observations.
+    numbers : ndarray of int, shape (C,)
+        Their numbers in the given rig.
+
     Raises
     ------
     ParameterError
-        If one is not in the rig, or there are under two.
+        If one is not in the rig, or there are fewer than two.
     """
     check_kind("observations", observations, Observations, "am.io.read_observations(path)")
     check_kind("rig", rig, Rig, "am.read_rig(path)")
@@ -110,7 +136,7 @@ def matched_rig(observations: Observations, rig: Rig) -> tuple[Rig, NDArray[np.i
         got = f"{', '.join(rig.names)}: no {', '.join(unknown)}"
         raise ParameterError("rig", expected, got)
     if len(names) < 2:
-        hint = "depth needs a second view"
+        hint = "add a second camera, without which there is no depth"
         raise ParameterError("observations", "two cameras or more", len(names), hint)
     numbers = np.array([rig.names.index(name) for name in names])
     return Rig(tuple(rig[int(i)] for i in numbers)), numbers
@@ -150,12 +176,12 @@ def _expected(prior: Detections | None, observations: Observations) -> Detection
         )
     check_kind("prior", prior, Detections, "am.filter.expected_positions(tracks, model)")
     if prior.n_axes != 3:
-        raise ParameterError("prior", "places in 3-D", f"{prior.n_axes}-D ones")
+        raise ParameterError("prior", "3-D positions", f"{prior.n_axes}-D positions")
     if not np.array_equal(prior.times, observations.times):
-        raise ParameterError("prior", "the times of the observations", "others")
+        raise ParameterError("prior", "the times of the observations", "other times")
     if prior.covariances is None:
         raise ParameterError(
-            "prior", "places with covariances", "none", "try expected_positions(tracks, model)"
+            "prior", "positions with covariances", "none", "try expected_positions(tracks, model)"
         )
     return prior
 

@@ -1,8 +1,8 @@
 """Estimation of the image model of a capture from its image points alone.
 
-Points are made with what is known so far, and what they show is taken for known in the next round:
-how far image points lie from their places, how often a camera misses one that stands in its view,
-what is left over, and how many points there are where.
+Each round reconstructs points with the current model and re-estimates the model from them: the
+noise from the residuals, the detection probability from the cameras that miss a visible point, the
+clutter from the unused image points, and the density and the volume from the points.
 """
 
 from __future__ import annotations
@@ -46,21 +46,37 @@ def estimate_images(
     Parameters
     ----------
     observations : Observations
-        What the cameras saw.
+        Image points of all cameras.
     rig : Rig
-        The cameras, found by their names.
+        Calibrated cameras, matched to the observations by name.
     sigma_px : float, optional
-        Noise of an image point where it is known, pixels per axis; otherwise it is estimated for
-        each camera.
+        Known standard deviation of an image point, pixels per axis, > 0; by default it is estimated
+        for each camera.
     gate : float
-        Standard deviations within which an image point may be of a place.
+        As for `reconstruct`.
     n_frames : int
-        How many frames to look at, spread evenly over those in which there is something.
+        Number of frames used, ≥ 1, spread evenly over the frames with image points in two cameras.
+        Larger values are more accurate and need more time.
 
     Returns
     -------
     ImageModel
-        The default one, but for what is given, where nothing at all could be made.
+        If no point could be reconstructed, the default model with the given `sigma_px`.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range, a camera is not in the rig, or there are fewer than two.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=3, height=2, target=(0, 0, 0))
+    >>> seeing = am.simulate.Seeing(noise_px=0.5)
+    >>> film = am.simulate.film(am.simulate.cube(seed=1, frames=20), rig, seeing=seeing, seed=1)
+    >>> model = am.multiview.estimate_images(film.observations, rig)
+    >>> [round(sigma, 1) for sigma in model.sigma_px]
+    [0.5, 0.4, 0.6, 0.5]
     """
     used, _ = matched_rig(observations, rig)
     check_number("n_frames", n_frames, above=1, closed=True, integer=True)
@@ -84,7 +100,7 @@ def estimate_images(
             share = len(made.views.blobs) / max(some.n_points, 1)
             if not made.detections.n_points:
                 break
-            model = _learnt(made, some, used, base, is_noise_known=sigma_px is not None)
+            model = _updated(made, some, used, base, is_noise_known=sigma_px is not None)
         if share > most:
             best, most = model, share
         if share >= _ENOUGH:
@@ -110,9 +126,10 @@ def _sample(observations: Observations, n: int) -> Observations:
     )
 
 
-def _learnt(
+def _updated(
     made: Reconstruction, seen: Observations, rig: Rig, base: float, *, is_noise_known: bool
 ) -> ImageModel:
+    """Estimate the image model from a reconstruction."""
     d, views = made.detections, made.views
     assert d.covariances is not None
     n_views = views.counts

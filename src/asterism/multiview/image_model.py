@@ -31,23 +31,34 @@ class ImageModel:
     Parameters
     ----------
     sigma_px : float or tuple of float
-        Standard deviation of an image point, pixels per axis.
+        Standard deviation of an image point, pixels per axis, > 0.
     p_detection : float or tuple of float
-        Probability that a camera reports a point that stands in its view, in (0, 1). What bodies
-        hide counts as missed: where they hide much this is low, and a miss cheap.
+        Probability that a camera reports a point inside its image, in (0, 1). Occlusions by bodies
+        count as missed detections, so frequent occlusions lower it.
     clutter : float or tuple of float
-        Expected image points a camera and frame that belong to no point in space: false ones, and
-        those of markers that no other camera sees.
+        Expected number of image points per camera and frame that belong to no point in space, > 0:
+        false alarms, and markers that no other camera sees.
     density : float
-        Points in space by cubic metre of the volume.
+        Number of points in space per cubic metre of the volume, > 0.
     volume : (low, high), each 3 floats, optional
-        Corners of the box in which there are points, world metres. By default one about the
-        cameras, that reaches ten times the distance of the two farthest apart each way.
+        Corners of the box that holds all points, world metres. By default the box is centred on
+        the cameras and extends on each side by ten times the largest distance between two of them.
 
     Raises
     ------
     ParameterError
-        If a number is out of range, here or, where there is one for each camera, in use.
+        If a number is out of range. The count of numbers, one for each camera, is checked in use.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(2, radius=3, height=2)
+    >>> model = am.multiview.ImageModel(sigma_px=(0.2, 0.4), volume=((-1, -1, 0), (1, 1, 2)))
+    >>> sigma, p_detection, clutter = model.of(rig)
+    >>> sigma, p_detection
+    (array([0.2, 0.4]), array([0.9, 0.9]))
+    >>> model.box(rig)
+    ((-1.0, -1.0, 0.0), (1.0, 1.0, 2.0))
     """
 
     sigma_px: CameraNumbers = 0.3
@@ -73,11 +84,27 @@ class ImageModel:
                 raise ParameterError("volume", "two corners, low and high", repr(self.volume))
             low, high = (check_array("volume", corner, (3,)).tolist() for corner in self.volume)
             if not np.all(np.less(low, high)):
-                raise ParameterError("volume", f"a corner beyond {low}", high)
+                raise ParameterError("volume", f"a corner beyond {low} on every axis", high)
             object.__setattr__(self, "volume", (tuple(low), tuple(high)))
 
     def of(self, rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return noise, probability of detection and clutter per pixel², each of shape (C,)."""
+        """Return noise, detection probability and clutter of each camera.
+
+        Parameters
+        ----------
+        rig : Rig
+            The C cameras.
+
+        Returns
+        -------
+        sigma, p_detection, clutter : ndarray, shape (C,)
+            Pixels; probability; image points per frame and square pixel.
+
+        Raises
+        ------
+        ParameterError
+            If there are numbers for another number of cameras.
+        """
         area = np.array([float(np.prod(camera.size_px)) for camera in rig])
         return (
             per_camera("sigma_px", self.sigma_px, rig),
@@ -86,7 +113,18 @@ class ImageModel:
         )
 
     def box(self, rig: Rig) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Return the corners of the given or default volume, world metres."""
+        """Return the corners of the given or default volume.
+
+        Parameters
+        ----------
+        rig : Rig
+            Cameras that define the default volume.
+
+        Returns
+        -------
+        low, high : (float, float, float)
+            World metres.
+        """
         if self.volume is not None:
             low, high = (np.asarray(corner).tolist() for corner in self.volume)
         else:
@@ -98,6 +136,23 @@ class ImageModel:
 
 
 def widest_base(rig: Rig) -> float:
-    """Return the largest distance between two cameras, metres."""
+    """Return the largest distance between two cameras.
+
+    Parameters
+    ----------
+    rig : Rig
+        Cameras.
+
+    Returns
+    -------
+    float
+        Metres.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> round(widest_base(am.Rig.ring(4, radius=3, height=2)), 6)
+    6.0
+    """
     centers = np.stack([camera.center for camera in rig])
     return float(np.linalg.norm(centers[:, None] - centers, axis=-1).max())

@@ -29,11 +29,30 @@ class Views:
     Parameters
     ----------
     offsets : array_like of int, shape (N + 1,)
-        Point i was made of the views ``offsets[i]:offsets[i + 1]``.
+        Point i was triangulated from the views ``offsets[i]:offsets[i + 1]``.
     cameras : array_like of int, shape (V,)
-        The camera of each view, as the observations number them; rising within a point.
+        Camera of each view, numbered as in the observations; ascending within a point.
     blobs : array_like of int, shape (V,)
-        Its image point, a row of ``observations.pixels``.
+        Image point of each view, a row of ``observations.pixels``.
+
+    Raises
+    ------
+    ParameterError
+        If an array does not fit the others.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=3, height=2, target=(0, 0, 0))
+    >>> film = am.simulate.film(am.simulate.cube(seed=1, frames=10), rig)
+    >>> views = am.reconstruct(film.observations, rig).views
+    >>> views
+    Views(80 points of 320 views)
+    >>> int(views.counts.min()), int(views.is_shared.sum())
+    (4, 0)
+    >>> camera, image_point = views.of(0)[0]
+    >>> int(views.point_of[0]), camera, image_point
+    (0, 0, 0)
     """
 
     offsets: NDArray[np.int64]
@@ -49,7 +68,9 @@ class Views:
         cameras = keep_array("cameras", self.cameras, (len(blobs),), dtype=np.int64)
         is_rising = len(offsets) and offsets[0] == 0 and (np.diff(offsets) >= 0).all()
         if not is_rising or offsets[-1] != len(blobs):
-            raise ParameterError("offsets", f"a rising sequence from 0 to {len(blobs)}", "another")
+            raise ParameterError(
+                "offsets", f"a rising sequence from 0 to {len(blobs)}", "another sequence"
+            )
         for name, array in (("offsets", offsets), ("cameras", cameras), ("blobs", blobs)):
             object.__setattr__(self, name, array)
 
@@ -72,7 +93,18 @@ class Views:
         return np.bincount(self.blobs - first)[self.blobs - first] > 1
 
     def of(self, point: int) -> list[tuple[int, int]]:
-        """Return (camera, image point) of each view of a point."""
+        """Return the views of a point.
+
+        Parameters
+        ----------
+        point : int
+            Number of the point.
+
+        Returns
+        -------
+        list of (int, int)
+            Camera and image point of each view.
+        """
         rows = slice(int(self.offsets[point]), int(self.offsets[point + 1]))
         return list(zip(self.cameras[rows].tolist(), self.blobs[rows].tolist(), strict=True))
 
@@ -84,18 +116,29 @@ class Reconstruction:
     Attributes
     ----------
     detections : Detections
-        The points in space, with their cameras (by number in the rig), residuals (root mean square
-        distance of the rays), covariances, and from these the standard deviation of a coordinate.
+        Points in space, with their cameras (by number in the rig), residuals (root mean square
+        distance from the rays, metres), covariances, and standard deviations of a coordinate.
     views : Views
-        The image points that made each.
+        Image points of each point.
     scores : ndarray, shape (N,)
-        Log likelihood ratio of each point against its image points being clutter.
+        Log-likelihood ratio of each point against clutter, nats.
     model : ImageModel
-        What the images were taken to be like.
+        Image model that was used.
     info : mapping
-        ``n_candidates``: how many sets of image points were weighed; ``n_searched``: in how many
-        groups the best choice among them had to be searched; ``n_cut``: in how many of those the
-        search was cut; ``gap``: by how much in all the best choice may be better, nats.
+        ``n_candidates``: number of candidate sets of image points; ``n_searched``: number of groups
+        of candidates that needed a search; ``n_cut``: number of these in which the search was
+        stopped at `max_nodes`; ``gap``: bound of the total loss against the optimum, nats.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=3, height=2, target=(0, 0, 0))
+    >>> film = am.simulate.film(am.simulate.cube(seed=1, frames=10), rig)
+    >>> found = am.reconstruct(film.observations, rig)
+    >>> found
+    Reconstruction(10 frames, 80 points, 3-D, 0 to 9 s, of 320 views)
+    >>> found.markers(film.observations)[:8].tolist(), found.info["n_cut"]
+    ([0, 3, 1, 2, 4, 6, 5, 7], 0)
     """
 
     detections: Detections
@@ -113,20 +156,20 @@ class Reconstruction:
         Parameters
         ----------
         observations : Observations
-            What was reconstructed.
+            Observations that were reconstructed, with the true marker of each image point.
 
         Returns
         -------
         ndarray of int, shape (N,)
-            The marker of most of its image points (of several the first), -1 if most are of none.
+            Marker of most of the point's image points (the lowest number in a tie), -1 for clutter.
 
         Raises
         ------
         ParameterError
-            If they do not know the truth.
+            If the observations have no true markers.
         """
         if observations.markers is None:
-            raise ParameterError("observations", "the truth (markers)", "none")
+            raise ParameterError("observations", "the true markers of the image points", "none")
         of = observations.markers[self.views.blobs]
         pair, votes = np.unique(
             np.stack([self.views.point_of, of], axis=1), axis=0, return_counts=True

@@ -28,11 +28,11 @@ class Check:
     Parameters
     ----------
     name : str
-        What was looked at.
+        Property that was checked.
     status : {"passes", "is odd", "fails"}
-        Odd is what may be meant; what fails cannot be.
+        "is odd" marks an unusual but possible value, "fails" an impossible one.
     detail : str
-        The figures, with the cameras at fault.
+        Measured values, with the names of the cameras concerned.
     """
 
     name: str
@@ -46,11 +46,12 @@ def check_rig(rig: Rig) -> list[Check]:
     Parameters
     ----------
     rig : Rig
-        The cameras.
+        Cameras to check.
 
     Returns
     -------
     list of Check
+        One for each property, in a fixed order.
     """
     return [
         _worst(rig, "rotations", _rotation, "R Rᵀ off by at most {}", (1e-9, 1e-6)),
@@ -149,9 +150,9 @@ def check_points(
     Parameters
     ----------
     rig : Rig
-        The cameras.
+        Cameras to check.
     sightings : sequence of Sightings
-        What they saw.
+        Known points with their measured pixels, by camera.
     most : float
         Largest median error that passes, pixels.
 
@@ -160,8 +161,8 @@ def check_points(
     checks : list of Check
         One over all cameras.
     errors : list of dict
-        For each camera its name, the number of points and of those without a pixel, and the
-        median, 95th percentile and greatest distance in pixels.
+        For each camera its name, the number of points, the number of points that it cannot see, and
+        the median, 95th percentile and maximum of the error in pixels.
     """
     errors: list[dict[str, Any]] = []
     for name in rig.names:

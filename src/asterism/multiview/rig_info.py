@@ -24,19 +24,19 @@ class CameraInfo:
     Parameters
     ----------
     name, lens : str
-        Its name, and the class of its lens, "–" for none.
+        Name of the camera, and class of its lens, "–" for none.
     size_px, focal_px : tuple
-        Width and height; focal lengths along both.
+        Width and height; focal lengths along both axes, pixels.
     field_deg : tuple of float
-        Angles between the sights of the middles of opposite edges, degrees; NaN where the lens
+        Angles between the rays of the centres of opposite image edges, degrees; NaN if the lens
         model does not reach them.
     position, looks_at : tuple of float
-        Metres; the latter is the place on its axis that is next to where all axes meet, or a metre
-        ahead if it is alone.
+        Position, and the point of the optical axis nearest to the meeting point of all axes, or
+        1 m ahead of a single camera; world metres.
     largest_shift_px : float
-        Farthest that the lens moves a pixel of the image.
+        Largest displacement of a pixel by the lens.
     reach_percent : float
-        Share of the image that the lens model covers.
+        Share of the image that the lens model covers, percent.
     """
 
     name: str
@@ -56,15 +56,15 @@ def describe_rig(rig: Rig) -> tuple[list[CameraInfo], dict[str, Any]]:
     Parameters
     ----------
     rig : Rig
-        The cameras.
+        Cameras to summarise.
 
     Returns
     -------
     cameras : list of CameraInfo
         In the order of the rig.
     whole : dict
-        Number of cameras; where they look and how far their axes pass from there; how many see it;
-        least and greatest distance between two cameras. Metres.
+        Number of cameras, meeting point of their axes, largest distance of an axis from it, number
+        of cameras that see it, and smallest and largest distance between two cameras; metres.
     """
     meeting = meeting_point(rig)
     cameras = [_describe(c, n, meeting) for c, n in zip(rig, rig.names, strict=True)]
@@ -90,12 +90,12 @@ def meeting_point(rig: Rig) -> NDArray[np.float64] | None:
     Parameters
     ----------
     rig : Rig
-        The cameras.
+        Cameras of which at least two are not parallel.
 
     Returns
     -------
     ndarray, shape (3,), or None
-        World metres; None where all axes are parallel, or there is one only.
+        World metres; None if all axes are parallel, or there is one camera only.
     """
     # The distance is measured across each axis, so the sum of (1 - a aᵀ)(x - c) is zero.
     across = [np.eye(3) - np.outer(c.axis, c.axis) for c in rig]
@@ -107,7 +107,17 @@ def meeting_point(rig: Rig) -> NDArray[np.float64] | None:
 
 
 def image_grid(camera: Camera) -> NDArray[np.float64]:
-    """Return a grid of pixels over an image, including its edges, shape (N, 2)."""
+    """Return a grid of pixels over an image, including its edges.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera whose image is covered.
+
+    Returns
+    -------
+    ndarray, shape (N, 2)
+    """
     u, v = (np.linspace(-0.5, n - 0.5, _SIDE) for n in camera.size_px)
     return np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
 

@@ -31,12 +31,21 @@ class CameraSuggestion:
     Attributes
     ----------
     camera : Camera
-        Where it would stand and look.
+        The candidate, with its position and direction.
     error : float
-        Root mean square error of a point over the volume with it, metres; a place that a rig does
-        not see is as unsure as the volume is wide.
+        Root mean square error of a point over the volume with this camera, metres. A position that
+        the rig does not see has the width of the volume as its standard deviation.
     share : float
-        Share of the volume that two cameras or more would see.
+        Share of the volume that at least two cameras would see, in [0, 1].
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=4, height=2.5)[:2]
+    >>> box = (-1, -1, 0), (1, 1, 2)
+    >>> best = am.multiview.triangulation_map(rig, *box, spacing=0.5).suggestions[0]
+    >>> best.camera.name, best.share
+    ('suggested', 1.0)
     """
 
     camera: Camera
@@ -51,14 +60,22 @@ class TriangulationMap:
     Attributes
     ----------
     coverage : Coverage
-        Of an even grid of places: how many cameras see each, and the covariance of a point there.
+        Number of cameras and covariance of a point at each position of a regular grid.
     error : float
-        Root mean square error of a point over the volume, metres; a place that the rig does not
-        see is as unsure as the volume is wide.
+        Root mean square error of a point over the volume, metres. A position that the rig does not
+        see has the width of the volume as its standard deviation.
     share : float
-        Share of the volume that two cameras or more see.
+        Share of the volume that at least two cameras see, in [0, 1].
     suggestions : tuple of CameraSuggestion
-        Where one more camera helps most, the best first; each by itself, not after the others.
+        Best positions of one further camera, the best first; each is evaluated on its own.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=4, height=2.5)
+    >>> am.multiview.triangulation_map(rig, (-1, -1, 0), (1, 1, 2), spacing=0.5, n_suggestions=0)
+    TriangulationMap(125 positions, 100 % seen by two cameras or more, error 1.48 mm
+    root mean square, 0 suggestions)
     """
 
     coverage: Coverage
@@ -68,7 +85,7 @@ class TriangulationMap:
 
     def __repr__(self) -> str:
         return (
-            f"TriangulationMap({self.coverage.n_cameras.size} places, {100 * self.share:.3g} % "
+            f"TriangulationMap({self.coverage.n_cameras.size} positions, {100 * self.share:.3g} % "
             f"seen by two cameras or more, error {1e3 * self.error:.3g} mm root mean square, "
             f"{len(self.suggestions)} suggestions)"
         )
@@ -89,27 +106,28 @@ def triangulation_map(
     Parameters
     ----------
     rig : Rig
-        The cameras.
+        Cameras to evaluate.
     low, high : array_like, shape (3,)
         Corners of the box, world metres.
     spacing : float, optional
-        Between the places looked at, metres; by default a twelfth of the longest side.
+        Distance between the positions of the grid, metres, > 0; by default a twelfth of the longest
+        side. Smaller values are more accurate and need more time.
     sigma_px : float
-        Standard deviation of an image point, pixels per axis.
+        Standard deviation of an image point, pixels per axis, > 0; errors are proportional to it.
     surfaces : sequence of Surface
-        What may hide places.
+        Surfaces that may occlude positions.
     n_suggestions : int
-        How many places for a camera to suggest; 0 for none.
+        Number of suggested cameras, ≥ 0; the search needs most of the time.
 
     Returns
     -------
     TriangulationMap
-        To be drawn by `asterism.plot.plot_coverage` of its `coverage`.
+        `asterism.plot.plot_coverage` draws its `coverage`.
 
     Raises
     ------
     ParameterError
-        If the box is none, or a number is out of range.
+        If the corners span no box, or a number is out of range.
 
     Examples
     --------
@@ -151,27 +169,43 @@ def suggest_cameras(
 ) -> list[CameraSuggestion]:
     """Rank candidate cameras by the accuracy that each adds to a rig, the best first.
 
-    The measure is the mean square error of a point over the places (A-optimality), each place
-    known beforehand to `width`, so that those that are not seen count as well.
+    The measure is the mean square error of a point over the positions (A-optimality). Each position
+    has a prior standard deviation of `width`, so that positions that no camera sees count as well.
 
     Parameters
     ----------
     rig : Rig
-        The cameras there are.
+        Existing cameras.
     points : array_like, shape (..., 3)
-        Places that matter, world metres.
+        Positions over which the error is averaged, world metres.
     candidates : sequence of Camera
-        Cameras that there might be.
+        Cameras to compare.
     sigma_px : float
-        Standard deviation of an image point, pixels per axis.
+        Standard deviation of an image point, pixels per axis, > 0.
     surfaces : sequence of Surface
-        What may hide places.
+        Surfaces that may occlude positions.
     width : float
-        How well a place is known unseen, one standard deviation, metres.
+        Prior standard deviation of a position, metres, > 0. Larger values favour candidates that
+        see further positions over those that improve the accuracy of seen ones.
 
     Returns
     -------
     list of CameraSuggestion
+        All candidates, the one with the smallest error first.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> ring = am.Rig.ring(8, radius=4, height=2.5)
+    >>> grid = am.camera.volume_grid((-1, -1, 0), (1, 1, 2), 0.5)
+    >>> ranked = am.multiview.suggest_cameras(ring[:2], grid, ring[2:])
+    >>> sorted(suggestion.camera.name for suggestion in ranked[:2])
+    ['cam4', 'cam7']
     """
     places = check_array("points", np.reshape(points, (-1, 3)), ("N", 3))
     check_number("sigma_px", sigma_px, above=0)

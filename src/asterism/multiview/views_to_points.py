@@ -33,49 +33,58 @@ def reconstruct(
 ) -> Reconstruction:
     """Reconstruct points in space from unnamed image points of several cameras.
 
-    A set of image points of different cameras is weighed by the likelihood that one point made
-    them, its place integrated out, against that of their being clutter; a camera that could see
-    the place and did not costs a miss. Pairs of rays that meet are the seeds of such sets. Of all
-    sets that are likelier than clutter those are chosen that together are the likeliest and share
-    no image point: S-dimensional assignment [1]_, exact but for what `info` says. Each is
-    triangulated on the pixels as they were measured (`triangulate`).
+    A candidate is a set of image points of different cameras. Its score is the log likelihood that
+    one point in space made them, with the position integrated out, relative to clutter; a camera
+    that could see the position and has no image point costs a missed detection. Pairs of rays that
+    meet are the seeds of candidates. Among the candidates that are more likely than clutter, the
+    most likely subset without a common image point is chosen by S-dimensional assignment [1]_,
+    exactly unless ``info["n_cut"]`` is above 0. Each point is triangulated from its measured pixels
+    (`triangulate`).
 
     Parameters
     ----------
     observations : Observations
-        What the cameras saw.
+        Image points of all cameras.
     rig : Rig
-        The cameras, found by their names. Those that observed nothing at all, in a rig of more,
-        are not asked.
+        Calibrated cameras, matched to the observations by name. Cameras of the rig without any
+        observations are not used.
     model : ImageModel, optional
-        What the images are like. By default it is estimated (`estimate_images`).
+        Noise, missed detections and clutter of the images. By default it is estimated
+        (`estimate_images`).
     min_views : int
-        Fewest cameras that a point needs, 2 or more.
+        Smallest number of cameras of a point, 2 or more. Larger values make fewer false points and
+        lose points that few cameras see.
     gate : float
-        Standard deviations within which an image point may be of a place.
+        Largest distance between an image point and a projected position, standard deviations, > 0.
+        Larger values make more candidates and need more time.
     merge_px : float
-        How far the middle of two merged images may be from where each belongs, one standard
-        deviation, pixels. A point that the choice left may share image points that are taken, but
-        needs one of its own; what two points share counts so much less in both. 0 for no sharing.
+        Standard deviation of the distance between a merged image point and the images of its two
+        points, pixels, ≥ 0. A point outside the chosen subset may then share image points with
+        others, but needs one of its own; a shared image point has a lower weight. 0 excludes
+        sharing.
     prior : Detections, optional
-        3-D places where points are expected, with covariances, for each frame of the observations:
-        predicted by a tracker (`expected_positions`). A point is likelier there, to be found
-        in fewer cameras and preferred to a ghost; what no camera saw is not claimed.
+        Expected 3-D positions with covariances for each frame of the observations, as predicted by
+        a tracker (`expected_positions`). A point at an expected position is more likely: it needs
+        fewer cameras and is preferred to a ghost. It still needs image points.
     max_nodes : int
-        Most nodes of the search for the best choice in a group of sets that share image points.
+        Largest number of search nodes in a group of candidates that share image points, ≥ 1.
+        Larger values give exact results in larger groups and need more time.
     n_threads : int
-        Frames at a time; the result does not depend on it.
+        Number of frames that are processed at the same time, 1 to 1024; the result does not depend
+        on it.
     advance : callable, optional
-        Told the number of frames that are done.
+        Called from time to time with the number of finished frames.
 
     Returns
     -------
     Reconstruction
+        Points in space, with the image points and the score of each.
 
     Raises
     ------
     ParameterError
-        If a camera is not in the rig, there are under two, or the prior is of other frames.
+        If a camera is not in the rig, there are fewer than two cameras, or the prior has other
+        frames.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""Captures whose truth is known: scenes in motion, and what goes wrong when one is recorded."""
+"""Simulation: scenes with ground truth, their corruption, and their filming by a rig."""
 
 from asterism.simulate.centroids import Seeing
 from asterism.simulate.corruption import corrupt

@@ -1,4 +1,4 @@
-"""From visible points to what a motion-capture camera reports: blobs and their centroids."""
+"""Image formation of markers in motion-capture cameras: blobs and their centroids."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Blobs", "Seeing", "see"]
 
-_SAMPLES = 13  # points of a marker's disc that are looked at, spread like the seeds of a sunflower
+_SAMPLES = 13  # points of a marker's disc whose visibility is tested, in a sunflower pattern
 _CHUNK = 256  # frames at a time
 
 
@@ -32,28 +32,38 @@ class Seeing:
     Parameters
     ----------
     marker_radius : float
-        Metres; 0 for points. Where the middle of a marker is before all surfaces, its rim may dip
-        into the one on which it sits, up to three radii deep, without being hidden by it.
+        Radius of a marker, metres; 0 for points. The default is a marker of 14 mm diameter. If the
+        centre of a marker is visible, its rim may lie up to three radii inside the surface on which
+        it sits without being occluded by it.
     smallest_share : float
-        A marker of which less than this share is to be seen is not seen; of the others the
-        centroid is that of the part that is seen.
+        Smallest visible share of a marker that is detected, in [0, 1]. The centroid is that of the
+        visible part.
     merge : bool
         Whether blobs that touch in the image become one, at their common centroid.
     noise_px : float
-        Standard deviation of a centroid on each axis, pixels.
+        Standard deviation of a centroid on each axis, pixels, ≥ 0.
     missing : float
-        Probability that a camera misses a blob.
+        Probability that a camera misses a blob, in [0, 1].
     false : float
-        Expected false blobs a camera and frame, anywhere in the image.
+        Expected number of false alarms per camera and frame, ≥ 0, uniform over the image.
     quantum_px : float
-        Centroids are rounded to multiples of this, pixels; 0 for not at all.
+        Step to which centroids are rounded, pixels; 0 for no rounding.
     timing : float
-        Each camera is early or late by its own time, normal with this standard deviation, seconds.
+        Standard deviation of the constant time offset of each camera, seconds; 0 for synchronous
+        cameras.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=3, height=2, target=(0, 0, 0))
+    >>> seeing = am.simulate.Seeing(noise_px=0.5, missing=0.2, false=0.1)
+    >>> am.simulate.film(am.simulate.cube(frames=10), rig, seeing=seeing, seed=1)
+    Film(4 cameras, 10 frames, 8 markers, 263 image points)
     """
 
     marker_radius: float = 0.007
@@ -81,15 +91,23 @@ class Blobs(NamedTuple):
     Attributes
     ----------
     cell : ndarray of int, shape (N,)
-        Frame × cameras + camera.
+        Frame times number of cameras plus camera.
     pixels : ndarray, shape (N, 2)
-        Centroids.
+        Centroids, pixels.
     markers : ndarray of int, shape (N,)
-        The marker with the largest part in each; -1 for false ones.
+        Marker with the largest part in each blob; -1 for a false alarm.
     blob_of : ndarray of int, shape (C, T, K)
-        The blob that holds each marker's image, -1 if there is none.
+        Blob of each marker, -1 without one.
     share : ndarray, shape (C, T, K)
-        Share of each marker's disc that is seen, 0 where it has no image.
+        Visible share of each marker's disc, 0 without an image.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(2, radius=3, height=2)
+    >>> blobs = see(np.zeros(1), np.ones((1, 1, 3)), rig, (), am.simulate.Seeing(), seed=1)
+    >>> blobs.cell.tolist(), blobs.markers.tolist()
+    ([0, 1], [0, 0])
     """
 
     cell: NDArray[np.int64]
@@ -107,23 +125,33 @@ def see(
     seeing: Seeing,
     seed: int,
 ) -> Blobs:
-    """Look at markers through every camera.
+    """Simulate the image formation of markers in every camera.
 
     Parameters
     ----------
     times : ndarray, shape (T,)
-        Seconds.
+        Times of the frames, seconds.
     positions : ndarray, shape (T, K, 3)
-        World metres, NaN where a marker is not there.
+        World metres; NaN for an absent marker.
     rig : Rig
-        The cameras.
+        Cameras that film.
     surfaces : sequence of Surface
-        What hides markers.
+        Surfaces that occlude markers.
     seeing : Seeing
-        What the cameras make of them.
+        Options of the image formation.
     seed : int
-        Chooses everything that is random; each switch has a stream of its own, and none is that of
-        a scene with the same seed.
+        Seed; each option has its own stream of random numbers, independent of the scenes' streams.
+
+    Returns
+    -------
+    Blobs
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(2, radius=3, height=2)
+    >>> see(np.zeros(1), np.ones((1, 1, 3)), rig, (), am.simulate.Seeing(), seed=1).pixels.shape
+    (2, 2)
     """
     streams = np.random.SeedSequence(seed).spawn(5)
     rng_timing, rng_missing, rng_noise, rng_false, rng_order = map(np.random.default_rng, streams)
@@ -146,7 +174,7 @@ def see(
     is_seen = np.isfinite(centroid[..., 0])
     where = np.nonzero(is_seen)
     cell, pixels = where[0] * C + where[1], centroid[where]
-    weight = np.maximum(area[where], 1e-12)  # points have no area, and weigh alike
+    weight = np.maximum(area[where], 1e-12)  # points have no area, so all have one weight
     group = np.arange(len(cell))
     if seeing.merge and len(cell):
         group = touching(pixels, cell, np.sqrt(area[where]))
@@ -155,7 +183,7 @@ def see(
     together = np.stack([np.bincount(group, weight * p, n) / total for p in pixels.T], axis=1)
     alone = np.bincount(group, minlength=n)[group] == 1
     together[group[alone]] = pixels[alone]  # to the last bit
-    # The largest part last, so that it stays.
+    # The largest part is written last, so it determines the marker.
     order = np.lexsort((-where[2], weight))
     markers, cells = np.empty(n, np.int64), np.empty(n, np.int64)
     markers[group[order]], cells[group[order]] = where[2][order], cell[order]
@@ -173,7 +201,7 @@ def see(
     inside = (all_pixels >= -0.5) & (all_pixels < size[all_cells % C] - 0.5)
     kept = np.append(kept, np.ones(len(false_cell), dtype=bool)) & inside.all(axis=1)
 
-    # By cell, and at random within it: the order gives nothing away.
+    # The order within a cell is random, so that it does not reveal the markers.
     chosen = np.flatnonzero(kept)
     chosen = chosen[np.lexsort((rng_order.random(len(kept))[chosen], all_cells[chosen]))]
     number = np.full(len(kept) + 1, -1)
@@ -192,7 +220,7 @@ def see(
 def _discs(
     camera: Camera, positions: NDArray[np.float64], surfaces: Sequence[Surface], seeing: Seeing
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return centroid (T, K, 2) and share (T, K) of the part of each marker that is seen."""
+    """Return centroid (T, K, 2) and share (T, K) of the visible part of each marker."""
     r = seeing.marker_radius
     middle = camera.project(positions, surfaces)
     in_view = np.isin(middle.reason, (Reason.VISIBLE, Reason.HIDDEN))
@@ -211,12 +239,12 @@ def _discs(
         np.cos(turn)[:, None] * right[..., None, :] + np.sin(turn)[:, None] * down[..., None, :]
     ) * reach[:, None]
     disc = positions[..., None, :] + offset
-    forgiving = camera.project(disc, surfaces, clearance=3 * r)
+    tolerant = camera.project(disc, surfaces, clearance=3 * r)
     exact = camera.project(disc, surfaces)
-    # A marker whose middle is hidden does not sit on what hides it.
-    is_hidden = (middle.reason == Reason.HIDDEN)[..., None]
-    seen = np.where(is_hidden, exact.visible, forgiving.visible)
-    counted = np.isin(exact.reason, (Reason.VISIBLE, Reason.HIDDEN))  # not beside the image
+    # A marker with an occluded centre does not sit on the occluding surface.
+    is_occluded = (middle.reason == Reason.HIDDEN)[..., None]
+    seen = np.where(is_occluded, exact.visible, tolerant.visible)
+    counted = np.isin(exact.reason, (Reason.VISIBLE, Reason.HIDDEN))  # inside the image
     with np.errstate(invalid="ignore", divide="ignore"):
         count = seen.sum(axis=-1)
         share = np.where(in_view & (count > 0), count / counted.sum(axis=-1), 0.0)
@@ -227,7 +255,7 @@ def _discs(
 
 
 def _velocity(times: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the velocity of each marker, from the frames beside; 0 where it has no neighbour."""
+    """Return the velocity of each marker from adjacent frames; 0 if both are missing."""
     if len(times) < 2:
         return np.zeros_like(positions)
     steps = np.diff(positions, axis=0) / np.diff(times)[:, None, None]

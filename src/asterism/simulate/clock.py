@@ -1,4 +1,4 @@
-"""The clock that all simulated scenes share."""
+"""Frame times of all simulated scenes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,22 @@ __all__ = ["clock"]
 
 
 def clock(frames: int, rate: float, seed: int) -> NDArray[np.float64]:
-    """Check what every scene takes and give the time of each frame, shape (T,), seconds."""
+    """Check the arguments of every scene and return the time of each frame.
+
+    Parameters
+    ----------
+    frames : int
+        Number of frames T, ≥ 1.
+    rate : float
+        Frame rate, frames per second, > 0.
+    seed : int
+        Seed, ≥ 0.
+
+    Returns
+    -------
+    ndarray, shape (T,)
+        Seconds.
+    """
     check_number("frames", frames, above=1, closed=True, integer=True)
     check_number("rate", rate, above=0)
     check_number("seed", seed, above=0, closed=True, integer=True)

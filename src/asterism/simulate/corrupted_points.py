@@ -1,4 +1,4 @@
-"""Points on their way through the sensing of a scene."""
+"""Points of a scene during its corruption."""
 
 from __future__ import annotations
 
@@ -13,24 +13,66 @@ __all__ = ["Points", "false_points", "in_unit_ball", "touching"]
 
 
 class Points(NamedTuple):
-    """Frame (N,), place (N, D) and marker (N,) of some points; marker -1 for false ones."""
+    """Points with frames and markers.
+
+    Parameters
+    ----------
+    frames : ndarray of int, shape (N,)
+        Frame of each point.
+    places : ndarray, shape (N, D)
+        Positions, metres.
+    markers : ndarray of int, shape (N,)
+        Marker of each point, -1 for a false point.
+    """
 
     frames: NDArray[np.int64]
     places: NDArray[np.float64]
     markers: NDArray[np.int64]
 
     def where(self, chosen: NDArray[np.bool_]) -> Points:
-        """Return those that are chosen."""
+        """Return the chosen points.
+
+        Parameters
+        ----------
+        chosen : ndarray of bool, shape (N,)
+            True for the points to keep.
+
+        Returns
+        -------
+        Points
+        """
         return Points(self.frames[chosen], self.places[chosen], self.markers[chosen])
 
 
 def false_points(frames: NDArray[np.int64], places: NDArray[np.float64]) -> Points:
-    """Return points that are of no marker."""
+    """Return points that belong to no marker.
+
+    Parameters
+    ----------
+    frames, places
+        As for `Points`.
+
+    Returns
+    -------
+    Points
+    """
     return Points(frames, places, np.full(len(frames), -1))
 
 
 def in_unit_ball(rng: np.random.Generator, n: int, n_axes: int) -> NDArray[np.float64]:
-    """Draw `n` places evenly from the unit ball (the disc in 2-D), shape (n, n_axes)."""
+    """Draw uniform positions in the unit ball (2-D: the disc).
+
+    Parameters
+    ----------
+    rng : Generator
+        Generator of random numbers.
+    n, n_axes : int
+        Numbers of positions and of coordinates.
+
+    Returns
+    -------
+    ndarray, shape (n, n_axes)
+    """
     direction = rng.standard_normal((n, n_axes))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     return direction * rng.random((n, 1)) ** (1 / n_axes)
@@ -39,21 +81,21 @@ def in_unit_ball(rng: np.random.Generator, n: int, n_axes: int) -> NDArray[np.fl
 def touching(
     places: NDArray[np.float64], cells: NDArray[np.int64], radii: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Group discs (balls) that touch, from neighbour to neighbour, within cells.
+    """Group discs (3-D: balls) of a cell that touch directly or through others.
 
     Parameters
     ----------
     places : ndarray, shape (N, D)
-        Their centres.
+        Centres of the discs.
     cells : ndarray of int, shape (N,)
-        Only discs of one cell can touch.
+        Cell of each disc; only discs of one cell can touch.
     radii : ndarray, shape (N,)
-        Two touch whose centres are no farther apart than the sum of their radii.
+        Radii; two discs touch if the distance of their centres is at most the sum of their radii.
 
     Returns
     -------
     ndarray of int, shape (N,)
-        Group of each, from 0.
+        Group of each disc, from 0.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -63,7 +105,7 @@ def touching(
     reach = 2.0 * float(radii.max(initial=0.0))
     if not reach:
         return np.arange(n)
-    # Cells far apart along an axis of their own, so that one tree does for all.
+    # Cells are far apart along a further axis, so that one tree serves all of them.
     tree: Any = KDTree(np.column_stack([places, cells * (2.0 * reach)]))
     pairs: NDArray[np.int64] = tree.query_pairs(reach, output_type="ndarray")
     apart = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)

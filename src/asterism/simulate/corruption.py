@@ -1,8 +1,7 @@
 """Corruption of a scene or a capture with known truth: missed detections, clutter and noise.
 
-Real failures come in kinds, and trackers fail on them differently: points missing here and there,
-markers hidden for a while, false points anywhere, ghosts near a marker, noise, a low rate. Each is
-a switch of `corrupt`. What remains is the truth of the recording.
+Each kind of failure of real captures is an option of `corrupt`, because trackers fail on them
+differently: isolated missed detections, occlusions, clutter, ghosts, noise, a low frame rate.
 """
 
 from __future__ import annotations
@@ -55,75 +54,74 @@ def corrupt(
     keep_unnamed: bool = False,
     seed: int = 0,
 ) -> Truth:
-    """Record a scene or a capture whose truth is known, and keep the truth of what is left.
+    """Corrupt a scene or a capture with known truth, and return the truth of the result.
 
-    Each switch draws from a stream of its own, so turning one on or off leaves the others' choices
-    as they were: with and without clutter, the same detections are missing.
+    Each option draws from its own stream of random numbers. Changing one option leaves the random
+    choices of the others unchanged: with and without clutter, the same detections are missing.
 
     Parameters
     ----------
     truth : Tracks
-        Who is whom. If any track has a name, the named tracks are the markers; otherwise all are.
+        Ground truth. If any track has a name, the named tracks are the markers; otherwise all are.
     missing : float
-        Probability that a detection is dropped, each on its own.
+        Probability that a detection is missing, in [0, 1]; independent unless `missing_run` is set.
     missing_run : float
-        Not each on its own, but in runs of so many frames in the mean (Gilbert 1960): the model's
-        P_r is one over this. 0 for each on its own.
+        Mean length of bursts of missed detections, frames (Gilbert 1960): the model's P_r is its
+        inverse. 0 for independent missed detections.
     clutter : float
-        Expected false points a frame, as a share of the mean number of markers seen in a frame of
-        the original; their number is Poisson, their place uniform over its bounding box.
+        Expected number of false alarms per frame, ≥ 0, as a share of the mean number of markers in
+        a frame of the original. The number is Poisson; positions are uniform over the bounding box.
     noise : float
-        Standard deviation of isotropic normal noise on every point of the original, metres.
+        Standard deviation of isotropic normal noise on every point, metres, ≥ 0.
     noise_spread : float
-        Markers differ in their noise: the logarithm of the factor of each is normal with this
-        standard deviation.
+        Variation of the noise between markers, ≥ 0: the standard deviation of the logarithm of each
+        marker's noise factor.
     burst : Burst, optional
-        Markers hidden for a while.
+        Occlusions: bursts of missed detections.
     visits : Visits, optional
         Markers that enter and leave; each visit is a marker of its own.
     rig : Rig, optional
-        A marker is missing where fewer than `views` of these cameras see it, past the surfaces of
-        the truth. For 3-D.
+        Cameras; a marker that fewer than `views` of them see past the surfaces of the truth is
+        missing. 3-D only.
     views : int
-        How many cameras must see it.
+        Smallest number of cameras that must see a marker, ≥ 1.
     ghosts : Ghosts, optional
-        False points beside markers that last for a while.
+        False points that accompany a marker for some frames.
     nearby : float
-        Probability that a marker that is seen has a false point beside it in that frame.
+        Probability that a detected marker has a false point beside it for one frame, in [0, 1].
     nearby_within : float
-        Greatest distance of such a point, metres.
+        Largest distance of such a point, metres, > 0.
     doubled : float
-        Probability that a marker is seen as two points; the second is false.
+        Probability that a marker is detected as two points, in [0, 1]; the second one is false.
     doubled_apart : float
-        Distance between the two, metres.
+        Distance between the two points, metres, > 0.
     merged : float
-        Points of one frame nearer than this, metres, become one in their middle; it is of the
-        first of their markers. 0 for never.
+        Distance below which points of a frame become one point at their mean, metres, of the marker
+        with the lowest number; 0 for never.
     stride : int
-        Keep frames 0, `stride`, 2 `stride` …
+        Step between kept frames, ≥ 1; larger values lower the frame rate.
     dropped : float
-        Probability that a frame is lost, as if it had never been.
+        Probability that a frame is lost, in [0, 1].
     jitter : float
-        Frames come early or late by up to half of this share of the time between two, in [0, 1).
+        Largest shift of a frame's time, in either direction, is half of this share of the frame
+        interval, in [0, 1).
     margin : float
-        The bounding box for clutter is larger by this on every side, metres.
+        Extension of the bounding box for clutter on every side, metres, ≥ 0.
     keep_unnamed : bool
-        Whether points that belong to no marker (clutter, and tracks without a name among named
-        ones) stay, as clutter. By default they go: nobody knows whose they are, so nothing can be
-        judged by them.
+        Whether points of no marker (clutter, and unnamed tracks beside named ones) stay as clutter.
+        By default they are removed, because their true markers are unknown.
     seed : int
-        Chooses everything that is random.
+        Seed of all random numbers.
 
     Returns
     -------
     Truth
-        Truth of the recording: `detections` holds its points in random order within each frame,
-        `labels` the marker of each, or -1 for what is false. Every marker stays in `names`, seen or
-        not. `record` says which switches were on. With a rig, the detections know which cameras
-        saw them. If the source was a `Capture`, so are these
-        detections, with the same file and units, no channels, and rate and first frame as befits
-        the stride; where frames are left out or shaken it has no format, because the rest of the
-        file no longer goes with it.
+        Truth of the result. `detections` holds the points in random order within each frame,
+        `labels` the marker of each, -1 for false points. `names` lists every marker, detected or
+        not, and `record` the options that were set. With a rig, detections have their cameras. The
+        detections of a `Capture` are a `Capture` with the same file and units, no channels, and
+        rate and first frame according to the stride. Its format is empty if frames were left out
+        or shifted, because the rest of the file no longer matches.
 
     Raises
     ------
@@ -213,7 +211,7 @@ def _not_missed(
     n_frames: int,
     n_markers: int,
 ) -> NDArray[np.bool_]:
-    """Draw which points are detected; `run` is the mean length of missed detections on end."""
+    """Draw which points are detected; `run` is the mean length of a burst, or 0."""
     if not run:
         return (whole.markers < 0) | (rng.random(len(whole.markers)) >= missing)
     is_missed = in_runs(rng, missing, run, n_frames, n_markers)
@@ -236,10 +234,12 @@ def _check(truth: Tracks, switches: dict[str, Any]) -> None:
         check_number(name, switches[name], above=0)
     if switches["missing_run"]:
         if not 0 < switches["missing"] < 1:
-            raise ParameterError("missing_run", "missing in (0, 1) beside it", switches["missing"])
-        # As long as misses each on their own are, at least; the longest hold for all frames.
-        least = 1 / (1 - switches["missing"])
-        check_number("missing_run", switches["missing_run"], above=least, below=1e6, closed=True)
+            raise ParameterError(
+                "missing_run", "missing in (0, 1) to go with it", switches["missing"]
+            )
+        # The lower bound is the mean length of runs of independent missed detections.
+        shortest = 1 / (1 - switches["missing"])
+        check_number("missing_run", switches["missing_run"], above=shortest, below=1e6, closed=True)
     check_number("jitter", switches["jitter"], above=0, closed=True)
     if switches["jitter"] >= 1:
         raise ParameterError("jitter", "a number in [0, 1)", switches["jitter"])
@@ -250,18 +250,20 @@ def _check(truth: Tracks, switches: dict[str, Any]) -> None:
         raise ParameterError("rig", "a 3-D scene", f"{truth.detections.n_axes}-D")
     if switches["rig"] is None:
         if switches["views"] != 2:
-            raise ParameterError("views", "a rig beside it", "none")
+            raise ParameterError("views", "2, or a rig to go with it", switches["views"])
     elif len(switches["rig"]) > 62:
         raise ParameterError("rig", "at most 62 cameras", len(switches["rig"]))
     elif switches["views"] > len(switches["rig"]):
         n = len(switches["rig"])
-        raise ParameterError("views", f"at most {n}, the cameras of the rig", switches["views"])
+        raise ParameterError(
+            "views", f"at most {n}, the number of cameras of the rig", switches["views"]
+        )
 
 
 def _record(switches: dict[str, Any]) -> dict[str, Any]:
     """Return the corruptions that were applied, as plain words and numbers."""
     defaults: dict[str, Any] = corrupt.__kwdefaults__ or {}
-    # What only says how another switch works is worth telling when that one is on.
+    # A detail of another option is recorded if that option is set.
     details = {"nearby_within": "nearby", "doubled_apart": "doubled", "views": "rig"}
     record = {
         name: value
@@ -282,17 +284,17 @@ def _views(
     by_cameras: NDArray[np.int64] | None,
     sigma: NDArray[np.float64],
 ) -> dict[str, Any]:
-    """Find which cameras saw each point, and how far their rays pass by it.
+    """Return the cameras of each point, and its residual distance from their rays.
 
-    The misfit of n rays, each off by `sigma` across, that were fitted by least squares has 2 n - 3
-    degrees of freedom and is independent of the error of the point: so it is drawn, and tells
-    nothing of the truth. A false point has what a true one has, drawn at random.
+    The residual of n rays, each with an error of `sigma` across, has 2 n - 3 degrees of freedom
+    after a least-squares fit and is independent of the error of the point. It is drawn, so it does
+    not reveal the truth. A false point has the values of a random true point.
     """
     if by_cameras is None or not len(clean.frames):
         return {"cameras": None, "residuals": None}
     index = np.full((int(clean.frames.max()) + 1, int(clean.markers.max()) + 2), -1)
     index[clean.frames, clean.markers] = np.arange(len(clean.frames))
-    index[:, -1] = -1  # where clutter of the original went
+    index[:, -1] = -1  # clutter of the original has no marker
     at = index[np.minimum(mixed.frames, len(index) - 1), mixed.markers]
     cameras = by_cameras[at]
     is_false = np.flatnonzero(at < 0)
@@ -323,7 +325,7 @@ def _shuffled(rng: np.random.Generator, parts: list[Points]) -> Points:
 def _markers(
     truth: Tracks, chosen: NDArray[np.int64], keep_unnamed: bool
 ) -> tuple[Points, NDArray[np.int64]]:
-    """Return the points that take part, in the frames that stay, and the tracks of the markers."""
+    """Return the points used in the kept frames, and the track of each marker."""
     has_name = np.array([name is not None for name in truth.names], dtype=bool)
     if not has_name.any():
         has_name[:] = True
@@ -359,7 +361,7 @@ def _detections(
     stride: int,
     switches: dict[str, Any],
 ) -> Detections:
-    """Return the points as detections that know of their file what `source` knew."""
+    """Return the points as detections with the file information of `source`."""
     counts = np.bincount(mixed.frames, minlength=len(times))
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     if not isinstance(source, Capture):
@@ -374,11 +376,11 @@ def _detections(
         residuals=None,
         stds=None,
         covariances=None,
-        # The rest of the file (analog channels, events) goes by its own frames: at another rate a
-        # writer must not take it over.
+        # Analog channels and events of the file have the original frames, so a writer must not
+        # copy them at another rate.
         format=source.format if is_whole else "",
         rate=source.rate / stride,
-        # Frame n of a file stands for the time (n - 1) / rate.
+        # Frame n of a file has the time (n - 1) / rate.
         first_frame=(source.first_frame - 1) // stride + 1,
         channels=np.full(len(mixed.markers), -1),
         labels=mixed.markers,

@@ -1,4 +1,4 @@
-"""Episodes of a capture: bursts of missed detections, ghosts and visitors, with their times."""
+"""Episodes of a capture: bursts of missed detections, ghosts and visits."""
 
 from __future__ import annotations
 
@@ -17,21 +17,29 @@ __all__ = ["Burst", "Ghosts", "Visits", "episodes", "stays"]
 
 @record
 class Burst:
-    """Markers hidden for a while: behind a limb, at the edge of the volume.
+    """Bursts of missed detections, as of markers occluded by a limb.
+
+    Each of `n` shadows occludes one random marker for a random time, pauses for a random time, and
+    continues with another marker.
 
     Parameters
     ----------
     n : int
-        At most so many are hidden at a time, half as many on average: each of `n` shadows stays on
-        one marker for a while, then rests for a while, both of a length drawn from `shortest` to
-        `longest`, then picks another.
+        Largest number of markers that are occluded at the same time, ≥ 0; half as many on average.
     shortest, longest : int
-        Length of a while in frames, those of the result where frames are left out.
+        Range of the lengths of occlusions and pauses, frames of the result, ≥ 1.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> burst = am.simulate.Burst(n=2, shortest=10, longest=30)
+    >>> am.simulate.corrupt(am.simulate.cube(seed=1), burst=burst, seed=1)
+    Truth(8 tracks, 698 detections in them, 0 clutter, 100 frames)
     """
 
     n: int = 5
@@ -46,22 +54,30 @@ class Burst:
 
 @record
 class Ghosts:
-    """Short-lived false points that go along with a marker: reflections, wrong intersections.
+    """Ghosts: false points that accompany a marker, such as reflections or wrong intersections.
 
     Parameters
     ----------
     n : int
-        At most so many at a time, half as many on average, timed like `Burst`.
+        Largest number of ghosts at the same time, ≥ 0; half as many on average, timed as in
+        `Burst`.
     shortest, longest : int
-        Frames that one lasts, those of the result where frames are left out.
+        Range of the lifetimes of a ghost, frames of the result, ≥ 1.
     within : float
-        Greatest distance from its marker, metres. A ghost keeps its place beside the marker, drawn
-        evenly from the ball (the disc in 2-D); where the capture lacks the marker, it is absent.
+        Largest distance from the marker, metres, > 0. A ghost keeps its offset from the marker,
+        which is uniform in the ball (2-D: the disc), and is absent where the marker is absent.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> ghosts = am.simulate.Ghosts(n=2, within=0.02)
+    >>> am.simulate.corrupt(am.simulate.cube(seed=1), ghosts=ghosts, seed=1)
+    Truth(8 tracks, 800 detections in them, 102 clutter, 100 frames)
     """
 
     n: int = 3
@@ -78,18 +94,25 @@ class Ghosts:
 
 @record
 class Visits:
-    """Markers that enter and leave; one that comes again is another marker.
+    """Visits: markers that enter and leave. A marker that returns counts as another marker.
 
     Parameters
     ----------
     shortest, longest : int
-        Frames that one stays; half as many on average are between its leaving and the next one's
-        coming. Those of the result where frames are left out.
+        Range of the lengths of a visit, frames of the result, ≥ 1. Pauses between visits are half
+        as long on average.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> visits = am.simulate.Visits(shortest=20, longest=40)
+    >>> am.simulate.corrupt(am.simulate.cube(seed=1), visits=visits, seed=1).names[:3]
+    ('M00/1', 'M00/2', 'M00/3')
     """
 
     shortest: int = 50
@@ -101,22 +124,27 @@ class Visits:
 
 
 def stays(rng: np.random.Generator, visits: Visits, n_frames: int) -> NDArray[np.int64]:
-    """Draw when the visitors of one place are there.
+    """Draw the times of successive visits of one marker.
 
     Parameters
     ----------
     rng : Generator
-        Random numbers.
+        Generator of random numbers.
     visits : Visits
-        How long.
+        Lengths of the visits.
     n_frames : int
-        Frames of the capture.
+        Number of frames of the capture.
 
     Returns
     -------
     ndarray of int, shape (M, 2)
-        First frame of each visit and the frame after its last; the first is under way at the
-        beginning.
+        First frame of each visit and the frame after its last; the first visit has started before
+        frame 0.
+
+    Examples
+    --------
+    >>> stays(np.random.default_rng(1), Visits(shortest=20, longest=40), 100).shape[1]
+    2
     """
     n = n_frames // visits.shortest + 2
     there = rng.integers(visits.shortest, visits.longest, n, endpoint=True)
@@ -127,26 +155,32 @@ def stays(rng: np.random.Generator, visits: Visits, n_frames: int) -> NDArray[np
 
 
 def episodes(rng: np.random.Generator, timing: Burst | Ghosts, n_frames: int) -> NDArray[np.int64]:
-    """Draw when shadows or ghosts are there.
+    """Draw the times of bursts or ghosts.
 
     Parameters
     ----------
     rng : Generator
-        Random numbers.
+        Generator of random numbers.
     timing : Burst or Ghosts
-        How many, and how long.
+        Number and lengths of the episodes.
     n_frames : int
-        Frames of the capture.
+        Number of frames of the capture.
 
     Returns
     -------
     ndarray of int, shape (M, 2)
         First frame of each episode and the frame after its last.
+
+    Examples
+    --------
+    >>> found = episodes(np.random.default_rng(1), Burst(n=1, shortest=5, longest=5), 30)
+    >>> int((found[:, 1] - found[:, 0]).max())
+    5
     """
-    n_cycles = n_frames // (2 * timing.shortest) + 2  # enough even if all are of the shortest
+    n_cycles = n_frames // (2 * timing.shortest) + 2  # enough if all have the shortest length
     shape = (timing.n, 2 * n_cycles)
     lengths = rng.integers(timing.shortest, timing.longest, shape, endpoint=True)
-    # Each starts somewhere inside its first rest, so that not all rest in the first frame.
+    # Each starts at a random time within its first pause, so that not all pause in frame 0.
     edges = np.cumsum(lengths, axis=1) - rng.integers(0, lengths[:, :1], endpoint=True)
     pairs = edges.reshape(-1, 2)
     return np.minimum(pairs[pairs[:, 0] < n_frames], n_frames)

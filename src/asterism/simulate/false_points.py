@@ -20,7 +20,25 @@ __all__ = ["anywhere", "beside", "ghost_points"]
 def anywhere(
     rng: np.random.Generator, share: float, margin: float, whole: Points, n_frames: int
 ) -> Points:
-    """Draw clutter, evenly over the bounding box of all points; Poisson in number."""
+    """Draw clutter, uniform over the bounding box of all points and Poisson in number.
+
+    Parameters
+    ----------
+    rng : Generator
+        Generator of random numbers.
+    share : float
+        Expected number of false points in a frame, relative to the mean number of markers.
+    margin : float
+        Extension of the box on every side, metres.
+    whole : Points
+        Points of the original.
+    n_frames : int
+        Number of frames.
+
+    Returns
+    -------
+    Points
+    """
     n_markers = int((whole.markers >= 0).sum())
     n_false = rng.poisson(share * n_markers / n_frames, n_frames)
     low, high = whole.places.min(axis=0) - margin, whole.places.max(axis=0) + margin
@@ -36,10 +54,27 @@ def beside(
     points: Points,
     is_seen: NDArray[np.bool_],
 ) -> Points:
-    """Draw false points that last one frame, each near a marker that is seen.
+    """Draw false points that last one frame, each near a detected marker.
 
-    Drawn for all markers and kept for those that are seen, so that the choices do not depend on
-    which are. Between the nearest and the farthest distance they are even in volume.
+    They are drawn for all markers and kept for detected ones, so that the draws do not depend on
+    which markers are detected. They are uniform in the volume between the two distances.
+
+    Parameters
+    ----------
+    rng : Generator
+        Generator of random numbers.
+    share : float
+        Probability that a marker has a false point.
+    nearest, farthest : float
+        Range of the distance from the marker, metres.
+    points : Points
+        Points of all markers.
+    is_seen : ndarray of bool, shape (N,)
+        True for detected points.
+
+    Returns
+    -------
+    Points
     """
     n, n_axes = points.places.shape
     is_chosen = rng.random(n) < share
@@ -55,7 +90,24 @@ def beside(
 def ghost_points(
     rng: np.random.Generator, ghosts: Ghosts, whole: Points, n_frames: int, n_markers: int
 ) -> list[Points]:
-    """Draw false points that go along with a marker for a while."""
+    """Draw false points that accompany a marker for some frames.
+
+    Parameters
+    ----------
+    rng : Generator
+        Generator of random numbers.
+    ghosts : Ghosts
+        Number, lifetimes and distances.
+    whole : Points
+        Points of the original.
+    n_frames, n_markers : int
+        Numbers of frames and markers.
+
+    Returns
+    -------
+    list of Points
+        One for each ghost.
+    """
     is_marker = whole.markers >= 0
     where = np.full((n_frames, n_markers), -1)
     where[whole.frames[is_marker], whole.markers[is_marker]] = np.flatnonzero(is_marker)

@@ -1,4 +1,4 @@
-"""Truth through a rig: what each camera sees of it, and who is who."""
+"""Filming of a scene by a rig: image points of each camera, with their true markers."""
 
 from __future__ import annotations
 
@@ -31,13 +31,23 @@ class Film:
     Parameters
     ----------
     observations : Observations
-        The image points, with the truth of which marker each is (the largest one in it).
+        Image points, with the true marker of each (the largest one of a merged point).
     projection : Projection
-        Every marker in every image, seen or not and why: arrays of shape (C, T, K).
+        Projection and visibility of every marker in every image: arrays of shape (C, T, K).
     blob_of : ndarray of int, shape (C, T, K)
-        The image point that holds each marker, -1 if none does; merged markers share one.
+        Image point of each marker, -1 without one; merged markers share one.
     share : ndarray, shape (C, T, K)
-        Share of each marker that the camera sees.
+        Visible share of each marker's disc, in [0, 1].
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=3, height=2, target=(0, 0, 0))
+    >>> film = am.simulate.film(am.simulate.cube(seed=1, frames=10), rig)
+    >>> film
+    Film(4 cameras, 10 frames, 8 markers, 320 image points)
+    >>> float(film.projection.visible.mean()), film.blob_of.shape
+    (1.0, (4, 10, 8))
     """
 
     observations: Observations
@@ -61,25 +71,27 @@ def film(
     seeing: Seeing | None = None,
     seed: int = 0,
 ) -> Film:
-    """Film markers.
+    """Film the markers of a scene by a rig.
 
     Parameters
     ----------
     truth : Tracks
-        3-D, metres. Where a marker has no detection, no camera sees it; clutter is not filmed.
+        Markers in 3-D. A marker without a detection is seen by no camera; clutter is not filmed.
     rig : Rig
-        The cameras.
+        Cameras that film.
     surfaces : sequence of Surface, optional
-        What hides markers; one moment, or one for every frame. By default those of the scene.
+        Surfaces that occlude markers, each fixed or with one moment per frame. By default those of
+        the scene.
     seeing : Seeing, optional
-        What the cameras make of what is before them. By default they are ideal: every visible
-        point is one image point where it belongs, in the order of the markers.
+        Image formation: partial occlusion, merging, noise, missed detections and false alarms. By
+        default every visible marker has one exact image point, in the order of the markers.
     seed : int
-        Chooses everything that is random.
+        Seed of all random numbers.
 
     Returns
     -------
     Film
+        Image points, with the truth.
 
     Raises
     ------
@@ -100,7 +112,7 @@ def film(
     check_kind("rig", rig, Rig, "am.read_rig(path)")
     detections = truth.detections
     if detections.n_axes != 3:
-        raise ParameterError("truth", "3-D detections", f"{detections.n_axes}-D ones")
+        raise ParameterError("truth", "3-D detections", f"{detections.n_axes}-D detections")
     check_number("seed", seed, above=0, closed=True, integer=True)
     if seeing is not None:
         check_kind("seeing", seeing, Seeing)

@@ -23,18 +23,22 @@ __all__ = ["come_and_go", "in_runs", "merge", "seen_by_rig", "shadowed"]
 def in_runs(
     rng: np.random.Generator, share: float, length: float, n_frames: int, n_markers: int
 ) -> NDArray[np.bool_]:
-    """Draw misses that come in runs, shape (n_frames, n_markers): Gilbert's channel of two states.
+    """Draw bursts of missed detections by the two-state channel of Gilbert (1960).
 
     Parameters
     ----------
     rng : Generator
-        For the draws.
+        Generator of random numbers.
     share : float
-        Of the frames, in the long run.
+        Expected share of missed detections.
     length : float
-        Of a run in the mean, frames.
+        Mean length of a burst, frames.
     n_frames, n_markers : int
-        How many.
+        Numbers of frames and markers.
+
+    Returns
+    -------
+    ndarray of bool, shape (n_frames, n_markers)
     """
     again = 1.0 / length
     dice = rng.random((n_frames, n_markers))
@@ -49,7 +53,23 @@ def in_runs(
 def shadowed(
     rng: np.random.Generator, burst: Burst, points: Points, n_frames: int, n_markers: int
 ) -> NDArray[np.bool_]:
-    """Find the points in the occluded regions of a burst."""
+    """Find the points that a burst occludes.
+
+    Parameters
+    ----------
+    rng : Generator
+        Generator of random numbers.
+    burst : Burst
+        Number and lengths of the occlusions.
+    points : Points
+        Points of all markers.
+    n_frames, n_markers : int
+        Numbers of frames and markers.
+
+    Returns
+    -------
+    ndarray of bool, shape (N,)
+    """
     is_dark = np.zeros((n_frames, n_markers), dtype=bool)
     for start, stop in episodes(rng, burst, n_frames):
         is_dark[start:stop, rng.integers(n_markers)] = True
@@ -62,7 +82,24 @@ def shadowed(
 def seen_by_rig(
     points: Points, rig: Rig, surfaces: Sequence[Surface], n_frames: int
 ) -> NDArray[np.int64]:
-    """Return the cameras that see each marker past the surfaces: bit i for camera i, shape (N,)."""
+    """Return the cameras that see each marker past the surfaces.
+
+    Parameters
+    ----------
+    points : Points
+        Points of all markers, 3-D.
+    rig : Rig
+        Cameras, at most 62.
+    surfaces : sequence of Surface
+        Surfaces that occlude markers.
+    n_frames : int
+        Number of frames.
+
+    Returns
+    -------
+    ndarray of int, shape (N,)
+        Bit i is set if camera i sees the point.
+    """
     is_marker = points.markers >= 0
     n_markers = int(points.markers.max(initial=-1)) + 1
     result = np.zeros(len(is_marker), dtype=np.int64)
@@ -71,7 +108,7 @@ def seen_by_rig(
     dense = np.full((n_frames, n_markers, 3), np.nan)
     at = points.frames[is_marker], points.markers[is_marker]
     dense[at] = points.places[is_marker]
-    for i, camera in enumerate(rig):  # one at a time: all at once would fill the memory
+    for i, camera in enumerate(rig):  # one camera at a time limits the memory
         result[is_marker] |= camera.project(dense, surfaces).visible[at].astype(np.int64) << i
     return result
 
@@ -79,14 +116,25 @@ def seen_by_rig(
 def come_and_go(
     rng: np.random.Generator, visits: Visits, points: Points, n_frames: int, n_markers: int
 ) -> tuple[Points, NDArray[np.int64]]:
-    """Let markers leave and others come in their place.
+    """Split markers into visits, and remove the points between visits.
+
+    Parameters
+    ----------
+    rng : Generator
+        Generator of random numbers.
+    visits : Visits
+        Lengths of the visits.
+    points : Points
+        Points of all markers.
+    n_frames, n_markers : int
+        Numbers of frames and markers.
 
     Returns
     -------
-    Points
-        Without those of absent markers; the markers numbered anew.
-    ndarray of int, shape (markers,)
-        Which of the old markers each new one goes on.
+    points : Points
+        Points during visits; every visit is a marker.
+    origin : ndarray of int, shape (n_visits,)
+        Original marker of each visit.
     """
     number = np.full((n_frames, n_markers), -1)
     origin: list[int] = []
@@ -102,10 +150,21 @@ def come_and_go(
 
 
 def merge(points: Points, distance: float) -> Points:
-    """Make one point of points of a frame that are nearer to each other than a distance.
+    """Merge points of a frame that are nearer to each other than a distance.
 
-    Groups are followed from neighbour to neighbour. The point lies in the middle of its group and
-    is of the marker with the lowest number in it.
+    Points are grouped directly or through others. The merged point is the mean of its group and
+    belongs to the marker with the lowest number in it.
+
+    Parameters
+    ----------
+    points : Points
+        Points to merge.
+    distance : float
+        Distance below which points merge, metres.
+
+    Returns
+    -------
+    Points
     """
     if not len(points.frames):
         return points

@@ -1,7 +1,7 @@
-"""Scenes of points alone: cubes, walkers, points on smooth paths.
+"""Scenes of points without bodies: cubes, random walks, and points on smooth paths.
 
-Motion is laid down per frame and `rate` only says how long a frame lasts, so a scene is equally
-hard at every rate: what moves 0.1 m a frame moves ``0.1 * rate`` m/s.
+Motion is defined per frame and `rate` sets the duration of a frame, so a scene is equally difficult
+at every rate: a displacement of 0.1 m per frame is a speed of ``0.1 * rate`` m/s.
 """
 
 from __future__ import annotations
@@ -30,38 +30,45 @@ _EDGES = [(i, i + step) for step in (1, 2, 4) for i in range(8) if not i & step]
 def cube(
     *, frames: int = 100, rate: float = 1.0, seed: int = 0, side: float = 0.3, speed: float = 0.1
 ) -> Truth:
-    """Make a cube that turns steadily while its centre follows a Lissajous path.
+    """Simulate a cube that rotates steadily while its centre follows a Lissajous curve.
 
     Parameters
     ----------
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0. Motion is defined per frame, so the rate scales the
+        speed in m/s only.
     seed : int
-        Chooses the axis and the path.
+        Seed of the axis and of the curve.
     side : float
-        Edge of the cube, metres.
+        Edge of the cube, metres, > 0.
     speed : float
-        No marker moves more than this from one frame to the next, metres. Three fifths of it go
-        to the centre and two to the turning.
+        Largest displacement of a marker between frames, metres, ≥ 0: three fifths by the centre,
+        two fifths by the rotation. The default is a third of the edge, difficult for trackers
+        without a velocity.
 
     Returns
     -------
     Truth
-        8 markers, M00 … M07, at the corners.
+        8 markers, M00 to M07, at the corners.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
+
+    Examples
+    --------
+    >>> cube(frames=10, side=0.2, seed=1)
+    Truth(8 tracks, 80 detections in them, 0 clutter, 10 frames)
     """
     check_number("side", side, above=0)
     check_number("speed", speed, above=0, closed=True)
     times = clock(frames, rate, seed)
     t = np.arange(float(frames))
     rng = np.random.default_rng(seed)
-    omega = rng.uniform(0.04, 0.08, 3)  # rad a frame: a hundred frames are about one round
+    omega = rng.uniform(0.04, 0.08, 3)  # rad per frame: about one cycle in a hundred frames
     amplitude = 0.6 * speed / math.sqrt(3) / omega
     centre = amplitude * np.sin(t[:, None] * omega + rng.uniform(0, 2 * math.pi, 3))
     spin = 0.4 * speed / (side * math.sqrt(3) / 2)
@@ -70,32 +77,38 @@ def cube(
 
 
 def crossing(*, frames: int = 60, rate: float = 1.0, seed: int = 0, side: float = 0.25) -> Truth:
-    """Make a turning cube that flies through one that stands still.
+    """Simulate a rotating cube that flies through a stationary one.
 
-    It moves 0.02 m a frame along x and turns 0.08 rad a frame about z and half that about y. In
-    the middle of the scene both centres would coincide, but for an offset drawn from a normal
-    distribution with a standard deviation of 0.025 m an axis.
+    It moves 0.02 m per frame along x and rotates 0.08 rad per frame about z and 0.04 rad about y.
+    In the middle of the scene the centres are separated by a random offset with a standard
+    deviation of 0.025 m on each axis.
 
     Parameters
     ----------
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0. Motion is defined per frame, so the rate scales the
+        speed in m/s only.
     seed : int
-        Chooses the offset.
+        Seed of the offset.
     side : float
-        Edge of both cubes, metres.
+        Edge of both cubes, metres, > 0. Smaller cubes are denser where they cross.
 
     Returns
     -------
     Truth
-        16 markers: M00 … M07 stand, M08 … M15 fly.
+        16 markers: M00 to M07 are stationary, M08 to M15 fly.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
+
+    Examples
+    --------
+    >>> crossing(frames=10, seed=1).names[-1]
+    'M15'
     """
     check_number("side", side, above=0)
     times = clock(frames, rate, seed)
@@ -121,34 +134,41 @@ def smooth(
     seed: int = 0,
     spacing: float = 0.34,
 ) -> Truth:
-    """Make any number of markers on Lissajous paths, at a density that does not depend on it.
+    """Simulate any number of markers on Lissajous curves at constant density.
 
-    On each axis a marker swings by 0.1 to 0.3 m at 0.08 to 0.18 rad a frame about a centre of its
-    own, so it moves by less than 0.1 m a frame; all drift together by 0.01 m a frame. The centres
-    are spread evenly over a cube with ``spacing³`` of room for each.
+    On each axis a marker oscillates by 0.1 to 0.3 m at 0.08 to 0.18 rad per frame about a centre of
+    its own, so its displacement is below 0.1 m per frame. All drift together by 0.01 m per frame.
+    The centres are uniform over a cube with a volume of ``spacing³`` for each marker.
 
     Parameters
     ----------
     n_markers : int
-        Number of markers.
+        Number of markers, ≥ 1.
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0. Motion is defined per frame, so the rate scales the
+        speed in m/s only.
     seed : int
-        Chooses the centres, the paths and the drift.
+        Seed of the centres, the curves and the drift.
     spacing : float
-        Usual distance between neighbouring centres, metres; smaller is denser and harder.
+        Typical distance between neighbouring centres, metres, > 0. Smaller values are denser and
+        more difficult.
 
     Returns
     -------
     Truth
-        `n_markers` markers.
+        Markers M00, M01 and so on, detected in every frame.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
+
+    Examples
+    --------
+    >>> smooth(n_markers=100, frames=10, seed=1)
+    Truth(100 tracks, 1000 detections in them, 0 clutter, 10 frames)
     """
     check_number("n_markers", n_markers, above=1, closed=True, integer=True)
     check_number("spacing", spacing, above=0)
@@ -180,35 +200,43 @@ def walk(
     stride: float = 0.02,
     pull: float = 0.0,
 ) -> Truth:
-    """Make markers that walk at random, towards the origin if they are pulled.
+    """Simulate markers on a random walk, with an optional pull towards the origin.
 
-    Each frame a marker keeps ``1 - pull`` of its position and takes a normal step. It has no
-    velocity to predict from, and the pull brings all of them to one place.
+    In each frame the position of a marker is multiplied by ``1 - pull`` and a normal step is added.
+    There is no velocity to predict from, and the pull brings all markers together.
 
     Parameters
     ----------
     n_markers : int
-        Number of markers; they start at the corners of cubes of side 0.3, 0.6, 0.9 … m.
+        Number of markers, ≥ 1; they start at the corners of cubes of side 0.3, 0.6, 0.9 … m.
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0. Motion is defined per frame, so the rate scales the
+        speed in m/s only.
     seed : int
-        Chooses the steps.
+        Seed of the steps.
     stride : float
-        Standard deviation of a step on each axis, metres.
+        Standard deviation of a step on each axis, metres, ≥ 0.
     pull : float
-        Share of its way to the origin that a marker is drawn back each frame, in [0, 1].
+        Share of the position that is removed in each frame, in [0, 1]. Larger values make the
+        markers denser.
 
     Returns
     -------
     Truth
-        `n_markers` markers.
+        Markers M00, M01 and so on, detected in every frame.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
+
+    Examples
+    --------
+    >>> walk(n_markers=2, frames=3, stride=0.0).positions()[-1]
+    array([[-0.15, -0.15, -0.15],
+           [-0.15, -0.15,  0.15]])
     """
     check_number("n_markers", n_markers, above=1, closed=True, integer=True)
     check_number("stride", stride, above=0, closed=True)
@@ -224,20 +252,29 @@ def walk(
 
 
 def attracted(*, frames: int = 200, rate: float = 1.0, seed: int = 0) -> Truth:
-    """Make 8 markers that walk at random and crowd about the origin: `walk` with a pull of 0.1.
+    """Simulate 8 markers on a random walk that crowd about the origin.
+
+    It is `walk` with a pull of 0.1.
 
     Parameters
     ----------
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0. Motion is defined per frame, so the rate scales the
+        speed in m/s only.
     seed : int
-        Chooses the steps.
+        Seed of the steps.
 
     Returns
     -------
     Truth
+        8 markers.
+
+    Examples
+    --------
+    >>> attracted(frames=10, seed=1)
+    Truth(8 tracks, 80 detections in them, 0 clutter, 10 frames)
     """
     return walk(frames=frames, rate=rate, seed=seed, pull=0.1)
 
@@ -251,35 +288,42 @@ def wander(
     speed: float = 0.03,
     agility: float = 0.1,
 ) -> Truth:
-    """Make markers whose speed and direction change all the time, each for itself.
+    """Simulate independent markers whose speed and direction change continually.
 
-    The velocity of a marker forgets a share `agility` of itself each frame and takes a normal part
-    instead; it is drawn back gently to a ball about the origin, and never exceeds `speed`.
+    In each frame a share `agility` of a marker's velocity is replaced by a normal random part. A
+    weak acceleration keeps the markers in a ball about the origin; the speed never exceeds `speed`.
 
     Parameters
     ----------
     n_markers : int
-        Number of markers.
+        Number of markers, ≥ 1.
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0. Motion is defined per frame, so the rate scales the
+        speed in m/s only.
     seed : int
-        Chooses the paths.
+        Seed of the paths.
     speed : float
-        Greatest way from one frame to the next, metres.
+        Largest displacement between frames, metres, > 0.
     agility : float
-        Share of the velocity that is new each frame, in (0, 1].
+        Share of the velocity that is new in each frame, in (0, 1]. Larger values are less
+        predictable.
 
     Returns
     -------
     Truth
-        `n_markers` markers.
+        Markers M00, M01 and so on, detected in every frame.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
+
+    Examples
+    --------
+    >>> wander(n_markers=3, frames=10, rate=100, seed=1).detections
+    Detections(10 frames, 30 points, 3-D, 0 to 0.09 s)
     """
     check_number("n_markers", n_markers, above=1, closed=True, integer=True)
     check_number("speed", speed, above=0)
@@ -317,7 +361,7 @@ def _named(
 
 
 def _rotations(axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotation matrices about one axis (Rodrigues), shape (T, 3, 3), from angles (T,)."""
+    """Return rotation matrices about one axis (Rodrigues), (T, 3, 3), from angles (T,)."""
     x, y, z = axis / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
@@ -325,5 +369,5 @@ def _rotations(axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray
 
 
 def _turned(turn: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turn K points (K, 3) by T rotations (T, 3, 3): shape (T, K, 3)."""
+    """Rotate K points (K, 3) by T rotations (T, 3, 3): shape (T, K, 3)."""
     return np.einsum("tij,kj->tki", turn, points)

@@ -1,4 +1,4 @@
-"""Rigs by name: cameras in a ring or along a wall, placed so that they see all of a scene."""
+"""Preset rigs: cameras in a ring or along a wall that see the whole of a scene."""
 
 from __future__ import annotations
 
@@ -17,18 +17,28 @@ if TYPE_CHECKING:
 __all__ = ["is_preset", "place_preset"]
 
 SIZE_PX, FOCAL_PX = (1280, 1024), 900.0
-_MARGIN = 1.15  # room about the scene, and for cameras a little off
+_MARGIN = 1.15  # margin about the scene, also for inexact cameras
 _ELEVATION = math.radians(25)  # of a ring's cameras above the middle of the scene
-_LEAST_RADIUS = 0.1  # metres: a single point has some room too
+_MIN_RADIUS = 0.1  # metres, also for a scene of a single point
 
 
 def is_preset(text: str) -> bool:
-    """Whether a text names a preset: ``ring`` or ``wall`` and a number of cameras."""
+    """Return whether a text is the name of a preset: ``ring`` or ``wall`` and a number.
+
+    Parameters
+    ----------
+    text : str
+        Text to test.
+
+    Returns
+    -------
+    bool
+    """
     return re.fullmatch(r"(ring|wall)\d+", text) is not None
 
 
 def place_preset(text: str, low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[Rig, str]:
-    """Place the cameras of a preset about a box so that each sees all of it; z is up.
+    """Place the cameras of a preset about a box so that each sees the whole box; z is up.
 
     A sphere of radius R about the box lies within the narrower angle of an image, 2 α, from the
     distance R / sin α on.
@@ -36,7 +46,7 @@ def place_preset(text: str, low: NDArray[np.float64], high: NDArray[np.float64])
     Parameters
     ----------
     text : str
-        ``ring8``, ``wall4`` and so on.
+        Name of the preset: ``ring8``, ``wall4`` and so on.
     low, high : ndarray, shape (3,)
         Corners of the box, metres.
 
@@ -44,7 +54,7 @@ def place_preset(text: str, low: NDArray[np.float64], high: NDArray[np.float64])
     -------
     rig : Rig
     about : str
-        What was chosen, for people.
+        Description of the rig in one line.
 
     Raises
     ------
@@ -54,9 +64,9 @@ def place_preset(text: str, low: NDArray[np.float64], high: NDArray[np.float64])
     shape, n = text[:4], int(text[4:])
     check_number("--rig (cameras)", n, above=1, below=1000, closed=True, integer=True)
     middle = (low + high) / 2
-    radius = max(float(np.linalg.norm(high - low)) / 2, _LEAST_RADIUS)
+    radius = max(float(np.linalg.norm(high - low)) / 2, _MIN_RADIUS)
     half_angle = math.atan(min(SIZE_PX) / 2 / FOCAL_PX)
-    # Rounded up to a centimetre, so that what is said of the rig is what it is.
+    # Rounded up to a centimetre, so that the description is exact.
     distance = math.ceil(100 * _MARGIN * radius / math.sin(half_angle)) / 100
     place = Rig.ring if shape == "ring" else Rig.wall
     if shape == "ring":

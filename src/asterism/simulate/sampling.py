@@ -17,7 +17,23 @@ __all__ = ["kept_frames", "shaken"]
 def kept_frames(
     rng: np.random.Generator, n_frames: int, stride: int, dropped: float
 ) -> NDArray[np.int64]:
-    """Return the frames that a recording keeps: every so many, less those that are lost."""
+    """Return the frames that are kept: every `stride`-th frame without the lost ones.
+
+    Parameters
+    ----------
+    rng : Generator
+        Generator of random numbers.
+    n_frames : int
+        Number of frames of the original.
+    stride : int
+        Step between frames.
+    dropped : float
+        Probability that a frame is lost.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+    """
     frames = np.arange(0, n_frames, stride)
     return frames[rng.random(len(frames)) >= dropped] if dropped else frames
 
@@ -25,17 +41,28 @@ def kept_frames(
 def shaken(
     rng: np.random.Generator, jitter: float, times: NDArray[np.float64], points: Points
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sample off the beat: each frame by up to half of `jitter` frames early or late.
+    """Shift the time of each frame at random, and interpolate the points.
 
-    A marker is where the parabola through its place in this frame and its neighbours has it; the
-    straight line where one neighbour is missing.
+    A position is interpolated by the parabola through the marker's positions in this frame and its
+    neighbours, or linearly if one neighbour is missing.
+
+    Parameters
+    ----------
+    rng : Generator
+        Generator of random numbers.
+    jitter : float
+        Twice the largest shift, as a share of the frame interval.
+    times : ndarray, shape (T,)
+        Times of the frames, seconds.
+    points : Points
+        Points of the frames.
 
     Returns
     -------
     times : ndarray, shape (T,)
-        Of the frames.
+        Shifted times, seconds.
     places : ndarray, shape (N, D)
-        Of the points.
+        Positions of the points at these times, metres.
     """
     n_frames = len(times)
     if n_frames < 2:
@@ -59,6 +86,6 @@ def shaken(
     both = np.isfinite(slope0[:, :1]) & np.isfinite(slope1[:, :1])
     bend = np.where(both, (slope1 - slope0) / (h0 + h1), 0.0)
     line = np.where(np.isfinite(slope0), slope0, np.where(np.isfinite(slope1), slope1, 0.0))
-    # Newton's form: through here and before, bent to go through after as well.
+    # Newton's form of the parabola through this position, the previous and the next one.
     shift = np.where(both, slope0 * tau + bend * tau * (tau + h0), line * tau)
     return moved, here + shift

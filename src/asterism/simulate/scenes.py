@@ -1,8 +1,8 @@
-"""The one list of scenes: truth in motion, in which every marker is seen in every frame.
+"""Registry of scenes: ground truth in which every marker is detected in every frame.
 
-A scene is a function of keyword-only arguments, among them `frames`, `rate` and `seed`, that gives
-a `Truth`. Noise, misses and clutter come afterwards, from `asterism.simulate.corrupt`; cameras from
-`asterism.simulate.film`.
+A scene is a function with keyword-only arguments, among them `frames`, `rate` and `seed`, that
+returns a `Truth`. `asterism.simulate.corrupt` adds noise, missed detections and clutter;
+`asterism.simulate.film` projects the scene into cameras.
 """
 
 from __future__ import annotations
@@ -30,14 +30,23 @@ __all__ = ["SCENES", "Scene", "from_capture"]
 
 @record(kw_only=False)
 class Scene:
-    """A scene as a list shows it.
+    """Entry of the registry `SCENES`.
 
     Attributes
     ----------
     make : callable
-        Gives the truth; takes `frames`, `rate`, `seed` and what its docstring says.
+        Function that returns the truth, with the arguments `frames`, `rate` and `seed` and others.
     about : str
-        One line on what is in it.
+        Description in one line.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> scene = am.simulate.SCENES["cube"]
+    >>> scene.about
+    '8 markers on a cube that rotates and travels'
+    >>> scene.make(frames=10, seed=1).n_tracks
+    8
     """
 
     make: Callable[..., Truth]
@@ -46,16 +55,16 @@ class Scene:
 
 SCENES: dict[str, Scene] = Registry(
     {
-        "cube": Scene(cube, "8 markers on a cube that turns and travels"),
-        "crossing": Scene(crossing, "16 markers: a turning cube flies through a still one"),
-        "wander": Scene(wander, "markers that change speed and direction all the time"),
-        "walk": Scene(walk, "markers that walk at random, with no velocity to predict from"),
-        "attracted": Scene(attracted, "8 markers that walk at random and crowd about the origin"),
+        "cube": Scene(cube, "8 markers on a cube that rotates and travels"),
+        "crossing": Scene(crossing, "16 markers: a rotating cube flies through a stationary one"),
+        "wander": Scene(wander, "markers that continually change speed and direction"),
+        "walk": Scene(walk, "markers on a random walk, without a velocity to predict from"),
+        "attracted": Scene(attracted, "8 markers on a random walk that crowd about the origin"),
         "smooth": Scene(smooth, "any number of markers on smooth paths, at constant density"),
-        "swarm": Scene(swarm, "drones that spread out, bunch up and change places"),
-        "person": Scene(person, "a person who walks, runs, jumps or turns, with limbs that hide"),
+        "swarm": Scene(swarm, "drones that spread out, gather and change places"),
+        "person": Scene(person, "a person who walks, runs, jumps or turns, with occluding limbs"),
         "two_people": Scene(two_people, "two people who pass each other closely, or hug"),
-        "fingers": Scene(fingers, "a hand whose fingers bend and open"),
+        "fingers": Scene(fingers, "a hand with bending fingers"),
         "juggler": Scene(juggler, "a person who juggles balls"),
     }
 )
@@ -63,26 +72,33 @@ SCENES: dict[str, Scene] = Registry(
 
 
 def from_capture(capture: Capture | Tracks) -> Truth:
-    """Make a scene of a labelled capture: its named markers, where they were seen.
+    """Make a scene from a labelled capture, with its named markers where they were detected.
 
     Parameters
     ----------
     capture : Capture or Tracks
-        From a file, or its tracks. If any track has a name, the named ones are the markers.
+        Capture from a file, or its tracks. If any track has a name, only named tracks are used.
 
     Returns
     -------
     Truth
-        Without clutter and without tracks that have no name among named ones.
+        Truth without clutter, and without unnamed tracks if there are named ones.
 
     Raises
     ------
     ParameterError
-        If nothing is labelled.
+        If the capture has no tracks.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> tracks = am.Tracks.from_dense([0, 0.01], [[[0, 0, 1]], [[0, 0, 2]]], ["LKNE"])
+    >>> am.simulate.from_capture(tracks).names
+    ('LKNE',)
     """
     tracks = capture.tracks if isinstance(capture, Capture) else capture
     if not tracks.n_tracks:
-        raise ParameterError("capture", "a labelled one", "one without tracks")
+        raise ParameterError("capture", "a labelled capture", "one without tracks")
     named = np.array([name is not None for name in tracks.names])
     if not named.any():
         named[:] = True

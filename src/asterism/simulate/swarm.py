@@ -1,4 +1,4 @@
-"""Drones in a room, each with one marker, that spread out and bunch up in turn."""
+"""Scene of drones in a room, each with one marker, that alternately spread and gather."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 __all__ = ["swarm"]
 
-_PULL, _DAMPING = 3.0, 3.0  # of the way to the goal, 1/s²; of the velocity, 1/s
-_REPULSION = 150.0  # m/s² for each `apart` that two come closer than one and a half of it
-_STEPS = 8  # of the motion between two frames at 100 Hz
+_PULL, _DAMPING = 3.0, 3.0  # spring constant, 1/s², and damping, 1/s
+_REPULSION = 150.0  # m/s² per distance of `apart` below 1.5 `apart`
+_STEPS = 8  # integration steps between two frames at 100 Hz
 
 
 def swarm(
@@ -30,38 +30,44 @@ def swarm(
     apart: float = 0.2,
     period: float = 6.0,
 ) -> Truth:
-    """Make drones that spread over a room, bunch up in its middle and change places.
+    """Simulate drones that spread over a room, gather in its middle and change places.
 
-    Each is drawn to a goal like a mass on a damped spring and pushed away by those near it. For
-    half of each period the goals lie in a loose crowd, for the other half they are packed as
-    closely as the drones allow, each time in another order.
+    Each drone is pulled to its goal like a mass on a damped spring, and repelled by near drones.
+    For half of each period the goals are spread; for the other half they are packed as densely as
+    the repulsion allows, each time in another order.
 
     Parameters
     ----------
     n_drones : int
-        Number of drones, one marker each.
+        Number of drones, ≥ 1, with one marker each.
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0.
     seed : int
-        Chooses the places.
+        Seed of the goals.
     spacing : float
-        Usual distance between neighbours while they are spread, metres.
+        Typical distance between neighbours while they are spread, metres, > 0.
     apart : float
-        Distance that they keep while they are bunched up, metres.
+        Distance between neighbours while they are gathered, metres, > 0. Smaller values are more
+        difficult.
     period : float
-        Seconds from one bunching to the next.
+        Time between two gatherings, seconds, > 0.
 
     Returns
     -------
     Truth
-        `n_drones` markers, D00 and so on.
+        Markers D00, D01 and so on, detected in every frame.
 
     Raises
     ------
     ParameterError
         If a number is out of range.
+
+    Examples
+    --------
+    >>> swarm(n_drones=4, frames=10, seed=1)
+    Truth(4 tracks, 40 detections in them, 0 clutter, 10 frames)
     """
     check_number("n_drones", n_drones, above=1, closed=True, integer=True)
     times = clock(frames, rate, seed)
@@ -101,7 +107,7 @@ def _lattice(n: int, pitch: float) -> NDArray[np.float64]:
 
 
 def _push(place: NDArray[np.float64], apart: float) -> NDArray[np.float64]:
-    """Accelerations away from neighbours, from nothing at one and a half of `apart` on."""
+    """Return accelerations away from neighbours, which are 0 from a distance of 1.5 `apart`."""
     way = place[:, None] - place[None]
     distance = np.linalg.norm(way, axis=2)
     np.fill_diagonal(distance, np.inf)

@@ -1,4 +1,4 @@
-"""Ground truth of a scene: who is whom, and what pictures and cameras need to know besides."""
+"""Ground truth of a scene: tracks, with lines and colours for figures, and surfaces."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 __all__ = ["Truth"]
 
 
-def _none() -> NDArray[np.int64]:
+def _no_lines() -> NDArray[np.int64]:
     return np.zeros((0, 0), dtype=np.int64)
 
 
-def _nobody() -> NDArray[np.int64]:
+def _no_colours() -> NDArray[np.int64]:
     return np.zeros(0, dtype=np.int64)
 
 
 @record(eq=False)
 class Truth(Tracks):
-    """Ground truth: tracks, with the lines and colours of pictures and the surfaces that hide.
+    """Ground truth: tracks, with lines and colours for figures and occluding surfaces.
 
     Parameters
     ----------
@@ -45,18 +45,30 @@ class Truth(Tracks):
     colours : array_like of int, shape (K,)
         Colour of each marker, 1 for the first; all 1 by default.
     surfaces : tuple of Surface
-        What hides markers: of one moment, or of T.
+        Surfaces that occlude markers, each fixed or with T moments.
     record : dict
-        How it was made, in words and numbers.
+        Corruptions that were applied, by name.
 
     Raises
     ------
     ParameterError
-        If something does not fit the tracks.
+        If a field does not fit the tracks.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.corrupt(am.simulate.cube(frames=20), missing=0.1, seed=1)
+    >>> truth.record, truth.connections.shape, truth.colours[:3].tolist()
+    ({'missing': 0.1, 'seed': 1}, (8, 8), [1, 1, 1])
+    >>> cube = am.simulate.cube(frames=40, seed=1)
+    >>> am.evaluate(am.track(cube.detections, "gnn"), cube).idf1
+    1.0
+    >>> am.simulate.Truth.of([0, 1], [[[0, 0, 0]], [[0, 0, 1]]], ["LKNE"])
+    Truth(1 tracks, 2 detections in them, 0 clutter, 2 frames)
     """
 
-    connections: NDArray[np.int64] = field(default_factory=_none)
-    colours: NDArray[np.int64] = field(default_factory=_nobody)
+    connections: NDArray[np.int64] = field(default_factory=_no_lines)
+    colours: NDArray[np.int64] = field(default_factory=_no_colours)
     surfaces: tuple[Surface, ...] = ()
     record: dict[str, Any] = field(default_factory=dict[str, Any])
 
@@ -66,7 +78,7 @@ class Truth(Tracks):
         given = self.connections if np.size(self.connections) else np.zeros((K, K), np.int64)
         connections = keep_array("connections", given, (K, K), dtype=np.int64)
         if (connections != connections.T).any() or (connections < 0).any():
-            raise ParameterError("connections", "a symmetric matrix of 0, 1, 2 …", "another")
+            raise ParameterError("connections", "a symmetric matrix of 0, 1, 2 …", "another matrix")
         given = self.colours if np.size(self.colours) else np.ones(K, np.int64)
         colours = keep_array("colours", given, (K,), dtype=np.int64)
         if (colours < 1).any():
@@ -94,20 +106,24 @@ class Truth(Tracks):
         colours: ArrayLike = (),
         surfaces: Sequence[Surface] = (),
     ) -> Self:
-        """Make the truth of a scene from positions.
+        """Make the truth of a scene from dense positions.
 
         Parameters
         ----------
         times : array_like, shape (T,)
-            Seconds.
+            Times of the frames, seconds.
         positions : array_like, shape (T, K, 3)
-            Metres; NaN where a marker is not there.
+            Positions, metres; NaN for an absent marker.
         names : sequence of K str
-            Of the markers.
+            Names of the markers.
         lines : sequence of (marker, marker, colour)
-            Lines between markers by their numbers; colours from 1.
+            Lines between markers by their numbers; colours count from 1.
         colours, surfaces
             As for the class.
+
+        Returns
+        -------
+        Truth
         """
         tracks = Tracks.from_dense(times, positions, names)
         connections = np.zeros((len(names), len(names)), dtype=np.int64)

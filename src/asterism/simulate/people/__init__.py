@@ -1,4 +1,4 @@
-"""Scenes with people, in real seconds and metres, z up: markers on moving bodies that hide them."""
+"""Scenes with people: markers on moving bodies that occlude them; seconds, metres, z up."""
 
 from asterism.simulate.people.hand import fingers
 from asterism.simulate.people.juggler import juggler

@@ -1,4 +1,4 @@
-"""Walking, running and turning round: a pose at every moment of a clip."""
+"""Walking, running and turning round: the pose in every frame of a scene."""
 
 from __future__ import annotations
 
@@ -34,16 +34,20 @@ __all__ = ["Walker", "run", "turn", "walk"]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Walker:
-    """Somebody on a course.
+    """Person who follows a course.
 
     Parameters
     ----------
-    body, style, gait, course
-        Who, how and where.
+    body : Body
+        Body of the person.
+    style, gait
+        Motion of the person.
+    course : Course
+        Position and heading over time.
     swings : dict of ndarray, shape (n, 2)
-        When the feet are in the air.
+        Start and end of each swing, by side, seconds.
     is_run : bool
-        Whether the body flies between the steps.
+        Whether both feet leave the ground between steps.
     """
 
     body: Body
@@ -54,17 +58,50 @@ class Walker:
     is_run: bool = False
 
     def carriage(self, t: Array) -> Carriage:
-        """Return pelvis, trunk, head and arms at times (T,)."""
+        """Return pelvis, trunk, head and arms.
+
+        Parameters
+        ----------
+        t : ndarray, shape (T,)
+            Times, seconds.
+
+        Returns
+        -------
+        Carriage
+        """
         phase = t * self.gait.cadence + self.style.phase
         heading, vigour = self.course.heading(t), self.course.vigour(t)
         return upright(phase, heading, vigour, self.style, is_run=self.is_run)
 
     def feet(self, t: Array) -> Feet:
-        """Return the feet at times (T,)."""
+        """Return positions and orientations of the feet.
+
+        Parameters
+        ----------
+        t : ndarray, shape (T,)
+            Times, seconds.
+
+        Returns
+        -------
+        Feet
+        """
         return feet_on(t, self.body, self.course, self.gait, self.swings)
 
     def root(self, t: Array, carriage: Carriage) -> Array:
-        """Return the middle of the hip joints, (T, 3)."""
+        """Return the middle of the hip joints.
+
+        Parameters
+        ----------
+        t : ndarray, shape (T,)
+            Times, seconds.
+        carriage : Carriage
+            Upper body at these times.
+
+        Returns
+        -------
+        ndarray, shape (T, 3)
+            World metres.
+        """
         root = self._flat(t, carriage)
         highest = reached(self.course, self.body, self._hips, self.feet)
         if not self.is_run:
@@ -77,7 +114,17 @@ class Walker:
         return root
 
     def pose(self, t: Array) -> Pose:
-        """Return the pose at times (T,)."""
+        """Return the pose of the whole body.
+
+        Parameters
+        ----------
+        t : ndarray, shape (T,)
+            Times, seconds.
+
+        Returns
+        -------
+        Pose
+        """
         c, feet = self.carriage(t), self.feet(t)
         return self.body.pose(
             root=self.root(t, c), pelvis=c.pelvis, trunk=c.trunk, head=c.head,
@@ -99,12 +146,62 @@ class Walker:
 
 
 def walk(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
-    """Walk straight on, through the origin at half time."""
+    """Walk straight on, through the origin at half time.
+
+    Parameters
+    ----------
+    t : ndarray, shape (T,)
+        Times, seconds.
+    body : Body
+        Body of the person.
+    style : Style
+        Individual variation.
+    rng : Generator
+        Generator of random numbers.
+
+    Returns
+    -------
+    Pose
+
+    Examples
+    --------
+    >>> from asterism.simulate.people.gait import Style
+    >>> from asterism.simulate.people.skeleton import Body
+    >>> rng = np.random.default_rng(1)
+    >>> pose = walk(np.linspace(0, 1, 5), Body(height=1.75), Style.drawn(rng), rng)
+    >>> pose.origins["pelvis"].shape
+    (5, 3)
+    """
     return _straight(t, body, style, rng, is_run=False)
 
 
 def run(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
-    """Run straight on, through the origin at half time."""
+    """Run straight on, through the origin at half time.
+
+    Parameters
+    ----------
+    t : ndarray, shape (T,)
+        Times, seconds.
+    body : Body
+        Body of the person.
+    style : Style
+        Individual variation.
+    rng : Generator
+        Generator of random numbers.
+
+    Returns
+    -------
+    Pose
+
+    Examples
+    --------
+    >>> from asterism.simulate.people.gait import Style
+    >>> from asterism.simulate.people.skeleton import Body
+    >>> rng = np.random.default_rng(1)
+    >>> pose = run(np.linspace(0, 1, 5), Body(height=1.75), Style.drawn(rng), rng)
+    >>> pose.origins["pelvis"].shape
+    (5, 3)
+    """
     return _straight(t, body, style, rng, is_run=True)
 
 
@@ -125,7 +222,32 @@ def _straight(
 
 
 def turn(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
-    """Walk on a circle, turn round at half time, and walk back on a circle."""
+    """Walk on a circle, turn round at half time, and walk back on a circle.
+
+    Parameters
+    ----------
+    t : ndarray, shape (T,)
+        Times, seconds.
+    body : Body
+        Body of the person.
+    style : Style
+        Individual variation.
+    rng : Generator
+        Generator of random numbers.
+
+    Returns
+    -------
+    Pose
+
+    Examples
+    --------
+    >>> from asterism.simulate.people.gait import Style
+    >>> from asterism.simulate.people.skeleton import Body
+    >>> rng = np.random.default_rng(1)
+    >>> pose = turn(np.linspace(0, 1, 5), Body(height=1.75), Style.drawn(rng), rng)
+    >>> pose.origins["pelvis"].shape
+    (5, 3)
+    """
     gait = walking(body.height, style)
     usual = gait.speed
     direction, side = rng.uniform(-np.pi, np.pi), rng.choice([-1.0, 1.0])

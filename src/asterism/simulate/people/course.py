@@ -19,7 +19,7 @@ __all__ = ["STEP", "Course"]
 STEP = 0.01
 """Seconds between samples of what is integrated or filtered."""
 
-_PAD = 1.5  # seconds of it before and after the clip
+_PAD = 1.5  # seconds of the course before and after the scene
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -29,13 +29,15 @@ class Course:
     Parameters
     ----------
     duration : float
-        Of the clip, seconds.
+        Duration of the scene, seconds.
     speed, heading : callable
-        Of times (T,): forward speed, m/s, and direction, radians.
+        Functions of times (T,): forward speed, m/s, and direction, radians.
     middle : (float, float)
-        Where the course is at half the clip, metres.
+        Position at half time, metres.
     usual : float
-        Speed at which the gait has its full vigour, m/s.
+        Speed at which the gait has its full amplitude, m/s.
+    times : ndarray, shape (n,)
+        Times at which the course is sampled, which are computed, seconds.
     """
 
     duration: float
@@ -57,15 +59,45 @@ class Course:
         object.__setattr__(self, "_curve", CubicSpline(times, np.asarray(way(times)) - middle))
 
     def velocity(self, t: Array) -> Array:
-        """Velocity over ground, (T, 2)."""
+        """Return the velocity over the ground.
+
+        Parameters
+        ----------
+        t : ndarray, shape (T,)
+            Times, seconds.
+
+        Returns
+        -------
+        ndarray, shape (T, 2)
+        """
         heading = self.heading(t)
         return self.speed(t)[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
 
     def place(self, t: Array) -> Array:
-        """Place on the ground, (T, 2)."""
+        """Return the position on the ground.
+
+        Parameters
+        ----------
+        t : ndarray, shape (T,)
+            Times, seconds.
+
+        Returns
+        -------
+        ndarray, shape (T, 2)
+        """
         inside = np.clip(t, self.times[0], self.times[-1])
         return np.asarray(self._curve(inside), dtype=np.float64)
 
     def vigour(self, t: Array) -> Array:
-        """How the speed compares with the usual one, between 0 and 1; 0 also backwards."""
+        """Return the speed relative to the usual one, in [0, 1]; 0 also for backward motion.
+
+        Parameters
+        ----------
+        t : ndarray, shape (T,)
+            Times, seconds.
+
+        Returns
+        -------
+        ndarray, shape (T,)
+        """
         return np.clip(self.speed(t) / self.usual, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Smooth curves in time and turns in space, of which people's motion is put together."""
+"""Smooth curves in time and rotations in space, from which human motion is composed."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ __all__ = ["about_x", "about_y", "about_z", "blend", "harmonics", "through", "un
 
 
 def through(t: Array, knots: Sequence[Knot], *, derivatives: int = 0) -> Array:
-    """Go through knots on quintics: position, velocity and acceleration are continuous.
+    """Interpolate knots by quintics with continuous velocity and acceleration.
 
     Parameters
     ----------
     t : ndarray, shape (T,)
-        Seconds; before the first knot and after the last the value stays that of the knot.
+        Times, seconds; before the first knot and after the last the value is constant.
     knots : sequence of (time, value, rate, acceleration)
         In order of time, at least two; values are numbers or vectors of D.
     derivatives : int
-        How many derivatives to give beside the value, on a last axis, if any.
+        Number of derivatives on an additional last axis, after the value.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def through(t: Array, knots: Sequence[Knot], *, derivatives: int = 0) -> Array:
 
 
 def blend(t: Array, *turns: float) -> Array:
-    """Go from 0 to 1 between two times, back to 0 between the next two, and so on.
+    """Blend from 0 to 1 between two times, back to 0 between the next two, and so on.
 
     Parameters
     ----------
@@ -72,11 +72,15 @@ def harmonics(phase: Array, mean: float, *terms: tuple[float, float]) -> Array:
     Parameters
     ----------
     phase : ndarray, shape (T,)
-        In cycles.
+        Phase in cycles.
     mean : float
         Mean over the cycle.
     *terms : (amplitude, phase of the peak)
-        Of the first, the second … harmonic.
+        Amplitude and phase of the peak of the first, the second … harmonic.
+
+    Returns
+    -------
+    ndarray, shape (T,)
     """
     total = np.full(phase.shape, float(mean))
     for k, (amplitude, peak) in enumerate(terms, start=1):
@@ -85,17 +89,47 @@ def harmonics(phase: Array, mean: float, *terms: tuple[float, float]) -> Array:
 
 
 def about_x(angle: ArrayLike) -> Array:
-    """Turn about x, from y to z: matrices (…, 3, 3) from angles (…) in degrees."""
+    """Return rotations about x, from y to z.
+
+    Parameters
+    ----------
+    angle : array_like, shape (...)
+        Degrees.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+    """
     return _about(0, angle)
 
 
 def about_y(angle: ArrayLike) -> Array:
-    """Turn about y, from z to x: matrices (…, 3, 3) from angles (…) in degrees."""
+    """Return rotations about y, from z to x.
+
+    Parameters
+    ----------
+    angle : array_like, shape (...)
+        Degrees.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+    """
     return _about(1, angle)
 
 
 def about_z(angle: ArrayLike) -> Array:
-    """Turn about z, from x to y: matrices (…, 3, 3) from angles (…) in degrees."""
+    """Return rotations about z, from x to y.
+
+    Parameters
+    ----------
+    angle : array_like, shape (...)
+        Degrees.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+    """
     return _about(2, angle)
 
 
@@ -111,5 +145,15 @@ def _about(axis: int, angle: ArrayLike) -> Array:
 
 
 def unit(vectors: Array) -> Array:
-    """Scale vectors (…, 3) to length 1."""
+    """Scale vectors to length 1.
+
+    Parameters
+    ----------
+    vectors : ndarray, shape (..., 3)
+        Vectors, none of them 0.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+    """
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

@@ -1,7 +1,7 @@
-"""How people walk and run: cadence, stance, and how pelvis, trunk, head and arms go along.
+"""Walking and running: cadence, stance, and the motion of pelvis, trunk, head and arms.
 
-The courses of the angles are sums of one or two harmonics of the cycle that follow the normative
-curves; the angles of the legs come from where the feet are (`steps`).
+The angles over the cycle are sums of one or two harmonics that follow the normative curves. The
+angles of the legs follow from the positions of the feet (`steps`).
 
 References
 ----------
@@ -32,22 +32,22 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """What makes one person's motion different from another's; drawn once, from the seed.
+    """Individual variation of the motion of a person, drawn once from the seed.
 
     Parameters
     ----------
     phase : float
-        Of the cycle at the beginning.
+        Phase of the cycle at time 0, cycles.
     pace, length : float
-        Cadence and step length against the mean of people, about 1.
+        Cadence and step length relative to the population mean, about 1.
     arms, turns : float
-        How much arms swing and how much pelvis and trunk turn, about 1.
+        Amplitudes of the arm swing, and of the rotation of pelvis and trunk, about 1.
     lean, elbows : float
-        Added to the lean of the trunk and the bend of the elbows, degrees.
+        Additional lean of the trunk and flexion of the elbows, degrees.
     asymmetry : float
-        How much more the left arm swings than the right, as a share.
+        Additional swing of the left arm relative to the right one, as a share.
     sway : float
-        How far the body goes to the side of the standing foot, metres.
+        Lateral displacement of the body towards the stance foot, metres.
     """
 
     phase: float
@@ -62,7 +62,17 @@ class Style:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> Self:
-        """Draw a person."""
+        """Draw the variation of a person.
+
+        Parameters
+        ----------
+        rng : Generator
+            Generator of random numbers.
+
+        Returns
+        -------
+        Style
+        """
         return cls(
             phase=rng.uniform(0, 1),
             pace=rng.uniform(0.96, 1.04),
@@ -78,7 +88,17 @@ class Style:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Carriage:
-    """Pelvis, trunk, head and arms: turns to the world, and how far the root sways to the left."""
+    """Orientations of the upper body over time.
+
+    Parameters
+    ----------
+    pelvis, trunk, head : ndarray, shape (T, 3, 3)
+        Rotations to the world.
+    arms : dict of Limb
+        Rotations of the arms, by side.
+    sway : ndarray, shape (T,)
+        Displacement of the root to the left, metres.
+    """
 
     pelvis: Array
     trunk: Array
@@ -91,7 +111,18 @@ def walking(height: float, style: Style) -> Gait:
     """Return the gait of a walk.
 
     Steps of 0.40 of the height, 112 a minute (Perry 1992: strides of 1.41 m, 113 steps a minute,
-    1.36 m/s). Time goes with the square root of the length.
+    1.36 m/s). Time scales with the square root of the length.
+
+    Parameters
+    ----------
+    height : float
+        Height of the person, metres.
+    style : Style
+        Individual variation.
+
+    Returns
+    -------
+    Gait
     """
     cadence = 56 / 60 * style.pace * np.sqrt(1.75 / height)
     return Gait(
@@ -114,6 +145,17 @@ def running(height: float, style: Style) -> Gait:
 
     About 3 m/s at 172 steps a minute, with a foot on the ground for 36 % of the cycle (Novacheck
     1998: 3.2 m/s, and under 40 %).
+
+    Parameters
+    ----------
+    height : float
+        Height of the person, metres.
+    style : Style
+        Individual variation.
+
+    Returns
+    -------
+    Gait
     """
     cadence = 86 / 60 * style.pace * np.sqrt(1.75 / height)
     return Gait(
@@ -134,20 +176,24 @@ def running(height: float, style: Style) -> Gait:
 def upright(
     phase: Array, heading: Array, vigour: Array, style: Style, *, is_run: bool = False
 ) -> Carriage:
-    """Carry pelvis, trunk, head and arms along with the legs.
+    """Return the motion of pelvis, trunk, head and arms that belongs to that of the legs.
 
     Parameters
     ----------
     phase : ndarray, shape (T,)
-        Cycles, whole as the left foot lands.
+        Phase in cycles; whole numbers where the left foot lands.
     heading : ndarray, shape (T,)
         Direction, radians.
     vigour : ndarray, shape (T,)
-        From 0, standing, to 1.
+        Amplitude of the motion, from 0, standing, to 1.
     style : Style
-        Whose.
+        Individual variation.
     is_run : bool
-        Whether it is a run.
+        Whether the person runs.
+
+    Returns
+    -------
+    Carriage
     """
     yaw, turn = np.degrees(heading), style.turns * vigour
     about, lean, twist = (6.0, 7.0, 13.0) if is_run else (4.0, 1.5, 4.0)
@@ -184,18 +230,22 @@ def upright(
 def arm_turns(
     trunk: Array, sign: float, swing: Array, aside: float, inward: float, bend: Array
 ) -> Limb:
-    """Turn an arm by the angles of its joints, degrees.
+    """Return the rotations of an arm from the angles of its joints, degrees.
 
     Parameters
     ----------
     trunk : ndarray, shape (T, 3, 3)
-        Turn of the trunk.
+        Rotation of the trunk.
     sign : float
         1 for the left arm, -1 for the right.
     swing, bend : ndarray, shape (T,)
         Flexion of shoulder and elbow, forwards positive.
     aside, inward : float
         Abduction and inward rotation of the upper arm.
+
+    Returns
+    -------
+    Limb
     """
     arm = trunk @ about_x(sign * aside) @ about_y(-swing) @ about_z(-sign * inward)
     forearm = arm @ about_y(-bend)
@@ -206,8 +256,20 @@ def arm_turns(
 def bounce(phase: Array, gait: Gait) -> Array:
     """Return the height of a runner's hips, up to a constant: a parabola while no foot stands.
 
-    Over the stance the ground pushes with ``A sin²``, which carries the weight over the step:
-    ``A T_stance / 2 = g T_step``.
+    The ground force over the stance is ``A sin²`` and carries the weight over the step: ``A
+    T_stance / 2 = g T_step``.
+
+    Parameters
+    ----------
+    phase : ndarray, shape (T,)
+        Phase in cycles.
+    gait : Gait
+        Cadence and stance.
+
+    Returns
+    -------
+    ndarray, shape (T,)
+        Metres.
     """
     step, stance = 0.5 / gait.cadence, gait.stance / gait.cadence
     push = 2 * GRAVITY * step / stance

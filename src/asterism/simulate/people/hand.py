@@ -1,4 +1,4 @@
-"""A scene with one hand whose five fingers bend and stretch, each in its own rhythm.
+"""Scene of one hand whose five fingers bend and stretch, each at its own frequency.
 
 In the frame of the palm, with its origin at the wrist, x points to the fingers, y to the thumb's
 side and z out of the back of the hand. It is a right hand.
@@ -26,7 +26,7 @@ __all__ = ["fingers"]
 
 @dataclass(frozen=True, kw_only=True)
 class _Finger:
-    """A finger: where it begins and how long its bones are, metres; how it points, degrees.
+    """Finger: position and lengths of its bones, metres, and directions, degrees.
 
     The first bone of the thumb is that of its palm, which moves too.
     """
@@ -40,7 +40,7 @@ class _Finger:
 
 
 # Lengths of the bones: means of A. Buryanov & V. Kotiuk, *Proportions of hand segments*,
-# Int. J. Morphol. 28(3), 2010; the last with 4 mm of pulp.
+# Int. J. Morphol. 28(3), 2010; the last bone includes 4 mm of pulp.
 _FINGERS = {
     "T": _Finger(
         start=(0.020, 0.022, -0.008), bones=(0.046, 0.032, 0.026), radii=(0.0105, 0.0095, 0.0085),
@@ -65,7 +65,7 @@ _FINGERS = {
 }  # fmt: skip
 _COLOURS = {"T": 1, "I": 2, "M": 3, "R": 4, "L": 5, "palm": 6}
 
-# Of the palm: its bones, the ball of the thumb's side, the wrist.
+# Capsules of the palm: its bones, the ball of the thumb, the wrist.
 _PALM = (
     ((0.012, 0.014, 0.000), (0.090, 0.024, 0.000), 0.0105),
     ((0.010, 0.003, 0.001), (0.092, 0.003, 0.002), 0.0105),
@@ -82,7 +82,7 @@ _ON_PALM = {
 
 
 def fingers(*, frames: int = 300, rate: float = 100.0, seed: int = 0) -> Truth:
-    """Make a right hand with 23 markers that plays with its fingers.
+    """Simulate a right hand with 23 markers and moving fingers.
 
     Four markers are on the back of each finger (``T1`` … ``T4`` on the thumb, ``I`` index, ``M``
     middle, ``R`` ring, ``L`` little finger): on its knuckle and near the end of each bone. Two
@@ -92,17 +92,17 @@ def fingers(*, frames: int = 300, rate: float = 100.0, seed: int = 0) -> Truth:
     Parameters
     ----------
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0.
     seed : int
-        Chooses the size of the hand, the rhythms and the movement of the wrist.
+        Seed of the size of the hand, the frequencies of the fingers and the motion of the wrist.
 
     Returns
     -------
     Truth
-        Metres, z up; the hand is about 1 m above the ground. Colours 1 to 5 are the fingers from
-        the thumb, 6 the palm.
+        Markers in metres, z up; the hand is about 1 m above the ground. Colours 1 to 5 are the
+        fingers from the thumb, 6 the palm.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def fingers(*, frames: int = 300, rate: float = 100.0, seed: int = 0) -> Truth:
 
 
 def _moving(t: Array, size: float, rng: np.random.Generator) -> Pose:
-    """Move palm and bones; segments are ``palm`` and ``T1`` … ``L3``."""
+    """Return the pose of palm and bones; segments are ``palm`` and ``T1`` to ``L3``."""
     facing = rng.uniform(-180, 180)
     hertz, start = rng.uniform(0.15, 0.35, 6), rng.uniform(0, 1, 6)
     swing = np.sin(2 * np.pi * (t[:, None] * hertz + start))
@@ -146,7 +146,7 @@ def _moving(t: Array, size: float, rng: np.random.Generator) -> Pose:
         angles = [a + (b - a) * bend for a, b in zip(finger.stretched, finger.bent, strict=True)]
         # Bent fingers do not spread.
         aside = finger.aside * (1 + 0.35 * spread) * (1 - 0.75 * bend)
-        if name == "T":  # points to the side and the palm, and bends towards the fingers
+        if name == "T":  # the thumb points to the side, and bends towards the fingers
             turn = palm @ about_z(finger.aside + 7 * spread) @ about_y(34.0) @ about_x(-62.0)
         else:
             turn = palm @ about_z(aside)
@@ -163,7 +163,7 @@ def _tubes(size: float) -> dict[str, list[tuple[Array, float]]]:
     tubes = {"palm": [(np.array([a, b]) * size, r * size) for a, b, r in _PALM]}
     for name, finger in _FINGERS.items():
         for k, (bone, radius) in enumerate(zip(finger.bones, finger.radii, strict=True)):
-            end = bone - radius if k == 2 else bone  # the tip belongs to the length
+            end = bone - radius if k == 2 else bone  # the length includes the tip
             tubes[f"{name}{k + 1}"] = [(np.array([[0, 0, 0], [end, 0, 0]]) * size, radius * size)]
     return tubes
 
@@ -171,7 +171,7 @@ def _tubes(size: float) -> dict[str, list[tuple[Array, float]]]:
 def _markers(
     pose: Pose, tubes: dict[str, list[tuple[Array, float]]]
 ) -> tuple[list[str], Array, list[int]]:
-    """Put markers on the skin: names, positions (T, K, 3) and colours."""
+    """Return the markers on the skin: names, positions (T, K, 3) and colours."""
     rows: list[tuple[str, str, Array, Array, int]] = []
     out = np.array([0.0, 0.0, 1.0])
     for name in _FINGERS:

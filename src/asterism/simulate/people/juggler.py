@@ -1,4 +1,4 @@
-"""A scene with a juggler: balls on parabolas from hand to hand."""
+"""Scene of a juggler: balls on parabolas from hand to hand."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["juggler"]
 
 _BEATS = {3: 0.25, 5: 0.20, 7: 0.18}  # seconds from throw to throw, by the number of balls
-_DWELL = 0.62  # share of the time between two throws of a hand that a ball lies in it
+_DWELL = 0.62  # share of the time between two throws of a hand in which it holds a ball
 _BALL = 0.034  # radius of a ball, metres
 _BALL_COLOUR = 4
 
@@ -39,33 +39,33 @@ def juggler(
     n_markers: int = 53,
     height: float = 1.75,
 ) -> Truth:
-    """Make a standing person with markers who juggles balls in a cascade.
+    """Simulate a standing person with markers who juggles balls in a cascade.
 
-    Each ball is a marker, wrapped in reflective tape: its position is that of its centre, and it
-    hides nothing. It flies on a parabola from a throw at the inner side of one hand to a catch at
-    the outer side of the other, and lies in the hand in between; hand and ball have one velocity
-    and one acceleration as they part and meet. Every hand throws every second beat, and n balls
-    share n beats (C. Shannon, *Scientific aspects of juggling*, about 1980).
+    Each ball is wrapped in reflective tape and is a marker at its centre; it occludes nothing. It
+    flies on a parabola from a throw at the inner side of one hand to a catch at the outer side of
+    the other, and lies in the hand in between; hand and ball have one velocity and one acceleration
+    as they part and meet. Every hand throws every second beat, and n balls share n beats (C.
+    Shannon, *Scientific aspects of juggling*, about 1980).
 
     Parameters
     ----------
     n_balls : int
-        3, 5 or 7: a cascade has an odd number.
+        Number of balls: 3, 5 or 7, because a cascade has an odd number.
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0.
     seed : int
-        Chooses the person's style, the phase and where the juggler looks.
+        Seed of the person's style, the phase and the direction of view.
     n_markers : int
-        On the person, 40 to 90; the balls come after them.
+        Number of markers on the person, 40 to 90; the balls follow them.
     height : float
-        Of the person, metres, 1.2 to 2.2.
+        Height of the person, metres, 1.2 to 2.2.
 
     Returns
     -------
     Truth
-        Markers of the person, then ``BALL1`` …; metres, z up. Colour 4 are the balls.
+        Markers of the person, then ``BALL1`` and so on; metres, z up. The balls have colour 4.
 
     Raises
     ------
@@ -81,7 +81,9 @@ def juggler(
     check_person(n_markers, height=height)
     check_number("n_balls", n_balls, integer=True)
     if n_balls not in _BEATS:
-        raise ParameterError("n_balls", "3, 5 or 7", n_balls, "a cascade has an odd number")
+        raise ParameterError(
+            "n_balls", "3, 5 or 7", n_balls, "choose an odd number, as a cascade needs"
+        )
     rng = np.random.default_rng(seed)
     body, style = Body(height=float(height)), Style.drawn(rng)
     facing, start = rng.uniform(-np.pi, np.pi), rng.uniform(0, 2 * n_balls)
@@ -113,7 +115,7 @@ def juggler(
         )
         for side, sign in SIDES.items()
     }
-    # The eyes follow the balls up a little.
+    # The head is raised slightly, because the eyes follow the balls.
     head = trunk @ about_y(-12.0 + 1.5 * np.sin(2 * np.pi * t / (2 * pattern.beat)))
     pose = body.pose(
         root=root, pelvis=carriage.pelvis, trunk=trunk, head=head,
@@ -133,7 +135,7 @@ def juggler(
 
 @dataclass(frozen=True, kw_only=True)
 class _Cascade:
-    """Where balls are, in a frame with x forward and y left whose origin is between the hips."""
+    """Motion of the balls in a frame between the hips, with x forward and y left."""
 
     n_balls: int
     body: Body
@@ -145,7 +147,7 @@ class _Cascade:
 
     @property
     def held(self) -> float:
-        """Seconds that a ball lies in a hand."""
+        """Time for which a hand holds a ball, seconds."""
         return 2 * self.beat * _DWELL
 
     @property
@@ -153,26 +155,26 @@ class _Cascade:
         return self.n_balls * self.beat - self.held
 
     def ball(self, t: Array, k: int) -> Array:
-        """Centre of a ball, (T, 3): thrown by the left hand at beat 0 of its round of 2n."""
+        """Return the centre of a ball, (T, 3): the left hand throws it at beat 0 of 2n."""
         n = self.n_balls
         beats = (t / self.beat + self.start - 2 * k) % (2 * n)  # ball k is thrown at beat 2k
-        sign = np.where(beats < n, 1.0, -1.0)  # of the hand that threw it last
+        sign = np.where(beats < n, 1.0, -1.0)  # side of the hand that threw it last
         since = (beats % n) * self.beat
         throw, _, velocity = self._ends()
         mirror = np.stack([np.ones_like(sign), sign, np.ones_like(sign)], axis=-1)
         s = np.minimum(since, self.flight)[:, None]
         air = throw + velocity * s - [0, 0, GRAVITY / 2] * s**2
         carried = self._carry(since - self.flight)
-        carried[:, 1] *= -1  # by the other hand
+        carried[:, 1] *= -1  # the other hand holds it
         return mirror * np.where(since[:, None] < self.flight, air, carried)
 
     def hand(self, t: Array, side: str) -> Array:
-        """Middle of what the hand holds or would hold, (T, 3): it throws every second beat."""
+        """Return the centre of the hand's grip, (T, 3): the hand throws every second beat."""
         beats = (t / self.beat + self.start - (0 if side == "L" else self.n_balls)) % 2
         since = beats * self.beat
         throw, catch, velocity = self._ends()
         empty = 2 * self.beat - self.held
-        # It brakes faster than the ball that it has thrown, and falls ahead of the one to catch.
+        # The hand brakes faster than the thrown ball, and falls ahead of the one that it catches.
         brake = [0.0, 0.0, -2 * velocity[2] / empty]
         to_catch: list[Knot] = [
             (0.0, throw, velocity, brake),
@@ -183,9 +185,9 @@ class _Cascade:
         return place * [1.0, SIDES[side], 1.0]
 
     def _ends(self) -> tuple[Array, Array, Array]:
-        """Throw and catch of the left hand, and the velocity of its throw."""
+        """Return throw and catch of the left hand, and the velocity of the throw."""
         h = self.body.height
-        # The deeper the scoop between catch and throw, the higher both, or arms would not reach it.
+        # A deep path between catch and throw needs both to be high, within reach of the arms.
         scoop = 3 / 16 * GRAVITY * self.flight / 2 * self.held
         up = 0.150 * h + max(0.0, scoop - 0.110 * h)
         throw, catch = np.array([0.200 * h, 0.065 * h, up]), np.array([0.190 * h, 0.165 * h, up])
@@ -194,15 +196,15 @@ class _Cascade:
         return throw, catch, velocity
 
     def _landing(self) -> Array:
-        """Velocity of a ball as the left hand catches it, thrown by the right."""
+        """Return the velocity of a ball that the left hand catches."""
         velocity = self._ends()[2] * [1, -1, 1]
         velocity[2] = -velocity[2]
         return velocity
 
     def _carry(self, since: Array) -> Array:
-        """Centre of a ball in the left hand, (T, 3), from the catch to the throw."""
+        """Return the centre of a ball in the left hand, (T, 3), from the catch to the throw."""
         throw, catch, velocity = self._ends()
-        # The push is strongest at both ends, twice the mean, which keeps the scoop flat.
+        # The acceleration at both ends is twice the mean, which keeps the path flat.
         push = [0.0, 0.0, 4 * velocity[2] / self.held]
         knots: list[Knot] = [
             (0.0, catch, self._landing(), push),
@@ -212,10 +214,10 @@ class _Cascade:
 
 
 def _reaching(body: Body, shoulder: Array, ball: Array, world: Array, sign: float) -> Limb:
-    """Hold an arm so that a ball lies on the palm, which is up with the fingers forward."""
+    """Return an arm with a ball on the palm, which faces up with the fingers forward."""
     elbow_down = world @ [0.5, 0.0, 0.9]
     side = world @ [0.0, sign, 0.0]
-    # The ball lies beside the middle of the palm, on the skin of the hand with a millimetre of air.
+    # The ball lies beside the middle of the palm, 1 mm above the skin of the hand.
     on_palm = np.array([0.002, 0, -0.050]) * body.height
     on_palm[1] = -sign * (0.016 * body.height + _BALL + 0.001)
     fingers = world @ unit(np.array([1.0, -0.25 * sign, -0.05]))
@@ -224,7 +226,7 @@ def _reaching(body: Body, shoulder: Array, ball: Array, world: Array, sign: floa
     wrist = ball - hand @ on_palm
     front = np.broadcast_to(elbow_down - 0.35 * side, shoulder.shape)
     arm, forearm = two_bones(shoulder, wrist, body["arm"], body["forearm"], front, -1.0)
-    # Turn the forearm about itself as the hand is turned.
+    # The forearm rotates about its axis with the hand.
     along = forearm[:, :, 2]
     across = unit(thumb - along * (along @ thumb)[:, None])
     forearm = np.stack([across, np.cross(along, across), along], axis=-1)

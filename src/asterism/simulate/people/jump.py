@@ -19,14 +19,30 @@ if TYPE_CHECKING:
 
 __all__ = ["jump"]
 
-_PERIOD = 3.0  # seconds a jump, at least
+_PERIOD = 3.0  # smallest duration of a jump, seconds
 _DIP, _PUSH, _SINK, _RISE = 0.62, 0.32, 0.26, 0.75  # seconds before and after the flight
 _TOE_OUT = 5.0  # degrees
 _LEAVE, _LAND = (-48.0, -360.0), (-34.0, 200.0)  # pitch of the feet and its rate, degrees
 
 
 def jump(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
-    """Jump on the spot: once in the middle of the clip, or once in every three seconds of it."""
+    """Jump on the spot: once in the middle of the scene, or once every three seconds.
+
+    Parameters
+    ----------
+    t : ndarray, shape (T,)
+        Times, seconds.
+    body : Body
+        Body of the person.
+    style : Style
+        Individual variation.
+    rng : Generator
+        Generator of random numbers.
+
+    Returns
+    -------
+    Pose
+    """
     facing, rise = rng.uniform(-180, 180), rng.uniform(0.26, 0.42) * body.height / 1.75
     depth = rng.uniform(0.14, 0.17) * body.height
     duration = float(t[-1])
@@ -48,18 +64,18 @@ class _Jump:
 
     @property
     def up(self) -> float:
-        """Time from leaving the ground to the top of the flight."""
+        """Time from take-off to the top of the flight, seconds."""
         return float(np.sqrt(2 * self.rise / GRAVITY))
 
     @property
     def down(self) -> float:
-        """Time from the top to the ground, which legs meet less stretched, so later."""
+        """Time from the top to the landing, seconds; it is longer, as the legs land bent."""
         leave, land = self._edges
         return float(np.sqrt(2 * (self.rise + leave - land) / GRAVITY))
 
     @property
     def _edges(self) -> tuple[float, float]:
-        """Heights of the root as the balls of the feet leave the ground and meet it."""
+        """Heights of the root at take-off and at landing, metres."""
         ankle = [
             float(rolled(np.array([[pitch, 0.0, 0.0]]), self.body.height)[0][0, 1])
             for pitch in (_LEAVE[0], _LAND[0])
@@ -71,7 +87,7 @@ class _Jump:
         return self.body["thigh"] + self.body["shank"]
 
     def pose(self, t: Array, facing: Array) -> Pose:
-        """Return the pose; `facing` (T, 3, 3) turns the person to the world."""
+        """Return the pose; `facing` (T, 3, 3) rotates the person to the world."""
 
         def turned(local: Array) -> Array:
             return np.einsum("tij,tj->ti", facing, local)
@@ -100,7 +116,7 @@ class _Jump:
         )  # fmt: skip
 
     def root(self, t: Array) -> Array:
-        """Middle of the hips in the person's frame, (T, 3): a parabola in flight."""
+        """Return the middle of the hips in the person's frame, (T, 3): a parabola in flight."""
         stand = self.body["ankle"] + REACH * self._leg - 0.005 * self.body.height
         leave, land = self._edges
         knots: list[Knot] = [
@@ -115,7 +131,7 @@ class _Jump:
         return np.column_stack([back, np.zeros(len(t)), through(t, knots)])
 
     def ankles(self, t: Array) -> dict[str, Array]:
-        """Ankle joints in the person's frame, (T, 3) each; in flight legs hang."""
+        """Return the ankle joints in the person's frame, (T, 3) each; in flight the legs hang."""
         flat = self._standing(t)[0]
         in_air = (t > -self.up) & (t < self.down)
         if in_air.any():
@@ -128,11 +144,11 @@ class _Jump:
         }
 
     def _standing(self, t: Array) -> tuple[Array, Array, Array]:
-        """Ankle over the planted foot and its derivatives, forward and up, (T, 2) each."""
+        """Return the ankle over the standing foot and its derivatives, forward and up, (T, 2)."""
         return rolled(self._pitch(t), self.body.height)
 
     def _hanging(self, t: Array) -> Array:
-        """Ankle in flight, forward and up, (T, 2): length and angle of the leg go on smoothly."""
+        """Return the ankle in flight, forward and up, (T, 2); the leg moves smoothly."""
         knots: list[tuple[float, Array, Array, Array]] = []
         for edge in (-self.up, self.down):
             e = 1e-3
@@ -151,7 +167,7 @@ class _Jump:
         return self.root(t)[:, [0, 2]] + across
 
     def _pitch(self, t: Array) -> Array:
-        """Pitch of the feet, its rate and acceleration, degrees, toes up: (T, 3)."""
+        """Return the pitch of the feet, its rate and acceleration, degrees, toes up: (T, 3)."""
         knots: list[Knot] = [
             (-self.up - 0.20, 0, 0, 0),
             (-self.up, *_LEAVE, 0),
@@ -172,7 +188,7 @@ class _Jump:
         sink: float,
         ahead: float = 0.0,
     ) -> Array:
-        """Go through values at rest, crouching, leaving, landing and sinking, and back to rest.
+        """Interpolate values at rest, crouch, take-off, landing, sinking, and rest again.
 
         The crouch is reached `ahead` seconds before the legs reach it.
         """

@@ -1,8 +1,8 @@
-"""Markers on a body: their names, the segments they are fixed to, and the lines between them.
+"""Markers on a body: names, segments, positions, and the lines of the stick figure.
 
 The first 39 are those of the conventional gait model (Davis et al., *A gait analysis data
 collection and reduction technique*, Hum. Mov. Sci. 10, 1991, and its full-body successors). Each
-place is where a ray from inside the segment leaves its flesh.
+marker lies where a ray from inside the segment leaves its capsules.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = ["FEWEST", "LIFT", "MOST", "MarkerSet", "lines_between", "on_skin"]
 
 FEWEST, MOST = 40, 90
 LIFT = 0.002
-"""How far the middle of a marker is above the skin, metres."""
+"""Distance of the centre of a marker from the skin, metres."""
 
 # Name, segment, where the ray starts and where it points: shares of the height, frame of the
 # segment. With "?" for the side it stands for two, of which the left is given.
@@ -102,22 +102,23 @@ _COLOURS = {"L": 1, "R": 2, "": 3}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MarkerSet:
-    """The markers of a body.
+    """Markers of a body.
 
     Parameters
     ----------
     body : Body
-        Whose.
+        Body that carries the markers.
     n_markers : int
-        How many, 40 to 90; the markers of a smaller set are the first of a larger.
+        Number of markers, 40 to 90; the markers of a smaller set are the first of a larger one.
 
     Attributes
     ----------
     names : tuple of str
+        Names of the markers.
     segments : tuple of str
-        What each is fixed to.
+        Segment of each marker.
     places : ndarray, shape (K, 3)
-        Where, in the frame of the segment, metres.
+        Position of each marker in the frame of its segment, metres.
     """
 
     body: Body
@@ -135,16 +136,27 @@ class MarkerSet:
 
     @property
     def places(self) -> Array:
-        """Places of the markers in the frames of their segments, shape (K, 3)."""
+        """Positions of the markers in the frames of their segments, shape (K, 3)."""
         return _places(self.body)[: self.n_markers]
 
     @property
     def colours(self) -> list[int]:
-        """1 on the left, 2 on the right, 3 in the middle."""
+        """Colour of each marker: 1 on the left, 2 on the right, 3 in the middle."""
         return [_COLOURS[_side(name)] for name in self.names]
 
     def at(self, pose: Pose) -> Array:
-        """Return the markers of a pose, world metres (T, K, 3)."""
+        """Return the markers of a pose.
+
+        Parameters
+        ----------
+        pose : Pose
+            Pose of the body in T frames.
+
+        Returns
+        -------
+        ndarray, shape (T, K, 3)
+            World metres.
+        """
         places, segments = self.places, self.segments
         out = np.empty((len(pose.origins["pelvis"]), self.n_markers, 3))
         for segment in dict.fromkeys(segments):
@@ -154,7 +166,18 @@ class MarkerSet:
 
 
 def lines_between(names: Sequence[str]) -> list[tuple[int, int, int]]:
-    """Return the lines of the stick figure among some markers: (marker, marker, colour)."""
+    """Return the lines of the stick figure between the given markers.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the markers.
+
+    Returns
+    -------
+    list of (marker, marker, colour)
+        Numbers of the markers, and colours from 1.
+    """
     number = {name: k for k, name in enumerate(names)}
     lines: list[tuple[int, int, int]] = []
     for line in _LINES:
@@ -166,14 +189,19 @@ def lines_between(names: Sequence[str]) -> list[tuple[int, int, int]]:
 
 
 def on_skin(tubes: Sequence[tuple[Array, float]], start: Array, towards: Array) -> Array:
-    """Return the place `LIFT` above the flesh where a ray from inside leaves it for good.
+    """Return the position at `LIFT` above the capsules where a ray from inside leaves them.
 
     Parameters
     ----------
     tubes : sequence of (ends, radius)
         Capsules: ends (2, 3), metres.
     start, towards : ndarray, shape (3,)
-        The ray.
+        Origin and direction of the ray.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Metres.
     """
     direction = towards / np.linalg.norm(towards)
 
@@ -196,7 +224,7 @@ def on_skin(tubes: Sequence[tuple[Array, float]], start: Array, towards: Array) 
 
 @lru_cache(maxsize=16)
 def _places(body: Body) -> Array:
-    """Places of all markers on a body, in the frames of their segments, shape (90, 3)."""
+    """Return the positions of all markers in the frames of their segments, shape (90, 3)."""
     places = np.array(
         [
             on_skin(

@@ -37,34 +37,34 @@ def two_people(
     n_markers: int = 53,
     heights: tuple[float, float] = (1.66, 1.82),
 ) -> Truth:
-    """Make two people who walk past each other, or who meet, hug and part.
+    """Simulate two people who walk past each other, or meet, hug and part.
 
-    They meet at the origin at half time. In ``cross`` they pass with a hand's breadth between
-    their arms. In ``hug`` they stop in front of each other, the taller lays the arms over the
-    shoulders of the other, who takes the taller round the waist; they let go, step back, turn round
-    and leave. The whole takes 6 s: a shorter clip shows its middle, a longer one hugs longer. No
-    marker is inside a body.
+    They meet at the origin at half time. In "cross" their arms pass at a distance of about 0.1 m.
+    In "hug" they stop in front of each other. The taller person's arms go over the other's
+    shoulders, and the other's arms round the taller person's waist. They let go, step back, turn
+    round and leave. A hug takes 6 s: a shorter scene shows its middle, a longer one has a longer
+    hug. No marker is inside a body.
 
     Parameters
     ----------
-    activity : str
-        ``cross`` or ``hug``.
+    activity : {"cross", "hug"}
+        Motion of the two people.
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0.
     seed : int
-        Chooses both persons' styles, their phases and the direction.
+        Seed of the styles, the phases and the direction of both persons.
     n_markers : int
-        On each person, 40 to 90.
+        Number of markers on each person, 40 to 90.
     heights : (float, float)
-        Of the persons, metres, 1.2 to 2.2, not more than a fifth apart.
+        Heights of the persons, metres, 1.2 to 2.2, with a ratio of at most 1.2.
 
     Returns
     -------
     Truth
-        ``A:LFHD`` …, then ``B:LFHD`` …; metres, z up. Colours 1 to 3 are the left, the right and
-        the middle of A, 4 to 6 those of B.
+        Markers ``A:LFHD`` and so on, then ``B:LFHD`` and so on; metres, z up. Colours 1 to 3 are
+        the left, the right and the middle of A, 4 to 6 those of B.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def two_people(
     for i, height in enumerate(heights):
         check_person(n_markers, **{f"heights[{i}]": height})
     if max(heights) > 1.2 * min(heights) + 1e-9:
-        raise ParameterError("heights", "heights not more than a fifth apart", repr(heights))
+        raise ParameterError("heights", "heights with a ratio of at most 1.2", repr(heights))
     check_fields("activity", [activity], PAIR_ACTIVITIES)
     rng = np.random.default_rng(seed)
     bodies = [Body(height=float(height)) for height in heights]
@@ -160,7 +160,7 @@ def _is_taller(bodies: list[Body], i: int) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class _Times:
-    """When they stop and when they go, seconds."""
+    """Times at which the two people stop and start to leave, seconds."""
 
     stop: float
     go: float
@@ -174,7 +174,7 @@ class _Times:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Part:
-    """One of two who hug: what there is of the pose before the arms are laid around the other."""
+    """One person of a hug: the pose without the arms, which depend on the other person."""
 
     body: Body
     walker: Walker
@@ -195,7 +195,7 @@ class _Part:
         middle: tuple[float, float],
     ) -> _Part:
         gait = walking(body.height, style)
-        # A foot lands as they stop.
+        # The phase is chosen so that a foot lands at the stop.
         style = replace(style, phase=-times.stop * gait.cadence)
         stop, go = times.stop, times.go
 
@@ -232,9 +232,9 @@ class _Part:
         )
 
     def pose(self, t: Array, times: _Times, other: _Part, *, is_over: bool) -> Pose:
-        """Lay the arms around the other, over the shoulders or round the waist."""
+        """Return the pose with the arms around the other person's shoulders or waist."""
         stop, go, h, of = times.stop, times.go, self.body.height, other.body.height
-        # The taller raise their arms before and drop them after the other's pass.
+        # The taller person's arms rise before the other's arms and fall after them.
         early = 0.15 if is_over else 0.0
         up = blend(t, stop - 1.1 - early, stop - 0.2 - early, go + 0.3 + early, go + 1.2 + early)
         close = blend(t, stop - 0.25, stop + 0.5, go - 0.85, go - 0.05)
@@ -282,4 +282,4 @@ def _laid(
 
 
 PAIR_ACTIVITIES = {"cross": _cross, "hug": _hug}
-"""What two people can do."""
+"""Activities of two people by name."""

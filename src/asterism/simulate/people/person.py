@@ -29,7 +29,7 @@ ACTIVITIES: dict[str, Callable[[Array, Body, Style, np.random.Generator], Pose]]
     "jump": jump,
     "turn": turn,
 }
-"""What a person can do."""
+"""Activities of a person by name."""
 
 
 def person(
@@ -41,32 +41,33 @@ def person(
     n_markers: int = 53,
     height: float = 1.75,
 ) -> Truth:
-    """Make one person with markers on the body, who walks, runs, jumps or turns round.
+    """Simulate one person with markers on the body, who walks, runs, jumps or turns round.
 
-    The limbs are capsules that hide markers. Markers are fixed to the skin, 2 mm above it, and
-    never inside another part of the body. Feet on the ground do not slide. Walkers and runners go
-    straight through the origin at half time; `turn` walks on a circle, turns round at half time
-    and walks back; `jump` jumps once in every three seconds, on the spot.
+    The limbs are capsules that occlude markers. Markers are fixed 2 mm above the skin, and are
+    never inside another part of the body. Feet on the ground do not slide. "walk" and "run" lead
+    straight through the origin at half time. "turn" walks on a circle, turns round at half time and
+    walks back. "jump" jumps on the spot, once every three seconds.
 
     Parameters
     ----------
-    activity : str
-        ``walk``, ``run``, ``jump`` or ``turn``.
+    activity : {"walk", "run", "jump", "turn"}
+        Motion of the person.
     frames : int
-        Number of frames.
+        Number of frames, ≥ 1.
     rate : float
-        Frames a second.
+        Frame rate, frames per second, > 0.
     seed : int
-        Chooses the person's style, the phase of the gait and the direction.
+        Seed of the person's style, the phase of the gait and the direction.
     n_markers : int
-        40 to 90. A smaller set is the beginning of a larger.
+        Number of markers, 40 to 90; the default is a common full-body set. A smaller set is the
+        beginning of a larger one.
     height : float
-        Of the person, metres, 1.2 to 2.2.
+        Height of the person, metres, 1.2 to 2.2.
 
     Returns
     -------
     Truth
-        Metres, z up, the ground at 0. Colour 1 is left, 2 right, 3 the middle.
+        Markers in metres, z up, with the ground at 0. Colour 1 is left, 2 right, 3 the middle.
 
     Raises
     ------
@@ -96,7 +97,22 @@ def person(
 
 
 def check_person(n_markers: int, **heights: float) -> None:
-    """Raise a ParameterError if nobody has that number of markers or that height."""
+    """Raise `ParameterError` if a number of markers or a height is out of range.
+
+    Parameters
+    ----------
+    n_markers : int
+        Number of markers, 40 to 90.
+    **heights : float
+        Heights by the names of their arguments, metres, 1.2 to 2.2.
+
+    Examples
+    --------
+    >>> check_person(53, height=0.5)
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: height: expected a number in [1.2, 2.2], found 0.5
+    """
     check_number("n_markers", n_markers, above=FEWEST, below=MOST, closed=True, integer=True)
     for name, height in heights.items():
         check_number(name, height, above=1.2, below=2.2, closed=True)

@@ -1,4 +1,4 @@
-"""A body of fifteen rigid segments: how long, how thick, and where they are for given joints.
+"""Body of fifteen rigid segments: lengths, thickness, and poses for given joints.
 
 A person stands upright with hanging arms in the neutral pose; x is forward, y left, z up, in the
 world and in the frame of every segment. Lengths are shares of the height.
@@ -78,7 +78,13 @@ SEGMENTS = (*_MIDDLE, *(s + k for s in SIDES for k in FLESH if k not in _MIDDLE)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Limb:
-    """The turns of an arm: matrices (T, 3, 3) from each segment's frame to the world."""
+    """Rotations of an arm from the frame of each segment to the world.
+
+    Parameters
+    ----------
+    arm, forearm, hand : ndarray, shape (T, 3, 3)
+        Rotation of each segment.
+    """
 
     arm: Array
     forearm: Array
@@ -87,54 +93,103 @@ class Limb:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Pose:
-    """Where the segments are, at T moments.
+    """Positions and orientations of the segments in T frames.
 
     Attributes
     ----------
     origins : dict of ndarray, shape (T, 3)
-        The upper joint of each segment, world metres.
+        Upper joint of each segment, world metres.
     turns : dict of ndarray, shape (T, 3, 3)
-        From the frame of the segment to the world.
+        Rotation from the frame of the segment to the world.
     """
 
     origins: dict[str, Array]
     turns: dict[str, Array]
 
     def place(self, segment: str, points: ArrayLike) -> Array:
-        """Take points fixed to a segment, (K, 3) in its frame, to the world, (T, K, 3)."""
+        """Transform points that are fixed to a segment to the world.
+
+        Parameters
+        ----------
+        segment : str
+            Name of the segment.
+        points : array_like, shape (K, 3)
+            Points in the frame of the segment, metres.
+
+        Returns
+        -------
+        ndarray, shape (T, K, 3)
+        """
         local = np.asarray(points, dtype=np.float64)
         return self.origins[segment][:, None] + np.einsum("tij,kj->tki", self.turns[segment], local)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """A body of a certain height.
+    """Body of a given height.
 
     Parameters
     ----------
     height : float
-        Metres.
+        Height, metres.
     """
 
     height: float
 
     def __getitem__(self, length: str) -> float:
-        """One of `LENGTHS` in metres."""
+        """Return one of `LENGTHS` in metres."""
         return LENGTHS[length] * self.height
 
     def tubes(self, segment: str) -> list[tuple[Array, float]]:
-        """Return the ends (2, 3) and the radius of the capsules of a segment, its frame, metres."""
+        """Return the capsules of a segment.
+
+        Parameters
+        ----------
+        segment : str
+            Name of the segment.
+
+        Returns
+        -------
+        list of (ndarray, float)
+            Ends (2, 3) in the frame of the segment, and radius, metres.
+        """
         return [
             (np.array([start, end]) * self.height, radius * self.height)
             for start, end, radius in FLESH[segment.lstrip("LR")]
         ]
 
     def hips(self, root: Array, pelvis: Array) -> dict[str, Array]:
-        """Return the hip joints, (T, 3) each, for the point between them and the pelvis' turn."""
+        """Return the hip joints.
+
+        Parameters
+        ----------
+        root : ndarray, shape (T, 3)
+            Middle of the hip joints, world metres.
+        pelvis : ndarray, shape (T, 3, 3)
+            Rotation of the pelvis.
+
+        Returns
+        -------
+        dict of ndarray, shape (T, 3)
+            By side.
+        """
         return {s: root + sign * self["hip"] * pelvis[:, :, 1] for s, sign in SIDES.items()}
 
     def shoulders(self, root: Array, pelvis: Array, trunk: Array) -> dict[str, Array]:
-        """Return the shoulder joints, (T, 3) each."""
+        """Return the shoulder joints.
+
+        Parameters
+        ----------
+        root, pelvis
+            As for `hips`.
+        trunk : ndarray, shape (T, 3, 3)
+            Rotation of the trunk.
+
+        Returns
+        -------
+        dict of ndarray, shape (T, 3)
+            By side.
+        """
         waist = root + self["waist"] * pelvis[:, :, 2]
         middle = waist + self["shoulder"] * trunk[:, :, 2]
         return {
@@ -152,20 +207,24 @@ class Body:
         feet: Mapping[str, Array],
         arms: Mapping[str, Limb],
     ) -> Pose:
-        """Put the segments together: trunk and arms by their turns, legs by where the feet are.
+        """Compose the pose: trunk and arms from rotations, legs from the positions of the feet.
 
         Parameters
         ----------
         root : ndarray, shape (T, 3)
             Middle of the hip joints, world metres.
         pelvis, trunk, head : ndarray, shape (T, 3, 3)
-            Turns to the world.
+            Rotations to the world.
         ankles : mapping of ndarray, shape (T, 3)
             Ankle joints by side, within reach of the legs.
         feet : mapping of ndarray, shape (T, 3, 3)
-            Turns of the feet.
+            Rotations of the feet.
         arms : mapping of Limb
-            Turns of the arms.
+            Rotations of the arms.
+
+        Returns
+        -------
+        Pose
         """
         waist = root + self["waist"] * pelvis[:, :, 2]
         origins = {"pelvis": root, "trunk": waist, "head": waist + self["head"] * trunk[:, :, 2]}
@@ -189,7 +248,19 @@ class Body:
         return Pose(origins=origins, turns=turns)
 
     def capsules(self, pose: Pose, prefix: str = "") -> list[Capsule]:
-        """Return the capsules of a pose, named by their segments."""
+        """Return the capsules of a pose, named after their segments.
+
+        Parameters
+        ----------
+        pose : Pose
+            Pose of the body.
+        prefix : str
+            Beginning of every name.
+
+        Returns
+        -------
+        list of Capsule
+        """
         return [
             Capsule(ends=pose.place(segment, ends), radius=radius, name=prefix + segment)
             for segment in SEGMENTS
@@ -200,24 +271,24 @@ class Body:
 def two_bones(
     start: Array, end: Array, upper: float, lower: float, front: Array, bend: float
 ) -> tuple[Array, Array]:
-    """Turn two bones so that they lead from one joint to another, as thigh and shank do.
+    """Return the rotations of two bones between two joints, such as thigh and shank.
 
     Parameters
     ----------
     start, end : ndarray, shape (T, 3)
-        Hip and ankle, or shoulder and wrist. Where they are too far apart the bones are straight
-        and do not quite reach; where too near, folded.
+        Hip and ankle, or shoulder and wrist, metres. If they are too far apart the bones are
+        straight and do not reach the end; if too near, they are folded.
     upper, lower : float
-        Lengths.
+        Lengths of the bones, metres.
     front : ndarray, shape (T, 3)
-        Roughly where the x axes of the bones point.
+        Approximate direction of the x axes of the bones.
     bend : float
-        1 if the joint between moves to the front when bent (knee), -1 if to the back (elbow).
+        1 if the joint between them moves forward on flexion (knee), -1 if backward (elbow).
 
     Returns
     -------
     tuple of ndarray, shape (T, 3, 3)
-        Turns of the bones, which lie along -z and have their hinge along y.
+        Rotations of the bones, which lie along -z with the hinge along y.
     """
     line = end - start
     distance = np.clip(

@@ -1,7 +1,8 @@
-"""Feet that stand still on the ground, step by step, and the height at which they carry a body.
+"""Steps of a person: feet that do not slide, and the height of the hips above them.
 
-A `Course` says where a person goes, a `Gait` how. Each foot is planted where the pelvis passes
-over it, rolls over its heel and its ball without sliding, and swings to the next place.
+A `Course` is the position of a person over time, a `Gait` the manner of walking. Each foot is
+placed where the pelvis passes over it, rolls over its heel and its ball without sliding, and swings
+to the next position.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ _HEEL, _BALL = (np.array(end)[[0, 2]] for end in FLESH["foot"][0][:2])
 
 @dataclass(frozen=True, kw_only=True)
 class Gait:
-    """How somebody walks or runs.
+    """Manner of walking or running.
 
     Parameters
     ----------
@@ -62,9 +63,9 @@ class Gait:
     speed : float
         Usual speed, m/s.
     width : float
-        Distance of the lines on which the feet are planted, metres.
+        Distance between the lines of left and right footprints, metres.
     toe_out : float
-        How far the feet point outwards, degrees.
+        Outward rotation of the feet, degrees.
     """
 
     cadence: float
@@ -80,10 +81,18 @@ class Gait:
     toe_out: float
 
     def way(self, body: Body) -> Array:
-        """Where the ankle passes as it swings at the usual speed, (n, 3).
+        """Return the path of the ankle during a swing at the usual speed.
 
-        Columns are the share of the swing, the share of the way from place to place, and the
-        height above the ground in metres.
+        Parameters
+        ----------
+        body : Body
+            Body of the person.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Share of the swing, share of the distance between the footprints, and height above the
+            ground, metres.
         """
         share, hip, knee = np.array(self.swing).T
         hip, shank = np.radians(hip), np.radians(hip - knee)
@@ -100,14 +109,14 @@ class Gait:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Feet:
-    """Where the feet are, by side.
+    """Positions and orientations of the feet, by side.
 
     Attributes
     ----------
     ankles : dict of ndarray, shape (T, 3)
         Ankle joints, world metres.
     turns : dict of ndarray, shape (T, 3, 3)
-        From the foot to the world.
+        Rotations from the foot to the world.
     """
 
     ankles: dict[str, Array]
@@ -120,9 +129,13 @@ def swings_of(course: Course, gait: Gait, phase: float) -> dict[str, Array]:
     Parameters
     ----------
     course, gait
-        Where and how.
+        Position over time, and manner of walking.
     phase : float
-        Of the cycle at time 0, in cycles; 0 as the left foot lands.
+        Phase at time 0, cycles; 0 where the left foot lands.
+
+    Returns
+    -------
+    dict of ndarray, shape (n, 2)
     """
     span = 1.5 / gait.cadence
     swings = {}
@@ -139,11 +152,15 @@ def feet_on(t: Array, body: Body, course: Course, gait: Gait, swings: dict[str, 
     Parameters
     ----------
     t : ndarray, shape (T,)
-        Seconds.
+        Times, seconds.
     body, course, gait
-        Who, where and how.
+        Person, position over time, and manner of walking.
     swings : dict of ndarray, shape (n, 2)
-        When each foot leaves the ground and lands, in order of time; outside it stands.
+        Times at which each foot leaves the ground and lands, ascending; it stands otherwise.
+
+    Returns
+    -------
+    Feet
     """
     ankles, turns = {}, {}
     for side in SIDES:
@@ -155,20 +172,20 @@ def feet_on(t: Array, body: Body, course: Course, gait: Gait, swings: dict[str, 
 
 
 class _Plan:
-    """The stances of one foot between its swings, and the motion that follows from them."""
+    """Stances of one foot between its swings, and the resulting motion."""
 
     def __init__(self, body: Body, course: Course, gait: Gait, swings: Array, sign: float) -> None:
         self.gait, self.height, self.way = gait, body.height, gait.way(body)
         self.sign = sign
         self.leave, self.land = swings.T
         length = gait.stance / gait.cadence
-        start = np.concatenate([[-np.inf], self.land])  # of stance i, which ends with swing i
+        start = np.concatenate([[-np.inf], self.land])  # start of stance i, which ends with swing i
         end = np.concatenate([self.leave, [np.inf]])
-        is_long = end - start > 1.3 * length  # a stand: it is over neither end that the pelvis is
+        is_long = end - start > 1.3 * length  # the pelvis is over neither end
         edges = np.clip([start, end], *course.times[[0, -1]])
         passing = np.where(is_long, edges.mean(axis=0), start + gait.under * length)
         yaw = course.heading(passing)
-        # Who turns sets the feet wider apart, or they would meet.
+        # In a turn the feet are wider apart, because they would meet otherwise.
         turning = np.abs(course.heading(passing + 0.05) - course.heading(passing - 0.05)) / 0.1
         spread = 0.055 * body.height * np.clip(turning / 1.2, 0.0, 1.0)
         aside = sign * (gait.width / 2 + spread)[:, None]
@@ -179,14 +196,14 @@ class _Plan:
         self.vigour_leave = course.vigour(self.leave)
 
     def yaw(self, t: Array) -> Array:
-        """Direction of the foot, radians (T,)."""
+        """Return the direction of the foot, radians (T,)."""
         knots: list[Knot] = [(-1e3, self.yaws[0], 0, 0)]
         for i, (leave, land) in enumerate(zip(self.leave, self.land, strict=True)):
             knots += [(leave, self.yaws[i], 0, 0), (land, self.yaws[i + 1], 0, 0)]
         return through(t, knots if len(knots) > 1 else [*knots, (1e3, self.yaws[0], 0, 0)])
 
     def pitch(self, t: Array) -> Array:
-        """Pitch of the foot, its rate and acceleration, degrees, toes up: (T, 3)."""
+        """Return pitch of the foot, its rate and acceleration, degrees, toes up: (T, 3)."""
         gait, length = self.gait, self.gait.stance / self.gait.cadence
         knots: list[Knot] = [(-1e3, 0, 0, 0)]
         for i, (leave, land) in enumerate(zip(self.leave, self.land, strict=True)):
@@ -200,7 +217,7 @@ class _Plan:
         return through(t, [*knots, (1e4, 0, 0, 0)], derivatives=2)
 
     def ankle(self, t: Array, pitch: Array) -> Array:
-        """Ankle joint, world metres (T, 3), at rising times: `pitch` as `pitch` gives it."""
+        """Return the ankle joint at ascending times, world metres (T, 3)."""
         from scipy.interpolate import make_interp_spline
 
         stance = np.searchsorted(self.land, t, side="right")
@@ -216,7 +233,7 @@ class _Plan:
             vigour = 0.3 + 0.35 * (self.vigour_leave[i] + self.vigour_land[i])
             step = self.places[i + 1] - self.places[i]
             ground = self.places[i] + along[:, None] * step
-            # A foot that turns goes round the other, not straight through it.
+            # In a turn a foot moves round the other one, not through it.
             bend, middle = self.yaws[i + 1] - self.yaws[i], self.yaws[i : i + 2].mean()
             round_it = 0.16 * self.height * np.sin(np.pi * share) ** 2 * (1 - np.cos(bend / 2))
             ground += self.sign * round_it[:, None] * [-np.sin(middle), np.cos(middle)]
@@ -250,7 +267,7 @@ def rolled(pitch: Array, height: float) -> tuple[Array, Array, Array]:
     pitch : ndarray, shape (T, 3)
         Angle, its rate and acceleration, degrees, toes up.
     height : float
-        Of the person, metres.
+        Height of the person, metres.
 
     Returns
     -------
@@ -277,11 +294,16 @@ def reached(
     Parameters
     ----------
     course, body
-        Where and who.
+        Position over time, and person.
     hips_at : callable
-        Gives the hip joints by side at times (T,) for a root at height 0: (T, 3).
+        Function from times (T,) to the hip joints by side, (T, 3), for a root at height 0.
     feet_at : callable
-        Gives the feet at times (T,).
+        Function from times (T,) to the feet.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Metres.
     """
     hips, feet = hips_at(course.times), feet_at(course.times)
     leg = REACH * (body["thigh"] + body["shank"])
@@ -294,23 +316,28 @@ def reached(
 
 
 def carried(t: Array, course: Course, highest: Array, smoothing: float = 0.15) -> Array:
-    """Return the height that legs carry the hips at, (T,): smooth and never out of their reach.
+    """Return the height of the hips over time, smooth and always within reach of the legs.
 
     Parameters
     ----------
     t : ndarray, shape (T,)
-        Seconds.
-    course
-        Where.
-    highest : ndarray
-        What `reached` gives.
+        Times, seconds.
+    course : Course
+        Position over time.
+    highest : ndarray, shape (n,)
+        Result of `reached`.
     smoothing : float
-        Seconds over which the height is evened out.
+        Width of the smoothing, seconds.
+
+    Returns
+    -------
+    ndarray, shape (T,)
+        Metres.
     """
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import convolve1d, minimum_filter1d
 
-    # A mean over a window, of minima over the same window, is under each of its values.
+    # The mean over a window of the minima over the same window is below every value in it.
     box = np.ones(2 * round(smoothing / 6 / STEP) + 1)
     kernel = np.convolve(np.convolve(box, box), box)
     lowest = minimum_filter1d(highest, len(kernel), mode="nearest")
