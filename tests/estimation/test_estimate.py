@@ -151,7 +151,7 @@ def test_misses_in_runs_are_told_from_single_ones():
     single = am.simulate.corrupt(quiet, **runs | {"missing_run": 0.0}).detections
     found = am.estimate_model(single, misses="runs")
     assert found.model.sensor.p_redetection is None
-    assert "no more than by chance" in str(found)
+    assert "no more bursts of missed detections than by chance" in str(found)
     assert found.model == am.estimate_model(single).model
 
 
