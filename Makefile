@@ -25,7 +25,7 @@ contracts: $(VENV)/.lint
 	$(BIN)/lint-imports
 
 docs: $(VENV)/.docs
-	$(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict # --quiet would hide broken links from --strict
 
 bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/speed.py --markdown docs/tables/speed.md

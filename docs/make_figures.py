@@ -1,4 +1,4 @@
-"""Make the pictures of docs/figures.md: ``python docs/make_figures.py [NAME…]``."""
+"""Make the pictures of docs/guides/figures.md: ``python docs/make_figures.py [NAME…]``."""
 
 from __future__ import annotations
 

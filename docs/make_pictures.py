@@ -13,28 +13,41 @@ from asterism.plot import plot_coverage, plot_image, plot_lens, plot_rig
 from asterism.plot.style import CYCLE
 
 
-def crossing(path: Path) -> None:
-    """Draw what goes in and what comes out: a turning cube flies through a still one."""
-    scene = am.simulate.crossing(seed=3, rate=100)
-    truth = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.002, seed=4)
-    unnamed = am.Tracks(detections=truth.detections, labels=np.full(truth.detections.n_points, -1))
-    tracks = am.track(truth.detections, am.GNN())
-    figure = Figure(figsize=(11, 3.6), dpi=110)
-    for i, (shown, title) in enumerate(
-        ((unnamed, "what the cameras give: points"), (tracks, "what Asterism makes of them"))
-    ):
-        # 3-D axes leave wide margins, which are let run out of the picture.
-        axes: Any = figure.add_axes((0.5 * i - 0.09, -0.42, 0.68, 1.75), projection="3d")
-        am.plot.plot_trajectories(shown, ax=axes)
-        axes.set_title("")
-        figure.text(0.5 * i + 0.02, 0.93, title, fontsize=12)
-        if not i:
-            axes.collections[0].set(color="#444444", alpha=0.8)
+def landing(path: Path, *, dark: bool) -> None:
+    """Draw 0.4 s of a walk: unnamed points on the left, their tracks on the right."""
+    person = am.simulate.person(activity="walk", frames=140, n_markers=53, seed=1)
+    truth = am.simulate.corrupt(person, missing=0.05, clutter=0.05, noise=0.0003, seed=1)
+    tracks = am.track(truth.detections, stitch=True)
+    d, seen = truth.detections, slice(40, 80)
+    places = person.positions()[seen]
+    middle = (places.min(axis=(0, 1)) + places.max(axis=(0, 1))) / 2
+    K = am.camera.intrinsics(focal_length=1500, principal_point=(1000.0, 1000.0))
+    stand = middle + np.array([2.4, -4.4, 0.6])
+    camera = am.Camera.look_at(stand, middle, K=K, size_px=(2001, 2001))
+    now = d.frame_of == seen.stop - 1
+    shown = (d.frame_of >= seen.start) & (d.frame_of < seen.stop)
+    pixels = camera.project(d.points).pixels
+    ways = camera.project(tracks.positions()[seen]).pixels.swapaxes(0, 1)
+    body = camera.project(places).pixels
+    ink, paper, line = ("#dfe6f5", "#1e2129", "#56607a") if dark else ("#3a4256", "#fff", "#c3c9d6")
+    figure = Figure(figsize=(11, 5.2), dpi=110, facecolor="none")
+    titles = "0.4 s of detections", f"{len(tracks)} tracks; false alarms are left out"
+    for i, title in enumerate(titles):
+        axes = figure.add_axes((0.5 * i, 0.0, 0.5, 0.93))
+        if i:
+            for a, b in np.argwhere(np.triu(person.connections)):
+                axes.plot(*body[-1, [a, b]].T, color=line, linewidth=1.2, zorder=0)
+            for k, way in enumerate(ways):
+                colour = CYCLE[k % len(CYCLE)]
+                axes.plot(*way.T, color=colour, linewidth=1.2, alpha=0.8)
+                axes.plot(*way[-1:].T, "o", color=colour, markersize=6, markeredgecolor=paper)
+        else:
+            axes.plot(*pixels[shown & ~now].T, ".", color=ink, markersize=2, alpha=0.6)
+            axes.plot(*pixels[now].T, "o", color=ink, markersize=4.2)
+        low, high = body.min(axis=(0, 1)), body.max(axis=(0, 1))
+        axes.set(xlim=(low[0] - 90, high[0] + 90), ylim=(high[1] + 25, low[1] - 25), aspect="equal")
         axes.set_axis_off()
-        marked = truth.detections.points[truth.labels >= 0]
-        low, high = marked.min(axis=0), marked.max(axis=0)
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-        axes.set_box_aspect(high - low, zoom=1.12)
+        figure.text(0.5 * i + 0.03, 0.95, title, fontsize=12, color=ink)
     figure.savefig(path)
 
 
@@ -184,5 +197,7 @@ def scenes(path: Path) -> None:
 if __name__ == "__main__":
     images = Path(__file__).parent / "images"
     images.mkdir(exist_ok=True)
-    for picture in (crossing, lenses, film, rig, scenes):
+    for picture in (lenses, film, rig, scenes):
         picture(images / f"{picture.__name__}.png")
+    landing(images / "landing_light.png", dark=False)
+    landing(images / "landing_dark.png", dark=True)

@@ -20,8 +20,10 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 IMAGES = Path(__file__).parent / "images"
+WIDTH = "95"  # columns that fit the page
 
 _BLOCK = re.compile(r"^```(?P<language>\w*)[^\n]*\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _PICTURE = re.compile(r"^!\[.*?\]\((?:\.\./)?images/(\S+\.png)\)", re.MULTILINE | re.DOTALL)
@@ -88,7 +90,7 @@ def run(page: Path, folder: Path) -> list[tuple[Block, str, Block | None]]:
     blocks = blocks_of(page.read_text(encoding="utf-8"))
     namespace: dict[str, Any] = {"__name__": "__main__"}
     done: list[tuple[Block, str, Block | None]] = []
-    with contextlib.chdir(folder):
+    with contextlib.chdir(folder), mock.patch.dict(os.environ, COLUMNS=WIDTH):
         for block, after in zip(blocks, [*blocks, None][1:], strict=True):
             shown = after if after is not None and after.language == "text" else None
             if block.language in ("python", "sh"):

@@ -139,7 +139,7 @@ def test_a_changed_figure_is_noticed(page):
     assert seen > 0.9 * total, f"{seen} of {total}"
 
 
-@pytest.mark.parametrize(("page", "n"), [("README.md", 1), ("docs/results.md", 2)])
+@pytest.mark.parametrize(("page", "n"), [("README.md", 1), ("docs/measured/results.md", 2)])
 def test_every_table_of_results_is_held(page, n):
     source = (ROOT / page).read_text(encoding="utf-8")
     tables = re.findall(r"(?m)(?<=\n\n)\|.*(?:\n\|.*)*", source)
