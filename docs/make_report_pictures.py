@@ -14,7 +14,7 @@ from PIL import Image
 
 import asterism as am
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "reporting"))
 from browser import Browser
 
 IMAGES = Path(__file__).parent / "images"
