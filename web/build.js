@@ -1,6 +1,6 @@
 /**
  * Bundle the player into the Python package; the same sources give the same bytes.
- * With --check nothing is written: it fails where the package holds another bundle.
+ * With --check nothing is written, and a different bundle in the package is an error.
  */
 
 import { readFile, rename, writeFile } from "node:fs/promises";
@@ -21,7 +21,7 @@ const { outputFiles } = await build({
   format: "iife",
   target: ["es2022"],
   charset: "ascii",
-  legalComments: "none", // the one there is comes in the banner, in full
+  legalComments: "none", // the banner holds the licence in full
   banner: {
     js: `/*! Made by \`make web\` from web/src; with three.js:\n\n${licence}\n*/`,
     css: "/*! Made by `make web` from web/src. */",

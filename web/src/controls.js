@@ -101,7 +101,7 @@ export function connect({ capture, state, stage, timeline }) {
   });
 }
 
-/** Whether what has the focus knows what to do with a key itself. */
+/** Return whether the focused element handles a key itself. */
 function ownKeys(event) {
   const { target, key } = event;
   const tag = target.tagName;
@@ -111,7 +111,7 @@ function ownKeys(event) {
   return target.type === "range" && (key.startsWith("Arrow") ? !event.shiftKey : false);
 }
 
-/** Let a pointer choose markers, and say which one it is over. */
+/** Select markers with the pointer, and show the name of the one under it. */
 export function connectPointer(stage, state) {
   const { canvas } = stage;
   let down = null;

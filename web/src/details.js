@@ -1,4 +1,4 @@
-/** What is known of the chosen marker at this frame. */
+/** Details of the selected marker in the current frame. */
 
 import { ABSENT, GAP, Places } from "./places.js";
 

@@ -1,7 +1,7 @@
-/** Flat canvases: sharp on every screen. */
+/** 2-D canvases with the resolution of the screen. */
 
 /**
- * Make a canvas as large as it is shown and clear it.
+ * Set a canvas to the size at which it is shown, and clear it.
  * @returns {CanvasRenderingContext2D} in CSS pixels
  */
 export function cleared(canvas, width = canvas.clientWidth, height = canvas.clientHeight) {

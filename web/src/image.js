@@ -1,23 +1,23 @@
-/** What a camera sees: markers in its image, through its lens. */
+/** Image of a camera: markers projected through its lens. */
 
 import { cleared } from "./flat.js";
 import { ABSENT, GAP, Places } from "./places.js";
 import { css } from "./theme.js";
 
-/** Pixels of places in the world, by one camera. */
+/** Projection of points in the world by one camera. */
 export class Lens {
   /**
    * @param {object} camera of the header
-   * @param {?Float32Array} table what the lens adds to the pin-hole, on an even grid
-   * @param {number} side places of the grid along each side
+   * @param {?Float32Array} table displacement by the lens, on a regular grid
+   * @param {number} side number of grid points along each side
    */
   constructor(camera, table, side) {
     Object.assign(this, { camera, table, side });
   }
 
   /**
-   * Write the pixel of a place into `out`.
-   * @returns {boolean} whether it is in the image
+   * Write the pixel of a point into `out`.
+   * @returns {boolean} whether the point is in the image
    */
   project(x, y, z, out) {
     const { T, K, near, far, size } = this.camera;
@@ -57,7 +57,7 @@ export class CameraImage {
     this.places = new Places(capture);
   }
 
-  /** Pixel of a track in the image of the chosen camera, null where it is not seen. */
+  /** Pixel of a track in the image of the selected camera, null outside the image. */
   pixelOf(track) {
     const place = [0, 0, 0];
     const pixel = [0, 0];
@@ -66,7 +66,7 @@ export class CameraImage {
     return isIn ? pixel : null;
   }
 
-  /** Draw the image of the chosen camera. */
+  /** Draw the image of the selected camera. */
   draw() {
     const { capture, state, canvas } = this;
     const lens = this.lenses[state.camera];

@@ -1,4 +1,4 @@
-/** Lines of any colours: trails, connections, the floor, cameras. */
+/** Coloured line segments: trails, connections, the floor, cameras. */
 
 import {
   BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, LineBasicMaterial, LineSegments,
@@ -6,11 +6,11 @@ import {
 
 import { frameAt, SEEN } from "./places.js";
 
-const MOST_SAMPLES = 80; // of a trail
-const MOST_LIVE = 400; // tracks whose trails are drawn at a time
+const MAX_SAMPLES = 80; // of a trail
+const MAX_TRAILS = 400; // tracks with a trail at the same time
 
 export class Lines {
-  /** @param {number} most segments there may ever be */
+  /** @param {number} most largest number of segments */
   constructor(most) {
     this.geometry = new BufferGeometry();
     this.position = new BufferAttribute(new Float32Array(6 * most), 3);
@@ -52,10 +52,10 @@ export class Lines {
   }
 }
 
-/** Where each marker has been of late. */
+/** Trails: the last positions of each marker. */
 export class Trails extends Lines {
   constructor(capture, places) {
-    super(Math.min(capture.K, MOST_LIVE) * MOST_SAMPLES);
+    super(Math.min(capture.K, MAX_TRAILS) * MAX_SAMPLES);
     this.capture = capture;
     this.places = places;
     this.cycle = capture.header.colours.cycle.map((c) => new Color(c));
@@ -70,7 +70,7 @@ export class Trails extends Lines {
     if (seconds > 0 && capture.T > 1) {
       const t = state.frame;
       const first = frameAt(capture.times, capture.times[t] - seconds);
-      const step = Math.max(1, Math.ceil((t - first) / MOST_SAMPLES));
+      const step = Math.max(1, Math.ceil((t - first) / MAX_SAMPLES));
       for (let k = 0; k < capture.K; k++) {
         let [now, before] = this.buffer;
         let was = places.find(k, t, now, 0);
@@ -91,7 +91,7 @@ export class Trails extends Lines {
   }
 }
 
-/** Lines between markers that keep their distance. */
+/** Lines between markers with a stable distance. */
 export class Connections extends Lines {
   constructor(capture, places) {
     super(capture.pairs.length / 2);

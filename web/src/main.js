@@ -1,4 +1,4 @@
-/** The player of a report: from the data in the page to what moves in it. */
+/** The player of a report page: unpacks the data of the page and connects its parts. */
 
 import "./style.css";
 
@@ -69,7 +69,7 @@ async function start() {
   document.body.dataset.ready = "true";
 }
 
-/** Make the scene, or say why there is none: all else on the page works without it. */
+/** Make the scene, or show why there is none. The rest of the page works without it. */
 function staged(capture, state, told) {
   try {
     return new Stage(capture, state, byId("scene"));
@@ -99,21 +99,21 @@ function size(metres) {
   return metres < 1 ? `${+(100 * metres).toPrecision(3)} cm` : `${+metres.toPrecision(3)} m`;
 }
 
-/** What may be asked and told from the console: `asterism.seek(120)`. */
+/** Commands for the console of the browser: `asterism.seek(120)`. */
 function script(capture, state, stage, image) {
   return {
     capture,
     state: () => ({ frame: state.frame, chosen: state.chosen, playing: state.playing }),
     seek: (frame) => state.seek(frame),
     choose: (track) => state.choose(track),
-    /** Where a track is on the canvas, CSS pixels; null where it is not. */
+    /** Position of a track on the canvas in CSS pixels, null without one. */
     where: (track) => {
       const n = stage ? stage.dotOf(track) : -1;
       if (n < 0) return null;
       const p = stage.onCanvas(stage.place(n, stage.point));
       return [p.x, p.y];
     },
-    /** Where a track is in the image of the chosen camera, pixels; null where it is not. */
+    /** Position of a track in the image of the selected camera in pixels, null without one. */
     pixel: (track) => image?.pixelOf(track) ?? null,
   };
 }

@@ -1,4 +1,4 @@
-/** Markers as round dots: filled where seen, hollow in gaps, with a ring where chosen or wrong. */
+/** Markers as dots: filled if detected, hollow in gaps, with a ring if selected or wrong. */
 
 import {
   BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, Points, ShaderMaterial,
@@ -91,9 +91,9 @@ export class Markers {
   }
 
   /**
-   * Put all dots where they are at the frame.
+   * Place all dots for the current frame.
    * @param {import("./state.js").State} state
-   * @param {Color} ink colour of the ring about the chosen one
+   * @param {Color} ink colour of the ring around the selected marker
    */
   update(state, ink) {
     const { capture, places } = this;

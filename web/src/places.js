@@ -1,22 +1,22 @@
-/** Where a track is at a frame. */
+/** Position of a track in a frame. */
 
 export const ABSENT = 0;
 export const SEEN = 1;
 export const GAP = 2;
 
-/** Answers for one capture; remembers where it was, so that playing on costs nothing. */
+/** Positions of one capture. The last run of each track is stored, so that playing needs no search. */
 export class Places {
   /** @param {import("./unpack.js").Capture} capture */
   constructor(capture) {
     this.capture = capture;
     this.last = Uint32Array.from(capture.runsOf.subarray(0, capture.K));
-    /** The point of the track that was asked for last, -1 in a gap. */
+    /** Index of the point that was looked up last, -1 in a gap. */
     this.point = -1;
   }
 
   /**
-   * Write the place of track k at frame t into `out`, from `offset` on.
-   * In a gap it is the one on the straight line across it.
+   * Write the position of track k in frame t into `out`, from `offset` on.
+   * In a gap the position is interpolated linearly.
    * @returns {number} ABSENT, SEEN or GAP
    */
   find(k, t, out, offset) {
@@ -42,7 +42,7 @@ export class Places {
     return GAP;
   }
 
-  /** The last run of track k that has begun by frame t, -1 before the first. */
+  /** Index of the last run of track k that begins by frame t, -1 before the first. */
   run(k, t) {
     const { runsOf, runFirst } = this.capture;
     const stop = runsOf[k + 1];
@@ -61,7 +61,7 @@ export class Places {
   }
 }
 
-/** The last frame that is not after a time. */
+/** Last frame at or before a time. */
 export function frameAt(times, time) {
   let low = 0;
   let high = times.length;

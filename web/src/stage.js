@@ -1,4 +1,4 @@
-/** The scene: markers, lines and surroundings, seen from where the reader turns them. */
+/** The 3-D scene: markers, lines and surroundings, with a view that the reader turns. */
 
 import {
   ColorManagement, Group, LinearSRGBColorSpace, MOUSE, PerspectiveCamera, Quaternion, Scene,
@@ -12,12 +12,12 @@ import { Places } from "./places.js";
 import { Floor, Frustums } from "./surroundings.js";
 import { ink, accent } from "./theme.js";
 
-// Colours go to the screen as they were written, like those of the figures.
+// Without colour management, so that colours equal those of the figures.
 ColorManagement.enabled = false;
 
 const UP = { x: new Vector3(1, 0, 0), y: new Vector3(0, 1, 0), z: new Vector3(0, 0, 1) };
 const SEEN_FROM = new Vector3(0.6, 0.33, 0.9).normalize();
-const NEAR_PX = 16; // a click so far from a dot still means it
+const NEAR_PX = 16; // largest distance of a click from the dot that it selects
 
 export class Stage {
   /**
@@ -33,7 +33,7 @@ export class Stage {
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.renderer.setClearColor(0, 0);
     this.scene = new Scene();
-    this.root = new Group(); // turns the capture's up to the scene's
+    this.root = new Group(); // rotates the vertical axis of the capture to that of the scene
     this.scene.add(this.root);
     this.view = new PerspectiveCamera(capture.axes === 2 ? 20 : 38, 1, 0.01, 1000);
     const places = new Places(capture);
@@ -100,7 +100,7 @@ export class Stage {
     this.redraw();
   }
 
-  /** Whether all corners are in view from so far away, with some room to the edges. */
+  /** Return whether all corners are in view from a distance, with a margin. */
   holds(corners, middle, from, away) {
     this.view.position.copy(middle).addScaledVector(from, away);
     this.view.lookAt(middle);
@@ -124,7 +124,7 @@ export class Stage {
     this.markers.uniforms.height.value = 0.5 * height * ratio;
   }
 
-  /** Put everything where it is at the frame, and draw. */
+  /** Place everything for the current frame, and draw. */
   update() {
     const { state } = this;
     const colour = ink();
@@ -170,13 +170,13 @@ export class Stage {
     return track < 0 ? -1 : this.markers.tracks.subarray(0, this.markers.count).indexOf(track);
   }
 
-  /** Place of a dot in the scene. */
+  /** Position of a dot in the scene. */
   place(n, out) {
     out.fromArray(this.markers.geometry.attributes.position.array, 3 * n);
     return this.root.localToWorld(out);
   }
 
-  /** Place of a point of the scene on the canvas, CSS pixels; z > 1 behind the reader. */
+  /** Position of a point of the scene on the canvas in CSS pixels; z > 1 is behind the view. */
   onCanvas(point) {
     point.project(this.view);
     point.x = (0.5 + 0.5 * point.x) * this.canvas.clientWidth;
@@ -184,7 +184,7 @@ export class Stage {
     return point;
   }
 
-  /** The track whose dot is at a place of the canvas, -1 for none. */
+  /** Track with a dot at a position of the canvas, -1 for none. */
   pick(x, y) {
     let best = -1;
     let least = NEAR_PX;
@@ -197,7 +197,7 @@ export class Stage {
     return best;
   }
 
-  /** Turn by angles, in radians. */
+  /** Rotate the view by angles in radians. */
   turn(across, along) {
     if (this.capture.axes === 2) return;
     const arm = this.view.position.clone().sub(this.controls.target);
@@ -210,7 +210,7 @@ export class Stage {
     this.redraw();
   }
 
-  /** Come nearer (below 1) or go farther. */
+  /** Multiply the distance of the view by a factor. */
   zoom(factor) {
     const { target } = this.controls;
     this.view.position.sub(target).multiplyScalar(factor).add(target);

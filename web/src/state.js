@@ -1,4 +1,4 @@
-/** What the reader has chosen, and who wants to know. */
+/** State of the page: frame, selection and options; listeners are called at each change. */
 
 import { frameAt } from "./places.js";
 
@@ -15,11 +15,11 @@ export class State extends EventTarget {
     this.speed = 1;
     this.camera = 0;
     this.show = { names: false, lines: true, clutter: true, cameras: true, trails: 0.5 };
-    this.clock = capture.times[this.frame] ?? 0; // time of playing, seconds; between frames it is not that of a frame
+    this.clock = capture.times[this.frame] ?? 0; // time of the player in seconds; it may lie between frames
     this.before = null;
   }
 
-  /** Say that something changed; all that listen draw anew. */
+  /** Call all listeners, which draw again. */
   changed() {
     this.dispatchEvent(new Event("change"));
   }

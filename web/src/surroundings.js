@@ -1,10 +1,10 @@
-/** What stands about the markers: the floor with its axes, and the cameras. */
+/** Surroundings of the markers: the floor with its axes, and the cameras. */
 
 import { Vector3 } from "three";
 
 import { Lines } from "./lines.js";
 
-/** A floor of squares with a round size. */
+/** A floor of squares, with a round number as their size. */
 export class Floor extends Lines {
   constructor(capture) {
     super(400);
@@ -23,7 +23,7 @@ export class Floor extends Lines {
     const extent = Math.max(high[a] - low[a], high[b] - low[b], 1e-3);
     this.cell = roundSize(extent / 8);
     const flat = this.capture.axes === 2;
-    // A floor at the origin where the feet are about there, else below what is lowest.
+    // The floor is at the origin if the lowest points are near it, else at the lowest point.
     const floor = flat || Math.abs(low[u]) < 0.15 * Math.max(extent, high[u] - low[u]) ? 0 : low[u];
     const from = [a, b].map((i) => (Math.floor(low[i] / this.cell) - 1) * this.cell);
     const to = [a, b].map((i) => (Math.ceil(high[i] / this.cell) + 1) * this.cell);
@@ -45,13 +45,13 @@ export class Floor extends Lines {
   }
 }
 
-/** The next of 1, 2 and 5 times a power of ten. */
+/** Round up to 1, 2 or 5 times a power of ten. */
 function roundSize(size) {
   const ten = 10 ** Math.floor(Math.log10(size));
   return ten * [1, 2, 5, 10].find((m) => m * ten >= size * 0.999);
 }
 
-/** Cameras as pyramids that open where they look. */
+/** Cameras as pyramids that open in their viewing direction. */
 export class Frustums extends Lines {
   constructor(capture, size) {
     super(8 * capture.header.cameras.length);
@@ -60,7 +60,7 @@ export class Frustums extends Lines {
     const away = this.cameras.map((camera) =>
       Math.hypot(...camera.centre.map((x, i) => x - (low[i] + high[i]) / 2)),
     );
-    // To be seen from where all of them are, but never larger than the scene.
+    // Large enough to be visible in a view of all cameras, and never larger than the scene.
     this.size = Math.min(0.3 * size, 0.07 * Math.max(size, ...away));
   }
 

@@ -1,4 +1,4 @@
-/** Colours of the page, light or dark, as the style sheet has them. */
+/** Colours of the page from its style sheet, light or dark. */
 
 import { Color } from "three";
 
@@ -15,12 +15,12 @@ function named(name) {
 export const ink = () => named("--ink");
 export const accent = () => named("--accent");
 
-/** The same as text for 2-D canvases. */
+/** The colours as text, for 2-D canvases. */
 export function css(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-/** Call back when the system goes from light to dark or back. */
+/** Register a listener for a change between light and dark. */
 export function onTheme(changed) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     cache.clear();

@@ -1,4 +1,4 @@
-/** When each track was there, how surely, and where it was wrong: one strip a track. */
+/** Timeline: one strip for each track with its detections, confidence and errors over time. */
 
 import { Color } from "three";
 
@@ -9,12 +9,12 @@ import { css } from "./theme.js";
 const ROW = 15;
 const RULER = 20;
 const NAMES = 96; // width of the names
-const LEVELS = 16; // of doubt
+const LEVELS = 16; // of confidence
 
-// What a cell of a strip shows; the worst of its frames counts. From SURE on doubt grows.
+// Content of a cell of a strip: the worst of its frames. From SURE on, confidence falls.
 const [NONE, SPAN, SURE, WRONG] = [0, 1, 2, 2 + LEVELS];
 
-/** Level of doubt: none at a confidence of 1, the most at a half and below. */
+/** Level of a confidence: 0 at a confidence of 1, the last at 0.5 and below. */
 function doubt(confidence) {
   const share = Math.min(1, (255 - confidence) / 127.5);
   return SURE + Math.round((LEVELS - 1) * Math.sqrt(share));
@@ -43,7 +43,7 @@ export class Timeline {
     this.rowOf = new Map(this.order.map((k, row) => [k, row]));
   }
 
-  /** Take the size that there is, and gather the strips anew. */
+  /** Adapt to the size of the page, and compute the strips again. */
   resize() {
     this.box.classList.toggle("short", this.order.length < 8);
     this.rows.style.height = `${RULER + ROW * this.order.length + 6}px`;
@@ -66,7 +66,7 @@ export class Timeline {
     return NAMES + (span > 0 ? (times[frame] - times[0]) / span : 0) * this.cells;
   }
 
-  /** For each track and cell the worst of what falls into it. */
+  /** Compute the worst frame of each track and cell. */
   gather() {
     const { capture, cells } = this;
     this.strips = new Uint8Array(capture.K * cells);
@@ -186,7 +186,7 @@ export class Timeline {
     this.step(step);
   }
 
-  /** Choose the track above or below the chosen one. */
+  /** Select the track above or below the selected one. */
   step(step) {
     if (!this.order.length) return;
     const row = this.rowOf.get(this.state.chosen);

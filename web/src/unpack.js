@@ -1,5 +1,5 @@
 /**
- * The data of the page, from text to arrays. How it is packed is written in packing.py.
+ * Unpacks the data of the page from text to arrays; packing.py describes the format.
  *
  * @typedef {object} Capture
  * @property {number} T frames
@@ -17,9 +17,9 @@
  * @property {?Uint8Array} filled 1 where a point was filled in
  * @property {?Uint8Array} verdict of each point: 0 right, 1 wrong, 2 missed
  * @property {?Int32Array} marker true marker of each point, -1 for none
- * @property {Uint32Array} trouble tracks, the most troubled first
+ * @property {Uint32Array} trouble tracks, ordered by the number of findings, most first
  * @property {Uint32Array} pairs tracks that are joined by lines, two by two
- * @property {object} header all else
+ * @property {object} header all other fields
  */
 
 /**
@@ -63,7 +63,7 @@ async function inflate(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** Put byte planes together; all machines that run browsers are little-endian. */
+/** Merge byte planes. All machines that run browsers are little-endian. */
 function fromPlanes(bytes, Kind, count) {
   const size = Kind.BYTES_PER_ELEMENT;
   const whole = new Uint8Array(count * size);

@@ -1,4 +1,4 @@
-/** Names in the scene, on a flat canvas over it: text there is never taken for HTML. */
+/** Names of markers, on a 2-D canvas over the scene, where no name is interpreted as HTML. */
 
 import { Vector3 } from "three";
 
@@ -35,7 +35,7 @@ export class Writing {
       pen.font = font;
       const [x, y, width] = [p.x, p.y, pen.measureText(text).width + 10];
       const covers = (o) => Math.abs(o.y - y) < 12 && o.x < x + width && x < o.x + o.width;
-      if (!mustBe && taken.some(covers)) return; // one over the other nobody can read
+      if (!mustBe && taken.some(covers)) return; // overlapping names are unreadable
       taken.push({ x, y, width });
       this.write(pen, text, p, colour, paper, 10);
     };
@@ -47,7 +47,7 @@ export class Writing {
     for (const n of others.slice(0, MOST_NAMES)) name(n, FONT, muted, false);
   }
 
-  /** Which way the axes of the capture point, in a corner where they are always seen. */
+  /** Directions of the axes of the capture, in a corner of the scene. */
   drawAxes(pen, paper) {
     const { root, view, capture, canvas } = this.stage;
     const turned = view.quaternion.clone().invert().multiply(root.quaternion);
