@@ -86,20 +86,20 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
     found: Found = {}
-    floors: dict[tuple[str, int], list[float]] = {}
+    oracles: dict[tuple[str, int], list[float]] = {}
     names: list[str] = []
     for path in captures(options.data):
         if not any(name in path.name for name in options.only):
             continue
         names.append(path.name)
         recorded = am.read(path).tracks
-        for condition, spoil in CONDITIONS.items():
+        for condition, corrupt in CONDITIONS.items():
             for seed in range(1, options.seeds + 1):
-                truth = spoil(recorded, seed)
+                truth = corrupt(recorded, seed)
                 model = am.estimate_model(truth.detections).model
                 for gap in (10, 60):
-                    floor = am.evaluate(am.metrics.oracle_tracks(truth, gap), truth).idf1
-                    floors.setdefault((condition, gap), []).append(floor)
+                    oracle = am.evaluate(am.metrics.oracle_tracks(truth, gap), truth).idf1
+                    oracles.setdefault((condition, gap), []).append(oracle)
                 for name in options.methods:
                     for way in WAYS:
                         one = figures(truth, model, METHODS[name], way)
@@ -110,8 +110,8 @@ def main() -> None:
     rows: list[list[str]] = []
     for condition in CONDITIONS:
         for gap in (10, 60):
-            value = f"{np.mean(floors[condition, gap]):.4f}"
-            rows.append([f"{condition}, floor at {gap} frames", value, "–", "–", "–"])
+            value = f"{np.mean(oracles[condition, gap]):.4f}"
+            rows.append([f"{condition}, oracle at {gap} frames", value, "–", "–", "–"])
         for name in options.methods:
             rows += [
                 [f"{condition}, {name}, {way}", *row(found[condition, name, way])] for way in WAYS

@@ -18,12 +18,12 @@ import asterism as am
 from methods import METHODS, LinkConfidence
 from report import publish, table
 
-ENDINGS = (".c3d", ".tsv", "recording_000", "drone2", "marker3")
+SUFFIXES = (".c3d", ".tsv", "recording_000", "drone2", "marker3")
 
 
 def captures(folder: Path) -> list[Path]:
     return sorted(
-        (p for p in folder.rglob("*") if p.is_file() and p.name.endswith(ENDINGS)),
+        (p for p in folder.rglob("*") if p.is_file() and p.name.endswith(SUFFIXES)),
         key=lambda p: p.name.lower(),
     )
 
@@ -123,9 +123,9 @@ def main() -> None:
             model = am.estimate_model(truth.detections).model
             seconds = time.process_time() - start
             gap = model.population.max_gap
-            floors = [oracle_idf1(truth, g) for g in (10, gap)]
+            oracles = [oracle_idf1(truth, g) for g in (10, gap)]
             found, speed, results = score(truth, model)
-            row = [path.name, condition, f"{floors[0]:.3f}", f"{floors[1]:.3f} ({gap})"]
+            row = [path.name, condition, f"{oracles[0]:.3f}", f"{oracles[1]:.3f} ({gap})"]
             for name, e in found.items():
                 row.append(f"{e.idf1:.3f} ({e.switches_per_1000:.2f})")
                 idf1.setdefault((condition, name), []).append(e.idf1)
@@ -142,7 +142,7 @@ def main() -> None:
             row.append(f"**{np.mean(idf1[key]):.3f}** ({np.mean(switches[key]):.2f})")
         scores.append(row)
     lines = ["IDF1, and switches for 1000 detections:", ""]
-    head = ["capture", "condition", "floor 10", "floor d̄ (d̄)", *METHODS]
+    head = ["capture", "condition", "oracle 10", "oracle d̄ (d̄)", *METHODS]
     lines += [*table(head, scores), ""]
     lines += ["Confidence of the links of all captures, where a method has any:", ""]
     lines += [*confidence.table(), ""]

@@ -24,7 +24,7 @@ from asterism.io.atomic import replacing
 from field_cache import Cache
 from field_clips import kinds
 from field_growth import growth
-from field_rows import FLOORS, OURS, Found, Score, rows_of, warm
+from field_rows import ORACLES, OURS, Found, Score, rows_of, warm
 from field_search import unloadable
 from field_tables import pages
 from peers import PEERS
@@ -66,7 +66,7 @@ def main() -> None:
     )  # fmt: skip
     if options.own:
         every = [replace(k, tuned_as=f"{k.name}, its own", tuning=k.scored) for k in every]
-    names = [n for n in (*FLOORS, *PEERS, *OURS) if not any(part in n for part in options.without)]
+    names = [n for n in (*ORACLES, *PEERS, *OURS) if not any(part in n for part in options.without)]
     if any(options.only in kind.name for kind in every):
         every = [kind for kind in every if options.only in kind.name]
     else:

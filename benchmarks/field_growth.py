@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from field_rows import FLOORS, LATE, NOT_RUN, OURS
+from field_rows import LATE, NOT_RUN, ORACLES, OURS
 from report import table
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def growth_table(kinds: Sequence[str], found: Found) -> list[str]:
     """Give milliseconds a frame and megabytes, a row for each tracker."""
     rows: list[list[str]] = []
     for name in dict.fromkeys(name for _, name in found):
-        if name in FLOORS:
+        if name in ORACLES:
             continue
         cells: list[str] = [f"**{name}**" if name in OURS else name]
         cells += [_time(found[kind, name]) for kind in kinds]
@@ -57,7 +57,7 @@ def growth(found: Found) -> Any:
     ends: list[tuple[float, float, str, str]] = []
     shown = ("gnn", "smp, window=3", "mcmcda", "auto")
     for name in dict.fromkeys(name for _, name in found):
-        if name in FLOORS or (name in OURS and name not in shown):
+        if name in ORACLES or (name in OURS and name not in shown):
             continue
         points = [
             (int(kind.removeprefix(DENSE)), float(np.mean([s.ms for s in scores if not s.error])))

@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from field_cache import Cache
     from field_clips import Clip, Kind
 
-__all__ = ["FLOORS", "LATE", "NOT_RUN", "OURS", "Found", "Score", "rows_of", "warm"]
+__all__ = ["LATE", "NOT_RUN", "ORACLES", "OURS", "Found", "Score", "rows_of", "warm"]
 
 HERE = Path(__file__).resolve().parent
 NOT_RUN = "not run"
 LATE = "more than"
 """How an error begins where time ran out."""
-FLOORS = {"the truth, broken at gaps > 10": 10, "the truth, broken at gaps > 60": 60}
+ORACLES = {"the truth, broken at gaps > 10": 10, "the truth, broken at gaps > 60": 60}
 OURS: dict[str, tuple[am.tracking.Method[Any] | None, bool]] = {
     "gnn": (am.GNN(), False),
     "gnn, stitched": (am.GNN(), True),
@@ -140,7 +140,7 @@ def of_peer(kind: Kind, peer: Peer, options: argparse.Namespace, cache: Cache) -
     return found
 
 
-def of_floor(kind: Kind, gap: int, options: argparse.Namespace, cache: Cache) -> list[Score]:
+def of_oracle(kind: Kind, gap: int, options: argparse.Namespace, cache: Cache) -> list[Score]:
     """Score the truth, broken where a marker is hidden for long: who bridges less can do no better.
 
     Its switches are those that no such tracker avoids.
@@ -154,7 +154,7 @@ def of_floor(kind: Kind, gap: int, options: argparse.Namespace, cache: Cache) ->
 
     source = digest(HERE / "field_clips.py")
     return [
-        kept(cache, ("floor", c.name, options.frames, gap, source), c, partial(make, c))
+        kept(cache, ("oracle", c.name, options.frames, gap, source), c, partial(make, c))
         for c in kind.scored
     ]
 
@@ -197,7 +197,7 @@ def rows_of(kind: Kind, name: str, options: argparse.Namespace, cache: Cache) ->
         return of_peer(kind, PEERS[name], options, cache)
     if name in OURS:
         return of_ours(kind, name, options, cache)
-    return of_floor(kind, FLOORS[name], options, cache)
+    return of_oracle(kind, ORACLES[name], options, cache)
 
 
 def warm() -> None:

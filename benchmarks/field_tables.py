@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from field_growth import growth_table
-from field_rows import FLOORS, NOT_RUN, OURS
+from field_rows import NOT_RUN, ORACLES, OURS
 from field_verdict import verdict
 from peers import PEERS
 from report import conditions, table
@@ -25,7 +25,7 @@ LABEL = {**dict.fromkeys(PEERS, "{}"), **dict.fromkeys(OURS, "**{}**")}
 
 
 def label(name: str) -> str:
-    """Give a tracker's name, ours in bold and the floors in italics."""
+    """Give a tracker's name, ours in bold and the oracles in italics."""
     return LABEL.get(name, "*{}*").format(name)
 
 
@@ -80,7 +80,7 @@ def of_kind(kind: str, found: Found) -> list[str]:
             rows.append([label(name) + some, scores[0].error, *[""] * 8])
             continue
         reference = found.get((kind, REFERENCE), [])
-        is_floor = name in FLOORS
+        is_oracle = name in ORACLES
         ratio = against(done, reference, is_whole=False)
         whole = against(done, reference, is_whole=True)
         rows.append([
@@ -91,7 +91,7 @@ def of_kind(kind: str, found: Found) -> list[str]:
             ratio if ratio == whole else f"{ratio} ({whole})",
             mean([s.megabytes for s in done], "{:.0f}"),
             "–" if done[0].trials is None else str(min(s.trials or 0 for s in done)),
-            "–" if is_floor else mean([s.prepared for s in done], "{:.1f}"),
+            "–" if is_oracle else mean([s.prepared for s in done], "{:.1f}"),
         ])  # fmt: skip
     head = [
         "", "IDF1", "switches a 1000", "links wrong, broken", "tracks/true", "ms a frame",
@@ -108,10 +108,10 @@ def of_clips(kinds: Sequence[str], found: Found) -> list[str]:
         for i, first in enumerate(found[kind, names[0]]):
             scores = [found[kind, name][i] for name in names]
             row = [f"{first.clip}, {max(s.points for s in scores):,} points"]
-            best = max((s.idf1 for s, n in zip(scores, names, strict=True) if n not in FLOORS))
+            best = max((s.idf1 for s, n in zip(scores, names, strict=True) if n not in ORACLES))
             for name, s in zip(names, scores, strict=True):
                 value = "–" if s.error else f"{s.idf1:.3f}"
-                is_best = name not in FLOORS and not s.error and s.idf1 >= best - 5e-4
+                is_best = name not in ORACLES and not s.error and s.idf1 >= best - 5e-4
                 row.append(f"**{value}**" if is_best else NOT_RUN if s.error == NOT_RUN else value)
             rows.append(row)
     return table(["", *names], rows)
@@ -132,7 +132,7 @@ def how(found: Found, options: argparse.Namespace) -> str:
 def pages(found: Found, options: argparse.Namespace) -> dict[str, list[str]]:
     """Give the lines of each page by its name."""
     kinds = list(
-        dict.fromkeys(k for (k, n), rows in found.items() if n not in FLOORS and ran(rows))
+        dict.fromkeys(k for (k, n), rows in found.items() if n not in ORACLES and ran(rows))
     )
     names = list(dict.fromkeys(name for _, name in found))
     made = how(found, options)

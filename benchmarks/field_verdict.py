@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from field_rows import FLOORS, NOT_RUN, OURS
+from field_rows import NOT_RUN, ORACLES, OURS
 from peers import PEERS
 from report import table
 
@@ -39,9 +39,9 @@ def switches(kind: str, name: str, found: Found) -> float:
     return float(np.nanmean([s.switches for s in found[kind, name] if not s.error]))
 
 
-def fewer(peer: float, ours: float, floor: float) -> str:
-    """Say how many times fewer switches ours have than a peer, beyond what the floor forces."""
-    theirs, own = max(peer - floor, 0.0), max(ours - floor, 0.0)
+def fewer(peer: float, ours: float, oracle: float) -> str:
+    """Say how many times fewer switches ours have than a peer, beyond what the oracle forces."""
+    theirs, own = max(peer - oracle, 0.0), max(ours - oracle, 0.0)
     if theirs < 0.005:
         return "none to save"
     return "all of them" if own < 0.005 else f"{theirs / own:.1f} ×"
@@ -49,29 +49,29 @@ def fewer(peer: float, ours: float, floor: float) -> str:
 
 def verdict(kinds: Sequence[str], found: Found) -> list[str]:
     """Give the table of all kinds, with a word on each goal."""
-    floor_name = list(FLOORS)[-1]
+    oracle_name = list(ORACLES)[-1]
     rows: list[list[str]] = []
     for kind in kinds:
         peers = [n for n in PEERS if not np.isnan(value(found.get((kind, n), ())))]
         ours = [n for n in OURS if not np.isnan(value(found.get((kind, n), ())))]
-        if not peers or "auto" not in ours or (kind, floor_name) not in found:
+        if not peers or "auto" not in ours or (kind, oracle_name) not in found:
             continue  # a part was asked for, or is missing
         peer, own = best(peers, kind, found), best(ours, kind, found)
         theirs, auto = value(found[kind, peer]), value(found[kind, "auto"])
         top = max(theirs, value(found[kind, own]))
         equal = [n for n in (*peers, *ours) if value(found[kind, n]) >= top - EQUAL]
         fastest = min(equal, key=lambda n: time(kind, n, found))
-        floor = switches(kind, floor_name, found)
+        oracle = switches(kind, oracle_name, found)
         of_peer, of_auto = switches(kind, peer, found), switches(kind, "auto", found)
         word = "equal" if abs(auto - theirs) < EQUAL else "auto" if auto > theirs else peer
         rows.append([
             kind, f"{peer} {theirs:.4f}", f"{auto:.4f}", f"{own} {value(found[kind, own]):.4f}",
-            word, f"{of_peer:.2f}", f"{of_auto:.2f}", f"{floor:.2f}",
-            fewer(of_peer, of_auto, floor), f"{fastest} {time(kind, fastest, found):.2f} ms",
+            word, f"{of_peer:.2f}", f"{of_auto:.2f}", f"{oracle:.2f}",
+            fewer(of_peer, of_auto, oracle), f"{fastest} {time(kind, fastest, found):.2f} ms",
         ])  # fmt: skip
     head = [
         "", "best peer, IDF1", "auto, IDF1", "best of ours, IDF1", "ahead by > 0.002",
-        "switches a 1000: best peer", "auto", "floor", "auto has fewer", "fastest of the best",
+        "switches a 1000: best peer", "auto", "oracle", "auto has fewer", "fastest of the best",
     ]  # fmt: skip
     return table(head, rows)
 

@@ -2,7 +2,7 @@
 
 As captured; 10 % missing, 10 % clutter, 0.3 mm of noise; bursts (up to 5 markers hidden at a time
 for 5 to 60 frames, up to 3 ghosts within 5 cm of a marker for 1 to 10 frames, 0.3 mm of noise); the
-second at half the rate. The identity of a marker counts across its gaps: the floors are the truth,
+second at half the rate. The identity of a marker counts across its gaps: the oracles are the truth,
 broken at every gap of more than 10, and of more than 60 frames.
 
     python benchmarks/identity.py [--data FOLDER] [--only NAME] [--methods NAME …] [--markdown FILE]
@@ -113,7 +113,7 @@ def options_of_the_run() -> argparse.Namespace:
 def main() -> None:
     options = options_of_the_run()
     found: dict[tuple[str, str, str], Figures] = {}
-    floors: dict[tuple[str, int], list[float]] = {}
+    oracles: dict[tuple[str, int], list[float]] = {}
     joins = Joins()
     each: list[list[str]] = []
     for path in captures(options.data):
@@ -128,7 +128,7 @@ def main() -> None:
             row = [path.name, condition]
             for gap in (10, 60):
                 value = am.evaluate(am.metrics.oracle_tracks(truth, gap), truth).idf1
-                floors.setdefault((condition, gap), []).append(value)
+                oracles.setdefault((condition, gap), []).append(value)
                 row.append(f"{value:.3f}")
             for name in options.methods:
                 alone = am.evaluate(am.track(d, METHODS[name], model=model, seed=0), truth)
@@ -145,7 +145,7 @@ def main() -> None:
             each.append(row)
             print(*row, sep=" | ", flush=True)
     means = [
-        [f"floor at {gap} frames", *(f"{np.mean(floors[c, gap]):.4f}" for c in CONDITIONS)]
+        [f"oracle at {gap} frames", *(f"{np.mean(oracles[c, gap]):.4f}" for c in CONDITIONS)]
         for gap in (10, 60)
     ]
     rest: list[list[str]] = []
@@ -166,7 +166,7 @@ def main() -> None:
     lines += ["Joins of all methods in bursts, by how probable they were held:", ""]
     lines += [*table(["held for", "joins", "mean, %", "right, %"], joins.rows()), ""]
     lines += ["IDF1, alone → stitched:", ""]
-    lines += table(["capture", "condition", "floor 10", "floor 60", *options.methods], each)
+    lines += table(["capture", "condition", "oracle 10", "oracle 60", *options.methods], each)
     lines += ["", f"{conditions()}."]
     publish(lines, options.markdown)
 

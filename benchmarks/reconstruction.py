@@ -89,11 +89,11 @@ def people(n_frames: int) -> tuple[list[str], list[str]]:
         rows.append(row_of(name, made, s))
         who = true_tracks(made, shot.observations)
         model = am.estimate_model(made.detections).model
-        told = [name]
+        row = [name]
         for method in (am.GNN(), am.MCMCDA()):
             e = am.evaluate(am.track(made.detections, method, model=model), who)
-            told += [f"{e.idf1:.4f}", str(e.switches)]
-        identities.append(told)
+            row += [f"{e.idf1:.4f}", str(e.switches)]
+        identities.append(row)
     head = ("scene", "GNN, IDF1", "switches", "MCMCDA, IDF1", "switches")
     return table(HEAD, rows), table(head, identities)
 

@@ -57,13 +57,13 @@ def row_of(
 ) -> tuple[list[str], list[str]]:
     """Give the scores of every method, and the tracks that each found for one marker."""
     found: dict[str, list[tuple[float, ...]]] = {name: [] for name in METHODS}
-    floors: list[float] = []
+    oracles: list[float] = []
     seen: list[float] = []
     for seed in range(seeds):
         truth = sensed(case, seed, through_cameras=through_cameras)
         model = am.estimate_model(truth.detections).model
-        floor = am.metrics.oracle_tracks(truth, model.population.max_gap)
-        floors.append(am.evaluate(floor, truth).idf1)
+        oracle = am.metrics.oracle_tracks(truth, model.population.max_gap)
+        oracles.append(am.evaluate(oracle, truth).idf1)
         seen.append(float((truth.labels >= 0).sum()) / truth.detections.n_frames / truth.n_tracks)
         for name, method in METHODS.items():
             tracks = am.track(truth.detections, method, model=model)
@@ -72,7 +72,7 @@ def row_of(
             found[name].append(figures)
             confidence.add(name, tracks, truth)
     scene = f"{case}, 4 cameras" if through_cameras else case
-    row = [scene, f"{100 * np.mean(seen):.0f} %", f"{np.mean(floors):.3f}"]
+    row = [scene, f"{100 * np.mean(seen):.0f} %", f"{np.mean(oracles):.3f}"]
     each = [scene]
     for name in METHODS:
         idf1, switches, tracks = np.array(found[name]).T
@@ -98,7 +98,7 @@ def main() -> None:
                 ratios.append(each)
                 print(*row, flush=True)
     lines = ["IDF1 ± its standard deviation between seeds, and switches for 1000 detections:", ""]
-    lines += [*table(["scene", "seen", "floor d̄", *METHODS], rows), ""]
+    lines += [*table(["scene", "seen", "oracle d̄", *METHODS], rows), ""]
     lines += ["Tracks found for each true one:", "", *table(["scene", *METHODS], ratios), ""]
     lines += ["Confidence of the links of all scenes, where a method has any:", ""]
     lines += [*confidence.table(), ""]

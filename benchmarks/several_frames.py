@@ -33,9 +33,9 @@ def posterior_and_identities(scene: str, seeds: int) -> list[list[str]]:
         clean = am.simulate.SCENES[scene].make(seed=seed)
         truth = am.simulate.corrupt(clean, missing=0.1, clutter=0.1, noise=0.005, seed=seed)
         model = am.estimate_model(truth.detections).model
-        floor = am.metrics.oracle_tracks(truth, model.population.max_gap)
-        best = am.log_posterior(floor, model)
-        results = {"floor": floor} | {
+        oracle = am.metrics.oracle_tracks(truth, model.population.max_gap)
+        best = am.log_posterior(oracle, model)
+        results = {"oracle": oracle} | {
             name: am.track(truth.detections, method, model=model)
             for name, method in (METHODS | SEVERAL).items()
         }
@@ -147,7 +147,7 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
     lines: list[str] = []
-    head = ["method", "log posterior − floor's", "IDF1", "switches / 1000", "% wrong", "tracks"]
+    head = ["method", "log posterior − oracle's", "IDF1", "switches / 1000", "% wrong", "tracks"]
     for scene, n in (("cube", 8), ("crossing", 16)):
         lines += [f"Scene `{scene}`, {n} markers, means over {options.seeds} seeds:", ""]
         lines += [*table(head, posterior_and_identities(scene, options.seeds)), ""]

@@ -2,7 +2,7 @@
 
 n markers on Lissajous-like paths (amplitude 0.1 to 0.3, 0.08 to 0.18 rad a frame) about places 0.34
 apart, drifting together; noise of 5 mm, 10 % missing, 10 % false alarms. Everything in one process
-from Python: neighbours, bookkeeping of identities, and the floor beside what was found.
+from Python: neighbours, bookkeeping of identities, and the oracle beside what was found.
 
     python benchmarks/smooth.py [--seeds N] [--markdown FILE]
     python benchmarks/smooth.py --lengths 500 1000 2000 4000 8000 [--markdown FILE]
@@ -74,9 +74,9 @@ def throughput(seeds: int) -> list[list[str]]:
     rows: list[list[str]] = []
     for n, frames in SIZES:
         scenes = [smooth(n, frames, seed) for seed in range(seeds)]
-        floors = [(am.metrics.oracle_tracks(truth, 8), truth, model) for truth, model in scenes]
-        floor = np.mean([am.evaluate(one, truth).idf1 for one, truth, _ in floors])
-        true = [am.log_posterior(one, model) for one, _, model in floors]
+        oracles = [(am.metrics.oracle_tracks(truth, 8), truth, model) for truth, model in scenes]
+        oracle = np.mean([am.evaluate(one, truth).idf1 for one, truth, _ in oracles])
+        true = [am.log_posterior(one, model) for one, _, model in oracles]
         for name, method in METHODS.items():
             fps: list[float] = []
             e: list[am.metrics.Evaluation] = []
@@ -90,7 +90,7 @@ def throughput(seeds: int) -> list[list[str]]:
             above = np.array(value) - true
             rows.append(
                 [f"{n} markers, {frames} frames, {name}", f"{np.median(fps):,.0f}",
-                 f"{np.mean([one.idf1 for one in e]):.4f}", f"{floor:.4f}",
+                 f"{np.mean([one.idf1 for one in e]):.4f}", f"{oracle:.4f}",
                  f"{np.mean([one.wrong_percent for one in e]):.3f}",
                  f"{np.mean([one.missing_percent for one in e]):.3f}",
                  f"{sum(one.wrong_percent == 0 for one in e)}", f"{above.mean():+.1f}",
@@ -153,7 +153,7 @@ def main() -> None:
         lines = [*table(head, whole_captures(options.lengths)), "", f"{conditions()}."]
         publish(lines, options.markdown)
         return
-    head = ["", "frames a second", "IDF1", "floor", "% wrong", "% missing", "scenes, none wrong",
+    head = ["", "frames a second", "IDF1", "oracle", "% wrong", "% missing", "scenes, none wrong",
             "log posterior over the truth's", "scenes in which it is no less"]  # fmt: skip
     lines = table(head, throughput(options.seeds))
     frame = 1e3 / 240

@@ -86,7 +86,7 @@ def _scenes(pages: Path) -> None:
     person = am.simulate.person(frames=400, seed=2)
     truth = am.simulate.corrupt(person, missing=0.1, clutter=0.1, noise=0.001, seed=2)
     tracks = am.track(truth.detections, am.GNN())
-    am.report(tracks, pages / "person.html", truth=truth, title="A person, spoilt")
+    am.report(tracks, pages / "person.html", truth=truth, title="A person, corrupted")
     crossing = am.simulate.crossing(seed=3, rate=100)
     truth = am.simulate.corrupt(crossing, missing=0.1, clutter=0.1, noise=0.002, seed=4)
     tracks = am.track(truth.detections, am.JPDA())

@@ -48,7 +48,7 @@ def label(d: am.Detections, setting: Setting) -> NDArray[np.int64]:
         ]
     labels = np.full(d.n_points, -1)
     for i, thing in owner:
-        # None where the track was never believed.
+        # None if the track was never confirmed.
         labels[i] = -1 if thing.id is None else thing.id
     return labels
 

@@ -1,7 +1,7 @@
 """The peer: Kalman filters and SciPy's assignment in a NumPy loop, as one would write it today.
 
 Vectorised over tracks, one assignment a frame on the full matrix; same gate, same scores, same life
-of a track as `asterism.GNN`, without its groups, its grid and its precedence of believed tracks.
+of a track as `asterism.GNN`, without its groups, its grid and its precedence of confirmed tracks.
 """
 
 from __future__ import annotations

@@ -95,12 +95,12 @@ def in_frames(detections: am.Detections) -> am.Detections:
 
 
 def length_of(detections: am.Detections) -> float:
-    """Give the upper quartile of the distance of a point to the nearest one of the next, metres.
+    """Return the upper quartile of the distance to the nearest point of the next frame, metres.
 
-    Over the captures and what was done to them, the longest steps are 1.2 to 6 of these (99 of 100,
-    one capture at rest left out). Of the median they are 1.7 to 9.5, for half the markers may rest;
-    the ninetieth percentile is that of clutter where there is any. A millimetre at least: nobody
-    would let a tracker look no farther for markers that rest.
+    Over all captures and conditions, the longest steps are 1.2 to 6 times this value (99 of 100,
+    one capture at rest left out). They are 1.7 to 9.5 times the median, because half the markers
+    may rest, and the ninetieth percentile is that of clutter if there is any. The value is at
+    least a millimetre, so that a tracker also searches around markers that rest.
     """
     frames = [points for _, points in detections if len(points)]
     apart = [KDTree(b).query(a)[0] for a, b in itertools.pairwise(frames)]

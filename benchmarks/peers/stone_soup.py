@@ -116,7 +116,7 @@ def _jpda(d: am.Detections, setting: Setting) -> NDArray[np.int64]:
     numbers: dict[str, int] = {}
     for now, found in _frames(d, parts.sensor):
         taken: set[Any] = set()
-        # Two tracks may hold the same detection for their best: it goes to the surer one.
+        # Two tracks may hold the same detection for their best: it goes to the more certain one.
         joined = joint.associate(tracks, found, now).items()
         for track, several in sorted(joined, key=lambda pair: -_greatest(pair[1])):
             states = [parts.updater.update(h) if h else h.prediction for h in several]

@@ -14,7 +14,6 @@
 // A link inside a tracklet is tested by its neighbours too, and is cut if they contradict it.
 //
 // The result of a pass through the capture in the other direction may be supplied as advice.
-// Whoever has gone through the take in the other direction may advise.
 #pragma once
 
 #include <algorithm>

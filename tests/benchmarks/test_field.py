@@ -18,7 +18,7 @@ sys.path.append(str(ROOT / "benchmarks"))
 from field_cache import Cache
 from field_clips import Clip, Kind
 from field_growth import growth, growth_table
-from field_rows import FLOORS, NOT_RUN, OURS, Score, of_peer, rows_of
+from field_rows import NOT_RUN, ORACLES, OURS, Score, of_peer, rows_of
 from field_search import tuned, unloadable
 from field_verdict import fewer, verdict
 from peers import PEERS, Peer
@@ -120,13 +120,13 @@ def test_who_was_late_on_a_clip_is_not_run_on_larger_ones_but_on_smaller(tmp_pat
     assert time.process_time() - start < 10
 
 
-def test_floors_and_ours_have_rows(tmp_path):
+def test_oracles_and_ours_have_rows(tmp_path):
     cache = Cache(tmp_path / "field.jsonl", is_closed=False)
-    for name in (*FLOORS, "gnn"):
+    for name in (*ORACLES, "gnn"):
         (row,) = rows_of(kind(1), name, OPTIONS, cache)
         assert row.idf1 > 0.99
         assert row.points == clip(1).detections.n_points
-    assert np.isnan(rows_of(kind(1), next(iter(FLOORS)), OPTIONS, cache)[0].ms)
+    assert np.isnan(rows_of(kind(1), next(iter(ORACLES)), OPTIONS, cache)[0].ms)
 
 
 def test_what_ends_its_process_does_not_load_and_harms_nobody():
@@ -154,7 +154,7 @@ def row(idf1, switches, ms, error=""):
 
 
 def table_of(peers, ours):
-    found = {("dense 50", name): [row(1.0, 0.0, np.nan)] for name in FLOORS}
+    found = {("dense 50", name): [row(1.0, 0.0, np.nan)] for name in ORACLES}
     found |= {("dense 50", name): [row(0, 0, 1, NOT_RUN)] for name in PEERS}
     found |= {("dense 50", name): [row(0.9, 9.0, 3.0)] for name in OURS}
     found |= {("dense 50", name): [value] for name, value in {**peers, **ours}.items()}
@@ -175,14 +175,14 @@ def test_the_verdict_tells_who_is_ahead(peer, ours, word, saved, fastest):
     assert (line[4], line[8], line[9].removesuffix(" |")) == (word, saved, fastest)
 
 
-@pytest.mark.parametrize("gone", ["motpy", "auto", list(FLOORS)[-1]])
+@pytest.mark.parametrize("gone", ["motpy", "auto", list(ORACLES)[-1]])
 def test_a_part_of_the_trackers_has_no_verdict_and_no_error(gone):
     found = table_of({"motpy": row(0.9, 1.0, 1)}, {})
     found = {key: rows for key, rows in found.items() if key[1] != gone}
     assert len(verdict(["dense 50"], found)) == 2  # the head
 
 
-def test_switches_that_the_floor_forces_do_not_count():
+def test_switches_that_the_oracle_has_do_not_count():
     assert fewer(3.0, 2.1, 2.0) == "10.0 ×"
     assert fewer(2.0, 2.1, 2.0) == "none to save"
     assert fewer(3.0, 1.9, 2.0) == "all of them"

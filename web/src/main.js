@@ -15,17 +15,17 @@ import { Writing } from "./writing.js";
 const byId = (id) => document.getElementById(id);
 
 async function start() {
-  const told = byId("state");
+  const message = byId("state");
   let capture;
   try {
     capture = await unpack(byId("data").textContent);
   } catch (error) {
-    told.textContent = "This browser cannot unpack the data of the page; one from 2023 on can.";
+    message.textContent = "This browser cannot unpack the data of the page; one from 2023 on can.";
     throw error;
   }
   byId("data").remove();
   const state = new State(capture);
-  const stage = staged(capture, state, told);
+  const stage = staged(capture, state, message);
   const writing = stage && new Writing(stage, byId("names"));
   if (stage) stage.drawn = () => writing.draw();
   const timeline = new Timeline(capture, state, {
@@ -63,18 +63,18 @@ async function start() {
   resize();
   stage?.fit();
   if (stage) byId("scale").textContent = `squares of ${size(stage.floor.cell)}`;
-  if (stage && capture.T && capture.positions.length) told.hidden = true;
-  else if (stage) told.textContent = capture.T ? "No point in any frame." : "Nothing was recorded.";
+  if (stage && capture.T && capture.positions.length) message.hidden = true;
+  else if (stage) message.textContent = capture.T ? "No point in any frame." : "Nothing was recorded.";
   globalThis.asterism = script(capture, state, stage, image);
   document.body.dataset.ready = "true";
 }
 
 /** Make the scene, or show why there is none. The rest of the page works without it. */
-function staged(capture, state, told) {
+function staged(capture, state, message) {
   try {
     return new Stage(capture, state, byId("scene"));
   } catch (error) {
-    told.textContent = "This browser has no WebGL: the scene is missing, all else works.";
+    message.textContent = "This browser has no WebGL: the scene is missing, all else works.";
     console.info(error.message);
     return null;
   }

@@ -32,8 +32,8 @@ inline Clock::time_point halfway_to(Clock::time_point end) {
   return now < end ? now + (end - now) / 2 : end;
 }
 
-// Regularly asks a callback, on the thread that created the object, whether to continue. Passes it
-// the fraction of the work done.
+// Regularly calls a callback with the fraction of the work done, on the thread that created the
+// object. The callback returns whether to continue.
 class Watch {
  public:
   Watch(double all, std::function<bool(double)> goes_on)

@@ -29,14 +29,14 @@ struct Toggle {
 template <typename Filter>
 class Toggles {
  public:
-  explicit Toggles(const Partition<Filter>& partition) : p_(partition), splices_(partition) {}
+  explicit Toggles(const Partition<Filter>& partition) : p_(partition), edits_(partition) {}
 
   // Returns false if the move is impossible.
   bool propose(const Toggle& t, Change<Filter>& out) const {
     out.n_edits = 0;
     out.log_forward = out.log_reverse = 0;
     if (!draw(t, out) || !p_.keeps_continuations(out.all())) return false;
-    splices_.weigh(out);
+    edits_.weigh(out);
     return true;
   }
 
@@ -56,10 +56,10 @@ class Toggles {
 
   bool trade(std::int32_t x, std::int32_t y, Change<Filter>& q) const {
     if (is_taken(x) && is_taken(y))
-      return p_.track_of(x) != p_.track_of(y) && splices_.exchange(x, y, q);
+      return p_.track_of(x) != p_.track_of(y) && edits_.exchange(x, y, q);
     // A settled detection is neither taken nor free, and does not move.
-    if (is_taken(x) && p_.is_free(y)) return splices_.replace(x, y, q);
-    if (is_taken(y) && p_.is_free(x)) return splices_.replace(y, x, q);
+    if (is_taken(x) && p_.is_free(y)) return edits_.replace(x, y, q);
+    if (is_taken(y) && p_.is_free(x)) return edits_.replace(y, x, q);
     return false;
   }
 
@@ -67,8 +67,8 @@ class Toggles {
     if (!is_taken(x) || !is_taken(y)) return false;
     const std::int32_t k = p_.track_of(x), l = p_.track_of(y);
     if (k == l || !goes_on(y, x) || !goes_on(x, y)) return false;
-    splices_.append(q.edit(k, p_.place_of(x)), l, p_.place_of(y));
-    splices_.append(q.edit(l, p_.place_of(y)), k, p_.place_of(x));
+    edits_.append(q.edit(k, p_.place_of(x)), l, p_.place_of(y));
+    edits_.append(q.edit(l, p_.place_of(y)), k, p_.place_of(x));
     return true;
   }
   // Whether a track may continue with y in place of x. If y becomes its first detection, y must not
@@ -89,11 +89,11 @@ class Toggles {
   }
 
   bool relocate(std::int32_t y, std::int32_t to, Change<Filter>& q) const {
-    if (to < 0 || !splices_.may_go(y)) return false;
+    if (to < 0 || !edits_.may_go(y)) return false;
     const std::int32_t next = p_.after(to);
     if (next >= 0 && !p_.window().is_linkable(y, next)) return false;
-    splices_.take_out(y, q);
-    splices_.put_in(y, p_.track_of(to), p_.place_of(to) + 1, q);
+    edits_.take_out(y, q);
+    edits_.put_in(y, p_.track_of(to), p_.place_of(to) + 1, q);
     return true;
   }
 
@@ -101,7 +101,7 @@ class Toggles {
     const std::int32_t k = p_.track_of(y);
     if (to < 0 || p_.after(to) >= 0 || p_.track(k).n_gone + p_.place_of(y) < 2) return false;
     q.edit(k, p_.place_of(y));
-    splices_.append(q.edit(p_.track_of(to), p_.place_of(to) + 1), k, p_.place_of(y));
+    edits_.append(q.edit(p_.track_of(to), p_.place_of(to) + 1), k, p_.place_of(y));
     return true;
   }
 
@@ -116,27 +116,27 @@ class Toggles {
       if (!is_taken(y) || !is_first(y)) return false;
       Edit<Filter>& e = q.edit(p_.track_of(y), 0);
       p_.append(e, a);
-      splices_.append(e, e.track, 0);
+      edits_.append(e, e.track, 0);
       return true;
     }
     if (!is_taken(a) || !is_first(a) || p_.after(a) != y) return false;
     const std::int32_t k = p_.track_of(a);
     Edit<Filter>& e = q.edit(k, 0);
-    if (p_.track(k).size() > 2) splices_.append(e, k, 1);
+    if (p_.track(k).size() > 2) edits_.append(e, k, 1);
     return true;
   }
 
   bool skip(std::int32_t y, std::int32_t a, std::int32_t c, Change<Filter>& q) const {
     if (is_taken(y)) {
-      if (p_.before(y) != a || p_.after(y) != c || !splices_.may_go(y)) return false;
-      splices_.take_out(y, q);
+      if (p_.before(y) != a || p_.after(y) != c || !edits_.may_go(y)) return false;
+      edits_.take_out(y, q);
       return true;
     }
     const std::int32_t k = p_.track_of(a);
     if (!p_.is_free(y) || k < 0 || p_.after(a) != c || !p_.window().is_linkable(a, y) ||
         (c >= 0 && !p_.window().is_linkable(y, c)))
       return false;
-    splices_.put_in(y, k, p_.place_of(a) + 1, q);
+    edits_.put_in(y, k, p_.place_of(a) + 1, q);
     return true;
   }
 
@@ -145,7 +145,7 @@ class Toggles {
   }
 
   const Partition<Filter>& p_;
-  Splices<Filter> splices_;
+  TrackEdits<Filter> edits_;
 };
 
 }  // namespace asterism

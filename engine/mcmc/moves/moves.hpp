@@ -29,7 +29,7 @@ template <typename Filter>
 class Moves {
  public:
   Moves(const Partition<Filter>& partition, const GrowthOptions& growth)
-      : p_(partition), splices_(partition), growth_(partition, growth) {}
+      : p_(partition), edits_(partition), growth_(partition, growth) {}
 
   // Draws ω'. Returns false if the draw is impossible, so that the chain stays.
   bool propose(Move move, Random& random, Change<Filter>& out) {
@@ -38,7 +38,7 @@ class Moves {
     out.log_forward = 0;
     out.with = -1;
     if (!draw(random, out) || !p_.keeps_continuations(out.all())) return false;
-    splices_.weigh(out);
+    edits_.weigh(out);
     return out.log_forward > Growth<Filter>::kNever;
   }
 
@@ -164,7 +164,7 @@ class Moves {
     const std::int32_t keep = min_kept(k) + random.below(n_cuts);
     q.log_forward -= log(n_cuts);
     q.edit(k, keep);
-    splices_.append(q.edit(-1, 0), k, keep);
+    edits_.append(q.edit(-1, 0), k, keep);
     return true;
   }
 
@@ -176,7 +176,7 @@ class Moves {
       if (p_.window().is_linkable(p_.last(k), node(other, 0))) starts_.push_back(other);
     if (starts_.empty()) return false;
     const std::int32_t other = draw_one(starts_, random, q);
-    splices_.append(q.edit(k, p_.track(k).size()), other, 0);
+    edits_.append(q.edit(k, p_.track(k).size()), other, 0);
     q.edit(other, 0);
     return true;
   }
@@ -240,8 +240,8 @@ class Moves {
     if (partners_.empty()) return false;
     const std::int32_t d = draw_one(partners_, random, q), other = p_.track_of(d);
     q.with = b;
-    splices_.append(q.edit(own, p_.place_of(b)), other, p_.place_of(d));
-    splices_.append(q.edit(other, p_.place_of(d)), own, p_.place_of(b));
+    edits_.append(q.edit(own, p_.place_of(b)), other, p_.place_of(d));
+    edits_.append(q.edit(other, p_.place_of(d)), own, p_.place_of(b));
     return true;
   }
   // Calls visit for every open detection of a track that may follow a, and whose predecessor lies
@@ -315,16 +315,16 @@ class Moves {
     if (slots_.empty()) return false;
     const Slot slot = draw_one(slots_, random, q);
     q.with = x;
-    splices_.put_in(x, slot.track, slot.keep, q);
+    edits_.put_in(x, slot.track, slot.keep, q);
     return true;
   }
 
   bool draw_deletion(Random& random, Change<Filter>& q) {
     const std::int32_t x = draw_one(p_.taken(), random, q);
     if (x < 0) return false;
-    if (!splices_.may_go(x)) return false;
+    if (!edits_.may_go(x)) return false;
     q.with = x;
-    splices_.take_out(x, q);
+    edits_.take_out(x, q);
     return true;
   }
 
@@ -340,7 +340,7 @@ class Moves {
     const std::int32_t other = draw_one(starts_, random, q);
     q.with = b;
     q.edit(own, p_.place_of(b));
-    splices_.append(q.edit(other, p_.track(other).size()), own, p_.place_of(b));
+    edits_.append(q.edit(other, p_.track(other).size()), own, p_.place_of(b));
     return true;
   }
 
@@ -354,20 +354,20 @@ class Moves {
     if (starts_.empty()) return false;
     const std::int32_t y = draw_one(starts_, random, q);
     q.with = x;
-    return splices_.replace(x, y, q);
+    return edits_.replace(x, y, q);
   }
 
   // Without x, ω and ω' are the same partition and have the same slots.
   bool draw_relocation(Random& random, Change<Filter>& q) {
     const std::int32_t x = draw_one(p_.taken(), random, q);
-    if (x < 0 || !splices_.may_go(x)) return false;
+    if (x < 0 || !edits_.may_go(x)) return false;
     list_slots(x);
     slots_.pop_back();  // its present slot
     if (slots_.empty()) return false;
     const Slot slot = draw_one(slots_, random, q);
     q.with = x;
-    splices_.take_out(x, q);
-    splices_.put_in(x, slot.track, slot.keep, q);
+    edits_.take_out(x, q);
+    edits_.put_in(x, slot.track, slot.keep, q);
     return true;
   }
 
@@ -379,11 +379,11 @@ class Moves {
       if (y != x && p_.taken().has(y)) starts_.push_back(y);
     if (starts_.empty()) return false;
     q.with = x;
-    return splices_.exchange(x, draw_one(starts_, random, q), q);
+    return edits_.exchange(x, draw_one(starts_, random, q), q);
   }
 
   const Partition<Filter>& p_;
-  Splices<Filter> splices_;
+  TrackEdits<Filter> edits_;
   Growth<Filter> growth_;
   std::vector<std::int32_t> starts_, partners_;
   std::vector<Slot> slots_;

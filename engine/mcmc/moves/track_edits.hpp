@@ -10,9 +10,9 @@
 namespace asterism {
 
 template <typename Filter>
-class Splices {
+class TrackEdits {
  public:
-  explicit Splices(const Partition<Filter>& partition) : p_(partition) {}
+  explicit TrackEdits(const Partition<Filter>& partition) : p_(partition) {}
 
   // Computes the gain of a proposed change.
   void weigh(Change<Filter>& q) const {
