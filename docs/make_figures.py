@@ -26,6 +26,13 @@ def experiment(noise: float) -> am.Tracks:
     return am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=noise, seed=1)
 
 
+def by_segment(plot: Callable[..., Any]) -> Any:
+    """Draw a walking person in the colours of the rigid segments."""
+    truth = am.simulate.person(activity="walk", seed=2)
+    segments = am.learn_bonds(truth).segments(truth.names)
+    return plot(truth.part(0, 150), segments=segments)
+
+
 def film() -> Any:
     """Draw a person who runs, through six cameras."""
     truth = am.simulate.person(activity="run", frames=200, rate=100, seed=2)
@@ -69,8 +76,8 @@ def main() -> None:
     gnn, best = found["gnn"], found["mcmcda"]
     calm = experiment(0.015)
     figures: dict[str, Callable[[], Any]] = {
-        "trajectories": lambda: am.plot.plot_trajectories(best),
-        "axes": lambda: am.plot.plot_axes(best),
+        "trajectories": lambda: by_segment(am.plot.plot_trajectories),
+        "axes": lambda: by_segment(am.plot.plot_axes),
         "presence": lambda: am.plot.plot_presence(best),
         "confidence": lambda: am.plot.plot_confidence(best),
         "errors": lambda: am.plot.plot_errors(gnn, truth),
