@@ -81,7 +81,7 @@ class TOMHT(EngineMethod):
 
     With a shorter window each decided frame is final, so that a longer window is usually more
     probable and not always: for six targets that cross in dense clutter, windows from 3 to 9 gain
-    35 to 69 nats, and of 10 to 16 frames some lose up to 21 nats against a shorter one.
+    35 to 69 nats, and of 10 to 16 frames some lose up to 25 nats against a shorter one.
 
     Examples
     --------
