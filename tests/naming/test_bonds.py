@@ -107,6 +107,7 @@ def test_bonds_come_back_from_their_file(tmp_path):
     [
         ('format = "asterism bonds"', 'format = "model"', "format"),
         ("axes = 3", "axes = 4", "axes"),
+        ("axes = 3", "axes = 3.0", "axes: expected 2 or 3, found 3.0"),
         ('name = "B"', 'name = "A"', "names"),
         ('name = "B"', 'title = "B"', "marker 2"),
         ('    "B",', '    "X",', "X"),

@@ -361,7 +361,7 @@ def _largest_clique(friends: list[set[int]]) -> tuple[int, ...] | None:
 def _from_plain(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of `Bonds` from the content of a file."""
     axes = content.get("axes")
-    if axes not in (2, 3):
+    if type(axes) is not int or axes not in (2, 3):  # 3.0 is equal to 3, and no length
         raise ParameterError("axes", "2 or 3", axes)
     markers, bonds = _tables(content, "marker"), _tables(content, "bond")
     names = [str(_get(own, f"marker {n}", "name")) for n, own in enumerate(markers, 1)]
