@@ -55,7 +55,7 @@ CAPTURES = {  # file, and one of how many of its frames
 def piece(name: str) -> tuple[am.Detections, am.TrackingModel]:
     """Detections with misses, clutter and noise, and a model of one motion."""
     if name == "crowd":
-        return crowd(3, spread=0.04, n_frames=sized(25, 12)).detections, small_model(
+        return crowd(3, spread=0.04, n_frames=sized(16, 12)).detections, small_model(
             motion=am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3), noise_sigma=0.01,
             max_speed=1.5, clutter_density=5.0, birth_density=0.5, p_disappear=1e-3, max_gap=6,
         )  # fmt: skip
@@ -68,7 +68,7 @@ def piece(name: str) -> tuple[am.Detections, am.TrackingModel]:
             pytest.skip(f"no {file} in {DATA}")
         truth = am.simulate.corrupt(am.read(found[0]).tracks, stride=stride)
     d = am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1).detections
-    first, n = d.n_frames // 2, sized(16, 8)
+    first, n = d.n_frames // 2, sized(11, 8)
     model = am.estimate_model(d.part(max(first - 60, 0), min(first + 60, d.n_frames))).model
     motion = am.DWNA(
         acceleration_sigma=model.motion.modes[-1].acceleration_sigma,

@@ -40,7 +40,7 @@ def crowd_model(motion: am.model.Motion | None = None) -> am.TrackingModel:
 @pytest.mark.parametrize("motion", ["dwna", "interacting"])
 @pytest.mark.parametrize("seed", range(2))
 def test_labels_and_confidence_are_those_of_the_blackboard(method, motion, seed):
-    truth = crowd(seed, n_axes=2 + seed % 2, spread=0.12)
+    truth = crowd(seed, n_axes=2 + seed % 2, spread=0.12, n_frames=16)
     model = crowd_model(interacting() if motion == "interacting" else None)
     labels, confidence = trees_by_hand(truth.detections, method, model)
     tracks = am.track(truth.detections, method, model=model)
@@ -166,13 +166,13 @@ def share_above(fading: float, alpha: float, n_axes: int, at: list[int], n_runs:
 @pytest.mark.parametrize("n_axes", [2, 3])
 def test_alpha_is_the_rate_at_which_right_branches_are_lost(n_axes):
     alpha, n_runs = 0.05, 1200
-    shares = share_above(1.0, alpha, n_axes, [2, 5, 20], n_runs)
+    shares = share_above(1.0, alpha, n_axes, [2, 5, 12], n_runs)
     error = np.sqrt(alpha * (1 - alpha) / n_runs)
     assert abs(shares - alpha).max() < 3.5 * error
 
 
 def test_with_fading_alpha_is_kept():
-    shares = share_above(0.5, 0.05, 3, [2, 5, 20], 1200)
+    shares = share_above(0.5, 0.05, 3, [2, 5, 12], 1200)
     assert abs(shares - 0.05).max() < 3.5 * np.sqrt(0.05 * 0.95 / 1200)
 
 

@@ -54,13 +54,19 @@ class OneTrack:
         F, Q = step_of(self.modes, dt)
         self.x, self.P, self.w = mean @ F.swapaxes(1, 2), F @ P @ F.swapaxes(1, 2) + Q, prior
         self.S = self.P @ self.h @ self.h + self.r
+        self.at, self.K = self.x @ self.h, self.P @ self.h / self.S[:, None]
+        self.updated_P = self.P - self.K[:, :, None] * self.K[:, None] * self.S[:, None, None]
+        self.found: dict[bytes, np.ndarray] = {}
 
     def odds(self, gain: float) -> float:
         return gain if self.id >= 0 else np.logaddexp(0, self.score + gain)
 
     def squares_of(self, y) -> np.ndarray:
-        """Normalised innovation squared, by each motion."""
-        return ((y - self.x @ self.h) ** 2).sum(axis=1) / self.S
+        """Normalised innovation squared, by each motion; computed once for each point."""
+        key = y.tobytes()
+        if key not in self.found:
+            self.found[key] = ((y - self.at) ** 2).sum(axis=1) / self.S
+        return self.found[key]
 
     def densities(self, y) -> np.ndarray:
         likelihood = np.exp(-0.5 * self.squares_of(y)) / (2 * np.pi * self.S) ** (len(y) / 2)
@@ -73,13 +79,12 @@ class OneTrack:
         return float(self.distances(y[None])[0])
 
     def distances(self, points) -> np.ndarray:
-        return ((points - self.w @ (self.x @ self.h)) ** 2).sum(axis=1)
+        return ((points - self.w @ self.at) ** 2).sum(axis=1)
 
     def update(self, y) -> None:
         each = self.densities(y)
-        K = self.P @ self.h / self.S[:, None]
-        self.x = self.x + (y - self.x @ self.h)[:, :, None] * K[:, None]
-        self.P = self.P - K[:, :, None] * K[:, None] * self.S[:, None, None]
+        self.x = self.x + (y - self.at)[:, :, None] * self.K[:, None]
+        self.P = self.updated_P
         self.w = each / each.sum()
 
 

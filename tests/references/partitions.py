@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 
 import numpy as np
@@ -76,6 +77,7 @@ def tiny_model(rng: np.random.Generator) -> am.TrackingModel:
     )
 
 
+@functools.cache
 def problem_of_size(least, most, seed, n_axes):
     """The first problem from a seed on that has so many partitions."""
     while True:

@@ -102,9 +102,9 @@ class BodyByHand:
             learn(1, expected)
         return means, counts, n_judged
 
-    def way(self, marker: int, until: int, then: int, now, bent: float, r: float):
+    def way(self, marker: int, until: int, then: int, now, bent: float, r: float, trust):
         """Place, variance and neighbours of a marker by where it was in a frame; or None."""
-        (error, expected), counts, _ = self.trust(marker)
+        (error, expected), counts, _ = trust
         off = 1.0 if counts[1] == 0 else (error - 2 * self.r) / expected
         frame = self.frames[then] if then >= 0 else {}
         own = [(v, k) for v, k in self.bonds(marker, until) if k in frame][:16]
@@ -125,12 +125,13 @@ class BodyByHand:
         """Place and variance of a hidden marker, and how many carry it; or None."""
         now = dict(zip(map(int, markers), np.asarray(points), strict=True))
         last = max(t for t, frame in enumerate(self.frames) if marker in frame)
-        if self.trust(marker)[2] < 3:
+        trust = self.trust(marker)
+        if trust[2] < 3:
             return None
         ways = []
         for then in (last - back for back in ANCHORS):
             bent = (len(self.frames) - then) / LAG
-            ways.append(self.way(marker, last + 2, then, now, bent, self.r))
+            ways.append(self.way(marker, last + 2, then, now, bent, self.r, trust))
         ways = [way for way in ways if way is not None]
         if not ways:
             return None

@@ -138,7 +138,7 @@ def carried_density(dense, then, now, y):
     by_hand = BodyByHand(3, NOISE, learnt_from=15, bonds_only=False)  # since all are known
     for points in dense[:61]:
         by_hand.see(range(9), points[:9])
-    at, variance, _ = by_hand.way(8, 61, then, dict(enumerate(now)), 1, BESIDE)
+    at, variance, _ = by_hand.way(8, 61, then, dict(enumerate(now)), 1, BESIDE, by_hand.trust(8))
     return stats.multivariate_t(at, variance * np.eye(3), df=3).logpdf(y)
 
 
