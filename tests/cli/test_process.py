@@ -52,7 +52,7 @@ def wait_for(condition, process, seconds=30):
 def long_capture(tmp_path_factory):
     """A capture that takes seconds to track and to write, and a model for it."""
     folder = tmp_path_factory.mktemp("long")
-    truth = am.simulate.smooth(n_markers=30, frames=6_000, rate=100, seed=1)
+    truth = am.simulate.smooth(n_markers=30, frames=3_000, rate=100, seed=1)
     am.write(truth, folder / "in.csv")
     model = am.TrackingModel(
         motion=am.DWNA(acceleration_sigma=20),

@@ -27,7 +27,7 @@ def test_a_kept_draw_is_of_the_posterior():
         window=d.n_frames, moves=300.0, confidence=0.0, end_odds=1.0, keep="draw",
         chain=ChainOptions(ambiguous_share=0, groups="whole"),
     )  # fmt: skip
-    n = 3000
+    n = 2000
     seen = Counter(
         as_partition(am.track(d, draw, model=model, seed=seed).labels) for seed in range(n)
     )

@@ -55,7 +55,7 @@ def best_by_solver(d: am.Detections, model: am.TrackingModel) -> float:
 @pytest.mark.parametrize("seed", range(3))
 def test_larger_problems_are_solved_as_well_as_by_the_exact_solver(seed):
     rng = np.random.default_rng(100 + seed)
-    for _ in range(8):
+    for _ in range(5):
         d, model = tiny_problem(rng, 5, 4), tiny_model(rng)
         if d.n_points > 14:
             continue  # whole trees of so many take ten seconds
@@ -232,7 +232,7 @@ def test_the_most_probable_partition_is_found_where_no_option_excludes_it():
     # With the default confirm_probability tracks of low odds are left out, as the notes say.
     rng = np.random.default_rng(3)
     n_below = 0
-    for _ in range(12):
+    for _ in range(15):
         d, model = tiny_problem(rng, 5, 3, 2), tiny_model(rng)
         if d.n_points > 12:
             continue  # millions of partitions

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 
 import numpy as np
@@ -89,10 +90,14 @@ def test_a_laboratory_is_above_its_floor_and_no_mirror_of_itself(path, n, height
         assert a * d - b * c < -100
 
 
+real_rig = functools.cache(read_rig)
+
+
+@pytest.mark.usefixtures("each_fit_once")
 @pytest.mark.parametrize("source", [FLYDRA, MYPTV, VICON, QUALISYS], ids=lambda p: p.name)
 @pytest.mark.parametrize("format", CALIBRATION_FORMATS)
 def test_real_rigs_go_through_every_format(tmp_path, source, format):
-    rig = read_rig(source)[:2]
+    rig = real_rig(source)[:2]
     form = CALIBRATION_FORMATS[format]
     fits = [fit_to_format(camera, form) for camera in rig]
     cameras = tuple(c if f is None else f.camera for c, f in zip(rig, fits, strict=True))

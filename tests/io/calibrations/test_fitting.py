@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -26,10 +28,15 @@ def test_limits_of_a_format_are_kept():
     assert np.linalg.norm(apart, axis=1).max() <= 1.05 * fit.max_px
 
 
+@functools.cache
+def camera_with(lens):
+    return rig_for("rig", bent=False)[0].replace(lens=LENSES[lens])
+
+
+@pytest.mark.usefixtures("each_fit_once")
 @pytest.mark.parametrize("name", CALIBRATION_FORMATS)
 @pytest.mark.parametrize("lens", LENSES)
 def test_what_was_fitted_is_held(name, lens):
-    camera = rig_for("rig", bent=False)[0].replace(lens=LENSES[lens])
-    fit = fit_to_format(camera, CALIBRATION_FORMATS[name])
+    fit = fit_to_format(camera_with(lens), CALIBRATION_FORMATS[name])
     if fit is not None:
         assert fit_to_format(fit.camera, CALIBRATION_FORMATS[name]) is None
