@@ -91,7 +91,7 @@ def kind(*seeds):
     return Kind(name="cube", tuned_as="cube", scored=tuple(clips), tuning=tuple(clips[:1]))
 
 
-def test_rows_are_kept_and_those_that_are_missing_are_told_one_by_one(tmp_path):
+def test_rows_are_kept_and_missing_ones_are_listed(tmp_path):
     cache = Cache(tmp_path / "kept" / "field.jsonl", is_closed=False)
     first = of_peer(kind(1), FAST, OPTIONS, cache)
     closed = Cache(tmp_path / "kept" / "field.jsonl", is_closed=True)
@@ -100,7 +100,7 @@ def test_rows_are_kept_and_those_that_are_missing_are_told_one_by_one(tmp_path):
     assert again[1].error == NOT_RUN
 
 
-def test_who_was_late_on_a_clip_is_not_run_on_larger_ones_but_on_smaller(tmp_path):
+def test_a_tracker_late_on_a_capture_is_run_on_smaller_ones_only(tmp_path):
     def late(d, setting):
         while d.n_points > 250:
             pass
@@ -129,7 +129,7 @@ def test_oracles_and_ours_have_rows(tmp_path):
     assert np.isnan(rows_of(kind(1), next(iter(ORACLES)), OPTIONS, cache)[0].ms)
 
 
-def test_what_ends_its_process_does_not_load_and_harms_nobody():
+def test_a_peer_that_ends_its_process_is_not_loaded():
     def ends(d, setting):
         import os
         import signal
@@ -169,7 +169,7 @@ def table_of(peers, ours):
         (row(0.990, 0.0, 1), row(0.991, 0.0, 2), "equal", "none to save", "motpy 1.00 ms"),
     ],
 )
-def test_the_verdict_tells_who_is_ahead(peer, ours, word, saved, fastest):
+def test_the_verdict_names_the_tracker_ahead(peer, ours, word, saved, fastest):
     line = verdict(["dense 50"], table_of({"motpy": peer}, {"auto": ours}))[-1].split(" | ")
     assert line[1].startswith("motpy")
     assert (line[4], line[8], line[9].removesuffix(" |")) == (word, saved, fastest)

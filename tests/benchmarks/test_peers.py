@@ -127,7 +127,7 @@ def test_memory_is_that_of_the_run():
 
 
 @pytest.mark.parametrize("is_middle", [False, True])
-def test_a_cut_clip_keeps_its_truth(is_middle):
+def test_a_part_of_a_capture_keeps_its_truth(is_middle):
     truth = tiny()
     part = cut(truth, 10, is_middle=is_middle)
     assert part.detections.n_frames == 10

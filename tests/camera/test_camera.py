@@ -165,7 +165,7 @@ def test_coverage_of_two_cameras_at_right_angles():
     assert np.isnan(coverage.error[1:]).all()
 
 
-def test_coverage_tells_the_error_of_triangulated_points():
+def test_coverage_gives_the_error_of_triangulated_points():
     rng = np.random.default_rng(5)
     rig = am.Rig.ring(4, radius=3, height=2, target=(0, 0, 1))
     place, sigma = np.array([0.3, -0.2, 1.1]), 0.3

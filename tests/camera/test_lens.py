@@ -249,7 +249,7 @@ def away(old, new):
 
 @pytest.mark.parametrize("lens", LENSES[1:], ids=repr)
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_changed_lens_tells_what_it_leaves_over(lens, kind):
+def test_a_changed_lens_reports_its_residual(lens, kind):
     K_lens = np.eye(3) if kind is am.camera.QuadraticCorrection and type(lens) is kind else None
     if K_lens is not None:  # a correction of raw pixels, as the fitted one is
         lens = am.camera.QuadraticCorrection(

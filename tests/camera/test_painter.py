@@ -113,7 +113,7 @@ def test_the_painter_fails_on_a_cycle_and_says_so(lens, n):
         np.testing.assert_array_equal(painting.depth, truth.depth)
 
 
-def test_the_painter_tells_of_faces_that_pass_through_each_other():
+def test_the_painter_reports_faces_that_pass_through_each_other():
     one = am.camera.Polygon(
         corners=[[-1, -0.5, 0.5], [1, 0.5, 0.5], [1, 0.5, 1.5], [-1, -0.5, 1.5]]
     )

@@ -17,7 +17,7 @@ from asterism.cli import main
 from tests.cli.runs import refused, run
 
 
-def test_misses_in_runs_are_made_and_learnt(scene, capsys):
+def test_bursts_of_missed_detections_are_made_and_estimated(scene, capsys):
     run("simulate person -o p.csv --frames 160 --seed 1", capsys)
     line = "corrupt p.csv -o a.csv --truth t.csv --missing 0.15 --corrupt missing_run=4"
     made = json.loads(run(f"{line} --noise 0.0003 --json", capsys))

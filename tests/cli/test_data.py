@@ -1,4 +1,4 @@
-"""Real captures: spoilt, tracked and scored from the command line."""
+"""Real captures: corrupted, tracked and scored from the command line."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("name", "ending", "least"), CASES)
-def test_spoil_track_and_score(tmp_path, monkeypatch, capsys, name, ending, least):
+def test_corrupt_track_and_score(tmp_path, monkeypatch, capsys, name, ending, least):
     monkeypatch.chdir(tmp_path)
     (source,) = DATA.rglob(name)
     spoil = "--missing 0.1 --clutter 0.1 --noise 0.0003 --burst 5:5-60 --seed 1 -q"

@@ -31,17 +31,17 @@ def here(tmp_path, monkeypatch):
 def gappy():
     """A scene with gaps, clutter, an empty frame, a nameless track, and some that come late."""
     scene = am.simulate.crossing(seed=3, rate=100)
-    spoilt = am.simulate.corrupt(scene, missing=0.2, clutter=0.2, seed=4)
-    d = spoilt.detections
-    is_late = (spoilt.labels % 2 == 0) & (spoilt.labels >= 0)
+    corrupted = am.simulate.corrupt(scene, missing=0.2, clutter=0.2, seed=4)
+    d = corrupted.detections
+    is_late = (corrupted.labels % 2 == 0) & (corrupted.labels >= 0)
     is_kept = (d.frame_of != 30) & ~(is_late & (d.frame_of < 10))
     counts = np.bincount(d.frame_of[is_kept], minlength=d.n_frames)
     return am.Tracks(
         detections=am.Detections(
             times=d.times, offsets=np.append(0, np.cumsum(counts)), points=d.points[is_kept]
         ),
-        labels=spoilt.labels[is_kept],
-        names=(None, *spoilt.names[1:]),
+        labels=corrupted.labels[is_kept],
+        names=(None, *corrupted.names[1:]),
     )
 
 
@@ -206,11 +206,11 @@ def test_nothing_is_said_when_all_is_well(here, capsys):
 
 def test_what_cannot_be_filmed_is_refused(here, capsys):
     scene = am.simulate.cube(frames=5)
-    nobody = am.Tracks(detections=scene.detections, labels=np.full(40, -1))
+    clutter = am.Tracks(detections=scene.detections, labels=np.full(40, -1))
     flat = am.Tracks.from_dense(scene.detections.times, scene.positions()[:, :, :2])
-    for name, tracks in (("in", scene), ("nobody", nobody), ("flat", flat)):
+    for name, tracks in (("in", scene), ("clutter", clutter), ("flat", flat)):
         am.write(tracks, f"{name}.csv")
-    assert "points in tracks" in refused("film nobody.csv --rig ring3 -o out", capsys)
+    assert "points in tracks" in refused("film clutter.csv --rig ring3 -o out", capsys)
     assert "points in 3-D" in refused("film flat.csv --rig ring3 -o out", capsys)
     err = refused("film none.c3d --rig ring3 -o out", capsys)
     assert "none.c3d" in err

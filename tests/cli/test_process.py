@@ -92,14 +92,14 @@ def test_stopped_while_writing(folder, signum):
     code, _ = stopped(process, signum)
     assert code == (-signum if signum == signal.SIGKILL else 128 + signum)
     assert (folder / "out.csv").read_text() == "the old result"
-    if signum != signal.SIGKILL:  # which leaves nobody to tidy up
+    if signum != signal.SIGKILL:  # which leaves no process to tidy up
         assert sorted(p.name for p in folder.iterdir()) == ["in.csv", "model.toml", "out.csv"]
 
 
 def catches(process, signum):
     """Whether a process answers a signal itself, which Python does not do with SIGTERM."""
     status = Path(f"/proc/{process.pid}/status")
-    if not status.exists():  # no Linux: long enough, if nobody else is busy
+    if not status.exists():  # no Linux: long enough on an idle machine
         time.sleep(1.0)
         return True
     (caught,) = (line for line in status.read_text().splitlines() if line.startswith("SigCgt"))
@@ -215,7 +215,7 @@ def test_failures_inside(what, code, says):
 
 
 @pytest.mark.parametrize("line", ["scenes", "scenes --json", "track --help"])  # each way to print
-def test_nobody_reads_the_output(line):
+def test_the_output_is_closed_by_its_reader(line):
     read, write = os.pipe()
     os.close(read)
     done = subprocess.run(

@@ -36,7 +36,7 @@ def person(recorded, tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_track_finds_hidden_markers_again(person, capsys):
+def test_track_finds_occluded_markers_again(person, capsys):
     out = run("track p.c3d --method gnn -o found.c3d --stitch --run r", capsys)
     assert "markers found again" in out
     truth = am.io.read_tracks("pt.c3d")
@@ -80,7 +80,7 @@ def test_what_stitch_refuses(scene, capsys, line, says):
     assert not Path("out.csv").exists()
 
 
-def test_bonds_of_one_take_name_the_next(person, capsys):
+def test_bonds_of_one_capture_name_the_next(person, capsys):
     out = run("bonds person.csv -o subject.toml", capsys)
     assert "rigid clusters" in out
     told = json.loads(run("bonds person.csv --json", capsys))

@@ -17,14 +17,12 @@ from tests.references.jpda import jpda_by_hand
 from tests.scenes import interacting, sized, small_model, wanderers
 
 # The others are held to every partition of small problems instead.
-ON_A_BLACKBOARD = {
+WITH_REFERENCE = {
     name: m
     for name, m in METHODS.items()
     if not isinstance(m, am.TOMHT | am.MDA | am.MHT | am.MCMCDA)
 }
-each_on_a_blackboard = pytest.mark.parametrize(
-    "method", ON_A_BLACKBOARD.values(), ids=ON_A_BLACKBOARD
-)
+each_with_reference = pytest.mark.parametrize("method", WITH_REFERENCE.values(), ids=WITH_REFERENCE)
 
 
 def stream(method, model, detections, **options):
@@ -110,10 +108,10 @@ def test_a_step_leaves_the_old_state_as_it_was(method):
     assert (other == -1).all()
 
 
-@each_on_a_blackboard
+@each_with_reference
 @pytest.mark.parametrize("motion", ["dwna", "interacting"])
 @pytest.mark.parametrize("seed", range(2))
-def test_the_engine_tracks_as_the_blackboard_does(method, motion, seed):
+def test_the_engine_tracks_as_the_reference_implementation_does(method, motion, seed):
     rng = np.random.default_rng(seed)
     truth = wanderers(rng, n_markers=5, n_frames=30, n_axes=2 + seed % 2, clutter=1.5)
     model = small_model()
@@ -124,10 +122,10 @@ def test_the_engine_tracks_as_the_blackboard_does(method, motion, seed):
     assert labels.max() >= 3
 
 
-@each_on_a_blackboard
+@each_with_reference
 @pytest.mark.parametrize("bound", ["gate", "speed", "odds"])
 @pytest.mark.parametrize("seed", range(3))
-def test_tight_bounds_are_those_of_the_blackboard(method, bound, seed):
+def test_tight_bounds_are_those_of_the_reference_implementation(method, bound, seed):
     # With bounds so tight that true links are lost, each of them decides.
     rng = np.random.default_rng(100 + seed)
     truth = wanderers(rng, n_markers=5, n_frames=20, clutter=1.5)
@@ -135,7 +133,7 @@ def test_tight_bounds_are_those_of_the_blackboard(method, bound, seed):
     free = am.track(truth.detections, method, model=model).labels
     if bound == "gate":
         method = dataclasses.replace(method, gate=Gate(probability=0.97))
-    elif bound == "odds":  # believed late, doubted soon: what a track once scored decides
+    elif bound == "odds":  # late confirmation, early deletion: the best score of a track decides
         method = dataclasses.replace(
             method, lifecycle=Lifecycle(confirm_probability=1 - 1e-12, delete_odds=1.5)
         )
@@ -146,7 +144,7 @@ def test_tight_bounds_are_those_of_the_blackboard(method, bound, seed):
     assert (labels != free).any()
 
 
-@each_on_a_blackboard
+@each_with_reference
 def test_many_points_are_tracked_as_few_are(method):
     # From 64 points on a frame takes the grid; the reference implementation has none.
     rng = np.random.default_rng(4)
@@ -194,7 +192,7 @@ def test_well_separated_markers_are_never_confused(method):
 
 @each_method
 def test_empty_frames_and_endings(method):
-    # A marker is seen for six frames, hidden for as long as the model bridges, and then for longer.
+    # A marker is seen for six frames, occluded for as long as the model bridges, then for longer.
     model = small_model(max_gap=4)
     seen = [*range(6), *range(9, 15), *range(19, 25)]
     frames = [[[0.01 * t, 0, 0]] if t in seen else [] for t in range(25)]
@@ -204,9 +202,9 @@ def test_empty_frames_and_endings(method):
     assert labels.tolist() == [0] * 12 + [1] * 6
 
 
-@each_on_a_blackboard  # multiple hypotheses weigh a long absence against a new marker
-def test_a_believed_track_may_be_missed_as_long_as_the_model_bridges(method):
-    # Soon believed, then hidden for longer than its own detections could make up for.
+@each_with_reference  # multiple hypotheses weigh a long absence against a new marker
+def test_a_confirmed_track_may_be_missed_for_max_gap_frames(method):
+    # Confirmed soon, then occluded for longer than its own detections could make up for.
     model = small_model(
         motion=am.RandomWalk(walk_sigma=0.02), noise_sigma=3e-4, p_detection=0.999,
         clutter_density=0.05, birth_density=1e-3, max_gap=30,
@@ -285,7 +283,7 @@ def test_options_are_checked():
     with pytest.raises(am.ParameterError, match="gate: expected a Gate"):
         am.GNN(gate=3)
     with pytest.raises(am.ParameterError, match="proposers"):
-        am.SMP(proposers="nobody")
+        am.SMP(proposers="markers")
     with pytest.raises(am.ParameterError, match="Did you mean 'probability'"):
         am.tracking.method_by_name("gnn", gate={"probabil": 0.1})
     with pytest.raises(am.ParameterError, match="Did you mean 'gnn'"):

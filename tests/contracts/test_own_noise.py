@@ -108,7 +108,7 @@ def test_knowing_which_detections_are_blurred_helps(method):
     assert 1 - with_it.idf1 < 0.8 * (1 - without.idf1)
 
 
-def test_the_model_from_the_clip_leaves_to_points_what_is_theirs():
+def test_the_model_of_a_capture_leaves_to_points_their_own_noise():
     rng = np.random.default_rng(4)
     truth = wanderers(rng, n_markers=12, n_frames=250)
     d = truth.detections

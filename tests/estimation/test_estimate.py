@@ -28,7 +28,7 @@ def test_the_scale_of_everything_is_found(seed):
     assert model.population.max_gap >= 4
 
 
-def test_two_kinds_of_motion_are_told_apart():
+def test_two_kinds_of_motion_are_distinguished():
     # Half of the markers rest; the others are shaken a hundred times as much as they tremble.
     rng = np.random.default_rng(1)
     n = 300
@@ -57,7 +57,7 @@ def test_the_order_within_a_frame_changes_nothing():
     assert replace(a.population, max_speed=1) == replace(b.population, max_speed=1)
 
 
-def test_the_same_clip_gives_the_same_model():
+def test_the_same_capture_gives_the_same_model():
     d = wanderers(np.random.default_rng(3), n_frames=60).detections
     assert am.estimate_model(d).model == am.estimate_model(d).model
 
@@ -132,7 +132,7 @@ def test_one_marker_in_the_plane():
     assert am.evaluate(am.track(truth.detections), truth).idf1 == 1.0
 
 
-def test_misses_in_runs_are_told_from_single_ones():
+def test_bursts_of_missed_detections_are_distinguished_from_single_ones():
     seed = 1
     quiet = am.simulate.SCENES["person"].make(activity="walk", frames=160, seed=seed)
     runs = {"missing": 0.15, "missing_run": 4.0, "noise": 3e-4, "clutter": 0.1, "seed": seed}

@@ -171,7 +171,7 @@ def test_weights_are_the_best_of_a_fine_grid(seed, J):
     assert w @ C @ w <= np.einsum("ij,jk,ik->i", grid, C, grid).min() * (1 + 1e-9)
 
 
-def test_what_is_bridged_knows_nothing_of_what_is_hidden(monkeypatch):
+def test_fills_do_not_use_the_points_left_out(monkeypatch):
     """A hole beside the hidden frame is bridged with its help: no window may begin there."""
     monkeypatch.setattr(estimates, "MAX_WINDOWS", 1000)
     truth = rigid(frames=120, noise=1e-4)

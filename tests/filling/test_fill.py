@@ -48,7 +48,7 @@ def test_irregular_times():
     assert np.sqrt((e**2).sum(axis=1).mean()) < 1e-3
 
 
-def test_a_take_too_short_to_try_says_so():
+def test_a_capture_too_short_to_try_says_so():
     truth = rigid(frames=60)
     filling = am.fill_gaps(hidden_at(truth, (2, 15, 44)), model=MODEL)
     (gap,) = filling.gaps
@@ -129,12 +129,12 @@ def test_a_marker_that_flickers_before_it_is_lost():
     positions = tracks.positions()
     positions[97:100, 2] += [0.03, -0.02, 0.03]
     positions[121, 2] += [0.0, 0.04, 0.0]
-    spoilt = am.Tracks.from_dense(truth.detections.times, positions)
-    e, _ = errors(am.fill_gaps(spoilt, model=MODEL), truth)
+    damaged = am.Tracks.from_dense(truth.detections.times, positions)
+    e, _ = errors(am.fill_gaps(damaged, model=MODEL), truth)
     assert np.linalg.norm(e, axis=1).max() < 2e-3
 
 
-def test_frames_after_a_jump_are_not_believed():
+def test_frames_after_a_jump_are_not_used():
     frames = np.r_[90:100, 120:130]
     places = np.zeros((20, 3))
     places[8:10] = 0.03

@@ -82,7 +82,7 @@ def test_linear_motion_by_its_matrices_is_the_motion_it_describes():
     assert np.allclose(a.log_densities, b.log_densities, rtol=1e-9, atol=1e-9)
 
 
-def test_smoothing_stays_calibrated_and_stable_over_a_long_take():
+def test_smoothing_stays_calibrated_and_stable_over_a_long_capture():
     # 20 000 frames of one marker: errors against truth within the stated covariance, none drifting.
     rng = np.random.default_rng(5)
     n, dt, sigma_a, sigma = 20_000, 0.01, 3.0, 0.01

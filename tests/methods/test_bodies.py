@@ -1,4 +1,4 @@
-"""Hidden markers carried by their neighbours: places, variances, what trackers make of them."""
+"""Occluded markers carried by their neighbours: places, variances, what trackers make of them."""
 
 from __future__ import annotations
 
@@ -57,24 +57,24 @@ def test_carried_places_are_those_by_hand(n_axes, n_seen, bend):
     _, seen = turning(rng, 110, n_axes, bend=bend)
     by_hand = BodyByHand(n_axes, SIGMA)
     engine = _engine.RigidCarrier(n_axes=n_axes, noise_sigma=SIGMA)
-    n_told = 0
+    n_carried = 0
     for t, points in enumerate(seen):
         others = np.arange(1, n_seen + 1) if t >= 80 else np.arange(1, 7)
         if t > 80 and t % 5 == 1:
-            told = engine.carry(0, others, points[others])
+            carried = engine.carry(0, others, points[others])
             at, variance, n = by_hand.carry(0, others, points[others])
-            np.testing.assert_allclose(told[0], at, atol=1e-9)
-            np.testing.assert_allclose(told[1], variance, rtol=1e-6)
-            assert told[2] == n
-            n_told += 1
+            np.testing.assert_allclose(carried[0], at, atol=1e-9)
+            np.testing.assert_allclose(carried[1], variance, rtol=1e-6)
+            assert carried[2] == n
+            n_carried += 1
         ids = np.append(0, others) if t < 80 else others
         engine.see(ids, points[ids])
         by_hand.see(ids, points[ids])
-    assert n_told == 6
+    assert n_carried == 6
 
 
 def normalised_errors(n_axes, bend, n_bodies=40):
-    """Squared errors of carried places over their variances, by the frames hidden."""
+    """Squared errors of carried places over their variances, by the frames occluded."""
     found: dict[int, list[float]] = {gap: [] for gap in (1, 5, 20, 39)}
     for seed in range(n_bodies):
         rng = np.random.default_rng(seed)
@@ -123,7 +123,7 @@ def test_neighbours_in_a_line_do_not_turn_a_marker():
     assert variance == pytest.approx(0.03**2, rel=0.05)
 
 
-def test_strangers_carry_nobody():
+def test_markers_without_bonds_carry_no_other():
     rng = np.random.default_rng(4)
     place, engine = rng.uniform(-1, 1, (6, 3)), _engine.RigidCarrier(n_axes=3, noise_sigma=SIGMA)
     for _ in range(100):
@@ -134,7 +134,7 @@ def test_strangers_carry_nobody():
     assert engine.carry(0, np.arange(1, 6), place[1:]) is None
 
 
-def test_who_is_forgotten_is_nobodys_neighbour():
+def test_a_forgotten_marker_is_no_neighbour():
     rng = np.random.default_rng(5)
     _, seen = turning(rng, 90, 3)
     engine = _engine.RigidCarrier(n_axes=3, noise_sigma=SIGMA)
@@ -171,19 +171,19 @@ def test_neighbours_tell_a_marker_from_a_ghost_that_moves_likelier(make):
 
 
 @each_method
-def test_a_hidden_marker_is_known_when_it_comes_back(make):
-    # Hidden for 40 frames, of which the model bridges 5, while the body goes on and turns; a ghost
+def test_an_occluded_marker_keeps_its_track_when_it_comes_back(make):
+    # Occluded for 40 frames, of which the model bridges 5, while the body moves and turns; a ghost
     # is beside its place: from the first on, or from the fourth for those that keep frames open and
-    # decide by the best branches, to which a marker is not hidden yet in the first.
+    # decide by the best branches, to which a marker is not occluded yet in the first.
     begins = 103 if make in BY_BRANCHES else 100
     rng = np.random.default_rng(9)
     truth, seen = turning(rng, 160, 3, speed=0.3)
     frames = []
     for t, points in enumerate(seen):
-        hidden = 100 <= t < 140
+        occluded = 100 <= t < 140
         ghost = truth[t, :1] + np.array([0.05, 0, 0])
         others = points[1:] if t < begins else np.vstack([ghost, points[1:]])
-        frames.append(others if hidden else points)
+        frames.append(others if occluded else points)
     d = am.Detections.from_frames(0.01 * np.arange(160), frames)
     model = walk_model()
     off, on = (am.track(d, make(rigid=r), model=model).labels for r in (None, Rigidity()))
@@ -194,7 +194,7 @@ def test_a_hidden_marker_is_known_when_it_comes_back(make):
 
 
 @functools.cache
-def hidden_person(seed):
+def occluded_person(seed):
     truth = am.simulate.person(seed=seed)
     truth = am.simulate.corrupt(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=seed)
     return truth, am.estimate_model(truth.detections).model
@@ -202,10 +202,10 @@ def hidden_person(seed):
 
 @each_method
 @pytest.mark.parametrize("seed", [1, 2])
-def test_hidden_markers_of_a_person_come_back_as_themselves(make, seed):
+def test_occluded_markers_of_a_person_come_back_as_themselves(make, seed):
     if make is am.MDA:
         pytest.skip("slow, and the same forest as TOMHT's")
-    truth, model = hidden_person(seed)
+    truth, model = occluded_person(seed)
     off, on = (am.track(truth.detections, make(rigid=r), model=model) for r in (None, Rigidity()))
     before, after = am.evaluate(off, truth), am.evaluate(on, truth)
     assert after.idf1 > before.idf1 + 0.03
@@ -220,7 +220,7 @@ def test_hidden_markers_of_a_person_come_back_as_themselves(make, seed):
 
 
 @functools.cache
-def spoilt(scene):
+def corrupted(scene):
     made = getattr(am.simulate, scene)(seed=1)
     truth = am.simulate.corrupt(made, missing=0.1, clutter=0.1, noise=1e-3, seed=1)
     return truth, am.estimate_model(truth.detections).model
@@ -233,7 +233,7 @@ def test_no_harm_where_there_are_no_bodies(make, scene):
         pytest.skip("slow, and the same tracks as GNN's")
     if make is am.MDA:
         pytest.skip("slow, and the same forest as TOMHT's")
-    truth, model = spoilt(scene)
+    truth, model = corrupted(scene)
     off, on = (
         am.evaluate(am.track(truth.detections, make(rigid=r), model=model), truth).idf1
         for r in (None, Rigidity())
@@ -242,8 +242,8 @@ def test_no_harm_where_there_are_no_bodies(make, scene):
 
 
 @each_method
-def test_a_stream_is_the_whole_take_and_a_state_is_a_value(make):
-    truth, model = hidden_person(1)
+def test_a_stream_is_the_whole_capture_and_a_state_is_a_value(make):
+    truth, model = occluded_person(1)
     d = truth.detections.part(0, 140)
     method = make(rigid=Rigidity())
     whole = am.track(d, method, model=model)
@@ -282,7 +282,7 @@ def test_a_window_beyond_the_longest_gap_carries_too(make):
 
 @pytest.mark.parametrize("make", [METHODS[n] for n in ("gnn", "smp of the past", "tomht", "mht")])
 def test_carrying_ends_in_time(make):
-    truth, model = hidden_person(1)
+    truth, model = occluded_person(1)
     longest = {}
     for limit in (1, 30, 60):
         method = make(rigid=Rigidity(max_gap=limit))

@@ -253,7 +253,7 @@ def test_same_seed_same_chain():
     assert runs[0] == runs[1] != runs[2]
 
 
-def test_a_chain_begins_where_it_is_told_to():
+def test_a_chain_begins_at_the_labels_assigned_to_it():
     d, model = problem_of_size(500, 5000, 0, 2)
     partitions, totals = every_partition(d, model)
     labels = np.full(d.n_points, -1)

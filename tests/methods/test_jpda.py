@@ -18,7 +18,7 @@ from tests.scenes import calibration_in_crowds, crowd, interacting, small_model
 @pytest.mark.parametrize("options", [{}, {"guard": False}, {"sure_until_gap": False}])
 @pytest.mark.parametrize("motion", ["dwna", "interacting"])
 @pytest.mark.parametrize("seed", range(2))
-def test_labels_and_confidence_are_those_of_the_blackboard(options, motion, seed):
+def test_labels_and_confidence_are_those_of_the_reference_implementation(options, motion, seed):
     truth = crowd(seed, n_axes=2 + seed % 2)
     slow = am.DWNA(acceleration_sigma=1.2, velocity_sigma=0.3)
     model = small_model(

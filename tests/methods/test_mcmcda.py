@@ -55,7 +55,7 @@ def test_a_crowd_is_explained_no_worse_than_by_any_other_method():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_where_nothing_is_in_doubt_the_truth_is_found(seed):
+def test_the_truth_is_found_where_no_link_is_ambiguous(seed):
     truth = wanderers(np.random.default_rng(seed), n_frames=80)
     tracks = am.track(truth.detections, am.MCMCDA(), model=small_model(), seed=seed)
     assert am.evaluate(tracks, truth).idf1 > 0.98
@@ -108,7 +108,7 @@ def test_the_seed_decides_and_nothing_else():
     assert len({str(one) for one in labels}) > 1
 
 
-def test_a_deadline_stops_the_walk_and_is_told():
+def test_a_deadline_stops_the_chain_and_is_kept():
     d, model = crowd(6, spread=0.05, n_frames=20).detections, crowd_model()
     method = am.MCMCDA(moves=None, deadline=0.005)
     state = method.init(model)
@@ -207,7 +207,7 @@ def follows(tracks, i):
     return -2
 
 
-def test_confidence_tells_wrong_links():
+def test_confidence_is_low_for_wrong_links():
     c = calibration_in_crowds(am.MCMCDA())
     assert c.ece < 0.02
     assert c.auc > 0.85

@@ -101,7 +101,7 @@ def test_a_start_is_for_those_who_can():
         am.track(truth.detections, am.MCMCDA(), model=small_model(), start=other)
 
 
-def test_a_whole_take_is_walked_over_in_the_end():
+def test_a_chain_over_a_whole_capture_runs_to_the_last_frame():
     truth = crowd(4, spread=0.1, n_frames=sized(60, 20))
     d, model = truth.detections, crowd_model()
     moves = sized(200, 20)
@@ -137,7 +137,7 @@ def test_a_signal_ends_a_run_between_two_frames():
     assert time.process_time() - start < 5  # to the end it would be a minute
 
 
-def test_a_walk_over_a_whole_take_can_be_interrupted():
+def test_a_chain_over_a_whole_capture_can_be_interrupted():
     d, model = crowd(4, spread=0.1, n_frames=60).detections, crowd_model()
 
     seen = []

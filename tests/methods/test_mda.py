@@ -51,7 +51,7 @@ def test_the_same_as_multiple_hypotheses_where_both_are_exact(solver):
     assert mda.info["gap"] == tomht.info["gap"] == 0
 
 
-def test_a_gap_of_the_relaxation_is_told(monkeypatch):
+def test_a_gap_of_the_relaxation_is_reported(monkeypatch):
     # One round of prices closes no gap where markers walk over each other.
     short = functools.partial(am.solve.assign_multidimensional, max_rounds=1)
     monkeypatch.setattr("asterism.tracking.methods.mda.assign_multidimensional", short)

@@ -14,7 +14,7 @@ from asterism.tracking import Gate, Lifecycle
 from tests.references.partitions import every_partition, tiny_model, tiny_problem
 from tests.scenes import calibration_in_crowds, crowd, small_model, wanderers
 
-# Nothing is dropped, and what is more likely than not is believed.
+# Nothing is dropped, and what is more likely than not is confirmed.
 WHOLE = am.MHT(
     window=16, max_hypotheses=10**6, prune_odds=1e300, new_track_odds=1e300,
     gate=Gate(probability=1e-300),
@@ -111,7 +111,7 @@ def test_clusters_apart_and_what_is_dropped_hardly_change_the_probabilities(seed
 
 @pytest.mark.parametrize("prune_odds", [2.0, 1e6])
 @pytest.mark.parametrize("seed", range(3))
-def test_where_nothing_is_in_doubt_the_truth_is_found(seed, prune_odds):
+def test_the_truth_is_found_where_no_link_is_ambiguous(seed, prune_odds):
     truth = wanderers(np.random.default_rng(seed), n_frames=80)
     tracks = am.track(truth.detections, am.MHT(prune_odds=prune_odds), model=small_model())
     assert am.evaluate(tracks, truth).idf1 > 0.98
@@ -158,7 +158,7 @@ def test_clusters_join_where_targets_compete_and_part_again():
     assert max(sizes[8:20]) == max(sizes[45:]) == 1
 
 
-def test_what_is_left_out_is_told():
+def test_what_is_left_out_is_reported():
     d, model = crowd(3, spread=0.04).detections, crowd_model(birth_density=1.0, clutter_density=1.0)
     few, many = (
         am.track(d, am.MHT(max_hypotheses=3), model=model),

@@ -127,7 +127,7 @@ def test_proposals_grow_like_n_log_n():
 @pytest.mark.parametrize("proposers", ["tracks", "detections"])
 @pytest.mark.parametrize("capacity", [2, 3])
 @pytest.mark.parametrize("seed", range(5))
-def test_hospitals_and_residents_equal_the_blackboard(proposers, capacity, seed):
+def test_hospitals_and_residents_equal_the_reference_implementation(proposers, capacity, seed):
     scene = am.simulate.walk(n_markers=5, frames=25, rate=10, stride=0.03, seed=seed)
     d = am.simulate.corrupt(
         scene, noise=0.004, missing=0.1, clutter=0.2, doubled=0.4, doubled_apart=0.012, seed=seed

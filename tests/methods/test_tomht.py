@@ -11,7 +11,7 @@ from tests.paths import REPRO
 from tests.references.partitions import every_partition, every_track, tiny_model, tiny_problem
 from tests.scenes import calibration_in_crowds, crowd, small_model, wanderers
 
-# Nothing is pruned, nothing is left out, and what is more likely than not is believed.
+# Nothing is pruned, nothing is left out, and what is more likely than not is confirmed.
 WHOLE = am.TOMHT(
     window=16, max_branches=10**6, prune_odds=1e30, max_hypotheses=10**6, max_nodes=10**6,
     new_track_odds=1e300, gate=Gate(probability=1e-300),
@@ -81,7 +81,7 @@ def test_a_longer_window_explains_a_crowd_better_than_single_frames():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_where_nothing_is_in_doubt_the_truth_is_found(seed):
+def test_the_truth_is_found_where_no_link_is_ambiguous(seed):
     truth = wanderers(np.random.default_rng(seed), n_frames=80)
     tracks = am.track(truth.detections, am.TOMHT(), model=small_model())
     e = am.evaluate(tracks, truth)
@@ -159,7 +159,7 @@ def test_a_search_cut_short_says_by_how_much_it_may_be_off():
         assert am.log_posterior(short, model) < am.log_posterior(whole, model) - 1
 
 
-def test_what_is_only_looked_ahead_at_is_told_as_well():
+def test_frames_not_yet_decided_count_in_the_report():
     # The window is longer than the take: nothing is decided, and still it says what was cut short.
     d = crowd(3, spread=0.04).detections
     first = am.Detections(times=d.times[:8], offsets=d.offsets[:9], points=d.points[: d.offsets[8]])

@@ -39,7 +39,7 @@ def crowd_model(motion: am.model.Motion | None = None) -> am.TrackingModel:
 )
 @pytest.mark.parametrize("motion", ["dwna", "interacting"])
 @pytest.mark.parametrize("seed", range(2))
-def test_labels_and_confidence_are_those_of_the_blackboard(method, motion, seed):
+def test_labels_and_confidence_are_those_of_the_reference_implementation(method, motion, seed):
     truth = crowd(seed, n_axes=2 + seed % 2, spread=0.12, n_frames=16)
     model = crowd_model(interacting() if motion == "interacting" else None)
     labels, confidence = trees_by_hand(truth.detections, method, model)
@@ -241,7 +241,7 @@ def test_a_long_life_passes_from_the_table_to_the_closed_form_without_a_step():
 
 
 @pytest.mark.parametrize("n_axes", [2, 3])
-def test_the_surprise_of_a_mixture_is_chi2(n_axes):
+def test_the_nis_of_a_mixture_is_chi2(n_axes):
     # Right after birth the three motions expect the same place, each with its own spread: the sum
     # over the modes is then exactly the tail of the mixture, and λ(1) is χ² with D degrees.
     model = small_model(
@@ -274,7 +274,7 @@ def test_the_surprise_of_a_mixture_is_chi2(n_axes):
     assert kstest(squares, chi2(n_axes).cdf).pvalue > 1e-3
 
 
-def test_trees_that_want_one_detection_are_told_and_resolved():
+def test_trees_that_want_one_detection_are_counted_and_resolved():
     # A second marker vanishes beside the first: for some frames both trees like one detection best.
     n = 40
     path = np.stack([0.01 * np.arange(n), np.zeros(n), np.zeros(n)], axis=1)
@@ -333,7 +333,7 @@ def test_confidence_is_calibrated_where_the_model_is_right():
     assert found.ece < 0.015
 
 
-def test_limits_on_branches_are_kept_and_told():
+def test_limits_on_branches_are_kept_and_reported():
     d, model = crowd(3, spread=0.05).detections, crowd_model()
     few = am.track(d, am.TrackSplitting(max_branches=2, window=6), model=model)
     assert few.info["most_branches"] == 2

@@ -44,7 +44,7 @@ def test_the_suggestion_is_the_best_of_those_tried():
     assert am.multiview.suggest_cameras(rig, grid, [])[:1] == []
 
 
-def test_what_nobody_sees_counts():
+def test_what_no_camera_sees_counts():
     K = am.camera.intrinsics(focal_length=900, principal_point=(640, 512))
     away = am.Camera.look_at((4, 4, 2), (9, 9, 2), K=K, size_px=(1280, 1024), name="away")
     rig = am.Rig((away, away.replace(name="too")))

@@ -42,7 +42,7 @@ def shuffled(tracks, seed):
     return am.Tracks(detections=tracks.detections, labels=labels), was
 
 
-def test_distances_and_spreads_are_those_of_the_take():
+def test_distances_and_spreads_are_those_of_the_capture():
     rng = np.random.default_rng(1)
     t, places = moving(rng.uniform(-0.2, 0.2, (5, 3)))
     places[:, 4] += 0.03 * np.sin(9 * t)[:, None]  # hangs loosely
@@ -131,7 +131,7 @@ def test_files_that_are_wrong_are_refused(tmp_path, old, new, message):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_person_is_recognized_in_the_next_take(seed):
+def test_a_person_is_named_in_the_next_capture(seed):
     truth = am.simulate.person(seed=seed)
     half = truth.detections.n_frames // 2
     bonds = am.learn_bonds(part(truth, 0, half))
@@ -154,7 +154,7 @@ def test_markers_may_be_stuck_on_anew(seed):
     assert np.mean(found.markers == was) > 0.95
 
 
-def test_a_body_and_its_mirror_image_are_told_apart():
+def test_a_body_and_its_mirror_image_are_distinguished():
     rng = np.random.default_rng(4)
     for seed in range(5):
         shape = rng.uniform(-0.3, 0.3, (7, 3))
@@ -178,18 +178,18 @@ def test_pieces_of_a_marker_become_one_track():
     assert am.evaluate(found.tracks, truth).switches == 0
 
 
-def test_strangers_have_no_name():
+def test_markers_outside_the_set_have_no_name():
     rng = np.random.default_rng(6)
     t, places = moving(rng.uniform(-0.3, 0.3, (9, 3)))
     bonds = am.learn_bonds(am.Tracks.from_dense(t, places[:, :6]))
-    # Six that it knows, and three that belong to nobody.
+    # Six markers of the set, and three of no set.
     places[:, 6:] = 3 + np.cumsum(rng.normal(scale=0.02, size=(len(t), 3, 3)), axis=0)
     found = am.name_tracks(am.Tracks.from_dense(t, places), bonds)
     np.testing.assert_array_equal(found.markers, [0, 1, 2, 3, 4, 5, -1, -1, -1])
     assert (found.probabilities[6:] == 0).all()
 
 
-def test_tracks_without_a_name_are_never_learnt():
+def test_tracks_without_a_name_enter_no_marker_set():
     # A recorder's own channels are no markers: learnt, they would name real markers T003 or *12.
     places = np.tile(np.random.default_rng(8).uniform(size=(6, 3)), (30, 1, 1))
     names = [None, "T000", "T004", "*12", "Unlabeled 7", "LASI"]
@@ -199,7 +199,7 @@ def test_tracks_without_a_name_are_never_learnt():
     np.testing.assert_allclose(bonds.distances[1], np.linalg.norm(places[0, 1] - places[0, 5]))
 
 
-def test_a_take_without_any_name_is_learnt_by_number():
+def test_markers_without_any_name_are_numbered():
     places = np.tile(np.random.default_rng(8).uniform(size=(3, 3)), (30, 1, 1))
     take = am.Tracks.from_dense(np.arange(30) / 100, places)
     assert am.learn_bonds(take).names == ("T000", "T001", "T002")
@@ -207,10 +207,10 @@ def test_a_take_without_any_name_is_learnt_by_number():
 
 def test_takes_without_anything_to_tell():
     bonds = am.learn_bonds(am.simulate.person(seed=1))
-    nobody = am.Tracks.from_dense(np.arange(5) / 100, np.full((5, 2, 3), np.nan))
-    found = am.name_tracks(nobody, bonds)
+    empty = am.Tracks.from_dense(np.arange(5) / 100, np.full((5, 2, 3), np.nan))
+    found = am.name_tracks(empty, bonds)
     assert found.n_named == 0
-    assert len(am.learn_bonds(nobody).pairs) == 0
+    assert len(am.learn_bonds(empty).pairs) == 0
     with pytest.raises(am.ParameterError, match="axes"):
         am.name_tracks(am.Tracks.from_dense([0, 1], np.zeros((2, 1, 2))), bonds)
 
@@ -281,7 +281,7 @@ def test_names_are_as_probable_as_among_all_ways_of_naming(seed):
     np.testing.assert_allclose(found.probabilities, probable, atol=2e-3)
 
 
-def test_a_body_may_be_elsewhere_in_the_next_take():
+def test_a_body_may_be_elsewhere_in_the_next_capture():
     rng = np.random.default_rng(3)
     t, body = moving(rng.uniform(-0.3, 0.3, (8, 3)), noise=1e-4)
     _, stick = moving(np.array([[0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]]), seed=1, noise=1e-4)
@@ -303,7 +303,7 @@ def test_who_comes_when_a_marker_has_gone_is_not_yet_that_marker():
     np.testing.assert_array_equal(found.markers, [0, 1, 2, 3, 4, 5, -1])
 
 
-def test_frames_of_long_takes_are_counted_though_not_all_are_looked_at():
+def test_frames_of_long_captures_are_counted_though_not_all_are_looked_at():
     places = np.tile([[0.0, 0, 0], [1, 0, 0], [0, 2, 0]], (2400, 1, 1))
     places[30:, 2] = np.nan
     bonds = am.learn_bonds(am.Tracks.from_dense(np.arange(2400) / 100, places))

@@ -1,6 +1,6 @@
-"""A frame-by-frame tracker as one would write it on a blackboard: lists, dictionaries, SciPy.
+"""Reference implementation of a frame-by-frame tracker: lists, dictionaries, SciPy.
 
-It shares nothing with the engine but the definitions: what a gain is, when a track is believed.
+It shares nothing with the engine but the definitions: what a gain is, when a track is confirmed.
 """
 
 from __future__ import annotations
@@ -124,11 +124,11 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
                 gain = odds(hit(track.gap) + math.log(total)) - missed
                 if gain > 0:
                     gains[i, j] = gain
-        believed = np.array([track.id >= 0 for track in tracks], dtype=bool)
-        match = pair(tracks, points, np.where(believed[:, None], gains, -np.inf), method)
+        confirmed = np.array([track.id >= 0 for track in tracks], dtype=bool)
+        match = pair(tracks, points, np.where(confirmed[:, None], gains, -np.inf), method)
         taken = {j for several in match.values() for j in several}
         free = np.array([j not in taken for j in range(len(points))], dtype=bool)
-        rest = np.where(~believed[:, None] & free, gains, -np.inf)
+        rest = np.where(~confirmed[:, None] & free, gains, -np.inf)
         match |= pair(tracks, points, rest, method)
         for i, track in enumerate(tracks):
             if i not in match:

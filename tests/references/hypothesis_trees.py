@@ -1,4 +1,4 @@
-"""Tracks split into branches over a window of frames, as one would write it on a blackboard.
+"""Reference implementation of track splitting: tracks split into branches over a window of frames.
 
 Lists of copies, dictionaries, SciPy; it shares nothing with the engine but the definitions.
 """
@@ -35,7 +35,7 @@ class Branch(OneTrack):
         other.path, other.squares = dict(self.path), dict(self.squares)
         return other
 
-    def surprise(self, y) -> float:
+    def nis(self, y) -> float:
         squares = self.squares_of(y)
         if len(squares) == 1:
             return float(squares[0])
@@ -43,7 +43,7 @@ class Branch(OneTrack):
 
 
 class Options:
-    """What a method asks of its branches."""
+    """Options of a method that concern its branches."""
 
     def __init__(self, method, n_axes: int) -> None:
         if isinstance(method, am.TrackSplitting):
@@ -85,7 +85,7 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
             sum(v for (k, column), v in claims[t].items() if column == j and k != key)
         )
 
-    def worth(b: Branch) -> float:
+    def log_odds(b: Branch) -> float:
         return b.score - b.n_taken * over
 
     def root(track: Branch) -> Branch:
@@ -115,7 +115,7 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
                 won = hit(b.gap) + math.log(likelihood)
                 if track.id >= 0 and won <= miss(b.gap) + over - o.drop:
                     continue  # never kept
-                sum_ = o.fading * b.chi2 + b.surprise(y)
+                sum_ = o.fading * b.chi2 + b.nis(y)
                 if sum_ > o.limits[min(b.updates, len(o.limits) - 1)]:
                     continue
                 child = b.fork()
@@ -130,10 +130,10 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
             b.gap += 1
             b.has_ended = b.gap >= p.max_gap
             grown.append(b)
-        grown.sort(key=lambda b: -worth(b))
+        grown.sort(key=lambda b: -log_odds(b))
         kept: list[Branch] = []
         for b in grown:
-            if worth(b) < worth(grown[0]) - o.drop:
+            if log_odds(b) < log_odds(grown[0]) - o.drop:
                 break
             last = [b.path.get(t - k) for k in range(o.merge)]
             if n_open > o.merge and any(
@@ -146,18 +146,18 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
 
     def odds(track: Branch, b: Branch, extra: float) -> float:
         if track.id >= 0:
-            return worth(b) + extra
+            return log_odds(b) + extra
         return float(np.logaddexp(0, b.score + extra)) - b.n_taken * over
 
     def ways(t: int, n_open: int, track: Branch):
         best: dict[int, Branch] = {}
         weight: dict[int, float] = {}
-        top = max(map(worth, track.branches))
+        top = max(map(log_odds, track.branches))
         for b in track.branches:
             j = b.path[t]
             best.setdefault(j, b)
             extra = crowding(t, track.key, j) if j >= 0 else 0.0
-            weight[j] = weight.get(j, 0.0) + math.exp(worth(b) - top + extra)
+            weight[j] = weight.get(j, 0.0) + math.exp(log_odds(b) - top + extra)
         weight.setdefault(-1, math.exp(-o.drop))
         missed = top - o.drop
         if -1 in best:
@@ -169,7 +169,7 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
         return best, weight, missed, new, scaled
 
     def newborn(t: int, n_open: int, track: Branch, b: Branch) -> float:
-        """What a way is worth to a marker that begins there, the track being gone."""
+        """Log odds of a new marker that takes a branch over, the track having ended."""
         if track.id < 0:
             return -math.inf
         j = b.path[t]
@@ -205,13 +205,13 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
         match: dict[int, int] = {}
         found = {i: ways(t, 1 + len(later), track) for i, track in enumerate(tracks)}
         sure: dict[int, np.ndarray] = {}
-        for believed in (True, False):
-            own = [i for i, track in enumerate(tracks) if (track.id >= 0) == believed]
+        for is_confirmed in (True, False):
+            own = [i for i, track in enumerate(tracks) if (track.id >= 0) == is_confirmed]
             sure |= probabilities(t, own, found, taken)
             gains = np.full((len(tracks), len(points)), -np.inf)
             squares = np.full(gains.shape, np.inf)
             for i, track in enumerate(tracks):
-                if (track.id >= 0) != believed:
+                if (track.id >= 0) != is_confirmed:
                     continue
                 best, _, missed, new, _ = found[i]
                 for j, b in best.items():
@@ -235,7 +235,7 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
             track.predict(step_to(t))
             if own >= 0:
                 y = points[own]
-                track.chi2 = o.fading * track.chi2 + track.surprise(y)
+                track.chi2 = o.fading * track.chi2 + track.nis(y)
                 track.updates += 1
                 track.score += hit(track.gap) + math.log(track.densities(y).sum())
                 track.update(y)

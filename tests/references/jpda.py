@@ -1,4 +1,4 @@
-"""Joint probabilistic data association as one would write it on a blackboard: every event listed.
+"""Reference implementation of joint probabilistic data association: every event listed.
 
 Beside the life of a track (frame_by_frame.OneTrack) it shares nothing with the engine but the
 definitions.
@@ -167,11 +167,11 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
                 y = points[j]
                 if track.within(y, gate):
                     weights[i, j] = r * p_seen[i] * track.densities(y).sum() / density
-        believed = np.array([track.id >= 0 for track in tracks], dtype=bool)
+        confirmed = np.array([track.id >= 0 for track in tracks], dtype=bool)
         free, taken = np.ones(m), np.zeros(m, dtype=bool)
         beta, match = np.zeros((n, m + 1)), np.full(n, -1)
         beta[:, m] = 1
-        for own in (believed, ~believed):
+        for own in (confirmed, ~confirmed):
             open_to = np.where(own[:, None] & ~taken, weights * free, 0)
             open_to[open_to <= math.exp(-20.7) * missed[:, None]] = 0
             for rows in components(open_to):
@@ -183,7 +183,7 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
                 match[rows] = best
                 is_guarded = method.guard and len(rows) > 1
                 moved = best_permutations(some, none) if is_guarded else found
-                if not believed[rows[0]]:
+                if not confirmed[rows[0]]:
                     # The best event; each as sure as it is if the others have their part of it.
                     for k in range(len(rows)):
                         rest = some[k] * ~np.isin(np.arange(m), np.delete(best, k))

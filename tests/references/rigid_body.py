@@ -1,4 +1,4 @@
-"""Carried places as one would write them on a blackboard: all frames kept, an SVD, whole matrices.
+"""Reference implementation of rigid prediction: all frames kept, an SVD, whole matrices.
 
 It shares nothing with the engine but the definitions. Every marker must have been seen in the first
 frame, and there be no more than twelve, so that each is everybody's neighbour.
@@ -122,7 +122,7 @@ class BodyByHand:
         return at, r + variance, len(own)
 
     def carry(self, marker: int, markers, points):
-        """Place and variance of a hidden marker, and how many carry it; or None."""
+        """Place and variance of an occluded marker, and how many carry it; or None."""
         now = dict(zip(map(int, markers), np.asarray(points), strict=True))
         last = max(t for t, frame in enumerate(self.frames) if marker in frame)
         trust = self.trust(marker)

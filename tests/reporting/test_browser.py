@@ -36,7 +36,7 @@ def box(page, selector):
     )
 
 
-def test_asks_nobody_and_complains_of_nothing(browser, person):
+def test_the_page_loads_nothing_and_logs_no_error(browser, person):
     page = browser.page(person[0])
     for key in (" ", "ArrowRight", "n", "l", "f", "d", "w", "+", "0"):
         page.key(key)

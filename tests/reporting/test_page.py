@@ -207,7 +207,7 @@ def test_a_jump_is_found_once_and_nothing_else():
     assert find_troubles(tracks_of(straight())) == []
 
 
-def test_gaps_ends_and_doubts_are_found_with_their_reasons():
+def test_gaps_ends_and_ambiguous_links_are_found_with_their_reasons():
     places = straight()
     places[50:80, 0] = np.nan
     places[:120, 1] = np.nan

@@ -79,7 +79,7 @@ def test_a_marker_half_behind_an_edge_moves_its_centroid():
     assert unseen.blob_of[0, 0, 0] == -1
 
 
-def test_a_marker_on_a_surface_is_not_hidden_by_it():
+def test_a_marker_on_a_surface_is_not_occluded_by_it():
     floor = Polygon(corners=[[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]])
     K = intrinsics(focal_length=900.0, principal_point=(639.5, 511.5))
     rig = Rig((Camera.look_at((0, -4, 2), (0, 0, 0), K=K, size_px=(1280, 1024)),))
@@ -174,7 +174,7 @@ def test_a_late_camera_sees_where_the_markers_will_be():
     assert late[:, 0].std() == pytest.approx(0.004, rel=0.4)
 
 
-def test_hidden_markers_by_the_scenes_own_surfaces():
+def test_markers_are_occluded_by_the_scenes_own_surfaces():
     wall = Polygon(corners=[[-9, -1, -9], [9, -1, -9], [9, -1, 9], [-9, -1, 9]])
     truth = Truth(**vars(still([0, 0, 0], frames=3)) | {"surfaces": (wall,)})
     assert (film(truth, one_camera()).projection.reason == Reason.HIDDEN).all()

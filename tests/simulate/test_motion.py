@@ -137,7 +137,7 @@ def test_people_jump_as_high_as_people_do(seed):
 
 @pytest.mark.parametrize(("activity", "limit"), [("walk", 6.5), ("run", 9), ("jump", 11)])
 @pytest.mark.parametrize("seed", range(4))
-def test_nobody_is_faster_than_people_are(activity, limit, seed):
+def test_no_marker_is_faster_than_people_are(activity, limit, seed):
     assert fastest(person(activity=activity, frames=400, seed=seed), 100.0, 1) < limit
 
 

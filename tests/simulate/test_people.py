@@ -80,7 +80,7 @@ def test_same_seed_same_bytes_and_another_seed_another_scene(name):
 
 @EVERY
 @pytest.mark.parametrize("wrong", [{"frames": 0}, {"frames": 2.5}, {"rate": 0}, {"seed": -1}])
-def test_what_makes_no_clip_is_refused(name, wrong):
+def test_what_makes_no_capture_is_refused(name, wrong):
     with pytest.raises(ParameterError, match=next(iter(wrong))):
         SCENES[name](**wrong)
 

@@ -114,7 +114,7 @@ def test_the_engine_refuses_what_would_corrupt_memory():
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_no_packing_is_worth_more_than_the_bound_less_any_of_its_losses(seed):
+def test_no_packing_gains_more_than_the_bound_less_any_of_its_losses(seed):
     rng = np.random.default_rng(500 + seed)
     gaps = []
     for _ in range(60):

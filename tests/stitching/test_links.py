@@ -30,7 +30,7 @@ def test_what_comes_up_too_late_to_be_decided_upon_is_a_ghost(first, marker):
 
 
 @pytest.mark.parametrize("frames", [1, 14, 15])
-def test_what_is_there_from_the_start_of_a_short_take_is_no_ghost(frames):
+def test_what_is_there_from_the_start_of_a_short_capture_is_no_ghost(frames):
     assert one_pass(scene(frames=frames)).marker == list(range(8))
 
 
@@ -86,7 +86,7 @@ def test_a_link_is_not_cut_where_the_steady_know_it():
     assert one_pass(dense).n_cuts == 0
 
 
-def test_a_marker_hidden_for_longer_than_it_may_be_is_forgotten():
+def test_a_marker_occluded_for_too_long_is_forgotten():
     dense = scene((0, 60, PLACE), (200, 299, PLACE))
     # It must still be known when its fragment is decided upon.
     assert one_pass(dense, max_hidden=153).marker[9] == 8
@@ -105,7 +105,7 @@ def test_where_there_is_no_body_a_marker_goes_on_as_it_moved():
     assert one_pass(dense).marker == [0, 1]
 
 
-def test_a_backward_pass_is_a_forward_one_through_the_take_reversed():
+def test_a_backward_pass_is_a_forward_one_through_the_capture_reversed():
     truth = am.simulate.corrupt(am.simulate.person(seed=1), burst=am.simulate.Burst(), seed=1)
     d = truth.detections
     inside = d.frame_of < 120
@@ -165,7 +165,7 @@ def stream(dense, *, lag=2, confirm=15, revise=None, labels=None):
     return np.array(final), told
 
 
-def test_what_was_not_known_is_told_when_it_is():
+def test_a_label_is_revised_once_it_is_known():
     dense = np.zeros((40, 1, 3))
     final, told = stream(dense)
     assert (final[:38] == 0).all()
@@ -174,7 +174,7 @@ def test_what_was_not_known_is_told_when_it_is():
     assert told[16] == [(k, 0) for k in range(16)]
 
 
-def test_what_is_decided_late_is_told_from_its_first_frame():
+def test_a_late_decision_is_revised_from_its_first_frame():
     dense = np.zeros((60, 1, 3))
     dense[14:17] = np.nan  # seen again in the last frame in which it may be, and then decided
     final, _ = stream(dense[:20])

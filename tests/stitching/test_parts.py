@@ -85,7 +85,7 @@ def test_neighbours_in_one_line_do_not_turn_a_marker_about_it():
     assert variance < 0.01**2
 
 
-def test_few_neighbours_are_believed_less():
+def test_few_neighbours_have_less_weight():
     a, there = np.eye(3)[[0, 1, 2, 2]] * [[1.0], [1], [1], [-1]], np.zeros((1, 3))
 
     def variance(n, then=there):
@@ -143,7 +143,7 @@ def carried_density(dense, then, now, y):
 
 
 def test_the_probability_is_that_of_body_and_elsewhere():
-    # Hidden too long for its motion to be believed: 8 goes away, 9 comes back.
+    # Occluded for too long to be predicted by its motion: 8 goes away, 9 comes back.
     dense = scene((0, 60, PLACE), (200, 299, PLACE))
     found = one_pass(dense)
     assert (found.marker[9], found.after[9]) == (8, 8)
@@ -179,7 +179,7 @@ def test_the_log_odds_of_a_body_are_those_of_its_steadiest_neighbours(seed):
 
 
 @pytest.mark.parametrize("weight", [-2.0, 1.0, 5.0])
-def test_advice_is_worth_its_weight_and_half_of_it_against_others(weight):
+def test_advice_has_its_weight_and_half_of_it_against_others(weight):
     dense = scene((0, 60, PLACE), (200, 299, PLACE))
     without = one_pass(dense).logit(9)
     advised = one_pass(dense, advice=[(9, 8, weight)])
@@ -238,7 +238,7 @@ def test_rivals_share_the_probability():
     assert found.probability[11] > 0.9  # one is left
 
 
-def test_a_marker_is_seen_again_before_it_is_hidden_again():
+def test_a_marker_is_seen_again_before_its_next_occlusion():
     other = PLACE + np.array([0, 0.3, 0])
     dense = scene(
         (0, 60, PLACE), (100, 130, PLACE), (132, 150, PLACE), (180, 299, PLACE), (240, 299, other)

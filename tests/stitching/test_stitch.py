@@ -85,7 +85,7 @@ def test_too_few_pairs_are_moved_and_not_turned(n):
         *((am.MCMCDA(confidence=0), seed) for seed in range(2)),
     ],
 )
-def test_hidden_markers_of_a_person_are_found_again(method, seed):
+def test_occluded_markers_of_a_person_are_found_again(method, seed):
     truth, model, found = person(seed)
     lost = am.evaluate(am.track(truth.detections, method, model=model, seed=1), truth)
     if method != am.SMP(window=3):
@@ -146,14 +146,14 @@ def test_it_does_no_harm(scene, noise):
     assert np.mean(joined) > np.mean(plain) - 0.001
 
 
-def test_where_neighbours_carry_nobody_motion_decides():
+def test_where_neighbours_predict_no_marker_motion_decides():
     found: list[float] = []
     for seed in range(4):
         made = am.simulate.smooth(seed=seed)
         hidden = Burst(n=4, shortest=5, longest=12)
         truth = am.simulate.corrupt(made, burst=hidden, noise=0.005, seed=seed)
         found.append(am.evaluate(stitched(truth.detections).tracks, truth).idf1)
-    assert np.mean(found) > 0.99  # 0.987 where the bodies are always believed
+    assert np.mean(found) > 0.99  # 0.987 where the bodies always decide
 
 
 def test_a_link_that_the_neighbours_contradict_is_cut():
@@ -171,7 +171,7 @@ def test_a_link_that_the_neighbours_contradict_is_cut():
     assert e.n_tracks == truth.n_tracks
 
 
-def test_whoever_cuts_nothing_and_hides_nothing_changes_nothing():
+def test_a_true_partition_without_gaps_is_hardly_changed():
     truth = am.simulate.corrupt(PERSON(seed=3), noise=3e-4, seed=3)
     model = am.estimate_model(truth.detections).model
     found = am.stitch(truth, model)

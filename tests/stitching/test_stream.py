@@ -56,7 +56,7 @@ def streamed_person(seed):
         *((am.MCMCDA(confidence=0), seed) for seed in range(2)),
     ],
 )
-def test_a_stream_is_as_good_as_the_whole_take(method, seed):
+def test_a_stream_is_as_good_as_the_whole_capture(method, seed):
     truth, model = disturbed(seed)
     d = truth.detections
     whole = am.evaluate(stitched(d, method, model=model, seed=1).tracks, truth)

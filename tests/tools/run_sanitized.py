@@ -39,20 +39,19 @@ TESTS = (
     "engine/test_sweep.py",
 )
 LEFT_OUT = (
-    "many_points or blackboard or partitions or beside_birth or unequal_shares or "
+    "many_points or reference_implementation or partitions or beside_birth or unequal_shares or "
     "several_motions or known_mistakes or changed_lens or stable_and_best or exact_solver or "
     "best_of_all_choices or too_many_rivals or used_twice or eight_cameras or harm[1e-310 or "
     "clusters_apart or share_of_the_posterior or no_worse or window_s_best or "
-    "identities_where_markers_hide or value_that_is_told or guessed_soon or "
-    "as_good_as_the_whole or endless_run or calibrated_where or interrupted or "
-    "too_long_to_be_read or blurred_helps or chains_disagree or model_from_the_clip or "
+    "guessed_soon or as_good_as_the_whole or endless_run or calibrated_where or interrupted or "
+    "too_long_to_be_read or blurred_helps or chains_disagree or model_of_a_capture or "
     "wrong_links or deadline_stops or keep_their_distances or no_harm_where or "
-    "of_a_person_come_back or carrying_ends or settled_tracks or hand[0.004 or "
+    "of_a_person_come_back or carrying_ends or hand[0.004 or "
     "without_noise[1 or without_noise[2 or without_noise[3 or without_noise[4 or without_noise[5"
 )
-"""Too slow (a blackboard is Python, a posterior is sampled for millions of moves, numbers below the
-normal range take a hundred cycles each), more seeds of what stays, or measuring memory or time,
-which the sanitizers inflate."""
+"""Too slow (a reference implementation is Python, a posterior is sampled for millions of moves,
+numbers below the normal range take a hundred cycles each), more seeds of what stays, or measuring
+memory or time, which the sanitizers inflate."""
 
 PLUGIN = """
 import sys

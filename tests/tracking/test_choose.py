@@ -50,7 +50,7 @@ def clip(name):
 
 
 @pytest.mark.parametrize("name", CLIPS)
-def test_the_clip_chooses_and_says_why(name):
+def test_the_method_is_chosen_by_the_capture_with_a_reason(name):
     _, method, stitch, why = CLIPS[name]
     truth, model = clip(name)
     choice = am.tracking.choose_method(truth.detections, model)
@@ -101,7 +101,7 @@ def test_partners_are_counted_by_distances_alone():
     assert partners(am.Tracks.from_dense(times, noisy), 1e-5) == (0, 2)
 
 
-def test_many_markers_in_a_short_clip_are_no_bodies():
+def test_many_markers_in_a_short_capture_are_no_segments():
     # Of some ten thousand pairs, over a second, many keep their distance by chance.
     moving = am.simulate.smooth(n_markers=200, frames=24, seed=1)
     truth = am.simulate.corrupt(moving, missing=0.1, clutter=0.1, noise=0.005, seed=1)
@@ -119,7 +119,7 @@ def test_the_first_detections_of_tracks_hide_no_rivals(frames):
     assert 2 < float(choice.reason.split()[0]) < 5
 
 
-def test_clips_of_nothing_and_of_one_point():
+def test_captures_of_nothing_and_of_one_point():
     model = am.estimate_model(am.simulate.cube(seed=1).detections).model
     for frames in ([np.empty((0, 3))] * 3, [np.zeros((1, 3))] * 3):
         d = am.Detections.from_frames(np.arange(3.0), frames)
@@ -168,7 +168,7 @@ def test_the_command_line_says_why_and_a_repeat_does_not_choose_again(person, ca
         assert (person / "first" / name).read_bytes() == (person / "second" / name).read_bytes()
 
 
-def test_json_tells_the_choice_and_auto_may_be_named(person, capsys):
+def test_json_holds_the_choice_and_auto_may_be_named(person, capsys):
     assert main(["track", "p.csv", "-o", "a.csv", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert "bodies" in told["chosen"]

@@ -115,7 +115,7 @@ def test_more_than_255_points(load):
     ["*0", "*183", "", "Unlabeled 7", "Unlabeled_7", "unlabelled12", "U_1034", "0001", "New 0001",
      "uname3", "uname*3", "Ann:Unlabeled 3"],
 )  # fmt: skip
-def test_names_of_nobody(name):
+def test_names_without_a_marker(name):
     assert is_unlabelled(name)
 
 
