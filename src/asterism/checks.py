@@ -27,7 +27,7 @@ __all__ = [
     "keep_array",
 ]
 
-_MAX_LISTED = 20  # known names in a message
+_MAX_LISTED = 25  # known names in a message
 
 
 def check_number(
@@ -295,11 +295,16 @@ def check_fields(name: str, given: Iterable[str], known: Iterable[str]) -> None:
 
 
 def _nearest(name: str, known: list[str]) -> str:
-    """Return the known name that was probably meant; "" if none comes near.
+    """Return the known name that was probably meant, or "" if none is similar.
 
-    A whole name that is near goes before one of whose words one is: gat means gate.probability.
+    The first name that begins with the text goes before a similar name ("fil" means fill, not
+    film), and that before a name with a similar word.
     """
     import difflib
+
+    begun = [k for k in known if name and k.lower().startswith(name.lower())]
+    if begun:
+        return begun[0]
 
     folded = {k.lower(): k for k in known}
     words: dict[str, str] = {}

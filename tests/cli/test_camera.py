@@ -121,7 +121,7 @@ def test_convert_with_a_lens_of_ones_choice(run):
         assert code == 0
         rig = read_rig(f"{name}.toml")
         assert {type(c.lens) for c in rig} == {kind}
-        assert "as it is" in out if name != "none" else "as it is" not in out
+        assert "not fitted" in out if name != "none" else "not fitted" not in out
     rms = {}
     for name in ("brown", "none"):
         _, out, _ = run("convert", "a.toml", f"{name}2.toml", "--lens", name, "--json")

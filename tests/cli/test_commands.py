@@ -114,7 +114,7 @@ def test_the_model_file_gives_what_the_estimate_gave(scene, capsys):
 def test_a_run_is_only_repeated_with_its_input(scene, capsys):
     run("track in.csv --model model.toml --run first", capsys)
     (scene / "in.csv").rename("moved.csv")
-    assert "Say where it is now" in refused("track --from first/run.toml", capsys)
+    assert "Give its new path" in refused("track --from first/run.toml", capsys)
     run("track moved.csv --from first/run.toml -o again.csv", capsys)
     assert (scene / "again.csv").read_bytes() == (scene / "first/in.tracked.csv").read_bytes()
     text = (scene / "moved.csv").read_text()
@@ -351,5 +351,5 @@ def test_corrupt_reports_markers_apart_from_unnamed_points(tmp_path, monkeypatch
     text = run(f"{line} --missing 0.5 --overwrite", capsys)
     n_dropped = 6 * 50 - am.io.read_tracks("t.csv").detections.n_points
     assert 100 < n_dropped < 200
-    assert re.search(rf"detections of markers dropped +{n_dropped} *\n", text)
+    assert re.search(rf"missed detections +{n_dropped} *\n", text)
     assert re.search(r"unnamed points left out +100 *\n", text)

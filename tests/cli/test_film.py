@@ -49,7 +49,7 @@ NARROW = am.Rig.ring(4, radius=2, height=1, target=(0.3, 0, 0), focal_px=4000)
 
 
 def test_piece_by_piece_is_the_same_as_at_once(gappy, monkeypatch):
-    monkeypatch.setattr("asterism.cli.filming._MOST_FRAMES", 7)
+    monkeypatch.setattr("asterism.cli.filming._MAX_FRAMES", 7)
     done = []
     footage = film_all(gappy, NARROW, done.append)
     whole = am.simulate.film(gappy, NARROW)
@@ -179,7 +179,7 @@ def test_a_capture_is_filmed_with_its_own_frame_numbers_and_names(here, gappy, c
     out, err = capsys.readouterr()
     assert "16 tracks, 15 of them named, 60 frames" in out
     n_clutter = (gappy.labels < 0).sum()
-    assert f"{n_clutter} points that are in no track are not filmed" in err
+    assert f"{n_clutter} points without a track are not filmed" in err
     assert [p.name for p in Path("out/pictures").iterdir()] == ["frame_000130.png"]
     seen = read_observations("out/observations.csv")
     assert seen.n_frames == 60
@@ -195,7 +195,7 @@ def test_cameras_of_another_world_are_told_of(here, capsys):
     assert main(shlex.split("film in.csv --rig far.toml -o out --pictures 0 -q")) == 0
     out, err = capsys.readouterr()
     assert out == ""
-    assert "only 0 % of the points are seen by any camera" in err
+    assert "only 0 % of the points are seen by a camera" in err
     assert "units and axes" in err
 
 

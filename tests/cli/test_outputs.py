@@ -145,7 +145,7 @@ def test_permission_is_looked_at_first(here, idle, capsys, monkeypatch, name):
         lambda path, mode: Path(path).name != "locked" and allowed(path, mode),
     )  # fmt: skip
     err = refused(line.replace("OUT", f"locked/new{ending}"), capsys)
-    assert "no permission to write in" in err
+    assert "without permission to write in" in err
 
 
 @pytest.mark.parametrize("name", [n for n in FILES if n not in ("evaluate", "camera convert")])

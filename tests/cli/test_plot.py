@@ -138,7 +138,7 @@ def test_help_lists_every_kind(capsys, monkeypatch):
         ("projections truth.csv", "--rig: expected"),
         ("confidence truth.csv", "tracks with a confidence"),
         ("reliability run truth.csv --truth truth.csv", "truth.csv, which has none"),
-        ("presence truth.csv --truth truth.csv", "takes it: errors, reliability, compare"),
+        ("presence truth.csv --truth truth.csv", "uses it: errors, reliability, compare"),
         ("presence truth.csv in.csv", "one file for presence"),
         ("presence truth.csv -o a.jpg", "a name ending in .pdf, .svg or .png"),
         ("presence truth.csv -o a", "a name ending in .pdf, .svg or .png"),
@@ -166,9 +166,7 @@ def test_what_plot_refuses(work, capsys, line, message):
 
 def test_a_folder_that_is_no_run(work, capsys):
     (work / "run/summary.json").write_text("{}")
-    assert "expected a finished run, found no word of its output" in refused(
-        "plot presence run", capsys
-    )
+    assert "expected a finished run, found no field output" in refused("plot presence run", capsys)
 
 
 def test_an_input_is_not_overwritten(work, capsys):

@@ -69,7 +69,7 @@ def test_info_says_what_can_be_said_of_points_without_names(tmp_path, capsys):
     write_c3d(tmp_path / "unlabelled.c3d", points, labels=["*0", "*1", "", "U_7"])
     out, _ = printed("info unlabelled.c3d", capsys)
     lines = {line[:17].strip(): line[17:].strip() for line in out.splitlines()}
-    assert lines["without a name"] == "4 channels in 4 pieces"
+    assert lines["unnamed"] == "4 channels in 4 tracklets"
     assert lines["step"].startswith("median ")
     assert lines["step to nearest"] == lines["step"]  # the points are far apart
     assert "another piece of a trajectory" in lines["difficulty"]
@@ -81,15 +81,15 @@ def test_info_says_what_can_be_said_of_points_without_names(tmp_path, capsys):
             am.write(am.read("c.csv").tracks, name)
         out, _ = printed(f"info {name}", capsys)
         lines = {line[:17].strip(): line[17:].strip() for line in out.splitlines()}
-        assert lines["without a name"] == "120 of 120 points belong to no track"
-        assert lines["points a frame"] == "4 to 4, 4 on average"
+        assert lines["unnamed"] == "120 of 120 points without a track"
+        assert lines["points per frame"] == "4 to 4, 4 on average"
         assert "step" not in lines
         assert float(lines["step to nearest"].split()[1].rstrip(",")) > 0
         assert "inf" not in out
         assert "–" not in out
     (tmp_path / "one.csv").write_text("frame,time_s,x_m,y_m,z_m\n1,0,1,2,3\n2,0.01,1,2,3\n")
     out, _ = printed("info one.csv", capsys)
-    assert "none: a frame has one at most" in out
+    assert "none: at most one point per frame" in out
     assert "–" not in out
     told = json.loads(printed("info one.csv --json", capsys)[0])
     assert (told["n_points"], told["nearest_step_99"], told["spacing_50"]) == (2, 0, None)

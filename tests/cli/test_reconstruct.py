@@ -61,7 +61,7 @@ def test_what_is_refused_leaves_no_file(film, tmp_path, capsys):
         ([str(obs), "--rig", str(fewer), "-o", str(out)], "no cam4"),
         ([str(tmp_path / "none.csv"), "--rig", str(rig), "-o", str(out)], "none.csv"),
         ([str(obs), "--rig", str(tmp_path / "none.toml"), "-o", str(out)], "none.toml"),
-        ([str(obs), "--rig", str(rig), "-o", str(obs)], "a place of its own"),
+        ([str(obs), "--rig", str(rig), "-o", str(obs)], "a path of its own"),
         ([str(obs), "--rig", str(rig), "-o", str(tmp_path / "p.xyz")], "--out: expected a name"),
         ([str(obs), "--rig", str(rig), "-o", str(out), "--min-views", "9"], "--min-views"),
         ([str(obs), "--rig", str(rig), "-o", str(out), "--sigma", "-1"], "--sigma"),
@@ -94,7 +94,7 @@ def test_the_whole_chain(tmp_path, capsys):
     assert main([*arguments[:-3], "--overwrite", "-o", str(tmp_path / "chain")]) == 0
     assert "Identity" in capsys.readouterr().out
     assert main(["chain", "person", "--rig", "ring6", "--frames", "30"]) == 0
-    assert "chosen  smp, window=3, then stitched" in capsys.readouterr().out
+    assert "auto  smp, window=3, then stitched" in capsys.readouterr().out
     assert main(["chain", "person", "--method", "nobody"]) == 2
 
 

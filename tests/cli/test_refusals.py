@@ -68,7 +68,7 @@ def test_no_input_is_written_to(scene, capsys):
         ("track in.csv --model in.csv", "in.csv: the file: expected TOML"),
         ("track --from nowhere.toml", "nowhere.toml"),
         ("track --from in.csv", "expected TOML"),
-        ("track in.csv --option lifecycle.delete_odds=5", "Name the method"),
+        ("track in.csv --option lifecycle.delete_odds=5", "Give the method"),
         ("track in.csv --methd gnn", "Did you mean '--method'?"),
         ("trak in.csv", "Did you mean 'track'?"),
         ("corrupt in.csv -o a.csv --truth t.csv", "has no labels"),
@@ -124,7 +124,7 @@ def test_only_mcmcda_starts_from_tracks(scene, capsys, monkeypatch):
     monkeypatch.setattr("asterism.estimate_model", never)  # told before the work
     assert main(["track", "truth.csv", "-o", "out.csv", "--method", "gnn", "--start"]) == 2
     told = capsys.readouterr().err
-    assert "--start: expected --method mcmcda beside it, or none, found --method gnn" in told
+    assert "--start: expected --method mcmcda, or no --method, found --method gnn" in told
 
 
 def test_the_common_options_are_everywhere():
@@ -179,4 +179,4 @@ def test_noise_in_millimetres_is_doubted(scene, capsys):
             main(f"corrupt scene.csv -o a.csv --truth t.csv --noise {noise} -q --overwrite".split())
             == 0
         )
-        assert ("the markers are within" in capsys.readouterr().err) == doubts
+        assert ("the markers span only" in capsys.readouterr().err) == doubts

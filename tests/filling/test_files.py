@@ -117,7 +117,7 @@ def test_the_command_fills_and_says_what(made, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(made[0])
     out = tmp_path / "out.csv"
     text = run(f"fill in.c3d -o {out} --model model.toml", capsys)
-    for word in ("gaps", "filled", "mostly by", "least sure", "mm", "written"):
+    for word in ("gaps", "filled", "main estimator", "least certain", "mm", "written"):
         assert word in text
     d, expected = am.read(out), made[1]
     assert d.filled.sum() == expected.tracks.detections.filled.sum()
@@ -137,7 +137,7 @@ def test_the_command_refuses_in_one_line(made, tmp_path, monkeypatch, capsys):
     before = sorted(path.name for path in made[0].iterdir())
     for line, says in (
         ("fill nowhere.c3d -o a.c3d", "nowhere.c3d: no such file"),
-        ("fill in.c3d -o in.c3d", "a place of its own"),
+        ("fill in.c3d -o in.c3d", "a path of its own"),
         ("fill in.c3d -o a.trc", "--unflagged"),
         ("fill in.c3d -o a.xyz", "a name ending in"),
         ("fill in.c3d -o a.c3d --longest 0", "--longest"),

@@ -1,4 +1,4 @@
-"""The command line: a thin face over the library, and the only place that prints and exits."""
+"""Command line of the library. No other package prints or ends the process."""
 
 from __future__ import annotations
 
@@ -11,19 +11,25 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``asterism`` and give its exit code.
+    """Run the command line ``asterism`` and return its exit code.
 
     Parameters
     ----------
     arguments : sequence of str, optional
-        What follows the name of the program; those of the process unless given.
+        Arguments after the name of the program. The default is those of the process.
 
     Returns
     -------
     int
-        0 after success, 2 where the user can mend what went wrong, 1 where memory ran out, 130 and
-        143 when stopped by SIGINT and SIGTERM, 141 when nobody reads the output any more. A fault
-        of the program itself is not caught: Python prints it and exits with 1.
+        0 after success, 2 after an error that the user can correct, 1 after a failed check or
+        without enough memory, 130 and 143 after SIGINT and SIGTERM, 141 if the reader of the output
+        has closed the pipe. Python prints other exceptions and exits with 1.
+
+    Examples
+    --------
+    >>> main(["--version"])
+    asterism 0.1.0
+    0
     """
     from asterism.cli.exit_codes import exit_code
 

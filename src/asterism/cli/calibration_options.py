@@ -16,15 +16,17 @@ CalibrationFile = Annotated[
     Path, typer.Argument(metavar="CALIB", help="Calibration: a file or a folder.")
 ]
 FromFormat = Annotated[
-    str | None, typer.Option("--from", metavar="FORMAT", help="Format, if it cannot be told.")
+    str | None,
+    typer.Option("--from", metavar="FORMAT", help="Format of CALIB.", show_default="detected"),
 ]
 LengthUnits = Annotated[
-    str | None, typer.Option(metavar="mm|cm|m", help="Unit of length, if the files do not say it.")
+    str | None,
+    typer.Option(metavar="mm|cm|m", help="Unit of length of CALIB.", show_default="from the files"),
 ]
 
 
 def read_calibration(path: Path, from_format: str | None, units: str | None) -> am.Rig:
-    """Read a calibration by these options."""
+    """Read a calibration in the format and the unit of the options."""
     from asterism.cli.options import as_options
     from asterism.io.calibrations import read_rig
 

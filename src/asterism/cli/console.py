@@ -1,4 +1,4 @@
-"""Printing: results go to stdout, news and progress to stderr."""
+"""Printing: results go to stdout, log messages and progress to stderr."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ __all__ = [
     "to_json",
 ]
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that exist.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only warnings and errors.")]
 
-_PIPED_WIDTH = 200  # columns where there is no terminal to ask, so that lines stay whole
+_PIPED_WIDTH = 200  # columns without a terminal, so that most lines are not wrapped
 
 
 def console(*, stderr: bool = False) -> Console:
-    """Give the console for results, or for news with ``stderr=True``."""
+    """Return the console for results, or for log messages with ``stderr=True``."""
     from rich.console import Console
 
     class PipeConsole(Console):
@@ -53,7 +53,7 @@ def console(*, stderr: bool = False) -> Console:
 def print_table(
     rows: Iterable[Sequence[object]], header: Sequence[str] = (), *, title: str = ""
 ) -> None:
-    """Print rows of cells as a table without lines; markup in the cells is not looked at."""
+    """Print rows of cells as a table without lines; cells are printed without markup."""
     from rich.table import Table
     from rich.text import Text
 
@@ -68,13 +68,13 @@ def print_table(
         screen.print(Text(title, style="bold"))
     with screen.capture() as printed:
         screen.print(table)
-    # The last column is as wide as its longest cell; a file needs no blanks that fill it.
+    # Rich pads the last column to its longest cell; those blanks are of no use in a file.
     lines = (line.rstrip() for line in printed.get().splitlines())
     screen.out("\n".join(lines), highlight=False)
 
 
 def to_json(value: Mapping[str, Any]) -> str:
-    """Give plain values as JSON text; NaN and infinities, which JSON does not know, become null."""
+    """Return plain values as JSON text; NaN and infinities, which JSON lacks, become null."""
     return json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False)
 
 
@@ -97,19 +97,19 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def progress(what: str, total: int | None = None) -> Generator[Callable[[int], None], None, None]:
-    """Show a bar on stderr while the block runs, if stderr is a terminal.
+    """Show a progress bar on stderr while the block runs, if stderr is a terminal.
 
     Parameters
     ----------
     what : str
-        What is being done.
+        Name of the step.
     total : int, optional
-        Steps there are; a bar that only moves where that is not known.
+        Number of steps. Without it the bar shows only that the step runs.
 
     Yields
     ------
     callable
-        To be told how many steps are done.
+        Function of the number of finished steps.
     """
     from rich.progress import Progress
 

@@ -1,4 +1,4 @@
-"""How a command may end: each reason has one line on stderr and one exit code."""
+"""Ends of a command: one line on stderr and one exit code for each reason."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 __all__ = ["BROKEN_PIPE", "exit_code"]
 
-FAILURE, MENDABLE, BROKEN_PIPE = 1, 2, 128 + 13
+FAILURE, USER_ERROR, BROKEN_PIPE = 1, 2, 128 + 13
 
 log = logging.getLogger(__name__)
 
 
 class Stopped(BaseException):
-    """The process was asked to stop; whatever is half done is taken back on the way out."""
+    """A signal stops the process; unfinished files are removed on the way out."""
 
     def __init__(self, signum: int) -> None:
         super().__init__(signum)
@@ -33,12 +33,12 @@ class Stopped(BaseException):
 
 
 def exit_code(run: Callable[[], None]) -> int:
-    """Run a command and say how it ended.
+    """Run a command and return its exit code.
 
     Parameters
     ----------
     run : callable
-        The command; may end by `SystemExit`.
+        The command. It may raise `SystemExit`.
 
     Returns
     -------
@@ -46,10 +46,10 @@ def exit_code(run: Callable[[], None]) -> int:
         The exit code, see `asterism.cli.main`.
     """
     for stream in (sys.stdout, sys.stderr):
-        # A name or a σ that the terminal cannot show must not end the program.
+        # A character that the terminal cannot show must not raise an error.
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    with _news():
+    with _log_messages():
         return _guarded(run)
 
 
@@ -61,29 +61,28 @@ def _guarded(run: Callable[[], None]) -> int:
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else FAILURE if end.code else 0
     except Stopped as stop:
-        return _say(f"stopped by {signal.Signals(stop.signum).name}", 128 + stop.signum)
+        return _fail(f"stopped by {signal.Signals(stop.signum).name}", 128 + stop.signum)
     except AsterismError as error:
-        return _say(str(error), MENDABLE)
+        return _fail(str(error), USER_ERROR)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        return _say(f"{where}{error.strerror or error}", MENDABLE)
+        return _fail(f"{where}{error.strerror or error}", USER_ERROR)
     except MemoryError:
-        hint = "track a shorter piece of the capture, or a part of its frames"
-        return _say(f"the memory is too small for this ({hint})", FAILURE)
+        return _fail("not enough memory. Use fewer frames of the capture.", FAILURE)
     return 0
 
 
-def _say(message: str, code: int) -> int:
+def _fail(message: str, code: int) -> int:
     log.error(message)
     return code
 
 
 @contextmanager
-def _news() -> Generator[None, None, None]:
-    """Let warnings and errors of the library appear on stderr, a line each."""
+def _log_messages() -> Generator[None, None, None]:
+    """Print warnings and errors of the library on stderr, one line each."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setLevel(logging.WARNING)
     handler.setFormatter(logging.Formatter("asterism: %(message)s"))
@@ -97,7 +96,7 @@ def _news() -> Generator[None, None, None]:
 
 @contextmanager
 def _stopping() -> Generator[None, None, None]:
-    """Turn SIGINT and SIGTERM into `Stopped`, once: a second one does not disturb the tidying."""
+    """Raise `Stopped` at the first SIGINT or SIGTERM, and ignore later ones during the cleanup."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -108,8 +107,8 @@ def _stopping() -> Generator[None, None, None]:
         raise Stopped(signum)
 
     def again(lost: sys.UnraisableHookArgs) -> None:
-        # The signal came while Python ran a finaliser or a weak reference's callback, which
-        # cannot be left by an exception: it comes once more, when that is over.
+        # The signal arrived during a finaliser or the callback of a weak reference, where Python
+        # discards exceptions. It is sent again after the finaliser.
         if not isinstance(lost.exc_value, Stopped):
             hook(lost)
             return
@@ -117,13 +116,13 @@ def _stopping() -> Generator[None, None, None]:
             signal.signal(number, stop)
         threading.Timer(0.01, _thread.interrupt_main, [lost.exc_value.signum]).start()
 
-    # Who started us with a signal ignored (nohup, a shell's background job) wants it ignored.
+    # A signal that the parent process ignores (nohup, a background job) stays ignored.
     known = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     before = {number: handler for number, handler in known.items() if handler != signal.SIG_IGN}
     hook = sys.unraisablehook
     try:
         sys.unraisablehook = again
-        for number in before:  # from the first on a signal may come
+        for number in before:  # a signal may arrive from the first one on
             signal.signal(number, stop)
         yield
     finally:

@@ -1,4 +1,4 @@
-"""The pictures of a film: what each camera sees of a frame, where they stand, how well they see."""
+"""Figures of a film: images of a frame, the rig, and its coverage."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ if TYPE_CHECKING:
 
 __all__ = ["contact_sheet", "coverage_picture", "rig_picture"]
 
-_MOST_FRAMES = 400  # of the paths in a picture
+_MAX_FRAMES = 400  # of the paths in a figure
 _DOT = 9  # square points
 _CELLS = 64  # of a level of the volume along its longer side
-_AROUND = 0.1  # how far the level reaches beyond markers and cameras, as a share of its extent
+_AROUND = 0.1  # margin of the level around markers and cameras, as a share of its extent
 
 
 def contact_sheet(truth: Tracks, rig: Rig, t: int, title: str) -> Figure:
-    """Draw what every camera sees of frame `t`, side by side.
+    """Draw the images of all cameras in frame `t`, side by side.
 
     Parameters
     ----------
     truth : Tracks
-        3-D; a marker has one colour in all images.
+        Tracks in 3-D; a marker has the same colour in all images.
     rig : Rig
         The cameras.
     t : int
-        The frame.
+        Index of the frame.
     title : str
-        Of the whole.
+        Title above the images.
 
     Notes
     -----
-    What ideal cameras see: noise and false blobs are not drawn.
+    The images are those of ideal cameras, without noise and false points.
     """
     from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
@@ -82,8 +82,8 @@ def contact_sheet(truth: Tracks, rig: Rig, t: int, title: str) -> Figure:
             ax=axes,
         )
         is_near = _near(axes, projection[i].pixels, camera.size_px)
-        told = axes.get_title(loc="left") + (", a part of the image" if is_near else "")
-        axes.set_title(told, fontsize=8, loc="left", parse_math=False)
+        text = axes.get_title(loc="left") + (", a part of the image" if is_near else "")
+        axes.set_title(text, fontsize=8, loc="left", parse_math=False)
         axes.set(xlabel="", ylabel="")
         axes.tick_params(labelsize=6)
         for dots in axes.collections:
@@ -93,7 +93,7 @@ def contact_sheet(truth: Tracks, rig: Rig, t: int, title: str) -> Figure:
 
 
 def _near(axes: Any, pixels: NDArray[np.float64], size_px: tuple[int, int]) -> bool:
-    """Show the part of the image that holds the points, if it is a small one; say whether so."""
+    """Zoom to the points if they fill a small part of the image; return whether it was zoomed."""
     size = np.array(size_px)
     inside = ((pixels > 0) & (pixels < size)).all(axis=1)
     if not inside.any():
@@ -121,7 +121,7 @@ def rig_picture(truth: Tracks, rig: Rig) -> Figure:
 
 
 def coverage_picture(truth: Tracks, rig: Rig) -> Figure:
-    """Draw how well the cameras see the level in which the middle of the markers lies."""
+    """Draw the coverage of the horizontal level through the middle of the markers."""
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
     from matplotlib.patheffects import withStroke
@@ -142,7 +142,7 @@ def coverage_picture(truth: Tracks, rig: Rig) -> Figure:
     known = 1e3 * among.error[np.isfinite(among.error)]
     error = f"median error {np.median(known):.3g} mm" if known.size else "no error known"
     level = f"z = {first[2]:.3g} m"
-    told = {
+    titles = {
         "cameras": f"{level}, among the markers: {100 * (among.n_cameras >= 2).mean():.3g} % of "
         "the places seen by two or more",
         "error": f"{level}, among the markers: {error}",
@@ -151,7 +151,7 @@ def coverage_picture(truth: Tracks, rig: Rig) -> Figure:
     figure = Figure(figsize=(14, min(max(5.5 * shape + 1, 3), 9)), layout="constrained", dpi=110)
     for axes, what in zip(figure.subplots(1, 2), ("cameras", "error"), strict=True):
         plot_coverage(coverage, what=what, ax=axes)
-        axes.set_title(told[what], fontsize=11, color=INK, loc="left")
+        axes.set_title(titles[what], fontsize=11, color=INK, loc="left")
         box = Rectangle(
             (low[0], low[1]), high[0] - low[0], high[1] - low[1], fill=False, edgecolor=WRONG,
             linewidth=1.6, label="markers",
@@ -171,9 +171,9 @@ def coverage_picture(truth: Tracks, rig: Rig) -> Figure:
 
 
 def _thinned(truth: Tracks) -> Tracks:
-    """Keep every so many frames of a long capture, and of its points those in tracks."""
+    """Return a long capture with evenly spaced frames, without clutter."""
     d = truth.detections
-    every = 1 + (d.n_frames - 1) // _MOST_FRAMES
+    every = 1 + (d.n_frames - 1) // _MAX_FRAMES
     is_kept = (d.frame_of % every == 0) & (truth.labels >= 0)
     times = d.times[::every]
     counts = np.bincount(d.frame_of[is_kept] // every, minlength=len(times))

@@ -1,4 +1,4 @@
-"""Filming a capture of any length piece by piece, and counting what is seen."""
+"""Film a capture of any length in pieces, and count its visible markers."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ if TYPE_CHECKING:
 
 __all__ = ["Footage", "film_all", "frames_between", "names_apart"]
 
-_MOST_FRAMES, _MOST_SAMPLES = 256, 2_000_000  # of one piece
+_MAX_FRAMES, _MAX_SAMPLES = 256, 2_000_000  # of one piece
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Footage:
-    """What a rig made of a whole capture.
+    """Image points of a whole capture, with counts of visible markers.
 
     Parameters
     ----------
     observations : Observations
-        The image points, with the truth.
+        Image points with their true markers.
     counts : ndarray of int, shape (C, 8)
-        Samples (a marker in a frame) of each camera by `Reason`; those that are absent are none.
+        Number of samples (a marker in a frame) of each camera by `Reason`, without absent ones.
     n_cameras : ndarray of int, shape (C + 1,)
-        How many samples so many cameras see.
+        Number of samples that 0, 1, … C cameras see.
     """
 
     observations: Observations
@@ -46,12 +46,12 @@ class Footage:
 
     @property
     def n_samples(self) -> int:
-        """Number of samples that there were to film."""
+        """Number of samples: markers that are present, over all frames."""
         return int(self.n_cameras.sum())
 
-    def share_seen_by(self, least: int) -> float:
-        """Share of the samples that `least` cameras or more see."""
-        return float(self.n_cameras[least:].sum()) / max(self.n_samples, 1)
+    def share_seen_by(self, n: int) -> float:
+        """Return the share of the samples that `n` cameras or more see."""
+        return float(self.n_cameras[n:].sum()) / max(self.n_samples, 1)
 
 
 def film_all(
@@ -61,21 +61,21 @@ def film_all(
     seeing: Seeing | None = None,
     seed: int = 0,
 ) -> Footage:
-    """Film tracks in pieces, so that the memory does not depend on their length.
+    """Film tracks in pieces, so that memory use does not depend on their length.
 
     Parameters
     ----------
     truth : Tracks
-        3-D. Clutter is not filmed.
+        Tracks in 3-D. Clutter is not filmed.
     rig : Rig
         The cameras.
     advance : callable
-        Told the number of frames that are done.
+        Called with the number of finished frames.
     seeing : Seeing, optional
-        What the cameras make of the markers; ideal by default.
+        Noise, missing and false points of the images. By default images are ideal.
     seed : int
-        Chooses what is random in that. With `seeing` the film is one piece, as all that is random
-        belongs to the whole.
+        Random seed of `seeing`. With `seeing` the film is one piece, so that the random numbers do
+        not depend on the size of pieces.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def film_all(
     """
     d = truth.detections
     most = max(int(d.counts.max(initial=0)), 1) * len(rig)
-    step = int(np.clip(_MOST_SAMPLES // most, 1, _MOST_FRAMES))
+    step = int(np.clip(_MAX_SAMPLES // most, 1, _MAX_FRAMES))
     if seeing is not None:
         step = max(d.n_frames, 1)
     counts = np.zeros((len(rig), len(Reason)), dtype=np.int64)
@@ -127,7 +127,7 @@ def film_all(
 
 
 def _piece(truth: Tracks, begin: int, end: int) -> tuple[NDArray[np.int64], Tracks]:
-    """Cut some frames out: the numbers of the tracks that are there, and these alone."""
+    """Return a range of frames: the numbers of its tracks, and these tracks."""
     d = truth.detections
     offsets = d.offsets[begin : end + 1]
     rows = slice(int(offsets[0]), int(offsets[-1]))
@@ -147,7 +147,7 @@ def _piece(truth: Tracks, begin: int, end: int) -> tuple[NDArray[np.int64], Trac
 
 
 def names_apart(names: Sequence[str | None]) -> tuple[str, ...]:
-    """Give every track a name of its own that a table can hold: ``T007`` where it has none."""
+    """Return a unique name for each track that a table can hold: ``T007`` without a name."""
     width = max(3, len(str(len(names) - 1)))
     taken = {name for name in names if name}
     found: dict[str, None] = {}
@@ -162,7 +162,7 @@ def names_apart(names: Sequence[str | None]) -> tuple[str, ...]:
 
 
 def frames_between(n_frames: int, n: int) -> list[int]:
-    """Give up to `n` different frames, spread evenly from the first to the last."""
+    """Return up to `n` different frames, evenly spaced from the first to the last."""
     if not n_frames or not n:
         return []
     if n == 1:

@@ -1,4 +1,4 @@
-"""Options derived from the library: names, types, defaults and texts are those of the API."""
+"""Options derived from the library, with the names, types, defaults and texts of the API."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ class Option:
     Parameters
     ----------
     name : str
-        Its name.
+        Name of the option.
     kind : object
-        Its type, as annotated.
+        Annotated type.
     default : object
-        Its default.
+        Default value.
     about : str
-        What the docstring says of it.
+        Text of the docstring about it.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Option:
 
     @property
     def type_text(self) -> str:
-        """The type as people write it."""
+        """Type as printed in the lists of options."""
         return _type_text(self.kind)
 
     def parse(self, text: str) -> Any:
@@ -65,7 +65,7 @@ class Option:
         Raises
         ------
         ParameterError
-            If the text is not of its type; its range is for the library to check.
+            If the text is not of the type. The library checks the range.
         """
         return _parse(self.name, self.kind, text)
 
@@ -73,8 +73,8 @@ class Option:
 def record_options(kind: type) -> dict[str, Option]:
     """Return the options of a method, or of another record, by name.
 
-    Those of a record among the options follow with its name and a dot; one that may be None is
-    itself an option, true or false.
+    Options of a nested record have its name and a dot before theirs. A record that may be None is
+    also an option itself, true or false.
     """
     from asterism.tracking.methods.registry import record_in
 
@@ -82,7 +82,7 @@ def record_options(kind: type) -> dict[str, Option]:
         return {}
     kinds = typing.get_type_hints(kind)
     about: dict[str, str] = {}
-    for base in kind.__mro__:  # a subclass often only says where its base explains the option
+    for base in kind.__mro__:  # a subclass may refer to the text of its base
         about |= _about_parameters(base)
     options: dict[str, Option] = {}
     for f in dataclasses.fields(kind):
@@ -133,7 +133,7 @@ def flat(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def scene_options(scene: Callable[..., Any]) -> dict[str, Option]:
-    """Give the options of a scene by name: the arguments of its function."""
+    """Return the options of a scene by name: the arguments of its function."""
     about = _about_parameters(scene)
     kinds = typing.get_type_hints(scene)
     arguments = inspect.signature(scene).parameters
@@ -156,13 +156,13 @@ def parsed(
     Parameters
     ----------
     option : str
-        The option of the command line that they follow, for the messages.
+        Option of the command line that has the texts as values, for the messages.
     owner : str
-        What they are values of, for the messages.
+        Method or scene that has the options, for the messages.
     texts : sequence of str
-        As given on the command line; of one name the last counts.
+        Texts of the command line. If a name is repeated, the last value is used.
     known : dict
-        The options there are.
+        Known options by name.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def parsed(
         if not equals:
             raise ParameterError(option, f"NAME=VALUE for {owner}", repr(text))
         if not known:
-            raise ParameterError(option, f"none for {owner}", repr(name))
+            raise ParameterError(option, f"no option, as {owner} has none", repr(name))
         check_fields(f"{option} ({owner})", [name], known)
         with as_options({name: f"{option} {name}"}):
             values[name] = known[name].parse(value.strip())
@@ -190,24 +190,23 @@ def parsed(
 
 @contextmanager
 def as_options(names: Mapping[str, str]) -> Generator[None, None, None]:
-    """Let errors about arguments of the library name the options that these came from.
+    """Replace the argument in an error of the library by its option of the command line.
 
     Parameters
     ----------
     names : mapping of str to str
-        The option by the argument; errors about others stay as they are.
+        Option by argument. Errors about other arguments stay unchanged.
     """
     try:
         yield
     except ParameterError as error:
         if error.name not in names:
             raise
-        told = error.expected, error.got, error.hint
-        raise ParameterError(names[error.name], *told) from error
+        raise ParameterError(names[error.name], error.expected, error.got, error.hint) from error
 
 
 def with_option_names(command: Callable[..., None]) -> Callable[..., None]:
-    """Let errors of a command about an argument of the library name its option of that name."""
+    """Return the command with option names in its errors, in place of arguments of the library."""
     names: dict[str, str] = {}
     for name, kind in typing.get_type_hints(command, include_extras=True).items():
         for info in getattr(kind, "__metadata__", ()):
@@ -227,7 +226,7 @@ def _type_text(kind: Any) -> str:
     if typing.get_origin(kind) is Literal:
         return "|".join(map(str, typing.get_args(kind)))
     if typing.get_origin(kind) in (Union, types.UnionType):
-        # What can be typed: the first of them, and none.
+        # A user can type a value of the first type, or none.
         inner = [k for k in typing.get_args(kind) if k is not type(None)]
         is_optional = len(inner) < len(typing.get_args(kind))
         return _type_text(inner[0]) + (" | None" if is_optional else "")
@@ -253,7 +252,7 @@ def _parse(name: str, kind: Any, text: str) -> Any:
         parts = [part.strip() for part in text.strip("() ").split(",")]
         inner = typing.get_args(kind)
         if Ellipsis not in inner and len(parts) != len(inner):
-            raise ParameterError(name, f"{len(inner)} values with commas between", repr(text))
+            raise ParameterError(name, f"{len(inner)} values separated by commas", repr(text))
         return tuple(_parse(name, inner[0], part) for part in parts)
     if typing.get_origin(kind) is Literal:
         choices = [str(choice) for choice in typing.get_args(kind)]

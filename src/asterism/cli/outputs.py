@@ -1,11 +1,11 @@
-"""Where commands may write, and the files that several of them read.
+"""Checks of output paths, and readers of files that several commands use.
 
-The rules for every file and folder that a command writes, held before it reads or computes:
+Rules for every output of a command, checked before it reads or computes:
 
-- A file or a folder with files that exists needs ``--overwrite``, which replaces files of the same
-  names and leaves others.
-- What is read is never written, ``--overwrite`` or not.
-- A file goes into a folder that exists. A folder is made, with its parents.
+- An existing file, or a folder with files, needs ``--overwrite``. It replaces files of the same
+  names and keeps the others.
+- An input is never overwritten, not even with ``--overwrite``.
+- The folder of an output file must exist. An output folder is made, with its parents.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ __all__ = [
     "truth_of_each",
 ]
 
-_MARKS_CLUTTER = ("c3d", "csv")  # as Asterism writes them
+_MARKS_CLUTTER = ("c3d", "csv")  # formats in which Asterism marks clutter
 
 
 @dataclass(frozen=True)
 class Folder:
-    """A folder that a command writes.
+    """Output folder of a command.
 
     Parameters
     ----------
     path : Path
-        The folder.
+        Path of the folder.
     names : tuple of str
-        Files that are written in it.
+        Names of the files that are written into it.
     """
 
     path: Path
@@ -56,21 +56,21 @@ def check_outputs(
     *,
     overwrite: bool,
 ) -> None:
-    """Raise before any work unless everything can be written where it is asked for.
+    """Raise unless every output can be written to its path.
 
     Parameters
     ----------
     outputs : mapping
-        Files and folders to write, by the option that names them.
+        Output files and folders by option.
     inputs : iterable
-        Files that are read.
+        Input files.
     overwrite : bool
-        Whether what exists may be replaced.
+        Whether existing files may be replaced.
 
     Raises
     ------
     ParameterError
-        With the option at fault.
+        If an output cannot be written; the error names its option.
     """
     seen = {_identity(file): f"the input {file}" for path in inputs for file in _files_of(path)}
     for option, output in outputs.items():
@@ -83,8 +83,8 @@ def check_outputs(
         for place, path in written.items():
             identity = _identity(path)
             if identity in seen:
-                raise ParameterError(place, "a place of its own", f"{path}, {seen[identity]}")
-            seen[identity] = f"which {place} names too"
+                raise ParameterError(place, "a path of its own", f"{path}, {seen[identity]}")
+            seen[identity] = f"also the path of {place}"
         if is_folder:
             _check_folder(option, output.path, overwrite=overwrite)
         else:
@@ -92,7 +92,7 @@ def check_outputs(
 
 
 def _files_of(path: Path | None) -> list[Path]:
-    """Give an input, and of a folder the files in it: any of them may be read."""
+    """Return an input and, if it is a folder, its files, any of which may be read."""
     if path is None:
         return []
     return [path, *(sorted(path.iterdir()) if path.is_dir() else ())]
@@ -102,7 +102,7 @@ def _check_file(option: str, path: Path, *, overwrite: bool) -> None:
     if path.is_dir():
         raise ParameterError(option, "a file", f"the folder {path}")
     if path.exists() and not path.is_file():
-        return  # a device or a pipe, which is written as it stands
+        return  # a device or a pipe, which has nothing to replace
     parent = path.resolve().parent
     if not parent.is_dir():
         raise ParameterError(option, "a file in a folder that exists", path)
@@ -116,45 +116,45 @@ def _check_folder(option: str, path: Path, *, overwrite: bool) -> None:
     if path.exists() and not path.is_dir():
         raise ParameterError(option, "a folder or a new name", f"the file {path}")
     if path.is_dir() and any(path.iterdir()) and not overwrite:
-        hint = "give --overwrite to replace those of the same names"
+        hint = "give --overwrite to replace files of the same names"
         raise ParameterError(option, "a new or an empty folder", f"{path}, which holds files", hint)
     there = path.resolve()
     while not there.exists():
         there = there.parent
     if not there.is_dir():
-        raise ParameterError(option, "a folder within folders", f"{path}, within a file")
+        raise ParameterError(option, "a folder whose parents are folders", f"{path}, inside a file")
     _check_access(option, path, there)
 
 
 def _check_access(option: str, path: Path, folder: Path) -> None:
     if not os.access(folder, os.W_OK | os.X_OK):
-        got = f"{path}, and no permission to write in {folder}"
-        raise ParameterError(option, "a place that can be written to", got)
+        got = f"{path}, without permission to write in {folder}"
+        raise ParameterError(option, "a writable path", got)
 
 
 def check_ending(option: str, path: Path | None, *endings: str) -> None:
-    """Raise before any work if a file would be written under the name of something else.
+    """Raise if the name of an output file has another ending than its format.
 
     Parameters
     ----------
     option : str
-        The option that names it.
+        Option of the file.
     path : Path or None
-        The file, if one is asked for.
+        The file; None if it is not written.
     *endings : str
-        What its name may end in, in small letters; the first is what the message says.
+        Allowed endings in lower case. The message lists the first.
 
     Raises
     ------
     ParameterError
-        If it ends in something else.
+        If the ending is none of them.
     """
     if path is not None and path.suffix.lower() not in endings:
         raise ParameterError(option, f"a name ending in {endings[0]}", str(path))
 
 
 def _identity(path: Path) -> object:
-    """Give what two paths share if they lead to one file, by other names or links too."""
+    """Return a key that is equal for paths of the same file, through links too."""
     if path.exists() and path.is_file():
         status = path.stat()
         return status.st_dev, status.st_ino
@@ -162,12 +162,12 @@ def _identity(path: Path) -> object:
 
 
 def read_model(path: Path) -> am.TrackingModel:
-    """Read a model from TOML.
+    """Read a tracking model from TOML.
 
     Raises
     ------
     FormatError
-        If the file cannot be read, or is no model.
+        If the file cannot be read, or is not a tracking model.
     """
     import asterism as am
 
@@ -175,7 +175,7 @@ def read_model(path: Path) -> am.TrackingModel:
 
 
 def read_labels(path: Path) -> am.Tracks:
-    """Read tracks; unnamed ones among named ones are clutter where the format cannot say so."""
+    """Read tracks; among named tracks, unnamed ones are clutter if the format cannot mark it."""
     import numpy as np
 
     import asterism as am
@@ -191,7 +191,9 @@ def read_labels(path: Path) -> am.Tracks:
 
 
 def truth_of_each(tracks: am.Tracks, truth: am.Tracks) -> am.Tracks:
-    """Give the truth of each detection of `tracks`, one by one: files have an order of their own.
+    """Return the true tracks in the order of the detections of `tracks`.
+
+    The order of detections differs between file formats.
 
     Raises
     ------

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import asterism as am
 
 __all__ = [
+    "confident_tracks",
     "is_observations",
     "model_for",
     "named",
@@ -28,13 +29,12 @@ __all__ = [
     "selected",
     "solid_tracks",
     "summary_of",
-    "sure_tracks",
     "tracks_of",
 ]
 
 
 def tracks_of(path: Path) -> am.Tracks:
-    """Read a tracking: a file, or the folder of a run."""
+    """Read tracks from a file or the folder of a run."""
     from asterism.cli.outputs import read_labels
 
     return read_labels(_result(path))
@@ -50,9 +50,9 @@ def selected(
         times = tracks.detections.times
         first, end = np.searchsorted(times, time[0]), np.searchsorted(times, time[1], side="right")
         if first >= end:
-            those = f"{times[0]:g} to {times[-1]:g} s" if len(times) else "no frame"
+            extent = f"{times[0]:g} to {times[-1]:g} s" if len(times) else "no frame"
             found = f"{time[0]:g} to {time[1]:g} s"
-            raise ParameterError("--time", f"a part of the capture, {those}", found)
+            raise ParameterError("--time", f"a part of the capture, {extent}", found)
         tracks = tracks.part(int(first), int(end))
     return tracks
 
@@ -82,24 +82,22 @@ def segments_of(tracks: am.Tracks) -> NDArray[np.int64] | None:
     return am.learn_bonds(renamed).segments(names)
 
 
-def sure_tracks(path: Path) -> am.Tracks:
-    """Read a tracking that has a confidence."""
+def confident_tracks(path: Path) -> am.Tracks:
+    """Read tracks that have a confidence."""
     tracks = tracks_of(path)
     if tracks.confidence is None:
-        hint = (
-            "write one by asterism track --method mcmcda -o FILE.csv; other formats have no place"
-        )
+        hint = "run asterism track --method mcmcda -o FILE.csv; only CSV holds a confidence"
         raise ParameterError("FILES", "tracks with a confidence", f"{path}, which has none", hint)
     return tracks
 
 
 def solid_tracks(path: Path) -> am.Tracks:
-    """Read tracks that cameras can look at."""
+    """Read tracks in 3-D."""
     import asterism as am
 
     truth = am.io.read_tracks(path)
     if not (truth.labels >= 0).any():
-        hint = "run asterism track first: it makes tracks of points without names"
+        hint = "run asterism track first"
         raise ParameterError("FILES", "points in tracks", f"{path}, which has none", hint)
     if truth.detections.n_axes != 3:
         raise ParameterError("FILES", "points in 3-D", f"{path}, in 2-D")
@@ -107,7 +105,7 @@ def solid_tracks(path: Path) -> am.Tracks:
 
 
 def model_for(path: Path | None, detections: am.Detections) -> am.TrackingModel:
-    """Read a model, or estimate it where none is given."""
+    """Read a model, or estimate it if there is no file."""
     import asterism as am
     from asterism.cli.console import progress
     from asterism.cli.outputs import read_model
@@ -119,7 +117,7 @@ def model_for(path: Path | None, detections: am.Detections) -> am.TrackingModel:
 
 
 def is_observations(path: Path) -> bool:
-    """Tell the observations of a film, CSV by camera, from a capture in CSV."""
+    """Return whether a CSV file holds image points by camera, and not a capture."""
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
             columns = {word.strip().lower() for word in file.readline().split(",")}
@@ -129,12 +127,12 @@ def is_observations(path: Path) -> bool:
 
 
 def summary_of(path: Path) -> dict[str, Any]:
-    """Give the summary of a run folder; nothing of a mere file."""
+    """Return the summary of a run folder, or an empty one for a file."""
     from asterism.cli.run_folder import SUMMARY
 
     if not path.is_dir():
         return {}
-    hint = "make one by asterism track --run"
+    hint = "make one with asterism track --run"
     try:
         found = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
     except FileNotFoundError as error:
@@ -144,17 +142,17 @@ def summary_of(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise FormatError(path, SUMMARY, "a finished run", error, hint) from error
     if not isinstance(found, dict) or "output" not in found:
-        raise FormatError(path, SUMMARY, "a finished run", "no word of its output", hint)
+        raise FormatError(path, SUMMARY, "a finished run", "no field output", hint)
     return found
 
 
 def _result(path: Path) -> Path:
-    """Give the file that a run wrote, which lies in its folder wherever that is now."""
+    """Return the result of a run, which is in its folder even if that was moved."""
     return path / Path(summary_of(path)["output"]).name if path.is_dir() else path
 
 
 def named(paths: Sequence[Path]) -> dict[str, Path]:
-    """Name files and folders shortly, and apart."""
+    """Return files and folders by a short unique name."""
     found: dict[str, Path] = {}
     for path in paths:
         name = path.resolve().name if path.is_dir() else path.stem

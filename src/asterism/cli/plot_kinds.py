@@ -1,4 +1,4 @@
-"""The kinds of figures that ``asterism plot`` draws, and what each is drawn from."""
+"""Kinds of figures of ``asterism plot``, with the inputs of each."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from asterism.cli.plot_inputs import (
+    confident_tracks,
     is_observations,
     model_for,
     named,
@@ -14,7 +15,6 @@ from asterism.cli.plot_inputs import (
     selected,
     solid_tracks,
     summary_of,
-    sure_tracks,
     tracks_of,
 )
 from asterism.errors import ParameterError
@@ -29,7 +29,7 @@ __all__ = ["KINDS", "Kind", "Request"]
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What a figure was asked for with; the fields are the options of the command."""
+    """Options of the command, one field each."""
 
     files: Sequence[Path]
     truth: Path | None = None
@@ -45,11 +45,11 @@ class Request:
 
     @property
     def file(self) -> Path:
-        """The one file of kinds that take one."""
+        """Input of kinds that have a single one."""
         return self.files[0]
 
     def tracks(self) -> am.Tracks:
-        """Read the chosen markers and times of the file."""
+        """Read the selected markers and times of the file."""
         return selected(tracks_of(self.file), self.markers, self.time)
 
 
@@ -60,13 +60,13 @@ class Kind:
     Parameters
     ----------
     about : str
-        What it shows, for the help.
+        Text of the help.
     draw : callable
-        Makes it: takes a `Request`, gives a figure or axes of it.
+        Function of a `Request` that returns a figure or its axes.
     many : bool
-        Whether it takes several files.
+        Whether several files are allowed.
     needs, takes : frozenset of str
-        Options that it cannot do without; that it may have besides.
+        Required options, and optional ones.
     """
 
     about: str
@@ -100,7 +100,7 @@ def _presence(asked: Request) -> Any:
 def _confidence(asked: Request) -> Any:
     import asterism as am
 
-    tracks = selected(sure_tracks(asked.file), asked.markers, asked.time)
+    tracks = selected(confident_tracks(asked.file), asked.markers, asked.time)
     return am.plot.plot_confidence(tracks)
 
 
@@ -120,7 +120,7 @@ def _reliability(asked: Request) -> Any:
     truth = _truth(asked)
     parts: dict[str, CalibrationCurve] = {}
     for name, file in named(asked.files).items():
-        tracks = sure_tracks(file)
+        tracks = confident_tracks(file)
         assert tracks.confidence is not None
         links, is_right = right_links(tracks.labels, truth_of_each(tracks, truth).labels)
         parts[name] = am.metrics.calibration_curve(tracks.confidence[links], is_right)
@@ -150,7 +150,7 @@ def _projections(asked: Request) -> Any:
 
     if is_observations(asked.file):
         seen = am.io.read_observations(asked.file)
-        # A ring or a wall is placed about points in space, of which there are none here.
+        # Layouts are placed around 3-D points, which image points do not have.
         rig = am.read_rig(Path(asked.rig or ""))
     else:
         from asterism.cli.console import progress
@@ -189,12 +189,11 @@ def _posterior(asked: Request) -> Any:
     moves = sorted(set(asked.moves or (0.3, 1, 3, 10, 30, 100)))
     seeds = asked.seeds or 3
     values: list[list[float]] = []
-    with progress("walking", seeds * len(moves)) as advance:
+    with progress("sampling", seeds * len(moves)) as advance:
         for seed in range(seeds):
             values.append([])
             for n in moves:
-                # Without walks for the confidence, and on the model's own posterior: ends weigh
-                # as they do in the number that is drawn.
+                # end_odds=1 searches the posterior that is drawn; a confidence is not needed.
                 method = am.MCMCDA(moves=n, confidence=0, end_odds=1)
                 found = am.track(capture, method, model=model, seed=seed)
                 values[-1].append(found.info["log_posterior"])
@@ -254,19 +253,19 @@ KINDS: dict[str, Kind] = {
         about="frames with a detection of each track, and the clutter", draw=_presence, takes=_PART
     ),
     "confidence": Kind(
-        about="the same, shaded by the confidence of each link", draw=_confidence, takes=_PART
+        about="as presence, shaded by the confidence of each link", draw=_confidence, takes=_PART
     ),
-    "errors": Kind(about="where labels are wrong", draw=_errors, needs=_TRUTH),
+    "errors": Kind(about="wrong labels of each track, over time", draw=_errors, needs=_TRUTH),
     "reliability": Kind(
-        about="how often labels are right, by their confidence; of one tracking or more",
+        about="share of correct labels by confidence, of one or more results",
         draw=_reliability, many=True, needs=_TRUTH,
     ),
     "compare": Kind(
-        about="IDF1, switches and, of run folders, milliseconds a frame; of one tracking or more",
+        about="IDF1, switches and (of run folders) time per frame, of one or more results",
         draw=_compare, many=True, needs=_TRUTH,
     ),
     "projections": Kind(
-        about="image points of a capture, or of a film's observations, in every camera",
+        about="image points of a capture or of observations, in every camera",
         draw=_projections, needs=_RIG,
     ),
     "image": Kind(
@@ -274,7 +273,7 @@ KINDS: dict[str, Kind] = {
         draw=_image, needs=_RIG, takes=frozenset({"frame"}),
     ),
     "posterior": Kind(
-        about="log posterior of mcmcda by its number of moves, beside gnn",
+        about="log posterior of mcmcda by number of moves, compared with gnn",
         draw=_posterior, takes=_MODEL | {"moves", "seeds"},
     ),
     "groups": Kind(
@@ -287,4 +286,4 @@ KINDS: dict[str, Kind] = {
         draw=_lens, takes=frozenset({"camera"}),
     ),
 }  # fmt: skip
-"""By the name on the command line, which is also that of the function: `am.plot_<kind>`."""
+"""Kinds by name; the function of a kind is `am.plot.plot_KIND`."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import inspect
+from typing import Annotated, Any
 
 import typer
 
@@ -33,8 +34,7 @@ __all__ = ["command"]
 
 app = typer.Typer(
     name="asterism",
-    help="Asterism: name the points of light. Tells which point of an optical motion capture is "
-    "which marker, over time.",
+    help="Asterism: optical motion capture from camera images to tracks of named markers.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -59,14 +59,27 @@ def _root(  # pyright: ignore[reportUnusedFunction]
 
 
 _TITLES = {
-    "From points to markers": (track, stitch, fill, bonds, name, estimate, methods),
-    "What there is, and what came of it": (info, evaluate, report, plot, view),
-    "Experiments with a known truth": (corrupt, simulate, scenes, demo, reproduce),
+    "Tracks and markers": (track, stitch, fill, bonds, name, estimate, methods),
+    "Captures and results": (info, evaluate, report, plot, view),
+    "Simulations and experiments": (corrupt, simulate, scenes, demo, reproduce),
     "Cameras": (film, reconstruct, chain),
 }
 for _title, _commands in _TITLES.items():
     for _command in _commands:
         app.command(rich_help_panel=_title)(with_option_names(_command))
 app.add_typer(camera, rich_help_panel="Cameras")
-command = typer.main.get_command(app)
+
+
+def _join_lines(command: Any) -> Any:
+    """Join the lines of each paragraph of the help, because Typer keeps them apart otherwise."""
+    for each in getattr(command, "commands", {}).values():
+        _join_lines(each)
+    paragraphs = inspect.cleandoc(command.help or "").split("\n\n")
+    command.help = "\n\n".join(
+        text if text.startswith(" ") else " ".join(text.splitlines()) for text in paragraphs
+    )
+    return command
+
+
+command = _join_lines(typer.main.get_command(app))
 """The whole command line, built once a process."""

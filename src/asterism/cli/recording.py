@@ -1,4 +1,4 @@
-"""What commands that simulate have in common: scenes, rigs and switches from their options."""
+"""Options of commands that simulate: scenes, rigs, corruption and camera images."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ E = TypeVar("E", "Burst", "Ghosts")
 def made_scene(
     name: str, given: dict[str, Any], texts: Sequence[str]
 ) -> tuple[am.simulate.Truth, dict[str, Any]]:
-    """Make a scene.
+    """Make a scene from options of the command line.
 
     Parameters
     ----------
     name : str
-        One of the scenes.
+        Name of the scene.
     given : dict
-        Values of the options that every scene has, None where not given; ``markers`` for the
-        scene's own number of them.
+        Values of the options that every scene has, None if not given. ``markers`` is the number of
+        markers or drones.
     texts : sequence of str
-        ``NAME=VALUE`` for its other options.
+        ``NAME=VALUE`` for the other options.
 
     Returns
     -------
     truth : Truth
     options : dict
-        All values that were given.
+        All values, given and default seed.
 
     Raises
     ------
     ParameterError
-        If the scene or an option is unknown, or it has no number of markers to choose.
+        If the scene or an option is unknown, or the number of markers is fixed.
     """
     import asterism as am
     from asterism.cli.options import as_options, parsed, scene_options
@@ -62,7 +62,7 @@ def made_scene(
         number = next((n for n in ("n_markers", "n_drones") if n in known), None)
         if number is None:
             raise ParameterError(
-                "--markers", f"nothing: {name} has its own number", given["markers"]
+                "--markers", f"no value, as {name} has a fixed number", given["markers"]
             )
         given[number] = given.pop("markers")
         options[number] = "--markers"
@@ -75,18 +75,18 @@ def made_scene(
 
 
 def rig_from(text: str, points: Any) -> tuple[am.Rig, str]:
-    """Read a calibration, or place the cameras of a preset about points, shape (N, 3).
+    """Read a calibration, or place the cameras of a layout around points, shape (N, 3).
 
     Returns
     -------
     rig : Rig
     about : str
-        What it is, for people.
+        Description for the printed result.
 
     Raises
     ------
     ParameterError
-        If the text is neither.
+        If the text is neither a calibration nor a layout.
     """
     from asterism.io.calibrations import read_rig
     from asterism.simulate.rig_presets import is_preset, place_preset
@@ -94,8 +94,8 @@ def rig_from(text: str, points: Any) -> tuple[am.Rig, str]:
     if is_preset(text) and not Path(text).exists():
         return place_preset(text, points.min(axis=0), points.max(axis=0))
     if not Path(text).exists():
-        expected = "a calibration, or ring or wall and a number of cameras: ring8"
-        raise ParameterError("--rig", expected, f"{text!r}, which is neither")
+        expected = "a calibration, or ring or wall with a number of cameras, such as ring8"
+        raise ParameterError("--rig", expected, repr(text))
     rig = read_rig(text)
     for warning in rig.warnings:
         log.warning("%s: %s", text, warning)
@@ -105,7 +105,7 @@ def rig_from(text: str, points: Any) -> tuple[am.Rig, str]:
 def switches_from(texts: Sequence[str]) -> dict[str, Any]:
     """Read ``NAME=VALUE`` switches of `asterism.simulate.corrupt`.
 
-    Numbers as they are; ``burst`` and ``ghosts`` as ``N[:MIN-MAX]``, ``visits`` as ``MIN-MAX``.
+    ``burst`` and ``ghosts`` are ``N[:MIN-MAX]``, ``visits`` is ``MIN-MAX``, others are numbers.
     """
     from asterism.cli.options import Option, parsed
     from asterism.simulate import Burst, Ghosts, Visits, corrupt
@@ -118,7 +118,7 @@ def switches_from(texts: Sequence[str]) -> dict[str, Any]:
         for name, default in defaults.items()
         if name not in ("rig", "seed", "keep_unnamed")
     }
-    values = parsed("--corrupt", "what goes wrong", texts, known)
+    values = parsed("--corrupt", "corruption", texts, known)
     if "burst" in values:
         values["burst"] = episode("--corrupt burst", Burst, values["burst"])
     if "ghosts" in values:
@@ -126,7 +126,9 @@ def switches_from(texts: Sequence[str]) -> dict[str, Any]:
     if "visits" in values:
         match = re.fullmatch(r"(\d+)-(\d+)", values["visits"])
         if match is None:
-            raise ParameterError("--corrupt visits", "MIN-MAX, 50-200 say", repr(values["visits"]))
+            raise ParameterError(
+                "--corrupt visits", "MIN-MAX, such as 50-200", repr(values["visits"])
+            )
         values["visits"] = Visits(shortest=int(match[1]), longest=int(match[2]))
     return values
 
@@ -136,7 +138,7 @@ def seeing_from(texts: Sequence[str]) -> am.simulate.Seeing | None:
     from asterism.cli.options import as_options, parsed, record_options
     from asterism.simulate import Seeing
 
-    values = parsed("--seeing", "what cameras see", texts, record_options(Seeing))
+    values = parsed("--seeing", "camera images", texts, record_options(Seeing))
     with as_options({name: f"--seeing {name}" for name in values}):
         return Seeing(**values) if texts else None
 
@@ -147,7 +149,7 @@ def episode(option: str, kind: type[E], text: str) -> E:
 
     match = re.fullmatch(r"(\d+)(?::(\d+)-(\d+))?", text.strip())
     if match is None:
-        raise ParameterError(option, "N or N:MIN-MAX, 5:5-60 say", repr(text))
+        raise ParameterError(option, "N or N:MIN-MAX, such as 5:5-60", repr(text))
     names = ("n", "shortest", "longest")
     values = {name: int(n) for name, n in zip(names, match.groups(), strict=True) if n is not None}
     with as_options({name: f"{option} ({name})" for name in names}):

@@ -1,8 +1,8 @@
-"""A run and its folder: everything that is needed to repeat a tracking bit for bit.
+"""Folder of a run, with everything that repeats it bit for bit.
 
-``run.toml`` holds the recipe and where its input lies, ``log.txt`` the log messages,
-``summary.json`` the figures, and the result lies beside them. ``summary.json`` is written last:
-where it is, the run is complete.
+``run.toml`` holds the recipe and the path of the input, ``log.txt`` the log messages and
+``summary.json`` the figures; the result is beside them. ``summary.json`` is written last, so its
+presence shows that the run is complete.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class Run:
     Parameters
     ----------
     recipe : Recipe
-        What to do.
+        Model, method, options and seed.
     source : Path
-        The capture.
+        Path of the capture.
     format : str
         Format of the result, a key of `asterism.io.CAPTURE_FORMATS`.
     """
@@ -47,7 +47,7 @@ class Run:
     format: str
 
     def write(self, path: Path) -> None:
-        """Write a ``run.toml``."""
+        """Write the run as ``run.toml``."""
         values = self.recipe.to_dict()
         values["input"] = {"path": str(self.source.resolve()), **values["input"]}
         write_text(path, write_toml({**values, "output": {"format": self.format}}, None))
@@ -59,7 +59,7 @@ class Run:
         Raises
         ------
         FormatError
-            If the file is not there, or not what `write` writes.
+            If the file does not exist, or `write` did not write it.
         """
         values = read_toml(path, "a run.toml")
         try:
@@ -92,7 +92,7 @@ def writing_log(folder: Path) -> Generator[None, None, None]:
     try:
         yield
     except BaseException as end:
-        # To this file alone: what else hears of it is decided where the program ends.
+        # Only this file gets the line; the end of the program decides about stderr.
         text = f"ended by {type(end).__name__}: {end}"
         handler.handle(logging.makeLogRecord({"levelname": "ERROR", "msg": text}))
         raise

@@ -1,4 +1,4 @@
-"""What a tracking did, in figures."""
+"""Figures of a finished tracking."""
 
 from __future__ import annotations
 
@@ -15,38 +15,38 @@ if TYPE_CHECKING:
 
 __all__ = ["Summary", "stitching_rows", "summarize"]
 
-DOUBTFUL = 0.9
+UNCERTAIN = 0.9
 
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """What a tracking did.
+    """Figures of a finished tracking.
 
     Parameters
     ----------
     input, output : str
-        The files.
+        Paths of capture and result.
     method : str
-        The method.
+        Name of the method.
     n_frames, n_detections : int
         Size of the capture.
     n_tracks, n_labelled, n_clutter : int
-        Tracks, detections in them and detections in none.
+        Number of tracks, of their detections, and of detections without a track.
     n_gaps : int
-        Gaps within tracks.
+        Number of gaps in tracks.
     longest_gaps : tuple of am.model.Gap
-        The longest of them, up to three.
+        Longest gaps, at most three.
     seconds, frames_per_second : float
-        Time that the method took, and its pace.
+        Running time of the method, and frames per second.
     log_posterior : float or None
-        Of the partition under the model, nats above “everything is clutter”: what methods may be
-        compared by. None where the model forbids one of the tracks.
+        Log posterior of the tracks, in nats above that of “everything is clutter”. Larger is
+        better under the same model. None if the model gives a track probability zero.
     n_doubtful : int or None
-        Detections whose label is held with less than `DOUBTFUL`; None from methods that do not say.
+        Number of detections with a confidence below `UNCERTAIN`; None without a confidence.
     info : dict
-        What the method tells of itself; what was approximated, among others.
+        Figures of the method, such as the error of approximations.
     truncated : str
-        Where the capture is cut off and what is missing; empty for a whole one.
+        Place at which the capture is cut off, and the missing part; empty for a complete one.
     """
 
     input: str
@@ -67,7 +67,7 @@ class Summary:
     truncated: str = ""
 
     def rows(self) -> list[tuple[str, str]]:
-        """Give the figures as people read them."""
+        """Return the figures as rows of the printed table."""
         gaps = [
             f"track {g.track}, frames {g.first} to {g.last} ({g.seconds:.3g} s)"
             for g in self.longest_gaps
@@ -77,10 +77,10 @@ class Summary:
             ("tracks", str(self.n_tracks)),
             ("detections labelled", f"{self.n_labelled} of {self.n_detections} ({share:.1f} %)"),
             ("clutter", str(self.n_clutter)),
-            ("gaps bridged", str(self.n_gaps)),
+            ("gaps", str(self.n_gaps)),
             *((("longest gaps"), gap) if i == 0 else ("", gap) for i, gap in enumerate(gaps)),
             *stitching_rows(self.info),
-            *self._doubts(),
+            *self._certainty(),
             *self._posterior(),
             *([("input truncated", self.truncated)] if self.truncated else []),
             ("time", f"{self.seconds:.3g} s, {self.frames_per_second:,.0f} frames/s"),
@@ -92,52 +92,51 @@ class Summary:
             return []
         return [("log posterior", f"{self.log_posterior:,.1f} nats above all clutter")]
 
-    def _doubts(self) -> list[tuple[str, str]]:
+    def _certainty(self) -> list[tuple[str, str]]:
         rows: list[tuple[str, str]] = []
         if self.n_doubtful is not None:
-            rows.append((f"labels held below {DOUBTFUL:.0%}", str(self.n_doubtful)))
+            rows.append((f"confidence below {UNCERTAIN:.0%}", f"{self.n_doubtful} labels"))
         if self.info.get("bound", 0) > 0:
             groups = f"{self.info['approximate_groups']:.0f} groups too large for the exact sum"
-            text = f"{groups}; probabilities there off by at most {self.info['bound']:.2g}"
+            text = f"{groups}; error of their probabilities at most {self.info['bound']:.2g}"
             rows.append(("approximated", text))
         if self.info.get("gap", 0) > 0:
             n = self.info.get("clusters_cut_short") or self.info.get("windows_with_a_gap", 0)
-            groups = f"{n:.0f} choices not proven best"
-            text = f"{groups}; at most {self.info['gap']:.3g} nats below the best"
+            groups = f"{n:.0f} assignments not proven optimal"
+            text = f"{groups}; at most {self.info['gap']:.3g} nats below the optimum"
             rows.append(("approximated", text))
         if self.info.get("unguarded_groups", 0) > 0:
-            text = (
-                f"{self.info['unguarded_groups']:.0f} groups too large: moved by their best event"
-            )
-            rows.append(("guard against coalescence", text))
+            n = self.info["unguarded_groups"]
+            text = f"{n:.0f} groups too large for the guard against coalescence"
+            rows.append(("approximated", text))
         return rows
 
     def to_dict(self) -> dict[str, Any]:
-        """Give the figures as plain values."""
+        """Return the figures as plain values."""
         return dataclasses.asdict(self)
 
 
 def stitching_rows(info: Mapping[str, float]) -> list[tuple[str, str]]:
-    """Give what was made of fragments, if anything was."""
+    """Return the result of stitching as rows of the printed table; empty without stitching."""
     if "joins" not in info:
         return []
-    text = f"{info['joins']:.0f} times; {info['cuts']:.0f} links cut, {info['ghosts']:.0f} ghosts"
-    return [("markers found again", text)]
+    text = f"{info['joins']:.0f} joins, {info['cuts']:.0f} links cut, {info['ghosts']:.0f} ghosts"
+    return [("stitching", text)]
 
 
 def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> Summary:
-    """Count what a tracking did.
+    """Compute the figures of a finished tracking.
 
     Parameters
     ----------
     tracks : Tracks
-        The result of `track`, over a `Capture`.
+        Result of `track` for a `Capture`.
     out : Path
-        The file it went to.
+        File of the result.
     method : str
-        The method.
+        Name of the method.
     seconds : float
-        Time that it took.
+        Running time.
     """
     d = tracks.detections
     assert isinstance(d, am.Capture)
@@ -166,7 +165,7 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
         log_posterior=log_posterior if math.isfinite(log_posterior) else None,
         n_doubtful=None
         if tracks.confidence is None
-        else int((tracks.confidence[order] < DOUBTFUL).sum()),
+        else int((tracks.confidence[order] < UNCERTAIN).sum()),
         info=info,
         truncated=d.truncated,
     )

@@ -1,4 +1,4 @@
-"""From a capture and a recipe to a result file and, where asked for, a run folder."""
+"""Track a capture by a recipe, and write the result and the run folder."""
 
 from __future__ import annotations
 
@@ -23,31 +23,31 @@ __all__ = ["carry_out", "default_output", "output_format"]
 
 log = logging.getLogger(__name__)
 
-# A log of point clouds has no place for identities.
+# A log of point clouds cannot hold labels.
 _WITHOUT_TRACKS = ("pointcloud",)
 
 
 def output_format(
     out: Path | None, name: str | None, source: str = "c3d", *, option: str = "--out"
 ) -> str:
-    """Choose the format of a result.
+    """Return the format of a result.
 
     Parameters
     ----------
     out : Path or None
-        The file to write, where it is known.
+        File to write; None if its name follows from the format.
     name : str or None
-        The format, where it was asked for.
+        Format that the user gives; None if it follows from `out`.
     source : str
-        Format of the capture, which decides where neither does.
+        Format of the capture, used without `name` and `out`.
     option : str
-        The option that names the file, for the messages.
+        Option of the file, for the messages.
 
     Returns
     -------
     str
-        As asked for, or told by the name of the file, or that of the capture; where that cannot be
-        written C3D, and where it has no place for tracks CSV.
+        `name`, or the format with the ending of `out`, or that of the capture. A capture in a
+        format that cannot be written gives C3D, one that cannot hold tracks CSV.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def output_format(
 
 
 def default_output(source: Path, format: str) -> Path:
-    """Name the result after the capture: ``trial.tracked.c3d`` beside ``trial.c3d``."""
+    """Return the default path of a result: ``trial.tracked.c3d`` beside ``trial.c3d``."""
     endings = am.io.CAPTURE_FORMATS[format].extensions
     ending = source.suffix if source.suffix.lower() in endings else endings[0]
     return source.with_name(f"{source.stem}.tracked{ending}")
@@ -83,18 +83,18 @@ def default_output(source: Path, format: str) -> Path:
 def carry_out(
     run: Run, capture: am.Capture, out: Path, folder: Path | None
 ) -> tuple[am.Tracks, Summary]:
-    """Track, and write the result and, where a folder is given, the run's files.
+    """Track a capture, and write the result and the files of the run.
 
     Parameters
     ----------
     run : Run
-        What to do.
+        Recipe and format.
     capture : Capture
-        The capture of the run.
+        Capture of the run.
     out : Path
-        The file to write.
+        File of the result.
     folder : Path or None
-        An existing folder for ``run.toml``, ``log.txt`` and ``summary.json``.
+        Existing folder for ``run.toml``, ``log.txt`` and ``summary.json``; None for no such files.
 
     Returns
     -------
@@ -114,13 +114,13 @@ def _carry_out(run: Run, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
     for warning in capture.warnings:
         log.info("%s: %s", capture.path, warning)
     if recipe.chosen:
-        log.info("method chosen: %s", recipe.chosen)
+        log.info("method selected: %s", recipe.chosen)
     log.info(
         "tracking %s (%d frames) with %s %s",
         capture.path, capture.n_frames, recipe.method, recipe.options,
     )  # fmt: skip
     method = am.tracking.method_by_name(recipe.method, **recipe.options)
-    method.init(recipe.model, n_axes=capture.n_axes)  # loads the engine before the clock starts
+    method.init(recipe.model, n_axes=capture.n_axes)  # loads the engine before the time is measured
     start = time.perf_counter()
     with progress(f"tracking with {recipe.method}", capture.n_frames) as advance:
         tracks = am.track(
@@ -130,7 +130,8 @@ def _carry_out(run: Run, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
     seconds = time.perf_counter() - start
     if capture.n_points and not tracks.n_tracks:
         log.warning(
-            "%s: no track was confirmed, all points are clutter; does the model fit the capture?",
+            "%s: no track was confirmed, so that all points are clutter. Check the model (asterism "
+            "estimate) and the unit of length.",
             capture.path,
         )
     am.write(tracks, out, format=run.format)

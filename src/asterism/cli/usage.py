@@ -1,4 +1,4 @@
-"""Errors of the command line itself, an option misspelt say, told in the one line of all others."""
+"""Errors in the arguments of the command line, in the form of all other messages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from asterism.errors import ParameterError
 
 __all__ = ["run_command"]
 
-# The parser's errors have no public name of their own in Typer: the base of one that has.
+# Typer has no public name for the base class of its parser's errors.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 _KINDS = {"int_parsing": "a whole number", "float_parsing": "a number"}
 
@@ -23,22 +23,22 @@ def run_command(command: Any, arguments: list[str] | None) -> None:
     Parameters
     ----------
     command : click command
-        Of the whole command line.
+        Command of the whole program.
     arguments : list of str or None
-        What follows the name of the program; those of the process unless given.
+        Arguments after the name of the program. None stands for those of the process.
 
     Raises
     ------
     ParameterError
-        Where the arguments fit no command.
+        If the arguments do not fit the command.
     SystemExit
-        Where a command ends with a code of its own.
+        If a command ends with an exit code.
     """
     try:
         code = command(args=arguments, prog_name="asterism", standalone_mode=False)
     except _UsageError as error:
         message = str(getattr(error, "message", error))
-        if type(error).__name__ == "NoArgsIsHelpError":  # which has printed the help
+        if type(error).__name__ == "NoArgsIsHelpError":  # it has printed the help
             raise SystemExit(2) from None
         _diagnose(error, message)
         where = _command(error)
@@ -48,13 +48,13 @@ def run_command(command: Any, arguments: list[str] | None) -> None:
 
 
 def _command(error: Any) -> str:
-    """Name the command; the program itself is named before every message."""
+    """Return the name of the command; every message begins with the program's name anyway."""
     path = "asterism" if error.ctx is None else error.ctx.command_path
     return path.partition(" ")[2] or "COMMAND"
 
 
 def _diagnose(error: Any, message: str) -> None:
-    """Raise what is known of an error in the words of the library."""
+    """Raise the error in the form of the library's messages, if its cause is known."""
     command: Any = None if error.ctx is None else error.ctx.command
     if hasattr(error, "possibilities"):
         every = [name for p in command.params for name in p.opts if name.startswith("--")]

@@ -1,4 +1,4 @@
-"""``asterism bonds``: which markers of a take keep their distances."""
+"""``asterism bonds``: the marker set of a capture, and its rigid clusters."""
 
 from __future__ import annotations
 
@@ -15,11 +15,9 @@ if TYPE_CHECKING:
 
 __all__ = ["bond_figures", "bond_rows", "bonds"]
 
-_In = Annotated[Path, typer.Argument(metavar="IN", help="Tracks, labelled where names matter.")]
-_Out = Annotated[
-    Path | None, typer.Option("--out", "-o", help="File to write, TOML; none by default.")
-]
-_Neighbours = Annotated[int, typer.Option(help="Bonds of each marker, the steadiest.")]
+_In = Annotated[Path, typer.Argument(metavar="IN", help="Capture with named tracks.")]
+_Out = Annotated[Path | None, typer.Option("--out", "-o", help="Marker set to write, TOML.")]
+_Neighbours = Annotated[int, typer.Option(help="Largest number of bonds per marker.")]
 
 
 def bonds(
@@ -30,9 +28,9 @@ def bonds(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Learn which markers keep their distances, and which of them are rigid clusters.
+    """Find the markers that keep their mutual distance, and the rigid clusters.
 
-    What is written can be used with the next take of the same body: `asterism name`.
+    `asterism name` names the tracks of another capture of the same subject by the file.
 
     For example:
 
@@ -66,13 +64,13 @@ def bonds(
         print_json({"input": str(source), "output": written} | figures)
     elif not quiet:
         rows = [("markers", str(len(found.names))), *bond_rows(found)]
-        rows += [("left out", f"{n_unnamed} tracks without a name")] if n_unnamed else []
+        rows += [("not used", f"{n_unnamed} tracks without a name")] if n_unnamed else []
         rows += [("written", str(out))] if out is not None else []
         print_table(rows, title="Bonds")
 
 
 def bond_figures(found: am.tracking.Bonds) -> dict[str, Any]:
-    """Give what was learnt as plain values."""
+    """Return the bonds and clusters as plain values."""
     return {
         "n_bonds": len(found.pairs),
         "n_rigid": int(found.rigid.sum()),
@@ -81,7 +79,7 @@ def bond_figures(found: am.tracking.Bonds) -> dict[str, Any]:
 
 
 def bond_rows(found: am.tracking.Bonds) -> list[tuple[str, str]]:
-    """Give what was learnt as people read it."""
+    """Return the bonds and clusters as rows of the printed table."""
     rows = [("bonds", f"{len(found.pairs)}, {int(found.rigid.sum())} rigid")]
     for n, cluster in enumerate(found.clusters):
         inside = [i in cluster and j in cluster for i, j in found.pairs]

@@ -1,4 +1,4 @@
-"""``asterism camera``: what a calibration holds, whether it can be right, and its conversion."""
+"""``asterism camera``: description, conversion and check of calibrations."""
 
 from __future__ import annotations
 
@@ -29,28 +29,30 @@ __all__ = ["app"]
 
 app = typer.Typer(
     name="camera",
-    help="Look at calibrations of cameras, check them, and turn them into other formats.",
+    help="Describe, check and convert calibrations of cameras.",
     no_args_is_help=True,
 )
 
-_Out = Annotated[Path, typer.Argument(metavar="OUT", help="File, or new folder, to write.")]
+_Out = Annotated[Path, typer.Argument(metavar="OUT", help="File or new folder to write.")]
 _Format = Annotated[
     str | None,
-    typer.Option("--format", metavar="FORMAT", help="Format to write; by the name, if not given."),
+    typer.Option(
+        "--format", metavar="FORMAT", help="Format to write.", show_default="from the name"
+    ),
 ]
 _LensOption = Annotated[
     str,
     typer.Option(
         "--lens",
         metavar="auto|brown|vicon|report|none",
-        help="Lens to fit; auto: as it is, unless the format cannot hold it.",
+        help="Lens model to write. auto keeps the lens unless the format cannot hold it.",
     ),
 ]
 _Points = Annotated[
     list[str] | None,
     typer.Option(
         metavar="[CAMERA=]FILE",
-        help="Known points and their pixels; may be given several times.",
+        help="Known points and their pixels; may be repeated.",
         show_default=False,
     ),
 ]
@@ -70,10 +72,10 @@ def info(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Say what each camera of a calibration is, where it stands, and what the rig sees.
+    """Describe the cameras of a calibration: lens, position, direction and field of view.
 
-    Angles are degrees, lengths metres. The shift is the farthest that the lens moves a pixel of
-    the image; the reach is how much of the image the lens model covers.
+    Angles are in degrees, lengths in metres. The shift is the largest displacement of a pixel by
+    the lens. The reach is the share of the image for which the lens model is valid.
 
     For example:
 
@@ -131,10 +133,10 @@ def convert(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Write a calibration in another format, fitting lenses that it cannot hold.
+    """Write a calibration in another format; lenses that it cannot hold are fitted.
 
-    Each camera's line says how many pixels the fitted camera is off over its image, root mean
-    square and farthest; a camera that went over as it is has no figures.
+    The table lists the error of each fitted camera over its image in pixels, root mean square and
+    maximum. A camera that is written without a fit has no error.
 
     For example:
 
@@ -176,7 +178,7 @@ def convert(
                     "warnings": list(rig.warnings)})  # fmt: skip
     elif not quiet:
         rows = [
-            (c["name"], c["lens"], "as it is", "") if c["rms_px"] is None
+            (c["name"], c["lens"], "not fitted", "") if c["rms_px"] is None
             else (c["name"], c["lens"], f"{c['rms_px']:.3g}", f"{c['max_px']:.3g}")
             for c in changes
         ]  # fmt: skip
@@ -213,17 +215,17 @@ def check(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Say whether a calibration can be right; exit with 1 if it cannot.
+    """Check a calibration for errors; exit code 1 if a check fails.
 
-    With known points, say how far from their pixels the cameras see them. A file of points is a
-    CSV with the columns camera, x, y, z, u, v (metres), or belongs to one camera: "X Y Z 1 u v 1"
-    as flydra writes it, or "u v X Y Z" as MyPTV does (millimetres).
+    With --points, the reprojection errors of known points are checked too. A file of points is a
+    CSV with the columns camera, x, y, z, u, v (metres), or it belongs to one camera: "X Y Z 1 u v
+    1" as flydra writes it, or "u v X Y Z" as MyPTV writes it (millimetres).
 
     For example:
 
         asterism camera check walk.xcp
 
-        asterism camera check calibration --points cam1.points4cal.dat --points cam2.points4cal.dat
+        asterism camera check rig --points cam1=one.dat --points cam2=two.dat
 
         asterism camera check rig.toml --points wand.csv --max-px 0.5
     """
@@ -251,15 +253,15 @@ def check(
 def _print_checks(
     checks: list[Check], errors: list[dict[str, Any]], warnings: tuple[str, ...]
 ) -> None:
-    print_table([(c.name, c.status, c.detail) for c in checks], ("check", "result", ""))
+    print_table([(c.name, c.status, c.detail) for c in checks], ("check", "result", "detail"))
     if errors:
-        columns = ("camera", "points", "unseen", "median px", "95 % px", "worst px")
+        columns = ("camera", "points", "not seen", "median px", "95 % px", "max px")
         rows = [
             (e["camera"], e["n_points"], e["n_unseen"], *(f"{e[k]:.3f}" for k in (
                 "median_px", "percentile_95_px", "worst_px")))
             for e in errors
         ]  # fmt: skip
-        print_table(rows, columns, title="reprojection")
+        print_table(rows, columns, title="\nReprojection errors")
     if warnings:
         print_table(_warnings(warnings))
 

@@ -1,4 +1,4 @@
-"""``asterism camera map``: how exactly a rig places points, and where one more camera helps."""
+"""``asterism camera map``: error of triangulation over a volume, and places for one more camera."""
 
 from __future__ import annotations
 
@@ -27,22 +27,26 @@ if TYPE_CHECKING:
 __all__ = ["map_"]
 
 _Picture = Annotated[
-    Path | None, typer.Option("--out", "-o", metavar="FILE.png", help="Picture to write.")
+    Path | None, typer.Option("--out", "-o", metavar="FILE.png", help="Figure to write.")
 ]
 _Low = Annotated[
     str | None,
-    typer.Option(metavar="X,Y,Z", help="Corner of the volume, metres.", show_default="by the rig"),
+    typer.Option(
+        metavar="X,Y,Z", help="Lower corner of the volume, m.", show_default="from the rig"
+    ),
 ]
 _High = Annotated[
     str | None,
-    typer.Option(metavar="X,Y,Z", help="The other corner.", show_default="by the rig"),
+    typer.Option(
+        metavar="X,Y,Z", help="Upper corner of the volume, m.", show_default="from the rig"
+    ),
 ]
 _Spacing = Annotated[
     float | None,
-    typer.Option(help="Between the places looked at, metres.", show_default="a twelfth"),
+    typer.Option(help="Spacing of the grid, metres.", show_default="a twelfth of the longest edge"),
 ]
-_Sigma = Annotated[float, typer.Option(help="Noise of an image point, pixels.")]
-_Suggest = Annotated[int, typer.Option(help="How many places for one more camera to suggest.")]
+_Sigma = Annotated[float, typer.Option(help="Standard deviation of an image point, pixels.")]
+_Suggest = Annotated[int, typer.Option(help="Number of suggested places for one more camera.")]
 
 
 def map_(
@@ -59,9 +63,9 @@ def map_(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Say how exactly a rig can place a point in its volume, and where one more camera helps most.
+    """Map the error of triangulation over a volume, and suggest places for one more camera.
 
-    The picture shows the middle level from above. z is taken as up.
+    The figure shows the middle level of the volume from above; the z axis points up.
 
     For example:
 
@@ -130,8 +134,8 @@ def _print_map(values: dict[str, Any], title: str) -> None:
             ("seen by two cameras or more", f"{values['seen_by_two_percent']:.1f} %"),
             ("error where seen", f"{values['median_error_mm']:.3g} mm median, "
                 f"{values['percentile_95_error_mm']:.3g} mm in 95 %"),
-            ("over the volume", f"{values['rms_error_mm']:.3g} mm root mean square, where a place "
-                "that is not seen is as unsure as the volume is wide"),
+            ("over the volume", f"{values['rms_error_mm']:.3g} mm root mean square; a place "
+                "without two cameras counts with the width of the volume"),
         ],
         title=title,
     )  # fmt: skip
@@ -162,7 +166,7 @@ def _corner(option: str, text: str) -> tuple[float, float, float]:
 
 
 def _default_box(rig: Rig) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Give a box about where the cameras look, half as wide each way as they stand from it."""
+    """Return a box around the point at which the cameras look, as wide as their median distance."""
     import numpy as np
 
     from asterism.multiview.rig_info import meeting_point
@@ -191,7 +195,7 @@ def _map_picture(found: TriangulationMap, rig: Rig) -> Figure:
         axes.scatter(*places[:, :2].T, s=24, c=INK, edgecolors="white", label="cameras")
         if found.suggestions:
             more = np.stack([s.camera.center for s in found.suggestions])
-            axes.scatter(*more[:, :2].T, s=60, c=WRONG, marker="*", label="one more would help")
+            axes.scatter(*more[:, :2].T, s=60, c=WRONG, marker="*", label="suggested camera")
         axes.legend(
             loc="upper left", bbox_to_anchor=(0, -0.1), ncols=2, fontsize=8, frameon=False,
             labelcolor=INK,

@@ -1,4 +1,4 @@
-"""``asterism chain``: a scene through cameras, back into space, tracked; scored at each stage."""
+"""``asterism chain``: simulation, filming, reconstruction and tracking, scored at each stage."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ if TYPE_CHECKING:
 
 _Scene = Annotated[str, typer.Argument(metavar="SCENE", help="One of `asterism scenes`.")]
 _Rig = Annotated[
-    str, typer.Option("--rig", metavar="RIG", help="A calibration, or ring8, wall4 and the like.")
+    str,
+    typer.Option("--rig", metavar="RIG", help="Calibration, or a layout such as ring8 or wall4."),
 ]
 _Out = Annotated[
     Path | None,
-    typer.Option("--out", "-o", metavar="DIR", help="Folder for what every stage made."),
+    typer.Option("--out", "-o", metavar="DIR", help="Folder for the results of each stage."),
 ]
 _Methods = Annotated[
     list[str] | None,
-    typer.Option("--method", help="Method to track with; may be repeated.", show_default="auto"),
+    typer.Option("--method", help="Tracking method; may be repeated.", show_default="auto"),
 ]
 _Frames = Annotated[int | None, typer.Option(help="Number of frames.", show_default="the scene's")]
-_Rate = Annotated[float | None, typer.Option(help="Frames a second.", show_default="the scene's")]
-_Seed = Annotated[int, typer.Option(help="Chooses everything that is random.")]
+_Rate = Annotated[float | None, typer.Option(help="Frame rate, Hz.", show_default="the scene's")]
+_Seed = Annotated[int, typer.Option(help="Random seed.")]
 _Options = Annotated[
     list[str] | None,
     typer.Option("--option", metavar="NAME=VALUE", help="Option of the scene; may be repeated."),
@@ -38,7 +39,7 @@ _Seeing = Annotated[
     typer.Option(
         "--seeing",
         metavar="NAME=VALUE",
-        help="What the cameras make of markers, as in `asterism film`; may be repeated.",
+        help="Property of the camera images, as in `asterism film`; may be repeated.",
         show_default="noise_px=0.3",
     ),
 ]
@@ -61,11 +62,11 @@ def chain(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Simulate a scene, film it, make points of the image points, track them, and score all that.
+    """Simulate, film, reconstruct and track a scene, and score each stage.
 
-    2-D: what the cameras saw of the markers. 3-D: which of the markers that two cameras or more
-    saw were found, ghosts, errors, and whether the covariance is honest. Identity: how well each
-    method keeps the markers apart.
+    2-D: share of the markers that the cameras see. 3-D: share of the visible markers that are
+    reconstructed, ghosts, errors and consistency of the covariance. Identity: scores of each
+    tracking method.
 
     For example:
 
@@ -73,7 +74,7 @@ def chain(
 
         asterism chain person --rig ring4 --prior
 
-        asterism chain two_people --rig ring8 --seeing false=0.5 --seeing noise_px=0.3 -o chain
+        asterism chain two_people --rig ring8 --seeing false=0.5 -o chain
     """
     import asterism as am
     from asterism.checks import check_fields
@@ -117,15 +118,15 @@ def chain(
         print_table([
             (scene, n_markers),
             ("seen by one camera or more", f"{two_d['seen_by_one_percent']:.2f} %"),
-            ("by two or more", f"{two_d['seen_by_two_percent']:.2f} %"),
+            ("seen by two or more", f"{two_d['seen_by_two_percent']:.2f} %"),
             ("image points", f"{o.n_points}, {two_d['n_false']} of them false"),
         ], title="2-D")  # fmt: skip
         print_table([
             *about(made, o),
-            ("found, of those seen by two", f"{100 * scores.recall:.2f} %"),
+            ("recall, of those seen by two", f"{100 * scores.recall:.2f} %"),
             ("ghosts", f"{100 * scores.ghosts:.2f} % of the points"),
             ("error", f"{scores.median_mm:.3g} mm median, {scores.p95_mm:.3g} mm in 95 %"),
-            ("squared error by covariance", f"{scores.nees:.3g} (1 if it is honest)"),
+            ("NEES per coordinate", f"{scores.nees:.3g} (1 if the covariance is right)"),
             ("speed", f"{o.n_frames / seconds:.0f} frames/s"),
         ], title="\n3-D")  # fmt: skip
         print_table([
@@ -133,13 +134,13 @@ def chain(
             for name, s in identity.items()
         ], ("method", "IDF1", "switches", "MOTA", "tracks"), title="\nIdentity")  # fmt: skip
         if AUTO in tracks and (recipe := tracks[AUTO].recipe) is not None:
-            print_table([("chosen", recipe.chosen)])
+            print_table([("auto", recipe.chosen)])
         if out is not None:
             print_table([("written", out)])
 
 
 def _tracked(detections: am.Detections, names: list[str], seed: int) -> dict[str, am.Tracks]:
-    """Track with every method, by one model."""
+    """Track with every method, on one model."""
     import asterism as am
 
     model = am.estimate_model(detections).model
@@ -152,7 +153,7 @@ def _tracked(detections: am.Detections, names: list[str], seed: int) -> dict[str
 
 
 def _image_figures(shot: am.simulate.Film) -> dict[str, float]:
-    """Count what the cameras saw of the markers."""
+    """Count image points and the share of the markers that are seen."""
     import asterism as am
 
     markers = shot.observations.markers
@@ -167,7 +168,7 @@ def _image_figures(shot: am.simulate.Film) -> dict[str, float]:
 
 
 def _write(out: Path, observations: Any, rig: Any, who: Any, tracks: dict[str, Any]) -> None:
-    """Write what every stage made."""
+    """Write the results of each stage."""
     import numpy as np
 
     import asterism as am

@@ -1,4 +1,4 @@
-"""``asterism corrupt``: a labelled capture becomes an experiment with known truth."""
+"""``asterism corrupt``: an experiment with a known truth, from a labelled capture."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from asterism.errors import ParameterError
 log = logging.getLogger(__name__)
 
 _In = Annotated[Path, typer.Argument(metavar="IN", help="Labelled capture.")]
-_Out = Annotated[Path, typer.Option("--out", "-o", help="File for the points without names.")]
+_Out = Annotated[Path, typer.Option("--out", "-o", help="File for the points, without names.")]
 _Truth = Annotated[Path, typer.Option(help="File for the same points with their true names.")]
-_Missing = Annotated[float, typer.Option(help="Probability that a detection is dropped.")]
-_Clutter = Annotated[float, typer.Option(help="False points a frame, as a share of the markers.")]
+_Missing = Annotated[float, typer.Option(help="Probability that a detection is missed.")]
+_Clutter = Annotated[float, typer.Option(help="False alarms per frame, as a share of the markers.")]
 _Noise = Annotated[float, typer.Option(help="Standard deviation of added noise, metres.")]
 _Burst = Annotated[
     str | None,
     typer.Option(
         metavar="N[:MIN-MAX]",
-        help="Hide up to N markers at a time, for MIN to MAX frames.",
+        help="Occlude up to N markers at a time, for MIN to MAX frames.",
         show_default=False,
     ),
 ]
@@ -31,21 +31,21 @@ _Ghosts = Annotated[
     str | None,
     typer.Option(
         metavar="N[:MIN-MAX]",
-        help="Add up to N false points at a time beside markers, for MIN to MAX frames.",
+        help="Add up to N ghosts at a time beside markers, for MIN to MAX frames.",
         show_default=False,
     ),
 ]
-_Stride = Annotated[int, typer.Option(help="Keep every so many frames.")]
+_Stride = Annotated[int, typer.Option(help="Keep every STRIDE-th frame.")]
 _Corruption = Annotated[
     list[str] | None,
     typer.Option(
         "--corrupt",
         metavar="NAME=VALUE",
-        help="What else goes wrong (missing_run, noise_spread, visits, nearby, doubled, merged, "
+        help="Other corruption (missing_run, noise_spread, visits, nearby, doubled, merged, "
         "dropped, jitter …); may be repeated.",
     ),
 ]
-_Seed = Annotated[int, typer.Option(help="Chooses everything that is random.")]
+_Seed = Annotated[int, typer.Option(help="Random seed.")]
 
 
 def corrupt(
@@ -64,13 +64,13 @@ def corrupt(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Make an experiment of a labelled capture: spoil it, shuffle it, and keep the truth.
+    """Corrupt a labelled capture; write its points without labels, and the truth.
 
-    Points that belong to no named marker are left out: nobody knows whose they are.
+    Points without a named marker are left out, because their truth is unknown.
 
     For example:
 
-        asterism corrupt walk.c3d -o spoilt.c3d --truth truth.c3d
+        asterism corrupt walk.c3d -o corrupted.c3d --truth truth.c3d
 
         asterism corrupt walk.c3d -o a.csv --truth t.csv --missing 0.1
 
@@ -90,7 +90,7 @@ def corrupt(
     with as_options({"path": "--truth"}):
         format_to_write(truth, None)
     check_outputs({"--out": out, "--truth": truth}, [source], overwrite=overwrite)
-    hiding = None if burst is None else episode("--burst", Burst, burst)
+    occlusions = None if burst is None else episode("--burst", Burst, burst)
     ghost_episodes = None if ghosts is None else episode("--ghosts", Ghosts, ghosts)
     more = switches_from(corruption or [])
     known = am.io.read_tracks(source)
@@ -101,39 +101,43 @@ def corrupt(
         "missing": missing,
         "clutter": clutter,
         "noise": noise,
-        "burst": hiding,
+        "burst": occlusions,
         "ghosts": ghost_episodes,
         "stride": stride,
     }
     extent = float(np.ptp(known.detections.points, axis=0).max(initial=0.0))
     if noise > extent / 10:
-        log.warning("--noise %g: metres; the markers are within %.3g m", noise, extent)
+        log.warning(
+            "--noise: expected metres, found %g; the markers span only %.3g m",
+            noise, extent,
+        )  # fmt: skip
     options = {name: f"--{name}" for name in ("seed", *switches)}
     with as_options(options | {name: f"--corrupt {name}" for name in more}):
-        spoilt = am.simulate.corrupt(known, **switches | more, seed=seed)
+        corrupted = am.simulate.corrupt(known, **switches | more, seed=seed)
     unnamed = am.Tracks(
-        detections=spoilt.detections, labels=np.full(spoilt.detections.n_points, -1)
+        detections=corrupted.detections, labels=np.full(corrupted.detections.n_points, -1)
     )
-    am.write(spoilt, truth)
+    am.write(corrupted, truth)
     am.write(unnamed, out)
     measured = known.measured()
     is_marker = np.array([name is not None for name in measured.names], dtype=bool)
     n_of_markers = int(measured.lengths[is_marker if is_marker.any() else slice(None)].sum())
     figures = {
-        "n_frames": spoilt.detections.n_frames,
-        "n_markers": spoilt.n_tracks,
-        "n_detections": spoilt.detections.n_points,
-        "n_dropped": n_of_markers - int((spoilt.labels >= 0).sum()),
+        "n_frames": corrupted.detections.n_frames,
+        "n_markers": corrupted.n_tracks,
+        "n_detections": corrupted.detections.n_points,
+        "n_dropped": n_of_markers - int((corrupted.labels >= 0).sum()),
         "n_unnamed": measured.detections.n_points - n_of_markers,
-        "n_clutter": int((spoilt.labels < 0).sum()),
+        "n_clutter": int((corrupted.labels < 0).sum()),
     }
     if json:
-        record = spoilt.record
+        record = corrupted.record
         print_json({"output": str(out), "truth": str(truth), "corruption": record, **figures})
     elif not quiet:
         about = {
-            "n_dropped": "detections of markers dropped",
+            "n_dropped": "missed detections",
             "n_unnamed": "unnamed points left out",
+            "n_clutter": "false alarms",
         }
         rows = [(about.get(name, name.removeprefix("n_")), n) for name, n in figures.items()]
         print_table([*rows, ("without names", out), ("truth", truth)])

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import asterism as am
 
 _Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the files.")]
-_Seed = Annotated[int, typer.Option(help="Chooses everything that is random.")]
+_Seed = Annotated[int, typer.Option(help="Random seed.")]
 
 _N_MARKERS, _N_FRAMES, _RATE = 20, 300, 100.0
 _ABOUT = (
@@ -39,8 +39,8 @@ def demo(
 ) -> None:
     """Simulate a capture, corrupt it, track it with each method, score and draw the results.
 
-    The first result is that of `auto`, which selects a method from the capture. The other methods
-    are there for comparison, on the same model. Each run has a folder of its own.
+    The method `auto` selects one of the others from the capture. All of them use the same model.
+    The files of each method are in a folder of its own.
 
     For example:
 
@@ -88,7 +88,7 @@ def demo(
 
 
 def _experiment(out: Path, seed: int) -> am.Tracks:
-    """Write the capture and its truth; give the truth."""
+    """Write the capture and its truth, and return the truth."""
     import numpy as np
 
     import asterism as am
@@ -99,8 +99,8 @@ def _experiment(out: Path, seed: int) -> am.Tracks:
         scene, missing=0.1, clutter=0.1, noise=3e-4, burst=Burst(n=2, shortest=3, longest=10),
         seed=seed,
     )  # fmt: skip
-    nobody = np.full(truth.detections.n_points, -1)
-    unnamed = am.Tracks(detections=truth.detections, labels=nobody)
+    clutter = np.full(truth.detections.n_points, -1)
+    unnamed = am.Tracks(detections=truth.detections, labels=clutter)
     for ending in ("c3d", "csv"):
         am.write(truth, out / f"truth.{ending}")
         am.write(unnamed, out / f"capture.{ending}")
@@ -170,13 +170,13 @@ def _print(
     each = "{" + ",".join(scores) + "}"
     print_table(
         [
-            (out / "summary.md", "scores, model and pictures on one page"),
+            (out / "summary.md", "scores, model and figures on one page"),
             (out / "capture.c3d", "the detections, without names (and capture.csv)"),
             (out / "truth.c3d", "the same points with their true names (and truth.csv)"),
             (out / "model.toml", "the model that was estimated"),
             (out / each / "tracked.c3d", "the results (and tracked.csv)"),
-            (out / each / "*.png", "trajectories, presence of each track, errors"),
-            (out / each / "run.toml", "all that is needed to repeat the run"),
+            (out / each / "*.png", "figures of trajectories, presence and errors"),
+            (out / each / "run.toml", "everything that repeats the run"),
         ],
         title="\nFiles",
     )

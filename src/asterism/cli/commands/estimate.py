@@ -1,4 +1,4 @@
-"""``asterism estimate``: the model from the clip."""
+"""``asterism estimate``: the tracking model of a capture."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import typer
 
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
 
-_In = Annotated[Path, typer.Argument(metavar="IN", help="Capture.")]
-_Out = Annotated[Path | None, typer.Option("--out", "-o", help="TOML file for the model.")]
+_In = Annotated[Path, typer.Argument(metavar="IN", help="Capture, with or without labels.")]
+_Out = Annotated[Path | None, typer.Option("--out", "-o", help="Model to write, TOML.")]
 
 _Open = Annotated[
     bool,
     typer.Option(
-        "--open", help="Markers come and go for good: learn how often, from drawn partitions."
+        "--open", help="Open population: estimate how often markers enter and leave the volume."
     ),
 ]
 _Runs = Annotated[
     bool,
-    typer.Option("--runs", help="Misses may come in runs: learn how likely one ends."),
+    typer.Option("--runs", help="Estimate how long bursts of missed detections last."),
 ]
 
 
@@ -33,9 +33,9 @@ def estimate(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Estimate noise, motion, misses and clutter from the points themselves.
+    """Estimate the tracking model of a capture: noise, motion, detection and clutter.
 
-    Each figure is told with what it was read off; `asterism track --model` takes the file.
+    The table lists each parameter with its source. `asterism track --model` uses the file.
 
     For example:
 

@@ -1,4 +1,4 @@
-"""``asterism evaluate``: how good labels are."""
+"""``asterism evaluate``: scores of labels against the truth."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from asterism.errors import ParameterError
 if TYPE_CHECKING:
     import asterism as am
 
-_Labels = Annotated[Path, typer.Argument(metavar="LABELS", help="What was found.")]
-_Truth = Annotated[Path, typer.Argument(metavar="TRUTH", help="What is so.")]
+_Labels = Annotated[Path, typer.Argument(metavar="LABELS", help="Tracks to score.")]
+_Truth = Annotated[Path, typer.Argument(metavar="TRUTH", help="True tracks of the detections.")]
 _ByFrame = Annotated[
     Path | None, typer.Option(metavar="FILE.csv", help="Write the scores frame by frame.")
 ]
@@ -30,15 +30,15 @@ def evaluate(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Score labels against the truth, detection by detection.
+    """Score tracks against the truth: IDF1, MOTA, HOTA and identity switches.
 
-    Both files must hold the same detections, whatever their formats: those at the same time and
-    place are the same. In the truth, points without a name are clutter; in the labels only where
-    the format has no other word for clutter (TRC, TSV, a row a frame).
+    Both files must hold the same detections, in any format; detections are matched by time and
+    position. In the truth, points without a name are clutter. In the tracks they are clutter only
+    where the format cannot mark clutter (TRC, TSV, CSV with one row per frame).
 
     For example:
 
-        asterism evaluate spoilt.tracked.c3d truth.c3d
+        asterism evaluate trial.tracked.c3d truth.c3d
 
         asterism evaluate tracks.csv truth.c3d --json --by-frame frames.csv
     """

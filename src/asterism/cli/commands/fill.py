@@ -1,4 +1,4 @@
-"""``asterism fill``: tracks with gaps in, tracks without out."""
+"""``asterism fill``: positions for the gaps of tracks."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from asterism.errors import ParameterError
 if TYPE_CHECKING:
     import asterism as am
 
-_In = Annotated[Path, typer.Argument(metavar="IN", help="Tracks whose gaps are to be filled.")]
+_In = Annotated[Path, typer.Argument(metavar="IN", help="Capture with tracks.")]
 _Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
-_Longest = Annotated[float, typer.Option(help="Longer gaps are left, seconds.")]
+_Longest = Annotated[float, typer.Option(help="Longest gap that is filled, seconds.")]
 _Model = Annotated[
     Path | None,
-    typer.Option(help="Model to use, TOML; by default it is estimated from IN."),
+    typer.Option(help="Model, TOML.", show_default="estimated from IN"),
 ]
 _Unflagged = Annotated[
     bool,
     typer.Option(
         "--unflagged",
-        help="Write a format in which nothing tells filled points from measured ones.",
+        help="Allow a format that cannot mark filled points.",
     ),
 ]
 _MOST = 10  # gaps that are shown
@@ -43,11 +43,11 @@ def fill(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Fill the gaps of tracks, and say how sure each fill is.
+    """Fill the gaps of tracks, with a standard deviation for each gap.
 
-    A marker's own motion, the body it sits on and all other markers tell where it was; where as
-    much was hidden on purpose shows which of them to believe. Filled points are flagged: in C3D by
-    residual 0, in CSV by a column. What was filled before is left out first.
+    Positions are estimated from the marker's own motion, its rigid cluster and all other markers.
+    Artificial gaps in measured frames give the weight of each estimator. Filled points are marked:
+    in C3D by residual 0, in CSV by a column. Earlier fills are removed first.
 
     For example:
 
@@ -65,7 +65,7 @@ def fill(
     if not (am.io.CAPTURE_FORMATS[format].keeps_filled or unflagged):
         able = ", ".join(name for name, f in am.io.CAPTURE_FORMATS.items() if f.keeps_filled)
         raise ParameterError(
-            "--out", f"a format that tells filled points from measured ones: {able}", str(out),
+            "--out", f"a format that marks filled points: {able}", str(out),
             "or give --unflagged",
         )  # fmt: skip
     check_outputs({"--out": out}, [source, model], overwrite=overwrite)
@@ -89,12 +89,12 @@ def fill(
         rows = [
             ("gaps", str(figures["n_gaps"])),
             ("filled", f"{figures['n_filled']}, {figures['n_points']} points"),
-            *([("mostly by", by)] if by else []),
+            *([("main estimator", by)] if by else []),
             *[
-                ("" if n else "left", f"{count}, {reason}")
+                ("" if n else "not filled", f"{count}, {reason}")
                 for n, (reason, count) in enumerate(figures["left"].items())
             ],
-            *_least_sure(found, capture),
+            *_least_certain(found, capture),
             ("written", str(out)),
         ]
         print_table(rows, title="Filled")
@@ -113,7 +113,7 @@ def _figures(found: am.tracking.Filling) -> dict[str, Any]:
 
 
 def _plain(gap: am.tracking.FilledGap, capture: am.Capture) -> dict[str, Any]:
-    """Give a gap as plain values, its frames as the file counts them."""
+    """Return a gap as plain values, with the frame numbers of the file."""
     return {
         "track": gap.track,
         "first": capture.first_frame + gap.first,
@@ -129,15 +129,15 @@ def _plain(gap: am.tracking.FilledGap, capture: am.Capture) -> dict[str, Any]:
     }
 
 
-def _least_sure(found: am.tracking.Filling, capture: am.Capture) -> list[tuple[str, str]]:
+def _least_certain(found: am.tracking.Filling, capture: am.Capture) -> list[tuple[str, str]]:
     filled = [gap for gap in found.gaps if gap.is_filled]
     names = found.tracks.names
     return [
         (
-            "" if n else "least sure",
+            "" if n else "least certain",
             f"{names[gap.track] or f'track {gap.track}'}, frames {capture.first_frame + gap.first} "
             f"to {capture.first_frame + gap.last}: ±{1e3 * gap.std:.3g} mm, {gap.estimator}"
-            + ("" if gap.n_windows else " (nowhere in the take could it be tried)"),
+            + ("" if gap.n_windows else " (not validated: no measured frames to test it on)"),
         )
         for n, gap in enumerate(sorted(filled, key=lambda gap: -gap.std)[:_MOST])
     ]

@@ -1,4 +1,4 @@
-"""``asterism film``: markers through a rig of cameras, with the truth of every image point."""
+"""``asterism film``: image points of markers in each camera, with their truth."""
 
 from __future__ import annotations
 
@@ -25,28 +25,28 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _Source = Annotated[
-    str, typer.Argument(metavar="CAPTURE", help="Capture, or one of `asterism scenes`.")
+    str, typer.Argument(metavar="CAPTURE", help="Capture, or a scene of `asterism scenes`.")
 ]
 _Rig = Annotated[
     str,
     typer.Option(
         "--rig",
         metavar="RIG",
-        help="Calibration of the cameras, a file or a folder; or ring8, wall4 and the like: so "
-        "many cameras, placed so that they see everything.",
+        help="Calibration (file or folder), or a layout such as ring8 or wall4: that number of "
+        "cameras, which together cover all markers.",
     ),
 ]
 _Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the files.")]
-_Pictures = Annotated[int, typer.Option(help="Frames to draw in all cameras, spread evenly.")]
+_Pictures = Annotated[int, typer.Option(help="Number of frames that are drawn, evenly spaced.")]
 _Frames = Annotated[
     int | None, typer.Option(help="Number of frames of a scene.", show_default="the scene's")
 ]
 _Rate = Annotated[
-    float | None, typer.Option(help="Frames a second of a scene.", show_default="the scene's")
+    float | None, typer.Option(help="Frame rate of a scene, Hz.", show_default="the scene's")
 ]
 _Seed = Annotated[
     int | None,
-    typer.Option(help="Chooses all that is random in a scene and in --seeing.", show_default="0"),
+    typer.Option(help="Random seed of the scene and of --seeing.", show_default="0"),
 ]
 _Options = Annotated[
     list[str] | None,
@@ -57,14 +57,14 @@ _Seeing = Annotated[
     typer.Option(
         "--seeing",
         metavar="NAME=VALUE",
-        help="What the cameras make of markers (marker_radius, smallest_share, merge, noise_px, "
-        "missing, false, quantum_px, timing); may be repeated. Ideal without it.",
+        help="Property of the camera images (marker_radius, smallest_share, merge, noise_px, "
+        "missing, false, quantum_px, timing); may be repeated. Ideal images without it.",
     ),
 ]
 
 POINTS, RIG, SUMMARY, PICTURES = "observations.csv", "rig.toml", "film.json", "pictures"
 RIG_PICTURE, COVERAGE_PICTURE = "rig.png", "coverage.png"
-_LEAST_SHARE = 0.05  # of the samples seen; under it the cameras are probably of another world
+_MIN_SHARE = 0.05  # of the samples that are seen; below it units or axes probably differ
 
 
 def film(
@@ -81,21 +81,22 @@ def film(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Film markers: what each camera sees of them.
+    """Film a capture or a scene: image points of its markers in each camera.
 
-    Every tracked point of the capture, named or not, is one image point wherever an ideal camera
-    sees it; with --seeing cameras report blobs. In scenes the limbs of people hide what is behind
-    them; a file has no limbs.
-    DIR gets the image points with their truth (observations.csv), the cameras (rig.toml), pictures
-    of what each camera sees, of the rig and of how well it sees, and a summary (film.json).
+    Ideal cameras report one image point for each visible tracked point; with --seeing, images have
+    noise, missing and false points. In scenes the limbs of people occlude markers; a file has no
+    limbs.
+
+    DIR receives the image points with their truth (observations.csv), the cameras (rig.toml),
+    figures of the images, the rig and its coverage, and a summary (film.json).
 
     For example:
 
         asterism film walk.c3d --rig walk.xcp -o film
 
-        asterism film person --rig ring8 -o film --option activity=jump --pictures 10
+        asterism film person --rig ring8 -o film --option activity=jump
 
-        asterism film crossing --rig wall4 -o film --seeing noise_px=0.2 --seeing false=0.5
+        asterism film crossing --rig wall4 -o film --seeing noise_px=0.2
     """
     from asterism.cli.console import to_json
     from asterism.cli.filming import film_all, frames_between
@@ -150,10 +151,10 @@ def film(
         "versions": versions(),
     }
     write_text(out / SUMMARY, to_json(summary) + "\n")
-    if footage.share_seen_by(1) < _LEAST_SHARE:
+    if footage.share_seen_by(1) < _MIN_SHARE:
         log.warning(
-            "%s: only %.3g %% of the points are seen by any camera; do its units and axes fit "
-            "those of %s?", source, 100 * footage.share_seen_by(1), rig,
+            "%s: only %.3g %% of the points are seen by a camera. Compare its units and axes with "
+            "those of %s.", source, 100 * footage.share_seen_by(1), rig,
         )  # fmt: skip
     if json:
         print_json({"folder": str(out), **summary})
@@ -163,14 +164,14 @@ def film(
 
 def _check_points(source: str, points: NDArray[np.float64]) -> None:
     if not len(points):
-        hint = "run asterism track first: it makes tracks of points without names"
+        hint = "run asterism track first"
         raise ParameterError("CAPTURE", "points in tracks", f"{source}, which has none", hint)
     if points.shape[1] != 3:
         raise ParameterError("CAPTURE", "points in 3-D", f"{source}, in {points.shape[1]}-D")
 
 
 def _draw(out: Path, truth: am.Tracks, cameras: am.Rig, sheets: dict[int, tuple[str, str]]) -> None:
-    """Draw the rig, its coverage, and what each camera sees: by frame a file and its title."""
+    """Draw the rig, its coverage and the images; `sheets` has a file and a title by frame."""
     from asterism.cli.film_pictures import contact_sheet, coverage_picture, rig_picture
     from asterism.plot.export import write_figure
 
@@ -188,7 +189,7 @@ def _draw(out: Path, truth: am.Tracks, cameras: am.Rig, sheets: dict[int, tuple[
 def _truth(
     source: str, given: dict[str, Any], texts: list[str], *, is_seeing: bool
 ) -> tuple[am.Tracks, int]:
-    """Make the scene or read the capture; give its tracks and the number of its first frame."""
+    """Make the scene or read the capture; return its tracks and the number of its first frame."""
     import asterism as am
     from asterism.cli.recording import made_scene
 
@@ -212,7 +213,7 @@ def _truth(
         log.warning("%s: %s", path, warning)
     n_clutter = int((tracks.labels < 0).sum())
     if n_clutter and tracks.n_tracks:
-        log.warning("%s: %d points that are in no track are not filmed", path, n_clutter)
+        log.warning("%s: %d points without a track are not filmed", path, n_clutter)
     return tracks, capture.first_frame
 
 
@@ -242,9 +243,9 @@ def _image_points(summary: dict[str, Any]) -> str:
 def _print(out: Path, summary: dict[str, Any]) -> None:
     tracks = f"{summary['n_tracks']} tracks, {summary['n_named']} of them named"
     size = f"{tracks}, {summary['n_frames']} frames"
-    hides = f"{summary['n_surfaces']} surfaces" if summary["n_surfaces"] else "nothing: no surfaces"
+    occluders = f"{summary['n_surfaces']} surfaces" if summary["n_surfaces"] else "none"
     print_table(
-        [(summary["capture"], size), ("rig", summary["about_rig"]), ("hides markers", hides)]
+        [(summary["capture"], size), ("rig", summary["about_rig"]), ("occluders", occluders)]
     )
     cameras: dict[str, dict[str, int]] = summary["cameras"]
     met = [kind for kind in next(iter(cameras.values())) if any(c[kind] for c in cameras.values())]
@@ -256,28 +257,28 @@ def _print(out: Path, summary: dict[str, Any]) -> None:
     ]
     title = "\nMarkers in the images"
     if summary["seeing"] is not None:
-        title += ", as ideal cameras would see them"
+        title += " (ideal cameras)"
     print_table(rows, ("camera", *kinds, "share seen"), title=title)
     pictures = summary["pictures"]
     print_table(
         [
             ("points seen by one or more", f"{summary['seen_by_one_percent']:.1f} %"),
             (
-                "by two or more, as a place in 3-D needs",
+                "points seen by two or more",
                 f"{summary['seen_by_two_percent']:.1f} %",
             ),
-            ("image points in all", _image_points(summary)),
+            ("image points", _image_points(summary)),
         ],
         title="\nAll cameras",
     )
     files = [
-        (out / POINTS, "the image points, with their truth"),
-        (out / RIG, "the cameras"),
-        (out / RIG_PICTURE, "where they stand, and the paths of the markers"),
-        (out / COVERAGE_PICTURE, "how many cameras see a place, and how exactly"),
+        (out / POINTS, "image points, with their truth"),
+        (out / RIG, "cameras"),
+        (out / RIG_PICTURE, "cameras and paths of the markers"),
+        (out / COVERAGE_PICTURE, "number of cameras and error by place"),
         (out / SUMMARY, "these figures"),
     ]
     if pictures:
-        what = f"what each camera sees, in {len(pictures)} frames"
+        what = f"images of all cameras, {len(pictures)} frames"
         files.insert(2, (out / PICTURES / "frame_*.png", what))
     print_table(files, title="\nFiles")

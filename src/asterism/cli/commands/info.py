@@ -1,4 +1,4 @@
-"""``asterism info``: what a file holds, and how hard it is."""
+"""``asterism info``: contents of a capture, and how difficult it is to track."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from asterism.cli.console import Json, Quiet, print_json, print_table
 if TYPE_CHECKING:
     import asterism as am
 
-_File = Annotated[Path, typer.Argument(metavar="FILE", help="Capture to look at.")]
+_File = Annotated[Path, typer.Argument(metavar="FILE", help="Capture to describe.")]
 
 
 def info(file: _File, quiet: Quiet = False, json: Json = False) -> None:
-    """Say what a capture holds, what is odd about it, and how hard its markers are to tell apart.
+    """Describe a capture: markers, gaps, motion, warnings and tracking difficulty.
 
-    Nothing is tracked and nothing written.
+    Nothing is tracked and no file is written.
 
     For example:
 
@@ -42,9 +42,9 @@ def _rows(found: am.io.CaptureInfo) -> list[tuple[str, str]]:
         ("file", f"{f.path} ({f.format}, units {f.units})"),
         ("frames", f"{f.n_frames} from frame {f.first_frame}, {f.rate:g} Hz, {f.duration:.4g} s"),
         ("named markers", f"{f.n_named}"),
-        ("without a name", _unnamed(f)),
+        ("unnamed", _unnamed(f)),
         ("left out", f"{f.n_modelled} computed points"),
-        ("points a frame", f"{f.points_min} to {f.points_max}, {f.points_mean:.4g} on average"),
+        ("points per frame", f"{f.points_min} to {f.points_max}, {f.points_mean:.4g} on average"),
     ]
     if f.n_named:
         gaps = f", median {_number(f.gap_median)}, longest {f.gap_longest} frames"
@@ -61,7 +61,7 @@ def _rows(found: am.io.CaptureInfo) -> list[tuple[str, str]]:
     )
     return [
         *rows,
-        ("nearest neighbour", spacing if f.points_max > 1 else "none: a frame has one at most"),
+        ("nearest neighbour", spacing if f.points_max > 1 else "none: at most one point per frame"),
         ("difficulty", f"{f.difficulty}: {f.reason}"),
         *([("truncated", f.truncated)] if f.truncated else []),
         *(("warning" if i == 0 else "", text) for i, text in enumerate(f.warnings)),
@@ -69,19 +69,19 @@ def _rows(found: am.io.CaptureInfo) -> list[tuple[str, str]]:
 
 
 def _unnamed(f: am.io.CaptureInfo) -> str:
-    """Say what there is beside named markers: pieces of trajectories, and points of nothing."""
+    """Describe the points without a named marker: channels, tracklets and single points."""
     parts = [f"{f.n_unlabelled} channels"] if f.n_unlabelled else []
     if f.n_pieces:
-        parts = [f"{parts[0]} in {f.n_pieces} pieces" if parts else f"{f.n_pieces} tracks"]
+        parts = [f"{parts[0]} in {f.n_pieces} tracklets" if parts else f"{f.n_pieces} tracks"]
     if f.n_unidentified:
-        parts.append(f"{f.n_unidentified} of {f.n_points} points belong to no track")
-    return "; ".join(parts) or "nothing"
+        parts.append(f"{f.n_unidentified} of {f.n_points} points without a track")
+    return "; ".join(parts) or "none"
 
 
 def _steps(what: str, median: float, most: float) -> list[tuple[str, str]]:
     if median != median:
         return []
-    return [(what, f"median {_number(median)}, 99 % below {_number(most)} mm a frame")]
+    return [(what, f"median {_number(median)}, 99 % below {_number(most)} mm per frame")]
 
 
 def _number(value: float) -> str:

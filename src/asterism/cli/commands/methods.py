@@ -1,4 +1,4 @@
-"""``asterism methods`` and ``asterism scenes``: what there is to choose from."""
+"""``asterism methods`` and ``asterism scenes``: lists of methods, scenes and their options."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 _Scene = Annotated[
-    str | None, typer.Argument(metavar="SCENE", help="Show the options of this one.")
+    str | None, typer.Argument(metavar="SCENE", help="Scene whose options are listed.")
 ]
 
 
 def methods(json: Json = False) -> None:
     """List the methods and their options.
 
-    `asterism track --method NAME --option NAME=VALUE` takes them.
+    `asterism track --method NAME --option NAME=VALUE` uses them.
 
     For example:
 
@@ -36,7 +36,12 @@ def methods(json: Json = False) -> None:
     from asterism.tracking.choose import AUTO
 
     _show(
-        {AUTO: ("The clip chooses one of these, and whether to stitch, and says why.", {})}
+        {
+            AUTO: (
+                "selects a method and stitching by measured properties of the capture.",
+                {},
+            )
+        }
         | {
             name: (_first_line(method), record_options(method))
             for name, method in am.tracking.METHODS.items()
@@ -46,9 +51,9 @@ def methods(json: Json = False) -> None:
 
 
 def scenes(scene: _Scene = None, json: Json = False) -> None:
-    """List the scenes that can be simulated, or the options of one.
+    """List the scenes of `asterism simulate`, or the options of one scene.
 
-    `asterism simulate SCENE --option NAME=VALUE` takes them.
+    `asterism simulate SCENE --option NAME=VALUE` sets an option.
 
     For example:
 

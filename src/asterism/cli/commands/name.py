@@ -1,4 +1,4 @@
-"""``asterism name``: tracks named after the markers of an earlier take."""
+"""``asterism name``: names for tracks, from the marker set of another capture."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from asterism.errors import ParameterError
 
 __all__ = ["name"]
 
-_In = Annotated[Path, typer.Argument(metavar="IN", help="Tracks to name.")]
+_In = Annotated[Path, typer.Argument(metavar="IN", help="Capture with tracks.")]
 _Bonds = Annotated[
-    Path, typer.Option("--bonds", metavar="TOML", help="What `asterism bonds` wrote.")
+    Path, typer.Option("--bonds", metavar="TOML", help="Marker set of `asterism bonds`.")
 ]
 _Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
-_SURE = 0.9
+_CERTAIN = 0.9
 
 
 def name(
@@ -28,9 +28,9 @@ def name(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Name the tracks of a take after the markers of an earlier one, by the distances they keep.
+    """Name tracks by the marker set of another capture of the same subject.
 
-    Names that IN has play no part. Pieces of one marker are made one track.
+    Names in IN are ignored. Tracklets of one marker become one track.
 
     For example:
 
@@ -57,10 +57,10 @@ def name(
     has = found.markers >= 0
     seen = {known.names[k] for k in found.markers[has]}
     missing = [name for name in known.names if name not in seen]
-    doubtful = sorted(
+    uncertain = sorted(
         (float(p), known.names[k])
         for p, k in zip(found.probabilities[has], found.markers[has], strict=True)
-        if p < _SURE
+        if p < _CERTAIN
     )
     if json:
         print_json(
@@ -80,11 +80,11 @@ def name(
             }
         )
     elif not quiet:
-        doubts = ", ".join(f"{name} {100 * p:.0f} %" for p, name in doubtful)
+        below = ", ".join(f"{name} {100 * p:.0f} %" for p, name in uncertain)
         rows = [
             ("tracks named", f"{found.n_named} of {int((tracks.lengths > 0).sum())}"),
             ("markers not found", ", ".join(missing) or "none"),
-            (f"less than {_SURE:.0%} sure", doubts or "none"),
+            (f"below {_CERTAIN:.0%}", below or "none"),
             ("written", str(out)),
         ]
-        print_table(rows, title="Recognized")
+        print_table(rows, title="Named")

@@ -13,7 +13,7 @@ from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table
 from asterism.cli.plot_kinds import KINDS, Kind, Request
 from asterism.errors import ParameterError
 
-_Kind = Annotated[str, typer.Argument(metavar="KIND", help="Kind of figure, see above.")]
+_Kind = Annotated[str, typer.Argument(metavar="KIND", help="Kind of figure (see above).")]
 _Files = Annotated[
     list[Path],
     typer.Argument(
@@ -113,19 +113,19 @@ def plot(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Draw a figure of results: vectors for a paper (.pdf, .svg), pixels for a screen (.png).
+    """Draw a figure of results: .pdf or .svg for a paper, .png for a screen.
 
-    The same input gives the same bytes. Kinds:
+    The same input gives the same bytes. Kinds of figures:
 
     KINDS
 
     For example:
 
-        asterism plot trajectories trial.tracked.c3d --markers LKNE,RKNE --time 1 3
+        asterism plot axes trial.tracked.c3d --markers LKNE,RKNE --time 1 3
 
         asterism plot errors trial.tracked.c3d --truth truth.c3d -o errors.svg
 
-        asterism plot compare runs/gnn runs/mcmcda --truth truth.c3d -o compare.pdf
+        asterism plot compare runs/gnn runs/mcmcda --truth truth.c3d
 
         asterism plot projections walk.c3d --rig walk.xcp -o walk.png
     """
@@ -165,7 +165,7 @@ plot.__doc__ = (plot.__doc__ or "").replace(
 
 
 def _check(name: str, kind: Kind, asked: Request) -> None:
-    """Raise if the kind lacks something, or something was given that it does not look at."""
+    """Raise if an option that the kind needs is missing, or one is given that it does not use."""
     if len(asked.files) > 1 and not kind.many:
         raise ParameterError("FILES", f"one file for {name}", f"{len(asked.files)}")
     for field in dataclasses.fields(asked):
@@ -177,7 +177,7 @@ def _check(name: str, kind: Kind, asked: Request) -> None:
             raise ParameterError(option, f"a file, which {name} needs", "nothing")
         if field.name not in kind.takes:
             fit = [k for k, other in KINDS.items() if field.name in other.needs | other.takes]
-            raise ParameterError(option, f"a kind that takes it: {', '.join(fit)}", name)
+            raise ParameterError(option, f"a kind that uses it: {', '.join(fit)}", name)
     for n in asked.moves or ():
         check_number("--moves", n, above=0, below=1e6, closed=True)
     if asked.seeds is not None:
@@ -193,7 +193,7 @@ def _check_ending(out: Path) -> None:
 
 
 def _default_output(source: Path, kind: str) -> Path:
-    """Name the picture after the first file: ``trial.presence.pdf`` beside ``trial.c3d``."""
+    """Name the figure after the first file: ``trial.presence.pdf`` beside ``trial.c3d``."""
     path = source.resolve() if source.is_dir() else source
     stem = path.name if source.is_dir() else path.stem
     return path.with_name(f"{stem}.{kind}.pdf")

@@ -1,4 +1,4 @@
-"""``asterism reconstruct``: image points of several cameras in, points in space out."""
+"""``asterism reconstruct``: 3-D points from the image points of several cameras."""
 
 from __future__ import annotations
 
@@ -16,32 +16,36 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-_In = Annotated[Path, typer.Argument(metavar="OBS", help="Image points, as CSV.")]
+_In = Annotated[Path, typer.Argument(metavar="OBS", help="Image points, CSV.")]
 _Rig = Annotated[
-    Path, typer.Option("--rig", metavar="RIG", help="Calibration of the cameras: file or folder.")
+    Path, typer.Option("--rig", metavar="RIG", help="Calibration of the cameras (file or folder).")
 ]
-_Out = Annotated[Path, typer.Option("--out", "-o", help="File for the points.")]
+_Out = Annotated[Path, typer.Option("--out", "-o", help="File for the 3-D points.")]
 _Truth = Annotated[
     Path | None,
-    typer.Option(help="File for the points with their true names, where OBS knows them."),
+    typer.Option(help="File for the points with true names, if OBS has them."),
 ]
 _Sigma = Annotated[
-    float | None, typer.Option(help="Noise of an image point, pixels.", show_default="estimated")
+    float | None,
+    typer.Option(help="Noise (σ) of an image point, pixels.", show_default="estimated"),
 ]
-_MinViews = Annotated[int, typer.Option(help="Fewest cameras that a point needs.")]
+_MinViews = Annotated[int, typer.Option(help="Smallest number of cameras for a point.")]
 _Gate = Annotated[
-    float, typer.Option(help="Standard deviations within which an image point may be of a place.")
+    float,
+    typer.Option(help="Largest reprojection error of an image point, in units of σ."),
 ]
 _Merge = Annotated[
-    float, typer.Option("--merge", help="Noise of images that have merged, pixels; 0 for none.")
+    float,
+    typer.Option("--merge", help="Noise (σ) of merged image points, pixels; 0: none merge."),
 ]
 Prior = Annotated[
     bool,
     typer.Option(
-        "--prior", help="Do it twice: tracks of the first points tell where to expect points."
+        "--prior",
+        help="Reconstruct twice; tracks of the first pass predict the second.",
     ),
 ]
-_Threads = Annotated[int, typer.Option(help="Frames at a time.")]
+_Threads = Annotated[int, typer.Option(help="Number of frames processed in parallel.")]
 
 
 def reconstruct(
@@ -59,18 +63,18 @@ def reconstruct(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Make points in space of what several cameras saw.
+    """Reconstruct 3-D points from the image points of several cameras.
 
-    The cameras of OBS are found in RIG by their names. Noise, misses, clutter and the volume are
-    estimated from OBS.
+    Cameras of OBS and RIG are matched by name. Noise, detection probability, clutter and the volume
+    are estimated from OBS.
 
     For example:
 
-        asterism reconstruct film/observations.csv --rig film/rig.toml -o points.c3d
+        asterism reconstruct observations.csv --rig rig.toml -o points.c3d
 
-        asterism reconstruct blobs.csv --rig calibration.toml -o points.csv --min-views 3
+        asterism reconstruct seen.csv --rig rig.toml -o points.csv --min-views 3
 
-        asterism reconstruct blobs.csv --rig four_cameras.toml -o points.csv --prior
+        asterism reconstruct seen.csv --rig rig.toml -o points.csv --prior
     """
     import numpy as np
 
@@ -89,7 +93,7 @@ def reconstruct(
     for warning in cameras.warnings:
         log.warning("%s: %s", rig, warning)
     names = {"n_threads": "--threads", "merge_px": "--merge", "sigma_px": "--sigma"}
-    with as_options(names), progress("estimating noise, misses and clutter"):
+    with as_options(names), progress("estimating noise, detection and clutter"):
         model = am.multiview.estimate_images(observations, cameras, sigma_px=sigma, gate=gate)
 
     def points(expected: am.Detections | None = None) -> am.multiview.Reconstruction:
@@ -108,7 +112,11 @@ def reconstruct(
     if truth is not None:
         am.write(true_tracks(made, observations), truth, format=formats[truth])
     if not d.n_points:
-        log.warning("%s: no points; is %s the calibration of these cameras?", source, rig)
+        log.warning(
+            "%s: no points reconstructed. Check that %s belongs to these cameras.",
+            source,
+            rig,
+        )
     if json:
         files = {
             "input": str(source),
@@ -122,7 +130,7 @@ def reconstruct(
 
 
 def expected_from(made: am.multiview.Reconstruction) -> am.Detections:
-    """Track the points and give where they were to be expected."""
+    """Track the points and return the predicted positions."""
     import asterism as am
 
     model = am.estimate_model(made.detections).model
@@ -131,13 +139,13 @@ def expected_from(made: am.multiview.Reconstruction) -> am.Detections:
 
 
 def true_tracks(made: am.multiview.Reconstruction, observations: am.Observations) -> am.Tracks:
-    """Give the points with the markers that most of their image points are of."""
+    """Label each point with the marker of most of its image points."""
     import numpy as np
 
     import asterism as am
 
     labels = made.markers(observations)
-    # Two points of one marker in one frame: the one of more views is it.
+    # Of two points of one marker in a frame, the one with more views keeps the label.
     order = np.lexsort((-made.views.counts, labels, made.detections.frame_of))
     frames, marks = made.detections.frame_of[order], labels[order]
     is_again = np.zeros(len(order), dtype=bool)
@@ -148,7 +156,7 @@ def true_tracks(made: am.multiview.Reconstruction, observations: am.Observations
 
 
 def figures(made: am.multiview.Reconstruction, observations: am.Observations) -> dict[str, Any]:
-    """Give what was made of the image points, for machines."""
+    """Return the figures of a reconstruction as plain values."""
     import numpy as np
 
     used = np.unique(made.views.blobs)
@@ -173,7 +181,7 @@ def figures(made: am.multiview.Reconstruction, observations: am.Observations) ->
 def about(
     made: am.multiview.Reconstruction, observations: am.Observations
 ) -> list[tuple[object, object]]:
-    """Give what was made of the image points, for people."""
+    """Return the figures of a reconstruction as rows of the printed table."""
     import numpy as np
 
     d, values = made.detections, figures(made, observations)
@@ -188,8 +196,8 @@ def about(
         ("noise", f"{sigma.min():.3g} to {sigma.max():.3g} px"),
     ]
     if d.stds is not None and d.n_points:
-        rows.append(("a coordinate is sure to", f"{1e3 * float(np.median(d.stds)):.3g} mm"))
+        rows.append(("standard deviation", f"{1e3 * float(np.median(d.stds)):.3g} mm"))
     if made.info["n_cut"]:
-        cut = f"{made.info['n_cut']} groups; at most {made.info['gap']:.3g} nats from the best"
-        rows.append(("search cut in", cut))
+        cut = f"{made.info['n_cut']} groups; at most {made.info['gap']:.3g} nats below the optimum"
+        rows.append(("search limited in", cut))
     return rows

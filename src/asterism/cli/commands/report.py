@@ -1,4 +1,4 @@
-"""``asterism report``: tracks as a page with a player."""
+"""``asterism report``: tracks as an HTML page with a player."""
 
 from __future__ import annotations
 
@@ -14,17 +14,19 @@ if TYPE_CHECKING:
 
 __all__ = ["report"]
 
-_In = Annotated[Path, typer.Argument(metavar="TRACKED", help="Tracks to show.")]
-_Truth = Annotated[Path | None, typer.Option(help="What is so: wrong labels are marked.")]
+_In = Annotated[Path, typer.Argument(metavar="TRACKED", help="Capture with tracks.")]
+_Truth = Annotated[Path | None, typer.Option(help="True tracks; wrong labels are marked.")]
 _Rig = Annotated[Path | None, typer.Option(help="Calibration of the cameras.")]
 _Out = Annotated[
-    Path | None, typer.Option("--out", "-o", help="Page to write; by default TRACKED.html.")
+    Path | None, typer.Option("--out", "-o", help="Page to write.", show_default="TRACKED.html")
 ]
 _Up = Annotated[
     Literal["x", "y", "z"] | None,
-    typer.Option(help="Axis that points up; told by the rig or by the format unless given."),
+    typer.Option(help="Axis that points up.", show_default="from the rig or the format"),
 ]
-_Title = Annotated[str | None, typer.Option(help="Title of the page; by default the file's name.")]
+_Title = Annotated[
+    str | None, typer.Option(help="Title of the page.", show_default="the file name")
+]
 
 
 def report(
@@ -38,9 +40,9 @@ def report(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Write tracks as one HTML page: a player, a timeline, and what to look at first.
+    """Write tracks as one HTML page with a player, a timeline and a list of findings.
 
-    The page needs nothing but a browser, and asks nobody for anything.
+    The page opens in any browser and loads nothing from the network.
 
     For example:
 
@@ -70,7 +72,7 @@ def report(
 
 
 def _origin(tracks: am.Tracks) -> list[tuple[str, str]]:
-    """Say what the file tells of itself."""
+    """Return the name, format and rate of the file."""
     import asterism as am
 
     d = tracks.detections

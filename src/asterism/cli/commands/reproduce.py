@@ -1,4 +1,4 @@
-"""``asterism reproduce``: the report's tables and figures, reported and measured side by side."""
+"""``asterism reproduce``: tables and figures of the 2010 report, reported and measured."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _Only = Annotated[
     typer.Option(
         "--only",
         metavar="PART",
-        help=f"Make this part alone; may be repeated. {', '.join(PARTS)}.",
+        help=f"Part to reproduce; may be repeated. Parts: {', '.join(PARTS)}.",
         show_default="all",
     ),
 ]
-_Seeds = Annotated[int, typer.Option(help="Seeds of all random draws; 5 take a minute.")]
+_Seeds = Annotated[int, typer.Option(help="Number of random seeds; 5 take a minute.")]
 _Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the files.")]
 
 MAX_SEEDS = 1000
@@ -44,8 +44,8 @@ def reproduce(
 ) -> None:
     """Reproduce every table and figure of the 2010 report, with a verdict for each claim.
 
-    Writes one page as Markdown, and the figures as SVG. The same seeds give the same bytes; times
-    are in a file of their own. If the command is stopped, the finished parts are written.
+    DIR receives a page in Markdown, figures in SVG and a file of running times. The same seeds give
+    the same bytes, except for the times. If the command is stopped, finished parts are written.
 
     For example:
 

@@ -1,4 +1,4 @@
-"""``asterism simulate``: scenes in motion whose truth is known, and recordings of them."""
+"""``asterism simulate``: scenes of moving markers with a known truth."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _Scene = Annotated[str, typer.Argument(metavar="SCENE", help="One of `asterism s
 _Out = Annotated[
     Path,
     typer.Option(
-        "--out", "-o", help="File for the named markers; with --truth, for points without names."
+        "--out", "-o", help="File for the markers; with --truth, for points without names."
     ),
 ]
 _Truth = Annotated[
@@ -22,13 +22,11 @@ _Truth = Annotated[
     typer.Option(help="File for the same points with their true names.", show_default=False),
 ]
 _Frames = Annotated[int | None, typer.Option(help="Number of frames.", show_default="the scene's")]
-_Rate = Annotated[float | None, typer.Option(help="Frames a second.", show_default="the scene's")]
+_Rate = Annotated[float | None, typer.Option(help="Frame rate, Hz.", show_default="the scene's")]
 _Markers = Annotated[
     int | None, typer.Option(help="Number of markers.", show_default="the scene's")
 ]
-_Seed = Annotated[
-    int | None, typer.Option(help="Chooses everything that is random.", show_default="0")
-]
+_Seed = Annotated[int | None, typer.Option(help="Random seed.", show_default="0")]
 _Options = Annotated[
     list[str] | None,
     typer.Option("--option", metavar="NAME=VALUE", help="Option of the scene; may be repeated."),
@@ -38,7 +36,7 @@ _Corruption = Annotated[
     typer.Option(
         "--corrupt",
         metavar="NAME=VALUE",
-        help="What goes wrong in the recording (missing, clutter, noise, burst, ghosts, visits, "
+        help="Corruption of the capture (missing, clutter, noise, burst, ghosts, visits, "
         "nearby, doubled, merged, dropped, jitter …); may be repeated.",
     ),
 ]
@@ -47,8 +45,8 @@ _Rig = Annotated[
     typer.Option(
         "--rig",
         metavar="RIG",
-        help="Leave out what fewer than two of these cameras see: a calibration, or ring8, wall4 "
-        "and the like.",
+        help="Cameras: a calibration, or a layout such as ring8 or wall4. Markers that fewer than "
+        "two of them see are left out.",
         show_default=False,
     ),
 ]
@@ -69,7 +67,7 @@ def simulate(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    r"""Simulate markers in motion and write them; spoilt, if asked, with the truth beside.
+    """Simulate moving markers, and write them with or without corruption.
 
     `asterism scenes` lists the scenes and their options. The same seed gives the same bytes.
 
@@ -77,10 +75,9 @@ def simulate(
 
         asterism simulate person -o walk.c3d --option activity=walk --markers 60
 
-        asterism simulate crossing -o a.c3d --truth t.c3d --rate 100 --corrupt missing=0.1 \
-            --corrupt clutter=0.1 --corrupt burst=5:5-60
+        asterism simulate crossing -o a.c3d --truth t.c3d --corrupt burst=5:5-60
 
-        asterism simulate two_people -o hug.csv --truth t.csv --option activity=hug --rig ring8
+        asterism simulate two_people -o a.csv --truth t.csv --rig ring8
     """
     import numpy as np
 
@@ -109,10 +106,10 @@ def simulate(
         if rig is not None:
             switches["rig"], about = rig_from(rig, made.detections.points)
         with as_options({name: f"--corrupt {name}" for name in switches}):
-            sensed = am.simulate.corrupt(made, **switches, seed=values["seed"])
-        values |= {"corruption": sensed.record}
-        d = sensed.detections
-        am.write(sensed, truth)
+            corrupted = am.simulate.corrupt(made, **switches, seed=values["seed"])
+        values |= {"corruption": corrupted.record}
+        d = corrupted.detections
+        am.write(corrupted, truth)
         result = am.Tracks(detections=d, labels=np.full(d.n_points, -1))
     am.write(result, out)
     figures = {
@@ -130,5 +127,5 @@ def simulate(
             rows.append(("rig", about))
         if truth is not None:
             record = ", ".join(f"{k}={v}" for k, v in values["corruption"].items() if k != "rig")
-            rows += [("sensed", record), ("truth", truth)]
+            rows += [("corruption", record), ("truth", truth)]
         print_table([*rows, ("written", out)])

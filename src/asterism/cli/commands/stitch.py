@@ -1,4 +1,4 @@
-"""``asterism stitch``: fragments in, markers out."""
+"""``asterism stitch``: tracks of markers from tracklets."""
 
 from __future__ import annotations
 
@@ -13,19 +13,22 @@ from asterism.errors import ParameterError
 if TYPE_CHECKING:
     import asterism as am
 
-_In = Annotated[Path, typer.Argument(metavar="IN", help="Tracks to stitch.")]
+_In = Annotated[Path, typer.Argument(metavar="IN", help="Capture with tracks.")]
 _Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
 _Model = Annotated[
     Path | None,
-    typer.Option(help="Model to use, TOML; by default it is estimated from IN."),
+    typer.Option(help="Model, TOML.", show_default="estimated from IN"),
 ]
-_Confirm = Annotated[int, typer.Option(help="Frames until it is decided what a fragment is.")]
+_Confirm = Annotated[
+    int, typer.Option(help="Frames after which a tracklet is assigned to a marker.")
+]
 _Ghosts = Annotated[
-    float, typer.Option("--ghost-radius", help="Ghosts are about so far from a marker, metres.")
+    float,
+    typer.Option("--ghost-radius", help="Distance of a ghost from its marker, metres."),
 ]
 _MaxHidden = Annotated[
     int | None,
-    typer.Option(help="Frames after which a hidden marker is forgotten.", show_default="never"),
+    typer.Option(help="Longest occlusion that is stitched, frames.", show_default="unlimited"),
 ]
 _MOST = 10  # joins that are shown
 
@@ -41,15 +44,15 @@ def stitch(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Tell which track goes on with which, through gaps of any length, and write the markers.
+    """Stitch the tracks of a capture through gaps of any length into tracks of markers.
 
-    Neighbours that keep their distance carry a hidden marker to where it must be when it comes
-    back. For the tracks of a file as they are; `asterism track --stitch` makes fragments that are
-    surer.
+    The position of an occluded marker is predicted from neighbours at a stable distance. This
+    command uses the tracks of the file as they are; `asterism track --stitch` tracks anew and makes
+    shorter, purer tracklets first.
 
     For example:
 
-        asterism stitch pieces.c3d -o markers.c3d
+        asterism stitch tracklets.c3d -o markers.c3d
 
         asterism stitch tracks.csv -o markers.csv --json
     """
@@ -94,24 +97,24 @@ def stitch(
         print_json(figures | bond_figures(found.bonds) | {"joins": joins})
     elif not quiet:
         rows = [
-            ("tracks", f"{figures['n_tracks']}, of {figures['n_tracks_before']}"),
-            ("markers found again", str(len(found.joins))),
+            ("tracks", f"{figures['n_tracks']}, from {figures['n_tracks_before']}"),
+            ("joins", str(len(found.joins))),
             ("links cut", str(found.n_cuts)),
             ("ghosts", str(found.n_ghosts)),
             *bond_rows(found.bonds),
-            *_least_sure(found, capture),
+            *_least_certain(found, capture),
             ("written", str(out)),
         ]
         print_table(rows, title="Stitched")
 
 
-def _least_sure(found: am.tracking.Stitching, capture: am.Capture) -> list[tuple[str, str]]:
-    doubtful = sorted(found.joins, key=lambda join: join.probability)[:_MOST]
+def _least_certain(found: am.tracking.Stitching, capture: am.Capture) -> list[tuple[str, str]]:
+    uncertain = sorted(found.joins, key=lambda join: join.probability)[:_MOST]
     return [
         (
-            "" if n else "least sure",
+            "" if n else "least certain",
             f"track {j.marker}, frames {capture.first_frame + j.last} to "
             f"{capture.first_frame + j.first}: {100 * j.probability:.1f} %",
         )
-        for n, j in enumerate(doubtful)
+        for n, j in enumerate(uncertain)
     ]

@@ -1,4 +1,4 @@
-"""``asterism track``: detections in, tracks out."""
+"""``asterism track``: tracks from the detections of a capture."""
 
 from __future__ import annotations
 
@@ -28,16 +28,17 @@ _Out = Annotated[
     typer.Option(
         "--out",
         "-o",
-        help="File to write; by default IN with .tracked in its name.",
+        help="File to write.",
+        show_default="IN with .tracked in its name",
     ),
 ]
 _Format = Annotated[
-    str | None, typer.Option(help="Format of the result; by default told by its name.")
+    str | None, typer.Option(help="Format of the result.", show_default="from its name")
 ]
 _Method = Annotated[
     str | None,
     typer.Option(
-        help="Method, one of `asterism methods`; auto chooses by the capture, and says why.",
+        help="Method, one of `asterism methods`; auto selects one from the capture.",
         show_default="auto",
     ),
 ]
@@ -47,37 +48,36 @@ _Options = Annotated[
 ]
 _Model = Annotated[
     Path | None,
-    typer.Option(help="Model to use, TOML; by default it is estimated from the capture."),
+    typer.Option(help="Model, TOML.", show_default="estimated from the capture"),
 ]
-_Seed = Annotated[int | None, typer.Option(help="For methods that draw.", show_default="0")]
+_Seed = Annotated[int | None, typer.Option(help="Random seed, for mcmcda.", show_default="0")]
 _Start = Annotated[
     bool,
-    typer.Option(
-        "--start", help="Begin with the tracks that IN carries, and repair them (mcmcda)."
-    ),
+    typer.Option("--start", help="Start from the tracks in IN and correct them, with mcmcda."),
 ]
 _Stitch = Annotated[
     bool,
     typer.Option(
         "--stitch",
-        help="Give up hidden markers early, and tell by their neighbours which comes back.",
+        help="Make short tracklets and stitch them through occlusions, whatever auto selects.",
     ),
 ]
 _Run = Annotated[
     Path | None,
     typer.Option(
         metavar="DIR",
-        help="Folder for the result and for all that repeats the run.",
+        help="Folder for the result, the settings and the log of the run.",
     ),
 ]
 _From = Annotated[
     Path | None,
     typer.Option(
-        "--from", metavar="RUN.TOML", help="Repeat a run; IN says where its input is now."
+        "--from", metavar="RUN.TOML", help="Repeat a run. IN is needed only if its input has moved."
     ),
 ]
 _Report = Annotated[
-    Path | None, typer.Option("--report", metavar="PAGE", help="Page with a player to write too.")
+    Path | None,
+    typer.Option("--report", metavar="PAGE", help="HTML page to write, with a player."),
 ]
 
 
@@ -98,10 +98,10 @@ def track(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Tell which detection is which marker, and write the tracks.
+    """Track the detections of a capture, and write the tracks.
 
-    The model is estimated from the capture unless one is given; names in the capture play no part.
-    The same input, options and seed give the same bytes.
+    Model and method are estimated from the capture unless they are given. Names in the capture are
+    ignored. The same input, options and seed give the same bytes.
 
     For example:
 
@@ -113,7 +113,7 @@ def track(
 
         asterism track trial.c3d -o tracks.csv --model model.toml
 
-        asterism track pieces.c3d --method mcmcda --start
+        asterism track tracklets.c3d --method mcmcda --start
 
         asterism track trial.c3d --stitch
 
@@ -153,7 +153,7 @@ def track(
         recipe, estimate = _checked(job, capture, repeat), None
     else:
         if start and method not in (None, am.tracking.AUTO, am.MCMCDA.name):
-            expected = f"--method {am.MCMCDA.name} beside it, or none"
+            expected = f"--method {am.MCMCDA.name}, or no --method"
             raise ParameterError("--start", expected, f"--method {method}")
         if start and not (capture.labels >= 0).any():
             raise ParameterError("--start", "a capture with tracks", f"none in {source}")
@@ -165,8 +165,8 @@ def track(
         recipe, estimate = plan.recipe, plan.estimate
     if run is not None:
         run.mkdir(parents=True, exist_ok=True)
-    talks = not (quiet or json)
-    if talks:
+    prints = not (quiet or json)
+    if prints:
         _print_capture(capture)
         if estimate is not None:
             print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
@@ -176,22 +176,22 @@ def track(
     tracks, summary = carry_out(job, capture, out, run)
     if report is not None:
         _write_report(tracks, report, recipe, estimate, summary)
-    if talks:
+    if prints:
         rows = summary.rows() + ([("report", str(report))] if report is not None else [])
         print_table(rows, title=f"\nTracked with {recipe.method}")
     if json:
         page = {} if report is None else {"report": str(report)}
-        told = {
+        settings = {
             "options": recipe.options,
             "stitch": recipe.stitch,
             "model": recipe.model.to_dict(),
         }
-        told |= {"chosen": recipe.chosen} if recipe.chosen else {}
-        print_json(summary.to_dict() | told | page)
+        settings |= {"chosen": recipe.chosen} if recipe.chosen else {}
+        print_json(summary.to_dict() | settings | page)
 
 
 def _outputs(out: Path, run: Path | None) -> dict[str, Path | Folder | None]:
-    """List what is written, by its option; the tracks may stand in the folder of the run."""
+    """Return the outputs by option; the tracks may be in the folder of the run."""
     from asterism.cli.outputs import Folder
     from asterism.cli.run_folder import FILES
 
@@ -210,8 +210,8 @@ def made_method(name: str | None, texts: list[str]) -> am.tracking.Method[Any] |
 
     if name in (None, am.tracking.AUTO):
         if texts:
-            expected = "a method to have it"
-            hint = "name the method: --method smp"
+            expected = "a method that has it"
+            hint = "give the method, such as --method smp"
             raise ParameterError("--option", expected, f"--method {am.tracking.AUTO}", hint)
         return None
     check_fields("--method", [name], am.tracking.METHODS)
@@ -222,29 +222,29 @@ def made_method(name: str | None, texts: list[str]) -> am.tracking.Method[Any] |
 
 
 def _run_of(path: Path, source: Path | None, settings: list[str]) -> Run:
-    """Read a run, with its input where it is now."""
+    """Read a run, with the present path of its input."""
     from asterism.cli.run_folder import Run
 
     if settings:
-        raise ParameterError("--from", "the settings of the run alone", ", ".join(settings))
+        raise ParameterError("--from", "no settings beside those of the run", ", ".join(settings))
     job = Run.read(path)
     job = dataclasses.replace(job, source=source or job.source)
     if not job.source.is_file():
-        hint = "say where it is now: asterism track IN --from RUN.TOML"
+        hint = "give its new path: asterism track IN --from RUN.TOML"
         raise FormatError(job.source, "the input of the run", "", "no such file", hint)
     return job
 
 
 def _checked(job: Run, capture: am.Capture, path: Path) -> Recipe:
-    """Return the recipe of a run if the capture is the one that it is of."""
+    """Return the recipe of a run, if the capture is its input."""
     from asterism.model.recipe import sha256_of
 
     recipe = job.recipe
     found = sha256_of(capture, capture.labels if recipe.has_start else None)
     if found != recipe.sha256:
         raise FormatError(
-            job.source, "the SHA-256 of its points", f"{recipe.sha256}, as {path} says", found,
-            "a run can only be repeated with the same input",
+            job.source, "SHA-256 of its points", f"{recipe.sha256} of {path}", found,
+            "repeat the run with the same input",
         )  # fmt: skip
     return recipe
 
@@ -256,28 +256,28 @@ def _write_report(
     estimate: am.tracking.ModelEstimate | None,
     summary: Summary,
 ) -> None:
-    """Write the page, with the method, its figures and the model."""
+    """Write the report page, with the method, its figures and the model."""
     import asterism as am
     from asterism.cli.options import flat
 
     stitched = ", then stitched" if recipe.stitch else ""
     options = ", ".join(f"{name}={value}" for name, value in flat(recipe.options).items())
-    told = [("method", recipe.method + stitched)]
-    told += [("chosen by the capture", recipe.chosen)] if recipe.chosen else []
-    told += [("options", options)] if options else []
-    told += summary.rows()
+    rows = [("method", recipe.method + stitched)]
+    rows += [("method selected", recipe.chosen)] if recipe.chosen else []
+    rows += [("options", options)] if options else []
+    rows += summary.rows()
     made = f"Tracked with {recipe.method}{stitched + ',' * recipe.stitch} in "
     made += f"{summary.seconds:.2g} s ({summary.frames_per_second:,.0f} frames a second). "
     if estimate is None:
-        told.append(("model", "given, not estimated"))
+        rows.append(("model", "given, not estimated"))
         made += "The model was given."
     else:
         reasons = estimate.reasons
-        told += [(f"model: {name}", f"{value}: {why}") for name, value, why in reasons]
+        rows += [(f"model: {name}", f"{value}: {why}") for name, value, why in reasons]
         name, value, _ = reasons[0]
-        made += f"The model was estimated from the capture ({name} {value}; all of it is below)."
+        made += f"The model was estimated from the capture ({name} {value}; the others are below)."
     with progress("writing the report"):
-        am.report(tracks, page, made=made, summary=told)
+        am.report(tracks, page, made=made, summary=rows)
 
 
 def _print_capture(capture: am.Capture) -> None:

@@ -12,11 +12,11 @@ from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table
 _Tracked = Annotated[Path, typer.Argument(metavar="TRACKED", help="File with tracks.")]
 _Rig = Annotated[
     str | None,
-    typer.Option(metavar="RIG", help="Cameras to show: a calibration, or ring8 and the like."),
+    typer.Option(metavar="RIG", help="Cameras: a calibration, or a layout such as ring8."),
 ]
 _Save = Annotated[
     Path | None,
-    typer.Option(metavar="FILE.rrd", help="Write the scene, and open no viewer."),
+    typer.Option(metavar="FILE.rrd", help="Write the scene to a file and do not open the viewer."),
 ]
 
 
@@ -28,10 +28,10 @@ def view(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    r"""Look at tracks in space and time: turn, zoom, play, choose what is shown.
+    r"""Show tracks and cameras in the Rerun viewer.
 
-    Needs Rerun: pip install 'asterism\[view]'. The viewer listens to this machine alone, and its
-    usage statistics are switched off.
+    The command needs Rerun: pip install 'asterism\[view]'. The viewer accepts connections from this
+    machine only; its usage statistics are switched off.
 
     For example:
 
