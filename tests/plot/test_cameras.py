@@ -50,7 +50,7 @@ def test_points_are_drawn_where_the_camera_sees_them(lens):
     assert [to_hex(c) for c in hidden.get_facecolors()] == ["#ffffff"]
     assert [to_hex(c) for c in hidden.get_edgecolors()] == [CYCLE[2].lower()]
     title = axes.get_title(loc="left")
-    assert title == "left: 2 seen, 1 hidden, 1 outside, 1 behind, 1 absent"
+    assert title == "left: 2 seen, 1 occluded, 1 outside, 1 behind, 1 absent"
 
 
 def test_the_image_has_its_own_frame_and_v_runs_down():

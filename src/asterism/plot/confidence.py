@@ -28,25 +28,33 @@ _MANY = 20_000  # cells beyond which a vector file holds them as one image
 def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
     """Draw each track as a bar over time, shaded by the confidence of each link.
 
-    The confidence of a label is that of the link from the detection before; the lighter, the less.
+    The confidence of a label is that of the link from the previous detection. Light shades stand
+    for a low confidence.
 
     Parameters
     ----------
     tracks : Tracks
-        With a confidence; bars lie as in `plot_presence`, broken where a track was not seen.
+        Tracks with a confidence. Bars are in the order of `plot_presence`, interrupted by gaps.
     ax : Axes, optional
-        Where to draw; a new figure unless given.
+        Axes to draw on. By default a new figure.
 
     Returns
     -------
     Axes
-        Seconds across, one row a track, with a colour bar; in an inset above the mean confidence of
-        the links into a frame, and the least.
+        Time in seconds and one row per track, with a colour bar. An inset above has the mean and
+        the lowest confidence of the links into each frame.
 
     Raises
     ------
     ParameterError
         If the tracks have no confidence.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> tracks = am.track(am.simulate.cube(frames=10, seed=1).detections, "jpda")
+    >>> am.plot.plot_confidence(tracks).get_xlabel()
+    'time [s]'
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     if tracks.confidence is None:
@@ -71,8 +79,8 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
             axes.axhline(edge, color="white", linewidth=2.0)
     frame_rows(axes, tracks, rows)
     axes.grid(visible=False)
-    told = f"confidence of links, mean {sure.mean():.3f}" if len(sure) else "no links"
-    above = strip_above(axes, told)
+    title = f"confidence of links, mean {sure.mean():.3f}" if len(sure) else "no links"
+    above = strip_above(axes, title)
     n = np.bincount(frame, minlength=d.n_frames)
     total = np.bincount(frame, weights=sure, minlength=d.n_frames)
     mean = np.divide(total, n, out=np.full(d.n_frames, np.nan), where=n > 0)
@@ -89,14 +97,14 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
 def plot_reliability(
     calibration: CalibrationCurve | Mapping[str, CalibrationCurve], ax: Axes | None = None
 ) -> Axes:
-    """Draw the share of labels that are right against the confidence that they are held with.
+    """Draw the share of correct labels over their confidence.
 
     Parameters
     ----------
     calibration : CalibrationCurve, or mapping of names to them
-        From `asterism.metrics.calibration_curve`.
+        Result of `asterism.metrics.calibration_curve`, or several by name.
     ax : Axes, optional
-        Where to draw; a new figure unless given.
+        Axes to draw on. By default a new figure.
 
     Returns
     -------
@@ -129,11 +137,11 @@ def plot_reliability(
         colour = CYCLE[i % len(CYCLE)]
         used = part.counts > 0
         share, n = part.right[used], part.counts[used]
-        told = f"{name}: " if name else ""
+        prefix = f"{name}: " if name else ""
         low, high = _interval(share, n)
         axes.errorbar(
             part.confidence[used], share, yerr=(share - low, high - share), marker="o",
-            markersize=4, linewidth=1.0, color=colour, label=f"{told}error {part.ece:.3f}",
+            markersize=4, linewidth=1.0, color=colour, label=f"{prefix}error {part.ece:.3f}",
         )  # fmt: skip
         above.stairs(part.counts, part.edges, color=colour, linewidth=1.2)
     above.set_ylim(bottom=0.5)

@@ -30,31 +30,39 @@ def plot_coverage(
     what: Literal["cameras", "error"] = "cameras",
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw one level of a covered volume from above.
+    """Draw one horizontal level of the coverage of a rig, seen from above.
 
-    Cells that under two cameras see are hatched: no point can be triangulated there.
+    Cells that fewer than two cameras see are hatched; no point can be triangulated there.
 
     Parameters
     ----------
     coverage : Coverage
-        Of a `volume_grid`.
+        Coverage of a `volume_grid`, from `Rig.coverage`.
     height : float, optional
-        z in metres; the level of the grid next to it is drawn, by default the middle one.
+        Height z in metres; the nearest level of the grid is drawn. By default the middle one.
     what : {"cameras", "error"}
-        The number of cameras that see a cell; or the root mean square error of a point that is
-        triangulated there, in millimetres.
+        "cameras" draws the number of cameras that see a cell, "error" the root mean square error of
+        a point triangulated there, in millimetres.
     ax : Axes, optional
-        Where to draw; a new figure unless given.
+        Axes to draw on. By default a new figure.
 
     Returns
     -------
     Axes
-        Metres, x across and y up, to one scale, with a colour bar.
+        x and y in metres, to one scale, with a colour bar.
 
     Raises
     ------
     ParameterError
-        If it is no coverage, the places are no grid, or it has no level near that height.
+        If `coverage` is of another type or not of a grid, or has no level near `height`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(4, radius=3, height=2)
+    >>> grid = am.camera.volume_grid((-1, -1, 0), (1, 1, 2), 0.5)
+    >>> am.plot.plot_coverage(rig.coverage(grid), height=1).get_xlabel()
+    'x [m]'
     """
     from matplotlib.colors import LogNorm
 
@@ -73,7 +81,7 @@ def plot_coverage(
         colours, norm = counts_map(int(coverage.n_cameras.max(initial=0)))
         drawn = axes.pcolormesh(*edges, n, cmap=colours, norm=norm, rasterized=n.size > 5000)
         draw_bar(axes, drawn, "cameras that see it", ticks=whole_ticks(coverage.n_cameras))
-        told = f"{100 * (n >= 2).mean():.3g} % of the cells seen by two or more"
+        text = f"{100 * (n >= 2).mean():.3g} % of the cells seen by two or more"
     else:
         error = 1e3 * coverage.error[:, :, level].T
         known = error[np.isfinite(error)]
@@ -86,18 +94,18 @@ def plot_coverage(
         if known.size:
             label = f"error [mm] at {coverage.sigma_px:g} px of noise"
             draw_bar(axes, drawn, label, ticks=np.geomspace(bottom, top, _N_TICKS), extend="max")
-        told = f"median error {np.median(known):.3g} mm" if known.size else "no error known"
+        text = f"median error {np.median(known):.3g} mm" if known.size else "no error known"
     _hatch(axes, edges, n < 2)
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlabel("x [m]", color=INK)
     axes.set_ylabel("y [m]", color=INK)
     tidy(axes)
-    axes.set_title(f"z = {z[level]:.3g} m: {told}", fontsize=11, color=INK, loc="left")
+    axes.set_title(f"z = {z[level]:.3g} m: {text}", fontsize=11, color=INK, loc="left")
     return axes
 
 
 def counts_map(n_most: int) -> tuple[ListedColormap, BoundaryNorm]:
-    """Give the colours of 0 … `n_most` cameras: grey for 0 and 1, then one for each number."""
+    """Return the colours of 0 … `n_most` cameras: white and grey for 0 and 1, then a gradient."""
     import matplotlib
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
@@ -107,7 +115,7 @@ def counts_map(n_most: int) -> tuple[ListedColormap, BoundaryNorm]:
 
 
 def whole_ticks(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give whole numbers from 0 to the largest of the counts, as many as have room."""
+    """Return whole numbers from 0 to the largest count, as ticks of a colour bar."""
     n_most = max(int(counts.max(initial=0)), 2)
     return np.arange(0, n_most + 1, 1 + n_most // _MOST_TICKS)
 
@@ -120,7 +128,7 @@ def draw_bar(
     ticks: NDArray[np.float64] | NDArray[np.int64] | None = None,
     **options: Any,
 ) -> None:
-    """Draw the colour bar of something, where given with a number at each tick."""
+    """Draw a colour bar with a label and, if given, ticks with numbers."""
     bar = axes.figure.colorbar(drawn, ax=axes, shrink=0.85, pad=0.02, **options)
     bar.set_label(label, color=INK)
     bar.ax.tick_params(colors=INK, labelsize=8, length=3)

@@ -37,14 +37,14 @@ def figure_bytes(
     size: tuple[float, float] | None = None,
     dpi: float | None = None,
 ) -> bytes:
-    """Render a picture; one that is made anew from the same data gives the same bytes.
+    """Render a figure as PDF, PNG or SVG; the same data give the same bytes.
 
     Parameters
     ----------
     picture : Figure, Axes or sequence of Axes
-        What a plot function gave, or the figure that holds it.
+        Result of a plot function, or its figure.
     ending : {"pdf", "png", "svg"}
-        The format.
+        Format of the file.
     size : (float, float), optional
         Width and height in inches; by default those of the figure.
     dpi : float, optional
@@ -54,12 +54,12 @@ def figure_bytes(
     Returns
     -------
     bytes
-        Of a whole file. Its metadata hold neither date nor version.
+        Content of the file. Its metadata have neither date nor version.
 
     Raises
     ------
     ParameterError
-        If the ending is another.
+        If the ending is unknown.
 
     Examples
     --------
@@ -72,7 +72,7 @@ def figure_bytes(
     check_fields("ending", [ending], ENDINGS)
     first: Any = picture[0] if isinstance(picture, (list, tuple)) else picture
     figure = getattr(first, "figure", first)
-    figure = getattr(figure, "figure", figure)  # of a part of a figure the whole
+    figure = getattr(figure, "figure", figure)  # the whole figure, if it is a subfigure
     file = io.BytesIO()
     with matplotlib.rc_context(_OPTIONS):
         if size is not None:
@@ -88,7 +88,34 @@ def write_figure(
     size: tuple[float, float] | None = None,
     dpi: float | None = None,
 ) -> None:
-    """Write a picture, as a whole or not at all, in the format of the path's ending."""
+    """Write a figure to a file, completely or not at all.
+
+    Parameters
+    ----------
+    picture : Figure, Axes or sequence of Axes
+        Result of a plot function, or its figure.
+    path : Path
+        File to write; its ending, .pdf, .png or .svg, selects the format.
+    size : (float, float), optional
+        Width and height in inches. By default those of the figure.
+    dpi : float, optional
+        Dots per inch, as in `figure_bytes`.
+
+    Raises
+    ------
+    ParameterError
+        If the ending is unknown.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> axes = am.plot.plot_presence(am.simulate.cube(frames=10, seed=1))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "presence.svg")
+    ...     write_figure(axes, path)
+    ...     path.stat().st_size > 1000
+    True
+    """
     content = figure_bytes(picture, path.suffix.lower().removeprefix("."), size=size, dpi=dpi)
     with replacing(path) as file:
         file.write(content)

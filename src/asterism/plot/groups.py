@@ -1,4 +1,4 @@
-"""Where tracks get in each other's way."""
+"""Groups of tracks that compete for detections."""
 
 from __future__ import annotations
 
@@ -15,32 +15,40 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_groups"]
 
-ALONE = "#D4D4D4"  # tracks that are in nobody's way: quiet
-# Least number of tracks in a group of each colour.
+ALONE = "#D4D4D4"  # tracks without a competitor
+# Smallest number of tracks in a group of each colour.
 _SIZES = {1: "1 track", 2: "2", 3: "3 to 4", 5: "5 to 8", 9: "9 or more"}
 
 
 def plot_groups(groups: GateGroups, ax: Axes | None = None) -> Axes:
-    """Draw how many tracks of each frame are in groups of which size.
+    """Draw the number of tracks in gate groups of each size, over time.
 
     Parameters
     ----------
     groups : GateGroups
-        From `gate_groups`: tracks and detections that gates link. A track alone has its
-        detection to itself; the larger a group, the more ways there are to share it out.
+        Result of `gate_groups`: tracks with common gated detections. A track alone in its group
+        has no competitor; larger groups have more possible associations.
     ax : Axes, optional
-        Where to draw; a new figure unless given.
+        Axes to draw on. By default a new figure.
 
     Returns
     -------
     Axes
-        Seconds across; tracks, stacked by the size of their group, the largest groups at the
-        bottom and darkest, those alone grey.
+        Time in seconds, and tracks stacked by the size of their group: the largest groups at the
+        bottom and darkest, single tracks grey.
 
     Raises
     ------
     ParameterError
-        If it is no `GateGroups`.
+        If `groups` is not a `GateGroups`.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> groups = am.filter.gate_groups(truth, am.estimate_model(truth.detections).model)
+    >>> am.plot.plot_groups(groups).get_ylabel()
+    'tracks'
     """
     import matplotlib
 

@@ -1,4 +1,4 @@
-"""What one camera sees: points and the lines between them; and how deep its image is."""
+"""Images of one camera: points with connecting lines, and depth."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = ["frame_image", "image_axes", "plot_depth", "plot_image"]
 
 WORDS = {
     Reason.VISIBLE: "seen",
-    Reason.HIDDEN: "hidden",
+    Reason.HIDDEN: "occluded",
     Reason.OUTSIDE: "outside",
     Reason.BEHIND: "behind",
     Reason.NEAR: "too near",
@@ -47,47 +47,54 @@ def plot_image(
     moment: int = 0,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw the points of one frame in the image of one camera, and the lines that link them.
+    """Draw the points of one frame in the image of one camera, with connecting lines.
 
-    A point that is seen is filled, one that a surface hides is hollow, and lines to it are dashed
-    and pale. Points that have no place in the image are not drawn, nor are lines to them; the
-    title counts them by reason. Lines are straight from point to point, also where the lens would
-    bend them.
+    Visible points are filled. Points occluded by a surface are hollow, with dashed pale lines.
+    Points outside the image are not drawn; the title counts them by reason. Lines are straight from
+    point to point, without the distortion of the lens.
 
     Parameters
     ----------
     camera : Camera
-        Whose image it is.
+        Camera of the image.
     projection : Projection
-        Of K points through that camera: arrays of shape (K,).
+        Projection of K points by this camera, with arrays of shape (K,).
     connections : array_like of int, shape (K, K), optional
-        The connection matrix, symmetric: 0 for no line between two points, k ≥ 1 for one in the
-        k-th colour of the style, which begins anew after the last.
+        Symmetric connection matrix: 0 for no line between two points, k ≥ 1 for a line in the k-th
+        colour of the style, counted cyclically.
     colours : colour or K of them, optional
-        Of the points; by default those of the style in turn.
+        Colours of the points. By default those of the style in turn.
     names : sequence of (str or None), optional
-        K names, written beside the points.
+        K names that are written beside the points.
     surfaces : sequence of Surface
-        What hides points; their outlines are drawn, bent by the lens.
+        Occluding surfaces; their distorted outlines are drawn.
     moment : int
-        Which moment of surfaces that move.
+        Index of the frame for moving surfaces.
     ax : Axes, optional
-        Where to draw; a new figure unless given.
+        Axes to draw on. By default a new figure.
 
     Returns
     -------
     Axes
-        Pixels, u to the right and v down; the frame is that of the image.
+        Pixels, u to the right and v down, within the borders of the image.
 
     Raises
     ------
     ParameterError
-        If an argument is of another kind, the projection is not of one frame and one camera, or
-        something has not its K entries.
+        If an argument is of another type, the projection is not of one frame and one camera, or an
+        argument does not have K entries.
 
     References
     ----------
     The 2010 report, §3.3 and 3.4.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> camera = am.Rig.ring(4, radius=3, height=2)[0]
+    >>> seen = camera.project([[0, 0, 1], [0.2, 0, 1]])
+    >>> am.plot.plot_image(camera, seen, names=["A", "B"]).get_xlabel()
+    'u [px]'
     """
     check_kind("camera", camera, Camera, "rig[0]")
     check_kind("projection", projection, Projection, "camera.project(points)")
@@ -128,23 +135,23 @@ def plot_image(
                 fontsize=7, color=INK, annotation_clip=True, parse_math=False,
             )  # fmt: skip
     counts = projection.counts()
-    told = [f"{counts[r]} {word}" for r, word in WORDS.items() if counts[r] or r == Reason.VISIBLE]
+    shown = [f"{counts[r]} {word}" for r, word in WORDS.items() if counts[r] or r == Reason.VISIBLE]
     before = f"{camera.name}: " if camera.name else ""
-    title = before + ", ".join(told)
+    title = before + ", ".join(shown)
     axes.set_title(title, fontsize=11, color=INK, loc="left", parse_math=False)
     frame_image(axes, camera.size_px)
     return axes
 
 
 def plot_depth(depth: DepthImage | ArrayLike, ax: Axes | None = None) -> Axes:
-    """Draw a depth image, near dark and far light; white where nothing is seen.
+    """Draw a depth image, from dark (near) to light (far); pixels without a surface are white.
 
     Parameters
     ----------
     depth : DepthImage or array_like, shape (height, width)
-        Metres along the optical axis; infinite where nothing is seen.
+        Depth along the optical axis in metres; infinite without a surface.
     ax : Axes, optional
-        Where to draw; a new figure unless given.
+        Axes to draw on. By default a new figure.
 
     Returns
     -------
@@ -154,7 +161,13 @@ def plot_depth(depth: DepthImage | ArrayLike, ax: Axes | None = None) -> Axes:
     Raises
     ------
     ParameterError
-        If it is no image.
+        If `depth` is not an image.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.plot.plot_depth([[1.0, 2.0], [2.0, float("inf")]]).get_ylabel()
+    'v [px]'
     """
     given = depth.depth if isinstance(depth, DepthImage) else depth
     image = check_array("depth", given, ("height", "width"), finite=False)
@@ -173,13 +186,13 @@ def plot_depth(depth: DepthImage | ArrayLike, ax: Axes | None = None) -> Axes:
 
 
 def image_axes(size_px: tuple[int, int]) -> Axes:
-    """Make a figure of the shape of an image and give its axes."""
+    """Return new axes with the aspect ratio of an image, width and height in pixels."""
     width, height = size_px
     return new_axes(height=float(np.clip(7.2 * height / width + 0.9, 3.0, 11.0)))
 
 
 def frame_image(axes: Any, size_px: tuple[int, int]) -> None:
-    """Give axes the frame of an image, in pixels to one scale, and the style."""
+    """Set the limits and the style of axes to those of an image in pixels, to one scale."""
     width, height = size_px
     axes.set_xlim(-0.5, width - 0.5)
     axes.set_ylim(height - 0.5, -0.5)
@@ -224,7 +237,7 @@ def _draw_connections(
     is_drawn: NDArray[np.bool_],
     is_seen: NDArray[np.bool_],
 ) -> None:
-    """Draw the lines of which both ends are drawn: those with a hidden end dashed and pale."""
+    """Draw the lines of which both ends are drawn: dashed and pale if an end is occluded."""
     from matplotlib.collections import LineCollection
 
     i, j = np.nonzero(np.triu(matrix, 1))

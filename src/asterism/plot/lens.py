@@ -1,4 +1,4 @@
-"""What a lens does to a square grid."""
+"""Distortion of a square grid by a lens."""
 
 from __future__ import annotations
 
@@ -24,33 +24,38 @@ _MARGIN = 0.12  # how far the bent grid may leave the image, as a share of its l
 
 
 def plot_lens(camera: Camera, ax: Axes | None = None) -> Axes:
-    """Draw a square grid as the camera sees it, and behind it, pale, as it would without its lens.
+    """Draw the image of a square grid with the lens of a camera and, pale, without it.
 
-    The grid stands square before the camera and fills the image of the pin-hole. Skew and unequal
-    focal lengths show in both. Where the lens model does not reach, the image is hatched: no point
-    is ever seen there.
+    The grid is perpendicular to the optical axis and fills the image of the pinhole camera. Skew
+    and unequal focal lengths affect both grids. Parts of the image that the lens model does not
+    reach are hatched.
 
     Parameters
     ----------
     camera : Camera
-        The camera; without a lens both grids are one.
+        Camera to draw. Without a lens both grids are equal.
     ax : Axes, optional
-        Where to draw; a new figure unless given.
+        Axes to draw on. By default a new figure.
 
     Returns
     -------
     Axes
-        Pixels, u to the right and v down. The title says how far the lens shifts points within
-        the image.
+        Pixels, u to the right and v down. The title has the largest shift of a point by the lens.
 
     Raises
     ------
     ParameterError
-        If it is no camera.
+        If `camera` is not a `Camera`.
 
     References
     ----------
     The 2010 report, figure 3.6.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.plot.plot_lens(am.Rig.ring(2, radius=3, height=2)[0]).get_ylabel()
+    'v [px]'
     """
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Rectangle
@@ -77,8 +82,8 @@ def plot_lens(camera: Camera, ax: Axes | None = None) -> Axes:
     axes.set_ylim(high[1] + edge, low[1] - edge)
     name = f"{camera.name}: " if camera.name else ""
     lens = "no lens" if camera.lens is None else type(camera.lens).__name__
-    told = "" if camera.lens is None else f", shifts points by up to {shift:.3g} px"
-    axes.set_title(name + lens + told, fontsize=11, color=INK, loc="left", parse_math=False)
+    shift_text = "" if camera.lens is None else f", shifts points by up to {shift:.3g} px"
+    axes.set_title(name + lens + shift_text, fontsize=11, color=INK, loc="left", parse_math=False)
     return axes
 
 
@@ -106,7 +111,7 @@ def _pin_hole(camera: Camera, normalised: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def _draw_domain(axes: Any, camera: Camera) -> float:
-    """Hatch what the lens does not reach; give the largest shift of a pixel that it does."""
+    """Hatch pixels beyond the lens model, and return the largest shift of the others."""
     w, h = camera.size_px
     step = max(w, h) / _SAMPLES
     u = np.linspace(-0.5, w - 0.5, max(2, round(w / step)))

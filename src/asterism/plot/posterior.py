@@ -1,4 +1,4 @@
-"""How far a walk over partitions climbs."""
+"""Convergence of a Markov chain over partitions."""
 
 from __future__ import annotations
 
@@ -26,31 +26,37 @@ def plot_posterior(
     others: Mapping[str, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw how far a Markov chain climbs with the number of its moves.
+    """Draw the log posterior of a Markov chain over the number of its moves.
 
     Parameters
     ----------
     moves : array_like, shape (M,)
-        Moves for each detection in doubt, as `MCMCDA` counts them; rising, the first may be 0.
+        Moves per ambiguous detection, as `MCMCDA` counts them, increasing; the first may be 0.
     values : array_like, shape (M,) or (R, M)
-        Log posterior of what was found, nats above “everything is clutter”, for each number of
-        moves and each of R seeds; not finite where the model forbids it, which is left out.
+        Log posterior of the result in nats above “everything is clutter”, for each number of moves
+        and each of R seeds. Values that are not finite are left out.
     others : mapping of str to float, optional
-        Log posterior of what other methods found, each drawn as a dashed line.
+        Log posterior of other methods by name, each drawn as a dashed line.
     ax : Axes, optional
-        Where to draw; a new figure unless given.
+        Axes to draw on. By default a new figure.
 
     Returns
     -------
     Axes
-        Nats below the best that is known of all that is drawn, on a scale that is logarithmic from
-        1 on, over moves; every seed as a pale line, their mean as a strong one. The title says how
-        far below the mean ends.
+        Nats below the best drawn value over moves, on a scale that is logarithmic above 1: each
+        seed as a pale line, their mean as a strong one. The title has the final mean.
 
     Raises
     ------
     ParameterError
-        If the arrays do not fit each other, or the moves do not rise.
+        If the shapes do not agree, or the moves do not increase.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> axes = am.plot.plot_posterior([1, 10], [[90.0, 99.0], [92.0, 100.0]], others={"gnn": 80.0})
+    >>> axes.get_xlabel()
+    'moves per ambiguous detection'
     """
     n = check_array("moves", moves, ("M",))
     if not len(n) or n[0] < 0 or (np.diff(n) <= 0).any():
@@ -82,7 +88,7 @@ def plot_posterior(
     decades = 10.0 ** np.arange(np.ceil(np.log10(max(2 * depth, 1.0))) + 1)
     ticks = [0.0, *(-decades[decades <= 2 * max(depth, 1.0)]).tolist()]
     axes.set_yticks(ticks, [f"{abs(tick):g}" for tick in ticks])
-    axes.set_xlabel("moves for each detection in doubt", color=INK)
+    axes.set_xlabel("moves per ambiguous detection", color=INK)
     axes.set_ylabel("nats below the best known", color=INK)
     axes.grid(color=GRID, linewidth=0.8)
     tidy(axes)

@@ -1,4 +1,4 @@
-"""When each track was there, and when it was wrong."""
+"""Presence of each track over time, and its wrong labels."""
 
 from __future__ import annotations
 
@@ -20,20 +20,26 @@ __all__ = ["plot_errors", "plot_presence"]
 
 
 def plot_presence(tracks: Tracks, ax: Axes | None = None) -> Axes:
-    """Draw each track as a bar over time, and the clutter a frame on top.
+    """Draw each track as a bar over time, with the clutter per frame above.
 
     Parameters
     ----------
     tracks : Tracks
-        A bar is broken where its track was not seen; tracks are sorted by their first frame, the
-        first on top.
+        Tracks, drawn from top to bottom in the order of their first frames. Gaps interrupt a bar.
     ax : Axes, optional
-        Where to draw; a new figure unless given.
+        Axes to draw on. By default a new figure.
 
     Returns
     -------
     Axes
-        Seconds across, one row a track; the counts are in an inset above.
+        Time in seconds and one row per track; an inset above has the counts.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> axes = am.plot.plot_presence(am.simulate.cube(frames=20, seed=1))
+    >>> axes.get_xlabel()
+    'time [s]'
     """
     rows = rows_of(tracks)
     axes = ax if ax is not None else axes_for(rows)
@@ -47,29 +53,37 @@ def plot_presence(tracks: Tracks, ax: Axes | None = None) -> Axes:
 
 
 def plot_errors(tracks: Tracks, truth: Tracks, ax: Axes | None = None) -> Axes:
-    """Draw each track as a bar over time, in another colour where it has the wrong marker.
+    """Draw each track as a bar over time, with wrong labels in another colour.
 
-    A track's marker is the one that it has most often. The counts on top are of detections with
-    the wrong label and of detections of markers without one.
+    The right marker of a track is its most frequent one. The counts above are detections with a
+    wrong label, and detections of markers without a label.
 
     Parameters
     ----------
     tracks : Tracks
-        What was found.
+        Tracks to check.
     truth : Tracks
-        What is so, label by label for the same detections; -1 is clutter.
+        True tracks of the same detections in the same order; label -1 is clutter.
     ax : Axes, optional
-        Where to draw; a new figure unless given.
+        Axes to draw on. By default a new figure.
 
     Returns
     -------
     Axes
-        Seconds across, one row a track, sorted by first frame; the counts are in an inset above.
+        Time in seconds and one row per track, sorted by first frame; an inset above has the counts.
 
     Raises
     ------
     ParameterError
-        If the detections of the two are not the same.
+        If `tracks` and `truth` have different detections.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> truth = am.simulate.crossing(frames=20, seed=1)
+    >>> tracks = am.track(truth.detections, "gnn")
+    >>> len(am.plot.plot_errors(tracks, truth).child_axes)
+    1
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_kind("truth", truth, Tracks)

@@ -31,24 +31,24 @@ def plot_projections(
     frames: slice | None = None,
     ax: Sequence[Axes] | None = None,
 ) -> list[Axes]:
-    """Draw the image points of a film, a panel for each camera.
+    """Draw image points of several cameras, one panel per camera.
 
     Parameters
     ----------
     observations : Observations
-        What was seen: from `asterism.simulate.film`, or a file. Where they carry the truth a marker
-        has one colour in all images, and what is of no marker is grey; otherwise all are.
+        Image points, from `asterism.simulate.film` or a file. With the true markers, each marker
+        has the same colour in all images and false points are grey; otherwise all are grey.
     rig : Rig
-        The cameras, for the size of their images; every camera of the film must be among them.
+        Rig with all cameras of the observations, for the sizes of their images.
     frames : slice, optional
-        Which frames; all by default.
+        Frames to draw. By default all.
     ax : sequence of Axes, optional
-        Where to draw, one for each camera; a new figure unless given.
+        Axes to draw on, one per camera. By default a new figure.
 
     Returns
     -------
     list of Axes
-        Pixels, u to the right and v down; the frame is that of the image.
+        Pixels, u to the right and v down, within the borders of the image.
 
     Raises
     ------
@@ -59,6 +59,14 @@ def plot_projections(
     References
     ----------
     The 2010 report, §3.3.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> rig = am.Rig.ring(3, radius=5, height=2)
+    >>> film = am.simulate.film(am.simulate.cube(frames=5, seed=1), rig)
+    >>> len(am.plot.plot_projections(film.observations, rig))
+    3
     """
     check_kind("observations", observations, Observations, "am.io.read_observations(path)")
     check_kind("rig", rig, Rig, "am.read_rig(path)")
@@ -100,9 +108,9 @@ def plot_projections(
         frame_image(axes, sizes[name])
         axes.set(xlabel="", ylabel="")
         axes.tick_params(labelsize=6)
-        told = f"{name}: {len(here):,} points"
+        title = f"{name}: {len(here):,} points"
         n_false = int((whose[here] < 0).sum())
         if seen.markers is not None and n_false:
-            told += f", {n_false:,} false"
-        axes.set_title(told, fontsize=9, color=INK, loc="left", parse_math=False)
+            title += f", {n_false:,} false"
+        axes.set_title(title, fontsize=9, color=INK, loc="left", parse_math=False)
     return panels

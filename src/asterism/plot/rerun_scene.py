@@ -27,35 +27,38 @@ _MOST_LABELS = 60  # markers that can bear their name legibly
 
 
 def view(tracks: Tracks, *, rig: Rig | None = None, path: str | Path | None = None) -> None:
-    """Look at tracks in Rerun's viewer, or save what it would show.
+    """Show tracks in the Rerun viewer, or save the scene to a file.
 
-    There are, each to be shown or hidden: every marker under its name and in its colour, gone where
-    it was not seen; the straight line across each gap, while it lasts; trails of half a second;
-    clutter in grey; the confidence of every label over time; and the cameras. The film has two
-    timelines: seconds, and numbers of frames.
+    The viewer can show or hide each part of the scene: markers by name, straight lines across gaps,
+    trails of half a second, clutter in grey, the confidence of labels over time, and the cameras.
+    The timelines are seconds and frame numbers.
 
     Parameters
     ----------
     tracks : Tracks
-        3-D, or 2-D, which lie in the plane z = 0. Metres, z up.
+        Tracks in 3-D, or in 2-D in the plane z = 0. Metres, z up.
     rig : Rig, optional
-        Cameras to show, as pin-holes: Rerun knows no lenses.
+        Cameras to show, as pinhole cameras, because Rerun has no lens models.
     path : path, optional
-        File to write, ``.rrd``; it takes neither viewer nor screen. Without it the viewer is opened
-        and this waits until it is closed.
+        File to write, ``.rrd``, which needs neither viewer nor screen. By default the viewer is
+        opened, and the call returns when it is closed.
 
     Raises
     ------
     ParameterError
-        If the tracks hold nothing, or Rerun is not installed: ``pip install 'asterism[view]'``.
+        Without detections, or without Rerun: ``pip install 'asterism[view]'``.
     FormatError
-        If the file cannot be written, or the viewer not be opened.
+        If the file cannot be written, or the viewer cannot be opened.
 
     Notes
     -----
-    Nothing is sent anywhere. A recording is written by this process; the viewer, which listens to
-    this machine alone, is opened with Rerun's usage statistics switched off, as ``rerun analytics
-    disable`` does it: also for the next time.
+    The viewer accepts connections from this machine only. Rerun's usage statistics are switched off
+    permanently, as by ``rerun analytics disable``.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.plot.view(am.simulate.cube(seed=1), path="cube.rrd")  # doctest: +SKIP
     """
     try:
         import rerun  # pyright: ignore[reportMissingImports]  # an extra

@@ -1,4 +1,4 @@
-"""Where the cameras stand, and what lies before them."""
+"""Positions and views of the cameras of a rig."""
 
 from __future__ import annotations
 
@@ -39,30 +39,36 @@ def plot_rig(
     length: float | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw cameras in their world, and what is given of what they look at.
+    """Draw the cameras of a rig in 3-D, with optional points, surfaces and coverage.
 
     Parameters
     ----------
     rig : Rig
-        Each camera is a pyramid from its centre along the rays of the edge of its image; where the
-        lens model does not reach that edge, of the outermost pixels that it reaches.
+        Cameras, each drawn as a pyramid from its centre along the rays of the border of its image.
+        If the lens model does not reach the border, the outermost valid pixels are used.
     points : array_like, shape (..., 3), optional
-        Drawn as dots, world metres; NaN where there is none.
+        Points in world coordinates, metres, drawn as dots; NaN for missing ones.
     surfaces : sequence of Surface
-        Drawn by their outlines.
+        Surfaces, drawn as outlines.
     moment : int
-        Which moment of surfaces that move.
+        Index of the frame for moving surfaces.
     coverage : Coverage, optional
-        Its places that two cameras or more see are coloured by their number.
+        Positions that two or more cameras see, coloured by their number.
     length : float, optional
-        Of the pyramids along their axes, metres; by default a ninth of the width of all.
+        Length of the pyramids in metres. By default a ninth of the width of the scene.
     ax : Axes, optional
-        Three-dimensional axes to draw on, beside what they hold; a new figure unless given.
+        Three-dimensional axes to draw on. By default a new figure.
 
     Returns
     -------
     Axes
         Metres on all axes, to one scale.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.plot.plot_rig(am.Rig.ring(4, radius=3, height=2)).get_zlabel()
+    'z [m]'
     """
     check_kind("rig", rig, Rig, "am.Rig((camera,))")
     axes: Any = ax if ax is not None else new_axes(solid=True, height=6.0)
@@ -113,7 +119,7 @@ def _limits(axes: Any) -> list[NDArray[np.float64]]:
 
 
 def _edge(camera: Camera) -> NDArray[np.float64]:
-    """Give the unit rays of the pixels along the edge of the image, shape (n, 3), in order."""
+    """Return the unit rays of the pixels along the edge of the image, shape (n, 3), in order."""
     w, h = camera.size_px
     share = np.linspace(0, 1, _SIDE, endpoint=False)
     zero, one = np.zeros(_SIDE), np.ones(_SIDE)
