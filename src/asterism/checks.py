@@ -133,7 +133,7 @@ def check_kind(name: str, value: object, kind: type, hint: str = "") -> None:
 
 
 def check_path(name: str, value: object) -> Path:
-    """Give `value` as a path, or raise.
+    """Return `value` as a path, or raise.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def check_array(
     dtype: type = np.float64,
     finite: bool = True,
 ) -> NDArray[Any]:
-    """Give `value` as a C-contiguous array of a shape and type, or raise.
+    """Return `value` as a C-contiguous array of a shape and type, or raise.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def keep_array(
     Returns
     -------
     ndarray
-        Read-only. A copy, unless nobody else can write to the memory.
+        Read-only. A copy, unless no other object can write to the memory.
 
     Raises
     ------

@@ -52,7 +52,7 @@ def clipped(text: str, limit: int) -> str:
 
 
 def _message(place: str, expected: str, got: str, hint: str) -> str:
-    """Give the one line that all messages are: where, what was expected, what was found, advice."""
+    """Return a message in one line: place, expectation, finding and advice."""
     text = f"{place}: expected {expected}, found {got}" if expected else f"{place}: {got}"
     if hint:
         first, end = hint.split(" ", 1)[0], "" if hint[-1] in ".?!" else "."
@@ -139,7 +139,7 @@ class SolverLimit(AsterismError, RuntimeError):
 
 
 def not_read(path: str | Path, error: OSError) -> FormatError:
-    """Give the error for a file that the system does not let be read."""
+    """Return the error for a file that cannot be read."""
     if isinstance(error, FileNotFoundError):
         return FormatError(path, "", "", "no such file")
     if isinstance(error, IsADirectoryError):
@@ -148,13 +148,13 @@ def not_read(path: str | Path, error: OSError) -> FormatError:
 
 
 def not_written(path: str | Path, error: OSError) -> FormatError:
-    """Give the error for a file or folder that the system does not let be written."""
+    """Return the error for a file or folder that cannot be written."""
     hint = "choose a folder that exists, may be written to and has room"
     return FormatError(path, "", "", f"cannot be written: {_reason(error)}", hint)
 
 
 def _reason(error: OSError) -> str:
-    """Say why, without the name of a temporary file."""
+    """Return the reason without the name of a temporary file."""
     if isinstance(error, FileNotFoundError):
         return "no such folder"
     text = error.strerror or "the system refuses"

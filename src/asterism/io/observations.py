@@ -4,7 +4,7 @@ Columns ``frame, time, camera, u, v, marker``: seconds, the camera's name, pixel
 of the top left one, and where the truth is known the marker's name, blank for none of them. The
 first rows have neither frame nor time: each declares a camera or a marker, in order, so that
 those that see nothing or are never seen are there too. A row with a frame and a time alone is a
-frame in which nobody saw anything. Floats are written with as many digits as give back the same
+frame in which no camera saw anything. Floats are written with as many digits as give back the same
 bits.
 """
 
@@ -39,26 +39,36 @@ _CHUNK = 1024  # frames at a time
 def write_observations(
     observations: Observations, path: str | Path, *, first_frame: int = 1
 ) -> None:
-    """Write image points to a CSV file; it is there as a whole afterwards, or untouched.
+    """Write image points to a CSV file, completely or not at all.
 
-    `read_observations` gives back the same, bit for bit. Names of markers are kept where it is
-    known which point is of which.
+    `read_observations` returns the same values bit for bit. Names of markers are written if the
+    observations have their true markers.
 
     Parameters
     ----------
     observations : Observations
-        What to write.
+        Image points to write.
     path : path
-        The file, which is replaced if it exists.
+        File to write; an existing one is replaced.
     first_frame : int
-        The number of the first frame.
+        Number of the first frame in the file.
 
     Raises
     ------
     ParameterError
-        If a name is empty, twice there, or has a line end in it.
+        If a name is empty, is repeated or contains a line end.
     FormatError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import asterism as am, tempfile
+    >>> rig = am.Rig.ring(2, radius=5, height=2)
+    >>> film = am.simulate.film(am.simulate.cube(frames=2, seed=1), rig)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_observations(film.observations, f"{folder}/seen.csv")
+    ...     read_observations(f"{folder}/seen.csv").cameras
+    ('cam1', 'cam2')
     """
     check_number("first_frame", first_frame, integer=True)
     _check_names("cameras", observations.cameras)
@@ -70,10 +80,10 @@ def write_observations(
 
 
 def read_observations(path: str | Path) -> Observations:
-    """Read image points from a CSV file, as `write_observations` or as caliscope writes it.
+    """Read image points from a CSV file of `write_observations` or of caliscope.
 
-    The header tells which of the two it is. Cameras of caliscope's ``xy.csv`` are called ``cam_N``,
-    as `read_rig` calls those of its calibration.
+    The header decides between the two. Cameras of caliscope's ``xy.csv`` are named ``cam_N``, as by
+    `read_rig` for its calibration.
 
     Columns and rows may stand in any order; of one camera and frame the points keep theirs.
     Cameras and markers need not be declared, if none of them is: then they come in the order in

@@ -159,7 +159,7 @@ def plot_reliability(
 def _interval(
     share: NDArray[np.float64], n: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the ends of Wilson's interval of one standard error about shares of `n`."""
+    """Return the ends of Wilson's interval of one standard error about shares of `n`."""
     middle = (share + 0.5 / n) / (1 + 1 / n)
     half = np.sqrt(share * (1 - share) / n + 0.25 / n**2) / (1 + 1 / n)
     # Rounding must not put the share itself outside.
@@ -167,7 +167,7 @@ def _interval(
 
 
 def _edges(times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the ends of the frames, shape (T + 1,): half way to the next, wherever that is."""
+    """Return the borders between frames, shape (T + 1,), half way between their times."""
     if len(times) == 1:
         return np.array([times[0] - 0.5, times[0] + 0.5])
     middle = (times[1:] + times[:-1]) / 2

@@ -141,7 +141,7 @@ def draw_bar(
 def _grid(
     points: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
-    """Give the coordinates of a grid along its axes, and the spacing."""
+    """Return the coordinates of a grid along its axes, and the spacing."""
     expected = "places of a volume_grid, shape (n_x, n_y, n_z, 3)"
     if points.ndim != 4 or not points.size:
         raise ParameterError("coverage", expected, f"shape {points.shape}")

@@ -20,7 +20,7 @@ _ARC = 12  # pieces of a quarter of a circle
 
 
 def outlines(surface: Surface, moment: int = 0) -> list[NDArray[np.float64]]:
-    """Give the lines by which a surface is drawn.
+    """Return the lines of the outline of a surface.
 
     Parameters
     ----------

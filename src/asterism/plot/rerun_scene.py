@@ -191,7 +191,7 @@ def _log_trails(
 
 
 def _times(rr: Any, tracks: Tracks, frames: NDArray[np.int64] | None = None) -> list[Any]:
-    """Give the two timelines of some frames, all unless given."""
+    """Return the two timelines of some frames; by default of all."""
     d = tracks.detections
     frames = np.arange(d.n_frames) if frames is None else frames
     first = getattr(d, "first_frame", 0)
@@ -202,7 +202,7 @@ def _times(rr: Any, tracks: Tracks, frames: NDArray[np.int64] | None = None) -> 
 
 
 def _blueprint(tracks: Tracks) -> Any:
-    """Give what is shown where: the space, and under it the confidence, if there is any."""
+    """Return the layout of the viewer: the space and, below it, the confidence if there is one."""
     import rerun as rr  # pyright: ignore[reportMissingImports]
     import rerun.blueprint as rrb  # pyright: ignore[reportMissingImports]
 
@@ -225,13 +225,13 @@ def _blueprint(tracks: Tracks) -> Any:
 
 
 def _rgb(colour: str) -> tuple[int, int, int]:
-    """Give a colour of the style, ``#RRGGBB``, as Rerun takes it."""
+    """Return a colour of the style, ``#RRGGBB``, as Rerun takes it."""
     red, green, blue = bytes.fromhex(colour[1:])
     return red, green, blue
 
 
 def _names(tracks: Tracks) -> list[str]:
-    """Give every track a name of its own: its number where it has none."""
+    """Return a unique name for each track: its number, if it has no name."""
     found: dict[str, None] = {}
     for k, name in enumerate(tracks.names):
         base = chosen = name or f"track {k}"

@@ -36,7 +36,7 @@ def axes_for(rows: NDArray[np.int64]) -> Axes:
 
 
 def frame_rows(axes: Any, tracks: Tracks, rows: NDArray[np.int64]) -> None:
-    """Give axes the times of a capture, the names of its tracks, and the style."""
+    """Set the times of a capture, the names of its tracks and the style on axes."""
     d = tracks.detections
     n_rows = int(rows.max(initial=-1)) + 1
     axes.set_ylim(n_rows - 0.3, -0.7)
@@ -82,7 +82,7 @@ def strip_above(axes: Any, says: str = "") -> Any:
 
 
 def legend_above(strip: Any) -> None:
-    """Give a strip its legend, on the right beside what it says and no higher than that."""
+    """Add the legend of a strip on its right, no higher than the strip."""
     strip.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, fontsize=8,
         labelcolor=INK, handlelength=1.2, borderpad=0, borderaxespad=0.5,

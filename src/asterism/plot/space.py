@@ -15,7 +15,7 @@ __all__ = ["to_scale"]
 
 
 def to_scale(axes: Any, points: NDArray[np.float64], *, zoom: float = 0.85) -> None:
-    """Give axes the style, and one scale in which all points have room.
+    """Set the style and equal scales on axes, with room for all points.
 
     Parameters
     ----------

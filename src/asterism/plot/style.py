@@ -70,7 +70,7 @@ def new_panels(n_rows: int, n_columns: int = 1, *, width: float, height: float) 
 
 
 def given_axes(ax: Sequence[Axes], n: int, what: str) -> list[Axes]:
-    """Give axes that a caller passed as a list, or raise if they are not `n`.
+    """Return axes that a caller passed as a list, or raise if they are not `n`.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def given_axes(ax: Sequence[Axes], n: int, what: str) -> list[Axes]:
 
 
 def tidy(axes: Axes) -> None:
-    """Give flat axes the style: no frame, quiet ticks."""
+    """Set the style on flat axes: no frame, unobtrusive ticks."""
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):

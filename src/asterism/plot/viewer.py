@@ -78,7 +78,7 @@ def _rerun(place: str, expected: str, *arguments: str) -> None:
 
 
 def _settings_file() -> Path:
-    """Give where the viewer keeps that setting."""
+    """Return the path of the viewer's settings."""
     if sys.platform == "win32":
         base = Path(os.environ.get("APPDATA") or Path.home() / "AppData" / "Roaming")
         return base / "rerun" / "config" / "analytics.json"

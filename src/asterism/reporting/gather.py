@@ -43,25 +43,25 @@ def report(
 ) -> None:
     """Write tracks as one self-contained HTML page with a player.
 
-    The page opens from the disk and asks nobody for anything. Above 3 million points every second,
-    third … frame is shown, and the page says so.
+    The page loads nothing from the network. Above 3 million points it shows every second, third …
+    frame, with a note.
 
     Parameters
     ----------
     tracks : Tracks
-        2-D or 3-D, with or without names and confidence.
+        Tracks in 2-D or 3-D, with or without names and confidence.
     path : path
-        The file; one that exists is replaced, except the one that the detections came from.
+        File to write. An existing file is replaced, unless it is the input of the detections.
     truth : Tracks, optional
-        What is so, as for `evaluate`: wrong labels are marked, and the scores explained.
+        True tracks, as for `evaluate`. Wrong labels are marked, and scores are shown.
     rig : Rig, optional
         The cameras, drawn in the scene; the player looks through each. Only with 3-D tracks.
     made : str
-        How the tracks were made, in a sentence or two: by which method, under which model.
+        Sentence about the method and the model of the tracks.
     summary : iterable of (str, str)
-        What else is to be told about how the tracks were made: names and values.
+        Names and values for the table about the tracking.
     title : str, optional
-        Of the page; the name of the file that was tracked unless given.
+        Title of the page. By default the name of the tracked file.
     up : "x", "y" or "z", optional
         The axis that points up. Unless given, it is the one that is up in the images of the `rig`;
         without a rig y for TRC, for Motive's CSV and where the lowest points stay by y = 0 and far
@@ -150,5 +150,5 @@ def _stands_on_y(tracks: Tracks) -> bool:
 def _oddities(tracks: Tracks) -> list[str]:
     d = tracks.detections
     if d.n_points and not (tracks.labels >= 0).any():
-        return ["No track was believed: all points are clutter. Does the model fit the capture?"]
+        return ["No track was confirmed: all points are clutter. Check the model and unit."]
     return []

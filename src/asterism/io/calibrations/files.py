@@ -70,15 +70,15 @@ def read_rig(path: str | Path, *, format: str | None = None, units: str | None =
 def write_rig(
     rig: Rig, path: str | Path, *, format: str | None = None, overwrite: bool = False
 ) -> None:
-    """Write cameras to a calibration; it is there as a whole afterwards, or untouched.
+    """Write the cameras of a rig to a calibration, completely or not at all.
 
     Parameters
     ----------
     rig : Rig
         The cameras.
     path : path
-        The file, which is replaced if it exists; for a format that is a folder (flydra, myptv) the
-        folder, which must be new or empty: among the files of another rig these would be lost.
+        File to write; an existing one is replaced. For a folder format (flydra, myptv) the
+        folder, which must be new or empty, because files of another rig would mix with these.
     format : str, optional
         Key of `CALIBRATION_FORMATS`; by default it follows from the suffix, and ``.toml`` is
         the format "rig", which holds everything exactly.
@@ -88,10 +88,18 @@ def write_rig(
     Raises
     ------
     ParameterError
-        If the format is unknown or cannot hold a camera as it is: then `fit_lens` gives
-        the nearest that it can, and says how near. Or if the folder is not empty.
+        If the format is unknown or cannot hold a camera, or if the folder is not empty. `fit_lens`
+        fits a lens that the format can hold, and returns the error of the fit.
     FormatError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import asterism as am, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     am.io.write_rig(am.Rig.ring(4, radius=3, height=2), f"{folder}/rig.toml")
+    ...     am.read_rig(f"{folder}/rig.toml").names
+    ('cam1', 'cam2', 'cam3', 'cam4')
     """
     check_kind("rig", rig, Rig)
     path = check_path("path", path)
@@ -187,10 +195,9 @@ def _openable(path: Path, chosen: CalibrationFormat) -> CalibrationFormat:
 
 
 def format_of(path: Path) -> CalibrationFormat:
-    """Tell the format of a calibration that exists by its first bytes.
+    """Detect the format of an existing calibration by its content.
 
-    The ending of its name decides between formats that the content fits alike, and where the
-    content fits none.
+    If the content fits several formats or none, the ending of the name decides.
 
     Parameters
     ----------
@@ -204,7 +211,7 @@ def format_of(path: Path) -> CalibrationFormat:
     Raises
     ------
     FormatError
-        If there is nothing, or nothing known.
+        If the path does not exist or has no known format.
     """
     every = list(CALIBRATION_FORMATS.values())
     if path.is_dir():

@@ -18,18 +18,18 @@ __all__ = ["CALIBRATION_FORMATS", "CalibrationFormat"]
 
 @record
 class CalibrationFormat:
-    """A calibration format.
+    """File format of calibrations.
 
     Parameters
     ----------
     name : str
-        Its key in `CALIBRATION_FORMATS`.
+        Key in `CALIBRATION_FORMATS`.
     extensions : tuple of str
-        Endings of its files; none where a folder holds the rig.
+        Endings of file names; empty for a format that is a folder.
     description : str
-        One line for people.
+        Description in one line.
     lens : {"any", "BrownConrady", "ViconRadial", "QuadraticCorrection"}
-        The lens that it can hold, beside none at all.
+        Lens model that the format can hold.
     read : callable
         Path, and the unit of length that the caller knows, to `Rig`.
     write : callable
@@ -42,6 +42,12 @@ class CalibrationFormat:
         The unit that all its files have; None where they do not say, or not all the same.
     has_skew, has_k3 : bool
         Whether it can hold a K with skew, and a `BrownConrady` lens with k3.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.io.CALIBRATION_FORMATS["xcp"].lens
+    'ViconRadial'
     """
 
     name: str

@@ -64,7 +64,7 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
 
 
 def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
-    """Read what a file says about who is whom.
+    """Read the tracks of a file, with their labels, names and confidence.
 
     Parameters
     ----------
@@ -74,13 +74,22 @@ def read_tracks(path: str | Path, *, format: str | None = None) -> Tracks:
     Returns
     -------
     Tracks
-        Over a `Capture`. Asterism's own CSV gives back labels, names and confidence as they were
-        written; other formats the identities of their channels, as `Capture.tracks`.
+        Tracks of a `Capture`. Asterism's CSV holds labels, names and confidence; in other formats
+        each channel is a track, as in `Capture.tracks`.
 
     Raises
     ------
     FormatError, ParameterError
         As in `read`.
+
+    Examples
+    --------
+    >>> import asterism as am, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     am.write(am.simulate.cube(frames=5, seed=1), f"{folder}/cube.csv")
+    ...     tracks = am.io.read_tracks(f"{folder}/cube.csv")
+    >>> len(tracks), tracks.detections.n_points
+    (8, 40)
     """
     path = check_path("path", path)
     asked = None if format is None else _named(format)
@@ -99,28 +108,36 @@ def write(
     overwrite_input: bool = False,
     unflagged: bool = False,
 ) -> None:
-    """Write tracks to a file; it is there as a whole afterwards, or untouched.
+    """Write tracks to a file, completely or not at all.
 
     Parameters
     ----------
     tracks : Tracks or Detections
-        What to write: every detection, those that are clutter too.
+        Tracks to write. All detections are written, with the clutter.
     path : path
-        The file. One that exists is replaced, except the one that the detections came from.
+        File to write. An existing file is replaced, unless it is the input of the detections.
     format : str, optional
         Key of `CAPTURE_FORMATS`; by default it follows from the suffix.
     overwrite_input : bool
         Allow `path` to be the file that the detections were read from.
     unflagged : bool
-        Allow points that were filled in a format in which nothing tells them from measured ones.
+        Allow filled points in a format that cannot mark them.
 
     Raises
     ------
     ParameterError
-        If `path` is the input and that was not allowed, its ending is unknown, or the format
-        cannot hold these tracks, or cannot tell which of their points were filled.
+        If `path` is the input without `overwrite_input`, if its ending is unknown, or if the format
+        cannot hold the tracks or mark their filled points.
     FormatError
-        If the file cannot be written, or its source cannot be read again.
+        If the file cannot be written, or the input cannot be read again.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     am.write(am.simulate.cube(frames=5, seed=1), f"{folder}/cube.trc")
+    ...     [path.name for path in pathlib.Path(folder).iterdir()]
+    ['cube.trc']
     """
     if isinstance(tracks, Detections):
         tracks = Tracks(detections=tracks, labels=np.full(tracks.n_points, -1))
@@ -138,7 +155,7 @@ def write(
         able = ", ".join(f.name for f in CAPTURE_FORMATS.values() if f.write and f.keeps_filled)
         raise ParameterError(
             "format", f"one that tells filled points from measured ones: {able}",
-            repr(chosen.name), "give unflagged=True if they need not be told apart",
+            repr(chosen.name), "give unflagged=True to write them without a mark",
         )  # fmt: skip
     with replacing(path) as file:
         chosen.write(tracks, file)
@@ -154,12 +171,12 @@ def _log_truncation(capture: Capture) -> Capture:
 
 
 def format_of(path: Path) -> CaptureFormat:
-    """Tell the format of a file that exists, by the ending of its name or by its content.
+    """Detect the format of an existing capture, by its ending or its content.
 
     Raises
     ------
     FormatError
-        If there is no such file, or it is of no known format.
+        If the file does not exist or has no known format.
     """
     with _about(path):
         return _find(path, None)

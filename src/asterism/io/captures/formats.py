@@ -27,26 +27,32 @@ __all__ = ["CAPTURE_FORMATS", "CaptureFormat"]
 
 @record
 class CaptureFormat:
-    """A file format.
+    """File format of captures.
 
     Parameters
     ----------
     name : str
-        Its key in `CAPTURE_FORMATS`.
+        Key in `CAPTURE_FORMATS`.
     extensions : tuple of str
-        Endings of its files, "" for none.
+        Endings of file names; "" for a name without one.
     description : str
-        One line for people.
+        Description in one line.
     sniff : callable
-        Whether the first bytes of a file look like this format.
+        Function of the first bytes of a file: whether they are of this format.
     read : callable
-        Path to `Capture`.
+        Function from a path to a `Capture`.
     write : callable or None
-        Writes `Tracks` to an open binary file; None where the format is only read.
+        Function that writes `Tracks` to an open binary file; None for a format that is only read.
     read_tracks : callable or None
-        Path to `Tracks`, for a format that holds more than a `Capture` can.
+        Function from a path to `Tracks`, for a format that holds more than a `Capture`.
     keeps_filled : bool
-        Whether filled points are told from measured ones in it.
+        Whether the format marks filled points.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> am.io.CAPTURE_FORMATS["trc"].extensions
+    ('.trc',)
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What a capture holds, and how hard its markers are to tell apart."""
+"""Figures of a capture: contents, gaps, motion and tracking difficulty."""
 
 from __future__ import annotations
 
@@ -17,45 +17,45 @@ if TYPE_CHECKING:
 
 __all__ = ["CaptureInfo", "describe"]
 
-_MOST_FRAMES = 10_000  # whose neighbours are looked up; of longer captures an even sample is taken
+_MAX_FRAMES = 10_000  # frames in which neighbours are searched, evenly spaced
 
 
 @record
 class CaptureInfo:
-    """Figures of a capture; lengths in millimetres, NaN where there is nothing to measure.
+    """Figures of a capture; lengths in millimetres, NaN where nothing can be measured.
 
     Parameters
     ----------
     path, format, units, first_frame : Path, str, str, int
         As in `Capture`.
     rate : float
-        Frames a second, from the spacing of the times where the file does not state it.
+        Frame rate in Hz, from the file or else from the spacing of the times.
     n_frames : int
-        Frames.
+        Number of frames.
     duration : float
-        Seconds from the first frame to the last, and one frame more.
+        Number of frames divided by the rate, seconds.
     n_named : int
-        Named markers.
+        Number of named markers.
     n_unlabelled : int
-        Channels without a name that hold detections.
+        Number of unnamed channels with detections.
     n_pieces : int
-        Unbroken pieces of those.
+        Number of tracklets in them, from gap to gap.
     n_modelled : int
-        Computed points that were left out.
+        Number of computed channels that were left out.
     n_points, n_unidentified : int
-        Points, and those of no identity: neither of a named marker nor of an unbroken piece.
+        Number of points, and of those without a named marker or tracklet.
     points_min, points_mean, points_max : float
-        Points in a frame.
+        Number of points per frame.
     absent_percent : float
-        Samples missing among the named markers that are there at all.
+        Share of missing samples of named markers, 0 to 100.
     n_gaps : int
-        Holes between detections of a named marker.
+        Number of gaps of named markers.
     gap_median, gap_longest : float
-        Their lengths in frames.
+        Median and largest length of the gaps, frames.
     step_median, step_99 : float
-        Displacement of an identity from one frame to the next, 50th and 99th percentile.
+        Displacement of a marker or tracklet per frame, 50th and 99th percentile.
     nearest_step_median, nearest_step_99 : float
-        Distance of a point to the nearest point of the next frame, whichever that is, percentiles.
+        Distance of a point to the nearest point of the next frame, percentiles.
     spacing_1, spacing_5, spacing_50 : float
         Distance of a point to its nearest neighbour in its frame, percentiles.
     confusion_percent : float
@@ -104,12 +104,12 @@ class CaptureInfo:
 
 
 def describe(capture: Capture) -> CaptureInfo:
-    """Measure a capture.
+    """Measure the contents of a capture and how difficult it is to track.
 
     Parameters
     ----------
     capture : Capture
-        What to measure.
+        Capture to measure.
 
     Returns
     -------
@@ -117,9 +117,18 @@ def describe(capture: Capture) -> CaptureInfo:
 
     Notes
     -----
-    Where no marker is named, displacement and confusion are those of the recording system's own
-    pieces of trajectory, which end where following them was hard: they look easier than they are.
-    In captures of more than 10 000 frames the neighbours are those of an even sample of frames.
+    Without named markers, displacements are those of the tracklets of the recording system. They
+    end at difficult places, so that the difficulty is underestimated. In captures of more than
+    10 000 frames, neighbours are searched in evenly spaced frames.
+
+    Examples
+    --------
+    >>> import asterism as am, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     am.write(am.simulate.cube(frames=20, seed=1), f"{folder}/cube.csv")
+    ...     found = am.io.describe(am.read(f"{folder}/cube.csv"))
+    >>> found.n_named, found.n_frames, found.difficulty
+    (8, 20, 'easy')
     """
     check_kind("capture", capture, Capture, "am.read(path)")
     named = np.array([name is not None for name in capture.names], dtype=bool)
@@ -221,7 +230,7 @@ def _neighbours(
     steps: list[NDArray[np.float64]] = []
     spacing: list[NDArray[np.float64]] = []
     n_confused = n_followed = 0
-    stride = max(-(-capture.n_frames // _MOST_FRAMES), 1)
+    stride = max(-(-capture.n_frames // _MAX_FRAMES), 1)
     for t in range(0, capture.n_frames, stride):
         here = slice(int(offsets[t]), int(offsets[t + 1]))
         n = here.stop - here.start

@@ -127,7 +127,7 @@ def _coded(
 
 
 def _box(points: NDArray[np.float64]) -> list[list[float]]:
-    """Give where nearly all points are, for the first view; strays do not count."""
+    """Return the box of nearly all points for the first view, without outliers."""
     if not len(points):
         return [[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]]
     low, high = np.quantile(points, [0.01, 0.99], axis=0)
@@ -140,7 +140,7 @@ def _first_frame(tracks: Tracks) -> int:
 
 
 def _opening_frame(d: Detections) -> int:
-    """Give the first frame with at least half of the usual number of points.
+    """Return the first frame with at least half of the usual number of points.
 
     Usual is the median over the frames that hold any: many captures begin before the subject does.
     """

@@ -136,7 +136,7 @@ def _top(contents: Contents) -> Markup:
 
 
 def _list(findings: Sequence[Finding], contents: Contents, stride: int) -> Markup:
-    """Give what to look at first, each with its reason."""
+    """Return the findings of the page, each with its reason."""
     if not findings:
         sure = contents.tracks.confidence is not None
         if not (contents.tracks.labels >= 0).any():

@@ -93,7 +93,7 @@ def in_words(facts: Facts, n_axes: int) -> str:
 
 
 def cards(facts: Facts) -> list[tuple[str, str, str]]:
-    """Give the figures at the top: a key for scripts, the number, and what it is of."""
+    """Return the figures at the top of the page: key for scripts, number and label."""
     share = _percent(100 * facts.n_labelled / facts.n_points) if facts.n_points else "–"
     gap = f", the longest {facts.longest_gap:.3g} s" if facts.n_gaps else ""
     found = [

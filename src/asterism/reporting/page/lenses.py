@@ -19,7 +19,7 @@ _WITHOUT = np.float32(np.nan)
 
 
 def camera_header(camera: Camera, number: int) -> dict[str, Any]:
-    """Give what the player needs to draw a camera and to look through it, but its lens."""
+    """Return the parameters of a camera for the player, without its lens."""
     width, height = camera.size_px
     right, low = width - 0.5, height - 0.5
     corners = np.array([[-0.5, -0.5], [right, -0.5], [right, low], [-0.5, low]])
@@ -80,7 +80,7 @@ def lens_table(camera: Camera) -> tuple[NDArray[np.float32], list[float], float]
 def pixels_by(
     camera: Camera, table: NDArray[np.float32], bounds: list[float], places: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Give pixels as the player finds them: the pin-hole's, and the table between four places.
+    """Return pixels as in the player: pinhole projection and bilinear table of the lens.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ ALONE = 0.05
 
 
 def usual_distance(tracks: Tracks) -> float:
-    """Give the median distance from a labelled point to the one nearest to it, metres."""
+    """Return the median distance of a labelled point to its nearest neighbour, metres."""
     from scipy.spatial import KDTree
 
     d = tracks.detections

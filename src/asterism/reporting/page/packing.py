@@ -38,7 +38,7 @@ class Grid(NamedTuple):
     step: NDArray[np.float64]
 
     def cells(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Give the cell of each point, shape (N, 3), and whether it is on the grid, shape (N,)."""
+        """Return the cell of each point, shape (N, 3), and whether it is in the grid, (N,)."""
         cells = np.rint((points - self.low) / self.step)
         is_on = ((cells >= 0) & (cells <= STEPS)).all(axis=1)
         return np.clip(cells, 0, STEPS).astype(np.int64), np.asarray(is_on)
@@ -57,7 +57,7 @@ def grid_over(points: NDArray[np.float64], margin: float) -> Grid:
 def residuals(
     cells: NDArray[np.int64], begins: NDArray[np.int64], order: int
 ) -> NDArray[np.uint16]:
-    """Give what is left of cells once they are predicted from those before, zigzagged.
+    """Return the residuals of cells after prediction from earlier ones, zigzag encoded.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def runs_of(tracks: Tracks) -> Runs:
 
 
 def gaps_of(tracks: Tracks) -> Gaps:
-    """Give the gaps within tracks."""
+    """Return the gaps within tracks."""
     runs, times = runs_of(tracks), tracks.detections.times
     ends = runs.first + runs.length
     i = np.flatnonzero(np.diff(runs.track) == 0)

@@ -110,7 +110,7 @@ def _medians(tracks: Tracks, off: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _partner(tracks: Tracks, heading: NDArray[np.float64], off: NDArray[np.float64], i: int) -> int:
-    """Give the detection of the same frame that explains this one by a change of places, or -1."""
+    """Return the detection of the frame that has exchanged labels with this one, or -1."""
     d = tracks.detections
     t = int(d.frame_of[i])
     others = np.arange(d.offsets[t], d.offsets[t + 1])

@@ -18,12 +18,12 @@ MOST_POINTS = 3_000_000
 
 
 def stride_for(n_points: int) -> int:
-    """Give which share of the frames to keep: every first, second, third …."""
+    """Return the stride of the frames to keep: 1 for all, 2 for every second …."""
     return max(1, -(-n_points // MOST_POINTS))
 
 
 def every_nth(tracks: Tracks, stride: int) -> NDArray[np.int64]:
-    """Give the detections in every `stride`-th frame, indices of shape (M,)."""
+    """Return the detections in every `stride`-th frame, indices of shape (M,)."""
     return np.flatnonzero(tracks.detections.frame_of % stride == 0)
 
 
