@@ -17,6 +17,7 @@ lint: $(VENV)/.lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/codespell
+	$(BIN)/codespell --dictionary tests/tools/retired_words.txt
 
 types: $(VENV)/.lint
 	$(BIN)/pyright

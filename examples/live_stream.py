@@ -1,6 +1,6 @@
 """Points as they come, identities as they go: frame by frame, with revisions.
 
-A new marker gets its identity when it is believed, a few frames after it came; `revised` then says
+A new marker gets its identity when it is confirmed, a few frames after it came; `revised` then says
 which of the earlier detections were its own.
 """
 

@@ -13,11 +13,11 @@ from asterism.cli import main
 def made(tmp_path_factory):
     """A folder with a labelled scene, an experiment made of it, its truth, and its model."""
     folder = tmp_path_factory.mktemp("made")
-    scene, spoilt, truth = (str(folder / f"{name}.csv") for name in ("scene", "in", "truth"))
-    spoil = "--missing 0.1 --clutter 0.1 --noise 0.0003 --seed 1 -q"
+    scene, corrupted, truth = (str(folder / f"{name}.csv") for name in ("scene", "in", "truth"))
+    options = "--missing 0.1 --clutter 0.1 --noise 0.0003 --seed 1 -q"
     assert main(["simulate", "crossing", "-o", scene, "--rate=100", "--seed=3", "-q"]) == 0
-    assert main(["corrupt", scene, "-o", spoilt, "--truth", truth, *spoil.split()]) == 0
-    assert main(["estimate", spoilt, "-o", str(folder / "model.toml"), "-q"]) == 0
+    assert main(["corrupt", scene, "-o", corrupted, "--truth", truth, *options.split()]) == 0
+    assert main(["estimate", corrupted, "-o", str(folder / "model.toml"), "-q"]) == 0
     return folder
 
 

@@ -42,8 +42,8 @@ def test_corrupt_forgets_every_name_and_keeps_every_point(scene):
 
 @pytest.mark.parametrize("ending", ["c3d", "trc", "csv", "tsv"])
 def test_corrupt_track_evaluate_in_every_format(scene, capsys, ending):
-    spoil = "--missing 0.1 --clutter 0.1 --noise 0.0003 --seed 1 -q"
-    run(f"corrupt scene.csv -o a.{ending} --truth t.{ending} {spoil}", capsys)
+    options = "--missing 0.1 --clutter 0.1 --noise 0.0003 --seed 1 -q"
+    run(f"corrupt scene.csv -o a.{ending} --truth t.{ending} {options}", capsys)
     run(f"track a.{ending}", capsys)
     scores = json.loads(run(f"evaluate a.tracked.{ending} t.{ending} --json", capsys))
     assert scores["idf1"] > 0.99

@@ -26,8 +26,8 @@ CASES = [
 def test_corrupt_track_and_score(tmp_path, monkeypatch, capsys, name, ending, least):
     monkeypatch.chdir(tmp_path)
     (source,) = DATA.rglob(name)
-    spoil = "--missing 0.1 --clutter 0.1 --noise 0.0003 --burst 5:5-60 --seed 1 -q"
-    made = ["-o", f"a.{ending}", "--truth", f"t.{ending}", *spoil.split()]
+    options = "--missing 0.1 --clutter 0.1 --noise 0.0003 --burst 5:5-60 --seed 1 -q"
+    made = ["-o", f"a.{ending}", "--truth", f"t.{ending}", *options.split()]
     assert main(["corrupt", str(source), *made]) == 0, capsys.readouterr().err
     assert main(["track", f"a.{ending}", "-o", f"b.{ending}", "-q"]) == 0
     capsys.readouterr()

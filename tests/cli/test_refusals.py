@@ -174,9 +174,9 @@ def test_mistakes_are_told_by_the_names_of_the_command_line(scene, capsys, line,
 
 
 def test_noise_in_millimetres_is_doubted(scene, capsys):
-    for noise, doubts in (("0.0003", False), ("3", True)):
+    for noise, warns in (("0.0003", False), ("3", True)):
         assert (
             main(f"corrupt scene.csv -o a.csv --truth t.csv --noise {noise} -q --overwrite".split())
             == 0
         )
-        assert ("the markers span only" in capsys.readouterr().err) == doubts
+        assert ("the markers span only" in capsys.readouterr().err) == warns

@@ -21,9 +21,9 @@ def recorded(tmp_path_factory):
     person, p, truth, alone = (
         str(folder / name) for name in ("person.csv", "p.c3d", "pt.c3d", "alone.c3d")
     )
-    spoil = "--burst 5:5-60 --ghosts 3:1-10 --noise 0.0003 --seed 1 -q"
+    options = "--burst 5:5-60 --ghosts 3:1-10 --noise 0.0003 --seed 1 -q"
     assert main(["simulate", "person", "-o", person, "--seed=1", "-q"]) == 0
-    assert main(["corrupt", person, "-o", p, "--truth", truth, *spoil.split()]) == 0
+    assert main(["corrupt", person, "-o", p, "--truth", truth, *options.split()]) == 0
     assert main(["track", p, "--method", "gnn", "-o", alone, "-q"]) == 0
     return folder
 

@@ -173,11 +173,11 @@ def test_a_wrong_method_is_told_before_the_model_is_estimated(monkeypatch):
 
 
 def test_millimetres_for_metres_are_doubted(caplog):
-    spoilt = am.Detections(times=D.times, offsets=D.offsets, points=D.points * 1000)
+    too_large = am.Detections(times=D.times, offsets=D.offsets, points=D.points * 1000)
     with caplog.at_level(logging.WARNING, "asterism"):
         am.estimate_model(D)
         assert not caplog.records
-        am.estimate_model(spoilt)
+        am.estimate_model(too_large)
     (told,) = caplog.records
     assert "expected metres; divide millimetres by 1000" in told.getMessage()
 

@@ -95,7 +95,7 @@ def parts_of(text: str) -> list[list[Figure]]:
     return [figures_of(_NOT_PROSE.sub("", " | ".join(cells[1:]))) for cells in rows]
 
 
-def stranger(part: list[Figure], sources: list[list[list[float]]]) -> Figure | None:
+def unsourced(part: list[Figure], sources: list[list[list[float]]]) -> Figure | None:
     """Give the first figure that is not found: in order, in one line of each source in turn."""
     n = 0
     for lines in sources:
@@ -117,7 +117,7 @@ def test_a_quoted_figure_is_in_its_table(page):
         sources = [lines_of(source) for source in named.split(";")]
         parts = parts_of(text)
         assert any(parts), f"from {named}: nothing is quoted"
-        found = [stranger(part, sources) for part in parts]
+        found = [unsourced(part, sources) for part in parts]
         wrong += [f"{figure.text} is not in {named}" for figure in found if figure is not None]
     assert not wrong
 
@@ -134,7 +134,7 @@ def test_a_changed_figure_is_noticed(page):
                 for step in (-6, 6):
                     changed = Figure(figure.text, figure.value + step * figure.half, figure.half)
                     planted = [*part[:i], changed, *part[i + 1 :]]
-                    seen += stranger(planted, sources) is not None
+                    seen += unsourced(planted, sources) is not None
                     total += 1
     assert seen > 0.9 * total, f"{seen} of {total}"
 

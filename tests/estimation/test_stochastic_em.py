@@ -22,7 +22,7 @@ def test_a_kept_draw_is_of_the_posterior():
     partitions, totals = every_partition(d, model)
     p = np.exp(totals - totals.max())
     p /= p.sum()
-    # Assignment, groups and doubts left out: the whole walk in one piece.
+    # Assignment, groups and ambiguous links left out: the whole walk in one piece.
     draw = am.MCMCDA(
         window=d.n_frames, moves=300.0, confidence=0.0, end_odds=1.0, keep="draw",
         chain=ChainOptions(ambiguous_share=0, groups="whole"),

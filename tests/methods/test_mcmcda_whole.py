@@ -153,7 +153,7 @@ def test_a_chain_over_a_whole_capture_can_be_interrupted():
 
 
 def test_the_report_s_own_makes_no_moves_but_its_own():
-    # Births and deaths alone can never undo half a track; moves at doubts would.
+    # Births and deaths alone can never undo half a track; moves at ambiguous links would.
     d, model = crowd(7, n_frames=30).detections, crowd_model()
     few = {"birth": 1, "death": 1}
     chain = ChainOptions(move_weights=few, ambiguous_share=0, assignment=False, groups="whole")

@@ -117,7 +117,7 @@ def crossing_pairs(only: int | None = None):
 
 def test_independent_ambiguities_of_one_cluster_have_the_confidence_that_each_has_alone():
     # The twenty best hypotheses of a cluster hold little of its probability: the links of twelve
-    # crossings that it joins were up to 0.33 surer than where each is tracked alone.
+    # crossings that it joins were up to 0.33 higher than where each is tracked alone.
     model = am.TrackingModel(
         motion=am.DWNA(acceleration_sigma=0.3, velocity_sigma=3.0),
         sensor=am.Sensor(noise_sigma=1.0, p_detection=0.9, clutter_density=1e-3),

@@ -1,4 +1,4 @@
-"""Bonds between markers, and tracks recognized by them."""
+"""Bonds between markers, and tracks named by them."""
 
 from __future__ import annotations
 

@@ -232,7 +232,7 @@ def test_the_viewer_is_for_this_machine_and_silent(tmp_path, monkeypatch):
 
 def test_a_viewer_that_does_not_open_says_so(tmp_path, monkeypatch):
     def run(command, **_):
-        return subprocess.CompletedProcess(command, 1, "", "news\nError: no DISPLAY\n")
+        return subprocess.CompletedProcess(command, 1, "", "log\nError: no DISPLAY\n")
 
     monkeypatch.setattr(subprocess, "run", run)
     settings = tmp_path / "analytics.json"

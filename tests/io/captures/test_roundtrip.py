@@ -36,7 +36,7 @@ def same(a, b):
     assert a.names == b.names
 
 
-# What a marker may be called; longer names and stranger letters have tests of their own.
+# What a marker may be called; longer names and other letters have tests of their own.
 names = st.text("ABCxyz:_12 é,\"'", min_size=1, max_size=8).map(
     lambda name: "L" + name.strip() + "k"
 )

@@ -1,4 +1,4 @@
-"""What a report shows, as it is handed over by whoever knows it."""
+"""Contents of a report page, as the caller hands them over."""
 
 from __future__ import annotations
 

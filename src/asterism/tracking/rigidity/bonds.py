@@ -14,6 +14,7 @@ from asterism.io.captures.marker_names import is_unlabelled
 from asterism.model import Tracks
 from asterism.model.toml_file import read_toml, write_toml
 from asterism.records import record
+from asterism.tracking.rigidity.cliques import disjoint_cliques
 from asterism.tracking.rigidity.distances import (
     BEND,
     MIN_TOGETHER,
@@ -129,18 +130,7 @@ class Bonds:
     @cached_property
     def clusters(self) -> tuple[tuple[int, ...], ...]:
         """Rigid clusters: disjoint groups of at least three markers with rigid pairs only."""
-        friends: list[set[int]] = [set() for _ in self.names]
-        for i, j in self.pairs[self.rigid]:
-            friends[i].add(int(j))
-            friends[j].add(int(i))
-        found: list[tuple[int, ...]] = []
-        while (largest := _largest_clique(friends)) is not None:
-            found.append(largest)
-            for i in largest:
-                for j in friends[i]:
-                    friends[j].discard(i)
-                friends[i] = set()
-        return tuple(found)
+        return disjoint_cliques(len(self.names), self.pairs[self.rigid])
 
     def segments(self, names: Sequence[str | None]) -> NDArray[np.int64]:
         """Return the rigid cluster of each marker name, -1 for a name in none.
@@ -339,23 +329,6 @@ def _pose(positions: NDArray[np.float64], usual: NDArray[np.float64]) -> NDArray
         off.append(float(np.nan_to_num(np.abs(distance - usual)).sum()))
     pose = positions[fullest[int(np.argmin(off))]]
     return pose - np.nanmean(pose, axis=0) if counts.max() else np.full(pose.shape, np.nan)
-
-
-def _largest_clique(friends: list[set[int]]) -> tuple[int, ...] | None:
-    """Find the largest of the maximal cliques grown greedily from each pair, of at least three."""
-    best: tuple[int, ...] | None = None
-    for i in range(len(friends)):
-        for j in sorted(friends[i]):
-            if j < i or (best is not None and len(friends[i]) < len(best)):
-                continue
-            own, common = [i, j], friends[i] & friends[j]
-            while common:  # the candidate that keeps the most others
-                more = max(sorted(common), key=lambda k: len(common & friends[k]))
-                own.append(more)
-                common &= friends[more]
-            if len(own) >= 3 and (best is None or len(own) > len(best)):
-                best = tuple(sorted(own))
-    return best
 
 
 def _from_plain(content: Mapping[str, Any]) -> dict[str, Any]:
