@@ -79,9 +79,10 @@ class TOMHT(EngineMethod):
     `lifecycle` large, and its `confirm_probability` near 0.5. A track whose odds are below those of
     `confirm_probability` is left out even if the most probable partition contains it.
 
-    With a shorter window each decided frame is final, so that a longer window is usually more
-    probable and not always: for six targets that cross in dense clutter, windows from 3 to 9 gain
-    35 to 69 nats, and of 10 to 16 frames some lose up to 25 nats against a shorter one.
+    Otherwise decided frames are final and the search is limited, so that a longer window is usually
+    more probable and not always: for six targets that cross in dense clutter, windows from 3 to 9
+    gain 35 to 69 nats, and of 10 to 16 frames some lose up to 25 nats against a shorter one. More
+    `max_branches` and `max_nodes` lessen that, and need more time.
 
     Examples
     --------
