@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -144,7 +145,7 @@ class HypothesisForest {
 
   // Prunes branches that no probable hypothesis contains. The best branch of a tree may conflict
   // with another tree, increasingly so in longer windows. A branch is therefore judged by the loss
-  // of the best hypothesis of its cluster that contains it, and all branches of a cluster share one
+  // of the best hypothesis of its cluster that contains it, and the branches of a cluster share a
   // limit.
   void limit(TreeStats& stats) {
     list_options();
@@ -156,13 +157,18 @@ class HypothesisForest {
     const std::int64_t n_tracks = weigh(cluster);
     rank(cluster);
     std::ranges::stable_sort(s_.ranked, {}, &Ranked::loss);
-    const auto probable = std::ranges::upper_bound(s_.ranked, open_.branches.prune_drop, {}, &Ranked::loss);
-    const std::ptrdiff_t n_probable = probable - s_.ranked.begin();
+    // New trees have a share of their own: their first detections gain little, so that in a long
+    // window the many similar branches of old tracks would crowd them out.
     const auto n_max =
         static_cast<std::ptrdiff_t>(cluster.size()) + open_.branches.max_branches * n_tracks;
-    stats.n_limited += std::max<std::ptrdiff_t>(n_probable - n_max, 0);
-    if (std::min(n_probable, n_max) == std::ssize(s_.ranked)) return;
-    s_.ranked.resize(std::min(n_probable, n_max));
+    std::array<std::ptrdiff_t, 2> n_left{n_max, n_max};
+    const auto is_pruned = [&](const Ranked& r) {
+      if (r.loss > open_.branches.prune_drop) return true;
+      const bool is_limited = n_left[open_.is_seed(r.tree)]-- <= 0;
+      stats.n_limited += is_limited;
+      return is_limited;
+    };
+    if (std::erase_if(s_.ranked, is_pruned) == 0) return;
     std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::pair(r.tree, r.branch); });
     auto next = s_.ranked.begin();
     for (const std::int32_t i : cluster) {
