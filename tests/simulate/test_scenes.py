@@ -21,7 +21,7 @@ from asterism.simulate import (
 )
 
 EVERY = pytest.mark.parametrize("name", sorted(SCENES))
-PER_FRAME = {"attracted", "crossing", "cube", "smooth", "walk", "wander"}
+PER_FRAME = {"attracted", "crossing", "cube", "dense", "smooth", "walk", "wander"}
 
 
 def _steps(positions):

@@ -8,7 +8,7 @@ from asterism.simulate.people.hand import fingers
 from asterism.simulate.people.juggler import juggler
 from asterism.simulate.people.pair import two_people
 from asterism.simulate.people.person import person
-from asterism.simulate.points import attracted, crossing, cube, smooth, walk, wander
+from asterism.simulate.points import attracted, crossing, cube, dense, smooth, walk, wander
 from asterism.simulate.scenes import SCENES, Scene, from_capture
 from asterism.simulate.swarm import swarm
 from asterism.simulate.truth import Truth
@@ -26,6 +26,7 @@ __all__ = [
     "corrupt",
     "crossing",
     "cube",
+    "dense",
     "film",
     "fingers",
     "from_capture",

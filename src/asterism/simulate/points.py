@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["attracted", "crossing", "cube", "smooth", "walk", "wander"]
+__all__ = ["attracted", "crossing", "cube", "dense", "smooth", "walk", "wander"]
 
 # Corners of a cube with side 1 about the origin, shape (8, 3), and the pairs along its edges.
 _CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -173,7 +173,6 @@ def smooth(
     check_number("n_markers", n_markers, above=1, closed=True, integer=True)
     check_number("spacing", spacing, above=0)
     times = clock(frames, rate, seed)
-    t = np.arange(float(frames))
     rng = np.random.default_rng(seed)
     shape = (n_markers, 3)
     centre = rng.uniform(0.0, spacing * n_markers ** (1 / 3), shape)
@@ -181,14 +180,81 @@ def smooth(
     phase = rng.uniform(0, 2 * math.pi, shape)
     heading = rng.uniform(0, 2 * math.pi)
     drift = 0.01 * np.array([math.cos(heading), math.sin(heading), 0.0])
-    positions = np.empty((frames, *shape))
-    for now, place in zip(t, positions, strict=True):  # in place: there may be very many
-        np.multiply(omega, now, out=place)
+    return _named(times, _lissajous(frames, centre, amplitude, omega, phase, drift))
+
+
+def dense(
+    *,
+    n_markers: int = 50,
+    frames: int = 200,
+    rate: float = 1.0,
+    seed: int = 0,
+    density: float = 8.0,
+) -> Truth:
+    """Simulate any number of fast markers that cross each other on smooth paths.
+
+    On each axis a marker oscillates with a peak speed of 0.048 to 0.0866 m per frame at 0.08 to
+    0.18 rad per frame. Its displacement per frame is 0.08 m in the mean and at most 0.15 m. The
+    centres are uniform over a cube.
+
+    Parameters
+    ----------
+    n_markers : int
+        Number of markers, ≥ 1.
+    frames : int
+        Number of frames, ≥ 1.
+    rate : float
+        Frame rate, frames per second, > 0. Motion is defined per frame, so the rate scales the
+        speed in m/s only.
+    seed : int
+        Seed of the centres and the curves.
+    density : float
+        Centres per cubic metre, > 0. Larger values are more difficult.
+
+    Returns
+    -------
+    Truth
+        Markers M00, M01 and so on, detected in every frame.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range.
+
+    Examples
+    --------
+    >>> dense(n_markers=100, frames=10, seed=1)
+    Truth(100 tracks, 1000 detections in them, 0 clutter, 10 frames)
+    """
+    check_number("n_markers", n_markers, above=1, closed=True, integer=True)
+    check_number("density", density, above=0)
+    times = clock(frames, rate, seed)
+    rng = np.random.default_rng(seed)
+    shape = (n_markers, 3)
+    centre = rng.uniform(0.0, (n_markers / density) ** (1 / 3), shape)
+    omega = rng.uniform(0.08, 0.18, shape)
+    amplitude = rng.uniform(0.048, 0.0866, shape) / omega
+    phase = rng.uniform(0, 2 * math.pi, shape)
+    return _named(times, _lissajous(frames, centre, amplitude, omega, phase, np.zeros(3)))
+
+
+def _lissajous(
+    frames: int,
+    centre: NDArray[np.float64],
+    amplitude: NDArray[np.float64],
+    omega: NDArray[np.float64],
+    phase: NDArray[np.float64],
+    drift: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Compute the positions of all markers, shape (frames, markers, axes)."""
+    positions = np.empty((frames, *centre.shape))
+    for now, place in enumerate(positions):  # in place: there may be very many
+        np.multiply(omega, float(now), out=place)
         place += phase
         np.sin(place, out=place)
         place *= amplitude
         place += centre + now * drift
-    return _named(times, positions)
+    return positions
 
 
 def walk(

@@ -18,7 +18,7 @@ from asterism.simulate.people.hand import fingers
 from asterism.simulate.people.juggler import juggler
 from asterism.simulate.people.pair import two_people
 from asterism.simulate.people.person import person
-from asterism.simulate.points import attracted, crossing, cube, smooth, walk, wander
+from asterism.simulate.points import attracted, crossing, cube, dense, smooth, walk, wander
 from asterism.simulate.swarm import swarm
 from asterism.simulate.truth import Truth
 
@@ -61,6 +61,7 @@ SCENES: dict[str, Scene] = Registry(
         "walk": Scene(walk, "markers on a random walk, without a velocity to predict from"),
         "attracted": Scene(attracted, "8 markers on a random walk that crowd about the origin"),
         "smooth": Scene(smooth, "any number of markers on smooth paths, at constant density"),
+        "dense": Scene(dense, "any number of fast markers on smooth paths that cross"),
         "swarm": Scene(swarm, "drones that spread out, gather and change places"),
         "person": Scene(person, "a person who walks, runs, jumps or turns, with occluding limbs"),
         "two_people": Scene(two_people, "two people who pass each other closely, or hug"),
