@@ -2,6 +2,9 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
+#include <cmath>
+
+#include "math/nearest.hpp"
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "solve/assignment.hpp"
@@ -51,6 +54,40 @@ nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_m
   }
   return nb::make_tuple(array_of<double>(marginals, {n, m + 1}), summary.log_total,
                         array_of<std::int32_t>(best), summary.bound, summary.n_states);
+}
+
+std::vector<Point> plain_points(const In<double>& array, const char* what) {
+  require(array.ndim() == 2 && (array.shape(1) == 2 || array.shape(1) == 3), what);
+  std::vector<Point> out(array.shape(0));
+  for (std::size_t i = 0; i < out.size(); ++i)
+    std::copy_n(array.data() + i * array.shape(1), array.shape(1), out[i].begin());
+  return out;
+}
+
+// For each place, the two nearest points of a frame: (indices or -1, distances or inf).
+nb::tuple nearest_two(const In<double>& points, const In<std::int64_t>& offsets,
+                      const In<double>& places, const In<std::int64_t>& frames) {
+  const std::vector<Point> all = plain_points(points, "points: shape (N, 2 or 3)");
+  const std::vector<Point> from = plain_points(places, "places: shape (Q, 2 or 3)");
+  require(points.shape(1) == places.shape(1), "points and places with the same number of axes");
+  require_offsets(flat(offsets), all.size(), "offsets: increasing, within the points");
+  require(frames.ndim() == 1 && frames.shape(0) == from.size(), "frames: shape (Q,)");
+  const auto n_frames = static_cast<std::int64_t>(offsets.size()) - 1;
+  for (const std::int64_t t : flat(frames)) require(t >= 0 && t < n_frames, "frames: within offsets");
+  Owned<std::int64_t> index(2 * from.size());
+  Owned<double> distance(2 * from.size());
+  {
+    nb::gil_scoped_release release;
+    const NearestInFrame nearest(all, flat(offsets), static_cast<int>(points.shape(1)));
+    for (std::size_t q = 0; q < from.size(); ++q) {
+      const NearestInFrame::Two two = nearest.of(from[q], frames.data()[q]);
+      for (int k = 0; k < 2; ++k) {
+        index.data[2 * q + k] = two.index[k];
+        distance.data[2 * q + k] = std::sqrt(two.distance2[k]);
+      }
+    }
+  }
+  return nb::make_tuple(index.give({from.size(), 2}), distance.give({from.size(), 2}));
 }
 
 // Pairs rows and columns of a sparse list of gains, ordered by row, for the largest sum of gains.
@@ -163,6 +200,7 @@ nb::tuple pack(const In<std::int64_t>& first_option, const In<double>& weights,
 
 void bind_solvers(nb::module_& module) {
   module.def("assign", &assign, "n_rows"_a, "n_columns"_a, "rows"_a, "columns"_a, "gains"_a);
+  module.def("nearest_two", &nearest_two, "points"_a, "offsets"_a, "places"_a, "frames"_a);
   module.def("marry", &marry, "first"_a, "receivers"_a, "costs"_a, "n_receivers"_a);
   module.def("k_best", &k_best, "cost"_a, "k"_a);
   module.def("pack", &pack, "first_option"_a, "log_weights"_a, "first_use"_a, "uses"_a, "k"_a,

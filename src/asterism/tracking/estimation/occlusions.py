@@ -7,9 +7,11 @@ starts within the gap (backward in time: that ends within it). These gaps are no
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from asterism._engine import nearest_two
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -90,8 +92,6 @@ def _is_left_over(
     way : {1, -1}
         1: forward from the start of the gap; -1: backward from its end.
     """
-    from scipy.spatial import KDTree
-
     d = tracks.detections
     free = np.flatnonzero(way * limits > way * (d.frame_of - way))  # in the next frame
     if not len(at) or not len(free):
@@ -104,8 +104,6 @@ def _is_left_over(
         is_steady, d.times[t] - d.times[d.frame_of[before]], np.inf
     )
     places = d.points[now] + (d.points[now] - d.points[before]) * step[:, None]
-    # Frames are far apart on a further axis, so that one tree serves all of them.
-    apart = 1.0 + 4.0 * reach
-    tree: Any = KDTree(np.column_stack([d.points[free], d.frame_of[free] * apart]))
-    distance = tree.query(np.column_stack([places, (t + way) * apart]))[0]
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(d.frame_of[free], minlength=d.n_frames))])
+    distance = nearest_two(d.points[free], offsets, places, t + way)[1][:, 0]
     return np.asarray(distance <= reach)

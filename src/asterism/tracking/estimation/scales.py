@@ -6,10 +6,11 @@ They are biased towards slow markers, which is accurate enough for a start.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism._engine import nearest_two
 from asterism.errors import ParameterError
 from asterism.records import record
 
@@ -69,32 +70,11 @@ def first_scales(pieces: list[Detections]) -> Scales:
     ParameterError
         If no point has an unambiguous link to the next frame.
     """
-    steps: list[NDArray[np.float64]] = []
-    jolts: list[NDArray[np.float64]] = []
-    spacings: list[NDArray[np.float64]] = []
-    for piece in pieces:
-        filled = np.flatnonzero(piece.counts)
-        frames = [piece.frame(int(t)) for t in filled]
-        linked: dict[int, tuple[NDArray[np.int64], NDArray[np.float64]]] = {}
-        stride = max(1, piece.n_points * len(pieces) // LINKED_POINTS)
-        for i in range(0, len(filled) - 2, stride):
-            a, b, c = frames[i : i + 3]
-            dt1, dt2 = np.diff(piece.times[filled[i : i + 3]])
-            for pair in (i, i + 1):  # with a stride of 1 all but the last are known already
-                if pair not in linked:
-                    linked[pair] = _sure_links(frames[pair], frames[pair + 1])
-            forward, spacing = linked[i]
-            spacings.append(spacing)
-            onward, _ = linked[i + 1]
-            k = np.flatnonzero(forward >= 0)
-            steps.append((b[forward[k]] - a[k]) / dt1)
-            k = k[onward[forward[k]] >= 0]
-            j = forward[k]
-            jolts.append((c[onward[j]] - b[j]) / dt2 - (b[j] - a[k]) / dt1)
+    share = LINKED_POINTS // len(pieces)
+    followed = [_follow(piece, max(1, piece.n_points // share)) for piece in pieces]
+    velocities, jolts, spacings = (np.concatenate(parts) for parts in zip(*followed, strict=True))
     step = float(np.median([p.step for p in pieces]))
-    velocities = np.concatenate(steps) if steps else np.empty((0, 3))
-    # Change of position against constant velocity, metres.
-    bends = np.abs(np.concatenate(jolts)).ravel() * step if jolts else np.empty(0)
+    bends = np.abs(jolts).ravel() * step  # change of position against constant velocity, metres
     if len(velocities) < 3 or not len(bends):
         raise ParameterError(
             "detections",
@@ -110,8 +90,7 @@ def first_scales(pieces: list[Detections]) -> Scales:
     # quantile 0.39.
     noise = max(float(quiet) / 0.39 / np.sqrt(6.0), floor)
     low = max(float(np.median(bends)) / 0.67, noise) / step**2
-    known = np.concatenate(spacings)
-    known = known[np.isfinite(known)]
+    known = spacings[np.isfinite(spacings)]
     return Scales(
         step=step,
         noise=noise,
@@ -124,31 +103,63 @@ def first_scales(pieces: list[Detections]) -> Scales:
     )
 
 
-def _sure_links(
-    a: NDArray[np.float64], b: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Link points to the next frame if the link is unambiguous.
+def _follow(
+    piece: Detections, stride: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Follow the points of every `stride`-th frame over the next two frames with points.
 
     Returns
     -------
-    link : ndarray of int, shape (len(a),)
-        Index into `b`, -1 for an ambiguous link.
-    spacing : ndarray, shape (len(a),)
-        Distance to the nearest other point of `a`, inf if there is none.
+    velocities, jolts : ndarray, shapes (V, D) and (J, D)
+        Velocity over the first link, and its change over the second, m/s.
+    spacings : ndarray, shape (M,)
+        Distance of a point to the nearest other point of its frame, inf if there is none.
     """
-    from scipy.spatial import KDTree
+    filled = np.flatnonzero(piece.counts)
+    points, times = piece.points, piece.times[filled]
+    offsets = np.append(piece.offsets[filled], piece.n_points)
+    frame = np.repeat(np.arange(len(filled)), np.diff(offsets))
+    is_first = (frame % stride == 0) & (frame < len(filled) - 2)
+    first = np.flatnonzero(is_first)
+    link, spacing = _sure_links(points, offsets, frame, first)
+    is_linked = link >= 0
+    a, b = first[is_linked], link[is_linked]
+    velocity = (points[b] - points[a]) / np.diff(times)[frame[a], None]
+    onward, _ = _sure_links(points, offsets, frame, b)
+    c, before, b = onward[onward >= 0], velocity[onward >= 0], b[onward >= 0]
+    jolt = (points[c] - points[b]) / np.diff(times)[frame[b], None] - before
+    return velocity, jolt, spacing
 
-    link = np.full(len(a), -1, dtype=np.int64)
-    if not len(a) or not len(b):
-        return link, np.full(len(a), np.inf)
-    # If there are fewer points than neighbours, SciPy returns inf for the distance.
-    neighbours: Any = KDTree(b)
-    distance, nearest = neighbours.query(a, k=2)
-    own: Any = KDTree(a)
-    spacing = own.query(a, k=2)[0][:, 1]
-    back = own.query(b)[1]
-    is_mutual = back[nearest[:, 0]] == np.arange(len(a))
-    is_clear = (distance[:, 0] < 0.3 * distance[:, 1]) & (distance[:, 0] < 0.3 * spacing)
-    sure = is_mutual & is_clear
-    link[sure] = nearest[sure, 0]
-    return link, spacing
+
+def _sure_links(
+    points: NDArray[np.float64],
+    offsets: NDArray[np.int64],
+    frame: NDArray[np.int64],
+    chosen: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Link chosen points to the next frame if the link is unambiguous.
+
+    Parameters
+    ----------
+    points : ndarray, shape (N, D)
+        Points of all frames.
+    offsets : ndarray of int, shape (T + 1,)
+        First point of each frame.
+    frame : ndarray of int, shape (N,)
+        Frame of each point.
+    chosen : ndarray of int, shape (M,)
+        Points to link; none of the last frame.
+
+    Returns
+    -------
+    link : ndarray of int, shape (M,)
+        Point of the next frame, -1 for an ambiguous link.
+    spacing : ndarray, shape (M,)
+        Distance to the nearest other point of the frame, inf if there is none.
+    """
+    t = frame[chosen]
+    spacing = nearest_two(points, offsets, points[chosen], t)[1][:, 1]
+    nearest, distance = nearest_two(points, offsets, points[chosen], t + 1)
+    back = nearest_two(points, offsets, points[nearest[:, 0]], t)[0][:, 0]
+    is_clear = distance[:, 0] < 0.3 * np.minimum(distance[:, 1], spacing)
+    return np.where((back == chosen) & is_clear, nearest[:, 0], -1), spacing
