@@ -17,11 +17,20 @@ from tests.references.posterior import chance_seen
 
 
 @cache
+def start_of(model: am.TrackingModel, n_axes: int):
+    """Stationary weights of the motions and the covariance of a first state."""
+    T = np.asarray(model.motion.mode_transitions)
+    M = len(T)
+    total = np.vstack([T.T - np.eye(M), np.ones(M)])
+    return np.linalg.lstsq(total, np.eye(M + 1)[M], rcond=None)[0], model.initial_covariance(n_axes)
+
+
+@cache
 def step_of(modes: tuple[am.model.Motion, ...], dt: float):
     """F and Q of each motion over a time; asked for again and again."""
     F = np.stack([mode.transition(dt)[0] for mode in modes])
     Q = np.stack([mode.process_noise(dt)[0] for mode in modes])
-    return F, Q
+    return F, F.swapaxes(1, 2), Q
 
 
 class OneTrack:
@@ -32,12 +41,10 @@ class OneTrack:
         self.modes = tuple(model.motion.modes)
         self.T = np.asarray(model.motion.mode_transitions)
         M = len(self.modes)
-        self.w = np.linalg.lstsq(
-            np.vstack([self.T.T - np.eye(M), np.ones(M)]), np.eye(M + 1)[M], rcond=None
-        )[0]
+        self.w, P = start_of(model, len(point))
         self.h, self.r = self.modes[0].observation, s.noise_sigma**2
         self.x = np.stack([np.outer(point, self.h / (self.h @ self.h))] * M)
-        self.P = np.stack([model.initial_covariance(len(point))] * M)
+        self.P = np.stack([P] * M)
         self.score = math.log(p.birth_density * s.p_detection / s.clutter_density)
         self.best = self.score
         self.id, self.gap, self.last, self.last_time = -1, 0, np.array(point), time
@@ -50,30 +57,26 @@ class OneTrack:
         mean = (share @ self.x.reshape(M, -1)).reshape(M, D, n)
         off = self.x - mean[:, None]
         spread = self.P + off.swapaxes(-1, -2) @ off / D
-        P = (share[:, :, None, None] * spread).sum(axis=1)
-        F, Q = step_of(self.modes, dt)
-        self.x, self.P, self.w = mean @ F.swapaxes(1, 2), F @ P @ F.swapaxes(1, 2) + Q, prior
-        self.S = self.P @ self.h @ self.h + self.r
-        self.at, self.K = self.x @ self.h, self.P @ self.h / self.S[:, None]
-        self.updated_P = self.P - self.K[:, :, None] * self.K[:, None] * self.S[:, None, None]
-        self.found: dict[bytes, np.ndarray] = {}
+        P = (share[:, None] @ spread.reshape(M, M, -1)).reshape(M, n, n)
+        F, F_T, Q = step_of(self.modes, dt)
+        self.x, self.P, self.w = mean @ F_T, F @ P @ F_T + Q, prior
+        Ph = self.P @ self.h
+        self.S = Ph @ self.h + self.r
+        self.at, self.K = self.x @ self.h, Ph / self.S[:, None]
 
     def odds(self, gain: float) -> float:
         return gain if self.id >= 0 else np.logaddexp(0, self.score + gain)
 
-    def squares_of(self, y) -> np.ndarray:
-        """Normalised innovation squared, by each motion; computed once for each point."""
-        key = y.tobytes()
-        if key not in self.found:
-            self.found[key] = ((y - self.at) ** 2).sum(axis=1) / self.S
-        return self.found[key]
+    def squares_of(self, points) -> np.ndarray:
+        """Normalised innovation squared of a point, or of each, by each motion."""
+        return ((points[..., None, :] - self.at) ** 2).sum(axis=-1) / self.S
 
-    def densities(self, y) -> np.ndarray:
-        likelihood = np.exp(-0.5 * self.squares_of(y)) / (2 * np.pi * self.S) ** (len(y) / 2)
-        return self.w * likelihood
+    def densities(self, points) -> np.ndarray:
+        likelihood = np.exp(-0.5 * self.squares_of(points))
+        return likelihood * (self.w / (2 * np.pi * self.S) ** (points.shape[-1] / 2))
 
-    def within(self, y, gate: float) -> bool:
-        return bool((self.squares_of(y) <= gate).any())
+    def within(self, points, gate: float) -> np.ndarray:
+        return (self.squares_of(points) <= gate).any(axis=-1)
 
     def distance(self, y) -> float:
         return float(self.distances(y[None])[0])
@@ -84,8 +87,14 @@ class OneTrack:
     def update(self, y) -> None:
         each = self.densities(y)
         self.x = self.x + (y - self.at)[:, :, None] * self.K[:, None]
-        self.P = self.updated_P
+        self.P = self.P - self.K[:, :, None] * self.K[:, None] * self.S[:, None, None]
         self.w = each / each.sum()
+
+
+def near(track: OneTrack, points, reach: float, gate: float) -> list[int]:
+    """Points that a track can reach and that its gate holds."""
+    reached = np.linalg.norm(points - track.last, axis=1) <= reach
+    return np.flatnonzero(reached & track.within(points, gate)).tolist()
 
 
 def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) -> np.ndarray:
@@ -114,14 +123,11 @@ def track_by_hand(detections: am.Detections, method, model: am.TrackingModel) ->
             reach = p.max_speed * (now - track.last_time) + 6 * s.noise_sigma
             odds = track.odds
             missed = odds(miss(track.gap)) + leftover
-            for j in np.flatnonzero(np.linalg.norm(points - track.last, axis=1) <= reach):
-                y = points[j]
-                if not track.within(y, gate):
+            densities = track.densities(points).sum(axis=1)
+            for j in near(track, points, reach, gate):
+                if densities[j] <= 0:
                     continue
-                total = track.densities(y).sum()
-                if total <= 0:
-                    continue
-                gain = odds(hit(track.gap) + math.log(total)) - missed
+                gain = odds(hit(track.gap) + math.log(densities[j])) - missed
                 if gain > 0:
                     gains[i, j] = gain
         confirmed = np.array([track.id >= 0 for track in tracks], dtype=bool)
@@ -172,7 +178,7 @@ def pair(tracks, points, gains, method) -> dict[int, list[int]]:
         return {int(i): [int(j)] for i, j in zip(rows, columns, strict=True) if i < n and j < m}
     n, m = gains.shape
     q = method.capacity
-    near = np.array([track.distances(points) for track in tracks]).reshape(n, m)
+    far = np.array([track.distances(points) for track in tracks]).reshape(n, m)
     # Every track stands in the market q times; its further copies look near its favourite only.
     wanted: dict[tuple[int, int], list[int]] = {}
     for i in range(n):
@@ -186,14 +192,14 @@ def pair(tracks, points, gains, method) -> dict[int, list[int]]:
     if method.proposers == "tracks":
         partners = propose(
             list(wanted.values()),
-            {(p, j): near[i, j] for p, (i, _) in enumerate(copies) for j in range(m)},
+            {(p, j): far[i, j] for p, (i, _) in enumerate(copies) for j in range(m)},
         )
         pairs = [(copies[p][0], j) for p, j in enumerate(partners) if j >= 0]
     else:
         lists = [
             sorted(
                 (p for p, key in enumerate(copies) if j in wanted[key]),
-                key=lambda p, j=j: (near[copies[p][0], j], p),
+                key=lambda p, j=j: (far[copies[p][0], j], p),
             )
             for j in range(m)
         ]

@@ -5,7 +5,6 @@ Lists of copies, dictionaries, SciPy; it shares nothing with the engine but the 
 
 from __future__ import annotations
 
-import copy
 import math
 
 import numpy as np
@@ -14,7 +13,7 @@ from scipy.stats import chi2
 
 import asterism as am
 from asterism.tracking.methods.track_splitting import chi2_limits
-from tests.references.frame_by_frame import OneTrack, pair, propose
+from tests.references.frame_by_frame import OneTrack, near, pair, propose
 from tests.references.jpda import components, marginals_of
 from tests.references.posterior import chance_seen
 
@@ -31,15 +30,17 @@ class Branch(OneTrack):
         self.key = 0
 
     def fork(self) -> Branch:
-        other = copy.copy(self)
+        other = object.__new__(Branch)
+        other.__dict__.update(self.__dict__)
         other.path, other.squares = dict(self.path), dict(self.squares)
         return other
 
-    def nis(self, y) -> float:
-        squares = self.squares_of(y)
-        if len(squares) == 1:
-            return float(squares[0])
-        return float(chdtri(len(y), self.w @ chdtrc(len(y), squares)))
+    def nis(self, points) -> np.ndarray:
+        """Normalised innovation squared of a point, or of each, over the mixture of motions."""
+        squares, D = self.squares_of(points), points.shape[-1]
+        if squares.shape[-1] == 1:
+            return squares[..., 0]
+        return chdtri(D, chdtrc(D, squares) @ self.w)
 
 
 class Options:
@@ -105,17 +106,15 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
             b.predict(step_to(t))
             reach = p.max_speed * (detections.times[t] - b.last_time) + 6 * s.noise_sigma
             points = detections.frame(t)
-            for j in np.flatnonzero(np.linalg.norm(points - b.last, axis=1) <= reach).tolist():
+            likelihood, nis = b.densities(points).sum(axis=1), b.nis(points)
+            for j in near(b, points, reach, gate):
                 y = points[j]
-                if not b.within(y, gate):
+                if likelihood[j] <= 0:
                     continue
-                likelihood = b.densities(y).sum()
-                if likelihood <= 0:
-                    continue
-                won = hit(b.gap) + math.log(likelihood)
+                won = hit(b.gap) + math.log(likelihood[j])
                 if track.id >= 0 and won <= miss(b.gap) + over - o.drop:
                     continue  # never kept
-                sum_ = o.fading * b.chi2 + b.nis(y)
+                sum_ = o.fading * b.chi2 + nis[j]
                 if sum_ > o.limits[min(b.updates, len(o.limits) - 1)]:
                     continue
                 child = b.fork()
@@ -296,15 +295,12 @@ def trees_by_hand(detections: am.Detections, method, model: am.TrackingModel):
                 continue
             b = track.branches[0].fork()
             b.predict(step_to(t))
-            expected = {
-                j: chance_seen(model, b.gap) / s.clutter_density * b.densities(y).sum()
-                for j, y in enumerate(detections.frame(t))
-            }
+            likelihood = b.densities(detections.frame(t)).sum(axis=1)
+            seen = chance_seen(model, b.gap)
+            expected = dict(enumerate((seen / s.clutter_density * likelihood).tolist()))
             expected = {j: w for j, w in expected.items() if w > math.exp(-7)}
             for j, w in expected.items():
-                others = (
-                    1 - chance_seen(model, b.gap) + sum(v for k, v in expected.items() if k != j)
-                )
+                others = 1 - seen + sum(v for k, v in expected.items() if k != j)
                 claims[t][track.key, j] = w / others
 
     window: list[int] = []

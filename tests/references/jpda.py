@@ -1,4 +1,4 @@
-"""Reference implementation of joint probabilistic data association: every event listed.
+"""Reference implementation of joint probabilistic data association: sums over all events.
 
 Beside the life of a track (frame_by_frame.OneTrack) it shares nothing with the engine but the
 definitions.
@@ -13,23 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
-from tests.references.frame_by_frame import OneTrack
+from tests.references.frame_by_frame import OneTrack, near
 
 if TYPE_CHECKING:
     import asterism as am
-
-
-def events_of(weights: np.ndarray, missed: np.ndarray):
-    """Every joint event and its weight: a detection or -1 for each track, none for two."""
-    events: list[tuple[tuple[int, ...], float]] = [((), 1.0)]
-    for row, none in zip(weights, missed, strict=True):
-        events = [
-            ((*event, j), weight * (none if j < 0 else row[j]))
-            for event, weight in events
-            for j in (-1, *np.flatnonzero(row > 0).tolist())
-            if j < 0 or j not in event
-        ]
-    return events
 
 
 def marginals_of(weights: np.ndarray, missed: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
@@ -82,10 +69,21 @@ def marginals_of(weights: np.ndarray, missed: np.ndarray) -> tuple[np.ndarray, t
 
 def best_permutations(weights: np.ndarray, missed: np.ndarray) -> np.ndarray:
     """Marginals over the heaviest event of every set of tracks with every set of detections."""
-    kept: dict[tuple, tuple[float, tuple[int, ...]]] = {}
-    for event, weight in events_of(weights, missed):
-        kind = (tuple(j >= 0 for j in event), tuple(sorted(event)))
-        kept[kind] = max(kept.get(kind, (0.0, ())), (weight, event))
+    # What may follow depends on the detections used alone: of each kind the heaviest goes on.
+    kept: dict[tuple, tuple[float, tuple[int, ...]]] = {((), 0): (1.0, ())}
+    for row, none in zip(weights.tolist(), missed.tolist(), strict=True):
+        after: dict[tuple, tuple[float, tuple[int, ...]]] = {}
+        for (seen, used), (weight, event) in kept.items():
+            options = [((*seen, False), used, weight * none, -1)]
+            options += [
+                ((*seen, True), used | 1 << j, weight * w, j)
+                for j, w in enumerate(row)
+                if w > 0 and not used >> j & 1
+            ]
+            for *kind, heavy, j in options:
+                key = tuple(kind)
+                after[key] = max(after.get(key, (0.0, ())), (heavy, (*event, j)))
+        kept = after
     beta = np.zeros((len(weights), weights.shape[1] + 1))
     for weight, event in kept.values():
         beta[np.arange(len(event)), event] += weight
@@ -163,10 +161,8 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
             missed[i] = 1 - r * p_seen[i]
             track.predict(round(now - detections.times[t - 1], 9))
             reach = p.max_speed * (now - track.last_time) + 6 * s.noise_sigma
-            for j in np.flatnonzero(np.linalg.norm(points - track.last, axis=1) <= reach):
-                y = points[j]
-                if track.within(y, gate):
-                    weights[i, j] = r * p_seen[i] * track.densities(y).sum() / density
+            own = near(track, points, reach, gate)
+            weights[i, own] = r * p_seen[i] * track.densities(points[own]).sum(axis=1) / density
         confirmed = np.array([track.id >= 0 for track in tracks], dtype=bool)
         free, taken = np.ones(m), np.zeros(m, dtype=bool)
         beta, match = np.zeros((n, m + 1)), np.full(n, -1)
