@@ -6,6 +6,8 @@ frame, and there be no more than twelve, so that each is everybody's neighbour.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 MEMORY, BEND, LEAST_SEEN, STEADY, LAG, ANCHORS = 400, 0.01, 20, 0.1, 12, (0, 4, 10)
@@ -18,12 +20,19 @@ class BodyByHand:
         self.D, self.r = n_axes, sigma**2
         self.learnt_from, self.bonds_only = learnt_from, bonds_only
         self.frames: list[dict[int, np.ndarray]] = []
+        self.known: dict[tuple[int, int], list[tuple[float, int]]] = {}
 
     def see(self, markers, points) -> None:
         self.frames.append(dict(zip(map(int, markers), np.asarray(points), strict=True)))
 
     def bonds(self, marker: int, until: int) -> list[tuple[float, int]]:
         """Predictive variance and number of the neighbours after so many frames, in order."""
+        key = marker, min(until, len(self.frames))
+        if key not in self.known:
+            self.known[key] = self.bonds_after(*key)
+        return self.known[key]
+
+    def bonds_after(self, marker: int, until: int) -> list[tuple[float, int]]:
         out = []
         for other in self.frames[0]:
             if other == marker:
@@ -33,7 +42,7 @@ class BodyByHand:
                 if marker not in frame or other not in frame:
                     continue
                 n += 1
-                distance = np.linalg.norm(frame[marker] - frame[other])
+                distance = math.dist(frame[marker], frame[other])
                 share, off = 1 / min(n, MEMORY), distance - mean
                 mean += share * off
                 variance += share * (off * (distance - mean) - variance)
