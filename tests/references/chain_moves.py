@@ -18,6 +18,7 @@ from asterism.model.compiled import (
     score_model,
     steps_of,
 )
+from tests.references.partitions import every_track
 from tests.references.posterior import chance_seen
 
 MOVES = (
@@ -69,7 +70,7 @@ class Oracle:
         self.n = d.n_points
         self.gap = model.population.max_gap
         self.after = [[j for j in range(self.n) if self.is_linkable(i, j)] for i in range(self.n)]
-        self._scores: dict[Track, float] = {}
+        self._scores = dict(zip(*every_track(d, model), strict=True))
 
     def is_linkable(self, i, j):
         d, p = self.d, self.model.population
@@ -90,12 +91,7 @@ class Oracle:
 
     def score(self, path: Track) -> float:
         """s(τ) of a track."""
-        if path not in self._scores:
-            labels = np.full(self.n, -1)
-            labels[list(path)] = 0
-            tracks = am.Tracks(detections=self.d, labels=labels)
-            self._scores[path] = float(am.model.track_scores(tracks, self.model)[0])
-        return self._scores[path]
+        return self._scores.get(path, -math.inf)
 
     def so_far(self, path: Track) -> float:
         """The score up to the last detection, whatever comes after."""

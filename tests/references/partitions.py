@@ -14,21 +14,25 @@ from tests.scenes import small_model
 def every_track(detections: am.Detections, model: am.TrackingModel):
     """All tracks that the model allows, as tuples of detections, and their scores s(τ)."""
     d, gap = detections, model.population.max_gap
+    frame_of = d.frame_of.tolist()
     frames = [range(a, b) for a, b in itertools.pairwise(d.offsets.tolist())]
     paths = []
     for choice in itertools.product(*([-1, *frame] for frame in frames)):
         path = tuple(i for i in choice if i >= 0)
-        if len(path) >= 2 and (np.diff(d.frame_of[list(path)]) <= gap).all():
+        links = itertools.pairwise(frame_of[i] for i in path)
+        if len(path) >= 2 and all(b - a <= gap for a, b in links):
             paths.append(path)
     if not paths:
         return [], np.empty(0)
-    # Each in its own copy of the detections, so that one call scores all.
-    scores = []
-    for path in paths:
-        labels = np.full(d.n_points, -1)
-        labels[list(path)] = 0
-        scores.append(am.model.track_scores(am.Tracks(detections=d, labels=labels), model)[0])
-    scores = np.array(scores)
+    # Each has its own copies of its detections, so that one call scores all.
+    of = np.concatenate(paths)
+    labels = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
+    order = np.argsort(d.frame_of[of], kind="stable")
+    counts = np.bincount(d.frame_of[of], minlength=d.n_frames)
+    copies = am.Detections(
+        times=d.times, offsets=np.append(0, np.cumsum(counts)), points=d.points[of[order]]
+    )
+    scores = am.model.track_scores(am.Tracks(detections=copies, labels=labels[order]), model)
     allowed = np.isfinite(scores)
     return [path for path, ok in zip(paths, allowed, strict=True) if ok], scores[allowed]
 
