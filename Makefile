@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Where compiled files are forbidden, every process would compile the package and the tests anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo install test lint types contracts docs bench tables sanitize sanitized wheel web web-check clean
 

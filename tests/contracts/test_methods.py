@@ -65,7 +65,8 @@ def test_every_registered_method_is_in_the_table():
 @pytest.mark.parametrize("irregular", [False, True])
 def test_stream_and_batch_give_identical_labels(method, n_axes, irregular):
     rng = np.random.default_rng(1)
-    truth = wanderers(rng, n_axes=n_axes, n_frames=80, clutter=1.5, irregular=irregular)
+    n_frames = sized(80, 30)
+    truth = wanderers(rng, n_axes=n_axes, n_frames=n_frames, clutter=1.5, irregular=irregular)
     model = small_model()
     tracks = am.track(truth.detections, method, model=model)
     state, labels, confidence = stream(method, model, truth.detections)

@@ -68,8 +68,8 @@ def piece(name: str) -> tuple[am.Detections, am.TrackingModel]:
             pytest.skip(f"no {file} in {DATA}")
         truth = am.simulate.corrupt(am.read(found[0]).tracks, stride=stride)
     d = am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=3e-4, seed=1).detections
-    first, n = d.n_frames // 2, sized(11, 8)
-    model = am.estimate_model(d.part(max(first - 60, 0), min(first + 60, d.n_frames))).model
+    first, n, about = d.n_frames // 2, sized(11, 8), sized(60, 20)
+    model = am.estimate_model(d.part(max(first - about, 0), min(first + about, d.n_frames))).model
     motion = am.DWNA(
         acceleration_sigma=model.motion.modes[-1].acceleration_sigma,
         velocity_sigma=model.motion.modes[-1].velocity_sigma,

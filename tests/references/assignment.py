@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+
+
+def every_choice(options: list[list[int]]) -> list[tuple[int, ...]]:
+    """All ways to take one of its options for each row: -1 is for any number of rows."""
+    found: list[tuple[int, ...]] = [()]
+    for own in options:
+        found = [(*taken, j) for taken in found for j in own if j < 0 or j not in taken]
+    return found
 
 
 def best_pairing(gains: np.ndarray) -> float:
@@ -22,11 +28,7 @@ def stable_matchings(lists: list[list[int]], costs: dict[tuple[int, int], float]
 
     `lists` rank the acceptable receivers of each proposer; `costs[p, r]` ranks p for r.
     """
-    options = [[*wishes, -1] for wishes in lists]
-    for partners in itertools.product(*options):
-        taken = [r for r in partners if r >= 0]
-        if len(set(taken)) < len(taken):
-            continue
+    for partners in every_choice([[*wishes, -1] for wishes in lists]):
         holder = {r: p for p, r in enumerate(partners) if r >= 0}
         if not any(
             is_blocking(lists, costs, partners, holder, p, r)

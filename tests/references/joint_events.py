@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
 
+from tests.references.assignment import every_choice
+
 
 def every_event(log_weights, log_miss):
     """All joint events of some weight: detection of each track, -1 for a miss; logs of factors."""
-    n, m = log_weights.shape
-    events, factors = [], []
-    for event in itertools.product(range(-1, m), repeat=n):
-        taken = [j for j in event if j >= 0]
-        if len(set(taken)) < len(taken):
-            continue
-        terms = [log_miss[i] if j < 0 else log_weights[i, j] for i, j in enumerate(event)]
-        if -math.inf not in terms:
-            events.append(event)
-            factors.append(terms)
-    return events, factors
+    rows = [[none, *row] for none, row in zip(log_miss.tolist(), log_weights.tolist(), strict=True)]
+    options = [[j - 1 for j, factor in enumerate(row) if factor > -math.inf] for row in rows]
+    events = every_choice(options)
+    return events, [[row[j + 1] for row, j in zip(rows, event, strict=True)] for event in events]
 
 
 def enumerate_events(log_weights, log_miss):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,17 +9,18 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 import asterism as am
+from tests.references.assignment import every_choice
 
 
 def every_pairing(gains: np.ndarray, *, complete: bool):
     """All pairings with their sums, the best first."""
-    n, m = gains.shape
-    found = []
-    for choice in itertools.product(range(0 if complete else -1, m), repeat=n):
-        used = [j for j in choice if j >= 0]
-        total = sum(gains[i, j] for i, j in enumerate(choice) if j >= 0)
-        if len(set(used)) == len(used) and total > -np.inf:
-            found.append((total, choice))
+    options = [
+        [*([] if complete else [-1]), *np.flatnonzero(row > -np.inf).tolist()] for row in gains
+    ]
+    found = [
+        (sum(gains[i, j] for i, j in enumerate(choice) if j >= 0), choice)
+        for choice in every_choice(options)
+    ]
     return sorted(found, key=lambda pair: -pair[0])
 
 
