@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.collections import PathCollection
+from matplotlib.figure import Figure
 
 import asterism as am
 from asterism.cli import main
@@ -25,6 +26,13 @@ from tests.paths import DATA
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.fixture
+def plain_pictures(monkeypatch):
+    """Empty figures, for tests of what else is in the folder."""
+    for name in ("contact_sheet", "rig_picture", "coverage_picture"):
+        monkeypatch.setattr(f"asterism.cli.film_pictures.{name}", lambda *_: Figure())
 
 
 @pytest.fixture(scope="module")
@@ -142,6 +150,7 @@ def test_the_folder_holds_the_film(here, capsys):
     assert "ring of radius" in out
 
 
+@pytest.mark.usefixtures("plain_pictures")
 def test_the_summary_says_what_was_seen(here, capsys):
     write_rig(NARROW, "narrow.toml")
     printed = json.loads(run("film crossing --rig narrow.toml -o out --pictures 0 --json", capsys))
@@ -167,6 +176,7 @@ def test_the_summary_says_what_was_seen(here, capsys):
     assert Path("out/observations.csv").read_bytes() == before
 
 
+@pytest.mark.usefixtures("plain_pictures")
 def test_a_capture_is_filmed_with_its_own_frame_numbers_and_names(here, gappy, capsys):
     am.write(gappy, "in.csv")
     text = Path("in.csv").read_text().splitlines()
@@ -189,6 +199,7 @@ def test_a_capture_is_filmed_with_its_own_frame_numbers_and_names(here, gappy, c
     assert seen.n_points == 3 * (gappy.labels >= 0).sum()
 
 
+@pytest.mark.usefixtures("plain_pictures")
 def test_cameras_of_another_world_are_told_of(here, capsys):
     am.write(am.simulate.cube(frames=5), "in.csv")
     write_rig(am.Rig.ring(3, radius=2, height=1, target=(900.0, 0, 0), far=50.0), "far.toml")

@@ -53,7 +53,7 @@ def long_capture(tmp_path_factory):
     """A capture that takes seconds to track and to write, and a model for it."""
     folder = tmp_path_factory.mktemp("long")
     truth = am.simulate.smooth(n_markers=30, frames=3_000, rate=100, seed=1)
-    am.write(truth, folder / "in.csv")
+    am.write(truth, folder / "in.c3d")
     model = am.TrackingModel(
         motion=am.DWNA(acceleration_sigma=20),
         sensor=am.Sensor(noise_sigma=1e-3, p_detection=0.99, clutter_density=1e-3),
@@ -65,7 +65,7 @@ def long_capture(tmp_path_factory):
 
 @pytest.fixture
 def folder(long_capture, tmp_path):
-    for name in ("in.csv", "model.toml"):
+    for name in ("in.c3d", "model.toml"):
         (tmp_path / name).symlink_to(long_capture / name)
     return tmp_path
 
@@ -74,7 +74,7 @@ def folder(long_capture, tmp_path):
     ("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["SIGINT", "SIGTERM"]
 )
 def test_stopped_while_tracking(folder, signum, code):
-    process = start("track", "in.csv", "--model", "model.toml", "--run", "run", cwd=folder)
+    process = start("track", "in.c3d", "--model", "model.toml", "--run", "run", cwd=folder)
     log = folder / "run" / "log.txt"
     wait_for(lambda: log.exists() and log.stat().st_size > 0, process)
     assert stopped(process, signum) == (code, f"asterism: stopped by {signum.name}\n")
@@ -86,14 +86,14 @@ def test_stopped_while_tracking(folder, signum, code):
 @pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_stopped_while_writing(folder, signum):
     (folder / "out.csv").write_text("the old result")
-    line = "track in.csv --model model.toml --method gnn -o out.csv --overwrite"
+    line = "track in.c3d --model model.toml --method gnn -o out.csv --overwrite"
     process = start(*line.split(), cwd=folder)
     wait_for(lambda: any(folder.glob(".*.part")), process)
     code, _ = stopped(process, signum)
     assert code == (-signum if signum == signal.SIGKILL else 128 + signum)
     assert (folder / "out.csv").read_text() == "the old result"
     if signum != signal.SIGKILL:  # which leaves no process to tidy up
-        assert sorted(p.name for p in folder.iterdir()) == ["in.csv", "model.toml", "out.csv"]
+        assert sorted(p.name for p in folder.iterdir()) == ["in.c3d", "model.toml", "out.csv"]
 
 
 def catches(process, signum):
@@ -107,10 +107,10 @@ def catches(process, signum):
 
 
 def test_stopped_early(folder):
-    process = start("track", "in.csv", cwd=folder)
+    process = start("track", "in.c3d", cwd=folder)
     wait_for(lambda: catches(process, signal.SIGTERM), process)
     assert stopped(process, signal.SIGINT) == (130, "asterism: stopped by SIGINT\n")
-    assert sorted(p.name for p in folder.iterdir()) == ["in.csv", "model.toml"]
+    assert sorted(p.name for p in folder.iterdir()) == ["in.c3d", "model.toml"]
 
 
 @pytest.mark.parametrize(

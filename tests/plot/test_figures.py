@@ -227,17 +227,22 @@ def test_projections_show_what_each_camera_saw():
         am.plot.plot_projections(o, am.Rig.ring(2, radius=4, height=2))
 
 
+ODD = pytest.mark.parametrize(
+    "table", [[], ["", ""], ["*", "*"], ["0"], ["0", "", "0"], ["3", "3"]]
+)
+
+
+@ODD
 @pytest.mark.parametrize("n_axes", [2, 3])
-@pytest.mark.parametrize("table", [[], ["", ""], ["*", "*"], ["0"], ["0", "", "0"], ["3", "3"]])
-def test_odd_tracks_can_be_drawn(table, n_axes):
-    tracks = tracks_of(table, n_axes=n_axes)
+def test_coordinates_of_odd_tracks_can_be_drawn(table, n_axes):
+    am.plot.plot_axes(tracks_of(table, n_axes=n_axes))[0].figure.draw_without_rendering()
+
+
+@ODD
+def test_labels_of_odd_tracks_can_be_drawn(table):
+    tracks = tracks_of(table)
     groups = am.filter.gate_groups(tracks, model_of())
-    axes = (
-        am.plot.plot_axes(tracks)[0],
-        am.plot.plot_confidence(tracks),
-        am.plot.plot_groups(groups),
-    )
-    for drawn in axes:
+    for drawn in (am.plot.plot_confidence(tracks), am.plot.plot_groups(groups)):
         drawn.figure.draw_without_rendering()
 
 

@@ -146,12 +146,22 @@ def test_the_title_is_the_callers_own_and_nothing_lies_on_it(kind, part):
     assert am.plot.figure_bytes(axes, "png")[1:4] == b"PNG"  # of the whole figure
 
 
+ODD = pytest.mark.parametrize(
+    "table", [[], ["", ""], ["*", "*"], ["0"], ["0", "", "0"], ["3", "3"]]
+)
+
+
+@ODD
 @pytest.mark.parametrize("n_axes", [2, 3])
-@pytest.mark.parametrize("table", [[], ["", ""], ["*", "*"], ["0"], ["0", "", "0"], ["3", "3"]])
-def test_odd_tracks_can_be_drawn(table, n_axes):
+def test_positions_of_odd_tracks_can_be_drawn(table, n_axes):
     tracks = tracks_of(table, n_axes=n_axes)
-    for axes in (plot_trajectories(tracks), plot_presence(tracks), plot_errors(tracks, tracks)):
+    for axes in (plot_trajectories(tracks), plot_errors(tracks, tracks)):
         axes.figure.draw_without_rendering()
+
+
+@ODD
+def test_the_presence_of_odd_tracks_can_be_drawn(table):
+    plot_presence(tracks_of(table)).figure.draw_without_rendering()
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
