@@ -1,4 +1,4 @@
-"""Files in and out: one file a format; units, axes and gaps are converted here and nowhere else.
+"""Reading and writing of files; only these modules convert units, axes and gaps.
 
 >>> import asterism as am
 >>> capture = am.read("trial.c3d")                        # doctest: +SKIP

@@ -1,4 +1,4 @@
-"""Writing a file so that it is either there as a whole or not touched at all."""
+"""Atomic writing: a file is replaced completely or not at all."""
 
 from __future__ import annotations
 
@@ -18,27 +18,29 @@ __all__ = ["replacing", "write_text"]
 
 @contextmanager
 def replacing(path: Path) -> Generator[IO[bytes], None, None]:
-    """Open a file to write that takes the place of `path` when the block ends well.
+    """Open a file to write that replaces `path` if the block ends without an error.
 
-    The bytes go to a temporary name in the same folder, are forced to the disk and renamed: who is
-    killed on the way leaves the old file as it was. On an error the temporary file is removed.
+    The bytes are written to a temporary file in the same folder, flushed to the disk, and the file
+    is renamed. A killed process leaves the old file unchanged. On an error the temporary file is
+    removed.
 
     Parameters
     ----------
     path : Path
-        The file to make or replace.
+        File to create or replace.
 
     Yields
     ------
     binary file
+        Open temporary file.
 
     Raises
     ------
     FormatError
-        If the system refuses: no such folder, no permission, disk full.
+        If the folder does not exist, permission is denied, or the disk is full.
     """
     try:
-        # A device or a pipe (/dev/stdout) cannot be renamed over: it is written as it stands.
+        # A device or a pipe (/dev/stdout) cannot be replaced, so it is written directly.
         if path.exists() and not path.is_file() and not path.is_dir():
             with path.open("wb") as device:
                 yield device
@@ -48,7 +50,7 @@ def replacing(path: Path) -> Generator[IO[bytes], None, None]:
             raise IsADirectoryError(0, "it is a folder")
         temporary = target.with_name(f".{secrets.token_hex(8)}.part")
         try:
-            # The file's name is that of its target: some formats hold it.
+            # The file object has the name of the target, because some formats store it.
             with open(
                 str(target), "xb", opener=lambda _, flags: os.open(temporary, flags, 0o666)
             ) as file:
@@ -65,6 +67,6 @@ def replacing(path: Path) -> Generator[IO[bytes], None, None]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file as a whole or not at all."""
+    """Write a text file in UTF-8, completely or not at all."""
     with replacing(path) as file:
         file.write(text.encode())

@@ -1,8 +1,8 @@
-"""Image points as caliscope tracks them: ``xy.csv``, one row a point.
+"""Image points of caliscope: ``xy.csv``, one row per point.
 
 Columns ``sync_index``, ``cam_id`` (in older files ``port``), ``point_id``, ``img_loc_x`` and
-``img_loc_y`` in pixels from the centre of the top left one; where it is known ``frame_time`` in
-seconds. Other columns, such as the place of a point on a calibration board, are not read.
+``img_loc_y`` in pixels from the centre of the top left pixel, and optionally ``frame_time`` in
+seconds. Other columns, such as the position of a point on a calibration board, are not read.
 """
 
 from __future__ import annotations
@@ -30,36 +30,36 @@ log = logging.getLogger(__name__)
 _REQUIRED = ("sync_index", "point_id", "img_loc_x", "img_loc_y")
 _CAMERAS = ("cam_id", "port")
 _TIME = "frame_time"
-_LARGEST = 10**9  # a number of a camera or a point beyond it is a mistake
+_LARGEST = 10**9  # a larger number of a camera or a point is an error
 
 
 def is_header(header: Sequence[str]) -> bool:
-    """Whether these are the columns of such a file."""
+    """Return whether a header has the columns of caliscope's ``xy.csv``."""
     return set(header) >= set(_REQUIRED) and any(name in header for name in _CAMERAS)
 
 
 def parse(path: Path, lines: Sequence[str], header: Sequence[str]) -> Observations:
-    """Read image points.
+    """Parse the lines of caliscope's ``xy.csv``.
 
     Parameters
     ----------
     path : Path
-        For messages.
+        File for messages.
     lines : sequence of str
         All lines of the file, the header first.
     header : sequence of str
-        The columns.
+        Names of the columns.
 
     Returns
     -------
     Observations
-        Camera N is called ``cam_N``, as `read_rig` calls it. Markers are the numbers of the points.
-        The time of a frame is the mean over its cameras.
+        Camera N is called ``cam_N``, as by `read_rig`. Markers are the numbers of the points. The
+        time of a frame is the mean over its cameras.
 
     Raises
     ------
     FormatError
-        With the line that is not as it should be.
+        If a line is malformed; the error names it.
     """
     camera_column = next(name for name in _CAMERAS if name in header)
     wanted = (*_REQUIRED, camera_column, _TIME)
@@ -112,12 +112,12 @@ def _times(
     index: NDArray[np.int64],
     frames: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """Seconds of each frame: the mean over its cameras, or where none is stated its number."""
+    """Return the time of each frame: the mean over its cameras, or its number without times."""
     if stated is None or np.isnan(stated).all():
-        log.warning("%s: no frame_time is given: times count frames, one a second", path)
+        log.warning("%s: no frame_time is given: times are frame numbers, one per second", path)
         return frames.astype(np.float64)
     stated = stated[order]
-    # One row for each camera of a frame: a camera with many points has no more weight.
+    # One row for each camera of a frame, so that a camera with many points has no more weight.
     first = np.flatnonzero((np.diff(cells, prepend=-1) > 0) & np.isfinite(stated))
     n_cameras = np.bincount(index[first], minlength=len(frames))
     with np.errstate(invalid="ignore"):

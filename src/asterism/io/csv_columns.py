@@ -1,4 +1,4 @@
-"""Columns of a CSV with a header: numbers and texts, fast, and with the line of what is wrong."""
+"""Parsing of the columns of a CSV with a header, with the line of any error."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["SOURCE_UNIT", "columns_of", "quoted", "source_unit", "whole"]
 
 SOURCE_UNIT = "source_unit"
-"""Column of the unit of the file that a capture came from; the coordinates are metres."""
+"""Column of the unit of a capture's source file; the coordinates are metres."""
 
 _CHUNK = 4096  # lines at a time, so that the cells as texts never fill the memory
 _TO_QUOTE = frozenset(',"\r\n')
@@ -29,12 +29,12 @@ _TO_QUOTE = frozenset(',"\r\n')
 def columns_of(
     path: Path, lines: Sequence[str], header: Sequence[str], texts: Collection[str]
 ) -> tuple[dict[str, NDArray[np.float64]], dict[str, list[str]]]:
-    """Parse the lines under a header.
+    """Parse the columns of a CSV.
 
     Parameters
     ----------
     path : Path
-        For messages.
+        File for messages.
     lines : sequence of str
         All lines, the header first.
     header : sequence of str
@@ -45,14 +45,14 @@ def columns_of(
     Returns
     -------
     numbers : dict of ndarray, shape (rows,)
-        By the name of their column; NaN where blank.
+        Numbers by the name of their column; NaN for a blank cell.
     texts : dict of list of str
-        By the name of their column, blanks and all.
+        Texts by the name of their column, not stripped.
 
     Raises
     ------
     FormatError
-        With the line and the column.
+        If a cell is malformed; the error names its line and column.
     """
     parts: dict[str, list[NDArray[np.float64]]] = {c: [] for c in header if c not in texts}
     words: dict[str, list[str]] = {c: [] for c in header if c in texts}
@@ -81,23 +81,28 @@ def columns_of(
 def whole(
     path: Path, column: str, values: NDArray[np.float64], lines: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Return numbers that must be whole as such.
+    """Convert whole numbers to integers.
 
     Parameters
     ----------
     path : Path
-        For messages.
+        File for messages.
     column : str
-        For messages.
+        Column for messages.
     values : ndarray, shape (n,)
-        The numbers.
+        Whole numbers as floats.
     lines : ndarray of int, shape (n,)
-        The line of each, for messages.
+        Line of each number for messages.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        The same numbers.
 
     Raises
     ------
     FormatError
-        At the first that is not whole, or beyond what a float holds exactly.
+        If a number is not whole, or is larger than 2**53.
     """
     bad = np.flatnonzero((values != np.floor(values)) | (np.abs(values) > 2**53))
     if len(bad):
@@ -107,19 +112,24 @@ def whole(
 
 
 def source_unit(path: Path, texts: Sequence[str]) -> str:
-    """Return the unit that the rows of a file name, "m" where none does.
+    """Return the unit of the cells of a column, "m" if all are blank.
 
     Parameters
     ----------
     path : Path
-        For messages.
+        File for messages.
     texts : sequence of str
         Cells of the column, from line 2; some may be blank.
+
+    Returns
+    -------
+    str
+        Key of `PER_METRE`.
 
     Raises
     ------
     FormatError
-        If one is no unit, or two differ.
+        If a cell is not a unit, or two differ.
     """
     found = dict.fromkeys(texts)
     found.pop("", None)
@@ -133,7 +143,7 @@ def source_unit(path: Path, texts: Sequence[str]) -> str:
 
 
 def quoted(text: str) -> str:
-    """Return a text as a cell, in quotes where it needs them."""
+    """Return a text as a CSV cell, in quotes if necessary."""
     if _TO_QUOTE.isdisjoint(text):
         return text
     return '"' + text.replace('"', '""') + '"'

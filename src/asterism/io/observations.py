@@ -1,11 +1,10 @@
-"""Image points of several cameras as CSV: one row a point, and nothing is lost.
+"""Image points of several cameras as CSV: one row per point, without loss.
 
-Columns ``frame, time, camera, u, v, marker``: seconds, the camera's name, pixels from the centre
-of the top left one, and where the truth is known the marker's name, blank for none of them. The
-first rows have neither frame nor time: each declares a camera or a marker, in order, so that
-those that see nothing or are never seen are there too. A row with a frame and a time alone is a
-frame in which no camera saw anything. Floats are written with as many digits as give back the same
-bits.
+Columns ``frame, time, camera, u, v, marker``: seconds, the name of the camera, pixels from the
+centre of the top left pixel, and, if the truth is known, the name of the marker, blank for clutter.
+The first rows have neither frame nor time: each declares a camera or a marker, in order, so that
+cameras and markers without any image point are kept. A row with a frame and a time alone is a frame
+without image points. Floats have enough digits to restore the same bits.
 """
 
 from __future__ import annotations
@@ -80,28 +79,39 @@ def write_observations(
 
 
 def read_observations(path: str | Path) -> Observations:
-    """Read image points from a CSV file of `write_observations` or of caliscope.
+    r"""Read image points from a CSV file of `write_observations` or of caliscope.
 
     The header decides between the two. Cameras of caliscope's ``xy.csv`` are named ``cam_N``, as by
     `read_rig` for its calibration.
 
-    Columns and rows may stand in any order; of one camera and frame the points keep theirs.
-    Cameras and markers need not be declared, if none of them is: then they come in the order in
-    which they are met, and markers that are all whole numbers have no names.
+    Columns and rows may stand in any order; the points of one camera and frame keep their order.
+    Either all cameras are declared or none, and the same holds for markers. Without declarations,
+    they are numbered in the order of their first row, and markers that are all whole numbers have
+    no names.
 
     Parameters
     ----------
     path : path
-        The file.
+        CSV file.
 
     Returns
     -------
     Observations
+        Image points with the true markers, if the file has them.
 
     Raises
     ------
     FormatError
-        If there is no such file, or with the line that is not as it should be.
+        If the file does not exist, or a line is malformed; the error names it.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "seen.csv")
+    ...     _ = path.write_text("frame,time,camera,u,v\n1,0.0,left,320.5,240.25\n")
+    ...     read_observations(path).pixels.tolist()
+    [[320.5, 240.25]]
     """
     path = check_path("path", path)
     try:
@@ -125,7 +135,7 @@ def read_observations(path: str | Path) -> Observations:
 
 @contextmanager
 def _faults_of(path: Path) -> Generator[None, None, None]:
-    """Turn what `Observations` refuses into an error about the file."""
+    """Turn a `ParameterError` of `Observations` into an error about the file."""
     try:
         yield
     except ParameterError as error:
@@ -133,7 +143,7 @@ def _faults_of(path: Path) -> Generator[None, None, None]:
 
 
 def _texts(observations: Observations, first_frame: int) -> Iterator[str]:
-    """Return the file in pieces."""
+    """Generate the text of the file in parts."""
     o = observations
     has_truth = o.markers is not None
     yield ",".join(_COLUMNS if has_truth else _COLUMNS[:-1]) + "\n"
@@ -162,7 +172,7 @@ def _texts(observations: Observations, first_frame: int) -> Iterator[str]:
         lines = list(map(",".join, zip(*columns, strict=True)))
         counts = o.counts[begin:end].sum(axis=1)
         places = np.cumsum(counts)
-        # Backwards, so that the places of the others stay right.
+        # Backwards, so that the earlier places stay valid.
         for t in np.flatnonzero(counts == 0)[::-1].tolist():
             lines.insert(int(places[t]), starts[t] + ",,," + "," * has_truth)
         yield "".join(f"{line}\n" for line in lines)
@@ -170,7 +180,7 @@ def _texts(observations: Observations, first_frame: int) -> Iterator[str]:
 
 def _check_names(what: str, names: Sequence[str]) -> None:
     for name in names:
-        # Half a surrogate pair is no text that a file could hold.
+        # UTF-8 cannot encode half a surrogate pair.
         if not name or any(c in "\r\n" or "\ud800" <= c <= "\udfff" for c in name):
             raise ParameterError(what, "names of one line, none empty", repr(name))
     if len(set(names)) < len(names):
@@ -229,7 +239,7 @@ def _assemble(
 def _indices(
     path: Path, column: str, texts: list[str], is_declaration: NDArray[np.bool_]
 ) -> tuple[tuple[str, ...], NDArray[np.int64]]:
-    """Return the names of a column and the number of each row's, -1 where it is blank."""
+    """Return the names of a column and the index of each row's name, -1 for a blank cell."""
     declared = np.flatnonzero(is_declaration).tolist()
     names: dict[str, int] = {}
     for i in declared:

@@ -1,4 +1,4 @@
-"""Tables of numbers in text: what TRC, TSV and the CSVs have in common."""
+"""Parsing of tables of numbers in text, shared by TRC, TSV and the CSVs."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _GAPS = {"", "null", "nan", "none"}
 
 
 def as_utf8(head: bytes) -> bytes:
-    """Return the first bytes of a file in UTF-8 where they say that they are UTF-16."""
+    """Return the first bytes of a file in UTF-8 if they begin with the mark of UTF-16."""
     return head.decode("utf-16", "ignore").encode() if head[:2] in _UTF16 else head
 
 
 def read_lines(path: Path) -> list[str]:
-    """Lines of a text file: UTF-8, UTF-16 if it says so, else Latin-1; any line ends."""
+    """Return the lines of a text file in UTF-8, in marked UTF-16, or else in Latin-1."""
     raw = path.read_bytes()
     try:
         text = raw.decode("utf-16" if raw[:2] in _UTF16 else "utf-8-sig")
@@ -37,7 +37,7 @@ def read_lines(path: Path) -> list[str]:
 
 
 def cells_of(line: str) -> list[str]:
-    """Cells of one line of CSV without the blanks round them; none if it is not CSV."""
+    """Return the stripped cells of one line of CSV; an empty list if it is not CSV."""
     try:
         return [cell.strip() for cell in next(csv.reader([line.strip("\r\n")]), [])]
     except csv.Error:
@@ -52,15 +52,15 @@ def parse_rows(
     Parameters
     ----------
     path : Path
-        For messages.
+        File for messages.
     lines : list of str
         All lines of the file.
     first : int
-        Index of the first data line; blank lines are passed over.
+        Index of the first data line; blank lines are skipped.
     n_columns : int
-        Numbers a line. Further fields must be blank; fewer are an error.
+        Numbers per line. Further fields must be blank; fewer are an error.
     separator : str
-        Between fields.
+        Separator of the fields.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def parse_rows(
     numbers = np.array(
         [i + 1 for i in range(first, len(lines)) if lines[i].strip(separator + " ")], dtype=np.int64
     )
-    # Checked before anything is allocated: the header of a hostile file may claim any width.
+    # Checked before anything is allocated: the header of a malicious file may claim any width.
     if len(numbers) and lines[numbers[0] - 1].count(separator) + 1 < n_columns:
         _complain(path, lines[numbers[0] - 1], int(numbers[0]), n_columns, separator)
     values = np.empty((len(numbers), n_columns if len(numbers) else 0))
@@ -116,7 +116,7 @@ def _complain(path: Path, line: str, number: int, n_columns: int, separator: str
 
 
 def check_times(path: Path, times: NDArray[np.float64], numbers: NDArray[np.int64]) -> None:
-    """Raise at the first line whose time is missing or does not follow the one before."""
+    """Raise at the first line whose time is missing or not after the previous one."""
     bad = np.flatnonzero(~np.isfinite(times))
     if len(bad):
         raise FormatError(path, f"line {numbers[bad[0]]}", "a time in seconds", "nothing")
@@ -130,5 +130,5 @@ def check_times(path: Path, times: NDArray[np.float64], numbers: NDArray[np.int6
 
 
 def plain(name: str) -> str:
-    """Name that fits one field of a table: no tabs, no line ends."""
+    """Return a name without tabs and line ends, which fits one field of a table."""
     return name.translate({ord(c): " " for c in "\t\r\n"})

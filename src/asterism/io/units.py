@@ -1,7 +1,7 @@
 """Units of length in files, and metres in memory.
 
-Files are divided by their units per metre and never multiplied by an inexact 0.001: then the way
-back gives the same float32, bit for bit, and the same decimal text.
+Numbers of files are divided by the units per metre and never multiplied by an inexact 0.001. So
+the conversion back restores the same float32, bit for bit, and the same decimal text.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ _SPELLINGS = {
     **dict.fromkeys(("ft", "foot", "feet"), "ft"),
 }
 _NEAREST, _FARTHEST = 0.02, 100.0
-"""Metres from the origin between which nine tenths of the points of a capture reach."""
-_MOST_POINTS = 100_000  # that are looked at, evenly spread
+"""Plausible limits, in metres, of the 90th percentile of the points' largest coordinates."""
+_MOST_POINTS = 100_000  # evenly spaced points that are examined
 
 
 def parse_unit(text: str) -> str | None:
@@ -42,18 +42,18 @@ def parse_unit(text: str) -> str | None:
 
 
 def judge_unit(points: NDArray[np.floating]) -> str:
-    """Guess whether coordinates without a unit are metres or millimetres.
+    """Estimate whether coordinates without a unit are metres or millimetres.
 
     Parameters
     ----------
     points : ndarray, shape (N, D)
-        Coordinates as they stand in the file, all finite.
+        Coordinates of the file, all finite.
 
     Returns
     -------
     {"mm", "m"}
-        "mm" if a tenth of the points are more than 20 units from the origin: no laboratory is that
-        large in metres, and hardly anything lies within 20 millimetres.
+        "mm" if a tenth of the points are more than 20 units from the origin. Few laboratories are
+        larger than 20 metres, and few captures are smaller than 20 millimetres.
     """
     if not len(points):
         return "mm"
@@ -61,26 +61,26 @@ def judge_unit(points: NDArray[np.floating]) -> str:
 
 
 def check_size(points: NDArray[np.floating], unit: str) -> tuple[str, ...]:
-    """Warn of metres that a file calls millimetres, and of millimetres that it calls metres.
+    """Warn of metres that a file labels as millimetres, and of the reverse.
 
     Parameters
     ----------
     points : ndarray, shape (N, D)
-        Metres, as the file's own unit makes them.
+        Metres, converted from the file's unit.
     unit : str
-        The unit that the file names.
+        Unit of the file.
 
     Returns
     -------
     tuple of str
-        One warning, or none: where a factor of 1000 brings an impossible size to a usual one.
+        One warning if the size is implausible and a factor of 1000 makes it plausible, else none.
 
     Examples
     --------
     >>> check_size(np.array([[0.9, 1.1, 0.4]]), "mm")
     ()
-    >>> check_size(np.array([[0.0009, 0.0011, 0.0004]]), "mm")[0][:72]
-    'unit of length: expected coordinates in mm, as the file says, found the '
+    >>> check_size(np.array([[0.0009, 0.0011, 0.0004]]), "mm")[0][:71]
+    'unit of length: expected coordinates in mm, the unit of the file, found'
     """
     if not len(points):
         return ()
@@ -92,23 +92,35 @@ def check_size(points: NDArray[np.floating], unit: str) -> tuple[str, ...]:
     else:
         return ()
     return (
-        f"unit of length: expected coordinates in {unit}, as the file says, found the size of "
+        f"unit of length: expected coordinates in {unit}, the unit of the file, found the size of "
         f"coordinates in {other} (nine tenths of the points lie within {far * PER_METRE[unit]:.3g} "
         f"{unit} of the origin). Correct the unit in the file.",
     )
 
 
 def _reach(points: NDArray[np.floating]) -> float:
-    """Largest coordinate that a tenth of the points exceed."""
+    """Return the 90th percentile of the points' largest coordinates."""
     return float(np.quantile(np.abs(points).max(axis=1), 0.9))
 
 
 def from_metres(metres: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
-    """Convert metres to a unit, so that dividing again gives the same metres.
+    """Convert metres to a unit, so that the conversion back restores the same metres.
 
-    Among the doubles next to the product, the roundest that divides back to the input is taken;
-    where there is none (the input did not come from a file in this unit) the product, which
-    divides back to within one unit in the last place.
+    The result is the double next to the product that divides back to the input, with the fewest
+    decimals. If there is none (the input did not come from a file in this unit), the result is the
+    product, which divides back to within one unit in the last place.
+
+    Parameters
+    ----------
+    metres : ndarray
+        Lengths in metres; NaN stays NaN.
+    unit : str
+        Key of `PER_METRE`.
+
+    Returns
+    -------
+    ndarray
+        Lengths in the unit.
 
     Examples
     --------
@@ -135,12 +147,12 @@ def from_metres(metres: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
 
 
 def to_float32(values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Round to 32 bits, which hold 7 digits; NaN stays.
+    """Round to 32-bit floats of about 7 digits; NaN stays NaN.
 
     Raises
     ------
     ParameterError
-        At a number that 32 bits cannot hold.
+        If a number is larger than the largest 32-bit float.
     """
     with np.errstate(over="ignore"):
         rounded = values.astype("<f4")

@@ -78,7 +78,7 @@ def test_the_older_form_without_the_table_of_cameras(tmp_path):
     (tmp_path / "config.toml").write_text(text)
     rig = am.read_rig(tmp_path / "config.toml", units="m")
     same_pixels(numbered(), rig)
-    assert rig.warnings == ("the entry 'charuco' is no camera and is left out",)
+    assert rig.warnings == ("the entry 'charuco' is not a camera and is left out",)
 
 
 def test_cameras_without_a_pose_or_marked_ignore_are_named(tmp_path):
@@ -178,7 +178,8 @@ def test_image_points_without_times_count_frames(tmp_path, caplog):
     path = tmp_path / "xy.csv"
     path.write_text(xy(numbered(), time=False, board=False))
     np.testing.assert_array_equal(am.io.read_observations(path).times, np.arange(40, 46))
-    assert caplog.messages == [f"{path}: no frame_time is given: times count frames, one a second"]
+    expected = f"{path}: no frame_time is given: times are frame numbers, one per second"
+    assert caplog.messages == [expected]
 
 
 @pytest.mark.parametrize(

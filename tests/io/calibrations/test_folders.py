@@ -141,7 +141,7 @@ def test_flydra_folders_with_less_in_them(tmp_path):
         ("Res.dat", lambda s: "1 2\n", "Res.dat", "3 × 2"),
         ("Res.dat", lambda s: s.replace("1000", "0"), "Res.dat", "whole pixels"),
         ("calibration_units.txt", lambda s: "ells", "calibration_units.txt", "millimeters"),
-        ("camera_order.txt", lambda s: "a\na\nb\n", "f", "a name of its own"),
+        ("camera_order.txt", lambda s: "a\na\nb\n", "f", "a unique name"),
     ],
 )
 def test_flydra_that_is_broken(tmp_path, name, change, file, expected):

@@ -106,7 +106,7 @@ def test_yaml_written_by_hand(tmp_path):
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (("[1e-1, 0, 0, 0]", "[1e-1, 0, 0, 0, 0, 0.3]"), "zeros after them"),
+        (("[1e-1, 0, 0, 0]", "[1e-1, 0, 0, 0, 0, 0.3]"), "followed by zeros"),
         (("image_size: [640, 480]", ""), "image_width and image_height"),
         (("[640, 480]", "[640, 0]"), "whole pixels"),
         (("[640, 480]", "[640, 480.5]"), "whole pixels"),
@@ -208,7 +208,7 @@ def test_cameras_as_caliscope_nests_them(tmp_path):
 def test_two_cameras_of_one_name(tmp_path):
     path = tmp_path / "c.toml"
     path.write_text(ANIPOSE + ANIPOSE.replace("cam_0", "cam_1").split("[metadata]")[0])
-    with pytest.raises(FormatError, match="a name of its own"):
+    with pytest.raises(FormatError, match="a unique name"):
         read_rig(path, units="m")
 
 

@@ -59,7 +59,7 @@ def test_a_truncated_file_of_more_than_65535_frames(tmp_path):
 def test_header_and_parameters_disagree(load):
     capture = load(grid(5), labels=["A", "B", "C"], frames=5, header_last=3)
     assert capture.n_frames == 5
-    assert "5 frames are taken; the header says 3" in capture.warnings
+    assert "5 frames are read; the header states 3" in capture.warnings
 
 
 def test_no_frames_no_points_no_detections(load):

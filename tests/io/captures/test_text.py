@@ -95,7 +95,7 @@ def test_trc_gaps_are_blank(tmp_path):
         (lambda t: t.replace("0.510", "0.500"), "line 8: expected a time after 0.5 s"),
         (lambda t: t.replace("0.520", "-0.52"), "line 9: expected a time after 0.51 s"),
         (lambda t: t.replace("0.510", ""), "line 8: expected a time"),
-        (lambda t: t.replace("LASI\t\t\t", "LASI\t"), "line 4: expected two tabs"),
+        (lambda t: t.replace("LASI\t\t\t", "LASI\t"), "line 4: expected three tabs"),
         (lambda t: t.replace("Frame#", "Item"), "line 4"),
         (lambda t: t.replace("PathFileType", "Path"), "line 1"),
         (lambda t: t[:60], "line 1"),
@@ -111,7 +111,7 @@ def test_bad_trc(load, change, place):
 def test_trc_without_frames(load, n_kept):
     capture = load("\n".join(TRC.split("\n")[:n_kept]))
     assert (capture.n_frames, capture.names) == (0, ("LASI", "RASI"))
-    assert "0 frames are there" in capture.warnings[0]
+    assert "the file has 0 frames" in capture.warnings[0]
 
 
 TSV = (
@@ -278,7 +278,7 @@ def test_wide_csv(load, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "place"),
     [
-        ("LASI_y", "LASI_w", "line 1: .* 'LASI_w' out of step"),
+        ("LASI_y", "LASI_w", "line 1: .* 'LASI_w' instead"),
         ("0.3,1,2", "0.3,1", "line 3: expected 7 columns"),
         ("0.3", "0.0", "line 3: expected a time after"),
     ],

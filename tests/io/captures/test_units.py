@@ -55,7 +55,7 @@ def test_metres_called_millimetres_are_told_of(tmp_path, name):
     capture = read(path)
     assert capture.units == "mm"
     assert len(capture.warnings) == 1
-    assert "expected coordinates in mm, as the file says, found" in capture.warnings[0]
+    assert "expected coordinates in mm, the unit of the file, found" in capture.warnings[0]
     assert "size of coordinates in m (nine" in capture.warnings[0]
     assert read(text(path, body(1000), "mm")).warnings == ()
 
@@ -66,7 +66,7 @@ def test_millimetres_called_metres_are_told_of(tmp_path, name):
     capture = read(path)
     assert capture.units == "m"
     assert len(capture.warnings) == 1
-    assert "expected coordinates in m, as the file says, found" in capture.warnings[0]
+    assert "expected coordinates in m, the unit of the file, found" in capture.warnings[0]
     assert "size of coordinates in mm (nine" in capture.warnings[0]
     assert read(text(path, body(), "m")).warnings == ()
 

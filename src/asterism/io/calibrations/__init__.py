@@ -1,4 +1,4 @@
-"""Calibrations in and out: one file a format; units and conventions are converted here only.
+"""Reading and writing of calibrations, one module per format.
 
 >>> from asterism.io.calibrations import read_rig, write_rig
 >>> rig = read_rig("walk.xcp")                             # doctest: +SKIP

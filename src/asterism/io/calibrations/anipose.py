@@ -1,6 +1,6 @@
-"""TOML of anipose and freemocap: OpenCV's camera, the rotation as a Rodrigues vector.
+"""TOML of anipose and freemocap: OpenCV's camera model, with rotations as Rodrigues vectors.
 
-Caliscope's own file has the same entries, its rotations vectors or matrices; see `caliscope`.
+Caliscope's file has the same entries, and its rotations are vectors or matrices; see `caliscope`.
 """
 
 from __future__ import annotations
@@ -37,23 +37,40 @@ __all__ = ["read", "sniff", "write"]
 
 
 def sniff(head: bytes) -> bool:
-    """Tell whether the first bytes of a file look like this format."""
+    """Return whether the first bytes of a file are those of an anipose calibration."""
     return all(re.search(rb"\b%b\"?\s*=" % key, head) for key in (b"matrix", b"distortions"))
 
 
 def read(path: Path, units: str | None) -> Rig:
-    """Read a rig.
+    """Read the cameras of an anipose or freemocap calibration.
 
     Parameters
     ----------
     path : Path
-        The file.
+        TOML file.
     units : str or None
-        Its unit of length; else what its metadata says, else by the cameras' distances.
+        Unit of length of the file. None takes it from the file's metadata, or else estimates it
+        from the distances of the cameras.
 
     Returns
     -------
     Rig
+        Cameras with a pose. Its `warnings` list the cameras that were left out.
+
+    Raises
+    ------
+    FormatError
+        If an entry is missing or malformed, or if a lens is a fisheye or has more than five
+        coefficients.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "calibration.toml")
+    ...     _ = path.write_bytes(write(am.Rig.ring(2, radius=3, height=2)))
+    ...     read(path, None).names
+    ('cam1', 'cam2')
     """
     warnings: list[str] = []
     found: list[dict[str, Any]] = []
@@ -67,7 +84,7 @@ def read(path: Path, units: str | None) -> Rig:
     for key, entry in content.items():
         if not isinstance(entry, dict) or "matrix" not in entry:
             if key != "metadata":
-                warnings.append(f"the entry {key!r} is no camera and is left out")
+                warnings.append(f"the entry {key!r} is not a camera and is left out")
         elif all(entry.get(k, "null") == "null" for k in ("rotation", "translation")):
             warnings.append(f"camera {entry.get('name', key)} has no pose and is left out")
         elif entry.get("ignore") is True:
@@ -134,17 +151,29 @@ def _rotation(path: Path, place: str, value: Any) -> NDArray[np.float64]:
 
 
 def write(rig: Rig) -> bytes:
-    """Write a rig in metres.
+    """Encode a rig as an anipose calibration in metres.
 
     Parameters
     ----------
     rig : Rig
-        With lenses in the manner of OpenCV, and no skew.
+        Cameras without skew, and without a lens or with a `BrownConrady` lens in the coordinates
+        of K.
 
     Returns
     -------
     bytes
-        The content of the file.
+        Content of the file.
+
+    Raises
+    ------
+    ParameterError
+        If a camera has skew or another lens, or if two cameras have the same name.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> write(am.Rig.ring(1, radius=3, height=2)).decode().splitlines()[:2]
+    ['[cam_0]', 'name = "cam1"']
     """
     from scipy.spatial.transform import Rotation
 

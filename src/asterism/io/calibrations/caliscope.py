@@ -1,8 +1,8 @@
 """Caliscope's ``camera_array.toml``: a table ``[cameras.N]`` for each camera, in metres.
 
 The entries are those of anipose. Rotations are Rodrigues vectors, in older files 3 × 3 matrices;
-both take world coordinates to camera coordinates. A camera has a number and no name, so that camera
-N is called ``cam_N``, in `read_observations` too.
+both take world coordinates to camera coordinates. Cameras have numbers instead of names: camera N
+is called ``cam_N``, as in `read_observations`.
 """
 
 from __future__ import annotations
@@ -23,42 +23,68 @@ __all__ = ["read", "sniff", "write"]
 
 
 def sniff(head: bytes) -> bool:
-    """Tell whether the first bytes of a file look like this format."""
+    """Return whether the first bytes of a file are those of a caliscope calibration."""
     return re.search(rb"(?m)^\s*\[\s*cameras\s*(\.\s*\"?\d+\"?\s*)?\]", head) is not None
 
 
 def read(path: Path, units: str | None) -> Rig:
-    """Read a rig.
+    """Read the cameras of a caliscope calibration.
 
     Parameters
     ----------
     path : Path
-        The file.
-    units : None
-        It is in metres.
+        File ``camera_array.toml``.
+    units : str or None
+        Not used: the format is in metres by definition.
 
     Returns
     -------
     Rig
-        The cameras that have a pose; the others are named in its warnings.
+        Cameras with a pose. Its `warnings` list the others.
+
+    Raises
+    ------
+    FormatError
+        If an entry is missing or malformed, or if a lens is a fisheye.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "camera_array.toml")
+    ...     _ = path.write_bytes(write(am.Rig.ring(2, radius=3, height=2)))
+    ...     read(path, None).names
+    ('cam1', 'cam2')
     """
     del units
     return anipose.read(path, "m")
 
 
 def write(rig: Rig) -> bytes:
-    """Write a rig.
+    """Encode a rig as a caliscope calibration in metres.
 
     Parameters
     ----------
     rig : Rig
-        With lenses in the manner of OpenCV, and no skew. Where all cameras are called ``cam_N``
-        those are their numbers; else they are numbered from 0 and an entry keeps the name.
+        Cameras without skew, and without a lens or with a `BrownConrady` lens in the coordinates
+        of K. If all names have the form ``cam_N``, the cameras get these numbers. Otherwise they
+        are numbered from 0, and an additional entry keeps each name.
 
     Returns
     -------
     bytes
-        The content of the file.
+        Content of the file.
+
+    Raises
+    ------
+    ParameterError
+        If a camera has skew or another lens, or if two cameras have the same name.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> write(am.Rig.ring(1, radius=3, height=2)).decode().splitlines()[:2]
+    ['[cameras.0]', 'cam_id = 0']
     """
     from scipy.spatial.transform import Rotation
 

@@ -30,24 +30,29 @@ def read_rig(path: str | Path, *, format: str | None = None, units: str | None =
     path : path
         The file or the folder.
     format : str, optional
-        Key of `CALIBRATION_FORMATS`; by default the content tells it.
+        Key of `CALIBRATION_FORMATS`; by default it follows from the content.
     units : {"mm", "cm", "m", "in", "ft"}, optional
-        The unit of length, for files that do not say it.
+        Unit of length, for files that do not state it. By default it is estimated for these.
 
     Returns
     -------
     Rig
-        Cameras in metres and pixels. What had to be guessed or was left out is in its `warnings`.
+        Cameras in metres and pixels. Its `warnings` list estimated values and cameras left out.
 
     Raises
     ------
     FormatError
-        If the calibration is not there, or is of no known format, or not what its format says.
+        If the calibration does not exist, has no known format, or is malformed.
     ParameterError
         If `format` or `units` is unknown, or the format has another unit by definition.
 
     Examples
     --------
+    >>> import asterism as am, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     am.io.write_rig(am.Rig.ring(4, radius=3, height=2), f"{folder}/rig.toml")
+    ...     read_rig(f"{folder}/rig.toml").names
+    ('cam1', 'cam2', 'cam3', 'cam4')
     >>> read_rig("none.toml")
     Traceback (most recent call last):
     ...
@@ -61,7 +66,7 @@ def read_rig(path: str | Path, *, format: str | None = None, units: str | None =
         if unit is not None and chosen.unit not in (None, unit):
             expected = f"{chosen.unit}, as in all files of format {chosen.name}"
             raise ParameterError("units", expected, repr(units))
-        with np.errstate(all="ignore"):  # what is not finite any more the model refuses
+        with np.errstate(all="ignore"):  # the data model refuses numbers that overflowed
             return chosen.read(path, unit)
     except OSError as error:
         raise not_read(path, error) from error
@@ -75,15 +80,15 @@ def write_rig(
     Parameters
     ----------
     rig : Rig
-        The cameras.
+        Cameras to write.
     path : path
         File to write; an existing one is replaced. For a folder format (flydra, myptv) the
-        folder, which must be new or empty, because files of another rig would mix with these.
+        folder, which must be new or empty, so that files of another rig do not mix with these.
     format : str, optional
-        Key of `CALIBRATION_FORMATS`; by default it follows from the suffix, and ``.toml`` is
-        the format "rig", which holds everything exactly.
+        Key of `CALIBRATION_FORMATS`; by default it follows from the suffix. ``.toml`` selects the
+        format "rig", which keeps every field bit for bit.
     overwrite : bool
-        Allow a folder that holds files, if each of them is one that is replaced.
+        Allow a folder that holds files, if all of them are replaced.
 
     Raises
     ------
@@ -135,23 +140,24 @@ def _write_folder(path: Path, content: dict[str, bytes], *, overwrite: bool) -> 
 
 
 def format_to_write(path: Path, format: str | None) -> CalibrationFormat:
-    """Return the format to write, as asked or by the ending of the name.
+    """Return the requested format to write, or the format of the suffix.
 
     Parameters
     ----------
     path : Path
-        The file.
+        File or folder to write.
     format : str or None
-        What was asked for.
+        Key of `CALIBRATION_FORMATS`; None selects by the suffix.
 
     Returns
     -------
     CalibrationFormat
+        Entry of `CALIBRATION_FORMATS`.
 
     Raises
     ------
     ParameterError
-        If it is unknown.
+        If the format or the suffix is unknown.
     """
     if format is not None:
         return _named(format)
@@ -181,7 +187,7 @@ def _unit(units: str | None) -> str | None:
 
 
 def _openable(path: Path, chosen: CalibrationFormat) -> CalibrationFormat:
-    """Check that there is a file, or a folder, where the format is one."""
+    """Check that the path is a file or a folder, as the format requires."""
     is_folder = path.is_dir()
     fits = chosen.sniff_folder is not None if is_folder else chosen.sniff is not None
     if (is_folder or path.is_file()) and fits:
@@ -207,6 +213,7 @@ def format_of(path: Path) -> CalibrationFormat:
     Returns
     -------
     CalibrationFormat
+        Entry of `CALIBRATION_FORMATS`.
 
     Raises
     ------
@@ -228,6 +235,6 @@ def format_of(path: Path) -> CalibrationFormat:
     if fitting:
         return next((c for c in fitting if c in by_name), fitting[0])
     if by_name:
-        return by_name[-1]  # its reader says what is amiss
+        return by_name[-1]  # its reader reports the error
     known = ", ".join(f"{c.name} ({c.description})" for c in every)
     raise FormatError(path, "its first bytes", f"one of: {known}", repr(head[:40]))

@@ -1,4 +1,4 @@
-"""Cameras fitted to what a format can hold."""
+"""Fitting of cameras to the limits of a calibration format."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ _KINDS: dict[str, type[Lens]] = {
 
 
 def fit_to_format(camera: Camera, format: CalibrationFormat) -> LensFit | None:
-    """Return a camera the lens, and if need be the K, that a format can hold.
+    """Fit the lens of a camera, and K if necessary, to the limits of a format.
 
     Parameters
     ----------
     camera : Camera
-        The camera.
+        Camera to fit.
     format : CalibrationFormat
-        Where it is to go.
+        Format that must be able to hold the result.
 
     Returns
     -------
     LensFit or None
-        The new camera and its distance from this one; None if this one fits as it is.
+        Fitted camera and its error in pixels; None if the format can hold `camera` itself.
     """
     try:
         format.write(Rig((camera.replace(name="camera"),)))
@@ -43,24 +43,24 @@ def fit_to_format(camera: Camera, format: CalibrationFormat) -> LensFit | None:
 
 
 def fit_kind(camera: Camera, kind: type[Lens] | None, format: CalibrationFormat) -> LensFit:
-    """Return a camera another kind of lens, and no coefficient for which a format has no place.
+    """Fit a lens of another class to a camera, without coefficients that a format cannot hold.
 
-    Where the lens has coordinates of its own (``K_lens``), or K a skew that must go, K and the
-    direction of sight are fitted as well. The place of the camera never changes.
+    K and the orientation are fitted too if the camera has a ``K_lens``, or a skew that the format
+    cannot hold. The position of the camera never changes.
 
     Parameters
     ----------
     camera : Camera
-        The camera.
+        Camera to fit.
     kind : type of Lens or None
-        The lens it shall have.
+        Class of the new lens, None for no lens.
     format : CalibrationFormat
-        Where it is to go.
+        Format that must be able to hold the result.
 
     Returns
     -------
     LensFit
-        The new camera and its distance from this one.
+        Fitted camera and its error in pixels.
     """
     without = [n for n, has in (("skew", format.has_skew), ("k3", format.has_k3)) if not has]
     drops_skew = not format.has_skew and camera.K[0, 1] != 0

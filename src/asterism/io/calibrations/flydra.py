@@ -1,9 +1,10 @@
 """Folders of flydra and the Multi-Camera Self-Calibration toolbox.
 
-``camera1.Pmat.cal`` … hold a projection matrix each, from world to pixels of an ideal camera;
-``name1.rad`` … the matrix and the coefficients of a lens that distorts about a centre of its own.
-``camera_order.txt`` names the cameras, ``Res.dat`` has the image sizes, ``calibration_units.txt``
-the unit of length; where they are absent, the rig says in its warnings what was taken instead.
+``camera1.Pmat.cal`` and so on hold one projection matrix each, from world coordinates to pixels of
+a camera without distortion. ``name1.rad`` and so on hold the matrix and the coefficients of the
+lens, whose centre may differ from the principal point. ``camera_order.txt`` lists the names,
+``Res.dat`` the image sizes, ``calibration_units.txt`` the unit of length. If one of these is
+absent, the warnings of the rig list the assumed values.
 """
 
 from __future__ import annotations
@@ -44,24 +45,38 @@ _COEFFICIENTS = ("kc1", "kc2", "kc3", "kc4")  # k1, k2, p1, p2
 
 
 def sniff_folder(folder: Path) -> bool:
-    """Tell whether a folder looks like this format."""
+    """Return whether a folder holds projection matrices of this format."""
     return any(_PMAT.fullmatch(path.name) for path in folder.iterdir())
 
 
 def read(path: Path, units: str | None) -> Rig:
-    """Read a rig.
+    """Read the cameras of a flydra folder.
 
     Parameters
     ----------
     path : Path
-        The folder.
+        Folder.
     units : str or None
-        Its unit of length, against what ``calibration_units.txt`` says; where that is absent and
-        nothing is given, by the cameras' distances.
+        Unit of length; it overrides ``calibration_units.txt``. None takes the unit from that file,
+        or else estimates it from the distances of the cameras.
 
     Returns
     -------
     Rig
+        One camera for each projection matrix.
+
+    Raises
+    ------
+    FormatError
+        If a file is malformed, or if the size of an image is neither given nor implied by a lens.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     am.io.write_rig(am.Rig.ring(2, radius=3, height=2), folder, format="flydra")
+    ...     read(pathlib.Path(folder), None).names
+    ('cam1', 'cam2')
     """
     matrices = _by_number(path, _PMAT)
     lenses = _by_number(path, _RAD)
@@ -87,12 +102,12 @@ def read(path: Path, units: str | None) -> Rig:
         if sizes is not None:
             size = sizes[i]
         elif K_lens is not None:
-            # The toolbox puts the centre of the lens at the centre of the image.
+            # The toolbox places the centre of the lens at the centre of the image.
             width, height = (float(np.round(2 * c + 1)) for c in K_lens[:2, 2])
             size = whole_size(lenses[number], "K13 and K23", width, height)
             guessed.setdefault(size, []).append(names[i])
         else:
-            hint = f"add {_SIZES}, a line with width and height for each camera"
+            hint = f"add {_SIZES} with one line of width and height for each camera"
             raise FormatError(path, f"camera {number}", "the size of its image", "nothing", hint)
         with faults_at(file, "its matrix"):
             cameras.append(Camera.from_matrix(
@@ -102,7 +117,7 @@ def read(path: Path, units: str | None) -> Rig:
     for (width, height), whose in guessed.items():
         center = f"({(width - 1) / 2:g}, {(height - 1) / 2:g})"
         warnings.append(
-            f"no {_SIZES} tells the size of the images: {width} × {height} pixels for "
+            f"no {_SIZES} gives the size of the images: {width} × {height} pixels are assumed for "
             f"{', '.join(whose)}, whose lenses are centred at {center}"
         )
     return build_rig(path, cameras, warnings)
@@ -179,23 +194,35 @@ def _lens(file: Path) -> tuple[NDArray[np.float64], BrownConrady | None]:
         got = f"{K[0, 0]:g} and {K[1, 1]:g}"
         raise FormatError(file, "K11 and K22", "focal lengths > 0", got)
     if any(k) and K[0, 1] != 0:
-        # The toolbox takes the skew into account on the way out of the lens and not on the way in.
+        # The toolbox uses the skew when it distorts a point, but not when it corrects one.
         raise FormatError(file, "K12", "0 beside a lens", f"{K[0, 1]:g}")
     return K, BrownConrady(*k) if any(k) else None
 
 
 def write(rig: Rig) -> dict[str, bytes]:
-    """Write a rig in millimetres.
+    """Encode a rig as a flydra folder in millimetres.
 
     Parameters
     ----------
     rig : Rig
-        With lenses in the manner of OpenCV without k3, about any centre.
+        Cameras without a lens, or with a `BrownConrady` lens about any centre, without k3 and
+        without skew.
 
     Returns
     -------
-    dict
-        The content of each file.
+    dict of str to bytes
+        Content of each file of the folder, by its name.
+
+    Raises
+    ------
+    ParameterError
+        If the format cannot hold a lens, or if two cameras have the same name.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> sorted(write(am.Rig.ring(1, radius=3, height=2)))[:3]
+    ['Res.dat', 'basename1.rad', 'calibration_units.txt']
     """
     names = names_of(rig)
     files = {_ORDER: "".join(f"{name}\n" for name in names), _UNITS: "millimeters\n"}

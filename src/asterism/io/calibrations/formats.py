@@ -25,29 +25,33 @@ class CalibrationFormat:
     name : str
         Key in `CALIBRATION_FORMATS`.
     extensions : tuple of str
-        Endings of file names; empty for a format that is a folder.
+        Suffixes of file names; empty for a folder format.
     description : str
         Description in one line.
     lens : {"any", "BrownConrady", "ViconRadial", "QuadraticCorrection"}
         Lens model that the format can hold.
     read : callable
-        Path, and the unit of length that the caller knows, to `Rig`.
+        Function from a path, and a unit of length or None, to a `Rig`.
     write : callable
-        `Rig` to the content of the file, or to the names and contents of a folder's files.
+        Function from a `Rig` to the content of the file, or to the names and contents of the files
+        of a folder.
     sniff : callable or None
-        Whether the first bytes of a file look like this format; None where it is never one file.
+        Function of the first bytes of a file: whether they are of this format. None for a format
+        that is always a folder.
     sniff_folder : callable or None
-        Whether a folder looks like this format; None where it never is one.
+        Function of a folder: whether it is of this format. None for a format of single files.
     unit : {"mm", "m"} or None
-        The unit that all its files have; None where they do not say, or not all the same.
+        Unit of length of all files by definition; None if files state it or differ.
     has_skew, has_k3 : bool
-        Whether it can hold a K with skew, and a `BrownConrady` lens with k3.
+        Whether the format can hold a K with skew, and a `BrownConrady` lens with k3.
 
     Examples
     --------
     >>> import asterism as am
     >>> am.io.CALIBRATION_FORMATS["xcp"].lens
     'ViconRadial'
+    >>> am.io.CALIBRATION_FORMATS["flydra"].is_folder
+    True
     """
 
     name: str

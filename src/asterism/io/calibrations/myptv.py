@@ -42,12 +42,12 @@ _LINES = ("title", "name", "resolution", "centre", "angles", "focal length", "pr
 
 
 def sniff(head: bytes) -> bool:
-    """Tell whether the first bytes of a file look like this format."""
+    """Return whether the first bytes of a file are those of a MyPTV camera file."""
     return head.lstrip().startswith(_TITLE.encode())
 
 
 def sniff_folder(folder: Path) -> bool:
-    """Tell whether a folder looks like this format."""
+    """Return whether a folder holds a MyPTV camera file."""
     return any(_is_camera(path) for path in folder.iterdir())
 
 
@@ -59,19 +59,32 @@ def _is_camera(path: Path) -> bool:
 
 
 def read(path: Path, units: str | None) -> Rig:
-    """Read a rig.
+    """Read the cameras of MyPTV's Tsai model.
 
     Parameters
     ----------
     path : Path
-        The folder, or one camera's file.
+        Folder of camera files, or the file of one camera.
     units : str or None
-        Its unit of length, "mm" if not given.
+        Unit of length; None is "mm", the unit of MyPTV's own calibrations.
 
     Returns
     -------
     Rig
-        The cameras in the order of their files' names, counted as people count.
+        Cameras in the order of the names of their files; ``cam10`` comes after ``cam9``.
+
+    Raises
+    ------
+    FormatError
+        If a file is malformed, or if the third row of the correction is not zero.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     am.io.write_rig(am.Rig.ring(2, radius=3, height=2), folder, format="myptv")
+    ...     read(pathlib.Path(folder), None).names
+    ('cam1', 'cam2')
     """
     scale = PER_METRE[units or "mm"]
     files = [path]
@@ -109,7 +122,7 @@ def _camera(file: Path, scale: float) -> Camera:
     K[:2, 2] = np.array(size) / 2 + numbers(6, 2)
     ex, ey, ez = (numbers(i, 5) for i in (7, 8, 9))
     if any(ez):
-        hint = "it would make the focal length depend on the pixel, which no lens here does"
+        hint = "a focal length that depends on the pixel is not supported"
         raise FormatError(file, f"line 10, {_LINES[9]}", "zeros", repr(lines[9][:60]), hint)
     lens = QuadraticCorrection(ex=_five(ex), ey=_five(ey)) if any(ex) or any(ey) else None
     return build_camera(
@@ -133,10 +146,10 @@ def _rotation(x: float, y: float, z: float) -> NDArray[np.float64]:
 
 
 def _angles(R: NDArray[np.float64]) -> list[float]:
-    """Return the angles of `_rotation`; with y a right angle, z is free and has any value.
+    """Return the angles of `_rotation`; if y is a right angle, z is arbitrary.
 
-    The first angle is taken from what the other two leave of the rotation, and not from its own
-    entries: beside a right angle those are too small to tell it.
+    The first angle is computed from the rotation that remains after the other two are undone. Its
+    own entries of the matrix are too small when y is near a right angle.
     """
     y = np.arctan2(R[0, 2], np.hypot(R[0, 0], R[0, 1]))
     z = np.arctan2(-R[0, 1], R[0, 0])
@@ -145,26 +158,38 @@ def _angles(R: NDArray[np.float64]) -> list[float]:
 
 
 def write(rig: Rig) -> dict[str, bytes]:
-    """Write a rig in millimetres.
+    """Encode a rig as a folder of MyPTV camera files in millimetres.
 
     Parameters
     ----------
     rig : Rig
-        Without lenses, or with `QuadraticCorrection` of raw pixels.
+        Cameras without a lens, or with a `QuadraticCorrection` of raw pixels (`K_lens` is the
+        identity).
 
     Returns
     -------
-    dict
-        The content of each camera's file.
+    dict of str to bytes
+        Content of each camera's file, by the name of the camera.
+
+    Raises
+    ------
+    ParameterError
+        If the format cannot hold a lens, or if a name is repeated or cannot be a file name.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> write(am.Rig.ring(1, radius=3, height=2))["cam1"].decode().splitlines()[0]
+    'Tsai model camera'
     """
     files: dict[str, bytes] = {}
     for camera, name in zip(rig, names_of(rig), strict=True):
         if re.fullmatch(r"[\w\- ][\w\-. ]*", name) is None or name != name.strip():
-            expected = "a name that a file can have: letters, digits, blanks, '-', '_' and '.'"
+            expected = "a valid file name: letters, digits, blanks, '-', '_' and '.'"
             raise ParameterError(f"the name of camera {name!r}", expected, repr(name))
         ex, ey = _rows(camera)
-        # The format knows one focal length and no skew; what K has beyond goes into the correction,
-        # whose terms of first order do the same to a pixel.
+        # The format has one focal length and no skew. The rest of K is moved to the correction,
+        # whose terms of first order have the same effect on a pixel.
         (fx, skew, u0), (_, fy, v0) = camera.K[:2].tolist()
         ey = ey * (fx / fy) + np.array([0, fx / fy - 1, 0, 0, 0])
         v0 *= fx / fy

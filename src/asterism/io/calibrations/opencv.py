@@ -1,4 +1,4 @@
-"""YAML of OpenCV's FileStorage: a camera a file, or several under names of their own."""
+"""YAML of OpenCV's FileStorage: one camera in a file, or several in named mappings."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 
 __all__ = ["read", "sniff", "write"]
 
-_LARGEST = 2 << 20  # bytes: the parser is slow, and this many it reads in some ten seconds
+_LARGEST = 2 << 20  # bytes: the parser is slow and takes about ten seconds for this many
 
-# The names in use, compared in small letters without "_" and "-".
+# Spellings found in files, compared in lower case without "_" and "-".
 _K = ("cameramatrix", "k", "matrix", "intrinsicmatrix", "intrinsics", "mtx")
 _D = ("distortioncoefficients", "distcoeffs", "distortioncoeffs", "distcoefs", "distcoeff",
       "distortions", "distortion", "dist", "d")  # fmt: skip
@@ -50,9 +50,9 @@ _MODEL = ("distortionmodel", "cameramodel", "cameratype", "modeltype")
 
 
 class _Loader(yaml.BaseLoader):
-    """Words, lists and mappings and nothing else, whatever the tags say; no node twice.
+    """Loader of texts, lists and mappings that ignores tags and refuses aliases.
 
-    A list may hold itself by an alias, or many others many times over: no calibration does.
+    By an alias a list can contain itself, or grow without limit. No calibration needs one.
     """
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
@@ -63,23 +63,40 @@ class _Loader(yaml.BaseLoader):
 
 
 def sniff(head: bytes) -> bool:
-    """Tell whether the first bytes of a file look like this format."""
+    """Return whether the first bytes of a file are those of an OpenCV FileStorage."""
     return head.lstrip(b"\xef\xbb\xbf").startswith(b"%YAML") or b"opencv-matrix" in head
 
 
 def read(path: Path, units: str | None) -> Rig:
-    """Read a rig.
+    """Read the cameras of an OpenCV FileStorage in YAML.
 
     Parameters
     ----------
     path : Path
-        The file.
+        YAML file.
     units : str or None
-        Its unit of length; else what its entry "units" says, else by the cameras' distances.
+        Unit of length of the file. None takes it from the entry ``units``, or else estimates it
+        from the distances of the cameras.
 
     Returns
     -------
     Rig
+        Cameras of the file. A single camera without a pose is placed at the origin, with a warning.
+
+    Raises
+    ------
+    FormatError
+        If the file is not plain YAML, has no camera matrix or image size, or has a camera model
+        other than a pinhole with up to five coefficients of distortion.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "cameras.yml")
+    ...     _ = path.write_bytes(write(am.Rig.ring(2, radius=3, height=2)))
+    ...     read(path, None).names
+    ('cam1', 'cam2')
     """
     content = _load(path)
     warnings: list[str] = []
@@ -97,7 +114,7 @@ def read(path: Path, units: str | None) -> Rig:
         expected = "a camera_matrix, at the top or within named mappings"
         raise FormatError(path, "its entries", expected, ", ".join(map(str, content))[:60])
     if len(found) == 1 and found[0]["R"] is None:
-        warnings.append("the file holds no pose: the camera stands at the origin and looks along z")
+        warnings.append("the file has no pose: the camera is at the origin and looks along z")
         found[0] |= {"R": np.eye(3), "t": np.zeros(3)}
         units = units or "m"
     for f in found:
@@ -118,7 +135,7 @@ def _load(path: Path) -> dict[str, Any]:
     raw = read_bytes(path, most=_LARGEST)
     try:
         text = raw.decode("utf-8-sig")
-        # OpenCV's first line is its own ("%YAML:1.0"), and its tags have no prefix in YAML 1.1.
+        # OpenCV's first line, "%YAML:1.0", is not valid YAML 1.1.
         text = re.sub(r"\A\s*%YAML[^\n]*\n", "", text)
         content = yaml.load(text, Loader=_Loader)
     except UnicodeDecodeError as error:
@@ -189,7 +206,7 @@ def _camera(path: Path, key: str, entry: dict[str, Any], warnings: list[str]) ->
     if distortion is not None:
         given = _matrix(path, f"{place}, distortion coefficients", distortion).ravel()
         if given[5:].any():
-            expected = "k1, k2, p1, p2, k3, and nothing but zeros after them"
+            expected = "k1, k2, p1, p2, k3, followed by zeros only"
             got, hint = f"{len(given)} numbers", "calibrate with five coefficients"
             raise FormatError(path, f"{place}, distortion coefficients", expected, got, hint)
         k[: len(given[:5])] = given[:5]
@@ -236,17 +253,29 @@ def _size(path: Path, place: str, entry: dict[str, Any]) -> tuple[int, int]:
 
 
 def write(rig: Rig) -> bytes:
-    """Write a rig in metres, every camera a mapping of its own.
+    """Encode a rig as an OpenCV FileStorage in metres, with one mapping for each camera.
 
     Parameters
     ----------
     rig : Rig
-        With lenses in the manner of OpenCV, and no skew.
+        Cameras without skew, and without a lens or with a `BrownConrady` lens in the coordinates
+        of K.
 
     Returns
     -------
     bytes
-        The content of the file.
+        Content of the file.
+
+    Raises
+    ------
+    ParameterError
+        If a camera has skew or another lens, or if two cameras have the same name.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> write(am.Rig.ring(1, radius=3, height=2)).decode().splitlines()[2:4]
+    ['units: "metres"', 'camera_0:']
     """
     lines = ["%YAML:1.0", "---", 'units: "metres"']
     for i, (camera, name) in enumerate(zip(rig, names_of(rig), strict=True)):

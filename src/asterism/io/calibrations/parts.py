@@ -1,6 +1,6 @@
-"""What readers of calibrations share: numbers out of text, and cameras and rigs out of numbers.
+"""Shared parts of the readers of calibrations: text to numbers, numbers to cameras and rigs.
 
-Every function raises `FormatError` with the place in the file, whatever went wrong.
+Every function reports errors as a `FormatError` with the place in the file.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ __all__ = [
 ]
 
 _LARGEST = 64 << 20  # bytes; a thousand cameras with all their thresholds take less
-_SLACK = 5e-3  # how far RᵀR may be from one: what a rotation written with three decimals keeps to
-_SMALLEST, _GREATEST = 1e-3, 1e9  # focal length; anything: far beyond what a camera can have
-_MOST_PIXELS = 100_000  # along an edge, as `Camera` has it
+_SLACK = 5e-3  # largest entry of RᵀR - I of a rotation written with three decimals
+_SMALLEST, _GREATEST = 1e-3, 1e9  # smallest focal length, largest number of any real camera
+_MOST_PIXELS = 100_000  # along an edge, the limit of `Camera`
 
 
 def read_bytes(path: Path, *, most: int = _LARGEST) -> bytes:
@@ -49,18 +49,19 @@ def read_bytes(path: Path, *, most: int = _LARGEST) -> bytes:
     Parameters
     ----------
     path : Path
-        The file.
+        File to read.
     most : int
-        Bytes that it may have.
+        Largest length, bytes.
 
     Returns
     -------
     bytes
+        Content of the file.
 
     Raises
     ------
     FormatError
-        If it has more.
+        If the file is longer.
     """
     with path.open("rb") as file:
         raw = file.read(most + 1)
@@ -71,14 +72,14 @@ def read_bytes(path: Path, *, most: int = _LARGEST) -> bytes:
 
 @contextmanager
 def faults_at(path: Path, place: str) -> Generator[None, None, None]:
-    """Turn what the data model refuses into an error about a place in a file.
+    """Turn a `ParameterError` of the data model into a `FormatError` at a place in a file.
 
     Parameters
     ----------
     path : Path
-        The file.
+        File for the error.
     place : str
-        Where in it.
+        Place in the file.
 
     Yields
     ------
@@ -92,20 +93,21 @@ def faults_at(path: Path, place: str) -> Generator[None, None, None]:
 
 
 def split_numbers(path: Path, place: str, text: str | None, count: int) -> list[float]:
-    """Read so many finite numbers from text.
+    """Parse a given count of finite numbers.
 
     Parameters
     ----------
     path, place : Path, str
-        For the error.
+        File and place for the error.
     text : str or None
-        Numbers with blanks between them; None where there is nothing.
+        Numbers separated by blanks; None for a missing entry.
     count : int
-        How many there must be.
+        Required count.
 
     Returns
     -------
     list of float
+        Parsed numbers.
     """
     wanted = "a number" if count == 1 else f"{count} numbers"
     if text is None:
@@ -125,16 +127,16 @@ def split_numbers(path: Path, place: str, text: str | None, count: int) -> list[
 def as_array(
     path: Path, place: str, value: Any, shape: tuple[int, ...] | None = None
 ) -> NDArray[np.float64]:
-    """Make an array of nested lists of numbers, or of words that are numbers.
+    """Convert nested lists of numbers, or of texts of numbers, to an array.
 
     Parameters
     ----------
     path, place : Path, str
-        For the error.
+        File and place for the error.
     value : object
-        What a file held.
+        Value read from the file.
     shape : tuple of int, optional
-        The shape it must have; without, a plain sequence of any length will do.
+        Required shape. By default one axis of any length.
 
     Returns
     -------
@@ -161,14 +163,14 @@ def whole_size(path: Path, place: str, width: float, height: float) -> tuple[int
     Parameters
     ----------
     path, place : Path, str
-        For the error.
+        File and place for the error.
     width, height : float
-        As the file has them.
+        Numbers of the file.
 
     Returns
     -------
     tuple of int
-        The same, pixels.
+        Width and height in pixels.
     """
     for value in (width, height):
         if not (math.isfinite(value) and 1 <= value <= _MOST_PIXELS and value == round(value)):
@@ -180,29 +182,29 @@ def whole_size(path: Path, place: str, width: float, height: float) -> tuple[int
 def nearest_rotation(
     path: Path, place: str, matrix: NDArray[np.float64], *, slack: float = _SLACK
 ) -> NDArray[np.float64]:
-    """Return the rotation next to a matrix that was written with few decimals.
+    """Return the rotation nearest to a matrix that was written with few decimals.
 
     Parameters
     ----------
     path, place : Path, str
-        For the error.
+        File and place for the error.
     matrix : ndarray, shape (3, 3)
-        Almost a rotation.
+        Rotation with rounded entries.
     slack : float
-        How far its product with its own transpose may be from one.
+        Largest entry of RᵀR - I that is accepted.
 
     Returns
     -------
     ndarray, shape (3, 3)
-        A proper rotation; the matrix itself where it is one already.
+        Proper rotation; `matrix` itself if it is exact.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         away = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
     if not away <= slack:
-        got = f"a matrix whose product with its transpose is {away:.2g} away from one"
+        got = f"a matrix whose product with its transpose differs from one by {away:.2g}"
         raise FormatError(path, place, "a rotation", got)
     if np.linalg.det(matrix) < 0:
-        hint = "one axis of the world or of the image has its sign changed"
+        hint = "one axis of the world or of the image has the wrong sign"
         raise FormatError(path, place, "a rotation", "a reflection, determinant −1", hint)
     if away < 1e-14:
         return matrix
@@ -211,23 +213,24 @@ def nearest_rotation(
 
 
 def drop_skew(place: str, K: NDArray[np.float64], warnings: list[str]) -> NDArray[np.float64]:
-    """Take the skew out of a matrix of OpenCV's, which itself never looks at it.
+    """Set the skew of a camera matrix to zero, because OpenCV ignores it.
 
     Parameters
     ----------
     place : str
-        For the warning.
+        Place for the warning.
     K : ndarray, shape (3, 3)
-        As the file has it.
+        Camera matrix of the file.
     warnings : list of str
-        Told where there was one.
+        Receives a warning if the skew is not zero.
 
     Returns
     -------
     ndarray, shape (3, 3)
+        Camera matrix without skew.
     """
     if K[0, 1] != 0:
-        warnings.append(f"{place}: the skew {K[0, 1]:g} is left out, as OpenCV leaves it out")
+        warnings.append(f"{place}: the skew {K[0, 1]:g} is ignored, as OpenCV ignores it")
         K = K.copy()
         K[0, 1] = 0.0
     return K
@@ -244,27 +247,28 @@ def pose(R: NDArray[np.float64], t: Iterable[float]) -> NDArray[np.float64]:
 def per_metre(
     units: str | None, centres: Sequence[NDArray[np.float64]], warnings: list[str]
 ) -> float:
-    """Say how many of a file's units make a metre, where the file itself does not.
+    """Return the number of a file's units per metre, estimated if the unit is not known.
 
     Parameters
     ----------
     units : str or None
-        What the caller knows.
+        Unit of the file, None if it is not known.
     centres : sequence of ndarray, shape (3,)
-        Where the cameras stand, in the units of the file; by them the unit is judged otherwise.
+        Positions of the cameras in the units of the file, from which the unit is estimated.
     warnings : list of str
-        Told when it had to be judged.
+        Receives a warning if the unit was estimated.
 
     Returns
     -------
     float
+        Units per metre.
     """
     if units is None:
         units = judge_unit(np.array(centres).reshape(-1, 3))
         far = max((float(np.abs(centre).max()) for centre in centres), default=0.0)
         warnings.append(
             f"the file names no unit of length: {units} by the cameras' distances "
-            f"(largest coordinate {far:.4g}); say units= where that is wrong"
+            f"(largest coordinate {far:.4g}); set units= if that is wrong"
         )
     return PER_METRE[units]
 
@@ -280,18 +284,19 @@ def build_camera(
     lens: Lens | None = None,
     K_lens: NDArray[np.float64] | None = None,
 ) -> Camera:
-    """Build a camera; what it refuses is an error about the file.
+    """Build a camera, and report a refused value as an error in the file.
 
     Parameters
     ----------
     path, place : Path, str
-        For the error.
+        File and place for the error.
     K, T_camera_world, size_px, name, lens, K_lens
         As in `Camera`.
 
     Returns
     -------
     Camera
+        Camera with these values.
     """
     with faults_at(path, place):
         return Camera(
@@ -300,27 +305,28 @@ def build_camera(
 
 
 def build_rig(path: Path, cameras: Sequence[Camera], warnings: Sequence[str] = ()) -> Rig:
-    """Build a rig of at least one camera, all with names of their own.
+    """Build a rig of at least one camera, all with different names.
 
     Parameters
     ----------
     path : Path
-        For the error.
+        File for the error.
     cameras : sequence of Camera
-        In the order of the file.
+        Cameras in the order of the file.
     warnings : sequence of str
-        What was odd about it.
+        Warnings of the reader.
 
     Returns
     -------
     Rig
+        Rig of the cameras.
     """
     if not cameras:
         raise FormatError(path, "its cameras", "at least one", "none")
     names = [camera.name for camera in cameras]
     for i, name in enumerate(names):
         if name and name in names[:i]:
-            raise FormatError(path, f"camera {i + 1}", "a name of its own", repr(name))
+            raise FormatError(path, f"camera {i + 1}", "a unique name", repr(name))
     for i, camera in enumerate(cameras):
         _check_magnitudes(path, f"camera {camera.name or i + 1}", camera)
     with faults_at(path, "the rig"):
@@ -328,7 +334,7 @@ def build_rig(path: Path, cameras: Sequence[Camera], warnings: Sequence[str] = (
 
 
 def _check_magnitudes(path: Path, place: str, camera: Camera) -> None:
-    """Refuse numbers of no real camera, whose squares would leave the range of numbers."""
+    """Refuse numbers that no real camera has, because their squares would overflow."""
     numbers = {"K": camera.K, "T_camera_world": camera.T_camera_world}
     if camera.lens is not None:
         numbers |= {"K_lens": camera.lens_matrix, "the lens": camera.lens.coefficients}

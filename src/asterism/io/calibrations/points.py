@@ -1,4 +1,4 @@
-"""Known points and where cameras saw them, to check a calibration by."""
+"""Known points and their pixels in cameras, to check a calibration."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ _FLYDRA, _MYPTV = 7, 5  # columns: X Y Z 1 u v 1, and u v X Y Z
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sightings:
-    """Places in the world and their pixels in one camera.
+    """Known points in the world and their pixels in one camera.
 
     Parameters
     ----------
     camera : str
-        The name of the camera.
+        Name of the camera.
     points : ndarray, shape (N, 3)
-        World metres.
+        World coordinates, metres.
     pixels : ndarray, shape (N, 2)
-        (u, v) from the centre of the top left pixel.
+        Image points (u, v), pixels from the centre of the top left pixel.
     """
 
     camera: str
@@ -58,23 +58,23 @@ def read_sightings(
         A CSV with columns camera, x, y, z, u, v; or a file of one camera, as flydra
         (``X Y Z 1 u v 1``) or MyPTV (``u v X Y Z``) write them.
     cameras : sequence of str
-        Names of the cameras there are.
+        Names of the cameras of the rig.
     camera : str, optional
-        Whose file it is; by default the one whose name the file's name begins with.
+        Camera of the points. By default the camera with whose name the file's name begins.
     units : {"mm", "cm", "m", "in", "ft"}, optional
-        Of the points; by default metres in a CSV and millimetres in the others.
+        Unit of the points. By default metres in a CSV and millimetres in the other formats.
 
     Returns
     -------
     list of Sightings
-        A camera each, in the order of `cameras`.
+        One entry for each camera with points, in the order of `cameras`.
 
     Raises
     ------
     FormatError
-        If the file is none of these.
+        If the file has none of these formats.
     ParameterError
-        If the camera is unknown, or not told by the file's name.
+        If the camera is unknown, or does not follow from the file's name.
     """
     check_file(path)
     try:
@@ -126,7 +126,8 @@ def _csv(path: Path, text: str) -> list[tuple[str, float, float, float, float, f
             elif any(cells):
                 if len(cells) <= max(places):
                     got = f"{len(cells)} cells"
-                    raise FormatError(path, f"line {reader.line_num}", "as many as the head", got)
+                    expected = "as many as in the header"
+                    raise FormatError(path, f"line {reader.line_num}", expected, got)
                 x, y, z, u, v = _numbers(path, reader.line_num, [cells[i] for i in places[1:]])
                 rows.append((cells[places[0]], x, y, z, u, v))
     except csv.Error as error:
@@ -143,7 +144,7 @@ def _table(path: Path, text: str) -> list[list[float]]:
             continue
         width = width or len(words)
         if width not in (_FLYDRA, _MYPTV) or len(words) != width:
-            expected = "X Y Z 1 u v 1, or u v X Y Z, all lines alike"
+            expected = "X Y Z 1 u v 1, or u v X Y Z, the same in all lines"
             raise FormatError(path, f"line {i + 1}", expected, f"{len(words)} words")
         n = _numbers(path, i + 1, words)
         if width == _MYPTV:
@@ -168,7 +169,7 @@ def _numbers(path: Path, line: int, words: Sequence[str]) -> list[float]:
 
 
 def _whose(path: Path, cameras: Sequence[str]) -> str:
-    """Tell the camera by the file's name: ``cam1_cal_points`` is cam1's, and cam1_0's too."""
+    """Return the camera of a file's name: ``cam1_cal_points`` belongs to cam1, or to cam1_0."""
     file = path.name
     word = re.split(r"[._\- ]", file)[0]
     fits = [n for n in cameras if re.match(rf"{re.escape(n)}(?![^\W_])", file)]
@@ -176,5 +177,5 @@ def _whose(path: Path, cameras: Sequence[str]) -> str:
     longest = [n for n in fits if len(n) == max(map(len, fits))]
     if len(longest) != 1:
         expected = f"a file whose name begins with that of a camera ({', '.join(cameras)})"
-        raise ParameterError("points", expected, repr(file), "say CAMERA=FILE otherwise")
+        raise ParameterError("points", expected, repr(file), "or write CAMERA=FILE")
     return longest[0]

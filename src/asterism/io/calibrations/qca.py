@@ -1,8 +1,8 @@
 """Qualisys calibrations: the XML in ``.qca.txt``.
 
-Lengths are millimetres, image coordinates 1/64 pixel of the whole sensor. The matrix takes world to
-camera, but to a camera whose y points up and whose z points back: turned by half a turn about x it
-is ours. Distortion is OpenCV's, in plain numbers: only the image coordinates are in 1/64.
+Lengths are millimetres; image coordinates are 1/64 pixel of the whole sensor. The matrix takes
+world coordinates to camera coordinates with y up and z backwards; a half turn about x converts them
+to ours. Distortion is OpenCV's, in dimensionless numbers.
 """
 
 from __future__ import annotations
@@ -40,24 +40,38 @@ _LENS = ("radialDistortion1", "radialDistortion2", "tangentalDistortion1", "tang
 
 
 def sniff(head: bytes) -> bool:
-    """Tell whether the first bytes of a file look like this format."""
+    """Return whether the first bytes of a file are those of a Qualisys calibration."""
     return b"<calibration" in head
 
 
 def read(path: Path, units: str | None) -> Rig:
-    """Read a rig.
+    """Read the cameras of a Qualisys calibration.
 
     Parameters
     ----------
     path : Path
-        The file.
-    units : None
-        It is in millimetres.
+        XML file, as a rule ``.qca.txt``.
+    units : str or None
+        Not used: the format is in millimetres by definition.
 
     Returns
     -------
     Rig
-        The cameras that were calibrated; the others are named in its warnings.
+        Calibrated cameras, named by their serial numbers. Its `warnings` list the others.
+
+    Raises
+    ------
+    FormatError
+        If an attribute is missing or malformed, or if a camera has skew.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "hall.qca.txt")
+    ...     _ = path.write_bytes(write(am.Rig.ring(2, radius=3, height=2)))
+    ...     read(path, None).names
+    ('cam1', 'cam2')
     """
     del units
     cameras: list[Camera] = []
@@ -78,7 +92,7 @@ def _camera(path: Path, place: str, name: str, element: Element) -> Camera:
         text = otherwise if found is None else found.get(key, otherwise)
         return split_numbers(path, f"{place}, {child} {key}", text, 1)[0]
 
-    # What the camera sends is cut out of the sensor, and image coordinates begin at the cut.
+    # The image is a window of the sensor, and its coordinates begin at the edge of the window.
     window = "fov_video" if "video" in element.get("model", "").lower() else "fov_marker"
     if element.find(window) is None:
         window = {"fov_video": "fov_marker", "fov_marker": "fov_video"}[window]
@@ -103,17 +117,29 @@ def _camera(path: Path, place: str, name: str, element: Element) -> Camera:
 
 
 def write(rig: Rig) -> bytes:
-    """Write a rig.
+    """Encode a rig as a Qualisys calibration in millimetres.
 
     Parameters
     ----------
     rig : Rig
-        With lenses in the manner of OpenCV, and no skew.
+        Cameras without skew, and without a lens or with a `BrownConrady` lens in the coordinates
+        of K. Names are written as serial numbers.
 
     Returns
     -------
     bytes
-        The content of the file.
+        Content of the file.
+
+    Raises
+    ------
+    ParameterError
+        If a camera has skew or another lens, or if two cameras have the same name.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> write(am.Rig.ring(1, radius=3, height=2)).decode().splitlines()[1]
+    '<calibration type="regular" source="Asterism">'
     """
     root = Element("calibration", {"type": "regular", "source": "Asterism"})
     cameras = SubElement(root, "cameras")

@@ -31,23 +31,39 @@ _FIELDS = ("name", "size_px", "K", "T_camera_world", "near", "far", "K_lens", "l
 
 
 def sniff(head: bytes) -> bool:
-    """Tell whether the first bytes of a file look like this format."""
+    """Return whether the first bytes of a file are those of Asterism's calibration."""
     return _NAME.encode() in head
 
 
 def read(path: Path, units: str | None) -> Rig:
-    """Read a rig.
+    """Read the cameras of Asterism's own calibration.
 
     Parameters
     ----------
     path : Path
-        The file.
-    units : None
-        It is in metres.
+        TOML file of `write`.
+    units : str or None
+        Not used: the format is in metres by definition.
 
     Returns
     -------
     Rig
+        The same cameras as were written, bit for bit.
+
+    Raises
+    ------
+    FormatError
+        If an entry is missing, malformed or unknown, or if the version is newer.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> rig = am.Rig.ring(2, radius=3, height=2)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "rig.toml")
+    ...     _ = path.write_bytes(write(rig))
+    ...     bool((read(path, None)[1].K == rig[1].K).all())
+    True
     """
     del units
     content = load(path)
@@ -82,7 +98,7 @@ def _camera(path: Path, number: int, entry: Any) -> Camera:
         if key in entry:
             if type(entry[key]) not in (int, float):
                 raise FormatError(path, f"{place}, {key}", "a number", repr(entry[key])[:60])
-            # A whole number in TOML may be larger than any float; only "inf" says that it is so.
+            # An integer in TOML may exceed the largest float; only "inf" means infinity.
             is_finite = entry[key] != math.inf
             place_of = f"{place}, {key}"
             limits[key] = float(as_array(path, place_of, entry[key], ())) if is_finite else math.inf
@@ -121,17 +137,23 @@ def _lens(path: Path, place: str, entry: Any) -> Lens:
 
 
 def write(rig: Rig) -> bytes:
-    """Write a rig.
+    """Encode a rig as Asterism's own calibration, which keeps every field bit for bit.
 
     Parameters
     ----------
     rig : Rig
-        Any.
+        Cameras with any lens.
 
     Returns
     -------
     bytes
-        The content of the file.
+        Content of the file.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> write(am.Rig.ring(1, radius=3, height=2)).decode().splitlines()[1:3]
+    ['format = "asterism-rig"', 'version = 1']
     """
     text = "# A rig of cameras: metres and pixels. T_camera_world takes world to camera.\n"
     text += table("", {"format": _NAME, "version": _VERSION})

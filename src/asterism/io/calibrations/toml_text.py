@@ -1,4 +1,4 @@
-"""TOML of calibrations: read with care, written with a matrix row a line."""
+"""TOML of calibrations: guarded reading, and writing with one row of a matrix per line."""
 
 from __future__ import annotations
 
@@ -28,16 +28,17 @@ def load(path: Path) -> dict[str, Any]:
     Parameters
     ----------
     path : Path
-        The file.
+        TOML file in UTF-8, of at most 4 MB.
 
     Returns
     -------
     dict
+        Content as of `tomllib.loads`.
 
     Raises
     ------
     FormatError
-        If it is not TOML.
+        If the file is not TOML, is too large, or has keys of more than 100 parts.
     """
     try:
         text = read_bytes(path, most=_LARGEST).decode("utf-8-sig")
@@ -54,7 +55,7 @@ def load(path: Path) -> dict[str, Any]:
 
 
 def _check_keys(path: Path, text: str) -> None:
-    """Refuse keys of hundreds of parts, for which the parser takes the square of their number."""
+    """Refuse keys of hundreds of parts: the parser's time grows with the square of the number."""
     bare = re.sub(r"\"[^\"\n]*\"|'[^'\n]*'", "", text)
     longest = max(piece.count(".") for piece in re.split(r"[,=\[\]{}\n#]", bare))
     if longest > _MOST_PARTS:
@@ -67,14 +68,14 @@ def table(header: str, values: Mapping[str, Any]) -> str:
     Parameters
     ----------
     header : str
-        Its head with the brackets, "" for the top level.
+        Header with its brackets, "" for the top level.
     values : mapping
-        Strings, booleans, numbers, and arrays of one or two axes.
+        Strings, booleans, numbers, and arrays of one or two axes, by key.
 
     Returns
     -------
     str
-        Lines that end with an empty one.
+        Lines of the table, followed by an empty one.
     """
     lines = [header] if header else []
     lines += [f"{key} = {_value(value)}" for key, value in values.items()]
@@ -92,4 +93,4 @@ def _value(value: Any) -> str:
         return _value(value.tolist())
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_value, value)) + "]"
-    return repr(value)  # the shortest digits that give the same float again; inf is inf in TOML
+    return repr(value)  # the shortest digits that round back to the same float; TOML knows inf

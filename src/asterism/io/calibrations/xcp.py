@@ -31,25 +31,39 @@ _THREE = "Vicon3Parameter"
 
 
 def sniff(head: bytes) -> bool:
-    """Tell whether the first bytes of a file look like this format."""
+    """Return whether the first bytes of a file are those of a Vicon calibration."""
     return b"<Cameras" in head
 
 
 def read(path: Path, units: str | None) -> Rig:
-    """Read a rig.
+    """Read the cameras of a Vicon calibration.
 
     Parameters
     ----------
     path : Path
-        The file.
-    units : None
-        It is in millimetres.
+        XML file, as a rule ``.xcp``.
+    units : str or None
+        Not used: the format is in millimetres by definition.
 
     Returns
     -------
     Rig
-        The cameras that were calibrated, under their names, or device numbers where they have
-        none; those without a key frame are named in its warnings.
+        Calibrated cameras. A camera without a name has its device number instead. The `warnings`
+        list cameras without a key frame, which are left out.
+
+    Raises
+    ------
+    FormatError
+        If an attribute is missing or malformed.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "walk.xcp")
+    ...     _ = path.write_bytes(write(am.Rig.ring(2, radius=3, height=2)))
+    ...     read(path, None).names
+    ('cam1', 'cam2')
     """
     del units
     cameras: list[Camera] = []
@@ -117,17 +131,28 @@ def _lens(
 
 
 def write(rig: Rig) -> bytes:
-    """Write a rig.
+    """Encode a rig as a Vicon calibration in millimetres.
 
     Parameters
     ----------
     rig : Rig
-        With lenses in the manner of Vicon, and no skew.
+        Cameras without skew, and without a lens or with a `ViconRadial` lens in pixels.
 
     Returns
     -------
     bytes
-        The content of the file.
+        Content of the file.
+
+    Raises
+    ------
+    ParameterError
+        If a camera has skew or another lens, or if two cameras have the same name.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> write(am.Rig.ring(1, radius=3, height=2)).decode().splitlines()[1]
+    '<Cameras VERSION="1.0">'
     """
     from scipy.spatial.transform import Rotation
 
@@ -135,7 +160,7 @@ def write(rig: Rig) -> bytes:
     for i, (camera, name) in enumerate(zip(rig, names_of(rig), strict=True)):
         no_skew(camera, "xcp")
         K = camera.K
-        # A name of digits is a device number; another goes where names are.
+        # A name of digits is a device number; any other name is written as a name.
         by_number = name.isascii() and name.isdigit()
         element = SubElement(root, "Camera", {
             "DEVICEID": name if by_number else str(i + 1), "NAME": "" if by_number else name,

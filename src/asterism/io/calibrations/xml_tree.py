@@ -1,4 +1,4 @@
-"""XML of calibrations, from files that may be damaged or mean harm."""
+"""XML of calibrations, from files that may be damaged or malicious."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 __all__ = ["load", "to_bytes"]
 
 _DEEPEST = 64  # levels; real files have five
-_PIECE = 1 << 16  # bytes that are parsed between two looks at what they held
+_PIECE = 1 << 16  # bytes parsed at a time
 
 
 class _Forbidden(Exception):
-    """What no calibration has was met."""
+    """The file has a structure that no calibration has."""
 
 
 class _CarefulBuilder(ElementTree.TreeBuilder):
@@ -47,18 +47,20 @@ def load(path: Path, root: str) -> ElementTree.Element:
     Parameters
     ----------
     path : Path
-        The file.
+        XML file of at most 64 MB.
     root : str
-        Name that its outermost element must have.
+        Required name of the outermost element.
 
     Returns
     -------
     Element
+        Outermost element.
 
     Raises
     ------
     FormatError
-        If it is not such a file.
+        If the file is not XML, has another outermost element, declares a document type, or nests
+        its elements more than 64 levels deep.
     """
     raw = read_bytes(path)
     parser = ElementTree.XMLParser(target=_CarefulBuilder())
@@ -80,6 +82,6 @@ def load(path: Path, root: str) -> ElementTree.Element:
 
 
 def to_bytes(root: ElementTree.Element) -> bytes:
-    """Write an element and all within it as an XML file."""
+    """Encode an element with its descendants as the bytes of an XML file."""
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"

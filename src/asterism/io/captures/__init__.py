@@ -1,4 +1,4 @@
-"""Captures in and out: one file a format."""
+"""Reading and writing of captures, one module per format."""
 
 from asterism.io.captures.files import read, read_tracks, write
 from asterism.io.captures.formats import CAPTURE_FORMATS, CaptureFormat

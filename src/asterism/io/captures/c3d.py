@@ -1,4 +1,4 @@
-"""Reading C3D, the binary file of biomechanics: which samples are points, and whose."""
+"""Reading of C3D, the binary format of biomechanics: detections and their identities."""
 
 from __future__ import annotations
 
@@ -32,34 +32,47 @@ __all__ = [
     "sniff",
 ]
 
-# What a writer here puts in POINT:DESCRIPTIONS, so that reading gives back the very same tracks.
+# The writer puts these in POINT:DESCRIPTIONS, so that the reader returns the same tracks.
 UNNAMED, CLUTTER = "track without a name", "clutter"
 OURS = "ASTERISM"
-"""Group of parameters of our own. FILLED: that samples whose residual and cameras are 0 were
-filled, and all others measured, as the format would always have it, but few files keep to.
-RESIDUALS: whether the residuals of the others say more than that. TRUNCATED: that the capture
-behind the file was cut off, and where."""
+"""Group of Asterism's own parameters. FILLED: samples whose residual and cameras are 0 were filled,
+and all others measured. The format prescribes this, but few files comply. RESIDUALS: whether the
+residuals of the measured samples were known. TRUNCATED: where the source of the file was cut
+off."""
 MADE_FROM = "made from a capture that is "
 
 
 def read(path: Path) -> Capture:
     """Read the optical points of a C3D file.
 
+    A sample is a missed detection if its residual is negative, if it is not finite, or if it lies
+    exactly at the origin. Coordinates are converted from the unit of POINT:UNITS.
+
     Parameters
     ----------
     path : Path
-        The file.
+        C3D file.
 
     Returns
     -------
     Capture
-        Samples count as not seen if their residual is negative, or they are not finite, or lie
-        exactly at the origin. Computed points are left out and listed in `Capture.modelled`.
+        Detections with the identities of the channels, analog channels, events and force plates.
+        Computed points are left out and listed in `Capture.modelled`.
 
     Raises
     ------
     FormatError
         If the file is not C3D, or is cut off before its first frame is complete.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "cube.c3d")
+    ...     am.write(am.simulate.cube(frames=5, seed=1), path)
+    ...     capture = read(path)
+    >>> capture.units, capture.n_points
+    ('mm', 40)
     """
     file = read_c3d(path)
     warnings = list(file.warnings)
@@ -68,7 +81,7 @@ def read(path: Path) -> Capture:
     seen = is_seen(file)
     n_origin = int((~seen & ~modelled & (file.points[..., 3] >= 0) & _at_origin(file)).sum())
     if n_origin:
-        warnings.append(f"{n_origin} samples at exactly (0, 0, 0) are taken as not seen")
+        warnings.append(f"{n_origin} samples at exactly (0, 0, 0) are taken as missed detections")
     seen[:, modelled] = False
     points = file.points[..., :3][seen].astype(np.float64)
     stated = " ".join(file.group("POINT").strings("UNITS")[:1])
@@ -82,7 +95,7 @@ def read(path: Path) -> Capture:
         warnings += check_size(points, unit)
     rate = file.rate
     if not rate:
-        warnings.append("no frame rate is given: times count frames, one a second")
+        warnings.append("no frame rate is given: times are frame numbers, one per second")
 
     labels, identity_names = _labels(file, seen, modelled)
     for array in (points, labels):
@@ -117,7 +130,7 @@ def read(path: Path) -> Capture:
 
 
 def _overflowing(file: C3DFile, name: str) -> list[str]:
-    """Texts of a parameter that may overflow into others: LABELS, LABELS2, LABELS3."""
+    """Return the texts of a parameter that may continue in others: LABELS, LABELS2, LABELS3."""
     point = file.group("POINT")
     texts = point.strings(name)
     number = 2
@@ -129,17 +142,17 @@ def _overflowing(file: C3DFile, name: str) -> list[str]:
 
 
 def channel_names(file: C3DFile) -> list[str]:
-    """Return the name of each channel, "" where the file has none."""
+    """Return the name of each channel, "" for a channel without one."""
     return _overflowing(file, "LABELS")
 
 
 def channel_descriptions(file: C3DFile) -> list[str]:
-    """Return the description of each channel, "" where the file has none."""
+    """Return the description of each channel, "" for a channel without one."""
     return _overflowing(file, "DESCRIPTIONS")
 
 
 def is_modelled(file: C3DFile) -> NDArray[np.bool_]:
-    """Which channels are computed and not seen, shape (K,)."""
+    """Return which channels are computed instead of measured, shape (K,)."""
     point = file.group("POINT")
     groups = {name: point.strings(name) for name in point.parameters}
     return np.array(find_modelled(channel_names(file), groups), dtype=bool)
@@ -151,7 +164,7 @@ def _at_origin(file: C3DFile) -> NDArray[np.bool_]:
 
 
 def is_seen(file: C3DFile) -> NDArray[np.bool_]:
-    """Which samples hold a point, shape (T, K)."""
+    """Return which samples are detections, shape (T, K)."""
     seen = ~(file.points[..., 3] < 0)
     for axis in range(3):
         seen &= np.isfinite(file.points[..., axis])
@@ -161,10 +174,10 @@ def is_seen(file: C3DFile) -> NDArray[np.bool_]:
 def _seen_by(
     file: C3DFile, seen: NDArray[np.bool_], per_metre: float
 ) -> tuple[NDArray[np.int64] | None, NDArray[np.float64] | None]:
-    """Cameras and residuals of the points; None where the file says nothing of them."""
+    """Return the cameras and the residuals of the points, None for those that are all zero."""
     words = file.points[..., 3][seen]
     if not np.isfinite(words).all() or words.max(initial=0) > 0x7FFF:
-        return None, None  # not as the format has it: some programs keep other things there
+        return None, None  # some programs store other values than the format prescribes
     whole = words.astype(np.int64)
     cameras: NDArray[np.int64] = whole >> 8
     residuals: NDArray[np.float64] = (whole & 0xFF).astype(np.float64) * (file.scale / per_metre)
@@ -174,7 +187,7 @@ def _seen_by(
 def _labels(
     file: C3DFile, seen: NDArray[np.bool_], modelled: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], tuple[str | None, ...]]:
-    """Identities of the channels that are not modelled, the marks of our own writer heeded."""
+    """Return the identities of the measured channels, by the marks of the writer if present."""
     names, descriptions = channel_names(file), channel_descriptions(file)
     is_clutter = np.array([text == CLUTTER for text in descriptions], dtype=bool)
     kept = np.flatnonzero(~modelled & ~is_clutter)
@@ -187,10 +200,10 @@ def _labels(
 
 
 def sniff(head: bytes) -> bool:
-    """Whether a file that begins so is C3D.
+    """Return whether the first bytes of a file are those of a C3D file.
 
-    The second byte is one of 256 that any binary file may have there. So the parameter section
-    must name a processor, or the header, where that section is damaged, a first frame.
+    The second byte alone is too weak a criterion for a binary file. In addition the parameter
+    section must name a processor or, if that section is damaged, the header a first frame.
     """
     if len(head) < BLOCK or head[1] != 0x50 or head[0] < 2:
         return False

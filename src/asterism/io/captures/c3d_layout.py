@@ -1,7 +1,7 @@
-"""The bytes of a C3D file: header, parameters, and one block of points and analog values a frame.
+"""Layout of a C3D file: header, parameters, and one block of points and analog values per frame.
 
-A reader of its own, because the file may be damaged (what can be read is read), hostile (nothing
-is allocated that the file is not long enough to fill) or long (more than 65535 frames).
+The reader accepts files that are damaged (it reads the intact part), malicious (it allocates no
+more than the file can fill) or long (more than 65535 frames).
 Format: the C3D user guide, https://www.c3d.org.
 """
 
@@ -30,25 +30,26 @@ class C3DFile:
     Parameters
     ----------
     header : bytes
-        The first block, in Intel order.
+        First block, in Intel order.
     groups : dict of str to Group
-        The parameters.
+        Groups of parameters by name.
     points : ndarray, shape (T, K, 4), float32
-        x, y, z in the file's unit, and the word of residual and cameras (negative: not seen).
+        x, y, z in the file's unit, and the word of residual and cameras (negative: missed
+        detection).
     analog : ndarray, shape (T, A), float32
-        Analog values as stored, all samples of a frame in a row.
+        Analog values as stored, all samples of a frame in one row.
     n_samples : int
-        Analog samples a frame.
+        Analog samples per frame.
     first_frame : int
-        The file's number of its first frame.
+        Number of the first frame in the file.
     rate : float
-        Frames a second, 0 where the file does not say.
+        Frame rate in Hz, 0 if the file does not state it.
     scale : float
         Size of one step of the residuals (and of integer points), positive.
     warnings : tuple of str
-        What was odd.
+        Irregularities of the file.
     truncated : str
-        Where the file is cut off and what is missing; empty for a whole file.
+        Place at which the file is cut off, and the missing part; empty for a complete file.
     """
 
     header: bytes
@@ -63,7 +64,7 @@ class C3DFile:
     truncated: str = ""
 
     def group(self, name: str) -> Group:
-        """Return a group, an empty one where there is none."""
+        """Return the group of a name, an empty one if the file has none."""
         return self.groups.get(name, Group())
 
 
@@ -73,21 +74,17 @@ def read_c3d(path: Path) -> C3DFile:
     Parameters
     ----------
     path : Path
-        The file.
+        C3D file.
 
     Returns
     -------
     C3DFile
+        Complete frames of the file; an incomplete last frame is dropped with its analog samples.
 
     Raises
     ------
     FormatError
-        If it is not C3D, or holds not a single complete frame of those that it declares.
-
-    Notes
-    -----
-    Of a file that is cut off the complete frames are read. Analog samples of the incomplete frame
-    are dropped with it.
+        If the file is not C3D, or declares frames and holds no complete one.
     """
     raw = path.read_bytes()
     if len(raw) < BLOCK or raw[1] != 0x50:
@@ -102,7 +99,7 @@ def read_c3d(path: Path) -> C3DFile:
     point = groups.get("POINT", Group())
     stated = next((n for n in point.counts("USED") if n <= 0xFFFF), n_points)
     if stated != n_points:
-        warnings.append(f"{stated} points (POINT:USED) are taken; the header says {n_points}")
+        warnings.append(f"{stated} points (POINT:USED) are read; the header states {n_points}")
         n_points = stated
     scale = next(iter(point.numbers("SCALE")), 0.0) or scale
     if not np.isfinite(scale) or scale == 0:
@@ -147,7 +144,7 @@ def read_c3d(path: Path) -> C3DFile:
 
 
 def _parameters(raw: bytes, warnings: list[str]) -> tuple[int, dict[str, Group]]:
-    """Read the processor and the groups of parameters, as far as they go."""
+    """Read the processor and the groups of parameters up to the first damage."""
     at = (raw[0] - 1) * BLOCK
     processor = raw[at + 3] if 0 < at <= len(raw) - 4 else 0
     groups: dict[str, Group] = {}
@@ -159,21 +156,21 @@ def _parameters(raw: bytes, warnings: list[str]) -> tuple[int, dict[str, Group]]
             warnings.append(f"damaged parameter section, read as far as it goes: {problem}")
     else:
         processor = INTEL
-        warnings.append("there is no parameter section where the header says")
+        warnings.append("the header points to no parameter section")
     if not groups:
         warnings.append("without parameters the points have neither names nor a unit")
     return processor, groups
 
 
 def _values(raw: bytes, offset: int, n: int, item: int, processor: int) -> NDArray[Any]:
-    """Decode n numbers of so many bytes each; of Intel's a view, because the file may be large."""
+    """Decode n numbers of `item` bytes each; in Intel order as a view, without a copy."""
     if processor != INTEL:
         return decode(raw[offset : offset + n * item], item, processor)
     return np.frombuffer(raw, "<f4" if item == 4 else "<i2", n, offset if n else 0)
 
 
 def _intel_header(header: bytes, processor: int) -> bytes:
-    """Header with its words, reals and event times in Intel order; event labels are bytes."""
+    """Return the header with its words, reals and event times in Intel order."""
     if processor == INTEL:
         return header
     words = decode(header, 2, processor).tobytes()
@@ -185,7 +182,7 @@ def _intel_header(header: bytes, processor: int) -> bytes:
 
 
 def _rate(in_header: float, groups: dict[str, Group], n_samples: int) -> float:
-    """Frames a second: POINT:RATE, else the header's, else that of the analog channels; else 0."""
+    """Return the frame rate: POINT:RATE, else the header's, else by the analog channels, else 0."""
     analog = groups.get("ANALOG", Group()).numbers("RATE")
     candidates = [*groups.get("POINT", Group()).numbers("RATE")[:1], in_header]
     candidates += [r / n_samples for r in analog[:1] if n_samples]
@@ -195,10 +192,10 @@ def _rate(in_header: float, groups: dict[str, Group], n_samples: int) -> float:
 def _frames(
     path: Path, groups: dict[str, Group], first: int, last: int, n_fit: int, warnings: list[str]
 ) -> tuple[int, int, int]:
-    """First frame, number of complete frames, and number of frames that the file declares.
+    """Return the first frame, the number of complete frames, and the number of declared frames.
 
-    The header's 16-bit words overflow at 65535, and every maker has another way round it. Of
-    several numbers that a file states, the first that fits its length is taken as the declared one.
+    The header's 16-bit words overflow at 65535, and each vendor stores longer counts elsewhere. Of
+    several numbers that a file states, the first that fits its length is the declared one.
     """
     point, trial = groups.get("POINT", Group()), groups.get("TRIAL", Group())
     in_header = last - first + 1 if last >= first else 0
@@ -212,7 +209,7 @@ def _frames(
             if stop >= begin:
                 first, counts = begin, [stop - begin + 1, *counts]
         if not counts and 0xFFFF in (*claimed, last) and n_fit > 0xFFFF + BLOCK:
-            warnings.append("the number of frames is told by the length of the file")
+            warnings.append("the number of frames is computed from the length of the file")
             counts = [n_fit]
         # 0xFFFF is where the words overflow: beside a longer count it says nothing.
         counts += [n for n in (*claimed, in_header) if n and not (n == 0xFFFF and counts)]
@@ -227,9 +224,9 @@ def _frames(
     if n_frames is None:
         return first, n_fit, counts[0]
     if n_frames != counts[0]:
-        warnings.append(f"{n_frames} frames are taken, for {counts[0]} the file is too short")
+        warnings.append(f"{n_frames} frames are read: the file is too short for {counts[0]}")
     elif n_frames != in_header and last < 0xFFFF:
-        warnings.append(f"{n_frames} frames are taken; the header says {in_header}")
+        warnings.append(f"{n_frames} frames are read; the header states {in_header}")
     if n_frames == 0:
         warnings.append("the file has no frames")
     return first, n_frames, n_frames

@@ -1,7 +1,6 @@
-"""The parameter section of a C3D file: groups of named values, read with care and built again.
+"""Parameter section of a C3D file: groups of named values, parsed and built.
 
-Values are kept as their bytes (in Intel order), so that what nobody understands survives a
-read and write unchanged.
+Values are kept as bytes in Intel order, so that unknown parameters are written again unchanged.
 """
 
 from __future__ import annotations
@@ -23,18 +22,18 @@ __all__ = ["BLOCK", "DEC", "INTEL", "SGI", "Group", "Parameter", "build", "decod
 
 BLOCK = 512
 INTEL, DEC, SGI = 84, 85, 86
-# The groups that are understood here: their names and their parameters' are told in capitals.
+# Groups that the reader interprets; their names and those of their parameters are in capitals.
 _SPOKEN = ("POINT", "ANALOG", "TRIAL")
 _TEXT, _BYTE, _INTEGER, _REAL = -1, 1, 2, 4
 
 
 def decode(raw: bytes, kind: int, processor: int) -> NDArray[np.generic]:
-    """Turn the bytes of one of the three processor types into integers or reals.
+    """Decode integers or reals of one of the three processor types.
 
     Parameters
     ----------
     raw : bytes
-        The values as in the file.
+        Bytes of the file.
     kind : int
         2 for 16-bit integers, 4 for 32-bit reals.
     processor : int
@@ -49,7 +48,7 @@ def decode(raw: bytes, kind: int, processor: int) -> NDArray[np.generic]:
     if kind == _INTEGER:
         return np.frombuffer(raw, dtype=f"{order}i2").astype("<i2", copy=False)
     if processor == DEC:
-        # VAX F: the two 16-bit words stand the other way round, and the exponent's bias is 2 more.
+        # VAX F: the two 16-bit words are swapped, and the bias of the exponent is larger by 2.
         words = np.frombuffer(raw, dtype="<u2").reshape(-1, 2)[:, ::-1]
         with np.errstate(invalid="ignore"):
             return np.ascontiguousarray(words).view("<f4").ravel() / np.float32(4)
@@ -58,7 +57,21 @@ def decode(raw: bytes, kind: int, processor: int) -> NDArray[np.generic]:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One named value: kind -1 text, 1 bytes, 2 integers, 4 reals; `data` in Intel order."""
+    """Value of a parameter.
+
+    Parameters
+    ----------
+    kind : {-1, 1, 2, 4}
+        Text, bytes, 16-bit integers or 32-bit reals.
+    dims : tuple of int
+        Dimensions, the fastest first; of texts the first is their length.
+    data : bytes
+        Values in Intel order.
+    description : bytes
+        Description of the parameter.
+    locked : bool
+        Whether the file marks the parameter as locked.
+    """
 
     kind: int
     dims: tuple[int, ...]
@@ -67,16 +80,16 @@ class Parameter:
     locked: bool = False
 
     def strings(self) -> list[str]:
-        """Texts without the padding; UTF-8 where it is, else Latin-1. Empty if not text."""
+        """Return the texts without padding, as UTF-8 or else Latin-1; empty if not text."""
         if self.kind != _TEXT:
             return []
         width = self.dims[0] if self.dims else 1
-        # Texts of no length take no bytes: without a bound a few dimensions would claim billions.
+        # Texts of length 0 take no bytes, so a few dimensions could claim billions of them.
         n = math.prod(self.dims[1:]) if width else math.prod(self.dims[1:2])
         return [_text(self.data[i * width : (i + 1) * width]) for i in range(n)]
 
     def numbers(self) -> list[float]:
-        """Values as numbers, integers without their sign as counts are; empty if not numeric."""
+        """Return the values as numbers, integers as unsigned counts; empty if not numeric."""
         if self.kind == _TEXT:
             return []
         kind = {_BYTE: "u1", _INTEGER: "<u2", _REAL: "<f4"}[self.kind]
@@ -85,7 +98,7 @@ class Parameter:
 
     @classmethod
     def of_strings(cls, texts: Sequence[str], like: Parameter | None = None) -> Self:
-        """Make a list of texts, at most 255 of at most 255 bytes."""
+        """Build a parameter of at most 255 texts of at most 255 bytes each."""
         raw = [text.encode() for text in texts]
         width = max(map(len, raw), default=0)
         if width > 255:
@@ -97,7 +110,7 @@ class Parameter:
 
     @classmethod
     def of_integers(cls, values: Sequence[int], like: Parameter | None = None) -> Self:
-        """Make one 16-bit integer, or a list of them."""
+        """Build a parameter of one 16-bit integer, or of a list of them."""
         dims = () if len(values) == 1 else (len(values),)
         old = like or cls(_INTEGER, (), b"")
         data = np.array(values, dtype="<u2").tobytes()
@@ -105,7 +118,7 @@ class Parameter:
 
     @classmethod
     def of_reals(cls, values: Sequence[float], like: Parameter | None = None) -> Self:
-        """Make one 32-bit real, or a list of them."""
+        """Build a parameter of one 32-bit real, or of a list of them."""
         dims = () if len(values) == 1 else (len(values),)
         old = like or cls(_REAL, (), b"")
         data = np.array(values, dtype="<f4").tobytes()
@@ -114,22 +127,32 @@ class Parameter:
 
 @dataclass
 class Group:
-    """Parameters by name, in the order of the file."""
+    """Group of parameters.
+
+    Parameters
+    ----------
+    parameters : dict of str to Parameter
+        Parameters by name, in the order of the file.
+    description : bytes
+        Description of the group.
+    locked : bool
+        Whether the file marks the group as locked.
+    """
 
     parameters: dict[str, Parameter] = field(default_factory=dict[str, Parameter])
     description: bytes = b""
     locked: bool = False
 
     def strings(self, name: str) -> list[str]:
-        """Texts of a parameter, [] where there is none."""
+        """Return the texts of a parameter, [] if there is none."""
         return self.parameters[name].strings() if name in self.parameters else []
 
     def numbers(self, name: str) -> list[float]:
-        """Numbers of a parameter, [] where there is none."""
+        """Return the numbers of a parameter, [] if there is none."""
         return self.parameters[name].numbers() if name in self.parameters else []
 
     def counts(self, name: str) -> list[int]:
-        """Whole numbers of a parameter, without those that can be no count."""
+        """Return the non-negative whole numbers of a parameter."""
         return [int(n) for n in self.numbers(name) if 0 <= n < 2**31]
 
 
@@ -142,21 +165,21 @@ def _text(raw: bytes) -> str:
 
 
 def parse(section: bytes, processor: int) -> tuple[dict[str, Group], str]:
-    """Read groups and parameters as far as they make sense.
+    """Parse groups and parameters up to the first damage.
 
     Parameters
     ----------
     section : bytes
-        The section without its four leading bytes.
+        Parameter section without its four leading bytes.
     processor : int
-        How its numbers are written, see `decode`.
+        Processor type of its numbers, see `decode`.
 
     Returns
     -------
     groups : dict of str to Group
-        By name.
+        Groups by name.
     problem : str
-        Where and why reading stopped early, "" where it did not.
+        Place and reason of an early stop, "" if there was none.
     """
     groups: dict[int, tuple[str, Group]] = {}
     parameters: list[tuple[int, str, str, Parameter]] = []
@@ -216,12 +239,22 @@ def _parse_parameter(body: bytes, processor: int, locked: bool) -> Parameter | N
 
 
 def build(groups: dict[str, Group]) -> bytes:
-    """Make the whole section, its four leading bytes and the padding to full blocks included.
+    """Build the parameter section with its four leading bytes, padded to full blocks.
+
+    Parameters
+    ----------
+    groups : dict of str to Group
+        Groups by name.
+
+    Returns
+    -------
+    bytes
+        Parameter section.
 
     Raises
     ------
     ParameterError
-        If it is longer than the 255 blocks that the format can count.
+        If the section is longer than the 255 blocks that the format can count.
     """
     records: list[bytes] = []
     for number, (name, group) in enumerate(groups.items(), start=1):

@@ -1,6 +1,6 @@
 """Analog channels, events and force plates of a C3D file.
 
-Each is read as far as it makes sense: a file whose points are sound is not refused for them.
+Malformed parts are left out: a file with sound points is not refused for them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["analog_of", "events_of", "plates_of"]
 
 
 def analog_of(file: C3DFile) -> Analog | None:
-    """Return the analog channels, None where the file has none."""
+    """Return the analog channels of a file, None if it has none."""
     n_frames, n = len(file.analog), max(file.n_samples, 1)
     n_channels = file.analog.shape[1] // n
     if not n_channels or not file.rate:
@@ -45,7 +45,7 @@ def analog_of(file: C3DFile) -> Analog | None:
 
 
 def events_of(file: C3DFile) -> tuple[Event, ...]:
-    """Return the events of the parameter section, by time."""
+    """Return the events of the parameter section in the order of their times."""
     group = file.group("EVENT")
     labels, contexts = group.strings("LABELS"), group.strings("CONTEXTS")
     times = np.array(group.numbers("TIMES"))
@@ -64,7 +64,7 @@ def events_of(file: C3DFile) -> tuple[Event, ...]:
 
 
 def plates_of(file: C3DFile, unit: str) -> tuple[ForcePlate, ...]:
-    """Return the force plates whose corners are all there; coordinates are in `unit`."""
+    """Return the force plates with four corners, converted from `unit` to metres."""
     group = file.group("FORCE_PLATFORM")
     used, kinds = group.counts("USED")[:1], group.counts("TYPE")
     corners = np.array(group.numbers("CORNERS"))
@@ -90,6 +90,6 @@ def plates_of(file: C3DFile, unit: str) -> tuple[ForcePlate, ...]:
 
 
 def _numbers(given: list[float], n: int, default: float) -> NDArray[np.float64]:
-    """Take n numbers of a parameter, the default for those that are missing or not finite."""
+    """Return n numbers of a parameter, the default for those that are missing or not finite."""
     values = np.array((given + [default] * n)[:n], dtype=np.float64)
     return np.where(np.isfinite(values), values, default)

@@ -1,4 +1,4 @@
-"""Writing tracks as C3D: the points are new, all else is what the source file held."""
+"""Writing of tracks as C3D: the points are new, everything else is copied from the source file."""
 
 from __future__ import annotations
 
@@ -33,40 +33,47 @@ if TYPE_CHECKING:
 
 __all__ = ["write"]
 
-_CHUNK = 2048  # frames converted at a time: long captures need not fit the memory twice
-# Some programs take 0, 0, 0 for a gap whatever the residual says; this is as far from it as a
-# marker can be without being anywhere else.
+_CHUNK = 2048  # frames converted at a time, so that a long capture is not in memory twice
+# Some programs read 0, 0, 0 as a gap whatever the residual is. This distance from the origin is
+# below any precision of measurement.
 _NEAR_ORIGIN = np.float32(1e-30)
 
 
 def write(tracks: Tracks, file: IO[bytes]) -> None:
-    """Write tracks as C3D, one channel a track.
+    """Write tracks as C3D, one channel per track.
 
     Parameters
     ----------
     tracks : Tracks
-        Over 3-D detections at a fixed rate.
+        Tracks over 3-D detections at a fixed rate.
     file : binary file
-        Where to.
+        Open file to write to.
 
     Raises
     ------
     ParameterError
-        If the detections are 2-D or the times irregular, or there are too many tracks.
+        If the detections are 2-D, if the times are irregular, or if there are too many tracks.
     FormatError
-        If the detections came from a C3D that is gone or no longer the same.
+        If the detections came from a C3D that no longer exists or has changed.
 
     Notes
     -----
-    Tracks without a name are called ``T000``, ``T001`` …, clutter goes to ``*0``, ``*1`` …, and
-    the descriptions of those channels say so, which gives back the same tracks on reading. If the
-    detections were read from a C3D its unit, analog channels, events, computed points and all
-    other parameters are kept, and so are the residuals and cameras of its points. A sample that
-    is not there is written as 0, 0, 0 with residual -1, which is what other programs expect. Of
-    the cameras that saw a point C3D has room for the first seven. A point that was filled has
-    residual 0, which is what C3D has for it, and then every measured one has at least a step; a
-    parameter of ours says that it is so. Where the capture was cut off, ASTERISM:TRUNCATED says
-    where and what is missing.
+    Tracks without a name are called ``T000``, ``T001`` and so on; clutter is written to channels
+    ``*0``, ``*1`` and so on. The descriptions of these channels mark them, so that `read` returns
+    the same tracks. If the detections were read from a C3D, its unit, analog channels, events,
+    computed points and all other parameters are kept, and so are the residuals and cameras of its
+    points. A missed detection is written as 0, 0, 0 with residual -1, as other programs expect.
+    C3D holds the first seven cameras of a point. A filled point has residual 0, as the format
+    prescribes, and every measured point at least one step; the parameter ASTERISM:FILLED marks such
+    a file. ASTERISM:TRUNCATED keeps the place at which the capture was cut off.
+
+    Examples
+    --------
+    >>> import asterism as am, io
+    >>> file = io.BytesIO()
+    >>> write(am.simulate.cube(frames=5, seed=1), file)
+    >>> file.getvalue()[1]  # the mark of C3D
+    80
     """
     d = tracks.detections
     rate = fixed_rate(d, "C3D")
@@ -79,7 +86,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     unit, first_frame, header = "mm", 1, bytes(BLOCK)
     groups: dict[str, Group] = {}
     analog = np.empty((d.n_frames, 0), dtype=np.float32)
-    # Where residuals are known, in steps of a hundredth: they fill 8 bits.
+    # Known residuals are written in steps of a hundredth, because they have 8 bits.
     scale, n_samples = 0.01 if d.residuals is not None else 1.0, 0
     if isinstance(d, Capture):
         unit = d.units
@@ -98,7 +105,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     truncated = d.truncated if isinstance(d, Capture) else ""
     _set_ours(groups, filled is not None, d.residuals is not None, truncated)
     n_blocks = len(build(groups)) // BLOCK
-    point = groups["POINT"].parameters  # the number of blocks is known now, and does not change
+    point = groups["POINT"].parameters  # the number of blocks is final from here on
     point["DATA_START"] = Parameter.of_integers([2 + n_blocks], point["DATA_START"])
     frames = np.minimum([first_frame, first_frame + d.n_frames - 1], 0xFFFF)
     counts = (len(names), analog.shape[1], *frames)
@@ -111,7 +118,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         block = row[: rows.stop - begin]
         dense = to_dense(tracks, channels, n_own, rows)
         seen = ~np.isnan(dense[..., 0])
-        values = to_float32(dense * PER_METRE[unit])  # 32 bits forgive the last bit of 64
+        values = to_float32(dense * PER_METRE[unit])  # rounding removes an error in the last bit
         values[~seen] = 0
         values[seen & (values == 0).all(axis=-1), 0] = _NEAR_ORIGIN
         block[:, :n_own, :3] = values

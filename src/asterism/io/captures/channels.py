@@ -1,8 +1,8 @@
-"""Between channels and identities.
+"""Conversion between the channels of a file and the labels of detections.
 
 A file has channels (columns, trajectories); detections have labels. A named channel is one
-identity. A channel without a name is a recorder's own short trajectory, and recorders reuse it
-for another marker after a gap, so each unbroken piece of it is an identity of its own.
+identity. A recording system reuses an unnamed channel for another marker after a gap, so each of
+its tracklets is a separate identity.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ __all__ = ["identities", "to_channels", "to_dense"]
 def identities(
     seen: NDArray[np.bool_], names: Sequence[str | None]
 ) -> tuple[NDArray[np.int64], tuple[str | None, ...]]:
-    """Label detections by the channel that they came in.
+    """Label detections by their channels.
 
     Parameters
     ----------
     seen : ndarray of bool, shape (T, C)
-        Which channels hold a detection, frame by frame.
+        True for channels with a detection in the frame.
     names : sequence of (str or None)
         Name of each channel; None for one identity without a name.
 
     Returns
     -------
     labels : ndarray of int, shape (N,)
-        Of the N detections, by frame and then by channel.
+        Labels of the N detections, by frame and then by channel.
     names : tuple of str or None
-        Of each identity, in the order of the channels. A named channel without any detection
-        keeps its name; an unnamed one is no identity.
+        Names of the identities, in the order of the channels. A named channel without detections
+        keeps its name; an unnamed one has no identity.
     """
     table = np.empty(seen.shape, dtype=np.int32)
     found: list[str | None] = []
@@ -58,7 +58,7 @@ def identities(
 
 
 def to_channels(tracks: Tracks) -> tuple[NDArray[np.int64], list[str], int]:
-    """Return every detection a channel of a file: each track its own, clutter as few as hold it.
+    """Assign detections to channels: one for each track, and the smallest number for clutter.
 
     Parameters
     ----------
@@ -68,11 +68,12 @@ def to_channels(tracks: Tracks) -> tuple[NDArray[np.int64], list[str], int]:
     Returns
     -------
     channels : ndarray of int, shape (N,)
+        Channel of each detection.
     names : list of str
-        Of the channels: first the K tracks, ``T007`` where one has no name, then ``*0``, ``*1`` …
-        with the clutter.
+        Names of the channels: the K tracks, with ``T007`` for an unnamed one, then ``*0``, ``*1``
+        and so on for clutter.
     n_clutter : int
-        How many channels of clutter there are.
+        Number of channels of clutter.
     """
     d = tracks.detections
     taken = {name for name in tracks.names if name is not None}
@@ -99,7 +100,24 @@ def to_channels(tracks: Tracks) -> tuple[NDArray[np.int64], list[str], int]:
 def to_dense(
     tracks: Tracks, channels: NDArray[np.int64], n_channels: int, rows: slice
 ) -> NDArray[np.float64]:
-    """Positions by frame and channel for some frames, shape (T', C, D), metres, NaN where none."""
+    """Return positions by frame and channel for a range of frames.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of D axes.
+    channels : ndarray of int, shape (N,)
+        Channel of each detection, as by `to_channels`.
+    n_channels : int
+        Number of channels, C.
+    rows : slice
+        Range of T' frames.
+
+    Returns
+    -------
+    ndarray, shape (T', C, D)
+        Metres; NaN for a missed detection.
+    """
     d = tracks.detections
     begin, end = int(d.offsets[rows.start]), int(d.offsets[rows.stop])
     dense = np.full((rows.stop - rows.start, n_channels, d.n_axes), np.nan)

@@ -1,13 +1,13 @@
-"""Asterism's own CSV: one row a detection, and nothing is lost.
+"""Asterism's own CSV: one row per detection, without loss.
 
 Columns ``frame, time_s, x_m, y_m, z_m, track, name, confidence, filled, std, source_unit``; ``z_m``
-is absent in 2-D, the last four where there is nothing of the kind. Clutter is track -1; ``filled``
-is 1 for a point that was not measured; ``std`` is the standard deviation of a coordinate in metres,
-0 where it is not known. Coordinates are metres; ``source_unit`` is the unit of the file that the
-capture came from, where that is another one, and is the same in all rows: the formats that name a
-unit are written in it again. A row without coordinates is a frame without points; a row without
-frame and time declares a track that has no detection. Floats are written with as many digits as
-give back the same bits. Tabs and line ends in a name become blanks.
+is absent in 2-D, and each of the last four if it has no values. Coordinates are metres. Clutter is
+track -1; ``filled`` is 1 for a point that was not measured; ``std`` is the standard deviation of a
+coordinate in metres, 0 if it is not known. ``source_unit`` is the unit of the source file if that
+is not metres; formats with a unit are written in it again. It is the same in all rows. A row
+without coordinates is a frame without points; a row without frame and time declares a track
+without a detection. Floats have enough digits to restore the same bits. Tabs and line ends in a
+name become blanks.
 """
 
 from __future__ import annotations
@@ -35,37 +35,71 @@ _COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "track", "name", "confidence
 _TEXTS = ("name", SOURCE_UNIT)
 _REQUIRED = ("frame", "time_s", "x_m", "y_m")
 _CHUNK = 4096  # lines or frames at a time
-_MOST_TRACKS = 10**6  # a number beyond it is a mistake, and would fill the memory
+_MOST_TRACKS = 10**6  # a larger number is an error and would exhaust the memory
 
 
 def sniff(head: bytes) -> bool:
-    """Whether a file that begins so is the CSV of this module."""
+    """Return whether the first bytes of a file are those of this CSV, with a column ``x_m``."""
     line = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")[0].decode("latin-1").strip()
     return "x_m" in line.replace('"', "").replace(" ", "").split(",")
 
 
 def read(path: Path) -> Capture:
-    """Read the detections, with the tracks as their identities; see `read_tracks`."""
-    return _load(path)[0]
-
-
-def read_tracks(path: Path) -> Tracks:
-    """Read tracks as `write` wrote them; columns may stand in any order.
+    """Read the detections of Asterism's CSV, with the tracks as their identities.
 
     Parameters
     ----------
     path : Path
-        The file.
+        CSV file. Columns and rows may stand in any order.
 
     Returns
     -------
-    Tracks
-        Over a `Capture` of the same file; without a column ``track`` all is clutter.
+    Capture
+        Detections, labels and names. `read_tracks` returns the confidence too.
 
     Raises
     ------
     FormatError
-        With the line that is not as it should be.
+        If a line is malformed; the error names it.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "cube.csv")
+    ...     am.write(am.simulate.cube(frames=5, seed=1), path)
+    ...     read(path).n_points
+    40
+    """
+    return _load(path)[0]
+
+
+def read_tracks(path: Path) -> Tracks:
+    r"""Read the tracks of Asterism's CSV, with their labels, names and confidence.
+
+    Parameters
+    ----------
+    path : Path
+        CSV file. Columns and rows may stand in any order.
+
+    Returns
+    -------
+    Tracks
+        Tracks over a `Capture` of the file. Without a column ``track`` all detections are clutter.
+
+    Raises
+    ------
+    FormatError
+        If a line is malformed; the error names it.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "one.csv")
+    ...     _ = path.write_text("frame,time_s,x_m,y_m,z_m,track,name\n1,0,0.5,1.2,0.9,0,LASI\n")
+    ...     read_tracks(path).names
+    ('LASI',)
     """
     return _load(path)[1]
 
@@ -169,14 +203,25 @@ def _names(path: Path, track: NDArray[np.int64], names: list[str]) -> tuple[str 
 
 
 def write(tracks: Tracks, file: IO[bytes]) -> None:
-    """Write tracks; `read_tracks` gives back the same labels, names, confidence, points and flags.
+    """Write tracks as Asterism's CSV, from which `read_tracks` returns the same tracks.
+
+    Labels, names, confidence, points, flags of filled points and standard deviations are kept bit
+    for bit.
 
     Parameters
     ----------
     tracks : Tracks
-        Over 2-D or 3-D detections at any times.
+        Tracks over 2-D or 3-D detections at any times.
     file : binary file
-        Where to.
+        Open file to write to.
+
+    Examples
+    --------
+    >>> import asterism as am, io
+    >>> file = io.BytesIO()
+    >>> write(am.simulate.cube(frames=5, seed=1), file)
+    >>> file.getvalue().decode().splitlines()[0]
+    'frame,time_s,x_m,y_m,z_m,track,name'
     """
     d = tracks.detections
     filled = None if d.filled is None else d.filled.astype(np.int64)
@@ -200,7 +245,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
         columns += [map(repr, values[rows].tolist()) for values in last.values()]
         columns += [repeat(unit, rows.stop - rows.start)] * bool(unit)
         lines = list(map(",".join, zip(*columns, strict=True)))
-        # Backwards, so that the places of the others stay right.
+        # Backwards, so that the earlier places stay valid.
         for t in begin + np.flatnonzero(d.counts[begin:end] == 0)[::-1]:
             lines.insert(int(d.offsets[t]) - rows.start, starts[t] + blank)
         file.write("".join(f"{line}\n" for line in lines).encode())

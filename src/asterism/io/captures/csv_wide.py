@@ -1,7 +1,7 @@
-"""CSV with one row a frame and three columns a marker: ``time_s, LASI_x, LASI_y, LASI_z, …``.
+"""CSV with one row per frame and three columns per marker: ``time_s, LASI_x, LASI_y, LASI_z, …``.
 
-Metres; gaps are blank fields. The suffixes make out the markers; 2-D files have no ``_z``. A last
-column ``source_unit`` names the unit of the file that the capture came from, where that is another.
+Coordinates are metres; gaps are blank fields; 2-D files have no columns ``_z``. A last column
+``source_unit`` names the unit of the source file if that is not metres.
 """
 
 from __future__ import annotations
@@ -26,28 +26,39 @@ __all__ = ["read", "sniff", "write"]
 
 
 def sniff(head: bytes) -> bool:
-    """Whether a file that begins so is the CSV of this module."""
+    """Return whether the first bytes of a file are those of this CSV, with ``time_s`` first."""
     cells = cells_of(head.removeprefix(b"\xef\xbb\xbf").split(b"\n")[0].decode("latin-1"))
     # A long header may be cut off in the middle of a name.
     return cells[:1] == ["time_s"] and (len(cells) == 1 or cells[1].endswith("_x"))
 
 
 def read(path: Path) -> Capture:
-    """Read a wide CSV.
+    r"""Read a CSV with one row per frame.
 
     Parameters
     ----------
     path : Path
-        The file.
+        CSV file.
 
     Returns
     -------
     Capture
+        Detections with one identity for each named marker.
 
     Raises
     ------
     FormatError
-        With the line that is not as it should be.
+        If a line is malformed; the error names it.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "wide.csv")
+    ...     _ = path.write_text("time_s,LASI_x,LASI_y,LASI_z\n0,0.5,1.2,0.9\n0.01,,,\n")
+    ...     capture = read(path)
+    >>> capture.names, capture.counts.tolist()
+    (('LASI',), [1, 0])
     """
     lines = read_lines(path)
     titles = cells_of(lines[0])
@@ -64,7 +75,7 @@ def read(path: Path) -> Capture:
     if titles != wanted:
         odd = next((t for t, w in zip(titles, wanted, strict=False) if t != w), "")
         expected = "'time_s', then NAME_x, NAME_y, NAME_z for each marker"
-        raise FormatError(path, "line 1", expected, f"{odd!r} out of step" if odd else "fewer")
+        raise FormatError(path, "line 1", expected, f"{odd!r} instead" if odd else "fewer")
     values, numbers = parse_rows(path, lines, 1, len(titles), ",")
     values = values.reshape(len(numbers), len(titles))
     check_times(path, values[:, 0], numbers)
@@ -81,15 +92,23 @@ def read(path: Path) -> Capture:
 
 
 def write(tracks: Tracks, file: IO[bytes]) -> None:
-    """Write tracks as one row a frame.
+    """Write tracks as a CSV with one row per frame.
 
     Parameters
     ----------
     tracks : Tracks
-        Over 2-D or 3-D detections; tracks without a name are called ``T000`` …, clutter goes to
-        columns ``*0``, ``*1`` …
+        Tracks over 2-D or 3-D detections. Tracks without a name are called ``T000``, ``T001`` and
+        so on; clutter is written to columns ``*0``, ``*1`` and so on.
     file : binary file
-        Where to.
+        Open file to write to.
+
+    Examples
+    --------
+    >>> import asterism as am, io
+    >>> file = io.BytesIO()
+    >>> write(am.simulate.cube(frames=5, seed=1), file)
+    >>> len(file.getvalue().splitlines())
+    6
     """
     names, rows = rows_of(tracks, "m", zero_is_gap=False)
     axes = "xyz"[: tracks.detections.n_axes]

@@ -23,7 +23,7 @@ __all__ = ["format_of", "format_to_write", "read", "read_tracks", "write"]
 
 log = logging.getLogger(__name__)
 
-_HEAD = 4096  # bytes that are enough to know a format by
+_HEAD = 4096  # bytes from which every format is recognised
 
 
 def read(path: str | Path, *, format: str | None = None) -> Capture:
@@ -32,26 +32,30 @@ def read(path: str | Path, *, format: str | None = None) -> Capture:
     Parameters
     ----------
     path : path
-        The file.
+        File to read.
     format : str, optional
-        Key of `CAPTURE_FORMATS`; by default it follows from the content, then from the suffix
-        of the name.
+        Key of `CAPTURE_FORMATS`; by default it follows from the content, then from the suffix.
 
     Returns
     -------
     Capture
-        Detections in metres with the file's own identities; axes are those of the file. Of a C3D
-        that is cut off the complete frames; `Capture.truncated` and a log message say so.
+        Detections in metres with the identities and the axes of the file. Of a truncated C3D the
+        complete frames are read; `Capture.truncated` and a log message report the missing part.
 
     Raises
     ------
     FormatError
-        If the file is not there, or is of no known format, or not what its format says.
+        If the file does not exist, has no known format, or is malformed.
     ParameterError
-        If `path` is no path, or `format` is unknown.
+        If `path` is not a path, or `format` is unknown.
 
     Examples
     --------
+    >>> import asterism as am, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     am.write(am.simulate.cube(frames=5, seed=1), f"{folder}/cube.c3d")
+    ...     read(f"{folder}/cube.c3d").n_points
+    40
     >>> read("nowhere.c3d")
     Traceback (most recent call last):
     ...
@@ -126,7 +130,7 @@ def write(
     Raises
     ------
     ParameterError
-        If `path` is the input without `overwrite_input`, if its ending is unknown, or if the format
+        If `path` is the input without `overwrite_input`, if its suffix is unknown, or if the format
         cannot hold the tracks or mark their filled points.
     FormatError
         If the file cannot be written, or the input cannot be read again.
@@ -154,7 +158,7 @@ def write(
     if source.filled is not None and source.filled.any() and not (chosen.keeps_filled or unflagged):
         able = ", ".join(f.name for f in CAPTURE_FORMATS.values() if f.write and f.keeps_filled)
         raise ParameterError(
-            "format", f"one that tells filled points from measured ones: {able}",
+            "format", f"one that marks filled points: {able}",
             repr(chosen.name), "give unflagged=True to write them without a mark",
         )  # fmt: skip
     with replacing(path) as file:
@@ -164,14 +168,24 @@ def write(
 
 
 def _log_truncation(capture: Capture) -> Capture:
-    """Log a warning where frames of the file are missing, and give the capture on."""
+    """Log a warning if frames of the file are missing, and return the capture."""
     if capture.truncated:
         log.warning("%s: %s", capture.path, capture.truncated)
     return capture
 
 
 def format_of(path: Path) -> CaptureFormat:
-    """Detect the format of an existing capture, by its ending or its content.
+    """Detect the format of an existing capture by its content, then by its suffix.
+
+    Parameters
+    ----------
+    path : Path
+        File to examine.
+
+    Returns
+    -------
+    CaptureFormat
+        Entry of `CAPTURE_FORMATS`.
 
     Raises
     ------
@@ -183,24 +197,24 @@ def format_of(path: Path) -> CaptureFormat:
 
 
 def format_to_write(path: Path, format: str | None) -> CaptureFormat:
-    """Return the format to write, as asked or by the ending of the name.
+    """Return the requested format to write, or the format of the suffix.
 
     Parameters
     ----------
     path : Path
-        The file.
+        File to write.
     format : str or None
-        Key of `CAPTURE_FORMATS`, where it was asked for.
+        Key of `CAPTURE_FORMATS`; None selects by the suffix.
 
     Returns
     -------
     CaptureFormat
-        One that can be written.
+        Entry of `CAPTURE_FORMATS` that can be written.
 
     Raises
     ------
     ParameterError
-        If the format or the ending is unknown, or the format is only read.
+        If the format or the suffix is unknown, or the format can only be read.
     """
     known = [f for f in CAPTURE_FORMATS.values() if f.write is not None]
     if format is None:
@@ -230,10 +244,10 @@ def _named(name: str) -> CaptureFormat:
 
 
 def _find(path: Path, asked: CaptureFormat | None) -> CaptureFormat:
-    """Format of an existing file: as asked, or by its content.
+    """Return the requested format of an existing file, or the format of its content.
 
-    The ending of the name decides between formats that the content fits alike, and where the
-    content fits none: then the reader of that format says what is amiss.
+    If the content fits several formats or none, the suffix decides. In the latter case the reader
+    of that format reports the error.
     """
     check_file(path)
     if asked is not None:
@@ -254,7 +268,7 @@ def _find(path: Path, asked: CaptureFormat | None) -> CaptureFormat:
 
 @contextmanager
 def _about(path: Path) -> Generator[None, None, None]:
-    """Turn what the system or the data model refuses into an error about the file."""
+    """Turn an error of the system or of the data model into an error about the file."""
     try:
         yield
     except OSError as error:

@@ -34,7 +34,7 @@ class CaptureFormat:
     name : str
         Key in `CAPTURE_FORMATS`.
     extensions : tuple of str
-        Endings of file names; "" for a name without one.
+        Suffixes of file names; "" for a name without one.
     description : str
         Description in one line.
     sniff : callable

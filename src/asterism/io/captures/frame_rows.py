@@ -1,4 +1,4 @@
-"""Captures as tables of one row a frame, as TRC, TSV and wide CSV hold them."""
+"""Captures as tables of one row per frame, the layout of TRC, TSV and wide CSV."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["capture_of", "rows_of"]
 
-_CHUNK = 4096  # frames at a time, so that the texts never fill the memory
+_CHUNK = 4096  # frames at a time, to bound the memory of the texts
 
 
 def capture_of(
@@ -38,32 +38,38 @@ def capture_of(
     modelled: Sequence[str] = (),
     warnings: Sequence[str] = (),
 ) -> Capture:
-    """Make a capture from one row a frame.
+    """Build a capture from coordinates with one row per frame.
 
     Parameters
     ----------
     path, format, unit, rate, first_frame, modelled, warnings
         As in `Capture`.
     times : ndarray, shape (T,)
-        Seconds.
+        Times of the frames, seconds.
     coordinates : ndarray, shape (T, C, D)
-        In `unit`; NaN where a marker was not seen.
+        Coordinates in `unit`; NaN for a missed detection.
     names : sequence of str
-        Of the C channels.
+        Names of the C channels.
     zero_is_gap : bool
-        Whether all zeros mean "not seen", as they do in files of recording systems.
+        Whether all zeros are a missed detection, as in files of recording systems.
     is_stated : bool
-        Whether the file states its unit: then a size that contradicts it is a warning.
+        Whether the file states its unit. If so, a contradicting size adds a warning.
+
+    Returns
+    -------
+    Capture
+        Detections in metres with the identities of the channels.
     """
     seen: NDArray[np.bool_] = np.all(np.isfinite(coordinates), axis=2)
     notes = list(warnings)
     n_partial = int((np.isfinite(coordinates).any(axis=2) & ~seen).sum())
     if n_partial:
-        notes.append(f"{n_partial} points with some of their coordinates are taken as not seen")
+        notes.append(f"{n_partial} points with missing coordinates are taken as missed detections")
     if zero_is_gap:
         at_origin: NDArray[np.bool_] = np.all(coordinates == 0, axis=2)
         if at_origin.any():
-            notes.append(f"{at_origin.sum()} points at exactly the origin are taken as not seen")
+            n_origin = at_origin.sum()
+            notes.append(f"{n_origin} points at exactly the origin are taken as missed detections")
         seen &= ~at_origin
     labels, identity_names = identities(seen, names)
     points = coordinates[seen].reshape(-1, coordinates.shape[2]) / PER_METRE[unit]
@@ -89,23 +95,23 @@ def capture_of(
 def rows_of(
     tracks: Tracks, unit: str, *, zero_is_gap: bool
 ) -> tuple[list[str], Iterator[list[str]]]:
-    """Names of the channels of some tracks, and their coordinates as shortest exact texts.
+    """Return the channel names of tracks, and their coordinates as shortest exact texts.
 
     Parameters
     ----------
     tracks : Tracks
-        What to write.
+        Tracks to write.
     unit : str
         Unit of the texts.
     zero_is_gap : bool
-        Keep a point at the very origin from being read as a gap, by 1e-30 of a unit.
+        Move a point at the origin by 1e-30 of a unit, so that it is not read as a gap.
 
     Returns
     -------
     names : list of str
-        C channels: tracks, then clutter as ``*0`` …
+        Names of the C channels: the tracks, then clutter as ``*0``, ``*1`` and so on.
     rows : iterator of list of str
-        C·D texts a frame, blank where a marker was not seen.
+        C·D texts per frame, blank for a missed detection.
     """
     channels, names, _ = to_channels(tracks)
 

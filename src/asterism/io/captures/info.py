@@ -22,7 +22,7 @@ _MAX_FRAMES = 10_000  # frames in which neighbours are searched, evenly spaced
 
 @record
 class CaptureInfo:
-    """Figures of a capture; lengths in millimetres, NaN where nothing can be measured.
+    """Figures of a capture; lengths in millimetres, NaN if there is nothing to measure.
 
     Parameters
     ----------
@@ -64,9 +64,18 @@ class CaptureInfo:
     difficulty : str
         "easy", "moderate", "hard", or "unknown" without identities or neighbours.
     reason : str
-        Why.
+        Measurements that decided the difficulty, in words.
     warnings, truncated : tuple of str, str
         As in `Capture`.
+
+    Examples
+    --------
+    >>> import asterism as am, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     am.write(am.simulate.cube(frames=20, seed=1), f"{folder}/cube.csv")
+    ...     found = am.io.describe(am.read(f"{folder}/cube.csv"))
+    >>> found.points_min, found.points_max, found.n_gaps
+    (8, 8, 0)
     """
 
     path: Path
@@ -114,6 +123,7 @@ def describe(capture: Capture) -> CaptureInfo:
     Returns
     -------
     CaptureInfo
+        Figures of the capture.
 
     Notes
     -----
@@ -189,7 +199,7 @@ def _percentile(metres: NDArray[np.float64], q: float) -> float:
 
 
 def _gaps(capture: Capture, is_named: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int, int]:
-    """Lengths of the holes of named markers; their samples that could be there, and are not."""
+    """Return the lengths of the gaps of named markers, their possible and their missing samples."""
     label, frame = capture.labels[is_named], capture.frame_of[is_named]
     order = np.argsort(label, kind="stable")
     label, frame = label[order], frame[order]
@@ -275,7 +285,7 @@ def _verdict(
 
 
 def _pace(steps: NDArray[np.float64], spacing: NDArray[np.float64]) -> tuple[float, str]:
-    """How far fast points move compared with the distance of close ones, and how that is put."""
+    """Return the ratio of fast displacements to small distances, and a text of it."""
     fast, close = _percentile(steps, 99), _percentile(spacing, 5)
     if close > 0:
         return fast / close, f"{fast / close:.2g} times the distance of close ones"

@@ -1,7 +1,7 @@
-"""What the name of a channel says: a marker, a point without a name, or something computed.
+"""Classification of channel names: named markers, unnamed points and computed channels.
 
-Recording systems have their own words for points that nobody has named, and Plug-in-Gait and its
-relatives put joint centres, segment axes, angles and forces among the points. Those are not light.
+Recording systems have their own names for unnamed points. Plug-in-Gait and similar models store
+joint centres, segment axes, angles and forces as points; these are not measured.
 """
 
 from __future__ import annotations
@@ -26,17 +26,27 @@ _COMPUTED = re.compile(
     r"|[LR](HJC|KJC|AJC|SJC|EJC|WJC)"
     r"|CentreOf(Mass|Pressure)(Floor)?|CenterOf(Mass|Pressure)(Floor)?"
 )
-# The Oxford Foot Model: names such as LTIB1 could be markers, so they count only beside LFOF0.
+# The Oxford Foot Model: names such as LTIB1 could be markers, so they need LFOF0 in the same file.
 _OXFORD = re.compile(r"([LR])(ArchHeight(Index)?|D1M0|FOF\d|HDF\d|HE1|HLX\d|PROXFF|TIB\d)")
 
 
 def _bare(name: str) -> str:
-    """Name without its subject, ``Subject:LASI`` -> ``LASI``."""
+    """Return a name without its subject, ``Subject:LASI`` -> ``LASI``."""
     return name.rpartition(":")[2].strip()
 
 
 def is_unlabelled(name: str) -> bool:
-    """Whether a channel's name is a recording system's word for "nobody knows".
+    """Return whether a recording system gives this name to an unnamed channel.
+
+    Parameters
+    ----------
+    name : str
+        Name of a channel, with or without its subject.
+
+    Returns
+    -------
+    bool
+        True for an unnamed channel.
 
     Examples
     --------
@@ -47,24 +57,26 @@ def is_unlabelled(name: str) -> bool:
 
 
 def find_modelled(names: Sequence[str], groups: Mapping[str, Iterable[str]]) -> list[bool]:
-    """Tell which channels are computed and not seen.
+    """Return which channels are computed instead of measured.
 
     Parameters
     ----------
     names : sequence of str
         Name of each channel.
     groups : mapping of str to iterable of str
-        Lists of channel names by kind, as the C3D parameters POINT:ANGLES, POINT:FORCES … give.
+        Lists of channel names by kind, as in the C3D parameters POINT:ANGLES, POINT:FORCES and so
+        on.
 
     Returns
     -------
     list of bool
-        One for each name.
+        One value for each name.
 
     Notes
     -----
-    Computed are the members of those lists, the names of Plug-in-Gait, and the axes of a segment:
-    four channels of one stem that end in O, A, L and P (origin, anterior, lateral, proximal).
+    Computed channels are the members of those lists, the names of Plug-in-Gait, and the axes of a
+    segment: four channels of one stem that end in O, A, L and P (origin, anterior, lateral,
+    proximal).
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""CSV as OptiTrack Motive exports it: several rows of header say what each column is.
+"""CSV as OptiTrack Motive exports it: several header rows define the columns.
 
-Only markers that cameras saw are points. Poses of rigid bodies and bones, and the marker
-positions that their models predict, are computed.
+Only measured markers are detections. Poses of rigid bodies and bones, and the marker positions that
+their models predict, are computed.
 """
 
 from __future__ import annotations
@@ -26,28 +26,40 @@ _MOST_HEADER = 12  # rows
 
 
 def sniff(head: bytes) -> bool:
-    """Whether a file that begins so is a Motive export."""
+    """Return whether the first bytes of a file are those of a Motive export."""
     return head.removeprefix(b"\xef\xbb\xbf").startswith(b"Format Version")
 
 
 def read(path: Path) -> Capture:
-    """Read the markers of a Motive export.
+    r"""Read the measured markers of a Motive export.
 
     Parameters
     ----------
     path : Path
-        The file.
+        CSV file in the unit of its header.
 
     Returns
     -------
     Capture
-        Columns of type Marker. Rigid bodies, bones and their predicted markers are listed in
-        `Capture.modelled`.
+        Detections of the columns of type Marker. Rigid bodies, bones and their predicted markers
+        are listed in `Capture.modelled`.
 
     Raises
     ------
     FormatError
-        With the line that is not as it should be.
+        If the header has no column of type Marker, or a line is malformed; the error names it.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> rows = ["Format Version,1.23,Length Units,Meters", ",Type,Marker,Marker,Marker",
+    ...         ",Name,LASI,LASI,LASI", ",,Position,Position,Position",
+    ...         "Frame,Time (Seconds),X,Y,Z", "0,0.0,0.5,1.2,0.9"]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "take.csv")
+    ...     _ = path.write_text("\n".join(rows))
+    ...     read(path).names
+    ('LASI',)
     """
     lines = read_lines(path)
     rows = [cells_of(line) for line in lines[:_MOST_HEADER]]
@@ -57,7 +69,7 @@ def read(path: Path) -> Capture:
         raise FormatError(path, "the header", expected, repr(lines[0][:40]))
     facts = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
     titles = rows[titles_at]
-    # The second cell names the row; the row that says Position or Rotation has no name itself.
+    # The second cell is the name of the row; the row of Position and Rotation has none.
     kinds, names, what = (
         next((row for row in rows[1:titles_at] if row[1:2] == [key]), [])
         for key in ("Type", "Name", "")

@@ -1,6 +1,6 @@
-"""Binary logs of unlabelled point clouds, as librigidbodytracker keeps them.
+"""Binary logs of unlabelled point clouds, as librigidbodytracker writes them.
 
-Repeated, little-endian: uint32 milliseconds, uint32 n, n × float32 x, y, z in metres.
+Little-endian records, one per frame: uint32 milliseconds, uint32 n, n × float32 x, y, z in metres.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ __all__ = ["read", "sniff", "write"]
 
 _RECORD = struct.Struct("<II")
 _POINT = 12  # bytes
-_NEAREST, _FARTHEST = 1e-30, 1e6  # metres; anything: beyond what a coordinate can be, but for 0
-_MOST_POINTS = 100_000  # in one frame; a text file read as a log claims far more
+_NEAREST, _FARTHEST = 1e-30, 1e6  # metres; limits of any coordinate but 0
+_MOST_POINTS = 100_000  # in one frame; a text file that is read as a log claims far more
 
 
 def sniff(head: bytes) -> bool:
-    """Whether a file that begins so is a log: records chain on, and hold places of points.
+    """Return whether the first bytes of a file are a chain of records with plausible points.
 
-    The header of a C3D and some texts chain on too, but as floats they are no metres.
+    The header of a C3D and some texts are such chains too, but their floats are not plausible.
     """
     at, last, n_records, n_points, is_rising = 0, -1, 0, 0, True
     while at + _RECORD.size <= len(head):
@@ -50,22 +50,34 @@ def sniff(head: bytes) -> bool:
 
 
 def read(path: Path) -> Capture:
-    """Read a log.
+    """Read a binary log of point clouds.
 
     Parameters
     ----------
     path : Path
-        The file.
+        Log file.
 
     Returns
     -------
     Capture
-        Without identities: all labels are -1. Times begin at the clock's own first value.
+        Detections without identities: all labels are -1. Times begin at the first value of the
+        recorded clock.
 
     Raises
     ------
     FormatError
-        With the record that is cut off, or whose time does not follow that of the one before.
+        If a record is cut off, has a coordinate that is not finite, or has a time that is not
+        after the previous one; the error names the record.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "cube.log")
+    ...     am.write(am.simulate.cube(frames=5, seed=1), path)
+    ...     capture = read(path)
+    >>> capture.n_points, int(capture.labels.max())
+    (40, -1)
     """
     raw = path.read_bytes()
     times: list[int] = []
@@ -99,33 +111,42 @@ def read(path: Path) -> Capture:
         frame = int(np.searchsorted(offsets, bad[0], side="right")) - 1
         place = f"record {frame}, point {bad[0] - offsets[frame]}"
         raise FormatError(path, place, "finite coordinates", points[bad[0]])
-    nobody = np.full(len(points), -1, dtype=np.int64)
+    none = np.full(len(points), -1, dtype=np.int64)
     return Capture(
         times=np.array(times) / 1000,
         offsets=offsets,
         points=points.astype(np.float64),
         path=path,
         format="pointcloud",
-        channels=nobody,
-        labels=nobody,
+        channels=none,
+        labels=none,
         warnings=check_size(points, "m"),
     )
 
 
 def write(tracks: Tracks, file: IO[bytes]) -> None:
-    """Write the points of some tracks as a log; identities have no place in it.
+    """Write the detections of tracks as a binary log, without their identities.
 
     Parameters
     ----------
     tracks : Tracks
-        Over 3-D detections, at times of at least 0 that differ by a millisecond or more.
+        Tracks over 3-D detections. Times must be at least 0 and differ by a millisecond or more,
+        because the log counts whole milliseconds.
     file : binary file
-        Where to.
+        Open file to write to.
 
     Raises
     ------
     ParameterError
-        If the points are 2-D or the times do not fit whole milliseconds.
+        If the points are 2-D, exceed 32-bit floats, or have other times.
+
+    Examples
+    --------
+    >>> import asterism as am, io
+    >>> file = io.BytesIO()
+    >>> write(am.simulate.cube(frames=5, seed=1), file)
+    >>> len(file.getvalue())  # 5 records of 8 bytes with 8 points of 12 bytes each
+    520
     """
     d = tracks.detections
     if d.n_axes != 3:

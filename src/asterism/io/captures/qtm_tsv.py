@@ -1,7 +1,7 @@
-"""TSV as Qualisys Track Manager exports it: a header of keys, then millimetres, one row a frame.
+"""TSV as Qualisys Track Manager exports it: a header of keys, then one row per frame.
 
-Gaps are blank, NULL or all zeros. The columns ``Frame`` and ``Time`` and their line of titles
-are there only if they were asked for at export.
+Coordinates are millimetres. Gaps are blank, NULL or all zeros. The columns ``Frame`` and ``Time``
+and their line of titles are an option of the export.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["read", "sniff", "write"]
 
 
 def sniff(head: bytes) -> bool:
-    """Whether a file that begins so is a Qualisys TSV."""
+    """Return whether the first bytes of a file are those of a Qualisys TSV."""
     return head.removeprefix(b"\xef\xbb\xbf").startswith(b"NO_OF_FRAMES")
 
 
@@ -35,24 +35,35 @@ def read(path: Path) -> Capture:
     Parameters
     ----------
     path : Path
-        The file.
+        TSV file.
 
     Returns
     -------
     Capture
-        Trajectories that the system filled or computed are named in `Capture.warnings`.
+        Detections with one identity for each named marker. `Capture.warnings` lists trajectories
+        that the system filled or computed.
 
     Raises
     ------
     FormatError
-        With the line that is not as it should be.
+        If the file holds no 3-D data, or a line is malformed; the error names it.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "cube.tsv")
+    ...     am.write(am.simulate.cube(frames=5, seed=1), path)
+    ...     capture = read(path)
+    >>> capture.units, capture.n_points
+    ('mm', 40)
     """
     lines = read_lines(path)
     if not sniff(lines[0].encode()):
         raise FormatError(path, "line 1", "NO_OF_FRAMES and its value", repr(lines[0][:40]))
     header: dict[str, list[str]] = {}
     at = 0
-    # Keys are capitals; the first other line is the titles or the data.
+    # Keys are in capitals; the first other line holds the titles or the data.
     while at < len(lines) and (key := lines[at].split("\t")[0].strip()).isupper():
         header[key] = [field.strip() for field in lines[at].split("\t")[1:]]
         at += 1
@@ -82,10 +93,10 @@ def read(path: Path) -> Capture:
     first = values[0, 0] if has_time and len(values) and np.isfinite(values[0, 0]) else 1
     kinds = header.get("TRAJECTORY_TYPES", [])
     filled = [f"{n} ({k})" for n, k in zip(names, kinds, strict=False) if k and k != "Measured"]
-    warnings = [f"trajectories that are not as measured: {', '.join(filled)}"] if filled else []
+    warnings = [f"trajectories that were not measured: {', '.join(filled)}"] if filled else []
     n_frames = int(_number(path, header, "NO_OF_FRAMES", float(len(values))))
     if n_frames != len(values):
-        warnings.append(f"{len(values)} frames are there; the header says {n_frames}")
+        warnings.append(f"the file has {len(values)} frames; the header states {n_frames}")
     return capture_of(
         path,
         "qtm",
@@ -114,20 +125,28 @@ def _number(path: Path, header: dict[str, list[str]], key: str, default: float =
 
 
 def write(tracks: Tracks, file: IO[bytes]) -> None:
-    """Write tracks as Qualisys Track Manager does.
+    """Write tracks as a Qualisys TSV in millimetres.
 
     Parameters
     ----------
     tracks : Tracks
-        Over 3-D detections at a fixed rate; tracks without a name are called ``T000`` …, clutter
-        goes to columns ``*0``, ``*1`` …
+        Tracks over 3-D detections at a fixed rate. Tracks without a name are called ``T000``,
+        ``T001`` and so on; clutter is written to columns ``*0``, ``*1`` and so on.
     file : binary file
-        Where to.
+        Open file to write to.
 
     Raises
     ------
     ParameterError
-        If the detections are 2-D or the times irregular.
+        If the detections are 2-D or the times are irregular.
+
+    Examples
+    --------
+    >>> import asterism as am, io
+    >>> file = io.BytesIO()
+    >>> write(am.simulate.cube(frames=5, seed=1), file)
+    >>> file.getvalue().decode().splitlines()[0].split()
+    ['NO_OF_FRAMES', '5']
     """
     d = tracks.detections
     rate = fixed_rate(d, "TSV")

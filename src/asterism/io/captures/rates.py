@@ -1,4 +1,4 @@
-"""What most formats demand: 3-D points at one fixed rate."""
+"""Check for 3-D points at one fixed rate, which most formats require."""
 
 from __future__ import annotations
 
@@ -16,21 +16,20 @@ __all__ = ["fixed_rate"]
 
 
 def fixed_rate(detections: Detections, format_name: str) -> float:
-    """Check that detections fit a format of 3-D points at a fixed rate, and give that rate.
+    """Return the rate of detections that fit a format of 3-D points at a fixed rate.
 
     Parameters
     ----------
     detections : Detections
-        T frames. For a `Capture` its stated rate is taken if every time agrees with it to half a
-        frame, because files round their times.
+        T frames.
     format_name : str
-        For the message.
+        Name of the format for the message.
 
     Returns
     -------
     float
-        Frames a second; what the file stated for a `Capture` that agrees with it, else the mean,
-        and 100 where there are fewer than two frames.
+        Frame rate in Hz. The stated rate of a `Capture` if every time agrees with it to half a
+        frame, because files round their times; else the mean rate; 100 for fewer than two frames.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""TRC, the marker file of OpenSim and Motion Analysis: text, tabs, one row a frame.
+"""TRC, the marker file of OpenSim and Motion Analysis: text with tabs, one row per frame.
 
-Gaps are blank fields: zeros would be points, and NaN stops inverse kinematics.
+Gaps are blank fields: OpenSim would read zeros as points, and NaN stops inverse kinematics.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _KEYS = (
 
 
 def sniff(head: bytes) -> bool:
-    """Whether a file that begins so is TRC."""
+    """Return whether the first bytes of a file are those of a TRC file."""
     return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"PathFileType")
 
 
@@ -40,17 +40,27 @@ def read(path: Path) -> Capture:
     Parameters
     ----------
     path : Path
-        The file.
+        TRC file. Its unit is that of the header, or else is estimated from the coordinates.
 
     Returns
     -------
     Capture
-        Times are those of the file's own column.
+        Detections with one identity for each named marker, at the times of the file's column.
 
     Raises
     ------
     FormatError
-        With the line that is not as it should be.
+        If a line is malformed; the error names it.
+
+    Examples
+    --------
+    >>> import asterism as am, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "cube.trc")
+    ...     am.write(am.simulate.cube(frames=5, seed=1), path)
+    ...     capture = read(path)
+    >>> capture.units, capture.n_points
+    ('mm', 40)
     """
     lines = read_lines(path)
     if not sniff(lines[0].encode()) or len(lines) < 5:
@@ -65,8 +75,8 @@ def read(path: Path) -> Capture:
     names = [name.strip() for name in titles[2::3]]
     stray = [name for i, name in enumerate(titles[2:]) if i % 3 and name.strip()]
     if stray:
-        raise FormatError(path, "line 4", "two tabs between names", f"{stray[0]!r} out of step")
-    # Markers without a name at the end of the line: an exporter may trim its blanks.
+        raise FormatError(path, "line 4", "three tabs from name to name", repr(stray[0]))
+    # An exporter may trim the blanks of unnamed markers at the end of the line.
     axes = [axis for axis in lines[4].split("\t") if axis.strip()]
     n_markers = min(_count(header, "NumMarkers", len(names)), len(axes) // 3)
     names += [""] * (n_markers - len(names))
@@ -85,7 +95,7 @@ def read(path: Path) -> Capture:
     first = values[0, 0] if len(values) and np.isfinite(values[0, 0]) else 1
     n_frames = _count(header, "NumFrames", len(values))
     if n_frames != len(values):
-        warnings.append(f"{len(values)} frames are there; the header says {n_frames}")
+        warnings.append(f"the file has {len(values)} frames; the header states {n_frames}")
     return capture_of(
         path,
         "trc",
@@ -118,20 +128,28 @@ def _rate(header: dict[str, str]) -> float:
 
 
 def write(tracks: Tracks, file: IO[bytes]) -> None:
-    """Write tracks as TRC.
+    r"""Write tracks as TRC, in the unit of their source file or else in millimetres.
 
     Parameters
     ----------
     tracks : Tracks
-        Over 3-D detections at a fixed rate; tracks without a name are called ``T000`` …, clutter
-        goes to columns ``*0``, ``*1`` …
+        Tracks over 3-D detections at a fixed rate. Tracks without a name are called ``T000``,
+        ``T001`` and so on; clutter is written to columns ``*0``, ``*1`` and so on.
     file : binary file
-        Where to; the header holds its name.
+        Open file to write to; the header holds its name.
 
     Raises
     ------
     ParameterError
-        If the detections are 2-D or the times irregular.
+        If the detections are 2-D or the times are irregular.
+
+    Examples
+    --------
+    >>> import asterism as am, io
+    >>> file = io.BytesIO()
+    >>> write(am.simulate.cube(frames=5, seed=1), file)
+    >>> file.getvalue().decode().splitlines()[3].split("\t")[:2]
+    ['Frame#', 'Time']
     """
     d = tracks.detections
     rate = fixed_rate(d, "TRC")
