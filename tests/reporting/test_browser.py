@@ -136,14 +136,14 @@ def test_a_click_chooses_the_marker_under_it(opened, person):
     alone = max(places, key=gap)
     opened.click(x + places[alone][0] + 2, y + places[alone][1] - 1)
     assert opened.run("asterism.state().chosen") == alone
-    told = opened.run("document.querySelector('[data-about=place]').textContent")
+    shown_at = opened.run("document.querySelector('[data-about=place]').textContent")
     here = (tracks.labels == alone) & (tracks.detections.frame_of == 60)
-    shown = np.array([float(part) for part in told.split(", ")])
+    shown = np.array([float(part) for part in shown_at.split(", ")])
     assert np.abs(shown - 1000 * tracks.detections.points[here][0]).max() < 0.2
     opened.run("asterism.choose(-1)")
 
 
-def test_gaps_are_bridged_straight(opened, person):
+def test_gaps_are_drawn_straight(opened, person):
     tracks = person[1]
     places = tracks.positions()
     k = 7
@@ -154,8 +154,8 @@ def test_gaps_are_bridged_straight(opened, person):
     t = a + 2
     expected = places[a, k] + (t - a) / (b - a) * (places[b, k] - places[a, k])
     opened.run(f"asterism.choose({k}); asterism.seek({t})")
-    told = opened.run("document.querySelector('[data-about=place]').textContent")
-    assert np.abs(np.array([float(x) for x in told.split(", ")]) - 1000 * expected).max() < 0.2
+    shown_at = opened.run("document.querySelector('[data-about=place]').textContent")
+    assert np.abs(np.array([float(x) for x in shown_at.split(", ")]) - 1000 * expected).max() < 0.2
     assert "not seen" in opened.run("document.querySelector('[data-about=now]').textContent")
     opened.run("asterism.choose(-1)")
 

@@ -120,7 +120,7 @@ def test_odd_captures_have_a_page(browser, tmp_path, name):
     page.settle()
     assert page.complaints() == []
     lead = page.run("document.querySelector('.lead').textContent")
-    said = {"no frame": "empty", "no track": "all clutter", "flat": "flat"}
+    said = {"no frame": "empty", "no track": "all clutter", "flat": "2-D"}
     assert said.get(name, "") in lead
     if tracks.detections.n_points and tracks.n_tracks:
         picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")

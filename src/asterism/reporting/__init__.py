@@ -1,4 +1,4 @@
-"""From tracks to their report: what is known about them is gathered here and drawn by `page`."""
+"""Report of tracks: this package gathers the content, and `page` draws it."""
 
 from asterism.reporting.gather import report
 

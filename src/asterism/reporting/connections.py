@@ -1,4 +1,4 @@
-"""Lines between markers that keep their distance, so that a body can be seen in the points."""
+"""Lines between bonded markers, which make a body visible among the points."""
 
 from __future__ import annotations
 
@@ -17,29 +17,30 @@ if TYPE_CHECKING:
 __all__ = ["connections_of"]
 
 MOST_MARKERS = 200
-"""Tracks among which bonds are learnt, the longest; the time goes with the square."""
+"""Number of longest tracks among which bonds are estimated; the time grows with its square."""
 MOST_FRAMES = 500
 EACH = 2
-"""Bonds of a marker that are drawn beside those that hold the body together."""
+"""Number of shortest bonds of each marker that are drawn in addition to the spanning forest."""
 FARTHEST = 8.0
-"""Longest bond that is drawn, in usual distances from a marker to its nearest bonded one."""
+"""Longest bond that is drawn, in median distances from a marker to its nearest bonded one."""
 _NO_PAIRS = np.empty((0, 2), dtype=np.int64)
 
 
 def connections_of(tracks: Tracks) -> Connections:
-    """Learn which markers keep their distances, and choose the lines to draw.
+    """Estimate the bonds between markers, and select the lines to draw.
 
-    A body has far more bonds than an eye can sort out. Of the steady ones those are drawn that
-    join all that can be joined over the shortest ways (a minimal spanning forest), and the `EACH`
-    shortest of each marker.
+    A body has more bonds than a reader can distinguish. The lines are a minimal spanning forest of
+    the bonds, and the `EACH` shortest bonds of each marker.
 
     Parameters
     ----------
     tracks : Tracks
+        Tracks of the page; filled points are not used.
 
     Returns
     -------
     Connections
+        Lines, and a sentence about them for the page.
     """
     tracks = tracks.measured()
     longest = np.argsort(-tracks.lengths, kind="stable")[:MOST_MARKERS]
@@ -47,7 +48,7 @@ def connections_of(tracks: Tracks) -> Connections:
     few = thinned(tracks, max(1, -(-tracks.detections.n_frames // MOST_FRAMES)))
     number = np.full(tracks.n_tracks + 1, -1)
     number[longest] = np.arange(len(longest))
-    # Without names: two tracks of one name are no hindrance to a picture.
+    # Without names, because two tracks of one name are allowed in a picture.
     bonds = learn_bonds(
         replace(few, labels=number[few.labels], names=(None,) * len(longest), confidence=None)
     )
@@ -59,7 +60,7 @@ def connections_of(tracks: Tracks) -> Connections:
     usual = np.median(nearest[np.isfinite(nearest)]) if len(steady) else 0.0
     steady = steady[bonds.distances[steady] <= FARTHEST * usual]
     n_drawn = np.zeros(len(longest), dtype=np.int64)
-    body = np.arange(len(longest))  # which markers are joined already
+    body = np.arange(len(longest))  # connected component of each marker
     chosen: list[tuple[int, int]] = []
     for i, j in bonds.pairs[steady]:
         if body[i] != body[j] or n_drawn[i] < EACH or n_drawn[j] < EACH:
@@ -67,12 +68,12 @@ def connections_of(tracks: Tracks) -> Connections:
             chosen.append((int(longest[i]), int(longest[j])))
             n_drawn[[i, j]] += 1
     if not chosen:
-        text = "No lines between markers: no two were found to keep their distance."
+        text = "No lines are drawn: no bonds were found between markers."
         return Connections(pairs=_NO_PAIRS, about=text)
     text = (
-        f"Lines join markers that were found to keep their distance in this take (bonds learnt "
-        f"from it): {len(chosen)} of {len(steady)}, the shortest ones that hold a body together."
+        f"Lines are bonds: pairs of markers with a stable distance in this capture. The shortest "
+        f"{len(chosen)} of {len(steady)} that connect each body are drawn."
     )
     if np.count_nonzero(tracks.lengths) > MOST_MARKERS:
-        text += f" They were looked for among the {MOST_MARKERS} longest tracks alone."
+        text += f" Only the {MOST_MARKERS} longest tracks were searched for bonds."
     return Connections(pairs=np.array(sorted(chosen), dtype=np.int64), about=text)

@@ -1,4 +1,4 @@
-"""One call from tracks to a page."""
+"""The function `report`, which writes tracks as a page."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["report"]
 
-_Y_UP = ("motive_csv", "trc")
-"""Formats of programs in which y is up."""
+_Y_UP = ("motive", "trc")
+"""Keys of `CAPTURE_FORMATS` whose programs have y up."""
 _BY_THE_GROUND, _OFF_THE_GROUND = 0.1, 0.3  # metres
 _FRAMES_FOR_UP = 500
 
@@ -63,16 +63,16 @@ def report(
     title : str, optional
         Title of the page. By default the name of the tracked file.
     up : "x", "y" or "z", optional
-        The axis that points up. Unless given, it is the one that is up in the images of the `rig`;
-        without a rig y for TRC, for Motive's CSV and where the lowest points stay by y = 0 and far
-        from z = 0; and z for all else. The page says which, and can change it.
+        Axis that points up; the page states it and can change it. By default the axis that is up
+        in the images of the `rig`. Without a rig it is y for TRC, for Motive's CSV and if the
+        lowest points stay near y = 0 and far from z = 0, and z otherwise.
     overwrite_input : bool
         Allow `path` to be the file that the detections were read from.
 
     Raises
     ------
     ParameterError
-        If an argument is of another kind, the truth is of another capture, or `path` is the input.
+        If an argument has another type, the truth is of another capture, or `path` is the input.
     FormatError
         If the page cannot be written.
 
@@ -118,26 +118,26 @@ def report(
 
 
 def _up(tracks: Tracks, rig: Rig | None, asked: Axis | None) -> tuple[Axis, str]:
-    """Choose the axis that points up, and say how it is known."""
+    """Return the axis that points up, and a sentence with the reason."""
     if asked is not None:
-        return asked, f"The {asked} axis points up, as was asked for."
+        return asked, f"The {asked} axis points up, as set by the option `up`."
     if rig is not None:
         # An image has its rows from top to bottom.
         mean = np.mean([-camera.T_camera_world[1, :3] for camera in rig.cameras], axis=0)
         axes: tuple[Axis, ...] = ("x", "y", "z")
         axis = axes[int(np.argmax(np.abs(mean)))]
-        return axis, f"The {axis} axis points up: it does so in the images of the cameras."
+        return axis, f"The {axis} axis points up, as in the images of the cameras."
     d = tracks.detections
     if isinstance(d, Capture) and d.format in _Y_UP:
         return "y", "The y axis points up, as in most files of this format."
     if d.n_axes == 3 and _stands_on_y(tracks):
         text = "The y axis is taken to point up: the lowest points stay near y = 0, far from z = 0."
-        return "y", f"{text} It can be changed under the player."
-    return "z", "The z axis is taken to point up; change it under the player if another does."
+        return "y", f"{text} Change it below the player if this is wrong."
+    return "z", "The z axis is taken to point up. Change it below the player if this is wrong."
 
 
 def _stands_on_y(tracks: Tracks) -> bool:
-    """Whether what is lowest stays by the ground y = 0, and nowhere near z = 0."""
+    """Return whether the lowest points stay near the ground y = 0, and far from z = 0."""
     d = tracks.detections
     frames = range(0, d.n_frames, max(1, d.n_frames // _FRAMES_FOR_UP))
     lowest = [d.frame(t).min(axis=0) for t in frames if len(d.frame(t))]

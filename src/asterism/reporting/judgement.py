@@ -1,4 +1,4 @@
-"""What the truth says about tracks: point by point, and in scores with what they mean."""
+"""Comparison of tracks with the truth: a verdict for each point, and explained scores."""
 
 from __future__ import annotations
 
@@ -22,22 +22,23 @@ __all__ = ["judge"]
 def judge(tracks: Tracks, truth: Tracks) -> Judgement:
     """Compare tracks with the truth.
 
-    A label is wrong where its detection is of another marker than its track has most often, the
-    lowest of several, as for `Evaluation.wrong_percent`.
+    A label is wrong if the marker of its detection differs from the most frequent marker of its
+    track (the lowest if several are equally frequent), as for `Evaluation.wrong_percent`.
 
     Parameters
     ----------
     tracks, truth : Tracks
-        What was found and what is so.
+        Tracks of the page, and the ground truth.
 
     Returns
     -------
     Judgement
+        Verdicts, true markers and scores.
 
     Raises
     ------
     ParameterError
-        If they are not of the same capture.
+        If tracks and truth are not of the same capture.
     """
     both = align(tracks, truth)
     verdicts = np.full(tracks.detections.n_points, int(Verdict.RIGHT))
@@ -71,25 +72,24 @@ def _verdicts(both: Alignment) -> NDArray[np.int64]:
 
 def _scores(e: Evaluation) -> tuple[Score, ...]:
     rows = (
-        ("IDF1", _number(e.idf1), "The share of right identities, when each marker may have one "
-         "track only: 1 is perfect. It balances the two below."),
-        ("Switches", f"{e.switches:,}", "How often a marker goes on under another track than "
-         "before."),
-        ("IDP", _number(e.idp), "Of what was labelled, the share that has the one right track."),
-        ("IDR", _number(e.idr), "Of what there was to label, the share that has the one right "
-         "track."),
-        ("Wrong labels", _percent(e.wrong_percent), "Labelled points that belong to another marker "
-         "than their track has most often, or to none."),
-        ("Missed", f"{e.missed:,}", "Points of markers that were left without a label."),
-        ("Labelled clutter", f"{e.false_labels:,}", "Points of no marker that were given a label."),
-        ("MOTA", _number(e.mota), "1 minus missed points, labelled clutter and switches, as a "
-         "share of all points of markers."),
-        ("HOTA", _number(e.hota), "Finding points and keeping identities in one number, each "
-         "counting alike: 1 is perfect."),
-        ("Fragments", f"{e.fragments:,}", "How often a marker loses its label and gets one back "
-         "while it is seen all the time."),
-        ("Tracks a marker", _number(e.tracks_per_marker), "How many pieces a marker is in, on "
-         "average: 1 is perfect."),
+        ("IDF1", _number(e.idf1), "Harmonic mean of IDP and IDR; 1 is perfect."),
+        ("Switches", f"{e.switches:,}", "Number of times that the track of a marker changes."),
+        ("IDP", _number(e.idp), "Share of the labelled points that are in the one track matched to "
+         "their marker."),
+        ("IDR", _number(e.idr), "Share of the points of markers that are in the one track matched "
+         "to their marker."),
+        ("Wrong labels", _percent(e.wrong_percent), "Share of the labelled points whose marker is "
+         "not the most frequent marker of their track."),
+        ("Missed", f"{e.missed:,}", "Number of points of markers without a label."),
+        ("Labelled clutter", f"{e.false_labels:,}", "Number of clutter points with a label."),
+        ("MOTA", _number(e.mota), "1 minus the number of missed points, labelled clutter and "
+         "switches, divided by the number of points of markers."),
+        ("HOTA", _number(e.hota), "Score with equal weights for detection and association; 1 is "
+         "perfect."),
+        ("Fragments", f"{e.fragments:,}", "Number of times that a marker loses its label and gets "
+         "one again, with unlabelled points between."),
+        ("Tracks per marker", _number(e.tracks_per_marker), "Mean number of tracks of a marker; 1 "
+         "is perfect."),
     )  # fmt: skip
     return tuple(Score(name=name, value=value, sentence=text) for name, value, text in rows)
 

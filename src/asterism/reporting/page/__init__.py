@@ -1,6 +1,6 @@
-"""The report: one HTML page with a player, that needs nothing but itself.
+"""The report: one self-contained HTML page with a player.
 
-This package draws; what it shows is handed to it as `Contents`. `asterism.report` gathers that.
+This package draws the `Contents` that `asterism.report` gathers.
 """
 
 from asterism.reporting.page.contents import Connections, Contents, Judgement, Score, Verdict

@@ -1,4 +1,4 @@
-"""Contents of a report page, as the caller hands them over."""
+"""Contents of a report page."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ Axis = Literal["x", "y", "z"]
 
 
 class Verdict(IntEnum):
-    """What the truth says about the label of a detection."""
+    """Result of the comparison of a detection's label with the truth."""
 
     RIGHT = 0
-    """Labelled with the marker that its track has most often, or rightly clutter."""
+    """Labelled, and of the most frequent marker of its track; or clutter without a label."""
     WRONG = 1
-    """Labelled, but of another marker than its track, or of none."""
+    """Labelled, but of another marker than the most frequent one of its track, or clutter."""
     MISSED = 2
-    """A marker that was taken for clutter."""
+    """Detection of a marker without a label."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """A number and what it says.
+    """Score with its explanation.
 
     Parameters
     ----------
     name, value : str
-        As people read them.
+        Name and formatted value.
     sentence : str
-        What the number means, in one plain sentence.
+        Meaning of the score in one sentence.
     """
 
     name: str
@@ -49,20 +49,20 @@ class Score:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judgement:
-    """What is known from the truth.
+    """Comparison of tracks with the truth.
 
     Parameters
     ----------
     verdicts : ndarray of int, shape (N,)
-        A `Verdict` for each detection of the tracks.
+        `Verdict` of each detection of the tracks.
     markers : ndarray of int, shape (N,)
-        The true marker of each detection, -1 for clutter.
+        True marker of each detection, -1 for clutter.
     names : tuple of str or None
-        Of the true markers.
+        Names of the true markers.
     scores : tuple of Score
-        How good the tracks are.
+        Scores of the tracks.
     n_elsewhere : int
-        Detections of markers that the truth has and the tracks lack: they cannot be drawn.
+        Number of detections of markers that only the truth has, which cannot be drawn.
     """
 
     verdicts: NDArray[np.int64]
@@ -79,9 +79,9 @@ class Connections:
     Parameters
     ----------
     pairs : ndarray of int, shape (M, 2)
-        Tracks that are joined by a line.
+        Pairs of tracks that a line connects.
     about : str
-        Where they come from, a sentence for people.
+        Sentence about the origin of the lines, for the page.
     """
 
     pairs: NDArray[np.int64]
@@ -90,30 +90,30 @@ class Connections:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contents:
-    """All that a report shows.
+    """Contents of a report page.
 
     Parameters
     ----------
     title : str
-        Usually the name of the capture.
+        Title, as a rule the name of the capture.
     tracks : Tracks
-        2-D or 3-D.
+        Tracks in 2-D or 3-D.
     made : str
-        How the tracks were made, a sentence or two for the top; may be empty.
+        Sentences at the top about the method and the model; may be empty.
     summary : tuple of (str, str)
-        What was done, as names and values.
+        Names and values for the table about the tracking.
     warnings : tuple of str
-        What the reader should know before believing anything.
+        Warnings at the top of the page.
     up : "x", "y" or "z"
-        The axis that points up.
+        Axis that points up.
     about_up : str
-        How that is known, a sentence.
+        Sentence with the reason for `up`.
     connections : Connections
         Lines between markers.
     judgement : Judgement or None
-        What the truth says, where there is one.
+        Comparison with the truth, None without a truth.
     rig : Rig or None
-        The cameras, where they are known.
+        Cameras, None if they are not known.
     """
 
     title: str

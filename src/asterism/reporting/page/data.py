@@ -1,4 +1,4 @@
-"""What the player plays, as a header and arrays."""
+"""Data of the player, as a header and arrays."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ _RADIUS = 0.012  # of markers as they are drawn, metres; less where they are clo
 
 
 class Played(NamedTuple):
-    """The player's data, and what was lost on the way to it.
+    """Data of the player, and their losses against the full data.
 
     Attributes
     ----------
     text : str
-        Base64, for the page.
+        Data in Base64.
     stride : int
-        Every so-manieth frame is shown.
+        Number of frames of the capture per frame of the player.
     resolution : float
-        Coarsest distance of the grid on which positions are kept, metres.
+        Largest spacing of the grid of positions, metres.
     n_outside : int
-        Clutter too far away to be drawn.
+        Number of clutter points that are too far away to be drawn.
     lens_error : float
-        The most that a point in a camera's image is off, pixels.
+        Largest error of a point in the image of a camera, pixels.
     """
 
     text: str
@@ -51,14 +51,19 @@ class Played(NamedTuple):
 
 
 def played(contents: Contents, order: NDArray[np.int64]) -> Played:
-    """Gather, thin and pack what the player plays.
+    """Select the frames of the player, and pack its data.
 
     Parameters
     ----------
     contents : Contents
-        What the report shows.
+        Contents of the page.
     order : ndarray of int, shape (K,)
-        Tracks, the most troubled first.
+        Tracks in the order of the weights of their findings, the largest first.
+
+    Returns
+    -------
+    Played
+        Packed data.
     """
     full = contents.tracks
     stride = stride_for(full.detections.n_points)
@@ -119,7 +124,7 @@ def played(contents: Contents, order: NDArray[np.int64]) -> Played:
 def _coded(
     cells: NDArray[np.int64], begins: NDArray[np.int64]
 ) -> tuple[int, list[NDArray[np.uint16]]]:
-    """Predict from one or from two before, whichever leaves less."""
+    """Encode by prediction from one or two earlier values, whichever gives the shorter code."""
     both = {n: [residuals(axis, begins, n) for axis in cells.T] for n in (1, 2)}
     size = {n: sum(float(np.log2(1.0 + r).sum()) for r in rest) for n, rest in both.items()}
     level = min(both, key=lambda n: size[n])
@@ -140,9 +145,10 @@ def _first_frame(tracks: Tracks) -> int:
 
 
 def _opening_frame(d: Detections) -> int:
-    """Return the first frame with at least half of the usual number of points.
+    """Return the first frame with at least half of the median number of points.
 
-    Usual is the median over the frames that hold any: many captures begin before the subject does.
+    The median is over the frames with points, because many captures begin before the subject
+    enters.
     """
     counts = d.counts
     if not counts.any():

@@ -1,4 +1,4 @@
-"""The page: what stands in it, and what it may do."""
+"""The page: its document, and the policy that restricts it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["MOST_LISTED", "page"]
 
 MOST_LISTED = 60
-"""Entries of the list of what to look at first; the page says of how many."""
+"""Length of the list of findings; the page states the total number."""
 _ICON = (
     "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 16 16'%3E"
     "%3Cpath d='M3 12 8 3l5 6z' fill='none' stroke='%230072B2'/%3E%3Cg fill='%230072B2'%3E"
@@ -38,18 +38,18 @@ _ICON = (
 
 
 def page(contents: Contents) -> bytes:
-    """Make the page.
+    """Build the page.
 
     Parameters
     ----------
     contents : Contents
-        What it shows.
+        Contents of the page.
 
     Returns
     -------
     bytes
-        HTML in UTF-8, the same for the same contents. It asks nobody for anything: its policy
-        forbids all requests, and all scripts and styles but its own.
+        HTML in UTF-8, the same for the same contents. Its policy forbids all requests, and all
+        scripts and styles but its own.
     """
     script, style = _bundled("player.js"), _bundled("player.css")
     findings = find_troubles(contents.tracks, contents.judgement)
@@ -87,7 +87,7 @@ def page(contents: Contents) -> bytes:
 
 
 def _policy(script: str, style: str) -> str:
-    """Forbid everything, and then allow what is here."""
+    """Return a policy that forbids everything but the page's own script and style."""
 
     def hashed(text: str) -> str:
         return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
@@ -104,7 +104,7 @@ def _bundled(name: str) -> str:
 
 
 def _by_trouble(contents: Contents, findings: Sequence[Finding]) -> NDArray[np.int64]:
-    """Sort tracks: the most troubled first, and where there is no trouble by their number."""
+    """Sort tracks by the weight of their findings, the largest first, and then by number."""
     trouble = np.zeros(contents.tracks.n_tracks)
     for finding in findings:
         if finding.track >= 0:
@@ -140,11 +140,9 @@ def _list(findings: Sequence[Finding], contents: Contents, stride: int) -> Marku
     if not findings:
         sure = contents.tracks.confidence is not None
         if not (contents.tracks.labels >= 0).any():
-            return element(
-                "p", "There is no track to look at.", class_="quiet", id="findings-count"
-            )
-        text = "Nothing stands out: no long gap, no strange step, no track begun midway"
-        text += ", no doubtful label." if sure else "."
+            return element("p", "The result has no track.", class_="quiet", id="findings-count")
+        text = "No findings: no long gap, no improbable step, no track that starts or ends midway"
+        text += ", no label of low confidence." if sure else "."
         return element("p", text, class_="quiet", id="findings-count")
     names, times = contents.tracks.display_names, contents.tracks.detections.times
     shown = [
@@ -168,7 +166,7 @@ def _list(findings: Sequence[Finding], contents: Contents, stride: int) -> Marku
     parts = ", ".join(f"{kind} {n:,}" for kind, n in kinds.most_common())
     n = len(findings)
     count = f"{n:,} places" if n > 1 else "One place"
-    count += f", the {len(shown)} worst below" if n > len(shown) else ""
+    count += f", of which the {len(shown)} most severe are listed" if n > len(shown) else ""
     return joined(
         element("p", f"{count}: {parts}.", class_="quiet", id="findings-count"),
         element("ol", *shown, id="findings"),
@@ -190,11 +188,11 @@ def _scores(contents: Contents) -> Markup:
     ]
     lost = ""
     if judged.n_elsewhere:
-        text = f"{judged.n_elsewhere:,} points of markers are in the truth only; they count as "
-        lost = element("p", text + "missed above, and cannot be drawn.", class_="quiet")
+        text = f"{judged.n_elsewhere:,} points of markers are in the truth only. They count as "
+        lost = element("p", text + "missed above and are not drawn.", class_="quiet")
     return element(
         "section",
-        element("h2", "Against the truth"),
+        element("h2", "Comparison with the truth"),
         element("table", *rows),
         lost,
         class_="judged",
@@ -207,9 +205,9 @@ def _made(contents: Contents) -> Markup:
         return Markup()
     parts = [_table(contents.summary)] if contents.summary else []
     if info:
-        told = element("summary", "What the method tells of itself")
-        parts.append(element("details", told, _table(info)))
-    return element("section", element("h2", "How it was made"), *parts)
+        heading = element("summary", "Figures reported by the method")
+        parts.append(element("details", heading, _table(info)))
+    return element("section", element("h2", "Method and model"), *parts)
 
 
 def _table(rows: Sequence[tuple[str, str]]) -> Markup:
@@ -219,33 +217,35 @@ def _table(rows: Sequence[tuple[str, str]]) -> Markup:
 
 def _drawn(contents: Contents, play: Played) -> Markup:
     d = contents.tracks.detections
-    told = [
-        f"Positions are kept on a grid of {1e3 * play.resolution:.2g} mm for drawing; all figures "
-        "come from the full numbers.",
+    notes = [
+        f"Positions are drawn on a grid of {1e3 * play.resolution:.2g} mm; all figures are "
+        "computed from the full numbers.",
         contents.connections.about,
     ]
     if d.n_axes == 3:
-        told.append(contents.about_up)
+        notes.append(contents.about_up)
     if contents.tracks.confidence is None:
-        told.append("The tracks carry no confidence: strips show presence alone.")
+        notes.append("The tracks have no confidence: the timeline shows presence only.")
     if play.stride > 1:
-        told.append(
+        notes.append(
             f"Every {_ordinal(play.stride)} frame is shown ({-(-d.n_frames // play.stride):,} of "
             f"{d.n_frames:,}), because a page holds {MOST_POINTS:,} points at most. Figures and "
-            "the list of places are of all frames."
+            "the list of findings are of all frames."
         )
     if play.n_outside:
-        told.append(
+        notes.append(
             f"{play.n_outside:,} points of clutter are too far from all tracks to be drawn."
         )
     if contents.rig is not None:
-        told.append(
-            "In the images of the cameras points are within "
+        notes.append(
+            "In the images of the cameras, points are drawn within "
             f"{max(play.lens_error, 0.01):.2f} pixels of the calibrated lens. "
-            "What a body hides from a camera is not known here."
+            "Occlusion by bodies is not drawn."
         )
-    items = [element("li", text) for text in told]
-    return element("section", element("h2", "What is drawn"), element("ul", *items, id="notes"))
+    items = [element("li", text) for text in notes]
+    return element(
+        "section", element("h2", "Notes on the drawing"), element("ul", *items, id="notes")
+    )
 
 
 def _ordinal(n: int) -> str:

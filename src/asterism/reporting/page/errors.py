@@ -1,4 +1,4 @@
-"""What the truth shows to be wrong: wrong markers, switches, markers taken for clutter."""
+"""Errors according to the truth: wrong markers, switches, and markers without a label."""
 
 from __future__ import annotations
 
@@ -21,12 +21,19 @@ __all__ = ["errors"]
 
 
 def errors(tracks: Tracks, judgement: Judgement) -> Iterator[Error]:
-    """Find what is wrong.
+    """Find the errors of tracks.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of the page.
+    judgement : Judgement
+        Comparison of the tracks with the truth.
 
     Yields
     ------
     kind, track, frame, size, reason : str, int, int, float, str
-        As for a `Finding`; the size is in detections, or 1 for each switch.
+        As for a `Finding`; the size is the number of detections, or 1 for each switch.
     """
     yield from _wrong(tracks, judgement)
     yield from _switches(tracks, judgement)
@@ -39,16 +46,16 @@ def _wrong(tracks: Tracks, judgement: Judgement) -> Iterator[Error]:
     own[tracks.labels[is_right]] = judgement.markers[is_right]
     members = np.flatnonzero((judgement.verdicts == Verdict.WRONG) & (tracks.labels >= 0))
     for track, group in stretches(tracks, members):
-        reason = f"{len(group)} points are truly" if len(group) > 1 else "1 point is truly"
+        reason = f"{len(group)} points are of" if len(group) > 1 else "1 point is of"
         reason += f" {_name(judgement, int(judgement.markers[group[0]]))}"
         if own[track] >= 0:
-            reason += f"; its marker is {_name(judgement, int(own[track]))}"
+            reason += f"; the track's marker is {_name(judgement, int(own[track]))}"
         frame = int(tracks.detections.frame_of[group[0]])
         yield "wrong marker", track, frame, float(len(group)), reason
 
 
 def _switches(tracks: Tracks, judgement: Judgement) -> Iterator[Error]:
-    """Markers that go on under another track, as `Evaluation.switches` counts them."""
+    """Find the detections at which the track of a marker changes, as in `Evaluation.switches`."""
     names, frame = tracks.display_names, tracks.detections.frame_of
     both = np.flatnonzero((tracks.labels >= 0) & (judgement.markers >= 0))
     both = both[np.argsort(judgement.markers[both], kind="stable")]
@@ -58,7 +65,7 @@ def _switches(tracks: Tracks, judgement: Judgement) -> Iterator[Error]:
     )
     for i, j in zip(before[is_switch], after[is_switch], strict=True):
         marker = _name(judgement, int(judgement.markers[i]))
-        reason = f"{marker} goes on here; before, it was {names[tracks.labels[i]]}"
+        reason = f"{marker} continues in this track; before, it was in {names[tracks.labels[i]]}"
         yield "switch", int(tracks.labels[j]), int(frame[j]), 1.0, reason
 
 
@@ -70,7 +77,7 @@ def _missed(tracks: Tracks, judgement: Judgement) -> Iterator[Error]:
         its = np.sort(frame[marker == k])
         for group in np.split(its, np.flatnonzero(np.diff(its) > 2) + 1):
             n = f"{len(group)} frames" if len(group) > 1 else "1 frame"
-            reason = f"{_name(judgement, int(k))} taken for clutter in {n}"
+            reason = f"{_name(judgement, int(k))} has no label in {n}"
             yield "missed", -1, int(group[0]), float(len(group)), reason
 
 

@@ -1,4 +1,4 @@
-"""What tracks come to, in figures and in a sentence."""
+"""Counts of a result, as figures and as a sentence."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ class Facts(NamedTuple):
     Attributes
     ----------
     n_frames, n_points, n_tracks, n_named, n_labelled, n_clutter, n_filled : int
-        Frames; points measured or filled; tracks with a point, those with a name; points in tracks,
-        in none, and filled.
+        Number of frames; of points, measured or filled; of tracks with a point, and with a name; of
+        points in tracks, in clutter, and filled.
     seconds, rate : float
-        From the first to the last frame; usual frames a second.
+        Time from the first to the last frame in seconds, and frame rate in Hz.
     n_gaps : int
-        Gaps within tracks.
+        Number of gaps within tracks.
     longest_gap : float
-        Seconds.
+        Longest gap, seconds.
     n_doubtful : int or None
-        Labels held below `DOUBTFUL`; None where nothing says how surely they are held.
+        Number of labels with a confidence below `DOUBTFUL`; None if labels have no confidence.
     """
 
     n_frames: int
@@ -48,7 +48,7 @@ class Facts(NamedTuple):
 
 
 def facts_of(tracks: Tracks) -> Facts:
-    """Count what there is."""
+    """Count the frames, points, tracks and gaps of tracks."""
     d = tracks.detections
     is_labelled = tracks.labels >= 0
     gaps = gaps_of(tracks)
@@ -71,14 +71,14 @@ def facts_of(tracks: Tracks) -> Facts:
 
 
 def in_words(facts: Facts, n_axes: int) -> str:
-    """Say in a sentence or two what is in the result."""
+    """Return the counts as one or two sentences."""
     if not facts.n_frames:
         return "An empty capture: no frame, no point, no track."
-    span = _count(facts.n_frames, "frame") + ("" if n_axes == 3 else " of a flat capture")
+    span = _count(facts.n_frames, "frame") + ("" if n_axes == 3 else " of a 2-D capture")
     if facts.rate:
         span += f" ({facts.seconds:.3g} s at {facts.rate:.4g} Hz)"
     if not facts.n_points:
-        return f"{span}, and not a single point."
+        return f"{span} without points."
     if not facts.n_tracks:
         return f"{span}. None of the {_count(facts.n_points, 'point')} is in a track: all clutter."
     named = "" if not facts.n_named else ", all named," if facts.n_named == facts.n_tracks else ""
@@ -86,7 +86,7 @@ def in_words(facts: Facts, n_axes: int) -> str:
         named = f", {facts.n_named:,} of them named,"
     share = 100 * facts.n_labelled / facts.n_points
     text = f"{_count(facts.n_tracks, 'track')}{named} over {span}. "
-    text += f"{_percent(share)} of {_count(facts.n_points, 'point')} carry a label"
+    text += f"{_percent(share)} of {_count(facts.n_points, 'point')} have a label"
     if facts.n_clutter:
         text += f"; {facts.n_clutter:,} are clutter"
     return text + "."
@@ -100,19 +100,23 @@ def cards(facts: Facts) -> list[tuple[str, str, str]]:
         ("tracks", f"{facts.n_tracks:,}", _only("track", facts.n_tracks)),
         ("labelled", share, f"of {_count(facts.n_points, 'point')} labelled"),
         ("gaps", f"{facts.n_gaps:,}", f"{_only('gap', facts.n_gaps)} within tracks{gap}"),
-        ("clutter", f"{facts.n_clutter:,}", "points taken for clutter"),
+        ("clutter", f"{facts.n_clutter:,}", "points without a label (clutter)"),
     ]
     if facts.n_doubtful is not None:
         found.append(
-            ("doubtful", f"{facts.n_doubtful:,}", f"labels held below {100 * DOUBTFUL:.0f}\xa0%")
+            (
+                "doubtful",
+                f"{facts.n_doubtful:,}",
+                f"labels below {100 * DOUBTFUL:.0f}\xa0% confidence",
+            )
         )
     if facts.n_filled:
-        found.append(("filled", f"{facts.n_filled:,}", "points filled in, not measured"))
+        found.append(("filled", f"{facts.n_filled:,}", "filled points, not measured"))
     return found
 
 
 def _percent(share: float) -> str:
-    """Round, but never up to all or down to none."""
+    """Round a percentage, but never to 0 or 100 unless it is exact."""
     if share in (0.0, 100.0):
         return f"{share:.0f} %"
     return f"{min(max(share, 0.1), 99.9):.1f} %"

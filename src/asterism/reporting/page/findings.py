@@ -1,4 +1,4 @@
-"""What to look at first: where tracks are most likely wrong, with the reason."""
+"""Findings: places at which tracks are most likely wrong, with the reason."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 __all__ = ["DOUBTFUL", "Finding", "find_troubles"]
 
 DOUBTFUL = 0.9
-"""Confidence below which a label is doubtful."""
+"""Confidence below which a label is listed."""
 LONG = 0.1
-"""Seconds from which a gap is long."""
+"""Shortest long gap, seconds."""
 _WEIGHT = {  # what each kind counts beside the others
     "wrong marker": 100.0, "switch": 80.0, "likely swap": 50.0, "jump": 10.0, "low confidence": 4.0,
     "begun midway": 3.0, "ends early": 2.0, "long gap": 1.0, "missed": 1.0,
@@ -32,20 +32,20 @@ _WEIGHT = {  # what each kind counts beside the others
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A place that deserves a look.
+    """Place at which tracks are probably wrong.
 
     Parameters
     ----------
     kind : str
-        Such as ``"likely swap"``.
+        Kind, such as ``"likely swap"``.
     track : int
-        The track, -1 where it is not about one.
+        Track of the finding, -1 for none.
     frame : int
-        Where to look, counted from 0.
+        Frame, counted from 0.
     weight : float
-        How bad it may be; only good for sorting.
+        Severity, by which findings are sorted.
     reason : str
-        What was seen, for people.
+        Reason in words.
     """
 
     kind: str
@@ -56,19 +56,19 @@ class Finding:
 
 
 def find_troubles(tracks: Tracks, judgement: Judgement | None = None) -> list[Finding]:
-    """Look through tracks for what is most likely wrong.
+    """Find the places at which tracks are most likely wrong.
 
     Parameters
     ----------
     tracks : Tracks
-        What was found.
+        Tracks of the page.
     judgement : Judgement, optional
-        What the truth says; then the wrong ones are known, and said.
+        Comparison with the truth, whose errors are added.
 
     Returns
     -------
     list of Finding
-        The worst first.
+        Findings in the order of their weights, the largest first.
     """
     found = [*_doubts(tracks), *_gaps(tracks), *_ends(tracks), *_steps(tracks)]
     if judgement is not None:
@@ -91,7 +91,7 @@ def _doubts(tracks: Tracks) -> Iterator[Finding]:
     c, frame = tracks.confidence, tracks.detections.frame_of
     for track, group in stretches(tracks, np.flatnonzero((tracks.labels >= 0) & (c < DOUBTFUL))):
         least = group[np.argmin(c[group])]
-        reason = f"held with {100 * c[least]:.0f} % at the worst" + (
+        reason = f"lowest confidence {100 * c[least]:.0f} %" + (
             f"; {len(group)} points below {100 * DOUBTFUL:.0f} %" if len(group) > 1 else ""
         )
         yield _finding("low confidence", track, frame[least], float((1 - c[group]).sum()), reason)
@@ -101,19 +101,19 @@ def _gaps(tracks: Tracks) -> Iterator[Finding]:
     gaps = gaps_of(tracks)
     for k, first, n, seconds in zip(*gaps, strict=True):
         if seconds >= LONG:
-            reason = f"not seen for {seconds:.3g} s ({n} frames), then taken up again"
+            reason = f"no detection for {seconds:.3g} s ({n} frames), then continued"
             yield _finding("long gap", k, first + n, float(seconds), reason)
 
 
 def _ends(tracks: Tracks) -> Iterator[Finding]:
-    """Tracks that begin or end in the middle: often one marker in two pieces."""
+    """Find tracks that begin or end midway, which are often two tracklets of one marker."""
     d = tracks.detections
     order, starts = tracks.by_track
     for k in np.flatnonzero(tracks.lengths):
         first, last = (d.frame_of[order[i]] for i in (starts[k], starts[k + 1] - 1))
         since, left = d.times[first] - d.times[0], d.times[-1] - d.times[last]
         if since >= LONG:
-            reason = f"begins {since:.3g} s after the start: a marker found again, or a ghost?"
+            reason = f"begins {since:.3g} s after the start: a reappearing marker, or a ghost"
             yield _finding("begun midway", k, first, 1.0, reason)
         if left >= LONG:
             reason = f"ends {left:.3g} s before the end"
@@ -132,8 +132,8 @@ def _steps(tracks: Tracks) -> Iterator[Finding]:
             jumps[step.detection] = step
     for steps in swaps.values():
         first = min(steps, key=lambda step: step.detection)
-        reason = f"{_off(first)}; that is where {names[first.other]} was heading, and vice versa"
-        reason += f"; {len(steps)} times in all" if len(steps) > 1 else ""
+        reason = f"{_off(first)}, where {names[first.other]} was predicted, and vice versa"
+        reason += f"; {len(steps)} times in total" if len(steps) > 1 else ""
         k = tracks.labels[first.detection]
         yield _finding("likely swap", k, frame[first.detection], 1.0, reason)
     for k, group in stretches(tracks, np.array(sorted(jumps), dtype=np.int64)):
@@ -143,4 +143,4 @@ def _steps(tracks: Tracks) -> Iterator[Finding]:
 
 
 def _off(step: StrangeStep) -> str:
-    return f"{1e3 * step.off:.0f} mm off its course, {step.ratio:.0f} × as much as usual"
+    return f"{1e3 * step.off:.0f} mm from its prediction, {step.ratio:.0f} × the track's median"

@@ -1,4 +1,4 @@
-"""Cameras as the player knows them: a pin-hole, and a table of what the lens adds."""
+"""Cameras of the player: a pinhole, and a table of the displacements by the lens."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["camera_header", "lens_table", "pixels_by"]
 
 SIDE = 41
-"""Places of the table along each side; between them it is interpolated."""
+"""Number of nodes of the table along each side; it is interpolated between them."""
 _WITHOUT = np.float32(np.nan)
 
 
@@ -24,7 +24,7 @@ def camera_header(camera: Camera, number: int) -> dict[str, Any]:
     right, low = width - 0.5, height - 0.5
     corners = np.array([[-0.5, -0.5], [right, -0.5], [right, low], [-0.5, low]])
     rays = camera.rays(corners)
-    if not np.isfinite(rays).all():  # the lens does not reach the corners: as without one
+    if not np.isfinite(rays).all():  # undefined lens at the corners: pinhole
         sight = np.concatenate([corners, np.ones((4, 1))], axis=1) @ np.linalg.inv(camera.K).T
         rays = sight / np.linalg.norm(sight, axis=1, keepdims=True) @ camera.T_camera_world[:3, :3]
     return {
@@ -40,22 +40,22 @@ def camera_header(camera: Camera, number: int) -> dict[str, Any]:
 
 
 def lens_table(camera: Camera) -> tuple[NDArray[np.float32], list[float], float]:
-    """Tabulate what the lens adds to the pixels of a pin-hole.
+    """Tabulate the displacements by a lens relative to a pinhole.
 
     Parameters
     ----------
     camera : Camera
-        With any lens, or none.
+        Camera with any lens, or without one.
 
     Returns
     -------
     table : ndarray, shape (SIDE, SIDE, 2)
-        Pixels, over even steps of ``y = Y / Z`` and then ``x = X / Z``; NaN where no light arrives.
-        Empty without a lens.
+        Pixels, over even steps of ``y = Y / Z`` and then ``x = X / Z``; NaN where the lens is not
+        defined. Empty without a lens.
     range : list of float
         Lowest and highest x, lowest and highest y; empty without a lens.
     error : float
-        The most that the table, interpolated, is off in the image, pixels.
+        Largest error of the interpolated table in the image, pixels.
     """
     if camera.lens is None:
         return np.empty((0, 0, 2), np.float32), [], 0.0
@@ -85,15 +85,18 @@ def pixels_by(
     Parameters
     ----------
     camera : Camera
+        Camera of the table.
     table : ndarray, shape (SIDE, SIDE, 2)
+        Table of `lens_table`.
     bounds : list of float
-        As from `lens_table`.
+        Range of `lens_table`.
     places : ndarray, shape (N, 2)
-        ``(X / Z, Y / Z)`` within the bounds.
+        Points ``(X / Z, Y / Z)`` within the bounds.
 
     Returns
     -------
     ndarray, shape (N, 2)
+        Pixels (u, v).
     """
     low, high = np.array(bounds[::2]), np.array(bounds[1::2])
     at = (places - low) / (high - low) * (SIDE - 1)

@@ -1,4 +1,4 @@
-"""HTML that cannot be broken by what stands in it: text is escaped unless it was made here."""
+"""Building of HTML: text is escaped unless it was built here."""
 
 from __future__ import annotations
 
@@ -10,23 +10,28 @@ _WITHOUT_CONTENT = {"input", "meta", "link"}
 
 
 class Markup(str):
-    """Text that is HTML already."""
+    """Text that is already HTML and is not escaped again."""
 
     __slots__ = ()
 
 
 def element(tag: str, *children: str, **attributes: str | int | bool | None) -> Markup:
-    """Make an element.
+    """Build an element.
 
     Parameters
     ----------
     tag : str
-        Its name.
+        Name of the element.
     *children : str
-        What stands in it; escaped unless it is `Markup`.
+        Content, escaped unless it is `Markup`.
     **attributes : str, int or bool
-        A trailing underscore is dropped and others become hyphens (``class_``, ``data_frame``);
-        True gives the name alone, False and None nothing.
+        Attributes. A trailing underscore is dropped and others become hyphens (``class_``,
+        ``data_frame``). True writes the name alone; False and None write nothing.
+
+    Returns
+    -------
+    Markup
+        HTML of the element.
 
     Examples
     --------
@@ -45,6 +50,6 @@ def element(tag: str, *children: str, **attributes: str | int | bool | None) -> 
 
 
 def joined(*children: str, between: str = "") -> Markup:
-    """Put pieces one after the other, escaped unless they are `Markup`."""
+    """Concatenate texts, escaped unless they are `Markup`."""
     safe = (c if isinstance(c, Markup) else Markup(html.escape(c)) for c in children)
     return Markup(between.join(safe))

@@ -1,4 +1,4 @@
-"""How far markers are from each other, which says what is small and what is large."""
+"""Distance between neighbouring markers, the scale of other distances."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 __all__ = ["usual_distance"]
 
 FRAMES = 100
-"""Frames in which it is measured, evenly spread."""
+"""Number of evenly spaced frames that are measured."""
 ALONE = 0.05
-"""Metres, where there is only one marker."""
+"""Distance in metres that is used if there is only one marker."""
 
 
 def usual_distance(tracks: Tracks) -> float:

@@ -1,8 +1,8 @@
-"""All numbers of the page in one deflated piece of text, as the player unpacks it.
+"""Packing of all numbers of the page into one deflated text, which the player unpacks.
 
-The piece is, before it is deflated, the length of a JSON header (32 bits, little-endian), the
-header, and the arrays that it lists, one after the other. Each array lies byte plane by byte plane:
-all lowest bytes, then all next ones, which deflates far better than the numbers as they are.
+Before compression the data are the length of a JSON header (32 bits, little-endian), the header,
+and the arrays that it lists. Each array is stored by byte planes: all lowest bytes, then all next
+ones, which deflates far better than whole numbers.
 """
 
 from __future__ import annotations
@@ -22,35 +22,35 @@ if TYPE_CHECKING:
 __all__ = ["Grid", "grid_over", "packed", "residuals"]
 
 STEPS = 2**16 - 1
-"""Cells of the grid along each axis."""
+"""Number of cells of the grid along each axis."""
 
 
 class Grid(NamedTuple):
-    """The grid on which positions are kept: 16 bits an axis.
+    """Grid of positions, with 16 bits per axis.
 
     Attributes
     ----------
     low, step : ndarray, shape (3,)
-        First cell and distance from cell to cell, metres.
+        Position of the first cell, and spacing of the cells, metres.
     """
 
     low: NDArray[np.float64]
     step: NDArray[np.float64]
 
     def cells(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the cell of each point, shape (N, 3), and whether it is in the grid, (N,)."""
+        """Return the cell of each point, shape (N, 3), and whether it is inside, shape (N,)."""
         cells = np.rint((points - self.low) / self.step)
         is_on = ((cells >= 0) & (cells <= STEPS)).all(axis=1)
         return np.clip(cells, 0, STEPS).astype(np.int64), np.asarray(is_on)
 
 
 def grid_over(points: NDArray[np.float64], margin: float) -> Grid:
-    """Lay the grid over points, shape (N, 3), and a margin of so many times their extent."""
+    """Return a grid over points, shape (N, 3), with a margin relative to their extent."""
     if not len(points):
         return Grid(np.zeros(3), np.full(3, 1e-6))
     low, high = points.min(axis=0), points.max(axis=0)
     room = margin * float((high - low).max())
-    # Where nothing moves along an axis a cell of a micrometre is fine enough.
+    # Without any extent along an axis, a cell of a micrometre is small enough.
     return Grid(low - room, np.maximum((high - low + 2 * room) / STEPS, 1e-6))
 
 
@@ -64,9 +64,9 @@ def residuals(
     cells : ndarray of int, shape (N,)
         Cells along one axis, sequence after sequence.
     begins : ndarray of int, shape (S,)
-        Where sequences begin; rising.
+        First index of each sequence, increasing.
     order : int
-        1 predicts the cell before, 2 goes on as from the one before that.
+        Order of the prediction: 1 for the previous cell, 2 for linear extrapolation.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def residuals(
         rest = np.diff(first, prepend=0)
         rest[begins] = cells[begins]
         second = begins + 1
-        # A sequence of one has no second: that place begins the next.
+        # A sequence of one has no second element; that index is the start of the next sequence.
         second = second[(second < len(cells)) & ~np.isin(second, begins)]
         rest[second] = first[second]
     wrapped = (rest + 2**15) % 2**16 - 2**15
@@ -93,14 +93,14 @@ def packed(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str
     Parameters
     ----------
     header : mapping
-        What JSON can hold.
+        Header, of types that JSON can hold.
     arrays : mapping
-        By name; their element types are kept.
+        Arrays by name; their element types are kept.
 
     Returns
     -------
     str
-        Base64, safe in any HTML.
+        Data in Base64, which needs no escaping in HTML.
     """
     kinds = {name: [array.dtype.name, array.size] for name, array in arrays.items()}
     text = json.dumps({**header, "arrays": kinds}, ensure_ascii=True, allow_nan=False).encode()

@@ -1,4 +1,4 @@
-"""The player's part of the page; what it does is in the bundled script."""
+"""HTML of the player; its behaviour is in the bundled script."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ __all__ = ["HELP", "player"]
 
 _KEYS = (
     ("Space", "play, pause"),
-    ("← →", "one frame back or on; ten with Shift"),
+    ("← →", "one frame back or forward; ten with Shift"),
     ("Home, End", "first and last frame"),
-    ("N, P", "next and previous place to look at"),
+    ("N, P", "next and previous finding"),
     ("[ ]", "previous and next track, in the order of the timeline"),
-    ("F", "follow the chosen track"),
-    ("Esc", "choose none"),
+    ("F", "follow the selected track"),
+    ("Esc", "clear the selection"),
     ("L", "names on and off"),
     ("W A S D", "turn the view"),
-    ("+ −", "nearer, farther"),
-    ("0", "the whole scene again"),
+    ("+ −", "zoom in and out"),
+    ("0", "show the whole scene"),
 )
 
 
 def player(contents: Contents, findings: Markup) -> Markup:
-    """Make the player, its timeline and the list of what to look at."""
+    """Build the player with its timeline and the list of findings."""
     solid = contents.tracks.detections.n_axes == 3
     does = "turn" if solid else "move"
-    hint = f"Drag to {does}, scroll to come nearer, click a marker to choose it."
+    hint = f"Drag to {does}, scroll to zoom, click a marker to select it."
     stage = element(
         "div",
         element(
             "canvas", id="scene", tabindex=0, role="img",
-            aria_label="Markers in space. Drag to turn; a click or [ and ] choose a marker.",
+            aria_label="Markers in space. Drag to turn; a click or [ and ] select a marker.",
         ),
         element("canvas", id="names", aria_hidden="true"),
         element("p", hint, class_="hint", aria_hidden="true"),
@@ -48,7 +48,7 @@ def player(contents: Contents, findings: Markup) -> Markup:
         element("h2", "Player", class_="hidden"),
         element(
             "noscript",
-            element("p", "Figures and reasons are all here; the player needs JavaScript."),
+            element("p", "The player needs JavaScript; all figures and reasons do not."),
         ),
         element(
             "div",
@@ -71,7 +71,7 @@ def _transport() -> Markup:
         "div",
         _button("play", "▶", "Play"),
         _button("back", "‹", "One frame back"),
-        _button("on", "›", "One frame on"),
+        _button("on", "›", "One frame forward"),
         element(
             "input", type="range", id="frame", min=0, max=0, value=0, step=1, aria_label="Frame"
         ),
@@ -88,10 +88,10 @@ def _button(name: str, sign: str, label: str) -> Markup:
 def _chosen() -> Markup:
     return element(
         "div",
-        element("h3", "Chosen marker", class_="hidden"),
+        element("h3", "Selected marker", class_="hidden"),
         element("dl", id="chosen"),
         element("label", element("input", type="checkbox", id="follow"), "Follow it"),
-        element("button", "×", type="button", id="release", aria_label="Choose none"),
+        element("button", "×", type="button", id="release", aria_label="Clear the selection"),
         id="about",
         hidden=True,
     )
@@ -172,8 +172,8 @@ def _timeline(contents: Contents) -> Markup:
             "div",
             element(
                 "canvas", id="strips", tabindex=0, role="img",
-                aria_label="When each track was there. A click goes to that time; arrows up and "
-                "down choose a track.",
+                aria_label="Presence of each track over time. A click goes to that time; arrows up "
+                "and down select a track.",
             ),
             element("div", id="rows", aria_hidden="true"),
             id="timeline",
@@ -192,4 +192,4 @@ HELP = element(
     class_="keys",
     id="keys",
 )
-"""What the keys do."""
+"""Table of the keys."""

@@ -1,4 +1,4 @@
-"""Runs: unbroken stretches of a track, and the gaps between them."""
+"""Runs of consecutive frames of a track, and the gaps between them."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["Gaps", "Runs", "gaps_of", "runs_of"]
 
 
 class Runs(NamedTuple):
-    """Stretches of consecutive frames in which a track was seen, by track and then by time.
+    """Runs of consecutive frames with a detection, by track and then by time.
 
     Attributes
     ----------
     track, first, length : ndarray of int, shape (R,)
-        Whose, from which frame, for how many.
+        Track, first frame and number of frames of each run.
     """
 
     track: NDArray[np.int64]
@@ -34,9 +34,9 @@ class Gaps(NamedTuple):
     Attributes
     ----------
     track, first, length : ndarray of int, shape (G,)
-        Whose, the first frame without it, and for how many.
+        Track, first missing frame and number of missing frames of each gap.
     seconds : ndarray, shape (G,)
-        From the detection before to the one after.
+        Time from the detection before the gap to the one after it, seconds.
     """
 
     track: NDArray[np.int64]
@@ -46,7 +46,7 @@ class Gaps(NamedTuple):
 
 
 def runs_of(tracks: Tracks) -> Runs:
-    """Cut every track where a frame is without it."""
+    """Split every track at its missed detections."""
     order, _ = tracks.by_track
     track, frame = tracks.labels[order], tracks.detections.frame_of[order]
     is_first = np.ones(len(order), dtype=bool)

@@ -1,4 +1,4 @@
-"""Steps that a track should not make: jumps, and two tracks that seem to change places."""
+"""Improbable steps of tracks: jumps, and apparent swaps of two tracks."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ if TYPE_CHECKING:
 __all__ = ["StrangeStep", "strange_steps"]
 
 USUAL = 12.0
-"""A step is strange that is off by more than so many times the median of its track …"""
+"""Least prediction error of an improbable step, relative to the median of its track."""
 LEAST = 0.25
-"""… and by more than so many times the usual distance of a point from its nearest neighbour."""
+"""Least prediction error of an improbable step, relative to the distance between neighbours."""
 MOST = 2000
-"""Strange steps that are looked at, the largest first; a capture with more is beyond a list."""
+"""Number of largest improbable steps that are examined, because a list has no room for more."""
 
 
 class StrangeStep(NamedTuple):
-    """A detection that is far from where its track was heading.
+    """Detection far from the linear prediction of its track.
 
     Attributes
     ----------
     detection : int
-        The detection.
+        Index of the detection.
     other : int
-        The track that seems to have changed places with its own, -1 for none.
+        Track that probably swapped its label with this one, -1 for none.
     off : float
-        Distance from where the track was heading, metres.
+        Distance from the prediction, metres.
     ratio : float
-        How many times what is usual for the track.
+        This distance divided by the median of the track.
     """
 
     detection: int
@@ -47,20 +47,20 @@ class StrangeStep(NamedTuple):
 
 
 def strange_steps(tracks: Tracks) -> Iterator[StrangeStep]:
-    """Find detections far from where the two before them lead.
+    """Find detections far from the linear extrapolation of the two before them.
 
-    Two tracks seem to have changed places in a frame if each is nearer to where the other was
-    heading, both together by half at least.
+    Two tracks have probably swapped in a frame if each is nearer to the prediction of the other,
+    and the swap halves the sum of both distances at least.
 
     Parameters
     ----------
     tracks : Tracks
-        2-D or 3-D; only stretches without a gap are judged.
+        Tracks in 2-D or 3-D; only runs without a gap are examined.
 
     Yields
     ------
     StrangeStep
-        The farthest first; a change of places once, in the track that is farther off.
+        The largest distance first. A swap is yielded once, for the track with the larger distance.
     """
     heading, off = _headings(tracks)
     usual = _medians(tracks, off)
@@ -75,7 +75,7 @@ def strange_steps(tracks: Tracks) -> Iterator[StrangeStep]:
         j = _partner(tracks, heading, off, int(i))
         other = -1
         if j >= 0:
-            # What comes after a change of places is strange twice more: the way back to a line.
+            # The predictions of the next two steps include the swap, so they are improbable too.
             explained |= {int(i), j}
             other = int(tracks.labels[j])
         elif _follows_a_strange_one(tracks, (ratio > USUAL) & (off > least), int(i)):
@@ -84,7 +84,7 @@ def strange_steps(tracks: Tracks) -> Iterator[StrangeStep]:
 
 
 def _headings(tracks: Tracks) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where tracks were heading, (N, D), and how far off they are, (N,); NaN where unknown."""
+    """Return predictions, shape (N, D), and distances from them, (N,); NaN if not known."""
     d = tracks.detections
     order, _ = tracks.by_track
     heading = np.full(d.points.shape, np.nan)
@@ -99,7 +99,7 @@ def _headings(tracks: Tracks) -> tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def _medians(tracks: Tracks, off: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Median of what a track is usually off, for each of its detections, shape (N,)."""
+    """Return the median distance of each detection's track, shape (N,)."""
     order, starts = tracks.by_track
     usual = np.full(len(off), np.inf)
     for k in range(tracks.n_tracks):
@@ -110,7 +110,7 @@ def _medians(tracks: Tracks, off: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _partner(tracks: Tracks, heading: NDArray[np.float64], off: NDArray[np.float64], i: int) -> int:
-    """Return the detection of the frame that has exchanged labels with this one, or -1."""
+    """Return the detection of the frame that probably swapped its label with this one, or -1."""
     d = tracks.detections
     t = int(d.frame_of[i])
     others = np.arange(d.offsets[t], d.offsets[t + 1])
@@ -125,7 +125,7 @@ def _partner(tracks: Tracks, heading: NDArray[np.float64], off: NDArray[np.float
 
 
 def _follows_a_strange_one(tracks: Tracks, is_strange: NDArray[np.bool_], i: int) -> bool:
-    """Whether one of the two steps before was as strange: a jump bends the two after it too."""
+    """Return whether one of the two previous steps was as improbable; a jump causes both."""
     order, starts = tracks.by_track
     k = tracks.labels[i]
     place = starts[k] + np.searchsorted(order[starts[k] : starts[k + 1]], i)

@@ -1,4 +1,4 @@
-"""Detections of one track that are close in time, taken together."""
+"""Grouping of detections of one track that are close in time."""
 
 from __future__ import annotations
 
@@ -16,25 +16,27 @@ if TYPE_CHECKING:
 __all__ = ["stretches"]
 
 TOGETHER = 0.1
-"""Seconds by which detections of one stretch are apart at most; a frame and a half where slower."""
+"""Largest distance in time within a group, seconds; 1.5 frames at lower frame rates."""
 
 
 def stretches(
     tracks: Tracks, members: NDArray[np.int64]
 ) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """Group labelled detections.
+    """Group labelled detections that are close in time.
 
     Parameters
     ----------
     tracks : Tracks
+        Tracks of the detections.
     members : ndarray of int, shape (M,)
-        The detections, all in tracks.
+        Indices of labelled detections.
 
     Yields
     ------
     track : int
+        Track of the group.
     group : ndarray of int
-        Its detections that are close in time, in order.
+        Indices of its detections in the order of time.
     """
     if not len(members):
         return

@@ -1,4 +1,4 @@
-"""Captures too long for a page keep every so-manieth frame, and the page says so."""
+"""Selection of every n-th frame of a capture that is too long for a page."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 __all__ = ["MOST_POINTS", "every_nth", "stride_for", "thinned"]
 
 MOST_POINTS = 3_000_000
-"""Points that a page holds, 10 to 20 MB of it; with more a browser takes long to open it."""
+"""Largest number of points of a page, 10 to 20 MB; browsers open larger pages slowly."""
 
 
 def stride_for(n_points: int) -> int:
-    """Return the stride of the frames to keep: 1 for all, 2 for every second …."""
+    """Return the stride of the frames to keep: 1 for all, 2 for every second, and so on."""
     return max(1, -(-n_points // MOST_POINTS))
 
 
@@ -28,18 +28,19 @@ def every_nth(tracks: Tracks, stride: int) -> NDArray[np.int64]:
 
 
 def thinned(tracks: Tracks, stride: int) -> Tracks:
-    """Keep every `stride`-th frame; the first stays.
+    """Keep every `stride`-th frame, starting with the first.
 
     Parameters
     ----------
     tracks : Tracks
+        Tracks of all frames.
     stride : int
-        1 keeps all.
+        Stride; 1 keeps all frames.
 
     Returns
     -------
     Tracks
-        Over plain `Detections`, of which only `filled` is kept beside the points.
+        Tracks over plain `Detections` with only the points and `filled`.
     """
     if stride == 1:
         return tracks
