@@ -44,8 +44,9 @@ class PointScores:
     --------
     >>> import asterism as am
     >>> truth = am.simulate.cube(frames=20, seed=1)
-    >>> point_scores(truth.detections, truth).recall
-    1.0
+    >>> scores = point_scores(truth.detections, truth)
+    >>> scores.recall, scores.ghosts
+    (1.0, 0.0)
     """
 
     n_markers: int

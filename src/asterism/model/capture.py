@@ -80,6 +80,8 @@ class Capture(Detections):
     >>> capture = Capture.from_frames([0.0, 0.01], [[[0, 0, 0], [1, 0, 0]], [[0, 0, 0]]])
     >>> replace(capture, path=Path("arena.dots"), format="dots", units="cm")
     Capture('arena.dots', 2 frames, 3 points, 3-D, 0 to 0.01 s, 0 named)
+    >>> replace(capture, labels=[0, 1, 0], names=("LASI", "RASI")).tracks.names
+    ('LASI', 'RASI')
     """
 
     path: Path = field(default_factory=Path)

@@ -64,8 +64,10 @@ class Detections:
     >>> d = Detections.from_frames([0.0, 0.01], [[[0, 0, 0], [1, 0, 0]], [[0, 0, 0]]])
     >>> d
     Detections(2 frames, 3 points, 3-D, 0 to 0.01 s)
-    >>> d.frame(1)
-    array([[0., 0., 0.]])
+    >>> d.n_frames, d.n_points, d.n_axes, d.step
+    (2, 3, 3, 0.01)
+    >>> d.counts, d.frame_of
+    (array([2, 1]), array([0, 0, 1]))
     """
 
     times: NDArray[np.float64]
@@ -85,7 +87,7 @@ class Detections:
         "stds",
         "covariances",
     )
-    """Names of the fields with one entry a point; adding or dropping points changes all of them."""
+    """Fields with one entry per point; adding or removing points changes all of them."""
 
     def __post_init__(self) -> None:
         times = keep_array("times", self.times, ("T",))

@@ -46,7 +46,7 @@ class Gap:
 
 
 def gaps_of(tracks: Tracks) -> tuple[Gap, ...]:
-    """Return the gaps of all tracks, ordered by track and then by time."""
+    """Return the gaps of all tracks, ordered by track and then by time; see `Tracks.gaps`."""
     order, _ = tracks.by_track
     frame, track = tracks.detections.frame_of[order], tracks.labels[order]
     before = np.flatnonzero((np.diff(track) == 0) & (np.diff(frame) > 1))

@@ -42,8 +42,8 @@ class InteractingMotions(Motion):
     ...     models=[am.DWNA(acceleration_sigma=1), am.DWNA(acceleration_sigma=50)],
     ...     transitions=[[0.98, 0.02], [0.05, 0.95]],
     ... )
-    >>> len(motion.modes)
-    2
+    >>> len(motion.modes), motion.mode_transitions[0].tolist()
+    (2, [0.98, 0.02])
     """
 
     models: tuple[SingleMotion, ...]

@@ -48,6 +48,8 @@ class LinearMotion(SingleMotion):
     >>> motion.transition([0.02])[0]
     array([[1.  , 0.02],
            [0.  , 1.  ]])
+    >>> motion.observation
+    array([1., 0.])
     """
 
     F: NDArray[np.float64]

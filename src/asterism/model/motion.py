@@ -28,8 +28,9 @@ class Motion(ABC):
     Examples
     --------
     >>> import asterism as am
-    >>> isinstance(am.DWNA(acceleration_sigma=30), am.model.Motion)
-    True
+    >>> motion = am.DWNA(acceleration_sigma=30)
+    >>> len(motion.modes), motion.mode_transitions
+    (1, array([[1.]]))
     """
 
     kind: ClassVar[str]
@@ -52,8 +53,9 @@ class SingleMotion(Motion):
     Examples
     --------
     >>> import asterism as am
-    >>> am.DWNA(acceleration_sigma=30).mode_transitions
-    array([[1.]])
+    >>> motion = am.RandomWalk(walk_sigma=0.1)
+    >>> motion.modes, motion.observation
+    ((RandomWalk(walk_sigma=0.1),), array([1.]))
     """
 
     @property
@@ -142,8 +144,8 @@ class DWNA(SingleMotion):
     Examples
     --------
     >>> import asterism as am
-    >>> am.DWNA(acceleration_sigma=30)
-    DWNA(acceleration_sigma=30)
+    >>> am.DWNA(acceleration_sigma=30).observation
+    array([1., 0.])
     """
 
     acceleration_sigma: float

@@ -59,6 +59,8 @@ class Recipe:
     'gnn'
     >>> am.track(d, recipe=recipe).recipe == recipe
     True
+    >>> recipe.chosen  # the caller named the method
+    ''
     """
 
     method: str

@@ -41,6 +41,8 @@ class Analog:
     ... )
     >>> analog["Fz1"]
     array([-0.5,  0.5])
+    >>> analog.n_samples, analog.times
+    (2, array([0.   , 0.001]))
     """
 
     names: tuple[str, ...]

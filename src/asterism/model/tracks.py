@@ -65,6 +65,8 @@ class Tracks:
     >>> tracks.positions()[1]
     array([[0., 0., 0.],
            [1., 0., 0.]])
+    >>> tracks.n_tracks, tracks.display_names, tracks.lengths, tracks.by_track[0]
+    (2, ('LASI', 'track 1'), array([2, 2]), array([0, 3, 1, 2]))
     """
 
     detections: Detections

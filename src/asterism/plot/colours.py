@@ -1,4 +1,4 @@
-"""Colours of tracks: by track or by rigid segment, with a legend where it can be read."""
+"""Colours of tracks, by track or by rigid segment, with a legend if it is legible."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add_legend", "colours_of"]
 
-# The colours of the style, and darker ones: as many segments as a legend has room for.
+# The colours of the style, and darker ones for the segments of a long legend.
 _SEGMENTS = (*CYCLE, "#003A5C", "#7D5500", "#00543D", "#7F3F64", "#1B6A94", "#6E2F00", "#625A00")
 _MAX_ENTRIES = len(_SEGMENTS) + 1
 _MAX_NAMES = 3  # of an entry
@@ -70,7 +70,7 @@ def colours_of(
 
 
 def _joined(names: Sequence[str]) -> str:
-    """Join a few names, with the prefix of their subject (``Anna:LKNE``) on the first alone."""
+    """Join a few names, with the prefix of their subject (``Anna:LKNE``) on the first only."""
     prefix = names[0].rpartition(":")[0] + ":"
     shown = [names[0], *(name.removeprefix(prefix) for name in names[1:_MAX_NAMES])]
     return ", ".join(shown) + (" …" if len(names) > _MAX_NAMES else "")

@@ -109,15 +109,21 @@ def plot_reliability(
     Returns
     -------
     Axes
-        A point for each bin that holds labels over the mean confidence there, with the range of
-        true shares that are within a standard error of it (Wilson's, so that few labels look like
-        few); on the diagonal confidence means what it says. How many labels there are in each bin
-        is in an inset above.
+        A point at the mean confidence of each bin with labels, with Wilson's interval of one
+        standard error. Points of calibrated confidence lie on the diagonal. An inset above shows
+        the number of labels of each bin.
 
     Raises
     ------
     ParameterError
         If there is nothing to draw.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> found = am.metrics.calibration_curve([0.9, 0.8, 0.2], [True, True, False])
+    >>> len(am.plot.plot_reliability(found).lines) > 0
+    True
     """
     parts = calibration if isinstance(calibration, Mapping) else {"": calibration}
     if not parts:

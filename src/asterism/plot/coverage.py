@@ -1,4 +1,4 @@
-"""How well a rig sees a level of its volume."""
+"""Figure of the coverage of a rig at one height."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def _grid(
 
 
 def _hatch(axes: Any, edges: list[NDArray[np.float64]], is_marked: NDArray[np.bool_]) -> None:
-    """Hatch cells, row by row of them in as few rectangles as may be."""
+    """Hatch cells, with one rectangle for each run of cells in a row."""
     from matplotlib.collections import PolyCollection
 
     rectangles: list[list[tuple[float, float]]] = []

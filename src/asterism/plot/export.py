@@ -1,4 +1,4 @@
-"""A picture as bytes, the same whenever it is made."""
+"""Reproducible export of figures: the same data give the same bytes."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["ENDINGS", "figure_bytes", "write_figure"]
+__all__ = ["SUFFIXES", "figure_bytes", "write_figure"]
 
-ENDINGS = ("pdf", "png", "svg")
-"""What a picture can be written as."""
+SUFFIXES = ("pdf", "png", "svg")
+"""Suffixes of the formats of figures."""
 
 # Without dates, versions and random names, all of which would differ from run to run.
 _METADATA: dict[str, dict[str, Any]] = {
@@ -69,7 +69,7 @@ def figure_bytes(
     """
     import matplotlib
 
-    check_fields("ending", [ending], ENDINGS)
+    check_fields("ending", [ending], SUFFIXES)
     first: Any = picture[0] if isinstance(picture, (list, tuple)) else picture
     figure = getattr(first, "figure", first)
     figure = getattr(figure, "figure", figure)  # the whole figure, if it is a subfigure

@@ -1,4 +1,4 @@
-"""The lines by which a surface is drawn: edges of polygons and meshes, the contour of capsules."""
+"""Lines that draw a surface: edges of polygons and meshes, contours of capsules."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def outlines(surface: Surface, moment: int = 0) -> list[NDArray[np.float64]]:
     Parameters
     ----------
     surface : Surface
-        A polygon gives its edge, a mesh every edge of its triangles once, a capsule the circles at
-        its ends and two outlines across each other.
+        Polygon (its edge), mesh (each edge of its triangles once) or capsule (the circles at its
+        ends and two perpendicular outlines).
     moment : int
-        Which moment of a moving surface; one that stands still has the same at all.
+        Frame of a moving surface; not used for a surface at rest.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def outlines(surface: Surface, moment: int = 0) -> list[NDArray[np.float64]]:
     Raises
     ------
     ParameterError
-        If a moving surface has no such moment.
+        If a moving surface has no such frame.
     """
     n = surface.n_moments
     if n > 1 and not 0 <= moment < n:
@@ -59,7 +59,7 @@ def _capsule(ends: NDArray[np.float64], radius: float) -> list[NDArray[np.float6
     along = ends[1] - ends[0]
     length = float(np.linalg.norm(along))
     along = along / length if length > 0 else np.array([0.0, 0.0, 1.0])
-    # Any direction across will do; the axis that is most so is safe.
+    # Any perpendicular direction serves; the axis that is nearest to it is numerically safe.
     across = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
     across /= np.linalg.norm(across)
     other = np.cross(along, across)

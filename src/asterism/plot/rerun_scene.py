@@ -1,4 +1,4 @@
-"""The optional viewer: tracks and cameras as a Rerun recording, to turn, zoom and play."""
+"""Optional viewer: tracks and cameras as a Rerun recording."""
 
 from __future__ import annotations
 
@@ -79,10 +79,10 @@ def view(tracks: Tracks, *, rig: Rig | None = None, path: str | Path | None = No
 
 
 def _save(rr: Any, tracks: Tracks, rig: Rig | None, path: Path) -> None:
-    """Write a recording as a whole or not at all."""
+    """Write a recording, completely or not at all."""
     temporary = path.with_name(f".{secrets.token_hex(8)}.part")
     try:
-        # Rerun tells of a folder that it cannot write to by a panic: it is tried before.
+        # Rerun panics if it cannot write to a folder, so this is tried first.
         temporary.touch(exist_ok=False)
         recording = rr.RecordingStream("asterism", recording_id="asterism", send_properties=False)
         recording.save(temporary, _blueprint(tracks))
@@ -136,10 +136,10 @@ def _log_marker(
     colour: str,
     radius: float,
 ) -> None:
-    """Log where one marker was, the lines across its gaps, and its confidence."""
+    """Log the positions of one marker, the lines across its gaps, and its confidence."""
     d = tracks.detections
     frames, places = d.frame_of[members], points[members]
-    # A point stays until it is told otherwise: a row without one where each run of frames ends.
+    # Rerun keeps a point until the next row, so an empty row follows each run of frames.
     gaps = np.flatnonzero(np.diff(frames) > 1)
     ends = np.append(frames[gaps], frames[-1]) + 1
     ends = ends[ends < d.n_frames]
@@ -173,7 +173,7 @@ def _log_marker(
 def _log_trails(
     rr: Any, recording: Any, tracks: Tracks, points: NDArray[np.float64], radius: float
 ) -> None:
-    """Log in each frame the way of every marker from the frame before; the view keeps some time."""
+    """Log each marker's displacement from the previous frame; the view shows a time window."""
     d = tracks.detections
     order, _ = tracks.by_track
     track, frame = tracks.labels[order], d.frame_of[order]
@@ -191,7 +191,7 @@ def _log_trails(
 
 
 def _times(rr: Any, tracks: Tracks, frames: NDArray[np.int64] | None = None) -> list[Any]:
-    """Return the two timelines of some frames; by default of all."""
+    """Return both timelines for a selection of frames, by default for all."""
     d = tracks.detections
     frames = np.arange(d.n_frames) if frames is None else frames
     first = getattr(d, "first_frame", 0)
@@ -202,7 +202,7 @@ def _times(rr: Any, tracks: Tracks, frames: NDArray[np.int64] | None = None) -> 
 
 
 def _blueprint(tracks: Tracks) -> Any:
-    """Return the layout of the viewer: the space and, below it, the confidence if there is one."""
+    """Return the layout of the viewer: the scene and, if labels have it, the confidence below."""
     import rerun as rr  # pyright: ignore[reportMissingImports]
     import rerun.blueprint as rrb  # pyright: ignore[reportMissingImports]
 
@@ -225,7 +225,7 @@ def _blueprint(tracks: Tracks) -> Any:
 
 
 def _rgb(colour: str) -> tuple[int, int, int]:
-    """Return a colour of the style, ``#RRGGBB``, as Rerun takes it."""
+    """Convert a colour of the style, ``#RRGGBB``, to Rerun's representation."""
     red, green, blue = bytes.fromhex(colour[1:])
     return red, green, blue
 

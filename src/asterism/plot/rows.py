@@ -20,7 +20,7 @@ _MAX_NAMES = 120  # rows with legible names on the highest figure
 
 
 def rows_of(tracks: Tracks) -> NDArray[np.int64]:
-    """Row of each track, shape (K,), by first frame and then by number; -1 where it is empty."""
+    """Return the row of each track by first frame, shape (K,); -1 without detections."""
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     order, offsets = tracks.by_track
     there = np.flatnonzero(tracks.lengths)
@@ -31,7 +31,7 @@ def rows_of(tracks: Tracks) -> NDArray[np.int64]:
 
 
 def axes_for(rows: NDArray[np.int64]) -> Axes:
-    """Make axes high enough for so many rows."""
+    """Return new axes that are high enough for the rows."""
     return new_axes(height=float(np.clip(2.0 + 0.16 * (rows.max(initial=0) + 1), 3.5, 20.0)))
 
 
@@ -55,19 +55,24 @@ def frame_rows(axes: Any, tracks: Tracks, rows: NDArray[np.int64]) -> None:
 
 
 def strip_above(axes: Any, says: str = "") -> Any:
-    """Make axes above others, over the same times, as high on every figure.
+    """Return axes above others, over the same times, of the same height in every figure.
 
     Parameters
     ----------
     axes : Axes
-        Those below. Their title stays free for the caller's own words, and clear of the strip.
+        Axes below. Their title stays free for the caller.
     says : str
-        The result in words, above the strip.
+        Result in words, above the strip.
+
+    Returns
+    -------
+    Axes
+        Axes of the strip.
     """
     from matplotlib.transforms import ScaledTranslation, blended_transform_factory
 
-    # Across a share of the axes below, upwards inches from their upper edge: whatever the layout
-    # makes of them later, and in a part of a figure too.
+    # The position is relative to the axes below in width, and in inches from their upper edge, so
+    # that it holds for any later layout and in a subfigure.
     inches = axes.figure.dpi_scale_trans + ScaledTranslation(0, 1, axes.transAxes)
     place = blended_transform_factory(axes.transAxes, inches)
     above = axes.inset_axes((0.0, 0.1, 1.0, 0.55), transform=place, sharex=axes)
@@ -75,7 +80,7 @@ def strip_above(axes: Any, says: str = "") -> Any:
     above.tick_params(axis="x", labelbottom=False, length=0)
     above.tick_params(axis="y", labelsize=7)
     above.yaxis.get_major_locator().set_params(integer=True, nbins=2)
-    # A label and not a title: matplotlib lifts the title of the axes below over it.
+    # A label and not a title, because matplotlib would lift the title of the axes below over it.
     above.xaxis.set_label_position("top")
     above.set_xlabel(says, fontsize=11, color=INK, loc="left", labelpad=5)
     return above

@@ -1,4 +1,4 @@
-"""Three-dimensional axes to one scale."""
+"""Three-dimensional axes with equal scales."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def to_scale(axes: Any, points: NDArray[np.float64], *, zoom: float = 0.85) -> N
     Parameters
     ----------
     axes : Axes3D
-        Where the points are drawn.
+        Axes to set.
     points : ndarray, shape (N, 3)
         Metres, all finite.
     zoom : float
@@ -35,13 +35,13 @@ def to_scale(axes: Any, points: NDArray[np.float64], *, zoom: float = 0.85) -> N
     if not len(points):
         return
     low, high = points.min(axis=0), points.max(axis=0)
-    # An axis on which hardly anything moves still gets room for its numbers.
+    # An axis without motion still needs room for its numbers.
     extent = np.maximum(high - low, max(0.25 * float((high - low).max()), 1e-3))
     middle = (low + high) / 2
     for i, name in enumerate("xyz"):
         half = 0.52 * float(extent[i])
         getattr(axes, f"set_{name}lim")(float(middle[i]) - half, float(middle[i]) + half)
-        # Numbers every so often in metres, not on the pixel: a short axis has room for a few only.
+        # Ticks at a spacing in metres, because a short axis has room for a few numbers only.
         getattr(axes, f"{name}axis").get_major_locator().set_params(
             nbins=max(2, round(7 * float(extent[i] / extent.max())))
         )

@@ -1,4 +1,4 @@
-"""The one style of all pictures."""
+"""The common style of all figures."""
 
 from __future__ import annotations
 
@@ -28,24 +28,29 @@ __all__ = [
     "tidy",
 ]
 
-# Okabe & Ito (2008), told apart by colour-blind people and in grey; its black is kept for text and
-# its yellow, too pale on white, is darkened.
+# Okabe & Ito (2008), distinguishable for colour-blind readers and in grey. Black is reserved for
+# text, and yellow, which is too pale on white, is darkened.
 CYCLE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#B8A800")
 RIGHT, WRONG, MISSED = "#0072B2", "#D55E00", "#E69F00"
 CLUTTER, INK, GRID = "#8C8C8C", "#333333", "#E6E6E6"
 GRADIENT = "viridis"
-"""The colour map of everything continuous: even in lightness, the same to colour-blind people."""
+"""Colour map of continuous values: perceptually uniform, also for colour-blind readers."""
 
 
 def new_axes(*, solid: bool = False, height: float = 5.0) -> Axes:
-    """Make a figure without pyplot and give its axes.
+    """Return the axes of a new figure, made without pyplot.
 
     Parameters
     ----------
     solid : bool
         Whether the axes are three-dimensional.
     height : float
-        Of the figure, inches.
+        Height of the figure, inches.
+
+    Returns
+    -------
+    Axes
+        Axes of the figure.
     """
     from matplotlib.figure import Figure
 
@@ -54,14 +59,19 @@ def new_axes(*, solid: bool = False, height: float = 5.0) -> Axes:
 
 
 def new_panels(n_rows: int, n_columns: int = 1, *, width: float, height: float) -> list[Axes]:
-    """Make a figure of several panels without pyplot and give their axes, row by row.
+    """Return the axes of a new figure of several panels, row by row, made without pyplot.
 
     Parameters
     ----------
     n_rows, n_columns : int
-        How they lie.
+        Number of rows and columns of panels.
     width, height : float
-        Of the figure, inches.
+        Size of the figure, inches.
+
+    Returns
+    -------
+    list of Axes
+        Axes of the panels.
     """
     from matplotlib.figure import Figure
 
@@ -70,12 +80,26 @@ def new_panels(n_rows: int, n_columns: int = 1, *, width: float, height: float) 
 
 
 def given_axes(ax: Sequence[Axes], n: int, what: str) -> list[Axes]:
-    """Return axes that a caller passed as a list, or raise if they are not `n`.
+    """Return the axes of a caller's sequence, or raise if they are not `n`.
+
+    Parameters
+    ----------
+    ax : sequence of Axes
+        Axes of the caller.
+    n : int
+        Required number.
+    what : str
+        Purpose of each, for the message.
+
+    Returns
+    -------
+    list of Axes
+        The same axes.
 
     Raises
     ------
     ParameterError
-        If there are more or fewer; `what` says what each is for.
+        If there are more or fewer.
     """
     axes = list(np.ravel(np.asarray(ax, dtype=object)))
     if len(axes) != n:
@@ -84,7 +108,7 @@ def given_axes(ax: Sequence[Axes], n: int, what: str) -> list[Axes]:
 
 
 def tidy(axes: Axes) -> None:
-    """Set the style on flat axes: no frame, unobtrusive ticks."""
+    """Set the style of 2-D axes: no frame, small ticks."""
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):

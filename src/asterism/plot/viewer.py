@@ -1,4 +1,4 @@
-"""Opening Rerun's viewer: on this machine alone, and without its usage statistics."""
+"""Opening of Rerun's viewer, on this machine only and without its usage statistics."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ def open_viewer(recording: Path) -> None:
     Parameters
     ----------
     recording : Path
-        An ``.rrd`` file.
+        File ``.rrd``.
 
     Raises
     ------
     FormatError
-        If the viewer ends with an error, where there is no screen say.
+        If the viewer ends with an error, for example without a screen.
     """
     switch_off_statistics(_settings_file())
     _rerun("opening", "a window", str(recording), "--bind", _HERE, "--port", "auto")
 
 
 def switch_off_statistics(settings: Path) -> None:
-    """See to it that the viewer sends no usage statistics, now and from then on.
+    """Switch off the usage statistics of the viewer permanently.
 
     Parameters
     ----------
     settings : Path
-        The viewer's ``analytics.json``; all but the one entry is kept.
+        File ``analytics.json`` of the viewer; its other entries are kept.
 
     Raises
     ------
     FormatError
-        If that cannot be done: sooner no viewer than one that talks.
+        If the file cannot be changed. The viewer is then not opened.
     """
     try:
         values = json.loads(settings.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         values = None
     if not isinstance(values, dict) or "analytics_enabled" not in values:
-        # There are no settings yet, and the first session of all sends nothing.
+        # Without settings this is the first session, which sends nothing.
         _rerun("switching off", "no usage statistics", "analytics", "disable")
     elif values["analytics_enabled"] is not False:
-        # Later ones do: the viewer's own command for it would count itself. Only this entry is
-        # touched, as settings that lack another are thrown away, with statistics on again.
+        # Later sessions send statistics, and so would the viewer's command to switch them off. Only
+        # this entry is changed: the viewer replaces incomplete settings, with statistics on.
         values["analytics_enabled"] = False
         temporary = settings.with_name(f".{secrets.token_hex(8)}.part")
         try:
@@ -68,7 +68,7 @@ def switch_off_statistics(settings: Path) -> None:
 
 
 def _rerun(place: str, expected: str, *arguments: str) -> None:
-    """Run the viewer's program; that of this Python, where another may lie on the path."""
+    """Run the viewer's program of this Python environment, not one that comes first on the path."""
     command = [sys.executable, "-m", "rerun", *arguments]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     if done.returncode:

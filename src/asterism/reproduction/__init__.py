@@ -1,4 +1,4 @@
-"""The tables and figures of the 2010 report, reproduced; each part is a module with a `PART`."""
+"""Reproduction of the tables and figures of the 2010 report, one module with a `PART` each."""
 
 from __future__ import annotations
 
@@ -18,5 +18,22 @@ PARTS = (
 
 
 def load(name: str) -> Part:
-    """Import a part by its name."""
+    """Import a part of the reproduction.
+
+    Parameters
+    ----------
+    name : str
+        Entry of `PARTS`.
+
+    Returns
+    -------
+    Part
+        Texts and function of the part.
+
+    Examples
+    --------
+    >>> from asterism.reproduction import load
+    >>> load("gates").section
+    '§2.1'
+    """
     return importlib.import_module(f"asterism.reproduction.{name}").PART

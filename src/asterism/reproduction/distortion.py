@@ -88,7 +88,7 @@ def _magnification(camera: am.Camera) -> NDArray[np.float64]:
 
 
 def _bow(camera: am.Camera) -> float:
-    """Return by how many pixels the middle of a line beside the centre lies outside its ends."""
+    """Return by how many pixels the middle of a line lies farther out than its ends."""
     x = np.array([-0.4, 0.0, 0.4])
     u = camera.distort(np.stack([np.full(3, 0.4), x], axis=1))[:, 0]
     return float(u[1] - 0.5 * (u[0] + u[2]))

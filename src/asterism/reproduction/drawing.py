@@ -1,4 +1,4 @@
-"""Panels of the figures, and the paths of tracks as the report draws them."""
+"""Panels of the figures, and paths of tracks in the style of the report."""
 
 from __future__ import annotations
 
@@ -28,20 +28,25 @@ def titled(axes: Axes, title: str) -> Axes:
 
 
 def titled_panels(*titles: str, width: float, height: float, n_rows: int = 1) -> list[Axes]:
-    """Make a figure with a panel for each title, row by row."""
+    """Return a new figure with one panel for each title, row by row."""
     panels = new_panels(n_rows, len(titles) // n_rows, width=width, height=height)
     return [titled(axes, title) for axes, title in zip(panels, titles, strict=True)]
 
 
 def draw_paths(shown: Mapping[str, am.Tracks], *, n_known: int = 8) -> Figure:
-    """Draw tracks in space, a panel each.
+    """Draw tracks in space, one panel for each title.
 
     Parameters
     ----------
     shown : mapping of str to Tracks
-        By their titles.
+        Tracks by the title of their panel.
     n_known : int
-        Only the longest `n_known` tracks have colours of their own, all others are brown.
+        Number of longest tracks with different colours; all others are brown.
+
+    Returns
+    -------
+    Figure
+        Figure of the panels.
     """
     from matplotlib.figure import Figure
 
@@ -65,7 +70,7 @@ def _draw(axes: Any, tracks: am.Tracks, n_known: int) -> None:
     for k in np.flatnonzero(tracks.lengths).tolist():
         path, colour = points[labels == k], colours.get(k, BROWN)
         axes.plot(*path.T, color=colour, linewidth=1.0)
-        # The last point is marked, or a marker at rest would not be seen.
+        # The last point is marked, because a marker at rest has no visible path.
         axes.plot(*path[-1:].T, "o", color=colour, markersize=2.5)
     shown = points[labels >= 0] if (labels >= 0).any() else points
     low, high = shown.min(axis=0), shown.max(axis=0)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 P_DETECTION, CLUTTER = 0.9, 0.05  # the latter per unit of area
 GATE = 9.21  # χ² of two degrees of freedom at 1 %
-# Figure 2.1 in kind: predictions, standard deviations along the axes, and measurements.
+# A case like figure 2.1: predictions, standard deviations along the axes, and measurements.
 TARGETS = np.array([[0.0, 0.0], [2.2, 0.3]])
 SIGMA = np.array([[0.8, 0.45], [0.75, 0.5]])
 MEASUREMENTS = np.array([[-0.9, 0.35], [1.15, 0.2], [3.1, 0.9]])
@@ -27,7 +27,7 @@ TOLERANCE = 1e-12
 
 
 def run(seeds: int) -> Outcome:
-    """Sum over joint events by enumeration and by elimination; take the case of figure 2.1."""
+    """Compare sums over joint events by enumeration and by elimination, for figure 2.1 too."""
     error = doubled = 0.0
     cases = list(itertools.product(range(seeds), range(1, LARGEST), range(1, LARGEST + 1)))
     for seed, same in itertools.groupby(cases, lambda case: case[0]):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SMALL = (2, 3, 4, 5, 6)
 LARGE = (4, 8, 16, 32, 64, 128, 256, 512)
 DRAWS = 20  # a seed, of small problems of each size
-# Figure 5.1 in kind: three of each; the men's lists, the women's lists, best first.
+# A case like figure 5.1 with three of each: the men's lists, the women's lists, best first.
 MEN = np.array([(0, 1, 2), (1, 0, 2), (0, 2, 1)])
 WOMEN = np.array([(0, 2, 1), (1, 0, 2), (2, 0, 1)])
 UNSTABLE = np.array([1, 0, 2], dtype=np.int32)
@@ -34,14 +34,16 @@ def marry(men: Ranks, women: Ranks) -> tuple[NDArray[np.int32], int]:
     Parameters
     ----------
     men : ndarray of int, shape (n, n)
-        Row i are the women in the order of man i's preference.
+        Row i holds the women in the order of man i's preference.
     women : ndarray of int, shape (n, n)
-        Row j are the men likewise.
+        Row j holds the men in the order of woman j's preference.
 
     Returns
     -------
     wives : ndarray of int, shape (n,)
+        Partner of each man.
     proposals : int
+        Number of proposals.
     """
     n = len(men)
     rank = np.argsort(women, axis=1)  # of man i with woman j, at [j, i]

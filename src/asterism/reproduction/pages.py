@@ -1,4 +1,4 @@
-"""The files of a reproduction: a figure and a piece of Markdown for each part, and the page."""
+"""Files of a reproduction: a figure and a Markdown file for each part, and the page."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PARTS, IMAGES = "parts", "images"
 
 
 def write_part(part: Part, outcome: Outcome, out: Path) -> None:
-    """Write the figure of a part and its piece of Markdown."""
+    """Write the figure and the Markdown file of a part."""
     for folder in (PARTS, IMAGES):
         (out / folder).mkdir(exist_ok=True)
     if outcome.figure is not None:
@@ -30,18 +30,18 @@ def write_part(part: Part, outcome: Outcome, out: Path) -> None:
 
 
 def write_page(done: Mapping[Part, Outcome], missing: Sequence[str], seeds: int, out: Path) -> None:
-    """Write the page, and the pieces that concern all parts.
+    """Write the page, and the files that concern all parts.
 
     Parameters
     ----------
     done : mapping of Part to Outcome
-        The finished parts; their own files are written already.
+        Finished parts, whose files are already written.
     missing : sequence of str
-        Names of the parts that were requested and are not finished.
+        Names of the requested parts that are not finished.
     seeds : int
         Number of seeds.
     out : Path
-        The folder.
+        Folder to write to.
     """
     contents, rules = _contents_text(done), "".join(f"- **{k}**: {v}\n" for k, v in RULES.items())
     stopped = f"**Stopped before its end. Not made: {', '.join(missing)}.**\n\n" if missing else ""

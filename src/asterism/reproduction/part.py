@@ -1,4 +1,4 @@
-"""What a part of the reproduction states, and what its run returns."""
+"""Data types of a part of the reproduction and of its results."""
 
 from __future__ import annotations
 
@@ -15,7 +15,19 @@ __all__ = ["Claim", "Outcome", "Part", "Table", "Timing"]
 
 
 class Claim(NamedTuple):
-    """A figure or statement of the report, the measurement and the verdict of a rule."""
+    """Figure or statement of the report, with the measurement and the verdict of a rule.
+
+    Attributes
+    ----------
+    about : str
+        Subject of the claim.
+    reported, measured, oracle : str
+        Value of the report, measured value, and the best value that the data allow.
+    reproduced : bool
+        Verdict of the rule.
+    rule, because : str
+        Key of `RULES`, and the numbers that decided.
+    """
 
     about: str
     reported: str
@@ -27,7 +39,17 @@ class Claim(NamedTuple):
 
 
 class Table(NamedTuple):
-    """A table; its first column is text, the others are figures."""
+    """Table whose first column is text and whose other columns are figures.
+
+    Attributes
+    ----------
+    title : str
+        Heading.
+    head : sequence of str
+        Names of the columns.
+    rows : sequence of sequence of str
+        Cells of each row.
+    """
 
     title: str
     head: Sequence[str]
@@ -35,7 +57,15 @@ class Table(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """A duration; kept apart from the tables because it differs from run to run."""
+    """Duration, not part of the tables because it differs from run to run.
+
+    Attributes
+    ----------
+    about, reported : str
+        Subject, and the value of the report.
+    seconds : float
+        Measured duration.
+    """
 
     about: str
     reported: str
@@ -44,7 +74,19 @@ class Timing(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """Results of a part: its claims, tables, figure and timings."""
+    """Results of a part.
+
+    Parameters
+    ----------
+    claims : sequence of Claim
+        Claims with their verdicts.
+    tables : sequence of Table
+        Further tables.
+    figure : Figure, Axes, sequence of Axes or None
+        Figure of the part.
+    timings : sequence of Timing
+        Measured durations.
+    """
 
     claims: Sequence[Claim]
     tables: Sequence[Table] = ()
@@ -53,28 +95,28 @@ class Outcome:
 
     @property
     def n_reproduced(self) -> str:
-        """Return how many of the claims were reproduced, as "2 of 3"."""
+        """Number of reproduced claims, as "2 of 3"."""
         return f"{sum(c.reproduced for c in self.claims)} of {len(self.claims)}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """A piece of the report; text in backticks is code.
+    """Section of the report that is reproduced; text in backticks is code.
 
     Parameters
     ----------
     name : str
-        Of the module, the files and the anchor.
+        Name of the module, of the files and of the anchor.
     title, section : str
         Heading, and the place in the report, such as "§3.1".
     covers : str
         The report's figures, tables and algorithms that are reproduced.
     summary : str
-        What the report did.
+        Content of this section of the report.
     run : callable
-        Takes the number of seeds, which are 0, 1, …
+        Function from the number of seeds, which are 0, 1, …, to an `Outcome`.
     caption : str
-        Of the figure, if there is one.
+        Caption of the figure, if there is one.
     notes, mistakes, assumptions : tuple of str
         Remarks; errors of the report; choices that the report leaves open.
     """

@@ -56,14 +56,14 @@ def by_matrices(camera: am.Camera, points: NDArray[np.float64]) -> NDArray[np.fl
     Parameters
     ----------
     camera : Camera
-        Without a lens.
+        Camera without a lens.
     points : ndarray, shape (K, 3)
-        World metres.
+        World coordinates, metres.
 
     Returns
     -------
     ndarray, shape (K, 2)
-        Pixels.
+        Pixels (u, v).
     """
     f = FOCAL_M
     K = camera.K @ np.diag([1 / f, 1 / f, 1.0])

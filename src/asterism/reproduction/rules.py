@@ -1,4 +1,4 @@
-"""Four rules, each decided by numbers alone, that turn measurements into claims with a verdict."""
+"""Four rules that decide by numbers whether a claim of the report is reproduced."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ RULES = {
     "shape": "a distribution is reproduced if its distance from the mean measured one, in total "
     "variation, is at most that of 95 % of the single runs.",
 }
-"""The rules, as the page states them."""
+"""Text of each rule on the page."""
 
 _QUANTILES = (0.025, 0.975)
 
@@ -51,19 +51,24 @@ def within(
     Parameters
     ----------
     about : str
-        What the figure is.
+        Subject of the figure.
     reported : float
-        As printed.
+        Printed figure.
     measured, oracle : array_like, shape (seeds,)
-        One value a seed; the oracle's values are the best that the data allow.
+        One value per seed; those of the oracle are the best that the data allow.
     step : float
-        One unit of the last digit printed; 0 for a figure that was not rounded.
+        One unit of the last printed digit; 0 for a figure that was not rounded.
     sign : str
-        Printed before the report's figure, such as "~".
+        Text before the report's figure, such as "~".
     unit : str
-        Printed after each figure.
+        Text after each figure.
     digits : int
         Decimals in the text.
+
+    Returns
+    -------
+    Claim
+        Claim with the verdict of the rule "spread".
     """
     low, high = np.quantile(np.asarray(measured, dtype=np.float64), _QUANTILES)
     # Slightly more than half a unit: 0.05 is not a binary number.
@@ -104,11 +109,16 @@ def alike(about: str, reported: ArrayLike, runs: ArrayLike) -> Claim:
     Parameters
     ----------
     about : str
-        What is distributed.
+        Subject of the distribution.
     reported : array_like, shape (n,)
-        Shares that add up to 1.
+        Printed shares, which sum to 1.
     runs : array_like, shape (seeds, n)
-        Measured ones, each row likewise.
+        Measured shares, one row per seed.
+
+    Returns
+    -------
+    Claim
+        Claim with the verdict of the rule "shape".
     """
     printed, found = np.asarray(reported), np.asarray(runs, dtype=np.float64)
     mean = found.mean(axis=0)

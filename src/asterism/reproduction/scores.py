@@ -1,4 +1,4 @@
-"""The report's cube, chains that track it, and their scores."""
+"""Captures of the report's cube, chains that track them, and their scores."""
 
 from __future__ import annotations
 
@@ -21,17 +21,27 @@ __all__ = ["FRAMES", "PER", "Capture", "Scores", "compare", "cubes", "own_chain"
 
 FRAMES, NOISE, MAX_SPEED = 100, 0.005, 0.15
 PER = 8.8
-"""Detections or tracks in a frame, for each of which the moves of a chain are counted."""
+"""Mean number of detections or tracks in a frame, by which moves per frame are divided."""
 
 
 def own_chain(*, moves: float, **chain: Any) -> am.MCMCDA:
-    """Make Asterism's chain over all detections at once and the model's own posterior."""
+    """Return Asterism's chain over all detections at once, with the unmodified posterior."""
     options = am.tracking.ChainOptions(groups="whole", **chain)
     return am.MCMCDA(moves=moves, confidence=0, end_odds=1, chain=options)
 
 
 class Capture(NamedTuple):
-    """A capture of the report's cube, the model that tracks it, and the oracle's tracks."""
+    """Capture of the report's cube.
+
+    Attributes
+    ----------
+    truth : Tracks
+        True tracks.
+    model : TrackingModel
+        Model estimated from the capture.
+    oracle : Tracks
+        Tracks of the oracle.
+    """
 
     truth: am.Tracks
     model: am.TrackingModel
@@ -39,22 +49,22 @@ class Capture(NamedTuple):
 
 
 class Scores(NamedTuple):
-    """Scores of a method, each an array with one entry a capture.
+    """Scores of a method, each an array with one entry per capture.
 
     Attributes
     ----------
     moves, seconds : ndarray
-        Moves a frame; seconds for the whole capture.
+        Moves per frame; time for the whole capture in seconds.
     strict : ndarray
-        Percent wrong as the report counts: all detections in a track beyond one for each marker
-        are wrong too, however pure (100 · (1 − IDP)).
+        Percentage of wrong detections in the sense of the report: all detections in further tracks
+        of a marker are wrong too, even if these tracks are pure (100 · (1 − IDP)).
     wrong, missing, correct : ndarray
-        Percent of the labelled detections whose marker is not their track's; of the markers'
+        Percentage of the labelled detections with another marker than their track; of the markers'
         detections without a label; of these in the one track of their marker (100 · IDR).
     tracks, idf1 : ndarray
-        Generated tracks; IDF1.
+        Number of tracks; IDF1.
     gain : ndarray
-        Log posterior above that of the oracle.
+        Log posterior minus that of the oracle, nats.
     example : Tracks
         Tracks of the first capture.
     """
@@ -72,16 +82,21 @@ class Scores(NamedTuple):
 
 
 def cubes(seeds: int, *, max_gap: int, missing: float = 0.1, clutter: float = 0.1) -> list[Capture]:
-    """Make captures of the cube; motion and rates are estimated from each.
+    """Simulate captures of the cube, and estimate motion and rates from each.
 
     Parameters
     ----------
     seeds : int
-        How many.
+        Number of captures.
     max_gap : int
         The report's d̄, frames. The oracle is the truth, broken at longer gaps.
     missing, clutter : float
-        Shares of the detections.
+        Share of missed detections, and of false alarms.
+
+    Returns
+    -------
+    list of Capture
+        One capture for each seed.
     """
     found: list[Capture] = []
     for seed in range(seeds):

@@ -40,7 +40,7 @@ CASES: dict[str, tuple[str, dict[str, Any], am.model.Motion]] = {
 
 
 def model_of(motion: am.model.Motion) -> am.TrackingModel:
-    """Make the model of data in which every marker is detected, without false alarms."""
+    """Return the model of data in which every marker is detected, without false alarms."""
     return am.TrackingModel(
         motion=motion,
         sensor=am.Sensor(noise_sigma=NOISE, p_detection=0.999, clutter_density=1e-6),
@@ -49,11 +49,12 @@ def model_of(motion: am.model.Motion) -> am.TrackingModel:
 
 
 def wrong_links(truth: am.Tracks, labels: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Count the markers of each frame but the first whose label is not that of the frame before.
+    """Count the markers of each frame whose label differs from that of the previous frame.
 
     Returns
     -------
     ndarray of int, shape (T - 1,)
+        Counts of all frames but the first.
     """
     dense = np.full((truth.detections.n_frames, truth.n_tracks), -1)
     dense[truth.detections.frame_of, truth.labels] = labels

@@ -55,7 +55,7 @@ def _camera(place: NDArray[np.float64], target: NDArray[np.float64]) -> am.Camer
 
 
 def _expected(camera: am.Camera, points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Decide point by point, with the report's three reasons in its words."""
+    """Decide the visibility point by point, by the report's three reasons."""
     w, h = camera.size_px
     found: list[int] = []
     for p in points:
