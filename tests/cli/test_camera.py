@@ -83,23 +83,23 @@ def test_info_of_a_lens_that_ends_within_the_image(run):
 
 @pytest.mark.parametrize("format", CALIBRATION_FORMATS)
 def test_convert_to_every_format(run, format):
-    endings = CALIBRATION_FORMATS[format].extensions or ("",)
-    code, out, err = run("convert", "a.toml", f"b{endings[0]}", "--format", format, "--json")
+    suffixes = CALIBRATION_FORMATS[format].extensions or ("",)
+    code, out, err = run("convert", "a.toml", f"b{suffixes[0]}", "--format", format, "--json")
     assert code == 0, err
-    told = json.loads(out)
-    again, rig, points = read_rig(f"b{endings[0]}"), rig_for("rig"), target_points()
+    report = json.loads(out)
+    again, rig, points = read_rig(f"b{suffixes[0]}"), rig_for("rig"), target_points()
     assert again.names == rig.names
-    for new, old, change in zip(again, rig, told["cameras"], strict=True):
+    for new, old, change in zip(again, rig, report["cameras"], strict=True):
         np.testing.assert_allclose(new.center, old.center, atol=1e-9)
         away = np.linalg.norm(new.project(points).pixels - old.project(points).pixels, axis=1)
         if change["rms_px"] is None:
             assert away.max() < 1e-9
-        else:  # what is told bounds what is met
+        else:  # the reported errors bound the measured ones
             assert 0 < change["rms_px"] <= change["max_px"]
             assert away.max() < 1.1 * change["max_px"] + 1e-6
             assert np.sqrt(np.mean(away**2)) < 2 * change["rms_px"] + 1e-6
     if format == "rig":
-        assert [c["rms_px"] for c in told["cameras"]] == [None] * 3
+        assert [c["rms_px"] for c in report["cameras"]] == [None] * 3
 
 
 def test_convert_a_report_lens_to_vicon_is_exact_where_it_can_be(run):

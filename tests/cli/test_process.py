@@ -200,10 +200,10 @@ def test_exit_codes(tmp_path, monkeypatch, capsys):
 def test_failures_inside(what, code, says):
     script = f"""
         import sys
-        import asterism.cli.exit_codes as endings
+        import asterism.cli.exit_codes as exit_codes
         def command():
             {what}
-        sys.exit(endings.exit_code(command))
+        sys.exit(exit_codes.exit_code(command))
     """
     import textwrap
 

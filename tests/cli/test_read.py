@@ -35,8 +35,8 @@ def test_bonds_leave_out_channels_without_a_name(tmp_path, capsys):
     out, _ = printed("bonds a.c3d -o a.toml", capsys)
     assert "2 tracks without a name" in out
     assert "T00" not in (tmp_path / "a.toml").read_text()
-    told = json.loads(printed("bonds a.c3d --json", capsys)[0])
-    assert (told["n_markers"], told["n_left_out"], told["n_bonds"]) == (3, 2, 3)
+    report = json.loads(printed("bonds a.c3d --json", capsys)[0])
+    assert (report["n_markers"], report["n_left_out"], report["n_bonds"]) == (3, 2, 3)
     write_c3d(tmp_path / "b.c3d", walk(), labels=["*0", "*1", "", "U_4", "New 0001"])
     err = refused("bonds b.c3d -o b.toml", capsys)
     assert "a capture with named markers, found 5 tracks without a name in b.c3d" in err
@@ -91,5 +91,5 @@ def test_info_says_what_can_be_said_of_points_without_names(tmp_path, capsys):
     out, _ = printed("info one.csv", capsys)
     assert "none: at most one point per frame" in out
     assert "–" not in out
-    told = json.loads(printed("info one.csv --json", capsys)[0])
-    assert (told["n_points"], told["nearest_step_99"], told["spacing_50"]) == (2, 0, None)
+    report = json.loads(printed("info one.csv --json", capsys)[0])
+    assert (report["n_points"], report["nearest_step_99"], report["spacing_50"]) == (2, 0, None)

@@ -95,7 +95,7 @@ def test_the_whole_chain(tmp_path, capsys):
     assert "Identity" in capsys.readouterr().out
     assert main(["chain", "person", "--rig", "ring6", "--frames", "30"]) == 0
     assert "auto  smp, window=3, then stitched" in capsys.readouterr().out
-    assert main(["chain", "person", "--method", "nobody"]) == 2
+    assert main(["chain", "person", "--method", "unknown"]) == 2
 
 
 def test_point_scores_by_hand():

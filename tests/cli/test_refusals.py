@@ -121,10 +121,10 @@ def test_only_mcmcda_starts_from_tracks(scene, capsys, monkeypatch):
     def never(*_, **__):
         raise AssertionError
 
-    monkeypatch.setattr("asterism.estimate_model", never)  # told before the work
+    monkeypatch.setattr("asterism.estimate_model", never)  # refused before the work
     assert main(["track", "truth.csv", "-o", "out.csv", "--method", "gnn", "--start"]) == 2
-    told = capsys.readouterr().err
-    assert "--start: expected --method mcmcda, or no --method, found --method gnn" in told
+    message = capsys.readouterr().err
+    assert "--start: expected --method mcmcda, or no --method, found --method gnn" in message
 
 
 def test_the_common_options_are_everywhere():
@@ -167,9 +167,9 @@ def test_mistakes_are_told_by_the_names_of_the_command_line(scene, capsys, line,
     am.io.write_rig(am.Rig.ring(4, radius=4, height=2.5), "rig.toml")
     Path("empty.csv").touch()
     before = sorted(scene.iterdir())
-    told = refused(line, capsys)
-    assert f" {says}" in told  # an option has its dashes, an argument of the library has none
-    assert told.count("\n") == 1
+    message = refused(line, capsys)
+    assert f" {says}" in message  # an option has its dashes, an argument of the library has none
+    assert message.count("\n") == 1
     assert sorted(scene.iterdir()) == before
 
 

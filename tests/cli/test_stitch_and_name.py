@@ -53,9 +53,9 @@ def test_track_finds_occluded_markers_again(person, capsys):
 def test_stitch_says_what_it_joined(scene, person, capsys):
     out = run("stitch alone.c3d -o markers.c3d", capsys)
     assert "least certain" in out
-    told = json.loads(run("stitch alone.c3d -o markers.csv --json", capsys))
-    assert told["n_joins"] == len(told["joins"]) > 10
-    assert told["n_tracks"] < told["n_tracks_before"]
+    report = json.loads(run("stitch alone.c3d -o markers.csv --json", capsys))
+    assert report["n_joins"] == len(report["joins"]) > 10
+    assert report["n_tracks"] < report["n_tracks_before"]
     truth = am.io.read_tracks("pt.c3d")
     before, after = (
         am.evaluate(am.io.read_tracks(f), truth).idf1 for f in ("alone.c3d", "markers.c3d")
@@ -83,9 +83,9 @@ def test_what_stitch_refuses(scene, capsys, line, says):
 def test_bonds_of_one_capture_name_the_next(person, capsys):
     out = run("bonds person.csv -o subject.toml", capsys)
     assert "rigid clusters" in out
-    told = json.loads(run("bonds person.csv --json", capsys))
-    assert told["n_bonds"] > told["n_rigid"] > 50
-    assert len(told["clusters"]) > 5
+    report = json.loads(run("bonds person.csv --json", capsys))
+    assert report["n_bonds"] > report["n_rigid"] > 50
+    assert len(report["clusters"]) > 5
     run("track p.c3d --stitch -o tracked.c3d", capsys)
     out = run("name tracked.c3d --bonds subject.toml -o named.c3d", capsys)
     assert "markers not found" in out
@@ -93,9 +93,9 @@ def test_bonds_of_one_capture_name_the_next(person, capsys):
     names = [name for name in named.names if name]
     assert set(names) <= set(truth.names)
     assert len(names) > 0.95 * truth.n_tracks
-    told = json.loads(run("name tracked.c3d --bonds subject.toml -o n.csv --json", capsys))
-    assert told["n_named"] == len(told["names"]) >= len(names)
-    assert {one["name"] for one in told["names"]} == set(names)
+    report = json.loads(run("name tracked.c3d --bonds subject.toml -o n.csv --json", capsys))
+    assert report["n_named"] == len(report["names"]) >= len(names)
+    assert {one["name"] for one in report["names"]} == set(names)
     # The names are right: each point that has one lies where that marker was.
     places = truth.positions()
     number = {name: k for k, name in enumerate(truth.names)}

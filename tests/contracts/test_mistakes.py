@@ -1,4 +1,4 @@
-"""Mistakes that a newcomer makes: each is told in one message that says what to do."""
+"""Mistakes of a new user: each raises one message that says what to do."""
 
 from __future__ import annotations
 
@@ -178,8 +178,8 @@ def test_millimetres_for_metres_are_doubted(caplog):
         am.estimate_model(D)
         assert not caplog.records
         am.estimate_model(too_large)
-    (told,) = caplog.records
-    assert "expected metres; divide millimetres by 1000" in told.getMessage()
+    (warning,) = caplog.records
+    assert "expected metres; divide millimetres by 1000" in warning.getMessage()
 
 
 def test_a_few_points_far_away_are_not_doubted(caplog):

@@ -108,7 +108,7 @@ print(n + 1)
         ("~~~sh\nasterism info nowhere.c3d\n~~~\n", "exit code 2: .*nowhere.c3d"),
         ("~~~sh\necho a | grep b\n~~~\n", "exit code 1"),
         ("~~~sh\necho a | cat\n~~~\n~~~text\nb\n~~~\n", r"-b\n\+a"),
-        ("![one](images/nobody.png)\n", "nobody.png and does not write it"),
+        ("![one](images/missing.png)\n", "missing.png and does not write it"),
     ],
 )
 def test_mistakes_are_seen(tmp_path, text, why):

@@ -29,12 +29,12 @@ def test_the_scale_of_everything_is_found(seed):
 
 
 def test_two_kinds_of_motion_are_distinguished():
-    # Half of the markers rest; the others are shaken a hundred times as much as they tremble.
+    # Half of the markers rest; the others accelerate at random, far beyond their noise.
     rng = np.random.default_rng(1)
     n = 300
     still = np.cumsum(rng.normal(0, 1e-5, (n, 10, 3)), axis=0)
-    shaken = np.cumsum(np.cumsum(rng.normal(0, 0.01, (n, 10, 3)), axis=0) * 0.1, axis=0)
-    positions = np.concatenate([still, shaken], axis=1) + rng.uniform(-5, 5, (20, 3))
+    moving = np.cumsum(np.cumsum(rng.normal(0, 0.01, (n, 10, 3)), axis=0) * 0.1, axis=0)
+    positions = np.concatenate([still, moving], axis=1) + rng.uniform(-5, 5, (20, 3))
     positions += rng.normal(0, 1e-4, positions.shape)
     truth = am.Tracks.from_dense(np.arange(n) * 0.1, positions)
     estimate = am.estimate_model(truth.detections)

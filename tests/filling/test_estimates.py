@@ -45,23 +45,23 @@ def test_gaps_are_those_between_detections(rows):
 @given(st.integers(0, 10_000))
 def test_windows_have_all_that_they_need_and_no_other_has(seed):
     rng = np.random.default_rng(seed)
-    own, bridged, helped = rng.random((3, 60)) < 0.85
-    bridged |= own
+    own, smoothed, helped = rng.random((3, 60)) < 0.85
+    smoothed |= own
     frames = np.array([16, 18, 20, 21, 23, 24, 25, 26, 28])
     near = np.array([18, 20, 21, 26, 28])
     span = Span(track=0, first=23, last=25)
     expected = [
         a
         for a in range(60 - 12)
-        if (helped & bridged)[a + frames - 16].all()
+        if (helped & smoothed)[a + frames - 16].all()
         and own[a + near - 16].all()
         and own[a + span.frames - 16].sum() >= 2
     ]
-    found = held_out(own, bridged, helped, frames, span, 1000)
+    found = held_out(own, smoothed, helped, frames, span, 1000)
     np.testing.assert_array_equal(found[:, 0], expected)
     shifts = np.broadcast_to(frames - 16, found.shape)
     np.testing.assert_array_equal(found - found[:, :1], shifts)
-    assert len(held_out(own, bridged, helped, frames, span, 5)) == min(5, len(expected))
+    assert len(held_out(own, smoothed, helped, frames, span, 5)) == min(5, len(expected))
 
 
 def test_ends_are_the_nearest_frames_that_were_seen():
@@ -172,7 +172,7 @@ def test_weights_are_the_best_of_a_fine_grid(seed, J):
 
 
 def test_fills_do_not_use_the_points_left_out(monkeypatch):
-    """A hole beside the hidden frame is bridged with its help: no window may begin there."""
+    """A hole beside the withheld frame is smoothed with its help: no window may begin there."""
     monkeypatch.setattr(estimates, "MAX_WINDOWS", 1000)
     truth = rigid(frames=120, noise=1e-4)
     take = estimates.DenseTracks(
@@ -180,8 +180,8 @@ def test_fills_do_not_use_the_points_left_out(monkeypatch):
         positions=hidden_at(truth, (0, 60, 60), (0, 40, 40), (3, 80, 84)).positions(),
         model=MODEL,
     )
-    assert np.isfinite(take.bridged[60, 0]).all()
-    assert np.isnan(take.bridged[80:85, 3]).all()  # too long
+    assert np.isfinite(take.smoothed[60, 0]).all()
+    assert np.isnan(take.smoothed[80:85, 3]).all()  # too long
     found = estimates.estimate(take, Span(track=0, first=60, last=60))
     middle = found.windows[:, found.windows.shape[1] // 2]
     assert not set(middle) & {37, 38, 39, 40, 41, 42, 43}
@@ -189,8 +189,8 @@ def test_fills_do_not_use_the_points_left_out(monkeypatch):
     assert np.isfinite(found.truth).all()
 
 
-def test_what_is_bridged_is_no_truth(monkeypatch):
-    """Neither an error nor the way through the gap is measured where a marker was bridged."""
+def test_smoothed_positions_are_no_truth(monkeypatch):
+    """Neither an error nor the way through the gap is measured where a marker was smoothed."""
     truth = rigid(frames=90, noise=1e-4)
     holes = [(0, t, t) for t in (20, 40)]
     positions = hidden_at(truth, (0, 60, 66), *holes).positions()
@@ -219,7 +219,7 @@ def test_the_profile_is_the_mean_over_what_is_known():
     rng = np.random.default_rng(0)
     off = rng.normal(size=(6, 5, 3))
     off[:4, 1] = np.nan
-    off[:, 3] = np.nan  # nobody knows: by the frames around it
+    off[:, 3] = np.nan  # not known: by the frames around it
     expected = [np.mean([x @ x / 3 for x in off[:, t] if np.isfinite(x[0])]) for t in (0, 1, 2, 4)]
     between = (expected[2] + expected[3]) / 2
     np.testing.assert_allclose(error_profile(off), [*expected[:3], between, expected[3]])

@@ -1,4 +1,4 @@
-"""Image points go to a file and come back to the last bit; what is damaged is told by its line."""
+"""Image points are read as written, to the last bit; an error names the damaged line."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from tests.io.calibrations.rigs import NAMES, rig_for, same_pixels
 from tests.paths import DATA
 from tests.tools.fuzz_readers import MOTIVE
 
-ENDINGS = ("", ".c3d", ".trc", ".csv", ".tsv", ".log", ".bin", ".txt", ".dat")
+SUFFIXES = ("", ".c3d", ".trc", ".csv", ".tsv", ".log", ".bin", ".txt", ".dat")
 
 
 def tracks():
@@ -25,7 +25,7 @@ def tracks():
 
 
 @pytest.mark.parametrize("format", CAPTURE_FORMATS)
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", SUFFIXES)
 def test_captures_by_content(tmp_path, format, ending):
     path = tmp_path / f"file{ending}"
     if CAPTURE_FORMATS[format].write is None:
@@ -36,7 +36,7 @@ def test_captures_by_content(tmp_path, format, ending):
     assert read(path).format == format
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", SUFFIXES)
 @pytest.mark.parametrize(
     "options", [{"processor": SGI}, {"processor": DEC}, {"scale": 0.1}], ids=["sgi", "dec", "int"]
 )
@@ -51,7 +51,7 @@ def test_c3d_of_any_processor_by_content(tmp_path, ending, options, is_damaged):
     assert read(tmp_path / f"file{ending}").format == "c3d"
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", SUFFIXES)
 def test_a_log_whose_clock_looks_like_a_c3d(tmp_path, ending):
     # The second byte of the first time is that of a C3D, 0x50.
     records = [(0x5002 + 10 * t, np.full((2, 3), t / 7, "<f4")) for t in range(40)]

@@ -18,7 +18,7 @@ from asterism.errors import FormatError, ParameterError
 from asterism.io import read, write
 from asterism.model import Tracks
 
-ENDINGS = ("c3d", "trc", "csv", "tsv", "log")
+SUFFIXES = ("c3d", "trc", "csv", "tsv", "log")
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def names_in(folder):
     return sorted(path.name for path in Path(folder).iterdir())
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", SUFFIXES)
 def test_the_input_is_not_overwritten_unless_asked(tracks, tmp_path, ending):
     path = tmp_path / f"a.{ending}"
     write(tracks, path)
@@ -52,7 +52,7 @@ def test_the_input_is_not_overwritten_unless_asked(tracks, tmp_path, ending):
     write(capture.tracks, tmp_path / f"b.{ending}")  # another file is replaced
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", SUFFIXES)
 def test_a_full_disk(tracks, tmp_path, monkeypatch, ending):
     path = tmp_path / f"a.{ending}"
     path.write_text("the old content")

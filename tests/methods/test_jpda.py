@@ -144,7 +144,7 @@ def test_a_group_too_large_is_summed_over_a_beam_and_says_so():
     assert beam.info["approximate_groups"] > 0
     assert 0 < beam.info["bound"] <= 1
     assert beam.info["most_states"] < exact.info["most_states"]
-    # Step by step the same is told, and the run says the worst of it.
+    # Step by step the bounds are the same, and the run reports the largest.
     state, bounds = method.init(model), []
     for time, points in d:
         state, update = method.step(state, time, points)
@@ -174,7 +174,7 @@ def test_a_track_that_is_not_seen_exists_less_and_less():
     assert r[0] == pytest.approx(predicted * 0.1 / (1 - 0.9 * predicted), rel=1e-9)
     assert r[1] < r[0] < before
     assert len(by_odds[-1]) == 0  # it ended, long before 30 misses
-    assert len(by_gap[-1]) == 1  # this one waits, and is told to exist as little
+    assert len(by_gap[-1]) == 1  # this one continues, with the same low existence
     assert by_gap[20] == pytest.approx(by_odds[20], abs=1e-9)
 
 

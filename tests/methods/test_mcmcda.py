@@ -166,8 +166,8 @@ def test_confidence_is_the_share_of_the_posterior_in_which_a_detection_follows_t
     [(4, 0.02), (4, 0.035), (4, 0.04), (4, 0.045), (4, 0.05), (4, 0.06), (7, 0.04), (7, 0.045)],
 )
 def test_what_comes_later_speaks_of_what_was_linked(until, off):
-    # A marker that moves straight, but for one point or from that on. Whether it is the marker's is
-    # told by the next: here against all partitions, as frames come.
+    # A marker that moves straight, but for one point or from that on. Whether it is the marker's
+    # depends on the points after it: here against all partitions, as frames come.
     x = 0.05 * np.arange(7.0)[:, None, None] * [1, 0, 0]
     x[3:until] += off
     d, model = am.Detections.from_frames(np.arange(7) * 0.1, list(x)), small_model()

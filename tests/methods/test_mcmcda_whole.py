@@ -64,7 +64,7 @@ def test_fragments_are_repaired(window):
 
 @pytest.mark.parametrize("window", [10, None])
 def test_without_a_move_and_a_start_nothing_could_begin(window):
-    # Every detection would be clutter, and nobody would be told.
+    # Every detection would be clutter, without a message.
     truth = wanderers(np.random.default_rng(6), n_frames=10)
     method = am.MCMCDA(window=window, moves=0)
     with pytest.raises(am.ParameterError, match=r"moves: expected a number > 0, or labels"):

@@ -67,7 +67,7 @@ def test_a_capture_is_made_as_detections_are():
         assert isinstance(d, am.Capture)
         assert d.channels.tolist() == d.labels.tolist() == [-1] * d.n_points
         assert d.tracks.n_tracks == 0
-    # None are nobody's, but a number of them that does not fit is still a mistake.
+    # Without labels all detections are clutter, but labels of another length are an error.
     with pytest.raises(am.ParameterError, match="labels"):
         am.Capture(times=d.times, offsets=d.offsets, points=d.points, labels=[])
 

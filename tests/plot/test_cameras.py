@@ -295,7 +295,7 @@ def test_a_level_of_the_coverage(coverage):
     (mesh,) = (c for c in axes.collections if isinstance(c, QuadMesh))
     n = coverage.n_cameras[:, :, 2]
     np.testing.assert_array_equal(mesh.get_array(), n.T)
-    # The middle of a cell is its place; counts are told apart by colours of their own.
+    # The middle of a cell is its place; each count has a different colour.
     np.testing.assert_array_equal(mesh.get_coordinates()[0, 0], [-2.25, -1.25])
     np.testing.assert_array_equal(mesh.get_coordinates()[-1, -1], [2.25, 1.75])
     colours = [to_hex(mesh.to_rgba(k)) for k in range(4)]

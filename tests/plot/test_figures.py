@@ -119,7 +119,7 @@ def test_compare_draws_the_scores_and_the_time():
     assert [t.get_text() for t in panels[0].get_yticklabels()] == ["right", "swapped"]
     assert [t.get_text() for t in panels[2].texts] == ["–", "0.25"]
     assert len(am.plot.plot_compare(scores)) == 2
-    for wrong in ({"nobody": 1.0}, {"right": 0.0}):
+    for wrong in ({"absent": 1.0}, {"right": 0.0}):
         with pytest.raises(am.ParameterError, match="milliseconds"):
             am.plot.plot_compare(scores, milliseconds=wrong)
     with pytest.raises(am.ParameterError, match="at least one"):

@@ -1,4 +1,4 @@
-"""The scene for Rerun holds the tracks, and nobody hears of it."""
+"""The scene for Rerun holds the tracks, and no statistics are sent."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_a_marker_is_there_when_it_was_seen_and_gone_when_not(rr):
     assert look["colors"] == [red << 24 | green << 16 | blue << 8 | 255]
 
 
-def test_gaps_are_bridged_while_they_last(rr):
+def test_gaps_have_lines_while_they_last(rr):
     tracks = tracks_of(["0", "0", "", "", "0", "", "0"])
     found = logged(rr, tracks)
     place = path_of(rr, ["world", "gaps", "track 0"])
@@ -159,7 +159,7 @@ def test_a_saved_scene_can_be_read_and_leaves_no_scraps(rr, tmp_path):
     am.plot.view(tracks, rig=am.Rig.ring(2, radius=4, height=2), path=tmp_path / "scene.rrd")
     assert [p.name for p in tmp_path.iterdir()] == ["scene.rrd"]
     command = [sys.executable, "-m", "rerun", "rrd", "verify", str(tmp_path / "scene.rrd")]
-    # With settings of its own: nobody's are touched by a test.
+    # With separate settings, so that a test changes no user's.
     env = os.environ | {
         "HOME": str(tmp_path),
         "XDG_CONFIG_HOME": str(tmp_path),

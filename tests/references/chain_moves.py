@@ -176,7 +176,7 @@ class Oracle:
         return -math.log(len(w)) - math.log(len(keeps))
 
     def of_update(self, w, v, keep):
-        if w == v:  # any track may have grown into itself again: which one is not told
+        if w == v:  # any track may have grown into itself again, so the move is ambiguous
             return None
         (new,), (old,) = v - w, w - v
         keeps = [r for r in range(1, len(old) + 1) if r >= self.n_frozen(old)]

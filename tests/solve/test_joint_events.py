@@ -278,7 +278,7 @@ def left_or_by_one_of_four(n_links, log_last):
     """Links with one way to go left and four to go right, and a last one with a dear right.
 
     A track t_i has d_i or one of a_i1..a_i4, and the track that has it then moves to d_(i + 1).
-    Nobody may miss, so that all go left up to some link and right after it; at that link the t_i
+    No track may miss, so that all go left up to some link and right after it; at that link the t_i
     may still have d_i or have left it.
     """
     n, k = n_links, 4

@@ -124,11 +124,11 @@ def test_a_backward_pass_is_a_forward_one_through_the_capture_reversed():
 
 
 def test_a_pass_advises_whom_its_joins_come_from():
-    told: list[Any] = []
+    advice: list[Any] = []
 
     class Listener:
         def advise(self, labels, before, weights):
-            told.extend(zip(labels.tolist(), before.tolist(), weights, strict=True))
+            advice.extend(zip(labels.tolist(), before.tolist(), weights, strict=True))
 
     found = Pass(
         tracklets=np.zeros(0, np.int32), markers=np.array([0, 1, 0, 0, -2, 1], np.int32),
@@ -137,17 +137,17 @@ def test_a_pass_advises_whom_its_joins_come_from():
     )  # fmt: skip
     found.advise(Listener())  # pyright: ignore[reportArgumentType]
     # 2 went on with 0: in the other direction 0 goes on with 2.
-    assert [(label, before) for label, before, _ in told] == [(0, 2), (2, 3), (1, 5)]
-    assert [weight for *_, weight in told] == pytest.approx([0.5 / WEIGHT, 5, 1])
+    assert [(label, before) for label, before, _ in advice] == [(0, 2), (2, 3), (1, 5)]
+    assert [weight for *_, weight in advice] == pytest.approx([0.5 / WEIGHT, 5, 1])
 
 
 def stream(dense, *, lag=2, confirm=15, revise=None, labels=None):
-    """Labels in the end, and what was told in each frame as (detection, marker)."""
+    """Labels in the end, and the revisions of each frame as (detection, marker)."""
     options = stitch_options(MODEL, confirm, 0.03, None)
     live = _engine.LiveStitcher(motion_model(MODEL, 3), options, lag=lag)
     F, Q = transition(MODEL.motion, 0.01)
     final: list[int] = []
-    told: list[list[tuple[int, int]]] = []
+    revised: list[list[tuple[int, int]]] = []
     for t, points in enumerate(dense):
         seen = np.isfinite(points[:, 0])
         own = np.flatnonzero(seen) if labels is None else labels[t][seen]
@@ -161,17 +161,17 @@ def stream(dense, *, lag=2, confirm=15, revise=None, labels=None):
             assert detection < first
             assert final[detection] != marker  # a revision reports changed labels only
             final[detection] = marker
-        told.append(list(zip(changed.tolist(), now.tolist(), strict=True)))
-    return np.array(final), told
+        revised.append(list(zip(changed.tolist(), now.tolist(), strict=True)))
+    return np.array(final), revised
 
 
 def test_a_label_is_revised_once_it_is_known():
     dense = np.zeros((40, 1, 3))
-    final, told = stream(dense)
+    final, revised = stream(dense)
     assert (final[:38] == 0).all()
     # Frame 14 makes the fragment a marker, and is taken two frames later.
-    assert told[:16] == [[]] * 16
-    assert told[16] == [(k, 0) for k in range(16)]
+    assert revised[:16] == [[]] * 16
+    assert revised[16] == [(k, 0) for k in range(16)]
 
 
 def test_a_late_decision_is_revised_from_its_first_frame():

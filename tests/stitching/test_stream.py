@@ -29,7 +29,7 @@ def disturbed(seed, frames=FRAMES):
 
 
 def streamed(method, detections, model):
-    """Labels in the end, as they were told first, the frame in which they changed last."""
+    """Labels in the end, as they were reported first, the frame in which they changed last."""
     state = method.init(model, n_axes=detections.n_axes, seed=1)
     final = np.full(detections.n_points, -1)
     first, when = final.copy(), final.copy()
@@ -92,7 +92,7 @@ def test_what_comes_back_is_guessed_soon(seed):
     ]
     assert is_back.sum() > 15
     assert np.median(late[is_back]) <= 5
-    for t in range(d.n_frames):  # what is told of a frame names no marker twice
+    for t in range(d.n_frames):  # the report of a frame names no marker twice
         own = first[d.offsets[t] : d.offsets[t + 1]]
         assert len(set(own[own >= 0])) == (own >= 0).sum()
 
@@ -115,11 +115,11 @@ def test_a_state_is_a_value():
         state, _ = method.step(state, time, points)
 
     def go_on(state):
-        told = []
+        updates = []
         for time, points in frames[60:100]:
             state, update = method.step(state, time, points)
-            told.append((update.labels, update.revised, update.revised_labels))
-        return told
+            updates.append((update.labels, update.revised, update.revised_labels))
+        return updates
 
     for one, other in zip(go_on(state), go_on(state), strict=True):
         for a, b in zip(one, other, strict=True):

@@ -170,12 +170,12 @@ def test_the_command_line_says_why_and_a_repeat_does_not_choose_again(person, ca
 
 def test_json_holds_the_choice_and_auto_may_be_named(person, capsys):
     assert main(["track", "p.csv", "-o", "a.csv", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert "bodies" in told["chosen"]
-    assert (told["method"], told["stitch"]) == ("smp", True)
+    report = json.loads(capsys.readouterr().out)
+    assert "bodies" in report["chosen"]
+    assert (report["method"], report["stitch"]) == ("smp", True)
     assert main(["track", "p.csv", "-o", "b.csv", "--method", "auto", "-q"]) == 0
     assert (person / "a.csv").read_bytes() == (person / "b.csv").read_bytes()
     assert main(["track", "p.csv", "-o", "c.csv", "--method", "gnn", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert "chosen" not in told
-    assert (told["method"], told["stitch"]) == ("gnn", False)
+    report = json.loads(capsys.readouterr().out)
+    assert "chosen" not in report
+    assert (report["method"], report["stitch"]) == ("gnn", False)

@@ -132,7 +132,7 @@ def _check_access(option: str, path: Path, folder: Path) -> None:
         raise ParameterError(option, "a writable path", got)
 
 
-def check_ending(option: str, path: Path | None, *endings: str) -> None:
+def check_ending(option: str, path: Path | None, *suffixes: str) -> None:
     """Raise if the name of an output file has another ending than its format.
 
     Parameters
@@ -141,16 +141,16 @@ def check_ending(option: str, path: Path | None, *endings: str) -> None:
         Option of the file.
     path : Path or None
         The file; None if it is not written.
-    *endings : str
-        Allowed endings in lower case. The message lists the first.
+    *suffixes : str
+        Allowed suffixes in lower case. The message lists the first.
 
     Raises
     ------
     ParameterError
         If the ending is none of them.
     """
-    if path is not None and path.suffix.lower() not in endings:
-        raise ParameterError(option, f"a name ending in {endings[0]}", str(path))
+    if path is not None and path.suffix.lower() not in suffixes:
+        raise ParameterError(option, f"a name ending in {suffixes[0]}", str(path))
 
 
 def _identity(path: Path) -> object:

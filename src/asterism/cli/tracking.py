@@ -66,8 +66,8 @@ def output_format(
         for format in known.values():
             if out.suffix and out.suffix.lower() in format.extensions:
                 return format.name
-        endings = ", ".join(dict.fromkeys(e for f in known.values() for e in f.extensions))
-        raise ParameterError(option, f"a name ending in {endings}", str(out), "or give --format")
+        suffixes = ", ".join(dict.fromkeys(e for f in known.values() for e in f.extensions))
+        raise ParameterError(option, f"a name ending in {suffixes}", str(out), "or give --format")
     if source in _WITHOUT_TRACKS:
         return "csv"
     return source if source in known else "c3d"
@@ -75,8 +75,8 @@ def output_format(
 
 def default_output(source: Path, format: str) -> Path:
     """Return the default path of a result: ``trial.tracked.c3d`` beside ``trial.c3d``."""
-    endings = am.io.CAPTURE_FORMATS[format].extensions
-    ending = source.suffix if source.suffix.lower() in endings else endings[0]
+    suffixes = am.io.CAPTURE_FORMATS[format].extensions
+    ending = source.suffix if source.suffix.lower() in suffixes else suffixes[0]
     return source.with_name(f"{source.stem}.tracked{ending}")
 
 

@@ -20,7 +20,7 @@ from asterism.simulate.corrupted_points import Points
 from asterism.simulate.episodes import Burst, Ghosts, Visits
 from asterism.simulate.false_points import anywhere, beside, ghost_points
 from asterism.simulate.missed_points import come_and_go, in_runs, merge, seen_by_rig, shadowed
-from asterism.simulate.sampling import kept_frames, shaken
+from asterism.simulate.sampling import jittered, kept_frames
 from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ def corrupt(
         is_kept &= (whole.markers < 0) | (n_views >= views)
     clean = whole
     if jitter:
-        times, places = shaken(rng_jitter, jitter, times, whole)
+        times, places = jittered(rng_jitter, jitter, times, whole)
         clean = whole._replace(places=places)
     factor = np.append(np.exp(noise_spread * rng_spread.standard_normal(n_markers)), 1.0)
     noisy = clean

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from asterism.simulate.corrupted_points import Points
 
-__all__ = ["kept_frames", "shaken"]
+__all__ = ["jittered", "kept_frames"]
 
 
 def kept_frames(
@@ -38,7 +38,7 @@ def kept_frames(
     return frames[rng.random(len(frames)) >= dropped] if dropped else frames
 
 
-def shaken(
+def jittered(
     rng: np.random.Generator, jitter: float, times: NDArray[np.float64], points: Points
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Shift the time of each frame at random, and interpolate the points.

@@ -32,7 +32,7 @@ def test_there_and_back(tmp_path, format, bent):
     assert [c.size_px for c in again] == [c.size_px for c in rig]
     assert [type(c.lens) for c in again] == [type(c.lens) for c in rig]
     assert again.warnings == ()
-    # Told by its content when its name says nothing.
+    # The content decides if the name has no suffix.
     if path.is_file():
         shutil.move(path, tmp_path / "nameless")
         same_pixels(rig, read_rig(tmp_path / "nameless"))
@@ -177,9 +177,9 @@ def test_a_unit_that_is_not_said_is_judged_and_told(tmp_path, format):
     assert len(judged.warnings) == 1
     assert "mm" in judged.warnings[0]
     assert "units=" in judged.warnings[0]
-    told = read_rig(path, units="mm")
-    same_pixels(rig, told)
-    assert told.warnings == ()
+    given = read_rig(path, units="mm")
+    same_pixels(rig, given)
+    assert given.warnings == ()
     np.testing.assert_allclose(read_rig(path, units="m")[0].center, rig[0].center * 1000)
 
 

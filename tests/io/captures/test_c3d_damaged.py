@@ -64,8 +64,8 @@ def test_header_and_parameters_disagree(load):
 
 def test_no_frames_no_points_no_detections(load):
     assert load(np.empty((0, 3, 4)), labels=["A", "B", "C"]).n_frames == 0
-    nobody = load(np.empty((6, 0, 4)), analog=np.ones((6, 2)), n_samples=2)
-    assert (nobody.n_frames, nobody.n_points) == (6, 0)
+    empty = load(np.empty((6, 0, 4)), analog=np.ones((6, 2)), n_samples=2)
+    assert (empty.n_frames, empty.n_points) == (6, 0)
     gone = np.full((6, 2, 4), np.nan)
     assert load(gone, labels=["A", "*1"]).names == ("A",)
 

@@ -185,10 +185,10 @@ def _check(name: str, kind: Kind, asked: Request) -> None:
 
 
 def _check_ending(out: Path) -> None:
-    from asterism.plot.export import ENDINGS
+    from asterism.plot.export import SUFFIXES
 
     ending = out.suffix.lower().removeprefix(".")
-    if ending not in ENDINGS:
+    if ending not in SUFFIXES:
         raise ParameterError("--out", "a name ending in .pdf, .svg or .png", str(out))
 
 

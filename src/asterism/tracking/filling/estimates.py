@@ -47,7 +47,7 @@ MAX_COMPARED = 400
 """Number of frames in which distances are compared."""
 MIN_SPREAD = 1e-4
 """Lower bound of the spread of a neighbour's distance, metres."""
-BRIDGED = 3
+MAX_SMOOTHED_GAP = 3
 """Longest gap of a helper, frames, that is filled by the smoother before the estimation. With
 independent missed detections there is hardly a frame with detections of all helpers."""
 
@@ -76,9 +76,9 @@ class DenseTracks:
         return np.isfinite(self.positions[..., 0])
 
     @cached_property
-    def bridged(self) -> NDArray[np.float64]:
-        """Positions with gaps of up to `BRIDGED` frames smoothed over, shape (T, K, D)."""
-        short = [span for span in find_gaps(self.seen) if span.length <= BRIDGED]
+    def smoothed(self) -> NDArray[np.float64]:
+        """Positions with gaps of up to `MAX_SMOOTHED_GAP` frames smoothed, shape (T, K, D)."""
+        short = [span for span in find_gaps(self.seen) if span.length <= MAX_SMOOTHED_GAP]
         if not short:
             return self.positions
         found = self.positions.copy()
@@ -92,8 +92,8 @@ class DenseTracks:
 
     @cached_property
     def known(self) -> NDArray[np.bool_]:
-        """True where each track was measured or bridged, shape (T, K)."""
-        return np.isfinite(self.bridged[..., 0])
+        """True where each track was measured or smoothed, shape (T, K)."""
+        return np.isfinite(self.smoothed[..., 0])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -152,7 +152,7 @@ def estimate(dense: DenseTracks, span: Span) -> Estimates:
     Estimates
     """
     k = span.track
-    X, own = dense.bridged, dense.seen[:, k]
+    X, own = dense.smoothed, dense.seen[:, k]
     ends = usable_ends(own, span)
     helpers, spreads = _helpers(dense, span, ends)
     helped = np.logical_and.reduce(dense.known[:, helpers], axis=1)
@@ -186,7 +186,7 @@ def estimate(dense: DenseTracks, span: Span) -> Estimates:
         rigid = np.full(span.length, (places[is_known] ** 2).mean())
         rigid *= _caution(is_known.sum() / span.length)
         there = places[at]
-        there[~own[every] & ~is_end] = np.nan  # bridged positions are no ground truth
+        there[~own[every] & ~is_end] = np.nan  # smoothed positions are no ground truth
         found.append(
             carried_estimate("body", np.zeros((*every.shape, X.shape[2])), there, is_end, ways,
                      room, rigid)
@@ -229,7 +229,7 @@ def _helpers(
     is_there[k] = False
     others = np.flatnonzero(is_there)
     compared = mine[:: -(-len(mine) // MAX_COMPARED)]
-    theirs = dense.bridged[compared][:, others]
+    theirs = dense.smoothed[compared][:, others]
     spreads = distances_from(dense.positions[compared, k], theirs).spread
     steadiest = np.argsort(spreads, kind="stable")[:MAX_HELPERS]
     others, spreads = others[steadiest], spreads[steadiest]
@@ -269,7 +269,7 @@ def _smoother(
     pieces = Detections(
         times=dense.times,
         offsets=np.concatenate([[0], np.cumsum(counts)]),
-        points=dense.bridged[frames[order], track],
+        points=dense.smoothed[frames[order], track],
     )
     states = smooth_states(Tracks(detections=pieces, labels=labels[order]), dense.model)
     at = states.offsets[:-1, None] + every[:, ~is_end] - states.first_frames[:, None]

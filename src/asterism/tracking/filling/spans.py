@@ -99,7 +99,7 @@ def usable_ends(seen: NDArray[np.bool_], span: Span) -> NDArray[np.int64]:
 
 def held_out(
     own: NDArray[np.bool_],
-    bridged: NDArray[np.bool_],
+    smoothed: NDArray[np.bool_],
     helped: NDArray[np.bool_],
     frames: NDArray[np.int64],
     span: Span,
@@ -111,10 +111,10 @@ def held_out(
     ----------
     own : ndarray of bool, shape (T,)
         True where the marker was detected. Required in the `NEAREST_ENDS` frames on each side,
-        because bridged positions there depend on withheld ones, and in half of the withheld
+        because smoothed positions there depend on withheld ones, and in half of the withheld
         frames.
-    bridged : ndarray of bool, shape (T,)
-        True where the marker was detected or bridged. Required in all other frames.
+    smoothed : ndarray of bool, shape (T,)
+        True where the marker was detected or smoothed. Required in all other frames.
     helped : ndarray of bool, shape (T,)
         True where all helpers are known. Required in all frames.
     frames : ndarray of int, shape (W,)
@@ -143,7 +143,7 @@ def held_out(
 
     before, after = frames[frames < span.first], frames[frames > span.last]
     nearest = np.concatenate([before[-NEAREST_ENDS:], after[:NEAREST_ENDS]])
-    fits = count(helped & bridged, frames) == len(frames)
+    fits = count(helped & smoothed, frames) == len(frames)
     fits &= count(own, nearest) == len(nearest)
     fits &= 2 * count(own, span.frames) >= span.length
     starts = np.flatnonzero(fits)
