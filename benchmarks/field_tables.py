@@ -101,20 +101,29 @@ def of_kind(kind: str, found: Found) -> list[str]:
 
 
 def of_clips(kinds: Sequence[str], found: Found) -> list[str]:
-    """Give the IDF1 of every tracker on every clip."""
+    """Return the IDF1 on every capture: a table of the peers, and one of the oracles and ours.
+
+    One table of all trackers would be wider than the page. The best of both is bold.
+    """
     names = list(dict.fromkeys(name for _, name in found))
-    rows: list[list[str]] = []
+    parts = [[n for n in names if n in PEERS], [n for n in names if n not in PEERS]]
+    rows: list[list[list[str]]] = [[] for _ in parts]
     for kind in kinds:
         for i, first in enumerate(found[kind, names[0]]):
-            scores = [found[kind, name][i] for name in names]
-            row = [f"{first.clip}, {max(s.points for s in scores):,} points"]
-            best = max((s.idf1 for s, n in zip(scores, names, strict=True) if n not in ORACLES))
-            for name, s in zip(names, scores, strict=True):
+            scores = {name: found[kind, name][i] for name in names}
+            title = f"{first.clip}, {max(s.points for s in scores.values()):,} points"
+            best = max(s.idf1 for n, s in scores.items() if n not in ORACLES)
+            cells: dict[str, str] = {}
+            for name, s in scores.items():
                 value = "–" if s.error else f"{s.idf1:.3f}"
                 is_best = name not in ORACLES and not s.error and s.idf1 >= best - 5e-4
-                row.append(f"**{value}**" if is_best else NOT_RUN if s.error == NOT_RUN else value)
-            rows.append(row)
-    return table(["", *names], rows)
+                cells[name] = (
+                    f"**{value}**" if is_best else NOT_RUN if s.error == NOT_RUN else value
+                )
+            for part, some in zip(parts, rows, strict=True):
+                some.append([title, *(cells[name] for name in part)])
+    tables = (table(["", *part], some) for part, some in zip(parts, rows, strict=True) if part)
+    return [line for lines in tables for line in (*lines, "")][:-1]
 
 
 def how(found: Found, options: argparse.Namespace) -> str:
