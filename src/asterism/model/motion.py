@@ -54,8 +54,8 @@ class SingleMotion(Motion):
     --------
     >>> import asterism as am
     >>> motion = am.RandomWalk(walk_sigma=0.1)
-    >>> motion.modes, motion.observation
-    ((RandomWalk(walk_sigma=0.1),), array([1.]))
+    >>> motion.modes, motion.mode_transitions, motion.observation
+    ((RandomWalk(walk_sigma=0.1),), array([[1.]]), array([1.]))
     """
 
     @property
@@ -77,6 +77,11 @@ class SingleMotion(Motion):
     def transition(self, dt: ArrayLike) -> NDArray[np.float64]:
         """Return F for each Δ of `dt` (M,), shape (M, n, n).
 
+        Parameters
+        ----------
+        dt : array_like, shape (M,)
+            Durations Δ, seconds.
+
         Examples
         --------
         >>> import asterism as am
@@ -87,6 +92,11 @@ class SingleMotion(Motion):
     @abstractmethod
     def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
         """Return Q for each Δ of `dt` (M,), shape (M, n, n).
+
+        Parameters
+        ----------
+        dt : array_like, shape (M,)
+            Durations Δ, seconds.
 
         Examples
         --------
@@ -215,8 +225,8 @@ class RandomWalk(SingleMotion):
     Examples
     --------
     >>> import asterism as am
-    >>> am.RandomWalk(walk_sigma=0.1)
-    RandomWalk(walk_sigma=0.1)
+    >>> am.RandomWalk(walk_sigma=0.1).observation
+    array([1.])
     """
 
     walk_sigma: float
@@ -285,8 +295,8 @@ class DWPA(SingleMotion):
     Examples
     --------
     >>> import asterism as am
-    >>> am.DWPA(increment_sigma=2, acceleration_prior_sigma=20).kind
-    'dwpa'
+    >>> am.DWPA(increment_sigma=2, acceleration_prior_sigma=20).observation
+    array([1., 0., 0.])
     """
 
     increment_sigma: float

@@ -108,7 +108,12 @@ class Recipe:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Make a recipe from nested plain values; the inverse of `to_dict`.
+        """Build a recipe from nested plain values; the inverse of `to_dict`.
+
+        Parameters
+        ----------
+        values : mapping
+            Content of a recipe file by section.
 
         Raises
         ------

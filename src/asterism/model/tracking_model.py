@@ -102,6 +102,11 @@ class TrackingModel:
     def initial_covariance(self, n_axes: int) -> NDArray[np.float64]:
         """Return the covariance of one axis' state after a first detection, shape (n, n).
 
+        Parameters
+        ----------
+        n_axes : int
+            Number of coordinates, 2 or 3, from which the prior of the velocity follows.
+
         Examples
         --------
         >>> import asterism as am
@@ -127,7 +132,12 @@ class TrackingModel:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Make a model from nested plain values; the inverse of `to_dict`.
+        """Build a model from nested plain values; the inverse of `to_dict`.
+
+        Parameters
+        ----------
+        values : mapping
+            Content of a model file by section.
 
         Raises
         ------
@@ -175,6 +185,11 @@ class TrackingModel:
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
         """Read a model from a TOML file.
+
+        Parameters
+        ----------
+        path : path
+            File of `to_toml`.
 
         Raises
         ------
