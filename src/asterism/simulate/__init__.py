@@ -4,11 +4,12 @@ from asterism.simulate.centroids import Seeing
 from asterism.simulate.corruption import corrupt
 from asterism.simulate.episodes import Burst, Ghosts, Visits
 from asterism.simulate.film import Film, film
+from asterism.simulate.lissajous import dense, smooth
 from asterism.simulate.people.hand import fingers
 from asterism.simulate.people.juggler import juggler
 from asterism.simulate.people.pair import two_people
 from asterism.simulate.people.person import person
-from asterism.simulate.points import attracted, crossing, cube, dense, smooth, walk, wander
+from asterism.simulate.points import attracted, crossing, cube, walk, wander
 from asterism.simulate.scenes import SCENES, Scene, from_capture
 from asterism.simulate.swarm import swarm
 from asterism.simulate.truth import Truth

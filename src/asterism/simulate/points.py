@@ -1,4 +1,4 @@
-"""Scenes of points without bodies: cubes, random walks, and points on smooth paths.
+"""Scenes of points without bodies: the cubes of the 2010 report and random walks.
 
 Motion is defined per frame and `rate` sets the duration of a frame, so a scene is equally difficult
 at every rate: a displacement of 0.1 m per frame is a speed of ``0.1 * rate`` m/s.
@@ -16,11 +16,9 @@ from asterism.simulate.clock import clock
 from asterism.simulate.truth import Truth
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
-__all__ = ["attracted", "crossing", "cube", "dense", "smooth", "walk", "wander"]
+__all__ = ["attracted", "crossing", "cube", "walk", "wander"]
 
 # Corners of a cube with side 1 about the origin, shape (8, 3), and the pairs along its edges.
 _CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -73,7 +71,8 @@ def cube(
     centre = amplitude * np.sin(t[:, None] * omega + rng.uniform(0, 2 * math.pi, 3))
     spin = 0.4 * speed / (side * math.sqrt(3) / 2)
     turn = _rotations(rng.standard_normal(3), spin * t)
-    return _named(times, centre[:, None, :] + _turned(turn, side * _CORNERS), _cube(0, 1))
+    corners = centre[:, None, :] + _turned(turn, side * _CORNERS)
+    return Truth.of(times, corners, lines=_cube(0, 1))
 
 
 def crossing(*, frames: int = 60, rate: float = 1.0, seed: int = 0, side: float = 0.25) -> Truth:
@@ -118,143 +117,12 @@ def crossing(*, frames: int = 60, rate: float = 1.0, seed: int = 0, side: float 
     turn = _rotations(np.array([0, 0, 1.0]), 0.08 * t) @ _rotations(np.array([0, 1.0, 0]), 0.04 * t)
     flying = centre[:, None, :] + _turned(turn, side * _CORNERS)
     standing = np.broadcast_to(side * _CORNERS, flying.shape)
-    return _named(
+    return Truth.of(
         times,
         np.concatenate([standing, flying], axis=1),
-        _cube(0, 1) + _cube(8, 2),
-        [1] * 8 + [2] * 8,
+        lines=_cube(0, 1) + _cube(8, 2),
+        colours=[1] * 8 + [2] * 8,
     )
-
-
-def smooth(
-    *,
-    n_markers: int = 50,
-    frames: int = 100,
-    rate: float = 1.0,
-    seed: int = 0,
-    spacing: float = 0.34,
-) -> Truth:
-    """Simulate any number of markers on Lissajous curves at constant density.
-
-    On each axis a marker oscillates by 0.1 to 0.3 m at 0.08 to 0.18 rad per frame about a centre of
-    its own, so its displacement is below 0.1 m per frame. All drift together by 0.01 m per frame.
-    The centres are uniform over a cube with a volume of ``spacing³`` for each marker.
-
-    Parameters
-    ----------
-    n_markers : int
-        Number of markers, ≥ 1.
-    frames : int
-        Number of frames, ≥ 1.
-    rate : float
-        Frame rate, frames per second, > 0. Motion is defined per frame, so the rate scales the
-        speed in m/s only.
-    seed : int
-        Seed of the centres, the curves and the drift.
-    spacing : float
-        Typical distance between neighbouring centres, metres, > 0. Smaller values are denser and
-        more difficult.
-
-    Returns
-    -------
-    Truth
-        Markers M00, M01 and so on, detected in every frame.
-
-    Raises
-    ------
-    ParameterError
-        If a number is out of range.
-
-    Examples
-    --------
-    >>> smooth(n_markers=100, frames=10, seed=1)
-    Truth(100 tracks, 1000 detections in them, 0 clutter, 10 frames)
-    """
-    check_number("n_markers", n_markers, above=1, closed=True, integer=True)
-    check_number("spacing", spacing, above=0)
-    times = clock(frames, rate, seed)
-    rng = np.random.default_rng(seed)
-    shape = (n_markers, 3)
-    centre = rng.uniform(0.0, spacing * n_markers ** (1 / 3), shape)
-    amplitude, omega = rng.uniform(0.1, 0.3, shape), rng.uniform(0.08, 0.18, shape)
-    phase = rng.uniform(0, 2 * math.pi, shape)
-    heading = rng.uniform(0, 2 * math.pi)
-    drift = 0.01 * np.array([math.cos(heading), math.sin(heading), 0.0])
-    return _named(times, _lissajous(frames, centre, amplitude, omega, phase, drift))
-
-
-def dense(
-    *,
-    n_markers: int = 50,
-    frames: int = 200,
-    rate: float = 1.0,
-    seed: int = 0,
-    density: float = 8.0,
-) -> Truth:
-    """Simulate any number of fast markers that cross each other on smooth paths.
-
-    On each axis a marker oscillates with a peak speed of 0.048 to 0.0866 m per frame at 0.08 to
-    0.18 rad per frame. Its displacement per frame is 0.08 m in the mean and at most 0.15 m. The
-    centres are uniform over a cube.
-
-    Parameters
-    ----------
-    n_markers : int
-        Number of markers, ≥ 1.
-    frames : int
-        Number of frames, ≥ 1.
-    rate : float
-        Frame rate, frames per second, > 0. Motion is defined per frame, so the rate scales the
-        speed in m/s only.
-    seed : int
-        Seed of the centres and the curves.
-    density : float
-        Centres per cubic metre, > 0. Larger values are more difficult.
-
-    Returns
-    -------
-    Truth
-        Markers M00, M01 and so on, detected in every frame.
-
-    Raises
-    ------
-    ParameterError
-        If a number is out of range.
-
-    Examples
-    --------
-    >>> dense(n_markers=100, frames=10, seed=1)
-    Truth(100 tracks, 1000 detections in them, 0 clutter, 10 frames)
-    """
-    check_number("n_markers", n_markers, above=1, closed=True, integer=True)
-    check_number("density", density, above=0)
-    times = clock(frames, rate, seed)
-    rng = np.random.default_rng(seed)
-    shape = (n_markers, 3)
-    centre = rng.uniform(0.0, (n_markers / density) ** (1 / 3), shape)
-    omega = rng.uniform(0.08, 0.18, shape)
-    amplitude = rng.uniform(0.048, 0.0866, shape) / omega
-    phase = rng.uniform(0, 2 * math.pi, shape)
-    return _named(times, _lissajous(frames, centre, amplitude, omega, phase, np.zeros(3)))
-
-
-def _lissajous(
-    frames: int,
-    centre: NDArray[np.float64],
-    amplitude: NDArray[np.float64],
-    omega: NDArray[np.float64],
-    phase: NDArray[np.float64],
-    drift: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Compute the positions of all markers, shape (frames, markers, axes)."""
-    positions = np.empty((frames, *centre.shape))
-    for now, place in enumerate(positions):  # in place: there may be very many
-        np.multiply(omega, float(now), out=place)
-        place += phase
-        np.sin(place, out=place)
-        place *= amplitude
-        place += centre + now * drift
-    return positions
 
 
 def walk(
@@ -314,7 +182,7 @@ def walk(
     steps = np.random.default_rng(seed).normal(0.0, stride, positions.shape)
     for k in range(1, frames):
         positions[k] = (1 - pull) * positions[k - 1] + steps[k]
-    return _named(times, positions)
+    return Truth.of(times, positions)
 
 
 def attracted(*, frames: int = 200, rate: float = 1.0, seed: int = 0) -> Truth:
@@ -407,23 +275,12 @@ def wander(
         size = np.linalg.norm(velocity, axis=1, keepdims=True)
         velocity *= np.minimum(1.0, speed / np.maximum(size, 1e-300))
         positions[k] = positions[k - 1] + velocity
-    return _named(times, positions)
+    return Truth.of(times, positions)
 
 
 def _cube(first: int, colour: int) -> list[tuple[int, int, int]]:
     """Return the lines along the edges of a cube whose first corner is a certain marker."""
     return [(first + i, first + j, colour) for i, j in _EDGES]
-
-
-def _named(
-    times: NDArray[np.float64],
-    positions: NDArray[np.float64],
-    lines: Sequence[tuple[int, int, int]] = (),
-    colours: Sequence[int] = (),
-) -> Truth:
-    names = [f"M{i:02d}" for i in range(positions.shape[1])]
-    positions.flags.writeable = False  # a read-only array is kept without a copy
-    return Truth.of(times, positions, names, lines=lines, colours=colours)
 
 
 def _rotations(axis: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,11 +14,12 @@ import numpy as np
 from asterism.errors import ParameterError
 from asterism.model import Capture, Tracks
 from asterism.records import Registry, record
+from asterism.simulate.lissajous import dense, smooth
 from asterism.simulate.people.hand import fingers
 from asterism.simulate.people.juggler import juggler
 from asterism.simulate.people.pair import two_people
 from asterism.simulate.people.person import person
-from asterism.simulate.points import attracted, crossing, cube, dense, smooth, walk, wander
+from asterism.simulate.points import attracted, crossing, cube, walk, wander
 from asterism.simulate.swarm import swarm
 from asterism.simulate.truth import Truth
 

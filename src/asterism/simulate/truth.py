@@ -100,7 +100,7 @@ class Truth(Tracks):
         cls,
         times: ArrayLike,
         positions: ArrayLike,
-        names: Sequence[str],
+        names: Sequence[str] | None = None,
         *,
         lines: Sequence[tuple[int, int, int]] = (),
         colours: ArrayLike = (),
@@ -114,8 +114,8 @@ class Truth(Tracks):
             Times of the frames, seconds.
         positions : array_like, shape (T, K, 3)
             Positions, metres; NaN for an absent marker.
-        names : sequence of K str
-            Names of the markers.
+        names : sequence of K str, optional
+            Names of the markers; M00, M01 and so on by default.
         lines : sequence of (marker, marker, colour)
             Lines between markers by their numbers; colours count from 1.
         colours, surfaces
@@ -125,6 +125,8 @@ class Truth(Tracks):
         -------
         Truth
         """
+        if names is None:
+            names = [f"M{i:02d}" for i in range(np.shape(positions)[1])]
         tracks = Tracks.from_dense(times, positions, names)
         connections = np.zeros((len(names), len(names)), dtype=np.int64)
         for i, j, colour in lines:
