@@ -136,7 +136,7 @@ def test_a_click_chooses_the_marker_under_it(opened, person):
     alone = max(places, key=gap)
     opened.click(x + places[alone][0] + 2, y + places[alone][1] - 1)
     assert opened.run("asterism.state().chosen") == alone
-    shown_at = opened.run("document.querySelector('[data-about=place]').textContent")
+    shown_at = opened.run("document.querySelector('[data-about=position]').textContent")
     here = (tracks.labels == alone) & (tracks.detections.frame_of == 60)
     shown = np.array([float(part) for part in shown_at.split(", ")])
     assert np.abs(shown - 1000 * tracks.detections.points[here][0]).max() < 0.2
@@ -154,9 +154,9 @@ def test_gaps_are_drawn_straight(opened, person):
     t = a + 2
     expected = places[a, k] + (t - a) / (b - a) * (places[b, k] - places[a, k])
     opened.run(f"asterism.choose({k}); asterism.seek({t})")
-    shown_at = opened.run("document.querySelector('[data-about=place]').textContent")
+    shown_at = opened.run("document.querySelector('[data-about=position]').textContent")
     assert np.abs(np.array([float(x) for x in shown_at.split(", ")]) - 1000 * expected).max() < 0.2
-    assert "not seen" in opened.run("document.querySelector('[data-about=now]').textContent")
+    assert "occluded" in opened.run("document.querySelector('[data-about=state]').textContent")
     opened.run("asterism.choose(-1)")
 
 

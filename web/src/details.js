@@ -20,21 +20,21 @@ export class Details {
     const point = this.places.point;
     this.row("Name", capture.header.names[k]);
     this.row("Track", `${k}, ${capture.starts[k + 1] - capture.starts[k]} points`);
-    this.row("Now", this.now(there, point));
+    this.row("State", this.seen(there, point));
     const shown = place.slice(0, capture.axes).map((x) => (1000 * x).toFixed(1));
-    this.row("Place, mm", there === ABSENT ? "–" : shown.join(", "));
+    this.row("Position, mm", there === ABSENT ? "–" : shown.join(", "));
     if (capture.confidence) this.row("Confidence", point < 0 ? "–" : percent(capture.confidence[point]));
-    if (capture.marker) this.row("Truly", this.truly(point));
+    if (capture.marker) this.row("True marker", this.trueMarker(point));
   }
 
-  now(there, point) {
-    if (there === ABSENT) return "not there";
-    if (there === GAP) return "not seen, drawn between where it was and will be";
-    if (this.capture.filled?.[point]) return "filled in, not measured";
-    return "seen";
+  seen(there, point) {
+    if (there === ABSENT) return "absent";
+    if (there === GAP) return "occluded, position interpolated";
+    if (this.capture.filled?.[point]) return "filled, not measured";
+    return "detected";
   }
 
-  truly(point) {
+  trueMarker(point) {
     const { marker, verdict, header } = this.capture;
     if (point < 0) return "–";
     const m = marker[point];

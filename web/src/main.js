@@ -20,7 +20,7 @@ async function start() {
   try {
     capture = await unpack(byId("data").textContent);
   } catch (error) {
-    message.textContent = "This browser cannot unpack the data of the page; one from 2023 on can.";
+    message.textContent = "This browser cannot decompress the data of the page. Use a browser of 2023 or newer.";
     throw error;
   }
   byId("data").remove();
@@ -64,7 +64,7 @@ async function start() {
   stage?.fit();
   if (stage) byId("scale").textContent = `squares of ${size(stage.floor.cell)}`;
   if (stage && capture.T && capture.positions.length) message.hidden = true;
-  else if (stage) message.textContent = capture.T ? "No point in any frame." : "Nothing was recorded.";
+  else if (stage) message.textContent = capture.T ? "The capture has no points." : "The capture has no frames.";
   globalThis.asterism = script(capture, state, stage, image);
   document.body.dataset.ready = "true";
 }
@@ -74,7 +74,7 @@ function staged(capture, state, message) {
   try {
     return new Stage(capture, state, byId("scene"));
   } catch (error) {
-    message.textContent = "This browser has no WebGL: the scene is missing, all else works.";
+    message.textContent = "This browser has no WebGL, so the 3-D view is absent.";
     console.info(error.message);
     return null;
   }
