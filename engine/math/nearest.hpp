@@ -23,16 +23,11 @@ class NearestInFrame {
 
   // Frame t has the points from offsets[t] to offsets[t + 1]. Both spans must outlive the object.
   NearestInFrame(std::span<const Point> points, std::span<const std::int64_t> offsets, int D)
-      : points_(points), offsets_(offsets), D_(D), order_(points.size()) {
-    std::iota(order_.begin(), order_.end(), std::int64_t{0});
-    for (std::size_t t = 0; t + 1 < offsets.size(); ++t)
-      std::sort(order_.begin() + offsets[t], order_.begin() + offsets[t + 1],
-                [&](std::int64_t a, std::int64_t b) {
-                  return points[a][0] != points[b][0] ? points[a][0] < points[b][0] : a < b;
-                });
-  }
+      : points_(points), offsets_(offsets), D_(D), order_(points.size()),
+        is_sorted_(offsets.size() - 1) {}
 
-  Two of(const Point& q, std::int64_t frame) const {
+  Two of(const Point& q, std::int64_t frame) {
+    if (!is_sorted_[frame]) sort(frame);  // often few of the frames are asked for
     const auto first = order_.begin() + offsets_[frame], last = order_.begin() + offsets_[frame + 1];
     auto right = std::partition_point(first, last,
                                       [&](std::int64_t i) { return points_[i][0] < q[0]; });
@@ -52,6 +47,15 @@ class NearestInFrame {
  private:
   static constexpr double kFar = std::numeric_limits<double>::infinity();
 
+  void sort(std::int64_t frame) {
+    const auto first = order_.begin() + offsets_[frame], last = order_.begin() + offsets_[frame + 1];
+    std::iota(first, last, offsets_[frame]);
+    std::sort(first, last, [&](std::int64_t a, std::int64_t b) {
+      return points_[a][0] != points_[b][0] ? points_[a][0] < points_[b][0] : a < b;
+    });
+    is_sorted_[frame] = true;
+  }
+
   // Of equally near points the first in the frame counts as nearer.
   void consider(std::int64_t i, const Point& q, Two& found) const {
     const double d2 = squared_distance(points_[i], q, D_);
@@ -69,7 +73,8 @@ class NearestInFrame {
   std::span<const Point> points_;
   std::span<const std::int64_t> offsets_;
   int D_;
-  std::vector<std::int64_t> order_;  // the points of each frame by their first coordinate
+  std::vector<std::int64_t> order_;  // the points of each sorted frame by their first coordinate
+  std::vector<bool> is_sorted_;
 };
 
 }  // namespace asterism

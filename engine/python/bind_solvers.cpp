@@ -78,7 +78,7 @@ nb::tuple nearest_two(const In<double>& points, const In<std::int64_t>& offsets,
   Owned<double> distance(2 * from.size());
   {
     nb::gil_scoped_release release;
-    const NearestInFrame nearest(all, flat(offsets), static_cast<int>(points.shape(1)));
+    NearestInFrame nearest(all, flat(offsets), static_cast<int>(points.shape(1)));
     for (std::size_t q = 0; q < from.size(); ++q) {
       const NearestInFrame::Two two = nearest.of(from[q], frames.data()[q]);
       for (int k = 0; k < 2; ++k) {

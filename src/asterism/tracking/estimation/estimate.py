@@ -40,11 +40,12 @@ from asterism.tracking.estimation.motion_fit import (
     polish,
 )
 from asterism.tracking.estimation.rates import Counts, Rates
+from asterism.tracking.estimation.sampling import sample_runs
 from asterism.tracking.estimation.scales import first_scales
 from asterism.tracking.estimation.stochastic_em import draw_rates
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from asterism.tracking.estimation.scales import Scales
 
@@ -54,11 +55,10 @@ log = logging.getLogger(__name__)
 
 MAX_EXTENT = 100.0
 """Distance from a capture's centre, metres, beyond which points are probably not in metres."""
-SAMPLE_POINTS = 60_000
-"""Number of detections used; of longer captures evenly spread pieces are used."""
-N_PIECES = 8
-MIN_FRAMES = 30
-N_ROUNDS = 2
+FIT_POINTS = 8_000
+"""Number of detections in the frames to which motion and noise are fitted."""
+COUNT_POINTS = 30_000
+"""Number of detections in the frames in which events are counted."""
 WIDER = 3.0
 """Factor on the strongest motion of the model that finds the tracks for the motion fit."""
 MIN_NOISE = 2e-4
@@ -131,15 +131,18 @@ def estimate_model(
             "give a model",
         )
     _check_units(detections)
-    pieces = list(_pieces(detections))
-    scales = first_scales(pieces)
+    scales, activity = first_scales(detections)
     region = Region.of(detections)
 
     def rates_of(evidence: Evidence) -> Rates:
         return _counts(evidence).rates(in_runs=in_runs)
 
-    fit, evidence, bounds = _fitted(pieces, scales, region, rates_of)
+    runs = sample_runs(detections, activity, FIT_POINTS)
+    fit, fitted, bounds = _fitted(runs, scales, region, rates_of)
     reach, min_noise = scales.spacing / 2, bounds.min_noise
+    runs = sample_runs(detections, activity, COUNT_POINTS)
+    model = _model(fit, rates_of(fitted), fitted, scales, region)
+    evidence = gather_evidence(runs, model, reach)
     counts = (_counts(evidence),)
     rates = rates_of(evidence)
     if population == "open":
@@ -148,7 +151,7 @@ def estimate_model(
             seen = evidence if tracks is None else Evidence.of(tracks, reach)
             return _model(fit, rates, seen, scales, region)
 
-        drawn = draw_rates(pieces, fit, rates, bounds, model_of, in_runs=in_runs)
+        drawn = draw_rates(runs, fit, rates, bounds, model_of, in_runs=in_runs)
         fit, rates, counts, evidence = (
             drawn.fit,
             drawn.rates,
@@ -170,7 +173,7 @@ def estimate_model(
 
 
 def _fitted(
-    pieces: list[Detections],
+    runs: list[Detections],
     scales: Scales,
     region: Region,
     rates_of: Callable[[Evidence], Rates],
@@ -187,13 +190,11 @@ def _fitted(
     )
 
     model = _first_model(fit, scales, region)
-    evidence = gather_evidence(pieces, _wider(model), reach)
-    fits: list[MotionFit] = []
-    for _ in range(N_ROUNDS):
-        fit = fit_motion(evidence.tracks, model, fit, bounds)
-        fits.append(fit)
+    evidence = gather_evidence(runs, _wider(model), reach)
+    for refine in (False, True):
+        fit = fit_motion(evidence.tracks, model, fit, bounds, refine=refine)
         model = _model(fit, rates_of(evidence), evidence, scales, region)
-        evidence = gather_evidence(pieces, _wider(model), reach)
+        evidence = gather_evidence(runs, _wider(model), reach)
     min_noise = max(scales.noise_floor, min(MIN_NOISE, scales.spacing / 100))
     bounds = replace(bounds, min_noise=min_noise)
 
@@ -202,31 +203,29 @@ def _fitted(
     def tried(trial: MotionFit, evidence: Evidence) -> tuple[float, MotionFit, Evidence]:
         trial = replace(trial, noise=max(trial.noise, min_noise))
         by = _model(trial, rates_of(evidence), evidence, scales, region)
-        found = gather_evidence(pieces, by, reach)
+        found = gather_evidence(runs, by, reach)
         model = _model(trial, rates_of(found), found, scales, region)
         # The bounds are those with which the tracks were found.
         bounds = {"max_speed": by.population.max_speed, "max_gap": by.population.max_gap}
         model = replace(model, population=replace(model.population, **bounds))
         return _log_evidence(found, model, region), trial, found
 
-    # A fit uses a sample of the tracks. If it misses the few fastest ones, it loses them.
-    three = min((tried(fit, evidence) for fit in reversed(fits)), key=lambda trial: trial[2].n_lost)
-    # One motion is fitted to tracks of its own, starting from the quietest. Tracks of three
+    three = tried(fit, evidence)
+    # One motion is fitted to tracks of its own, those of the quietest motion. Tracks of three
     # motions contain jolts, true or wrong, that a single motion would have to explain.
     one = tried(replace(fit, levels=fit.levels[:1], stay=1.0), evidence)
-    for _ in range(N_ROUNDS):
-        one = tried(fit_one_motion(one[2].tracks, model, one[1], bounds), one[2])
+    one = tried(fit_one_motion(one[2].tracks, model, one[1], bounds), one[2])
     # One motion is rejected if it loses markers that three motions keep, however well it predicts
     # the remaining ones.
     is_blind = one[2].n_lost > BLIND * three[2].n_lost + 1
-    gains_enough = three[0] - one[0] > MIN_GAIN * sum(p.n_points for p in pieces)
+    gains_enough = three[0] - one[0] > MIN_GAIN * sum(run.n_points for run in runs)
     _, fit, evidence = three if is_blind or gains_enough else one
     return fit, evidence, bounds
 
 
 def _check_units(detections: Detections) -> None:
     """Log a warning if a tenth of the points is too far from the centre for metres."""
-    points = detections.points[:: 1 + detections.n_points // SAMPLE_POINTS]
+    points = detections.points[:: 1 + detections.n_points // COUNT_POINTS]
     spread = np.abs(points - np.median(points, axis=0)).max(axis=1)
     far = float(np.quantile(spread, 0.9))
     if far > MAX_EXTENT:
@@ -234,19 +233,6 @@ def _check_units(detections: Detections) -> None:
             "a tenth of the points is more than %.3g m from their median: "
             "expected metres; divide millimetres by 1000", far,
         )  # fmt: skip
-
-
-def _pieces(detections: Detections) -> Iterator[Detections]:
-    """Yield up to `N_PIECES` runs of consecutive frames with `SAMPLE_POINTS` detections in all."""
-    if detections.n_points <= SAMPLE_POINTS:
-        yield detections
-        return
-    T, n = detections.n_frames, detections.n_points
-    length = max(T * SAMPLE_POINTS // n // N_PIECES, min(T, MIN_FRAMES))
-    # The pieces are spread over the points, because many frames in a row may be empty.
-    seeds = np.linspace(0, n - 1, max(1, min(N_PIECES, T // length))).astype(int)
-    for start in np.unique(np.minimum(detections.frame_of[seeds], T - length)):
-        yield detections.part(int(start), int(start) + length)
 
 
 def _first_model(fit: MotionFit, scales: Scales, region: Region) -> TrackingModel:

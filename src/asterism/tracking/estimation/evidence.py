@@ -179,8 +179,6 @@ def gather_evidence(pieces: list[Detections], model: TrackingModel, reach: float
         If too few points could be linked.
     """
     method = GNN()
-    found: list[Tracks] = []
-    for piece in pieces:
-        state = method.init(model, n_axes=piece.n_axes)
-        found.append(Tracks(detections=piece, labels=method.run(state, piece)[1]))
+    start = method.init(model, n_axes=pieces[0].n_axes)
+    found = [Tracks(detections=piece, labels=method.run(start, piece)[1]) for piece in pieces]
     return Evidence.of(found, reach)

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["TrackLikelihood"]
 
-SAMPLE_POINTS = 4000
-"""Number of detections in the sample, in pieces of tracks spread over the capture."""
 PIECE_POINTS = 60
 
 
@@ -32,13 +30,15 @@ class TrackLikelihood:
     Parameters
     ----------
     tracks : list of Tracks
-        Tracks of runs of frames; about `SAMPLE_POINTS` of their detections are used.
+        Tracks of runs of frames.
     velocity_sigma : float
         Prior standard deviation of a velocity coordinate, m/s.
+    n_points : int
+        Number of detections that are used, about, in pieces of tracks spread over the capture.
     """
 
-    def __init__(self, tracks: list[Tracks], velocity_sigma: float) -> None:
-        sample = _sample(tracks)
+    def __init__(self, tracks: list[Tracks], velocity_sigma: float, n_points: int) -> None:
+        sample = _sample(tracks, n_points)
         d = sample.detections
         order, offsets = sample.by_track
         points = with_noise(d.points, d.covariances)[order]
@@ -85,14 +85,14 @@ class TrackLikelihood:
         return total / self.n_points
 
 
-def _sample(tracks: list[Tracks]) -> Tracks:
+def _sample(tracks: list[Tracks], n_points: int) -> Tracks:
     """Cut the tracks into pieces of `PIECE_POINTS` and return evenly spread ones as one capture.
 
     The runs of frames are placed one after the other. No piece of a track extends over two runs,
     so the time between runs has no effect.
     """
     total = sum(int(found.lengths.sum()) for found in tracks)
-    stride = max(1, round(total / SAMPLE_POINTS))
+    stride = max(1, round(total / n_points))
     times: list[NDArray[np.float64]] = []
     points: list[NDArray[np.float64]] = []
     counts: list[NDArray[np.int64]] = []

@@ -34,6 +34,10 @@ __all__ = ["MIN_GAIN", "FitBounds", "MotionFit", "fit_motion", "fit_one_motion",
 
 Kind = Literal["dwna", "random_walk"]
 KINDS: tuple[Kind, ...] = ("dwna", "random_walk")
+SEARCH_POINTS, FIT_POINTS = 1500, 4000
+"""Numbers of detections in the likelihood of a search from afar, and of a fit."""
+REFINED = 0.4
+"""Size of the first steps of a search near the maximum, relative to those of one from afar."""
 MIN_GAIN = 0.05
 """Smallest gain of a motion over a simpler one, nats per detection. The few wrong links in tracks
 look like jolts to the fit; on their own they gain less than this."""
@@ -41,6 +45,8 @@ ROUGH = 0.1
 """Step of a logarithm over which the likelihood of several motions is assumed to be smooth."""
 MAX_NEWTON_STEP = 0.3
 """Largest Newton step of a logarithm towards the maximum of the likelihood."""
+FLAT = 1e-10
+"""Ratio of curvatures below which the likelihood has no maximum to double precision."""
 JOLT = 0.1
 """Share of jolts among the transitions from quiet or busy; a jolt lasts two frames on average."""
 
@@ -143,7 +149,12 @@ class FitBounds:
 
 
 def fit_motion(
-    tracks: list[Tracks], model: TrackingModel, start: MotionFit, bounds: FitBounds
+    tracks: list[Tracks],
+    model: TrackingModel,
+    start: MotionFit,
+    bounds: FitBounds,
+    *,
+    refine: bool = False,
 ) -> MotionFit:
     """Fit three motions and the noise to tracks.
 
@@ -157,6 +168,9 @@ def fit_motion(
         Start of the search.
     bounds : FitBounds
         Bounds of noise and motion.
+    refine : bool
+        Whether `start` is a fit to earlier tracks. The search then has smaller steps and a larger
+        sample of the detections.
 
     Returns
     -------
@@ -179,7 +193,9 @@ def fit_motion(
         log_levels[2] - log_levels[1],
         math.log(start.stay / (1 - start.stay)),
     ]
-    return _search(tracks, model, unpack, first, [0.4, 0.4, 0.4, 0.4, 0.8])[0]
+    likelihood = _likelihood(tracks, model, FIT_POINTS if refine else SEARCH_POINTS)
+    spread = (REFINED if refine else 1) * np.array([0.4, 0.4, 0.4, 0.4, 0.8])
+    return _search(likelihood, unpack, first, spread)[0]
 
 
 def fit_one_motion(
@@ -200,6 +216,7 @@ def fit_one_motion(
     MotionFit
     """
     velocity = model.velocity_sigma(tracks[0].detections.n_axes)
+    likelihood = _likelihood(tracks, model, FIT_POINTS)
     middle = math.log(start.levels[len(start.levels) // 2])
     best, best_cost = start, math.inf
     for kind in KINDS:
@@ -212,7 +229,8 @@ def fit_one_motion(
         level = middle
         if kind == "random_walk":
             level = math.log(velocity) + math.log(tracks[0].detections.step or 1.0) / 2
-        plain, cost = _search(tracks, model, unpack, [math.log(start.noise), level], [0.4, 0.7])
+        first = [math.log(start.noise), level]
+        plain, cost = _search(likelihood, unpack, first, np.array([0.4, 0.7]))
         if cost < best_cost - MIN_GAIN:
             best, best_cost = plain, cost
     return best
@@ -238,7 +256,7 @@ def polish(
         Standard deviations of the logarithms of the noise and of each level, from the inverse of
         the observed information; None if the likelihood has no maximum.
     """
-    likelihood = TrackLikelihood(tracks, model.velocity_sigma(tracks[0].detections.n_axes))
+    likelihood = _likelihood(tracks, model, FIT_POINTS)
     first = np.log([fit.noise, *fit.levels])
 
     def at(x: NDArray[np.float64]) -> MotionFit:
@@ -257,12 +275,14 @@ def polish(
     gradient = (up - down) / (2 * h)
     information: NDArray[Any] = np.diag(up - 2 * middle + down)
     for a, b in zip(*np.tril_indices(len(first), -1), strict=True):
-        corners = [
-            s * t * cost(first + s * steps[a] + t * steps[b]) for s in (1, -1) for t in (1, -1)
-        ]
-        information[a, b] = information[b, a] = sum(corners) / 4
+        corners = cost(first + steps[a] + steps[b]) + cost(first - steps[a] - steps[b])
+        sides = up[a] + down[a] + up[b] + down[b] - 2 * middle
+        information[a, b] = information[b, a] = (corners - sides) / 2
     information = information / h**2
-    if not np.isfinite(information).all() or np.linalg.eigvalsh(information)[0] <= 0:
+    if not np.isfinite(information).all():
+        return fit, None
+    curvatures = np.linalg.eigvalsh(information)
+    if curvatures[0] <= FLAT * curvatures[-1]:
         return fit, None
     stds = tuple(map(float, np.sqrt(np.diag(np.linalg.inv(information)))))
     step = np.linalg.solve(information, gradient).astype(np.float64)
@@ -278,16 +298,17 @@ def polish(
     ), stds
 
 
+def _likelihood(tracks: list[Tracks], model: TrackingModel, n_points: int) -> TrackLikelihood:
+    return TrackLikelihood(tracks, model.velocity_sigma(tracks[0].detections.n_axes), n_points)
+
+
 def _search(
-    tracks: list[Tracks],
-    model: TrackingModel,
+    likelihood: TrackLikelihood,
     unpack: Callable[[NDArray[np.float64]], MotionFit],
     first: list[float],
-    spread: list[float],
+    spread: NDArray[np.float64],
 ) -> tuple[MotionFit, float]:
     from scipy.optimize import minimize
-
-    likelihood = TrackLikelihood(tracks, model.velocity_sigma(tracks[0].detections.n_axes))
 
     def cost(x: NDArray[np.float64]) -> float:
         return -likelihood.mean(unpack(x))

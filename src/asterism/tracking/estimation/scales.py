@@ -6,7 +6,7 @@ They are biased towards slow markers, which is accurate enough for a start.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -53,27 +53,30 @@ class Scales:
     spacing: float
 
 
-def first_scales(pieces: list[Detections]) -> Scales:
-    """Estimate the scales from runs of consecutive frames.
+def first_scales(detections: Detections) -> tuple[Scales, NDArray[np.float64]]:
+    """Estimate the scales of a capture, and how much its points move in each frame.
 
     Parameters
     ----------
-    pieces : list of Detections
-        Runs of consecutive frames of the capture.
+    detections : Detections
+        Capture.
 
     Returns
     -------
-    Scales
+    scales : Scales
+    activity : ndarray, shape (T,)
+        Mean square distance of the points of a frame to the nearest point of the next frame, each
+        limited to the spacing of the points, m²; NaN for frames that were not measured.
 
     Raises
     ------
     ParameterError
         If no point has an unambiguous link to the next frame.
     """
-    share = LINKED_POINTS // len(pieces)
-    followed = [_follow(piece, max(1, piece.n_points // share)) for piece in pieces]
-    velocities, jolts, spacings = (np.concatenate(parts) for parts in zip(*followed, strict=True))
-    step = float(np.median([p.step for p in pieces]))
+    d = detections
+    links = _follow(d, 1 + d.n_points // LINKED_POINTS)
+    velocities, jolts = links.velocities, links.jolts
+    step = d.step
     bends = np.abs(jolts).ravel() * step  # change of position against constant velocity, metres
     if len(velocities) < 3 or not len(bends):
         raise ParameterError(
@@ -82,7 +85,7 @@ def first_scales(pieces: list[Detections]) -> Scales:
             "none that are nearer to their next position than to other points",
             "give a model",
         )
-    extent = max(float(np.ptp(p.points, axis=0).max()) for p in pieces)
+    extent = float(np.ptp(d.points, axis=0).max())
     floor = max(extent, 1e-3) * 1e-6
     speeds = np.linalg.norm(velocities, axis=1)
     quiet, busy = np.quantile(bends, [0.3, 0.99])
@@ -90,8 +93,9 @@ def first_scales(pieces: list[Detections]) -> Scales:
     # quantile 0.39.
     noise = max(float(quiet) / 0.39 / np.sqrt(6.0), floor)
     low = max(float(np.median(bends)) / 0.67, noise) / step**2
-    known = spacings[np.isfinite(spacings)]
-    return Scales(
+    known = links.spacings[np.isfinite(links.spacings)]
+    spacing = float(np.median(known)) if len(known) else max(extent, floor)
+    scales = Scales(
         step=step,
         noise=noise,
         noise_floor=floor,
@@ -99,36 +103,55 @@ def first_scales(pieces: list[Detections]) -> Scales:
         top_speed=max(float(speeds.max()), noise / step),
         acceleration_low=low,
         acceleration_high=max(float(busy) / step**2, 3 * low),
-        spacing=float(np.median(known)) if len(known) else max(extent, floor),
+        spacing=spacing,
     )
+    squares = np.minimum(links.distances, spacing) ** 2
+    with np.errstate(invalid="ignore"):
+        activity = np.bincount(links.frames, squares, d.n_frames) / np.bincount(
+            links.frames, minlength=d.n_frames
+        )
+    return scales, activity
 
 
-def _follow(
-    piece: Detections, stride: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Follow the points of every `stride`-th frame over the next two frames with points.
+class _Links(NamedTuple):
+    """Links of points to the next frames.
 
-    Returns
-    -------
+    Parameters
+    ----------
     velocities, jolts : ndarray, shapes (V, D) and (J, D)
-        Velocity over the first link, and its change over the second, m/s.
+        Velocity over an unambiguous link, and its change over the next one, m/s.
     spacings : ndarray, shape (M,)
-        Distance of a point to the nearest other point of its frame, inf if there is none.
+        Distance of each followed point to the nearest other point of its frame, inf if there is
+        none.
+    frames : ndarray of int, shape (M,)
+        Frame of each followed point.
+    distances : ndarray, shape (M,)
+        Distance of each followed point to the nearest point of the next frame, metres.
     """
-    filled = np.flatnonzero(piece.counts)
-    points, times = piece.points, piece.times[filled]
-    offsets = np.append(piece.offsets[filled], piece.n_points)
+
+    velocities: NDArray[np.float64]
+    jolts: NDArray[np.float64]
+    spacings: NDArray[np.float64]
+    frames: NDArray[np.int64]
+    distances: NDArray[np.float64]
+
+
+def _follow(d: Detections, stride: int) -> _Links:
+    """Follow the points of every `stride`-th frame over the next two frames with points."""
+    filled = np.flatnonzero(d.counts)
+    points, times = d.points, d.times[filled]
+    offsets = np.append(d.offsets[filled], d.n_points)
     frame = np.repeat(np.arange(len(filled)), np.diff(offsets))
     is_first = (frame % stride == 0) & (frame < len(filled) - 2)
     first = np.flatnonzero(is_first)
-    link, spacing = _sure_links(points, offsets, frame, first)
+    link, spacing, distance = _sure_links(points, offsets, frame, first)
     is_linked = link >= 0
     a, b = first[is_linked], link[is_linked]
     velocity = (points[b] - points[a]) / np.diff(times)[frame[a], None]
-    onward, _ = _sure_links(points, offsets, frame, b)
+    onward, _, _ = _sure_links(points, offsets, frame, b)
     c, before, b = onward[onward >= 0], velocity[onward >= 0], b[onward >= 0]
     jolt = (points[c] - points[b]) / np.diff(times)[frame[b], None] - before
-    return velocity, jolt, spacing
+    return _Links(velocity, jolt, spacing, filled[frame[first]].astype(np.int64), distance)
 
 
 def _sure_links(
@@ -136,7 +159,7 @@ def _sure_links(
     offsets: NDArray[np.int64],
     frame: NDArray[np.int64],
     chosen: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Link chosen points to the next frame if the link is unambiguous.
 
     Parameters
@@ -156,10 +179,12 @@ def _sure_links(
         Point of the next frame, -1 for an ambiguous link.
     spacing : ndarray, shape (M,)
         Distance to the nearest other point of the frame, inf if there is none.
+    distance : ndarray, shape (M,)
+        Distance to the nearest point of the next frame, metres.
     """
     t = frame[chosen]
     spacing = nearest_two(points, offsets, points[chosen], t)[1][:, 1]
     nearest, distance = nearest_two(points, offsets, points[chosen], t + 1)
     back = nearest_two(points, offsets, points[nearest[:, 0]], t)[0][:, 0]
     is_clear = distance[:, 0] < 0.3 * np.minimum(distance[:, 1], spacing)
-    return np.where((back == chosen) & is_clear, nearest[:, 0], -1), spacing
+    return np.where((back == chosen) & is_clear, nearest[:, 0], -1), spacing, distance[:, 0]
