@@ -51,9 +51,11 @@ struct Marker {
   std::int32_t tracklet = -1;
   std::int64_t label = -1;  // of that tracklet
   std::int64_t last = 0;
-  MotionState state;            // predicted to the newest frame, while occluded
-  std::vector<Anchor> anchors;  // while occluded
   bool is_occluded = false;
+  // While it is occluded, from the first comparison with a tracklet. Most occlusions end before.
+  bool is_prepared = false;
+  MotionState state;  // predicted to the newest frame
+  std::vector<Anchor> anchors;
   double mean_gain = 3;  // mean log-likelihood ratio of its detections by neighbours
 };
 using Tracklets = std::map<std::int32_t, Tracklet>;

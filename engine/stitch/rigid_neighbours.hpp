@@ -29,7 +29,7 @@ class RigidNeighbours {
 
   // Prepares the evaluation of the links of the newest frame.
   void begin_links(const StitchMemory& s) {
-    w_.common_from = kNever;
+    w_.n_common = 0;
     list_markers(s, s.frames.newest(), w_.places_now);
   }
   // Log-likelihood ratio of a tracklet's link into the newest frame, predicted by its neighbours,
@@ -37,8 +37,8 @@ class RigidNeighbours {
   // also if the result is below `enough`. Returns false if there are too few neighbours.
   bool link(const StitchMemory& s, const Frame::One& own, const Tracklet& f, double enough,
             double& gain) {
-    list_common(s, f.last);
-    if (w_.common.size() < min_for_rotation(D_) + 2) return false;
+    const Common& common = common_with(s, f.last);
+    if (common.pairs.size() < min_for_rotation(D_) + 2) return false;
     const Point then = *s.frames.find(f.last)->find(own.tracklet);
     const double background = s.background.log_density(own.at, s.frames.newest(), own.tracklet);
     // Segments hardly deform between two frames, so the residual of the fit alone gives the
@@ -49,18 +49,17 @@ class RigidNeighbours {
     };
     gain = -std::numeric_limits<double>::infinity();
     if (f.marker >= 0)
-      if (const auto pairs = carrier_.pair(f.marker, w_.places, w_.places_now); pairs.size() == kSteadiest)
+      if (const auto pairs = carrier_.pair(f.marker, common.places, w_.places_now); pairs.size() == kSteadiest)
         gain = say(pairs);
     if (gain >= enough) return true;
-    pair_nearest(own.tracklet, then);
+    pair_nearest(common, own.tracklet, then);
     gain = std::max(gain, say(w_.pairs));
     return true;
   }
 
-  // Stores the positions of the neighbours of a marker that became occluded. The last detections
-  // may already be those of a ghost, so several earlier frames are stored.
+  // Stores the positions of the neighbours of an occluded marker. The last detections may already
+  // be those of a ghost, so several earlier frames are stored.
   void remember_around(const StitchMemory& s, std::int32_t k, Marker& marker) {
-    marker.is_occluded = true;
     marker.anchors.clear();
     for (const std::int64_t back : Carrier::kAnchors) {
       const Frame* then = s.frames.find(marker.last - back);
@@ -97,35 +96,43 @@ class RigidNeighbours {
   }
 
  private:
-  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min() / 2;
   static constexpr std::size_t kLooks = 3;  // frames of a tracklet in which it is compared
   // Added to the variance of a predicted position, in units of the measurement variance.
   static constexpr double kNoise = 12;
 
   static double square(double x) { return x * x; }
 
-  // Lists the tracklets detected in both frames.
-  void list_common(const StitchMemory& s, std::int64_t then) {
-    if (w_.common_from == then) return;
-    w_.common_from = then;
-    w_.common.clear();
-    list_markers(s, *s.frames.find(then), w_.places);
+  // The markers of an earlier frame, and the tracklets detected in it and in the newest frame.
+  struct Common {
+    std::int64_t then = 0;
+    Places places;
+    std::vector<std::pair<std::int32_t, RigidPair>> pairs;
+  };
+  const Common& common_with(const StitchMemory& s, std::int64_t then) {
+    for (std::size_t k = 0; k < w_.n_common; ++k)
+      if (w_.common[k].then == then) return w_.common[k];
+    if (w_.n_common == w_.common.size()) w_.common.emplace_back();
+    Common& common = w_.common[w_.n_common++];
+    common.then = then;
+    common.pairs.clear();
+    list_markers(s, *s.frames.find(then), common.places);
     const auto& before = s.frames.find(then)->seen;
     auto a = before.begin();
     for (const auto& b : s.frames.newest().seen) {
       while (a != before.end() && a->tracklet < b.tracklet) ++a;
       if (a != before.end() && a->tracklet == b.tracklet)
-        w_.common.push_back({b.tracklet, {a->at, b.at, 1}});
+        common.pairs.push_back({b.tracklet, {a->at, b.at, 1}});
     }
+    return common;
   }
-  void pair_nearest(std::int32_t own, const Point& then) {
+  void pair_nearest(const Common& common, std::int32_t own, const Point& then) {
     w_.nearest.clear();
-    for (std::int32_t k = 0; k < static_cast<std::int32_t>(w_.common.size()); ++k)
-      if (w_.common[k].first != own)
-        keep_smallest(w_.nearest, kSteadiest, {squared_distance(w_.common[k].second.a, then, D_), k});
+    for (std::int32_t k = 0; k < static_cast<std::int32_t>(common.pairs.size()); ++k)
+      if (common.pairs[k].first != own)
+        keep_smallest(w_.nearest, kSteadiest, {squared_distance(common.pairs[k].second.a, then, D_), k});
     w_.pairs.clear();
     for (const auto& [distance2, k] : w_.nearest) {
-      w_.pairs.push_back(w_.common[k].second);
+      w_.pairs.push_back(common.pairs[k].second);
       w_.pairs.back().weight = 1 / (distance2 + w_.nearest.front().first + square(40 * noise_));
     }
   }
@@ -172,8 +179,8 @@ class RigidNeighbours {
     }
   };
   struct Memory {
-    std::int64_t common_from = kNever;
-    std::vector<std::pair<std::int32_t, RigidPair>> common;
+    std::vector<Common> common;  // of the earlier frames from which links lead into the newest
+    std::size_t n_common = 0;
     std::vector<std::pair<double, std::int32_t>> nearest;
     std::vector<Looks> looks;
     std::vector<RigidPair> pairs;

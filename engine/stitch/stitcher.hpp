@@ -91,6 +91,11 @@ class Stitcher {
   }
   // Computes the best candidates of all undecided tracklets, as if no further frame came.
   void guess() {
+    for (const auto& [id, f] : so_far_.tracklets)
+      if (f.marker == Decision::kOpen && f.last == now()) {
+        prepare_all();
+        break;
+      }
     assignment_.guess(so_far_, markers_, neighbours_,
                       [this](const Tracklet& f) { return is_short(f); });
   }
@@ -121,7 +126,7 @@ class Stitcher {
       for (Continuation& c : f.continuations) predict(m_, step, c.state);
     }
     for (auto& [id, marker] : markers_)
-      if (marker.is_occluded && now() - marker.last <= kMotionFrames)
+      if (marker.is_prepared && now() - marker.last <= kMotionFrames)
         predict(m_, step, marker.state);
   }
 
@@ -209,10 +214,7 @@ class Stitcher {
     Tracklet& f = so_far_.tracklets.at(id);
     if (f.marker >= 0) {
       Marker& marker = markers_.at(f.marker);
-      if (marker.is_occluded) {
-        marker.is_occluded = false;
-        marker.anchors.clear();
-      }
+      marker.is_occluded = marker.is_prepared = false;
       marker.last = f.last = now();
       ++f.n;
       return;
@@ -229,12 +231,20 @@ class Stitcher {
     if (static_cast<std::int64_t>(f.detections.size()) < opt_.confirm)
       f.detections.push_back({now(), y});
   }
-  // Stores the motion and the neighbours of each marker that became occluded.
   void mark_occluded() {
-    for (auto& [k, marker] : markers_)
-      if (!marker.is_occluded && marker.last < now()) mark_occluded(k, marker);
+    for (auto& [k, marker] : markers_) {
+      if (marker.last < now()) marker.is_occluded = true;
+      // Its last frames are removed soon.
+      if (now() - marker.last > opt_.max_gap) prepare(k, marker);
+    }
   }
-  void mark_occluded(std::int32_t k, Marker& marker) {
+  // Stores the motion and the neighbours of each occluded marker.
+  void prepare_all() {
+    for (auto& [k, marker] : markers_) prepare(k, marker);
+  }
+  void prepare(std::int32_t k, Marker& marker) {
+    if (!marker.is_occluded || marker.is_prepared) return;
+    marker.is_prepared = true;
     neighbours_.remember_around(so_far_, k, marker);
     marker.state = so_far_.frames.motion(m_, marker.tracklet);
   }
@@ -243,6 +253,7 @@ class Stitcher {
     for (const auto& one : so_far_.frames.newest().seen) {
       Tracklet& f = so_far_.tracklets.at(one.tracklet);
       if (f.n != 1 || f.marker != Decision::kOpen) continue;
+      prepare_all();
       for (const auto& [k, marker] : markers_) {
         if (!marker.is_occluded || now() - marker.last > kMotionFrames) continue;
         Continuation& c = f.continuations.emplace_back(Continuation{k, marker.state, 0});
@@ -273,6 +284,7 @@ class Stitcher {
   Decision decide_upon(std::int32_t id) {
     Tracklet& f = so_far_.tracklets.at(id);
     Decision out{id};
+    prepare_all();
     std::tie(out.marker, out.probability) = assignment_.best(
         so_far_, markers_, neighbours_, id, [this](const Tracklet& g) { return is_short(g); });
     if (out.marker == Decision::kOpen) {
@@ -289,8 +301,8 @@ class Stitcher {
     marker.tracklet = id;
     marker.label = f.label;
     marker.last = f.last;
-    marker.is_occluded = false;
-    if (f.last < now()) mark_occluded(out.marker, marker);
+    marker.is_occluded = f.last < now();
+    marker.is_prepared = false;
     f.detections.clear();
     f.continuations.clear();
     return out;
