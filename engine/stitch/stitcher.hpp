@@ -192,7 +192,7 @@ class Stitcher {
       if (f.n == 0 || so_far_.frames.find(f.last) == nullptr) continue;
       const double min_gain = std::min(kContradicted, f.link_gain - kFall);
       double gain = 0;
-      if (!neighbours_.link(so_far_, one, f, f.link_gain, gain)) continue;
+      if (!neighbours_.link(so_far_, one, f, min_gain, gain)) continue;
       if (opt_.may_cut && gain < min_gain) {
         w_.cut.push_back(&one);
       } else {

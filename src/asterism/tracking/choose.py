@@ -31,7 +31,7 @@ AUTO = "auto"
 
 SAMPLES = 200
 """Number of frames, spread over the capture, in which distances are compared."""
-MAX_TRACKS = 150
+MAX_TRACKS = 60
 """Number of tracks that are compared, the longest ones."""
 RIGID = 0.05
 """Largest spread of a bond on a rigid segment, as a share of the spread of its markers' positions.
