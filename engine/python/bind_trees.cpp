@@ -20,10 +20,12 @@ using namespace asterism;
 
 namespace {
 
-// Returns λ of the confirmed tracks and its number of detections, in the order of `tracks`.
+// Returns λ of the confirmed tracks and its number of detections, in the order of `tracks`; nothing
+// without a χ² test.
 nb::dict chi2(const TreeTracker<Forest>& tracker) {
-  const auto tracks = confirmed(tracker.live());
   nb::dict out;
+  if (!tracker.forest().has_test()) return out;
+  const auto tracks = confirmed(tracker.live());
   out["chi2"] = array_of<double>(tracks, [](const auto* t) { return t->more.lambda; });
   out["updates"] = array_of<std::int64_t>(tracks, [](const auto* t) { return t->more.n_updates; });
   return out;

@@ -66,6 +66,7 @@ struct BranchOptions {
   double prune_drop = 0;          // a branch is pruned this many nats below the best of its tree
   double fading = 1;              // ρ
   std::vector<double> delta;      // δ(1), δ(2), …; empty: no test
+  bool has_test() const { return !delta.empty(); }
   double z = 0;                   // normal quantile of α, for δ beyond those if ρ is 1
   // Whether tracks are evaluated jointly. The gain of a branch is then its term of the log
   // posterior, and conflicts between tracks are resolved by the joint choice instead of by claims.
@@ -192,7 +193,9 @@ class BranchGrower {
     for (Branch& parent : track.more.branches)
       split(frame, track, std::move(parent), grown_, stats);
     prune(frame.number, n_open, max_branches, stats);
-    track.more.branches.assign(grown_.begin(), grown_.end());
+    track.more.branches.resize(kept_.size());
+    for (std::size_t k = 0; k < kept_.size(); ++k)
+      track.more.branches[k] = std::move(grown_[kept_[k]]);
   }
 
   // Prediction for a track missed in the last `gap` frames. Its state must be predicted to the
@@ -233,7 +236,7 @@ class BranchGrower {
       const Point& y = frame.points[j];
       ++stats.n_candidates;
       const Prediction& prediction = all.of(y);
-      const double lambda = opt_.fading * parent.lambda + nis(prediction, y);
+      const double lambda = next_lambda(parent.lambda, prediction, y);
       if (!passes(lambda, parent.n_updates + 1)) {
         ++stats.n_cut;
         return;
@@ -314,8 +317,12 @@ class BranchGrower {
     }
   }
 
+  // λ after a further detection; 0 without a test.
+  double next_lambda(double lambda, const Prediction& prediction, const Point& y) const {
+    return opt_.has_test() ? opt_.fading * lambda + nis(prediction, y) : 0;
+  }
   bool passes(double lambda, std::int64_t n_updates) const {
-    if (opt_.delta.empty()) return true;
+    if (!opt_.has_test()) return true;
     const auto k = static_cast<std::size_t>(n_updates);
     if (k <= opt_.delta.size()) return lambda <= opt_.delta[k - 1];
     if (opt_.fading < 1) return lambda <= opt_.delta.back();
@@ -330,28 +337,28 @@ class BranchGrower {
   static constexpr double kNoClaim = -7;  // log of w
 
   void prune(std::int64_t frame, std::int32_t n_open, std::int32_t max_branches, TreeStats& stats) {
-    std::stable_sort(grown_.begin(), grown_.end(),
-                     [&](const Branch& a, const Branch& b) { return rank(a) > rank(b); });
+    ranked_.clear();  // branches are large, so their ranks are sorted
+    for (std::size_t b = 0; b < grown_.size(); ++b)
+      ranked_.emplace_back(-rank(grown_[b]), static_cast<std::int32_t>(b));
+    std::ranges::sort(ranked_);
     const double min_rank = max_branches == kAll ? -std::numeric_limits<double>::infinity()
-                                              : rank(grown_.front()) - opt_.prune_drop;
-    std::size_t kept = 0;
-    for (std::size_t b = 0; b < grown_.size(); ++b) {
-      if (rank(grown_[b]) < min_rank) break;
-      if (n_open > opt_.merge_last && is_merged(grown_[b], frame, kept)) continue;
-      if (kept == static_cast<std::size_t>(max_branches)) {
+                                              : -ranked_.front().first - opt_.prune_drop;
+    kept_.clear();
+    for (const auto& [negated, b] : ranked_) {
+      if (-negated < min_rank) break;
+      if (n_open > opt_.merge_last && is_merged(grown_[b], frame)) continue;
+      if (kept_.size() == static_cast<std::size_t>(max_branches)) {
         ++stats.n_limited;
         continue;
       }
-      if (kept != b) grown_[kept] = std::move(grown_[b]);
-      ++kept;
+      kept_.push_back(b);
     }
-    grown_.resize(kept);
-    stats.most_branches = std::max<std::int64_t>(stats.most_branches, static_cast<std::int64_t>(kept));
+    stats.most_branches = std::max(stats.most_branches, static_cast<std::int64_t>(kept_.size()));
   }
 
   // Whether a more likely branch has the same detections in the last frames.
-  bool is_merged(const Branch& branch, std::int64_t frame, std::size_t kept) const {
-    for (std::size_t a = 0; a < kept; ++a) {
+  bool is_merged(const Branch& branch, std::int64_t frame) const {
+    for (const std::int32_t a : kept_) {
       bool is_same = true;
       for (std::int32_t k = 0; k < opt_.merge_last && is_same; ++k)
         is_same = grown_[a].taken(frame - k) == branch.taken(frame - k);
@@ -363,6 +370,8 @@ class BranchGrower {
   const LiveTracks<Tree>& live_;
   const BranchOptions& opt_;
   std::vector<Branch> grown_;
+  std::vector<std::pair<double, std::int32_t>> ranked_;
+  std::vector<std::int32_t> kept_;  // indices of the branches that remain, best first
   std::vector<double> weights_;
 };
 

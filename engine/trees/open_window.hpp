@@ -84,7 +84,7 @@ struct OpenWindow {
       const Prediction& prediction = expected.of(y);
       expected.choose(y, track.state);
       stats.n_returned += expected.is_carried();
-      track.more.lambda = branches.fading * track.more.lambda + nis(prediction, y);
+      track.more.lambda = grower.next_lambda(track.more.lambda, prediction, y);
       ++track.more.n_updates;
       track.score += live.hit_gain(track.gap) + update(live.m, prediction, y, track.state);
       track.last = y;

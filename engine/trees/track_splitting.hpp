@@ -48,6 +48,7 @@ class Forest {
   }
 
   bool has_confidence() const { return opt_.pairing == Pairing::assignment; }
+  bool has_test() const { return open_.branches.has_test(); }
   const LiveTracks<Tree>& live() const { return open_.live; }
   void count(TreeStats& stats) const { open_.count(stats); }
 

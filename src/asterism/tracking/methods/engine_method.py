@@ -102,7 +102,7 @@ class EngineState:
         dict
             ``ids (k,)``, ``gaps (k,)`` frames since the last detection, ``log_odds (k,)`` that the
             marker exists, ``means (k, D, n)`` and ``covariances (k, n, n)`` of the state, SI units;
-            of tracks with branches also ``chi2 (k,)`` λ and ``updates (k,)`` detections so far.
+            with a χ² test also ``chi2 (k,)`` λ and ``updates (k,)`` detections so far.
         """
         from asterism import _engine
 
