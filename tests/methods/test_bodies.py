@@ -209,7 +209,7 @@ def test_occluded_markers_of_a_person_come_back_as_themselves(make, seed):
     truth, model = occluded_person(seed)
     off, on = (am.track(truth.detections, make(rigid=r), model=model) for r in (None, Rigidity()))
     before, after = am.evaluate(off, truth), am.evaluate(on, truth)
-    assert after.idf1 > before.idf1 + 0.03
+    assert 1 - after.idf1 < 0.8 * (1 - before.idf1)
     # Nearly all switches of splitting are between frames in a row: of markers that are seen.
     if make is not am.TrackSplitting:
         assert after.switches_per_1000 < before.switches_per_1000
