@@ -151,9 +151,9 @@ SCENES: dict[str, tuple[dict[str, Any], int, int]] = {
     "walk": ({"frames": 60}, 50, 8),
     "attracted": ({"frames": 60}, 20, 6),
     "smooth": ({"n_markers": 40, "frames": 60}, 50, 10),
+    "dense": ({"frames": 60}, 50, 6),
     "swarm": ({"frames": 700}, 470, 40),
     "person": ({"activity": "run"}, 130, 0),
-    "person, jumping": ({"activity": "jump"}, 170, 0),
     "two_people": ({"activity": "hug"}, 330, 0),
     "fingers": ({}, 60, 0),
     "juggler": ({"frames": 400}, 250, 30),
@@ -161,10 +161,9 @@ SCENES: dict[str, tuple[dict[str, Any], int, int]] = {
 
 
 def scenes(path: Path) -> None:
-    """Draw every scene: one moment of it, the way that led there, and what hides."""
+    """Draw every scene: one moment of it, the way that led there, and what occludes."""
     figure = Figure(figsize=(13, 10.5), dpi=90, layout="constrained")
-    for i, (title, (options, t, trail)) in enumerate(SCENES.items()):
-        name = title.split(",")[0]
+    for i, (name, (options, t, trail)) in enumerate(SCENES.items()):
         truth = am.simulate.SCENES[name].make(seed=2, **options)
         places = truth.positions()
         shown = places[max(0, t - trail) : t + 1]
@@ -190,7 +189,7 @@ def scenes(path: Path) -> None:
         (u, v), half = (low + high) / 2, 0.6 * float((high - low).max())
         axes.set(xlim=(u - half, u + half), ylim=(v + half, v - half))
         axes.set_axis_off()
-        axes.set_title(title.replace("_", " "), fontsize=11, loc="left")
+        axes.set_title(name.replace("_", " "), fontsize=11, loc="left")
     figure.savefig(path)
 
 
