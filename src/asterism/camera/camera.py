@@ -41,15 +41,15 @@ class Camera:
 
     Parameters
     ----------
-    K : array_like, shape (3, 3)
+    K : array_like of shape (3, 3)
         ``[[f_u, s, u0], [0, f_v, v0], [0, 0, 1]]``, pixels; s is the skew.
-    T_camera_world : array_like, shape (4, 4)
+    T_camera_world : array_like of shape (4, 4)
         World to camera coordinates, metres: a rotation and a translation.
     size_px : (int, int)
         Width and height of the image, pixels.
     lens : Lens, optional
         Lens model; None for a pin-hole without distortion.
-    K_lens : array_like, shape (3, 3), optional
+    K_lens : array_like of shape (3, 3), optional
         Matrix between pixels and lens coordinates, if a calibration has one apart from K: an ideal
         pixel p becomes ``K_lens distort(K_lens⁻¹ p)``. By default K, or for a lens in pixels the
         translation to the principal point.
@@ -148,11 +148,11 @@ class Camera:
 
         Parameters
         ----------
-        position, target : array_like, shape (3,)
+        position, target : array_like of shape (3,)
             Position of the camera, and point at which it looks, world metres.
         K, size_px, **options
             As for the class.
-        up : array_like, shape (3,)
+        up : array_like of shape (3,)
             World direction that is up in the image.
 
         Raises
@@ -169,7 +169,7 @@ class Camera:
 
         Parameters
         ----------
-        P : array_like, shape (3, 4)
+        P : array_like of shape (3, 4)
             Homogeneous world metres to homogeneous pixels, up to scale and sign.
         size_px, **options
             As for the class.
@@ -207,7 +207,7 @@ class Camera:
 
         Parameters
         ----------
-        points : array_like, shape (..., 3)
+        points : array_like of shape (..., 3)
             World metres; NaN for an absent point. With moving surfaces (T, ..., 3).
         surfaces : sequence of Surface
             Occluding surfaces. A point is occluded if its segment to the camera meets one.
@@ -231,12 +231,12 @@ class Camera:
 
         Parameters
         ----------
-        pixels : array_like, shape (..., 2)
+        pixels : array_like of shape (..., 2)
             (u, v), in the image or not.
 
         Returns
         -------
-        ndarray, shape (..., 2)
+        ndarray of shape (..., 2)
             NaN for pixels beyond the lens model.
         """
         p = as_coordinates("pixels", pixels, 2)
@@ -247,12 +247,12 @@ class Camera:
 
         Parameters
         ----------
-        normalised : array_like, shape (..., 2)
+        normalised : array_like of shape (..., 2)
             ``(X / Z, Y / Z)``.
 
         Returns
         -------
-        ndarray, shape (..., 2)
+        ndarray of shape (..., 2)
             Pixels, in the image or not; NaN beyond the lens model.
         """
         p = as_coordinates("normalised", normalised, 2)
@@ -263,12 +263,12 @@ class Camera:
 
         Parameters
         ----------
-        pixels : array_like, shape (..., 2)
+        pixels : array_like of shape (..., 2)
             (u, v), in the image or not.
 
         Returns
         -------
-        ndarray, shape (..., 3)
+        ndarray of shape (..., 3)
             Unit vectors, world axes; NaN for pixels beyond the lens model.
         """
         n = self.undistort(pixels)
@@ -281,12 +281,12 @@ class Camera:
 
         Parameters
         ----------
-        points : array_like, shape (..., 3)
+        points : array_like of shape (..., 3)
             World metres.
 
         Returns
         -------
-        ndarray, shape (..., 2, 3)
+        ndarray of shape (..., 2, 3)
             Pixels per metre; NaN where a point has no pixel.
         """
         p = as_coordinates("points", points, 3)

@@ -32,7 +32,7 @@ def compile_camera(
     ----------
     K, T_camera_world, lens, near, far, size_px
         As for `Camera`.
-    lens_matrix : ndarray, shape (3, 3)
+    lens_matrix : ndarray of shape (3, 3)
         `Camera.lens_matrix`.
 
     Returns
@@ -68,14 +68,14 @@ def middle_of_image(
 
     Parameters
     ----------
-    lens_matrix : ndarray, shape (3, 3)
+    lens_matrix : ndarray of shape (3, 3)
         Matrix between pixels and lens coordinates.
     size_px : (int, int)
         Width and height.
 
     Returns
     -------
-    ndarray, shape (2,)
+    ndarray of shape (2,)
     """
     w, h = size_px
     middle = np.array([(w - 1) / 2, (h - 1) / 2, 1.0])

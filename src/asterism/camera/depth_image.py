@@ -23,7 +23,7 @@ class DepthImage:
 
     Parameters
     ----------
-    depth : ndarray, shape (height, width)
+    depth : ndarray of shape (height, width)
         Depth along the optical axis, metres; infinite where no surface is seen.
     surface : ndarray of int32, shape (height, width)
         Number of the surface that is seen, -1 where none is.

@@ -40,7 +40,7 @@ def intrinsics(
 
     Returns
     -------
-    ndarray, shape (3, 3)
+    ndarray of shape (3, 3)
         The matrix K of a `Camera`.
 
     Examples
@@ -67,12 +67,12 @@ def checked_intrinsics(name: str, value: ArrayLike) -> NDArray[np.float64]:
     ----------
     name : str
         Name of the argument, for the message.
-    value : array_like, shape (3, 3)
+    value : array_like of shape (3, 3)
         ``[[f_u, s, u0], [0, f_v, v0], [0, 0, 1]]``, pixels.
 
     Returns
     -------
-    ndarray, shape (3, 3)
+    ndarray of shape (3, 3)
 
     Raises
     ------
@@ -101,12 +101,12 @@ def checked_pose(value: ArrayLike) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    value : array_like, shape (4, 4)
+    value : array_like of shape (4, 4)
         Rotation and translation, metres.
 
     Returns
     -------
-    ndarray, shape (4, 4)
+    ndarray of shape (4, 4)
 
     Raises
     ------
@@ -143,14 +143,14 @@ def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> NDArray
 
     Parameters
     ----------
-    position, target : array_like, shape (3,)
+    position, target : array_like of shape (3,)
         World metres.
-    up : array_like, shape (3,)
+    up : array_like of shape (3,)
         World direction that is up in the image.
 
     Returns
     -------
-    ndarray, shape (4, 4)
+    ndarray of shape (4, 4)
 
     Raises
     ------
@@ -188,13 +188,13 @@ def decomposed(P: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
     Parameters
     ----------
-    P : array_like, shape (3, 4)
+    P : array_like of shape (3, 4)
         Projection matrix, up to scale and sign.
 
     Returns
     -------
-    K : ndarray, shape (3, 3)
-    T_camera_world : ndarray, shape (4, 4)
+    K : ndarray of shape (3, 3)
+    T_camera_world : ndarray of shape (4, 4)
 
     Raises
     ------

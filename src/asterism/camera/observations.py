@@ -23,13 +23,13 @@ class Observations:
 
     Parameters
     ----------
-    times : array_like, shape (T,)
+    times : array_like of shape (T,)
         Seconds, strictly increasing.
     cameras : tuple of str
         Names of the C cameras, all different, in the order of the rig.
     offsets : array_like of int, shape (T * C + 1,)
         Camera c has in frame t the points ``offsets[t * C + c]:offsets[t * C + c + 1]``.
-    pixels : array_like, shape (N, 2)
+    pixels : array_like of shape (N, 2)
         Pixels (u, v) from the centre of the top left pixel, all finite.
     markers : array_like of int, shape (N,), optional
         True marker of each point, -1 for clutter, if it is known.
@@ -129,7 +129,7 @@ class Observations:
 
         Returns
         -------
-        ndarray, shape (n, 2)
+        ndarray of shape (n, 2)
             Pixels.
         """
         cell = t * self.n_cameras + camera

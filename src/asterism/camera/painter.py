@@ -59,8 +59,11 @@ class Painting(DepthImage):
 
     Parameters
     ----------
-    depth, surface
-        As in `DepthImage`, for the face that was painted last on each pixel.
+    depth : ndarray of shape (height, width)
+        Depth along the optical axis of the face that was painted last on each pixel, metres;
+        infinite where there is none.
+    surface : ndarray of int32, shape (height, width)
+        Number of the surface of that face, -1 where there is none.
     order : tuple of Face
         Faces in the order of painting, the farthest first.
     cycles : tuple of tuple of Face
@@ -101,7 +104,7 @@ def in_painters_order(
         Surfaces to paint.
     moment : int
         Frame of moving surfaces.
-    T_camera_world : ndarray, shape (4, 4)
+    T_camera_world : ndarray of shape (4, 4)
         Pose of the camera.
 
     Returns

@@ -22,7 +22,7 @@ def triangulate(corners: NDArray[np.float64]) -> NDArray[np.int32]:
 
     Parameters
     ----------
-    corners : ndarray, shape (T, M, 3)
+    corners : ndarray of shape (T, M, 3)
         Corners of the polygon in each of T frames, metres.
 
     Returns

@@ -77,14 +77,14 @@ def as_coordinates(name: str, value: ArrayLike, n: int) -> NDArray[np.float64]:
     ----------
     name : str
         Name of the argument, for the message.
-    value : array_like, shape (..., n)
+    value : array_like of shape (..., n)
         The coordinates.
     n : int
         Number of coordinates of a point.
 
     Returns
     -------
-    ndarray, shape (..., n)
+    ndarray of shape (..., n)
         C-contiguous; masked items are NaN.
 
     Raises

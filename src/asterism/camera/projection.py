@@ -52,11 +52,11 @@ class Projection:
 
     Parameters
     ----------
-    pixels : ndarray, shape (..., 2)
+    pixels : ndarray of shape (..., 2)
         (u, v) from the centre of the top left pixel, u to the right, v down. Points outside the
         image and occluded points have pixels too; absent points, points behind the camera and
         points beyond the lens have NaN.
-    depth : ndarray, shape (...)
+    depth : ndarray of shape (...)
         Distance along the optical axis, metres.
     reason : ndarray of uint8, shape (...)
         `Reason` of each point.

@@ -34,11 +34,11 @@ class Coverage:
 
     Parameters
     ----------
-    points : ndarray, shape (..., 3)
+    points : ndarray of shape (..., 3)
         Positions, world metres.
     n_cameras : ndarray of int, shape (...)
         Number of cameras that see each position.
-    covariance : ndarray, shape (..., 3, 3)
+    covariance : ndarray of shape (..., 3, 3)
         Covariance of a point triangulated there from all cameras that see it, m²: the inverse of
         the summed information ``JᵀJ / σ²`` (the Cramér-Rao bound). NaN if fewer than two cameras
         see the position, or if they and the position lie on one line.
@@ -143,7 +143,7 @@ class Rig:
             Radius of the circle about the target's vertical, metres, > 0.
         height : float
             Height of the cameras above z = 0, metres.
-        target : array_like, shape (3,)
+        target : array_like of shape (3,)
             Point at which all cameras look, metres.
         focal_px : float
             Focal length of every camera, pixels. The defaults of 900 px and 1280 × 1024 px are a
@@ -280,7 +280,7 @@ class Rig:
 
         Parameters
         ----------
-        points : array_like, shape (..., 3)
+        points : array_like of shape (..., 3)
             Positions, world metres; `volume_grid` makes a grid of them.
         surfaces : sequence of Surface
             Surfaces that may occlude the positions.
@@ -348,14 +348,14 @@ def volume_grid(low: ArrayLike, high: ArrayLike, spacing: float) -> NDArray[np.f
 
     Parameters
     ----------
-    low, high : array_like, shape (3,)
+    low, high : array_like of shape (3,)
         Corners of the box, metres; the grid starts at `low` and ends at or before `high`.
     spacing : float
         Distance between neighbours, metres, > 0.
 
     Returns
     -------
-    ndarray, shape (n_x, n_y, n_z, 3)
+    ndarray of shape (n_x, n_y, n_z, 3)
 
     Examples
     --------

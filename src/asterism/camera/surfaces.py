@@ -83,7 +83,7 @@ class Polygon(Surface):
 
     Parameters
     ----------
-    corners : array_like, shape (M, 3) or (T, M, 3)
+    corners : array_like of shape (M, 3) or (T, M, 3)
         Corners in order along the edge, at least three, world metres; for a moving polygon in each
         of T frames.
     name : str
@@ -139,7 +139,7 @@ class Mesh(Surface):
 
     Parameters
     ----------
-    vertices : array_like, shape (V, 3) or (T, V, 3)
+    vertices : array_like of shape (V, 3) or (T, V, 3)
         Vertices, world metres; for a moving mesh in each of T frames.
     faces : array_like of int, shape (F, 3)
         Numbers of the three vertices of each triangle.
@@ -205,7 +205,7 @@ class Capsule(Surface):
 
     Parameters
     ----------
-    ends : array_like, shape (2, 3) or (T, 2, 3)
+    ends : array_like of shape (2, 3) or (T, 2, 3)
         Ends of the axis, world metres; for a moving capsule in each of T frames.
     radius : float
         Distance of the surface from the axis, metres, > 0.

@@ -28,7 +28,7 @@ class GateGroups:
 
     Attributes
     ----------
-    times : ndarray, shape (T,)
+    times : ndarray of shape (T,)
         Times of the frames, seconds.
     frames : ndarray of int, shape (G,)
         Frame of each group.

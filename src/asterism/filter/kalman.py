@@ -27,16 +27,16 @@ class States:
 
     Parameters
     ----------
-    means : ndarray, shape (M, D, n)
+    means : ndarray of shape (M, D, n)
         State of each axis: position, and velocity and acceleration if the motion has them; SI
         units.
-    covariances : ndarray, shape (M, n, n)
+    covariances : ndarray of shape (M, n, n)
         Covariance of the state, equal on every axis.
     offsets : ndarray of int, shape (K + 1,)
         Track ``k`` has the rows ``offsets[k]:offsets[k + 1]``, one for each frame.
     first_frames : ndarray of int, shape (K,)
         Frame of each track's first row.
-    log_densities : ndarray, shape (N,)
+    log_densities : ndarray of shape (N,)
         ``log N(y; ŷ, S)`` of each detection given the track's earlier detections; 0 for the first
         detection of a track and for clutter.
 
@@ -72,7 +72,7 @@ class States:
 
         Returns
         -------
-        ndarray, shape (n_frames, K, D)
+        ndarray of shape (n_frames, K, D)
             Positions, metres; gaps inside a track hold the estimated position.
 
         Examples

@@ -44,7 +44,7 @@ def columns_of(
 
     Returns
     -------
-    numbers : dict of ndarray, shape (rows,)
+    numbers : dict of ndarray of shape (rows,)
         Numbers by the name of their column; NaN for a blank cell.
     texts : dict of list of str
         Texts by the name of their column, not stripped.
@@ -89,7 +89,7 @@ def whole(
         File for messages.
     column : str
         Column for messages.
-    values : ndarray, shape (n,)
+    values : ndarray of shape (n,)
         Whole numbers as floats.
     lines : ndarray of int, shape (n,)
         Line of each number for messages.

@@ -64,7 +64,7 @@ def parse_rows(
 
     Returns
     -------
-    values : ndarray, shape (R, n_columns)
+    values : ndarray of shape (R, n_columns)
         NaN for a blank field, NULL or NaN.
     numbers : ndarray of int, shape (R,)
         Line number of each row, from 1.

@@ -46,7 +46,7 @@ def judge_unit(points: NDArray[np.floating]) -> str:
 
     Parameters
     ----------
-    points : ndarray, shape (N, D)
+    points : ndarray of shape (N, D)
         Coordinates of the file, all finite.
 
     Returns
@@ -65,7 +65,7 @@ def check_size(points: NDArray[np.floating], unit: str) -> tuple[str, ...]:
 
     Parameters
     ----------
-    points : ndarray, shape (N, D)
+    points : ndarray of shape (N, D)
         Metres, converted from the file's unit.
     unit : str
         Unit of the file.

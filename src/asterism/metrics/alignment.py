@@ -24,7 +24,7 @@ class Alignment:
 
     Attributes
     ----------
-    times : ndarray, shape (T,)
+    times : ndarray of shape (T,)
         Times of all frames, seconds.
     frame_of : ndarray of int, shape (N,)
         Frame of each detection, in increasing order.

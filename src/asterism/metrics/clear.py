@@ -86,7 +86,7 @@ def clear_scores(
         Frame of each detection, in increasing order.
     n_frames : int, optional
         Number of frames. By default the last frame is that of the last detection.
-    error : array_like, shape (N,), optional
+    error : array_like of shape (N,), optional
         Distance of each detection from the true position of its marker, metres; 0 by default.
         Only labelled detections of markers are used.
 

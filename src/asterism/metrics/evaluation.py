@@ -30,7 +30,7 @@ class Evaluation(ClearScores, IdentityScores, HotaScores, GospaScores, Associati
 
     Attributes
     ----------
-    times : ndarray, shape (T,)
+    times : ndarray of shape (T,)
         Times of the frames, seconds, for all fields that start with ``frame_``.
 
     Examples
@@ -129,7 +129,7 @@ def evaluate(
         Tracks to score.
     truth : Tracks
         Ground truth.
-    truth_positions : array_like, shape (N, D), optional
+    truth_positions : array_like of shape (N, D), optional
         True position of the marker of each detection of `truth`, metres; NaN for clutter. Used
         for `motp_mm` and `gospa`. By default the detections are assumed to be exact.
     c : float

@@ -24,7 +24,7 @@ class GospaScores:
     ----------
     gospa : float
         Mean GOSPA distance over the frames, metres; NaN without a frame.
-    frame_gospa : ndarray, shape (T,)
+    frame_gospa : ndarray of shape (T,)
         GOSPA distance of each frame, metres.
 
     Examples
@@ -62,7 +62,7 @@ def gospa_scores(
         false labels more.
     n_frames : int, optional
         Number of frames. By default the last frame is that of the last detection.
-    error : array_like, shape (N,), optional
+    error : array_like of shape (N,), optional
         Distance of each detection from the true position of its marker, metres; 0 by default.
 
     Returns

@@ -23,11 +23,11 @@ class CalibrationCurve:
 
     Attributes
     ----------
-    edges : ndarray, shape (B + 1,)
+    edges : ndarray of shape (B + 1,)
         Edges of the bins of confidence. A bin includes its lower edge, the last bin both edges.
     counts : ndarray of int, shape (B,)
         Number of labels in each bin.
-    confidence, right : ndarray, shape (B,)
+    confidence, right : ndarray of shape (B,)
         Mean confidence and share of right labels of each bin; NaN for an empty bin.
     ece : float
         Expected calibration error: mean of ``|confidence − right|`` over the labels; NaN without
@@ -69,7 +69,7 @@ def calibration_curve(
 
     Parameters
     ----------
-    confidence : array_like, shape (N,)
+    confidence : array_like of shape (N,)
         Probability in [0, 1] that a label (or link) is right.
     is_right : array_like of bool, shape (N,)
         Whether the label (or link) is right.

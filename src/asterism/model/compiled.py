@@ -97,7 +97,7 @@ def steps_of(
     -------
     kind : ndarray of int32, shape (T,)
         Kind of the step from frame t - 1 to t; 0 at the first frame, which has no step.
-    F, Q : ndarray, shape (kinds, modes, n, n)
+    F, Q : ndarray of shape (kinds, modes, n, n)
         Transition and process noise of each kind; there is at least one kind.
     """
     if len(times) < 2:
@@ -118,14 +118,14 @@ def with_noise(
 
     Parameters
     ----------
-    points : ndarray, shape (N, D)
+    points : ndarray of shape (N, D)
         Positions, metres.
-    covariances : ndarray, shape (N, D, D), or None
+    covariances : ndarray of shape (N, D, D), or None
         Covariance of each point, m², added to the sensor's noise.
 
     Returns
     -------
-    ndarray, shape (N, D) or (N, D + 1)
+    ndarray of shape (N, D) or (N, D + 1)
         D + 1 columns if there are covariances, otherwise `points` itself.
     """
     if covariances is None:

@@ -35,22 +35,22 @@ class Detections:
 
     Parameters
     ----------
-    times : array_like, shape (T,)
+    times : array_like of shape (T,)
         Seconds, strictly increasing; the spacing may vary.
     offsets : array_like of int, shape (T + 1,)
         Frame ``t`` holds the points ``offsets[t]:offsets[t + 1]``. Frames may be empty.
-    points : array_like, shape (N, D)
+    points : array_like of shape (N, D)
         Positions in metres, D = 2 or 3, all finite.
     cameras : array_like of int, shape (N,), optional
         Cameras that saw each point, if known: bit i is set for camera i, i ≤ 62.
-    residuals : array_like, shape (N,), optional
+    residuals : array_like of shape (N,), optional
         Distance between each point and the rays of its cameras, if known, metres.
     filled : array_like of bool, shape (N,), optional
         True for points that were estimated, not measured (see `asterism.fill_gaps`). All points
         are measured by default.
-    stds : array_like, shape (N,), optional
+    stds : array_like of shape (N,), optional
         Standard deviation of each point's coordinates, metres; 0 where it is unknown.
-    covariances : array_like, shape (N, D, D), optional
+    covariances : array_like of shape (N, D, D), optional
         Covariance of each point, m², if several cameras determine it; all zeros where it is
         unknown. Trackers add it to the sensor's noise.
 
@@ -141,7 +141,7 @@ class Detections:
 
         Parameters
         ----------
-        times : array_like, shape (T,)
+        times : array_like of shape (T,)
             Seconds.
         frames : sequence of T array_like, each of shape (n_t, D)
             Points of each frame, metres; an empty list for a frame without points.
@@ -188,9 +188,9 @@ class Detections:
 
         Parameters
         ----------
-        times : array_like, shape (T,)
+        times : array_like of shape (T,)
             Seconds.
-        positions : array_like, shape (T, K, D)
+        positions : array_like of shape (T, K, D)
             Metres; NaN in any coordinate if the marker was not detected.
 
         Returns

@@ -31,7 +31,7 @@ class InteractingMotions(Motion):
     models : sequence of 2 or 3 motions
         The modes: single motions of the same class with different noise. New tracks start with
         the prior covariance of the first.
-    transitions : array_like, shape (M, M)
+    transitions : array_like of shape (M, M)
         Probability of switching from mode (row) to mode (column) in a step; positive, rows sum
         to 1.
 

@@ -28,13 +28,13 @@ class LinearMotion(SingleMotion):
 
     Parameters
     ----------
-    F, Q : array_like, shape (n, n)
+    F, Q : array_like of shape (n, n)
         Transition and process noise over `step` seconds; n is 1, 2 or 3.
-    H : array_like, shape (n,)
+    H : array_like of shape (n,)
         Observation row: position = H · state.
     step : float
         Duration for which F and Q hold, seconds, > 0.
-    prior_covariance : array_like, shape (n, n)
+    prior_covariance : array_like of shape (n, n)
         Covariance of the state at the start of a track, given its position. The measurement noise
         is added along H.
 

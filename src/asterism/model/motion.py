@@ -79,7 +79,7 @@ class SingleMotion(Motion):
 
         Parameters
         ----------
-        dt : array_like, shape (M,)
+        dt : array_like of shape (M,)
             Durations Δ, seconds.
 
         Examples
@@ -95,7 +95,7 @@ class SingleMotion(Motion):
 
         Parameters
         ----------
-        dt : array_like, shape (M,)
+        dt : array_like of shape (M,)
             Durations Δ, seconds.
 
         Examples

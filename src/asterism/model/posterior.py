@@ -39,7 +39,7 @@ def track_scores(tracks: Tracks, model: TrackingModel) -> NDArray[np.float64]:
 
     Returns
     -------
-    ndarray, shape (K,)
+    ndarray of shape (K,)
         -inf for a track that the model forbids; 0 for a track without a detection.
 
     Examples

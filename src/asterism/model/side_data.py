@@ -26,9 +26,9 @@ class Analog:
         Unit of each channel as stated in the file, "" if the file states none.
     rate : float
         Samples per second. The first sample belongs to the first frame of the file.
-    stored : ndarray, shape (S, A)
+    stored : ndarray of shape (S, A)
         Samples as the file stores them.
-    offset, scale : ndarray, shape (A,)
+    offset, scale : ndarray of shape (A,)
         Conversion of the stored samples: a value is ``(stored - offset) * scale``.
 
     Examples
@@ -116,9 +116,9 @@ class ForcePlate:
     ----------
     kind : int
         FORCE_PLATFORM:TYPE of the C3D file, which defines what the channels measure.
-    corners : ndarray, shape (4, 3)
+    corners : ndarray of shape (4, 3)
         Corners of the working surface, metres.
-    origin : ndarray, shape (3,)
+    origin : ndarray of shape (3,)
         Vector from the centre of the surface to the sensors' origin, in the plate's axes, metres.
     channels : tuple of str
         Names of its analog channels, in the order prescribed by `kind`.

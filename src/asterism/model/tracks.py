@@ -46,7 +46,7 @@ class Tracks:
     names : sequence of (str or None), optional
         Marker name of each of the K tracks, None if it is unknown. Without names K is the largest
         label + 1.
-    confidence : array_like, shape (N,), optional
+    confidence : array_like of shape (N,), optional
         Probability in [0, 1] that each label is right, if the method estimates it.
     info : mapping, optional
         Numbers reported by the method: sizes of approximations, counts and running time.
@@ -119,9 +119,9 @@ class Tracks:
 
         Parameters
         ----------
-        times : array_like, shape (T,)
+        times : array_like of shape (T,)
             Seconds.
-        positions : array_like, shape (T, K, D)
+        positions : array_like of shape (T, K, D)
             Metres; NaN where a marker was not detected.
         names : sequence of str, optional
             Names of the K markers; without them the tracks have no names.

@@ -97,7 +97,7 @@ class ImageModel:
 
         Returns
         -------
-        sigma, p_detection, clutter : ndarray, shape (C,)
+        sigma, p_detection, clutter : ndarray of shape (C,)
             Pixels; probability; image points per frame and square pixel.
 
         Raises

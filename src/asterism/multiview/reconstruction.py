@@ -120,7 +120,7 @@ class Reconstruction:
         distance from the rays, metres), covariances, and standard deviations of a coordinate.
     views : Views
         Image points of each point.
-    scores : ndarray, shape (N,)
+    scores : ndarray of shape (N,)
         Log-likelihood ratio of each point against clutter, nats.
     model : ImageModel
         Image model that was used.

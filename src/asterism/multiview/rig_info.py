@@ -94,7 +94,7 @@ def meeting_point(rig: Rig) -> NDArray[np.float64] | None:
 
     Returns
     -------
-    ndarray, shape (3,), or None
+    ndarray of shape (3,), or None
         World metres; None if all axes are parallel, or there is one camera only.
     """
     # The distance is measured across each axis, so the sum of (1 - a aᵀ)(x - c) is zero.
@@ -116,7 +116,7 @@ def image_grid(camera: Camera) -> NDArray[np.float64]:
 
     Returns
     -------
-    ndarray, shape (N, 2)
+    ndarray of shape (N, 2)
     """
     u, v = (np.linspace(-0.5, n - 0.5, _SIDE) for n in camera.size_px)
     return np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)

@@ -30,12 +30,12 @@ class Triangulation:
 
     Attributes
     ----------
-    points : ndarray, shape (N, 3)
+    points : ndarray of shape (N, 3)
         World metres; NaN for a point that fewer than two cameras see, or that would lie behind one.
-    covariances : ndarray, shape (N, 3, 3)
+    covariances : ndarray of shape (N, 3, 3)
         Covariance of each point, m²: the inverse of the summed information ``Jᵀ J / σ²`` (the
         Cramér-Rao bound). NaN for points that are NaN, or whose rays lie on one line.
-    residuals : ndarray, shape (C, N, 2)
+    residuals : ndarray of shape (C, N, 2)
         Measured pixel minus projected pixel; NaN without a measurement.
     n_views : ndarray of int, shape (N,)
         Number of cameras that see each point.
@@ -67,14 +67,14 @@ def triangulate(
 
     Parameters
     ----------
-    pixels : array_like, shape (C, N, 2)
+    pixels : array_like of shape (C, N, 2)
         Image point of each point in each camera; NaN if the camera has none.
     rig : Rig
         The C cameras.
-    sigma_px : array_like, shape (), (C,) or (C, N)
+    sigma_px : array_like of shape (), (C,) or (C, N)
         Standard deviation of an image point, pixels per axis, > 0: one for all, one for each
         camera, or one for each image point. It weights the cameras and scales the covariances.
-    start : array_like, shape (N, 3), optional
+    start : array_like of shape (N, 3), optional
         Initial positions instead of the linear start, world metres.
 
     Returns
@@ -142,7 +142,7 @@ def per_camera(
     ----------
     name : str
         Name of the argument, for the message.
-    value : array_like, shape () or (C,)
+    value : array_like of shape () or (C,)
         The number or numbers.
     rig : Rig
         The C cameras.
@@ -153,7 +153,7 @@ def per_camera(
 
     Returns
     -------
-    ndarray, shape (C,)
+    ndarray of shape (C,)
 
     Raises
     ------

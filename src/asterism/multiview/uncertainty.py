@@ -107,7 +107,7 @@ def triangulation_map(
     ----------
     rig : Rig
         Cameras to evaluate.
-    low, high : array_like, shape (3,)
+    low, high : array_like of shape (3,)
         Corners of the box, world metres.
     spacing : float, optional
         Distance between the positions of the grid, metres, > 0; by default a twelfth of the longest
@@ -176,7 +176,7 @@ def suggest_cameras(
     ----------
     rig : Rig
         Existing cameras.
-    points : array_like, shape (..., 3)
+    points : array_like of shape (..., 3)
         Positions over which the error is averaged, world metres.
     candidates : sequence of Camera
         Cameras to compare.

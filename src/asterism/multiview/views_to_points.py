@@ -37,7 +37,7 @@ def reconstruct(
     one point in space made them, with the position integrated out, relative to clutter; a camera
     that could see the position and has no image point costs a missed detection. Pairs of rays that
     meet are the seeds of candidates. Among the candidates that are more likely than clutter, the
-    most likely subset without a common image point is chosen by S-dimensional assignment [1]_,
+    most likely subset without a common image point is chosen by S-dimensional assignment [1],
     exactly unless ``info["n_cut"]`` is above 0. Each point is triangulated from its measured pixels
     (`triangulate`).
 
@@ -88,7 +88,7 @@ def reconstruct(
 
     References
     ----------
-    .. [1] S. Deb, M. Yeddanapudi, K. Pattipati, Y. Bar-Shalom: A generalized S-D assignment
+    1. S. Deb, M. Yeddanapudi, K. Pattipati, Y. Bar-Shalom: A generalized S-D assignment
        algorithm for multisensor-multitarget state estimation. IEEE Transactions on Aerospace and
        Electronic Systems 33, 1997.
 

@@ -148,7 +148,7 @@ def plot_depth(depth: DepthImage | ArrayLike, ax: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    depth : DepthImage or array_like, shape (height, width)
+    depth : DepthImage or array_like of shape (height, width)
         Depth along the optical axis in metres; infinite without a surface.
     ax : Axes, optional
         Axes to draw on. By default a new figure.

@@ -32,7 +32,7 @@ def outlines(surface: Surface, moment: int = 0) -> list[NDArray[np.float64]]:
 
     Returns
     -------
-    list of ndarray, shape (n, 3)
+    list of ndarray of shape (n, 3)
         Lines through n points each, world metres.
 
     Raises

@@ -30,9 +30,9 @@ def plot_posterior(
 
     Parameters
     ----------
-    moves : array_like, shape (M,)
+    moves : array_like of shape (M,)
         Moves per ambiguous detection, as `MCMCDA` counts them, increasing; the first may be 0.
-    values : array_like, shape (M,) or (R, M)
+    values : array_like of shape (M,) or (R, M)
         Log posterior of the result in nats above “everything is clutter”, for each number of moves
         and each of R seeds. Values that are not finite are left out.
     others : mapping of str to float, optional

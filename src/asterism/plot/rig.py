@@ -46,7 +46,7 @@ def plot_rig(
     rig : Rig
         Cameras, each drawn as a pyramid from its centre along the rays of the border of its image.
         If the lens model does not reach the border, the outermost valid pixels are used.
-    points : array_like, shape (..., 3), optional
+    points : array_like of shape (..., 3), optional
         Points in world coordinates, metres, drawn as dots; NaN for missing ones.
     surfaces : sequence of Surface
         Surfaces, drawn as outlines.

@@ -21,7 +21,7 @@ def to_scale(axes: Any, points: NDArray[np.float64], *, zoom: float = 0.85) -> N
     ----------
     axes : Axes3D
         Axes to set.
-    points : ndarray, shape (N, 3)
+    points : ndarray of shape (N, 3)
         Metres, all finite.
     zoom : float
         Size of the box in its axes; it leaves room for the names of the axes.

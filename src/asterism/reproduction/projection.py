@@ -57,12 +57,12 @@ def by_matrices(camera: am.Camera, points: NDArray[np.float64]) -> NDArray[np.fl
     ----------
     camera : Camera
         Camera without a lens.
-    points : ndarray, shape (K, 3)
+    points : ndarray of shape (K, 3)
         World coordinates, metres.
 
     Returns
     -------
-    ndarray, shape (K, 2)
+    ndarray of shape (K, 2)
         Pixels (u, v).
     """
     f = FOCAL_M

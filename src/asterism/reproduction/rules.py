@@ -54,7 +54,7 @@ def within(
         Subject of the figure.
     reported : float
         Printed figure.
-    measured, oracle : array_like, shape (seeds,)
+    measured, oracle : array_like of shape (seeds,)
         One value per seed; those of the oracle are the best that the data allow.
     step : float
         One unit of the last printed digit; 0 for a figure that was not rounded.
@@ -110,9 +110,9 @@ def alike(about: str, reported: ArrayLike, runs: ArrayLike) -> Claim:
     ----------
     about : str
         Subject of the distribution.
-    reported : array_like, shape (n,)
+    reported : array_like of shape (n,)
         Printed shares, which sum to 1.
-    runs : array_like, shape (seeds, n)
+    runs : array_like of shape (seeds, n)
         Measured shares, one row per seed.
 
     Returns

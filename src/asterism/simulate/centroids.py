@@ -92,13 +92,13 @@ class Blobs(NamedTuple):
     ----------
     cell : ndarray of int, shape (N,)
         Frame times number of cameras plus camera.
-    pixels : ndarray, shape (N, 2)
+    pixels : ndarray of shape (N, 2)
         Centroids, pixels.
     markers : ndarray of int, shape (N,)
         Marker with the largest part in each blob; -1 for a false alarm.
     blob_of : ndarray of int, shape (C, T, K)
         Blob of each marker, -1 without one.
-    share : ndarray, shape (C, T, K)
+    share : ndarray of shape (C, T, K)
         Visible share of each marker's disc, 0 without an image.
 
     Examples
@@ -129,9 +129,9 @@ def see(
 
     Parameters
     ----------
-    times : ndarray, shape (T,)
+    times : ndarray of shape (T,)
         Times of the frames, seconds.
-    positions : ndarray, shape (T, K, 3)
+    positions : ndarray of shape (T, K, 3)
         World metres; NaN for an absent marker.
     rig : Rig
         Cameras that film.

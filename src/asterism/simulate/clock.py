@@ -28,7 +28,7 @@ def clock(frames: int, rate: float, seed: int) -> NDArray[np.float64]:
 
     Returns
     -------
-    ndarray, shape (T,)
+    ndarray of shape (T,)
         Seconds.
     """
     check_number("frames", frames, above=1, closed=True, integer=True)

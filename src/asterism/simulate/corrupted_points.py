@@ -19,7 +19,7 @@ class Points(NamedTuple):
     ----------
     frames : ndarray of int, shape (N,)
         Frame of each point.
-    places : ndarray, shape (N, D)
+    places : ndarray of shape (N, D)
         Positions, metres.
     markers : ndarray of int, shape (N,)
         Marker of each point, -1 for a false point.
@@ -71,7 +71,7 @@ def in_unit_ball(rng: np.random.Generator, n: int, n_axes: int) -> NDArray[np.fl
 
     Returns
     -------
-    ndarray, shape (n, n_axes)
+    ndarray of shape (n, n_axes)
     """
     direction = rng.standard_normal((n, n_axes))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -85,11 +85,11 @@ def touching(
 
     Parameters
     ----------
-    places : ndarray, shape (N, D)
+    places : ndarray of shape (N, D)
         Centres of the discs.
     cells : ndarray of int, shape (N,)
         Cell of each disc; only discs of one cell can touch.
-    radii : ndarray, shape (N,)
+    radii : ndarray of shape (N,)
         Radii; two discs touch if the distance of their centres is at most the sum of their radii.
 
     Returns

@@ -36,7 +36,7 @@ class Film:
         Projection and visibility of every marker in every image: arrays of shape (C, T, K).
     blob_of : ndarray of int, shape (C, T, K)
         Image point of each marker, -1 without one; merged markers share one.
-    share : ndarray, shape (C, T, K)
+    share : ndarray of shape (C, T, K)
         Visible share of each marker's disc, in [0, 1].
 
     Examples

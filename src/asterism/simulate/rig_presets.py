@@ -47,7 +47,7 @@ def place_preset(text: str, low: NDArray[np.float64], high: NDArray[np.float64])
     ----------
     text : str
         Name of the preset: ``ring8``, ``wall4`` and so on.
-    low, high : ndarray, shape (3,)
+    low, high : ndarray of shape (3,)
         Corners of the box, metres.
 
     Returns

@@ -52,16 +52,16 @@ def jittered(
         Generator of random numbers.
     jitter : float
         Twice the largest shift, as a share of the frame interval.
-    times : ndarray, shape (T,)
+    times : ndarray of shape (T,)
         Times of the frames, seconds.
     points : Points
         Points of the frames.
 
     Returns
     -------
-    times : ndarray, shape (T,)
+    times : ndarray of shape (T,)
         Shifted times, seconds.
-    places : ndarray, shape (N, D)
+    places : ndarray of shape (N, D)
         Positions of the points at these times, metres.
     """
     n_frames = len(times)

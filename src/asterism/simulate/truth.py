@@ -37,8 +37,14 @@ class Truth(Tracks):
 
     Parameters
     ----------
-    detections, labels, names, confidence
-        As for `Tracks`; K markers in T frames.
+    detections : Detections
+        Detections of K markers in T frames.
+    labels : ndarray of int, shape (N,)
+        Marker of each detection, -1 for clutter.
+    names : tuple of (str or None), optional
+        Names of the markers.
+    confidence : ndarray of shape (N,), optional
+        Confidence of each label.
     connections : array_like of int, shape (K, K)
         Connection matrix of the 2010 report (§3.3), symmetric: 0 for no line between two markers,
         k for one in the k-th colour. No lines by default.
@@ -110,9 +116,9 @@ class Truth(Tracks):
 
         Parameters
         ----------
-        times : array_like, shape (T,)
+        times : array_like of shape (T,)
             Times of the frames, seconds.
-        positions : array_like, shape (T, K, 3)
+        positions : array_like of shape (T, K, 3)
             Positions, metres; NaN for an absent marker.
         names : sequence of K str, optional
             Names of the markers; M00, M01 and so on by default.

@@ -29,7 +29,7 @@ class JointMarginals:
 
     Attributes
     ----------
-    marginals : ndarray, shape (n, m + 1)
+    marginals : ndarray of shape (n, m + 1)
         ``marginals[i, j]`` is the probability that track i has detection j, ``marginals[i, -1]``
         that it has none. Rows sum to 1, the columns of detections to at most 1.
     log_total : float
@@ -73,14 +73,14 @@ def joint_marginals(
 
     ``P(θ) = Π_i w_{i θ_i} / Σ_θ' Π_i w_{i θ'_i}``
 
-    and the marginals are ``β_ij = P(θ_i = j)``. In joint probabilistic data association [1]_
+    and the marginals are ``β_ij = P(θ_i = j)``. In joint probabilistic data association [1]
     ``w_ij = N(y_j; ŷ_i, S_i) P_d / λ_f`` within the gate and ``w_i0 = 1 - P_d``.
 
     Groups of tracks that share no detection, directly or through others, are summed separately.
     In each group tracks and detections are eliminated one by one, forward and backward. A state is
     the used subset of the *frontier*: the remaining nodes with an eliminated neighbour. A group of
     n tracks that share the same m detections needs ``2^min(n, m)`` states, a chain of any length
-    needs two. Efficient hypothesis management [2]_ is another way to share work between events.
+    needs two. Efficient hypothesis management [2] is another way to share work between events.
 
     A group whose frontier exceeds `max_states` is summed over a *beam*: the states with the
     largest upper bounds. The mass F(s) of each dropped state, times a bound U(s) of the remaining
@@ -90,9 +90,9 @@ def joint_marginals(
 
     Parameters
     ----------
-    log_weights : array_like, shape (n, m)
+    log_weights : array_like of shape (n, m)
         ``log w_ij``; -inf where track i cannot have detection j.
-    log_miss : array_like, shape (n,)
+    log_miss : array_like of shape (n,)
         ``log w_i0``, finite.
     max_states : int
         Largest number of states of a layer, 1 to 2^30. Larger values keep larger groups exact,
@@ -113,9 +113,9 @@ def joint_marginals(
 
     References
     ----------
-    .. [1] Y. Bar-Shalom, X.-R. Li: Multitarget-Multisensor Tracking: Principles and Techniques.
+    1. Y. Bar-Shalom, X.-R. Li: Multitarget-Multisensor Tracking: Principles and Techniques.
        YBS, 1995.
-    .. [2] P. Horridge, S. Maskell: Real-time tracking of hundreds of targets with efficient exact
+    2. P. Horridge, S. Maskell: Real-time tracking of hundreds of targets with efficient exact
        JPDAF implementation. FUSION, 2006.
 
     Examples

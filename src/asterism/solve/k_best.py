@@ -29,7 +29,7 @@ class KBestAssignments:
     matches : ndarray of int, shape (K, n)
         Column of each row in each assignment, -1 for an unassigned row; the best assignment
         first. K is less than k if fewer assignments exist.
-    totals : ndarray, shape (K,)
+    totals : ndarray of shape (K,)
         Total gain of each assignment, in decreasing order.
 
     Examples
@@ -46,13 +46,13 @@ def k_best_assignments(gains: ArrayLike, k: int, *, complete: bool = False) -> K
     """Find the k assignments of n rows to m columns with the largest total gains.
 
     An assignment gives each row at most one column, and each column to at most one row. The
-    algorithm is Murty's partition [1]_ with the improvements of [2]_: a subproblem starts from the
+    algorithm is Murty's partition [1] with the improvements of [2]: a subproblem starts from the
     dual prices of its parent, takes one shortest augmenting path, and is solved when its bound
     comes to the front of the queue.
 
     Parameters
     ----------
-    gains : array_like, shape (n, m)
+    gains : array_like of shape (n, m)
         Gain of each pair; -inf for a forbidden pair.
     k : int
         Number of assignments to find, ≥ 1; fewer are returned if fewer exist.
@@ -74,9 +74,9 @@ def k_best_assignments(gains: ArrayLike, k: int, *, complete: bool = False) -> K
 
     References
     ----------
-    .. [1] K. G. Murty: An algorithm for ranking all the assignments in order of increasing cost.
+    1. K. G. Murty: An algorithm for ranking all the assignments in order of increasing cost.
        Operations Research 16, 1968.
-    .. [2] M. L. Miller, H. S. Stone, I. J. Cox: Optimizing Murty's ranked assignment method. IEEE
+    2. M. L. Miller, H. S. Stone, I. J. Cox: Optimizing Murty's ranked assignment method. IEEE
        Transactions on Aerospace and Electronic Systems 33, 1997.
 
     Examples

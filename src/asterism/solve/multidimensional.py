@@ -73,14 +73,14 @@ def assign_multidimensional(
     An index in no chosen tuple is assigned to the dummy at weight 0. With two dimensions this is
     linear assignment; with three or more it is NP-hard. ``"exact"`` is solved by HiGHS, to 1e-6
     of the value. ``"relaxed"`` puts dual prices on the constraints of all dimensions but the two
-    largest, solves the remaining assignment, and moves the prices along the subgradient [1]_. Each
+    largest, solves the remaining assignment, and moves the prices along the subgradient [1]. Each
     round yields an upper bound and, after a repair, a feasible choice.
 
     Parameters
     ----------
     tuples : array_like of int, shape (C, S)
         Index in each dimension, -1 for none; each tuple has at least one index.
-    weights : array_like, shape (C,)
+    weights : array_like of shape (C,)
         Weight of each tuple, relative to assigning its indices to the dummy.
     method : {"exact", "relaxed"}
         Solver: "exact" for the optimum, "relaxed" for a fast choice with a bound.
@@ -98,7 +98,7 @@ def assign_multidimensional(
 
     References
     ----------
-    .. [1] S. Deb, M. Yeddanapudi, K. Pattipati, Y. Bar-Shalom: A generalized S-D assignment
+    1. S. Deb, M. Yeddanapudi, K. Pattipati, Y. Bar-Shalom: A generalized S-D assignment
        algorithm for multisensor-multitarget state estimation. IEEE Transactions on Aerospace and
        Electronic Systems 33, 1997.
 

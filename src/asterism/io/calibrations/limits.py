@@ -71,7 +71,7 @@ def brown_coefficients(camera: Camera, format: str) -> NDArray[np.float64]:
 
     Returns
     -------
-    ndarray, shape (5,)
+    ndarray of shape (5,)
         k1, k2, p1, p2, k3; zeros without a lens.
 
     Raises

@@ -188,14 +188,14 @@ def nearest_rotation(
     ----------
     path, place : Path, str
         File and place for the error.
-    matrix : ndarray, shape (3, 3)
+    matrix : ndarray of shape (3, 3)
         Rotation with rounded entries.
     slack : float
         Largest entry of RᵀR - I that is accepted.
 
     Returns
     -------
-    ndarray, shape (3, 3)
+    ndarray of shape (3, 3)
         Proper rotation; `matrix` itself if it is exact.
     """
     with np.errstate(over="ignore", invalid="ignore"):
@@ -219,14 +219,14 @@ def drop_skew(place: str, K: NDArray[np.float64], warnings: list[str]) -> NDArra
     ----------
     place : str
         Place for the warning.
-    K : ndarray, shape (3, 3)
+    K : ndarray of shape (3, 3)
         Camera matrix of the file.
     warnings : list of str
         Receives a warning if the skew is not zero.
 
     Returns
     -------
-    ndarray, shape (3, 3)
+    ndarray of shape (3, 3)
         Camera matrix without skew.
     """
     if K[0, 1] != 0:
@@ -253,7 +253,7 @@ def per_metre(
     ----------
     units : str or None
         Unit of the file, None if it is not known.
-    centres : sequence of ndarray, shape (3,)
+    centres : sequence of ndarray of shape (3,)
         Positions of the cameras in the units of the file, from which the unit is estimated.
     warnings : list of str
         Receives a warning if the unit was estimated.

@@ -36,9 +36,9 @@ class Sightings:
     ----------
     camera : str
         Name of the camera.
-    points : ndarray, shape (N, 3)
+    points : ndarray of shape (N, 3)
         World coordinates, metres.
-    pixels : ndarray, shape (N, 2)
+    pixels : ndarray of shape (N, 2)
         Image points (u, v), pixels from the centre of the top left pixel.
     """
 

@@ -33,10 +33,10 @@ class C3DFile:
         First block, in Intel order.
     groups : dict of str to Group
         Groups of parameters by name.
-    points : ndarray, shape (T, K, 4), float32
+    points : ndarray of shape (T, K, 4), float32
         x, y, z in the file's unit, and the word of residual and cameras (negative: missed
         detection).
-    analog : ndarray, shape (T, A), float32
+    analog : ndarray of shape (T, A), float32
         Analog values as stored, all samples of a frame in one row.
     n_samples : int
         Analog samples per frame.

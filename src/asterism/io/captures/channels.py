@@ -115,7 +115,7 @@ def to_dense(
 
     Returns
     -------
-    ndarray, shape (T', C, D)
+    ndarray of shape (T', C, D)
         Metres; NaN for a missed detection.
     """
     d = tracks.detections

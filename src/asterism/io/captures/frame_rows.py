@@ -44,9 +44,9 @@ def capture_of(
     ----------
     path, format, unit, rate, first_frame, modelled, warnings
         As in `Capture`.
-    times : ndarray, shape (T,)
+    times : ndarray of shape (T,)
         Times of the frames, seconds.
-    coordinates : ndarray, shape (T, C, D)
+    coordinates : ndarray of shape (T, C, D)
         Coordinates in `unit`; NaN for a missed detection.
     names : sequence of str
         Names of the C channels.

@@ -49,7 +49,7 @@ def lens_table(camera: Camera) -> tuple[NDArray[np.float32], list[float], float]
 
     Returns
     -------
-    table : ndarray, shape (SIDE, SIDE, 2)
+    table : ndarray of shape (SIDE, SIDE, 2)
         Pixels, over even steps of ``y = Y / Z`` and then ``x = X / Z``; NaN where the lens is not
         defined. Empty without a lens.
     range : list of float
@@ -86,16 +86,16 @@ def pixels_by(
     ----------
     camera : Camera
         Camera of the table.
-    table : ndarray, shape (SIDE, SIDE, 2)
+    table : ndarray of shape (SIDE, SIDE, 2)
         Table of `lens_table`.
     bounds : list of float
         Range of `lens_table`.
-    places : ndarray, shape (N, 2)
+    places : ndarray of shape (N, 2)
         Points ``(X / Z, Y / Z)`` within the bounds.
 
     Returns
     -------
-    ndarray, shape (N, 2)
+    ndarray of shape (N, 2)
         Pixels (u, v).
     """
     low, high = np.array(bounds[::2]), np.array(bounds[1::2])

@@ -30,7 +30,7 @@ class Grid(NamedTuple):
 
     Attributes
     ----------
-    low, step : ndarray, shape (3,)
+    low, step : ndarray of shape (3,)
         Position of the first cell, and spacing of the cells, metres.
     """
 

@@ -35,7 +35,7 @@ class Gaps(NamedTuple):
     ----------
     track, first, length : ndarray of int, shape (G,)
         Track, first missing frame and number of missing frames of each gap.
-    seconds : ndarray, shape (G,)
+    seconds : ndarray of shape (G,)
         Time from the detection before the gap to the one after it, seconds.
     """
 

@@ -44,7 +44,7 @@ class Walker:
         Motion of the person.
     course : Course
         Position and heading over time.
-    swings : dict of ndarray, shape (n, 2)
+    swings : dict of ndarray of shape (n, 2)
         Start and end of each swing, by side, seconds.
     is_run : bool
         Whether both feet leave the ground between steps.
@@ -62,7 +62,7 @@ class Walker:
 
         Parameters
         ----------
-        t : ndarray, shape (T,)
+        t : ndarray of shape (T,)
             Times, seconds.
 
         Returns
@@ -78,7 +78,7 @@ class Walker:
 
         Parameters
         ----------
-        t : ndarray, shape (T,)
+        t : ndarray of shape (T,)
             Times, seconds.
 
         Returns
@@ -92,14 +92,14 @@ class Walker:
 
         Parameters
         ----------
-        t : ndarray, shape (T,)
+        t : ndarray of shape (T,)
             Times, seconds.
         carriage : Carriage
             Upper body at these times.
 
         Returns
         -------
-        ndarray, shape (T, 3)
+        ndarray of shape (T, 3)
             World metres.
         """
         root = self._flat(t, carriage)
@@ -118,7 +118,7 @@ class Walker:
 
         Parameters
         ----------
-        t : ndarray, shape (T,)
+        t : ndarray of shape (T,)
             Times, seconds.
 
         Returns
@@ -150,7 +150,7 @@ def walk(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
 
     Parameters
     ----------
-    t : ndarray, shape (T,)
+    t : ndarray of shape (T,)
         Times, seconds.
     body : Body
         Body of the person.
@@ -180,7 +180,7 @@ def run(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
 
     Parameters
     ----------
-    t : ndarray, shape (T,)
+    t : ndarray of shape (T,)
         Times, seconds.
     body : Body
         Body of the person.
@@ -226,7 +226,7 @@ def turn(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
 
     Parameters
     ----------
-    t : ndarray, shape (T,)
+    t : ndarray of shape (T,)
         Times, seconds.
     body : Body
         Body of the person.

@@ -36,7 +36,7 @@ class Course:
         Position at half time, metres.
     usual : float
         Speed at which the gait has its full amplitude, m/s.
-    times : ndarray, shape (n,)
+    times : ndarray of shape (n,)
         Times at which the course is sampled, which are computed, seconds.
     """
 
@@ -63,12 +63,12 @@ class Course:
 
         Parameters
         ----------
-        t : ndarray, shape (T,)
+        t : ndarray of shape (T,)
             Times, seconds.
 
         Returns
         -------
-        ndarray, shape (T, 2)
+        ndarray of shape (T, 2)
         """
         heading = self.heading(t)
         return self.speed(t)[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
@@ -78,12 +78,12 @@ class Course:
 
         Parameters
         ----------
-        t : ndarray, shape (T,)
+        t : ndarray of shape (T,)
             Times, seconds.
 
         Returns
         -------
-        ndarray, shape (T, 2)
+        ndarray of shape (T, 2)
         """
         inside = np.clip(t, self.times[0], self.times[-1])
         return np.asarray(self._curve(inside), dtype=np.float64)
@@ -93,11 +93,11 @@ class Course:
 
         Parameters
         ----------
-        t : ndarray, shape (T,)
+        t : ndarray of shape (T,)
             Times, seconds.
 
         Returns
         -------
-        ndarray, shape (T,)
+        ndarray of shape (T,)
         """
         return np.clip(self.speed(t) / self.usual, 0.0, 1.0)

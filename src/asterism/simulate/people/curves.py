@@ -22,7 +22,7 @@ def through(t: Array, knots: Sequence[Knot], *, derivatives: int = 0) -> Array:
 
     Parameters
     ----------
-    t : ndarray, shape (T,)
+    t : ndarray of shape (T,)
         Times, seconds; before the first knot and after the last the value is constant.
     knots : sequence of (time, value, rate, acceleration)
         In order of time, at least two; values are numbers or vectors of D.
@@ -31,7 +31,7 @@ def through(t: Array, knots: Sequence[Knot], *, derivatives: int = 0) -> Array:
 
     Returns
     -------
-    ndarray, shape (T,) or (T, D), or (T, 1 + derivatives)
+    ndarray of shape (T,) or (T, D), or (T, 1 + derivatives)
     """
     from scipy.interpolate import BPoly
 
@@ -48,7 +48,7 @@ def blend(t: Array, *turns: float) -> Array:
 
     Parameters
     ----------
-    t : ndarray, shape (T,)
+    t : ndarray of shape (T,)
         Seconds.
     *turns : float
         Pairs of times, rising: each pair begins and ends a passage, which starts and stops
@@ -56,7 +56,7 @@ def blend(t: Array, *turns: float) -> Array:
 
     Returns
     -------
-    ndarray, shape (T,)
+    ndarray of shape (T,)
         In [0, 1].
     """
     total = np.zeros_like(t)
@@ -71,7 +71,7 @@ def harmonics(phase: Array, mean: float, *terms: tuple[float, float]) -> Array:
 
     Parameters
     ----------
-    phase : ndarray, shape (T,)
+    phase : ndarray of shape (T,)
         Phase in cycles.
     mean : float
         Mean over the cycle.
@@ -80,7 +80,7 @@ def harmonics(phase: Array, mean: float, *terms: tuple[float, float]) -> Array:
 
     Returns
     -------
-    ndarray, shape (T,)
+    ndarray of shape (T,)
     """
     total = np.full(phase.shape, float(mean))
     for k, (amplitude, peak) in enumerate(terms, start=1):
@@ -93,12 +93,12 @@ def about_x(angle: ArrayLike) -> Array:
 
     Parameters
     ----------
-    angle : array_like, shape (...)
+    angle : array_like of shape (...)
         Degrees.
 
     Returns
     -------
-    ndarray, shape (..., 3, 3)
+    ndarray of shape (..., 3, 3)
     """
     return _about(0, angle)
 
@@ -108,12 +108,12 @@ def about_y(angle: ArrayLike) -> Array:
 
     Parameters
     ----------
-    angle : array_like, shape (...)
+    angle : array_like of shape (...)
         Degrees.
 
     Returns
     -------
-    ndarray, shape (..., 3, 3)
+    ndarray of shape (..., 3, 3)
     """
     return _about(1, angle)
 
@@ -123,12 +123,12 @@ def about_z(angle: ArrayLike) -> Array:
 
     Parameters
     ----------
-    angle : array_like, shape (...)
+    angle : array_like of shape (...)
         Degrees.
 
     Returns
     -------
-    ndarray, shape (..., 3, 3)
+    ndarray of shape (..., 3, 3)
     """
     return _about(2, angle)
 
@@ -149,11 +149,11 @@ def unit(vectors: Array) -> Array:
 
     Parameters
     ----------
-    vectors : ndarray, shape (..., 3)
+    vectors : ndarray of shape (..., 3)
         Vectors, none of them 0.
 
     Returns
     -------
-    ndarray, shape (..., 3)
+    ndarray of shape (..., 3)
     """
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

@@ -92,11 +92,11 @@ class Carriage:
 
     Parameters
     ----------
-    pelvis, trunk, head : ndarray, shape (T, 3, 3)
+    pelvis, trunk, head : ndarray of shape (T, 3, 3)
         Rotations to the world.
     arms : dict of Limb
         Rotations of the arms, by side.
-    sway : ndarray, shape (T,)
+    sway : ndarray of shape (T,)
         Displacement of the root to the left, metres.
     """
 
@@ -180,11 +180,11 @@ def upright(
 
     Parameters
     ----------
-    phase : ndarray, shape (T,)
+    phase : ndarray of shape (T,)
         Phase in cycles; whole numbers where the left foot lands.
-    heading : ndarray, shape (T,)
+    heading : ndarray of shape (T,)
         Direction, radians.
-    vigour : ndarray, shape (T,)
+    vigour : ndarray of shape (T,)
         Amplitude of the motion, from 0, standing, to 1.
     style : Style
         Individual variation.
@@ -234,11 +234,11 @@ def arm_turns(
 
     Parameters
     ----------
-    trunk : ndarray, shape (T, 3, 3)
+    trunk : ndarray of shape (T, 3, 3)
         Rotation of the trunk.
     sign : float
         1 for the left arm, -1 for the right.
-    swing, bend : ndarray, shape (T,)
+    swing, bend : ndarray of shape (T,)
         Flexion of shoulder and elbow, forwards positive.
     aside, inward : float
         Abduction and inward rotation of the upper arm.
@@ -261,14 +261,14 @@ def bounce(phase: Array, gait: Gait) -> Array:
 
     Parameters
     ----------
-    phase : ndarray, shape (T,)
+    phase : ndarray of shape (T,)
         Phase in cycles.
     gait : Gait
         Cadence and stance.
 
     Returns
     -------
-    ndarray, shape (T,)
+    ndarray of shape (T,)
         Metres.
     """
     step, stance = 0.5 / gait.cadence, gait.stance / gait.cadence

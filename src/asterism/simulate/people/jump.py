@@ -30,7 +30,7 @@ def jump(t: Array, body: Body, style: Style, rng: np.random.Generator) -> Pose:
 
     Parameters
     ----------
-    t : ndarray, shape (T,)
+    t : ndarray of shape (T,)
         Times, seconds.
     body : Body
         Body of the person.

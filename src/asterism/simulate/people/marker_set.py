@@ -117,7 +117,7 @@ class MarkerSet:
         Names of the markers.
     segments : tuple of str
         Segment of each marker.
-    places : ndarray, shape (K, 3)
+    places : ndarray of shape (K, 3)
         Position of each marker in the frame of its segment, metres.
     """
 
@@ -154,7 +154,7 @@ class MarkerSet:
 
         Returns
         -------
-        ndarray, shape (T, K, 3)
+        ndarray of shape (T, K, 3)
             World metres.
         """
         places, segments = self.places, self.segments
@@ -195,12 +195,12 @@ def on_skin(tubes: Sequence[tuple[Array, float]], start: Array, towards: Array) 
     ----------
     tubes : sequence of (ends, radius)
         Capsules: ends (2, 3), metres.
-    start, towards : ndarray, shape (3,)
+    start, towards : ndarray of shape (3,)
         Origin and direction of the ray.
 
     Returns
     -------
-    ndarray, shape (3,)
+    ndarray of shape (3,)
         Metres.
     """
     direction = towards / np.linalg.norm(towards)

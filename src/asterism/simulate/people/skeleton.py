@@ -82,7 +82,7 @@ class Limb:
 
     Parameters
     ----------
-    arm, forearm, hand : ndarray, shape (T, 3, 3)
+    arm, forearm, hand : ndarray of shape (T, 3, 3)
         Rotation of each segment.
     """
 
@@ -97,9 +97,9 @@ class Pose:
 
     Attributes
     ----------
-    origins : dict of ndarray, shape (T, 3)
+    origins : dict of ndarray of shape (T, 3)
         Upper joint of each segment, world metres.
-    turns : dict of ndarray, shape (T, 3, 3)
+    turns : dict of ndarray of shape (T, 3, 3)
         Rotation from the frame of the segment to the world.
     """
 
@@ -113,12 +113,12 @@ class Pose:
         ----------
         segment : str
             Name of the segment.
-        points : array_like, shape (K, 3)
+        points : array_like of shape (K, 3)
             Points in the frame of the segment, metres.
 
         Returns
         -------
-        ndarray, shape (T, K, 3)
+        ndarray of shape (T, K, 3)
         """
         local = np.asarray(points, dtype=np.float64)
         return self.origins[segment][:, None] + np.einsum("tij,kj->tki", self.turns[segment], local)
@@ -163,14 +163,14 @@ class Body:
 
         Parameters
         ----------
-        root : ndarray, shape (T, 3)
+        root : ndarray of shape (T, 3)
             Middle of the hip joints, world metres.
-        pelvis : ndarray, shape (T, 3, 3)
+        pelvis : ndarray of shape (T, 3, 3)
             Rotation of the pelvis.
 
         Returns
         -------
-        dict of ndarray, shape (T, 3)
+        dict of ndarray of shape (T, 3)
             By side.
         """
         return {s: root + sign * self["hip"] * pelvis[:, :, 1] for s, sign in SIDES.items()}
@@ -182,12 +182,12 @@ class Body:
         ----------
         root, pelvis
             As for `hips`.
-        trunk : ndarray, shape (T, 3, 3)
+        trunk : ndarray of shape (T, 3, 3)
             Rotation of the trunk.
 
         Returns
         -------
-        dict of ndarray, shape (T, 3)
+        dict of ndarray of shape (T, 3)
             By side.
         """
         waist = root + self["waist"] * pelvis[:, :, 2]
@@ -211,13 +211,13 @@ class Body:
 
         Parameters
         ----------
-        root : ndarray, shape (T, 3)
+        root : ndarray of shape (T, 3)
             Middle of the hip joints, world metres.
-        pelvis, trunk, head : ndarray, shape (T, 3, 3)
+        pelvis, trunk, head : ndarray of shape (T, 3, 3)
             Rotations to the world.
-        ankles : mapping of ndarray, shape (T, 3)
+        ankles : mapping of ndarray of shape (T, 3)
             Ankle joints by side, within reach of the legs.
-        feet : mapping of ndarray, shape (T, 3, 3)
+        feet : mapping of ndarray of shape (T, 3, 3)
             Rotations of the feet.
         arms : mapping of Limb
             Rotations of the arms.
@@ -275,19 +275,19 @@ def two_bones(
 
     Parameters
     ----------
-    start, end : ndarray, shape (T, 3)
+    start, end : ndarray of shape (T, 3)
         Hip and ankle, or shoulder and wrist, metres. If they are too far apart the bones are
         straight and do not reach the end; if too near, they are folded.
     upper, lower : float
         Lengths of the bones, metres.
-    front : ndarray, shape (T, 3)
+    front : ndarray of shape (T, 3)
         Approximate direction of the x axes of the bones.
     bend : float
         1 if the joint between them moves forward on flexion (knee), -1 if backward (elbow).
 
     Returns
     -------
-    tuple of ndarray, shape (T, 3, 3)
+    tuple of ndarray of shape (T, 3, 3)
         Rotations of the bones, which lie along -z with the hinge along y.
     """
     line = end - start

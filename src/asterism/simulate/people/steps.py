@@ -90,7 +90,7 @@ class Gait:
 
         Returns
         -------
-        ndarray, shape (n, 3)
+        ndarray of shape (n, 3)
             Share of the swing, share of the distance between the footprints, and height above the
             ground, metres.
         """
@@ -113,9 +113,9 @@ class Feet:
 
     Attributes
     ----------
-    ankles : dict of ndarray, shape (T, 3)
+    ankles : dict of ndarray of shape (T, 3)
         Ankle joints, world metres.
-    turns : dict of ndarray, shape (T, 3, 3)
+    turns : dict of ndarray of shape (T, 3, 3)
         Rotations from the foot to the world.
     """
 
@@ -135,7 +135,7 @@ def swings_of(course: Course, gait: Gait, phase: float) -> dict[str, Array]:
 
     Returns
     -------
-    dict of ndarray, shape (n, 2)
+    dict of ndarray of shape (n, 2)
     """
     span = 1.5 / gait.cadence
     swings = {}
@@ -151,11 +151,11 @@ def feet_on(t: Array, body: Body, course: Course, gait: Gait, swings: dict[str, 
 
     Parameters
     ----------
-    t : ndarray, shape (T,)
+    t : ndarray of shape (T,)
         Times, seconds.
     body, course, gait
         Person, position over time, and manner of walking.
-    swings : dict of ndarray, shape (n, 2)
+    swings : dict of ndarray of shape (n, 2)
         Times at which each foot leaves the ground and lands, ascending; it stands otherwise.
 
     Returns
@@ -264,14 +264,14 @@ def rolled(pitch: Array, height: float) -> tuple[Array, Array, Array]:
 
     Parameters
     ----------
-    pitch : ndarray, shape (T, 3)
+    pitch : ndarray of shape (T, 3)
         Angle, its rate and acceleration, degrees, toes up.
     height : float
         Height of the person, metres.
 
     Returns
     -------
-    tuple of ndarray, shape (T, 2)
+    tuple of ndarray of shape (T, 2)
         Ankle forward of its place over the flat foot and above the ground, velocity, acceleration.
     """
     angle, rate, bend = (np.radians(pitch[:, k, None]) for k in range(3))
@@ -302,7 +302,7 @@ def reached(
 
     Returns
     -------
-    ndarray, shape (n,)
+    ndarray of shape (n,)
         Metres.
     """
     hips, feet = hips_at(course.times), feet_at(course.times)
@@ -320,18 +320,18 @@ def carried(t: Array, course: Course, highest: Array, smoothing: float = 0.15) -
 
     Parameters
     ----------
-    t : ndarray, shape (T,)
+    t : ndarray of shape (T,)
         Times, seconds.
     course : Course
         Position over time.
-    highest : ndarray, shape (n,)
+    highest : ndarray of shape (n,)
         Result of `reached`.
     smoothing : float
         Width of the smoothing, seconds.
 
     Returns
     -------
-    ndarray, shape (T,)
+    ndarray of shape (T,)
         Metres.
     """
     from scipy.interpolate import CubicSpline

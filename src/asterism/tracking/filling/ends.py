@@ -39,10 +39,10 @@ class Bridges:
 
     Parameters
     ----------
-    weights : ndarray, shape (M, B, L, n)
+    weights : ndarray of shape (M, B, L, n)
         Weights of the frames at the ends for each missing frame; B = 1 if all windows have equal
         times.
-    left : ndarray, shape (L,)
+    left : ndarray of shape (L,)
         Variance of the residuals in the last window relative to their prior variance, by the
         default interpolator: it increases from the ends to 1.
     """
@@ -55,12 +55,12 @@ class Bridges:
 
         Parameters
         ----------
-        missed : ndarray, shape (B, n, D)
+        missed : ndarray of shape (B, n, D)
             Residuals at the ends of each window, metres.
 
         Returns
         -------
-        ndarray, shape (M, B, L, D)
+        ndarray of shape (M, B, L, D)
         """
         M, same, L, n = self.weights.shape
         if same > 1:
@@ -79,7 +79,7 @@ def bridges(times: NDArray[np.float64], is_end: NDArray[np.bool_]) -> Bridges:
 
     Parameters
     ----------
-    times : ndarray, shape (B, W)
+    times : ndarray of shape (B, W)
         Times of each window, seconds.
     is_end : ndarray of bool, shape (W,)
         True for frames at the ends.
@@ -127,7 +127,7 @@ def is_steady(
 
     Parameters
     ----------
-    places : ndarray, shape (n, D)
+    places : ndarray of shape (n, D)
         Positions of the marker, relative to its body if there is one, metres.
     frames : ndarray of int, shape (n,)
         Frames at both ends, in order of time.

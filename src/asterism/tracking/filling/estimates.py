@@ -58,9 +58,9 @@ class DenseTracks:
 
     Parameters
     ----------
-    times : ndarray, shape (T,)
+    times : ndarray of shape (T,)
         Times of the frames, seconds.
-    positions : ndarray, shape (T, K, D)
+    positions : ndarray of shape (T, K, D)
         Positions, metres, NaN where not measured.
     model : TrackingModel
         Model whose motion and noise are used.
@@ -104,9 +104,9 @@ class Estimate:
     ----------
     name : str
         Name of the estimator.
-    values : ndarray, shape (H + 1, L, D)
+    values : ndarray of shape (H + 1, L, D)
         Estimated positions in each window and, last, in the gap, metres.
-    variances : ndarray, shape (L,)
+    variances : ndarray of shape (L,)
         Variance of a coordinate in the gap according to the estimator itself, m².
     """
 
@@ -123,7 +123,7 @@ class Estimates:
     ----------
     each : tuple of Estimate
         One to three estimates.
-    truth : ndarray, shape (H, L, D)
+    truth : ndarray of shape (H, L, D)
         Withheld positions in the windows, metres; NaN where the marker was not detected.
     windows : ndarray of int, shape (H, W)
         Frames of the windows.

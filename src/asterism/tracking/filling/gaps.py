@@ -143,9 +143,9 @@ def fill_gaps(
     """Fill the gaps of tracks from their own motion, their rigid body and the other markers.
 
     *smoother*: the motion of the model through the gap (Rauch-Tung-Striebel). *body*: neighbours
-    at stable distances are fitted as a rigid body in every frame [1]_, which predicts the marker.
+    at stable distances are fitted as a rigid body in every frame [1], which predicts the marker.
     *pattern*: in the frame of that body, ridge regression on the positions of up to 14 markers,
-    estimated from frames in which all were detected [2]_ [3]_. A Gaussian process interpolates the
+    estimated from frames in which all were detected [2] [3]. A Gaussian process interpolates the
     residuals of body and pattern at the ends of the gap, so that the fill joins them smoothly.
 
     For validation the marker is withheld in stretches of the capture in which it and its helpers
@@ -177,10 +177,10 @@ def fill_gaps(
 
     References
     ----------
-    .. [1] Horn, Closed-form solution of absolute orientation using unit quaternions, 1987.
-    .. [2] Gløersen & Federolf, Predicting missing marker trajectories in human motion data using
+    1. Horn, Closed-form solution of absolute orientation using unit quaternions, 1987.
+    2. Gløersen & Federolf, Predicting missing marker trajectories in human motion data using
        marker intercorrelations, PLoS ONE 11(3), 2016.
-    .. [3] Liu & McMillan, Estimation of missing markers in human motion capture, 2006.
+    3. Liu & McMillan, Estimation of missing markers in human motion capture, 2006.
 
     Examples
     --------

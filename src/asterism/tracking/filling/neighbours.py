@@ -25,9 +25,9 @@ class Body:
 
     Parameters
     ----------
-    turns : ndarray, shape (F, D, D)
+    turns : ndarray of shape (F, D, D)
         Rotations R.
-    middles : ndarray, shape (F, D)
+    middles : ndarray of shape (F, D)
         Centres c, metres.
     """
 
@@ -39,7 +39,7 @@ class Body:
 
         Parameters
         ----------
-        points : ndarray, shape (F, D) or (F, n, D)
+        points : ndarray of shape (F, D) or (F, n, D)
             Points in room coordinates, metres.
 
         Returns
@@ -54,7 +54,7 @@ class Body:
 
         Parameters
         ----------
-        points : ndarray, shape (F, D) or (F, n, D)
+        points : ndarray of shape (F, D) or (F, n, D)
             Points in body coordinates, metres.
 
         Returns
@@ -87,9 +87,9 @@ def fit_body(points: NDArray[np.float64], weights: NDArray[np.float64]) -> Body:
 
     Parameters
     ----------
-    points : ndarray, shape (F, n, D)
+    points : ndarray of shape (F, n, D)
         Positions of the markers, metres, all finite.
-    weights : ndarray, shape (n,)
+    weights : ndarray of shape (n,)
         Weight of each marker in the fit, > 0.
 
     Returns

@@ -26,13 +26,13 @@ class Pattern:
 
     Parameters
     ----------
-    by_fold : ndarray, shape (folds, F, D)
+    by_fold : ndarray of shape (folds, F, D)
         Positions predicted by the regression without each fold.
-    by_all : ndarray, shape (F, D)
+    by_all : ndarray of shape (F, D)
         Positions predicted by the regression over all folds.
     fold : ndarray of int, shape (F,)
         Fold to which each frame belongs, or is nearest.
-    variances : ndarray, shape (F,)
+    variances : ndarray of shape (F,)
         Variance of a coordinate, m²: the mean square error of each fold predicted without it,
         inflated for poses far from those of the frames used in the regression.
     """
@@ -50,14 +50,14 @@ def learn_pattern(
 
     The frames are cut into up to `MAX_FOLDS` folds no shorter than the gap, if there are two of
     them. Each fold is predicted from the others, and the ridge with the smallest error is used.
-    The pattern has a low rank, as in [1]_: directions with less variance than the ridge have no
+    The pattern has a low rank, as in [1]: directions with less variance than the ridge have no
     effect.
 
     Parameters
     ----------
-    Z : ndarray, shape (F, p)
+    Z : ndarray of shape (F, p)
         Positions of the other markers in body coordinates, metres, in order of time.
-    y : ndarray, shape (F, D)
+    y : ndarray of shape (F, D)
         Positions of the marker, metres; any values where it is not known.
     is_known : ndarray of bool, shape (F,)
         True where the marker is known.
@@ -70,7 +70,7 @@ def learn_pattern(
 
     References
     ----------
-    .. [1] Gløersen & Federolf 2016, Predicting missing marker trajectories in human motion data
+    1. Gløersen & Federolf 2016, Predicting missing marker trajectories in human motion data
        using marker intercorrelations, PLoS ONE 11(3).
     """
     rows = np.flatnonzero(is_known)

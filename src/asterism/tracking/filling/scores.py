@@ -38,13 +38,13 @@ class Fill:
 
     Parameters
     ----------
-    points : ndarray, shape (L, D)
+    points : ndarray of shape (L, D)
         Filled positions, metres.
-    stds : ndarray, shape (L,)
+    stds : ndarray of shape (L,)
         Standard deviation of a coordinate, metres.
-    weights : ndarray, shape (J,)
+    weights : ndarray of shape (J,)
         Weights of the estimators, with sum 1.
-    rms : ndarray, shape (J,)
+    rms : ndarray of shape (J,)
         Root mean square distance of each estimator in the windows, metres; NaN with too few
         windows.
     n_windows : int
@@ -118,12 +118,12 @@ def minimum_variance_weights(errors: NDArray[np.float64]) -> NDArray[np.float64]
 
     Parameters
     ----------
-    errors : ndarray, shape (J, H, L, D)
+    errors : ndarray of shape (J, H, L, D)
         Errors of each estimator in the windows, metres; NaN without a true position.
 
     Returns
     -------
-    ndarray, shape (J,)
+    ndarray of shape (J,)
     """
     J = len(errors)
     flat = errors.reshape(J, -1)
@@ -150,12 +150,12 @@ def error_profile(off: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    off : ndarray, shape (H, L, D)
+    off : ndarray of shape (H, L, D)
         Errors in the windows, metres; NaN without a true position.
 
     Returns
     -------
-    ndarray, shape (L,)
+    ndarray of shape (L,)
         Mean squares, m².
     """
     every = np.arange(off.shape[1])
@@ -181,9 +181,9 @@ def disagreement_factor(apart: NDArray[np.float64], z: NDArray[np.float64]) -> f
 
     Parameters
     ----------
-    apart : ndarray, shape (J, H + 1, L, D)
+    apart : ndarray of shape (J, H + 1, L, D)
         Differences of the estimates from their mean, in the windows and, last, in the gap.
-    z : ndarray, shape (H, L, D)
+    z : ndarray of shape (H, L, D)
         Errors in the windows, relative to their usual size; NaN without a true position.
 
     Returns

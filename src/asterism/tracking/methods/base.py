@@ -70,9 +70,9 @@ class Update:
         Earlier detections whose label changes, numbered from 0 in order of arrival.
     revised_labels : ndarray of int, shape (r,)
         New labels of these detections.
-    confidence : ndarray, shape (n,), or None
+    confidence : ndarray of shape (n,), or None
         Probability that each label is right, if the method estimates it.
-    revised_confidence : ndarray, shape (r,), or None
+    revised_confidence : ndarray of shape (r,), or None
         Probability that each revised label is right.
     info : mapping
         Counts of the step, such as tracks, groups and candidates.
@@ -167,9 +167,9 @@ class Method(ABC, Generic[State]):
             State from `init` or the previous step; it is not changed.
         time : float
             Time of the frame, seconds, later than the previous frame.
-        points : array_like, shape (n, D)
+        points : array_like of shape (n, D)
             Points of the frame, metres; may be empty.
-        covariances : array_like, shape (n, D, D), optional
+        covariances : array_like of shape (n, D, D), optional
             Covariance of each point, m², added to the sensor's noise. Its mean variance over the
             axes is used, because a track has one variance for all axes.
 
@@ -243,14 +243,14 @@ def checked_frame(
         Time of the frame, seconds.
     last_time : float
         Time of the previous frame, seconds; -inf before the first.
-    points : array_like, shape (n, D)
+    points : array_like of shape (n, D)
         Points of the frame, metres; may be empty.
     n_axes : int
         Number of coordinates D, 2 or 3.
 
     Returns
     -------
-    ndarray, shape (n, D)
+    ndarray of shape (n, D)
 
     Raises
     ------
@@ -286,14 +286,14 @@ def checked_covariances(covariances: ArrayLike, frame: NDArray[np.float64]) -> N
 
     Parameters
     ----------
-    covariances : array_like, shape (n, D, D)
+    covariances : array_like of shape (n, D, D)
         Covariance of each point, m².
-    frame : ndarray, shape (n, D)
+    frame : ndarray of shape (n, D)
         Points of the frame, metres.
 
     Returns
     -------
-    ndarray, shape (n, D, D)
+    ndarray of shape (n, D, D)
 
     Raises
     ------

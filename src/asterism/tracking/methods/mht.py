@@ -45,7 +45,7 @@ class HypothesisCluster:
     origins : ndarray of int, shape (h, n)
         Target of each detection in each hypothesis, or -1 for clutter and for the only detection
         of a new marker.
-    probabilities : ndarray, shape (h,)
+    probabilities : ndarray of shape (h,)
         Probabilities of the hypotheses, in decreasing order, with sum 1.
 
     Examples

@@ -47,7 +47,7 @@ def branch_options(
     ----------
     window, max_branches, prune_odds, merge_last, fading
         As for `TrackSplitting`; `merge_last` is the window by default.
-    limits : ndarray, shape (K,), optional
+    limits : ndarray of shape (K,), optional
         Limits of the χ² test, from `chi2_limits`.
     z : float
         Standard normal quantile of the test, for branches with more than K detections.

@@ -177,7 +177,7 @@ def chi2_limits(alpha: float, n_axes: int, fading: float) -> NDArray[np.float64]
 
     Returns
     -------
-    ndarray, shape (K,)
+    ndarray of shape (K,)
         Limits for k = 1 to K; with fading the last one holds for all larger k.
 
     Examples

@@ -45,13 +45,13 @@ class Bonds:
     ----------
     names : tuple of str
         Names of the K markers, all different.
-    places : array_like, shape (K, D)
+    places : array_like of shape (K, D)
         Positions in one pose, metres, relative to its centre; NaN for markers missing in it.
     pairs : array_like of int, shape (M, 2)
         Bonded markers, the lower index first.
-    distances : array_like, shape (M,)
+    distances : array_like of shape (M,)
         Median distance of each pair, metres.
-    spreads : array_like, shape (M,)
+    spreads : array_like of shape (M,)
         Standard deviation of each distance, metres.
     frames : array_like of int, shape (M,)
         Number of frames from which each distance was measured.

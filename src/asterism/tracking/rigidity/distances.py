@@ -31,9 +31,9 @@ class Distances:
 
     Parameters
     ----------
-    middle : ndarray, shape (..., n)
+    middle : ndarray of shape (..., n)
         Median distances, metres; NaN for two markers without a common frame.
-    spread : ndarray, shape (..., n)
+    spread : ndarray of shape (..., n)
         Half the width of the central 68 %, metres: the standard deviation of a Gaussian.
     n_frames : ndarray of int, shape (..., n)
         Number of frames in which both markers were detected.
@@ -65,9 +65,9 @@ def distances_from(marker: NDArray[np.float64], others: NDArray[np.float64]) -> 
 
     Parameters
     ----------
-    marker : ndarray, shape (F, D)
+    marker : ndarray of shape (F, D)
         Positions, metres, NaN where not detected.
-    others : ndarray, shape (F, n, D)
+    others : ndarray of shape (F, n, D)
         Positions of the other markers.
 
     Returns
@@ -90,7 +90,7 @@ def distances_between(positions: NDArray[np.float64]) -> Distances:
 
     Parameters
     ----------
-    positions : ndarray, shape (F, K, D)
+    positions : ndarray of shape (F, K, D)
         Positions, metres, NaN where not detected.
 
     Returns

@@ -34,7 +34,7 @@ class Pass:
     after : ndarray of int, shape (F,)
         Predecessor of each tracklet in the direction of the pass, -1 for the first of a
         marker.
-    probabilities : ndarray, shape (F,)
+    probabilities : ndarray of shape (F,)
         Probability of the decision about each tracklet.
     n_cuts : int
         Number of links that were cut because the neighbours contradict them.

@@ -72,7 +72,7 @@ class Stitching:
         Track of each tracklet; -2 for a ghost, which is clutter in the result.
     after : ndarray of int, shape (F,)
         Preceding tracklet of each tracklet, -1 for the first of a marker.
-    probabilities : ndarray, shape (F,)
+    probabilities : ndarray of shape (F,)
         Probability of the decision about each tracklet.
     n_cuts : int
         Number of links of the input tracks that were cut because the neighbours contradict
@@ -191,12 +191,12 @@ def stitch(
 
     Notes
     -----
-    Rigid fits are weighted least squares [1]_. The prediction error of a body has Student's t
+    Rigid fits are weighted least squares [1]. The prediction error of a body has Student's t
     distribution with three degrees of freedom, whose scale follows from the residuals of the fit.
 
     References
     ----------
-    .. [1] Horn, Closed-form solution of absolute orientation using unit quaternions, 1987.
+    1. Horn, Closed-form solution of absolute orientation using unit quaternions, 1987.
 
     Examples
     --------
