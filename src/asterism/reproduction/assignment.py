@@ -49,12 +49,12 @@ def run(seeds: int) -> Outcome:
         exact("determinants of square submatrices of A", "+1, −1 or 0",
               int((~np.isin(determinants, (-1, 0, 1))).sum()), "number of other values",
               len(determinants)),
-        exact("so the relaxed problem has an integer solution", "total unimodularity", max(two),
-              "greatest share of fractional solutions", len(two)),
-        exact("… which costs what the exact solver finds", "an identity", gap,
+        exact("the relaxed problem of two dimensions has an integer solution",
+              "total unimodularity", max(two), "greatest share of fractional solutions", len(two)),
+        exact("the relaxed solution costs as much as the exact one", "an identity", gap,
               "greatest difference", len(two), TOLERANCE),
-        fewer("with three dimensions it has not (NP-hard)", "Lagrangian relaxation is needed",
-              two, three, "% of the solutions fractional", 1),
+        fewer("three dimensions: the relaxed solution is fractional (NP-hard)",
+              "Lagrangian relaxation is needed", two, three, "% of the solutions fractional", 1),
     ]  # fmt: skip
     rows = [
         [str(n), str(math.factorial(n)), f"{np.mean(fractional[n, 2]):.0f} %",

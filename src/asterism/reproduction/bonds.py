@@ -42,7 +42,7 @@ def run(seeds: int) -> Outcome:
         claims += [
             fewer(f"bonds save moves, {data}", "a speed-up", bonded.moves, free.moves,
                   "moves a frame", 1),
-            exact(f"… without a loss, {data}", "“correctly detected”", loss,
+            exact(f"bonds lose no correct association, {data}", "“correctly detected”", loss,
                   "mean loss in percent correct", seeds, 0.1),
         ]  # fmt: skip
         title = f"{data}, N_mc = {COUNT}, 10 % false alarms, d̄ = {MAX_GAP}"

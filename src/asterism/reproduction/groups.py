@@ -28,11 +28,11 @@ def run(seeds: int) -> Outcome:
     found = compare(cubes(seeds, max_gap=MAX_GAP), methods)
     whole, cells, clusters = (found[name] for name in GROUPS)
     claims = [
-        fewer("regrouping what cells divide remains a problem", "tracks break at borders",
+        fewer("cells break tracks at their borders", "a remaining problem",
               whole.tracks, cells.tracks, "tracks", 1),
-        fewer("clusters are the more efficient approach", "better than cells",
+        fewer("clusters track more correctly than cells", "better than cells",
               100 - clusters.correct, 100 - cells.correct, "% not correct"),
-        fewer("clusters improve on no groups", "an improvement",
+        fewer("clusters track more correctly than no groups", "an improvement",
               100 - clusters.correct, 100 - whole.correct, "% not correct"),
     ]  # fmt: skip
     title = f"N_mc = {COUNT}, 10 % false alarms, 10 % missing, d̄ = {MAX_GAP}"

@@ -85,9 +85,10 @@ def run(seeds: int) -> Outcome:
     expected = np.array([n * (1 / np.arange(1, n + 1)).sum() for n in LARGE])
     ratios = (counts / expected[:, None]).ravel()
     claims = [
-        exact("no dissatisfied pair is left", "none", unstable, "number of them", len(small)),
+        exact("the marriages are stable", "none", unstable, "number of dissatisfied pairs",
+              len(small)),
         exact("every man has his highest ranked feasible partner", "always", not_best,
-              "number of men without", len(small)),
+              "number of men without this partner", len(small)),
         exact("proposals in the worst case", "O(n²)",
               int((slowest > np.square(LARGE)).sum()), "number beyond n²", len(LARGE)),
         fewer("proposals on average", "O(n lg n)", ratios, np.ones(len(ratios)),

@@ -41,7 +41,7 @@ def run(seeds: int) -> Outcome:
     claims = [
         exact("the bounds of equation 4.7 are the sums of its shares", "an identity", off,
               "greatest difference", len(EQUATION), LAST_DIGIT),
-        exact("its shares add up to 1", "an identity", abs(sum(shares) - 30),
+        exact("the shares of equation 4.7 add up to 1", "an identity", abs(sum(shares) - 30),
               "difference in thirtieths", 1),
         exact('`move_weights="report"` has these shares', "equation 4.7", different,
               "number that differ", len(EQUATION)),

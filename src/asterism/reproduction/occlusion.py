@@ -47,15 +47,16 @@ def run(seeds: int) -> Outcome:
     n_wrong, n_cycles = _n_painted_wrong(camera, ring), len(camera.paint(ring).cycles)
     n_pixels = SIZE[0] * SIZE[1]
     claims = [
-        exact(f"testing only where a point falls hides the same points ({n_hidden:,} of them)",
+        exact(f"a test at each point alone occludes the same points ({n_hidden:,})",
               "equal to the z-buffer", different, "number that differ away from edges",
               seeds * N_POINTS),
-        exact(f"… at fewer places ({N_POINTS} instead of {n_pixels:,})",
+        exact(f"it tests fewer places ({N_POINTS} instead of {n_pixels:,})",
               "a considerable reduction of complexity", float(n_pixels <= N_POINTS),
               "number of images with fewer pixels", 1),
         exact("the painter's algorithm is right without cycles", "a rule", painted_wrong,
               "number of wrong pixels", seeds * n_pixels),
-        exact(f"… and fails on a cycle ({n_wrong:,} pixels wrong, {n_cycles} cycle reported)",
+        exact(f"the painter's algorithm fails on a cycle ({n_wrong:,} pixels wrong, {n_cycles} "
+              "cycle reported)",
               "a rule", float(n_wrong == 0 or n_cycles == 0),
               "number of cycles painted right or missed", 1),
     ]  # fmt: skip
@@ -117,7 +118,7 @@ def _draw(camera: am.Camera) -> list[Axes]:
         [rng.uniform(-1.3, 1.3, 60), rng.uniform(0.2, 0.8, 60), rng.uniform(-0.9, 0.9, 60)]
     )
     titles = ("curtains: hollow points are hidden", "the same in a z-buffer",
-              "three bars in a cycle, z-buffer", "… by the painter's algorithm")  # fmt: skip
+              "three bars in a cycle, z-buffer", "the same, painter's algorithm")  # fmt: skip
     panels = titled_panels(*titles, width=11.5, height=8.2, n_rows=2)
     plot_image(camera, camera.project(points, curtains), colours=CYCLE[0], surfaces=curtains,
                ax=panels[0])  # fmt: skip

@@ -40,7 +40,7 @@ def run(seeds: int) -> Outcome:
     cases = seeds * N_POINTS
     metres = "greatest difference in metres"
     claims = [
-        exact("K F [R T] P is what the camera gives", "an identity", worst,
+        exact("the camera projects P to K F [R T] P", "an identity", worst,
               "greatest difference in pixels", cases, TOLERANCE_PX),
         exact("similar triangles: x = f X / Z (figure 3.1)", "an identity", similar, metres, cases,
               TOLERANCE_M),

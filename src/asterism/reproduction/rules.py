@@ -71,7 +71,7 @@ def within(
         Claim with the verdict of the rule "spread".
     """
     low, high = np.quantile(np.asarray(measured, dtype=np.float64), _QUANTILES)
-    # Slightly more than half a unit: 0.05 is not a binary number.
+    # Slightly more than half a unit: 0.05 has no exact binary form.
     slack = 0.5 * step * (1 + 1e-9)
     is_within = bool(low - slack <= reported <= high + slack)
     side = "within" if is_within else "above" if reported > high else "below"
