@@ -56,7 +56,7 @@ class Option:
 
     @property
     def type_text(self) -> str:
-        """Type as printed in the lists of options."""
+        """Type of the option, as the lists of options print it."""
         return _type_text(self.kind)
 
     def parse(self, text: str) -> Any:

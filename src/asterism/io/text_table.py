@@ -22,7 +22,7 @@ _GAPS = {"", "null", "nan", "none"}
 
 
 def as_utf8(head: bytes) -> bytes:
-    """Return the first bytes of a file in UTF-8 if they begin with the mark of UTF-16."""
+    """Convert the first bytes of a file to UTF-8 if they begin with the mark of UTF-16."""
     return head.decode("utf-16", "ignore").encode() if head[:2] in _UTF16 else head
 
 

@@ -127,7 +127,8 @@ def _edge(camera: Camera) -> NDArray[np.float64]:
     v = np.concatenate([zero, share, one, 1 - share]) * h - 0.5
     edge = np.stack([u, v], axis=1)
     middle = np.array([(w - 1) / 2, (h - 1) / 2])
-    # From the edge to the middle, until the lens reaches.
+    # The lens model may not reach the edge of the image: of each line from the edge to the
+    # middle, the first pixel with a ray is taken.
     inward = np.linspace(1, 0, 65)[:, None, None]
     rays = camera.rays(middle + inward * (edge - middle))
     is_reached = np.isfinite(rays[..., 0])

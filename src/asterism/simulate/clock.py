@@ -15,7 +15,7 @@ __all__ = ["clock"]
 
 
 def clock(frames: int, rate: float, seed: int) -> NDArray[np.float64]:
-    """Check the arguments of every scene and return the time of each frame.
+    """Check the arguments that all scenes share, and return the time of each frame.
 
     Parameters
     ----------

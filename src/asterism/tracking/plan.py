@@ -60,8 +60,18 @@ def plan_tracking(
 
     Parameters
     ----------
-    detections, method, model, stitch, seed, start
-        As for `track`.
+    detections : Detections
+        Unnamed points.
+    method : Method or str, optional
+        Method of association, or its name; by default `choose_method` selects one.
+    model : TrackingModel, optional
+        Tracking model; by default `estimate_model` estimates it from the capture.
+    stitch : bool or "auto", optional
+        Whether tracks are joined through gaps of any length, as for `track`.
+    seed : int, optional
+        Seed of the methods that draw random numbers; 0 by default.
+    start : Tracks, optional
+        Initial tracks, which `MCMCDA` repairs.
 
     Returns
     -------

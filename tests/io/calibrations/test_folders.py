@@ -137,7 +137,7 @@ def test_flydra_folders_with_less_in_them(tmp_path):
         ("basename2.rad", lambda s: s.replace("K11 = ", "K11 = -"), "basename2.rad", "> 0"),
         ("basename2.rad", lambda s: s.replace("K12 = 0.0", "K12 = 3"), "basename2.rad", "0 beside"),
         ("basename2.rad", lambda s: "hello\n", "basename2.rad", "a name = a number"),
-        ("other2.rad", lambda s: "", "other2.rad", "one file a camera"),
+        ("other2.rad", lambda s: "", "other2.rad", "one file for each camera, found camera 2"),
         ("Res.dat", lambda s: "1 2\n", "Res.dat", "3 × 2"),
         ("Res.dat", lambda s: s.replace("1000", "0"), "Res.dat", "whole pixels"),
         ("calibration_units.txt", lambda s: "ells", "calibration_units.txt", "millimeters"),

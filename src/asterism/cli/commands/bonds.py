@@ -30,7 +30,7 @@ def bonds(
 ) -> None:
     """Find the markers that keep their mutual distance, and the rigid clusters.
 
-    `asterism name` names the tracks of another capture of the same subject by the file.
+    `asterism name` uses the marker set to name the tracks of another capture of the same subject.
 
     For example:
 

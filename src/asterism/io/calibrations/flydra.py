@@ -132,7 +132,12 @@ def _by_number(folder: Path, pattern: re.Pattern[str]) -> dict[int, Path]:
             continue
         number = int(match[1])
         if number in found:
-            raise FormatError(file, "its name", "one file a camera", f"{found[number].name} too")
+            raise FormatError(
+                file,
+                "its name",
+                "one file for each camera",
+                f"camera {number}, which {found[number].name} has too",
+            )
         found[number] = file
     return dict(sorted(found.items()))
 

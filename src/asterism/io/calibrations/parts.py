@@ -305,7 +305,7 @@ def build_camera(
 
 
 def build_rig(path: Path, cameras: Sequence[Camera], warnings: Sequence[str] = ()) -> Rig:
-    """Build a rig of at least one camera, all with different names.
+    """Build a rig from the cameras of a file; refuse an empty file and repeated names.
 
     Parameters
     ----------
