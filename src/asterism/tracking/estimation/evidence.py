@@ -79,7 +79,7 @@ class Evidence:
         Number of points in no track.
     n_frames : int
         Number of frames of all pieces.
-    speeds : ndarray, shape (L,)
+    speeds : ndarray of shape (L,)
         Speed of each link, m/s.
     velocity_rms : float
         Root mean square of a velocity coordinate, m/s.

@@ -32,7 +32,7 @@ def sample_runs(
     ----------
     detections : Detections
         Capture.
-    activity : ndarray, shape (T,)
+    activity : ndarray of shape (T,)
         Activity of each frame, as of `first_scales`; NaN where it was not measured.
     n_points : int
         Number of detections in all runs, about.

@@ -64,7 +64,7 @@ def first_scales(detections: Detections) -> tuple[Scales, NDArray[np.float64]]:
     Returns
     -------
     scales : Scales
-    activity : ndarray, shape (T,)
+    activity : ndarray of shape (T,)
         Mean square distance of the points of a frame to the nearest point of the next frame, each
         limited to the spacing of the points, m²; NaN for frames that were not measured.
 
@@ -120,12 +120,12 @@ class _Links(NamedTuple):
     ----------
     velocities, jolts : ndarray, shapes (V, D) and (J, D)
         Velocity over an unambiguous link, and its change over the next one, m/s.
-    spacings : ndarray, shape (M,)
+    spacings : ndarray of shape (M,)
         Distance of each followed point to the nearest other point of its frame, inf if there is
         none.
     frames : ndarray of int, shape (M,)
         Frame of each followed point.
-    distances : ndarray, shape (M,)
+    distances : ndarray of shape (M,)
         Distance of each followed point to the nearest point of the next frame, metres.
     """
 
@@ -164,7 +164,7 @@ def _sure_links(
 
     Parameters
     ----------
-    points : ndarray, shape (N, D)
+    points : ndarray of shape (N, D)
         Points of all frames.
     offsets : ndarray of int, shape (T + 1,)
         First point of each frame.
@@ -177,9 +177,9 @@ def _sure_links(
     -------
     link : ndarray of int, shape (M,)
         Point of the next frame, -1 for an ambiguous link.
-    spacing : ndarray, shape (M,)
+    spacing : ndarray of shape (M,)
         Distance to the nearest other point of the frame, inf if there is none.
-    distance : ndarray, shape (M,)
+    distance : ndarray of shape (M,)
         Distance to the nearest point of the next frame, metres.
     """
     t = frame[chosen]
