@@ -145,7 +145,7 @@ def fill_gaps(
     *smoother*: the motion of the model through the gap (Rauch-Tung-Striebel). *body*: neighbours
     at stable distances are fitted as a rigid body in every frame [1], which predicts the marker.
     *pattern*: in the frame of that body, ridge regression on the positions of up to 14 markers,
-    estimated from frames in which all were detected [2] [3]. A Gaussian process interpolates the
+    estimated from frames in which all were detected [2], [3]. A Gaussian process interpolates the
     residuals of body and pattern at the ends of the gap, so that the fill joins them smoothly.
 
     For validation the marker is withheld in stretches of the capture in which it and its helpers
