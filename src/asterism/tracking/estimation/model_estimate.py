@@ -75,8 +75,12 @@ def motion_levels(model: TrackingModel) -> tuple[str, str, tuple[float, ...]]:
 
     Returns
     -------
-    symbol, unit : str
+    symbol : str
+        Name and symbol of σ.
+    unit : str
+        Unit of the values.
     values : tuple of float
+        σ of each mode, in that unit.
 
     Examples
     --------
