@@ -52,7 +52,7 @@ class Naming:
         Named tracks; tracks with the same marker are merged.
     markers : ndarray of int, shape (K,)
         Marker of each input track in the bonds, -1 for a track without a name.
-    probabilities : ndarray, shape (K,)
+    probabilities : ndarray of shape (K,)
         Probability of each name among the names considered; 0 for a track without a name. Check
         names with a probability well below 1 by eye.
 
