@@ -9,6 +9,7 @@ from asterism.metrics.evaluation import Evaluation, evaluate
 from asterism.metrics.gospa import GospaScores, gospa_scores
 from asterism.metrics.hota import HotaScores, hota_scores
 from asterism.metrics.identity import IdentityScores, identity_scores
+from asterism.metrics.names import NameScores, name_scores
 from asterism.metrics.oracle import oracle_tracks
 from asterism.metrics.points import PointScores, point_scores
 from asterism.metrics.reliability import CalibrationCurve, calibration_curve
@@ -22,6 +23,7 @@ __all__ = [
     "GospaScores",
     "HotaScores",
     "IdentityScores",
+    "NameScores",
     "PointScores",
     "align",
     "association_scores",
@@ -31,6 +33,7 @@ __all__ = [
     "gospa_scores",
     "hota_scores",
     "identity_scores",
+    "name_scores",
     "oracle_tracks",
     "point_scores",
     "right_links",

@@ -14,6 +14,7 @@ from asterism.metrics.clear import ClearScores, clear_scores
 from asterism.metrics.gospa import GospaScores, gospa_scores
 from asterism.metrics.hota import HotaScores, hota_scores
 from asterism.metrics.identity import IdentityScores, identity_scores
+from asterism.metrics.names import NameScores, name_scores
 from asterism.records import record
 
 if TYPE_CHECKING:
@@ -25,7 +26,9 @@ __all__ = ["Evaluation", "evaluate"]
 
 
 @record(eq=False)
-class Evaluation(ClearScores, IdentityScores, HotaScores, GospaScores, AssociationScores):
+class Evaluation(
+    ClearScores, IdentityScores, HotaScores, GospaScores, AssociationScores, NameScores
+):
     """All scores of a result; the base classes describe their fields.
 
     Attributes
@@ -93,9 +96,20 @@ class Evaluation(ClearScores, IdentityScores, HotaScores, GospaScores, Associati
             ("tracks a marker", f"{self.tracks_per_marker:.3f}"),
             ("wrong links, broken links", f"{self.wrong_links}, {self.broken_links}"),
             ("frames by wrong ones", table),
+            *self._name_rows(),
         ]
         width = max(len(name) for name, _ in rows)
         return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
+
+    def _name_rows(self) -> list[tuple[str, str]]:
+        if np.isnan(self.name_accuracy):
+            return [("names", "not scored, because tracks or truth have none")]
+        parts = f"{self.name_precision:.4f}, {self.name_recall:.4f}"
+        return [
+            ("name F1 (precision, recall)", f"{self.name_f1:.4f} ({parts})"),
+            ("name accuracy", f"{self.name_accuracy:.4f}"),
+            ("left and right swapped", f"{self.swapped_sides_percent:.3f} %"),
+        ]
 
     def __repr__(self) -> str:
         return (
@@ -121,7 +135,7 @@ def evaluate(
     Labels are compared detection by detection, so both must come from the same capture. If they do
     not share one `Detections`, detections are matched by equal times and positions
     (`asterism.metrics.align`). If any track of the truth has a name, its unnamed tracks are
-    clutter. The names of `tracks` are not used.
+    clutter. Names are scored if both sides have any; all other scores compare identities alone.
 
     Parameters
     ----------
@@ -177,6 +191,7 @@ def evaluate(
         hota_scores(labels, truth_labels),
         gospa_scores(labels, truth_labels, frame_of, c=c, n_frames=n_frames, error=error),
         association_scores(labels, truth_labels, frame_of, n_frames=n_frames),
+        name_scores(labels, truth_labels, tracks.names, truth.names),
     )
     scores: dict[str, Any] = {}
     for part in parts:

@@ -34,7 +34,8 @@ def evaluate(
 
     Both files must hold the same detections, in any format; detections are matched by time and
     position. In the truth, points without a name are clutter. In the tracks they are clutter only
-    where the format cannot mark clutter (TRC, TSV, CSV with one row per frame).
+    where the format cannot mark clutter (TRC, TSV, CSV with one row per frame). Names are scored
+    if both files have any.
 
     For example:
 
