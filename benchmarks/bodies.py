@@ -1,4 +1,4 @@
-"""Bodies that carry hidden markers inside a tracker: what that wins, what it costs, what it spoils.
+"""Rigid prediction of occluded markers inside a tracker: gains, costs and losses.
 
 Real captures (in ``../shared/data``) in bursts with ghosts and with 10 % missing and 10 % clutter
 (`identity.py`): by each method alone, with bodies, stitched, and both; and scenes in which hardly

@@ -73,23 +73,23 @@ def occlusion() -> list[str]:
     drift = rng.normal(0, 0.01, (T, 1, 3)).cumsum(axis=0)
     standing = [am.camera.Polygon(corners=c) for c in corners]
     moving = [am.camera.Polygon(corners=c + drift) for c in corners]
-    lines = ["| what | time | share hidden |", "|---|---:|---:|"]
+    lines = ["| what | time | share occluded |", "|---|---:|---:|"]
     cases: dict[str, list[am.camera.Polygon]] = {"none": [], "standing": standing, "moving": moving}
     for name, surfaces in cases.items():
         seconds = best_of(3, partial(rig.project, points, surfaces))
-        hidden = float((rig.project(points, surfaces).reason == am.camera.Reason.HIDDEN).mean())
+        occluded = float((rig.project(points, surfaces).reason == am.camera.Reason.OCCLUDED).mean())
         what = f"8 cameras × 60 markers × {T} frames, 200 triangles {name}"
         if name == "none":
             what = f"8 cameras × 60 markers × {T} frames, no surface"
-        lines.append(f"| {what} | {seconds:.2f} s | {100 * hidden:.0f} % |")
+        lines.append(f"| {what} | {seconds:.2f} s | {100 * occluded:.0f} % |")
     mesh = ball()
     one = points[0]
     seconds = best_of(20, lambda: rig.project(one, [mesh]))
-    hidden = float((rig.project(one, [mesh]).reason == am.camera.Reason.HIDDEN).mean())
+    occluded = float((rig.project(one, [mesh]).reason == am.camera.Reason.OCCLUDED).mean())
     what = (
         f"8 cameras × 60 markers, one frame, mesh of {len(mesh.faces)} triangles, tree built anew"
     )
-    lines.append(f"| {what} | {1e3 * seconds:.1f} ms | {100 * hidden:.0f} % |")
+    lines.append(f"| {what} | {1e3 * seconds:.1f} ms | {100 * occluded:.0f} % |")
     for name, where in (("from 4 m", rig[0].center), ("from 0.8 m", np.array([0.8, 0, 1.0]))):
         camera = am.Camera.look_at(where, (0, 0, 1), K=rig[0].K, size_px=(1280, 1024))
         first = best_of(1, lambda c=camera: c.depth_image([mesh]))

@@ -144,7 +144,7 @@ def main() -> None:
         for seed in range(options.seeds):
             drawn = world.draw(seed)
             start = time.perf_counter()
-            misses = "runs" if world.p_redetection else "independent"
+            misses = "bursts" if world.p_redetection else "independent"
             found = am.estimate_model(drawn.detections, population=population, misses=misses)
             seconds.append(time.perf_counter() - start)
             kinds.append(type(found.model.motion).__name__)

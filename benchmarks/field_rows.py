@@ -141,7 +141,7 @@ def of_peer(kind: Kind, peer: Peer, options: argparse.Namespace, cache: Cache) -
 
 
 def of_oracle(kind: Kind, gap: int, options: argparse.Namespace, cache: Cache) -> list[Score]:
-    """Score the truth, broken where a marker is hidden for long: who bridges less can do no better.
+    """Score the truth, broken at long occlusions: a tracker that fills no more cannot score higher.
 
     Its switches are those that no such tracker avoids.
     """

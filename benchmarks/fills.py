@@ -1,12 +1,11 @@
-"""Filled gaps against the truth: stretches of real captures hidden on purpose.
+"""Filled gaps against the truth: stretches of real captures occluded on purpose.
 
-Of markers that are seen around them, stretches of 10, 30, 60 and 120 frames are hidden, up to three
-at a time, at random places (seeded), and filled by `am.fill_gaps`, by a cubic spline through ten
-frames on each side, and
-by Kinetics Toolkit's `fill_missing_samples` (linear, its default, and cubic). The
-gaps that the captures have themselves stay. Then 10 % of the points of an excerpt are hidden at
-random, wherever they are. A marker is *bonded* if the distance to three others or
-more varies by less than 10 mm (half of the middle 68 %).
+Stretches of 10, 30, 60 and 120 frames of markers that are seen around them are taken out, up to
+three at a time, at random places (seeded), and filled by `am.fill_gaps`, by a cubic spline
+through ten frames on each side, and by Kinetics Toolkit's `fill_missing_samples` (linear, its
+default, and cubic). The gaps that the captures have themselves stay. Then 10 % of the points of
+an excerpt are occluded at random, wherever they are. A marker is *bonded* if the distance to
+three others or more varies by less than 10 mm (half of the middle 68 %).
 
     python benchmarks/fills.py [--data FOLDER] [--only NAME] [--rounds N] [--markdown FILE]
 """
@@ -42,7 +41,7 @@ WAYS = ("fill", "spline", "ktk linear", "ktk cubic")
 
 @dataclass(frozen=True)
 class Stretch:
-    """One stretch that was hidden: how far each way is off, and how far `fill` said it may be."""
+    """One stretch that was occluded: how far each way is off, and how far `fill` said it may be."""
 
     capture: str
     length: int
@@ -61,17 +60,17 @@ def chosen(
 ) -> list[tuple[int, int, int]]:
     """Draw stretches (marker, first, stop) of markers seen throughout and around them."""
     T, K = seen.shape
-    n_hidden = np.zeros(T, dtype=int)
+    n_occluded = np.zeros(T, dtype=int)
     found: list[tuple[int, int, int]] = []
     for _ in range(40 * MOST):
         if len(found) == MOST or length + 2 * ENDS > T:
             break
         k, first = int(rng.integers(K)), int(rng.integers(ENDS, T - length - ENDS + 1))
         around = slice(first - ENDS, first + length + ENDS)
-        is_free = n_hidden[around].max() < AT_A_TIME and k not in {other for other, *_ in found}
+        is_free = n_occluded[around].max() < AT_A_TIME and k not in {other for other, *_ in found}
         if is_free and seen[around, k].all():
             found.append((k, first, first + length))
-            n_hidden[around] += 1
+            n_occluded[around] += 1
     return found
 
 
@@ -95,13 +94,13 @@ def measure(name: str, truth: am.Tracks, length: int, seed: int) -> tuple[list[S
     d = truth.detections
     whole = truth.positions()
     rng = np.random.default_rng([seed, length])
-    hidden = whole.copy()
+    occluded = whole.copy()
     stretches = chosen(np.isfinite(whole[..., 0]), length, rng)
     if not stretches:
         return [], np.nan
     for k, first, stop in stretches:
-        hidden[first:stop, k] = np.nan
-    tracks = am.Tracks.from_dense(d.times, hidden, truth.names)
+        occluded[first:stop, k] = np.nan
+    tracks = am.Tracks.from_dense(d.times, occluded, truth.names)
     model = am.estimate_model(tracks.detections).model
     longest = float(max(d.times[stop] - d.times[first - 1] for _, first, stop in stretches)) + 1e-6
     start = time.process_time()
@@ -119,12 +118,12 @@ def measure(name: str, truth: am.Tracks, length: int, seed: int) -> tuple[list[S
     regular = np.arange(d.n_frames) / (1 / d.step)  # it refuses times that differ in a last bit
     for way in ("linear", "cubic"):
         every[f"ktk {way}"] = np.full_like(whole, np.nan)
-        every[f"ktk {way}"][:, columns] = by_kinetics_toolkit(regular, hidden[:, columns], way)
+        every[f"ktk {way}"][:, columns] = by_kinetics_toolkit(regular, occluded[:, columns], way)
     found: list[Stretch] = []
     for k, first, stop in stretches:
         at, true = slice(first, stop), whole[first:stop, k]
         ends = np.r_[first - ENDS : first, stop : stop + ENDS]
-        spline = CubicSpline(d.times[ends], hidden[ends, k])(d.times[at])
+        spline = CubicSpline(d.times[ends], occluded[ends, k])(d.times[at])
         spreads = distances_from(whole[:, k], np.delete(whole, k, axis=1)).spread
         found.append(
             Stretch(
@@ -144,22 +143,22 @@ def scattered(truth: am.Tracks) -> list[str]:
     """Hide points at random and fill: how many could be tried, how far off beside the spline."""
     d = truth.detections
     whole = truth.positions()[:EXCERPT]
-    is_hidden = np.random.default_rng(0).random(whole.shape[:2]) < SCATTERED
-    hidden = np.where(is_hidden[..., None], np.nan, whole)
-    tracks = am.Tracks.from_dense(d.times[:EXCERPT], hidden, truth.names)
+    is_occluded = np.random.default_rng(0).random(whole.shape[:2]) < SCATTERED
+    occluded = np.where(is_occluded[..., None], np.nan, whole)
+    tracks = am.Tracks.from_dense(d.times[:EXCERPT], occluded, truth.names)
     filling = am.fill_gaps(tracks)
     e = filling.tracks.detections
     assert e.stds is not None
     frames, labels = e.frame_of[e.filled], filling.tracks.labels[e.filled]
-    kept = is_hidden[frames, labels] & np.isfinite(whole[frames, labels, 0])
+    kept = is_occluded[frames, labels] & np.isfinite(whole[frames, labels, 0])
     frames, labels = frames[kept], labels[kept]
     true = whole[frames, labels]
     off = e.points[e.filled][kept] - true
     z = off / e.stds[e.filled][kept, None]
     spline = np.empty_like(off)
     for k in np.unique(labels):
-        seen, mine = np.flatnonzero(np.isfinite(hidden[:, k, 0])), labels == k
-        spline[mine] = CubicSpline(d.times[seen], hidden[seen, k])(d.times[frames[mine]])
+        seen, mine = np.flatnonzero(np.isfinite(occluded[:, k, 0])), labels == k
+        spline[mine] = CubicSpline(d.times[seen], occluded[seen, k])(d.times[frames[mine]])
     of_fill, of_spline = (1e3 * np.linalg.norm(one, axis=1) for one in (off, spline - true))
     tried = [gap.n_windows > 0 for gap in filling.gaps if gap.is_filled]
     return [
@@ -215,7 +214,7 @@ def main() -> None:
                 taken += [ms] * bool(stretches)
         at_random.append([path.name, *scattered(truth)])
         print(path.name, len(found), flush=True)
-    head = ["frames hidden", "stretches", *WAYS, "spline / fill"]
+    head = ["frames occluded", "stretches", *WAYS, "spline / fill"]
     lines = ["RMS distance over all stretches, mm (median of the stretches):", ""]
     rows: list[list[str]] = []
     for which, wanted in (("bonded", {True}), ("all", {True, False})):
@@ -229,7 +228,7 @@ def main() -> None:
         for length in LENGTHS:
             some = [s for s in found if s.length == length and s.is_tried is wanted]
             rows += [[f"{length}, {which}", *calibration(some)]] if some else []
-    head = ["frames hidden", "stretches", "within 1 σ, %", "within 1.96 σ, %", "mean square"]
+    head = ["frames occluded", "stretches", "within 1 σ, %", "within 1.96 σ, %", "mean square"]
     lines += [*table(head, rows), ""]
     lines += ["By capture, of stretches that were tried:", ""]
     rows = []

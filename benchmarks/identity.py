@@ -1,6 +1,6 @@
 """Identity through occlusion: captures corrupted in four ways, each method alone and stitched.
 
-As captured; 10 % missing, 10 % clutter, 0.3 mm of noise; bursts (up to 5 markers hidden at a time
+As captured; 10 % missing, 10 % clutter, 0.3 mm of noise; bursts (up to 5 markers occluded at a time
 for 5 to 60 frames, up to 3 ghosts within 5 cm of a marker for 1 to 10 frames, 0.3 mm of noise); the
 second at half the rate. The identity of a marker counts across its gaps: the oracles are the truth,
 broken at every gap of more than 10, and of more than 60 frames.

@@ -1,6 +1,6 @@
 """Names by distances: bonds learnt from the first half of a capture, used on the second.
 
-The second half comes without names and in another order: as labelled, and after it was hidden in
+The second half comes without names and in another order: as labelled, and after it was occluded in
 bursts (up to 5 markers at a time for 5 to 60 frames, ghosts, 0.3 mm of noise), tracked and
 stitched.
 
@@ -54,9 +54,9 @@ def row(path: Path, truth: am.Tracks) -> list[str]:
     seconds = time.perf_counter() - start
     is_there = second.lengths[was] > 0
     n_right = int((found.markers == was)[is_there].sum())
-    hidden = am.simulate.corrupt(second, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
-    named = am.name_tracks(am.track(hidden.detections, stitch=True), bonds).tracks
-    right, wrong = shares(named, hidden)
+    occluded = am.simulate.corrupt(second, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
+    named = am.name_tracks(am.track(occluded.detections, stitch=True), bonds).tracks
+    right, wrong = shares(named, occluded)
     return [
         path.name,
         f"{len(bonds.pairs)}",
@@ -84,7 +84,7 @@ def main() -> None:
     head = ("capture", "bonds", "clusters", "markers right", "right %", "wrong %", "s")
     lines = [
         "The second half of each capture, named by what was learnt from the first: as labelled "
-        "(markers right, and the time for it), and hidden in bursts, tracked by SMP over three "
+        "(markers right, and the time for it), and occluded in bursts, tracked by SMP over three "
         "frames and stitched (of all detections of markers, those with the right name and with a "
         "wrong one). Seeds 0 and 1.",
         "",

@@ -77,7 +77,7 @@ def cost() -> list[list[str]]:
                 size = f"{info['largest_group']:.0f}"
                 if name in ("tomht", "mht"):
                     size += f" ({info['most_hypotheses']:.0f})"
-                limit = info["most_dropped_odds"] if name == "mht" else info["gap"]
+                limit = info["max_dropped_odds"] if name == "mht" else info["gap"]
                 row += [f"{1e3 * taken:.2f}", size, f"{limit:.1g}"]
             rows.append(row)
             print(*row, flush=True)

@@ -1,8 +1,8 @@
 """Stitching in a stream: what a frame takes, how long an answer waits, and whether memory grows.
 
-A person of 53 markers at 100 Hz in bursts (up to 5 markers hidden at a time for 5 to 60 frames, up
-to 3 ghosts, 0.3 mm of noise), frame by frame from Python: the method alone, and stitched. Memory is
-that of the process after a third of the stream and after all of it.
+A person of 53 markers at 100 Hz in bursts (up to 5 markers occluded at a time for 5 to 60 frames,
+up to 3 ghosts, 0.3 mm of noise), frame by frame from Python: the method alone, and stitched.
+Memory is that of the process after a third of the stream and after all of it.
 
     python benchmarks/stream.py [--frames N] [--markdown FILE]
 """

@@ -23,8 +23,8 @@ def main() -> None:
     live = state.live()
     for identity, gap, mean in zip(live["ids"], live["gaps"], live["means"], strict=True):
         x, y, z = mean[:, 0]
-        hidden = f", not seen for {gap} frames" if gap else ""
-        print(f"marker {identity} at ({x:.3f}, {y:.3f}, {z:.3f}) m{hidden}")
+        occluded = f", not seen for {gap} frames" if gap else ""
+        print(f"marker {identity} at ({x:.3f}, {y:.3f}, {z:.3f}) m{occluded}")
 
 
 if __name__ == "__main__":

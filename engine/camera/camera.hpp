@@ -12,7 +12,7 @@
 namespace asterism {
 
 // The names are those of `camera/projection.py`.
-enum class Reason : std::uint8_t { visible, absent, behind, near, far, lens, outside, hidden };
+enum class Reason : std::uint8_t { visible, absent, behind, near, far, lens, outside, occluded };
 
 struct Affine2 {
   double a, b, c, d, e, f;  // (a x + b y + c, d x + e y + f)

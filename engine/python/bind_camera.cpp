@@ -90,7 +90,7 @@ nb::tuple project(const std::vector<const Camera*>& cameras, const In<double>& p
     require(s->n_moments == 1 || s->n_moments == T, "surfaces: one moment or T");
   Owned<double> pixels(C * n * 2), depth(C * n);
   std::vector<Reason> reason(C * n);
-  std::vector<std::int32_t> hidden_by(C * n, -1);
+  std::vector<std::int32_t> occluded_by(C * n, -1);
   {
     nb::gil_scoped_release release;
     std::vector<Vec3> centers;
@@ -112,14 +112,14 @@ nb::tuple project(const std::vector<const Camera*>& cameras, const In<double>& p
           for (const Scene& scene : scenes)
             if (const Hit hit = scene.first_hit(centers[c], d, until); hit.owner >= 0) first.keep(hit.s, hit.owner);
           if (first.owner < 0) continue;
-          reason[c * n + k] = Reason::hidden;
-          hidden_by[c * n + k] = first.owner;
+          reason[c * n + k] = Reason::occluded;
+          occluded_by[c * n + k] = first.owner;
         }
     }
   }
   return nb::make_tuple(pixels.give({C, T, K, 2}), depth.give({C, T, K}),
                         array_of<std::uint8_t>(reason, {C, T, K}),
-                        array_of<std::int32_t>(hidden_by, {C, T, K}));
+                        array_of<std::int32_t>(occluded_by, {C, T, K}));
 }
 
 nb::tuple give_image(const RayGrid& grid, const auto& draw) {

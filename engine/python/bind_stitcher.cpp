@@ -215,7 +215,7 @@ void bind_stitcher(nb::module_& module) {
       .def("forget", &RigidCarrier::forget, "marker"_a);
   nb::class_<StitchOptions>(module, "StitchOptions")
       .def(nb::init<double, double, std::int64_t, std::int64_t, std::int64_t, bool>(),
-           nb::kw_only(), "noise"_a, "ghost_radius"_a, "confirm"_a, "max_gap"_a, "max_hidden"_a,
+           nb::kw_only(), "noise"_a, "ghost_radius"_a, "confirm"_a, "max_gap"_a, "max_occlusion"_a,
            "may_cut"_a);
   nb::class_<Stitcher>(module, "Stitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&>(), "motion"_a, "options"_a)

@@ -84,7 +84,7 @@ nb::list clusters(const TreeTracker<HypothesisMatrix>& tracker) {
 void bind_trees(nb::module_& module) {
   nb::class_<TreeStats, FrameStats>(module, "TreeStats")
       .def_ro("n_branches", &TreeStats::n_branches)
-      .def_ro("most_branches", &TreeStats::most_branches)
+      .def_ro("peak_branches", &TreeStats::peak_branches)
       .def_ro("n_cut", &TreeStats::n_cut)
       .def_ro("n_limited", &TreeStats::n_limited)
       .def_ro("n_shared", &TreeStats::n_shared)

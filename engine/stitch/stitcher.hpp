@@ -38,7 +38,7 @@ struct StitchOptions {
   double ghost_radius = 0;  // scale of the distance of a ghost from its marker
   std::int64_t confirm = 15;     // frames until a tracklet is decided
   std::int64_t max_gap = 0;      // missed frames after which a tracklet is over
-  std::int64_t max_hidden = 0;   // frames after which an occluded marker is removed; 0: never
+  std::int64_t max_occlusion = 0;   // frames after which an occluded marker is removed; 0: never
   bool may_cut = true;           // cut links that neighbours contradict
 };
 
@@ -322,9 +322,9 @@ class Stitcher {
         of_label_.erase(of);
       at = so_far_.tracklets.erase(at);
     }
-    if (opt_.max_hidden == 0) return;
+    if (opt_.max_occlusion == 0) return;
     for (auto at = markers_.begin(); at != markers_.end();) {
-      if (now() - at->second.last <= opt_.max_hidden) {
+      if (now() - at->second.last <= opt_.max_occlusion) {
         ++at;
         continue;
       }

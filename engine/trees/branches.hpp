@@ -26,7 +26,7 @@ inline constexpr int kMaxWindow = 16;
 struct TreeStats : FrameStats {
   // Branches at the end; largest number in a tree; cut by the χ² test; dropped by the limit on
   // their number.
-  std::int64_t n_branches = 0, most_branches = 0, n_cut = 0, n_limited = 0;
+  std::int64_t n_branches = 0, peak_branches = 0, n_cut = 0, n_limited = 0;
   std::int64_t n_shared = 0;  // detections that are the best choice of several trees
   std::int64_t n_beams = 0;   // groups that were not solved exactly
   double bound = 0, gap = 0;  // bounds of the error of their marginals and of their log posterior
@@ -45,7 +45,7 @@ struct TreeStats : FrameStats {
 
  private:
   void add_tree_work(const TreeStats& next) {
-    most_branches = std::max(most_branches, next.most_branches);
+    peak_branches = std::max(peak_branches, next.peak_branches);
     n_cut += next.n_cut;
     n_limited += next.n_limited;
     n_shared += next.n_shared;
@@ -353,7 +353,7 @@ class BranchGrower {
       }
       kept_.push_back(b);
     }
-    stats.most_branches = std::max(stats.most_branches, static_cast<std::int64_t>(kept_.size()));
+    stats.peak_branches = std::max(stats.peak_branches, static_cast<std::int64_t>(kept_.size()));
   }
 
   // Whether a more likely branch has the same detections in the last frames.

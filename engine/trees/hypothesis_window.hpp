@@ -71,7 +71,7 @@ struct HypothesisWindow : OpenWindow {
   }
   void count_branches(TreeStats& stats) const {
     for (std::size_t i = 0; i < n_all(); ++i)
-      stats.most_branches = std::max<std::int64_t>(stats.most_branches, tree(i).more.branches.size());
+      stats.peak_branches = std::max<std::int64_t>(stats.peak_branches, tree(i).more.branches.size());
   }
 
   // Initiates a tree at each detection of the newest frame.

@@ -85,7 +85,7 @@ class JointStats(FrameStats):
 
 class TreeStats(FrameStats):
     n_branches: Final[int]
-    most_branches: Final[int]
+    peak_branches: Final[int]
     n_cut: Final[int]
     n_limited: Final[int]
     n_shared: Final[int]
@@ -471,7 +471,7 @@ class StitchOptions:
         ghost_radius: float,
         confirm: int,
         max_gap: int,
-        max_hidden: int,
+        max_occlusion: int,
         may_cut: bool,
     ) -> None: ...
 

@@ -41,7 +41,7 @@ def test_reasons(point, reason, why):
     projection = camera(near=0.5, far=8.0).project(point)
     assert projection.reason == reason
     assert projection.visible == (reason == am.camera.Reason.VISIBLE)
-    assert projection.hidden_by == -1
+    assert projection.occluded_by == -1
     has_pixel = reason not in (am.camera.Reason.ABSENT, am.camera.Reason.BEHIND)
     assert np.isfinite(projection.pixels).all() == has_pixel
 
@@ -101,8 +101,8 @@ def test_moving_everything_changes_nothing(seed):
     a = one.project(points, surfaces)
     b = moved.project(points @ M[:3, :3].T + M[:3, 3], there)
     np.testing.assert_array_equal(a.reason, b.reason)
-    np.testing.assert_array_equal(a.hidden_by, b.hidden_by)
-    assert (a.reason == am.camera.Reason.HIDDEN).any()
+    np.testing.assert_array_equal(a.occluded_by, b.occluded_by)
+    assert (a.reason == am.camera.Reason.OCCLUDED).any()
     np.testing.assert_allclose(a.pixels, b.pixels, atol=1e-8)
 
 

@@ -43,14 +43,14 @@ def test_the_z_buffer_is_exact_at_the_centre_of_every_pixel(lens, seed):
     )
     far = c.project(c.center + 50 * rays, surfaces)
     # Edges pass by some pixel centres within the rounding of another way to the same number.
-    assert (far.hidden_by != image.surface[reached]).mean() < 1e-4
+    assert (far.occluded_by != image.surface[reached]).mean() < 1e-4
     met = np.isfinite(image.depth[reached])
     assert met.mean() > 0.1
     depth = image.depth[reached][met][:, None]
     just_before = c.project(c.center + (depth - 1e-3) * rays[met], surfaces)
     just_behind = c.project(c.center + (depth + 1e-3) * rays[met], surfaces)
-    assert (just_before.hidden_by != -1).mean() < 1e-4
-    assert (just_behind.hidden_by == -1).mean() < 1e-4
+    assert (just_before.occluded_by != -1).mean() < 1e-4
+    assert (just_behind.occluded_by == -1).mean() < 1e-4
     assert (image.surface[~reached] == -1).all()
 
 
@@ -60,9 +60,9 @@ def test_the_z_buffer_hides_points_as_rays_do_away_from_edges(lens):
     c, surfaces = camera(lens), scene_of(rng)
     image = c.depth_image(surfaces)
     projection = c.project(cloud(rng, 4000), surfaces)
-    exact = projection.reason == am.camera.Reason.HIDDEN
+    exact = projection.reason == am.camera.Reason.OCCLUDED
     # Away from edges: all pixels around are of one surface, whose depth hardly changes.
-    in_image = np.isin(projection.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN))
+    in_image = np.isin(projection.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.OCCLUDED))
     v, u = np.rint(projection.pixels[in_image][:, ::-1]).astype(int).T
     inner = (u > 0) & (v > 0) & (u < SIZE[0] - 1) & (v < SIZE[1] - 1)
     around = np.array(

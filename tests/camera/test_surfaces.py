@@ -23,13 +23,13 @@ def test_triangles_hide_as_the_oracle_says(seed):
     )
     as_mesh = c.project(points, [mesh])
     expected = np.array([first_triangle(c.center, p, corners) for p in points])
-    in_image = np.isin(as_polygons.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN))
+    in_image = np.isin(as_polygons.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.OCCLUDED))
     assert (expected[in_image] >= 0).any()
-    np.testing.assert_array_equal(as_polygons.hidden_by[in_image], expected[in_image])
+    np.testing.assert_array_equal(as_polygons.occluded_by[in_image], expected[in_image])
     np.testing.assert_array_equal(
-        as_polygons.reason == am.camera.Reason.HIDDEN, as_polygons.hidden_by >= 0
+        as_polygons.reason == am.camera.Reason.OCCLUDED, as_polygons.occluded_by >= 0
     )
-    np.testing.assert_array_equal(as_mesh.hidden_by[in_image], np.minimum(expected[in_image], 0))
+    np.testing.assert_array_equal(as_mesh.occluded_by[in_image], np.minimum(expected[in_image], 0))
 
 
 @pytest.mark.parametrize("far_away", [0.0, 1e3, 1e5])
@@ -43,8 +43,8 @@ def test_a_thousand_triangles_far_from_the_origin(far_away):
     c = am.Camera.look_at(stand, target, K=K, size_px=SIZE)
     found = c.project(points + shift, [am.camera.Polygon(corners=t + shift) for t in corners])
     expected = [first_triangle(c.center, p + shift, corners + shift) for p in points]
-    in_image = np.isin(found.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN))
-    np.testing.assert_array_equal(found.hidden_by[in_image], np.array(expected)[in_image])
+    in_image = np.isin(found.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.OCCLUDED))
+    np.testing.assert_array_equal(found.occluded_by[in_image], np.array(expected)[in_image])
 
 
 def star(n, rng):
@@ -67,10 +67,10 @@ def test_concave_polygons_hide_what_lies_within_their_outline(seed):
     points = c.center + 1.5 * (targets - c.center)
     found = c.project(points, [am.camera.Polygon(corners=corners)])
     inside = Outline(outline).contains_points(on_plane)
-    in_image = np.isin(found.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN))
-    np.testing.assert_array_equal((found.hidden_by == 0)[in_image], inside[in_image])
+    in_image = np.isin(found.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.OCCLUDED))
+    np.testing.assert_array_equal((found.occluded_by == 0)[in_image], inside[in_image])
     before = c.project(c.center + 0.9 * (targets - c.center), [am.camera.Polygon(corners=corners)])
-    assert (before.hidden_by == -1).all()
+    assert (before.occluded_by == -1).all()
 
 
 def test_a_polygon_in_the_shape_of_a_u_lets_points_through_its_gap():
@@ -79,7 +79,7 @@ def test_a_polygon_in_the_shape_of_a_u_lets_points_through_its_gap():
     behind = camera().project(
         [[0, 0.01, 1.5], [0.75, 0.01, 1.5], [0, 0.01, 0.25], [0.75, -0.01, 1.5]], [curtain]
     )
-    assert behind.hidden_by.tolist() == [-1, 0, 0, -1]
+    assert behind.occluded_by.tolist() == [-1, 0, 0, -1]
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -90,8 +90,8 @@ def test_capsules_hide_as_marching_says(seed):
     capsules.append(am.camera.Capsule(ends=np.tile(cloud(rng, 1), (2, 1)), radius=0.4))  # a ball
     points = cloud(rng, 60)
     found = c.project(points, capsules)
-    for p, who, reason in zip(points, found.hidden_by, found.reason, strict=True):
-        if reason not in (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN):
+    for p, who, reason in zip(points, found.occluded_by, found.reason, strict=True):
+        if reason not in (am.camera.Reason.VISIBLE, am.camera.Reason.OCCLUDED):
             continue
         entries = [
             capsule_entry(c.center, p - c.center, k.ends[0], k.radius, 1.0) for k in capsules
@@ -126,8 +126,8 @@ def test_no_ray_slips_through_the_seams_of_a_mesh():
     c = camera()
     for targets in (on_seams[inner], vertices[i[1:-1, 1:-1].ravel()]):
         found = c.project(c.center + 1.3 * (targets - c.center), [mesh])
-        seen = np.isin(found.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.HIDDEN))
-        assert (found.hidden_by[seen] == 0).all()
+        seen = np.isin(found.reason, (am.camera.Reason.VISIBLE, am.camera.Reason.OCCLUDED))
+        assert (found.occluded_by[seen] == 0).all()
 
 
 def test_surfaces_that_move_equal_those_that_stand_frame_by_frame():
@@ -153,11 +153,11 @@ def test_surfaces_that_move_equal_those_that_stand_frame_by_frame():
             am.camera.Capsule(ends=moving[3].ends[t], radius=0.2),
         ]
         alone = rig.project(points[t], standing)
-        np.testing.assert_array_equal(together.hidden_by[:, t], alone.hidden_by)
+        np.testing.assert_array_equal(together.occluded_by[:, t], alone.occluded_by)
         np.testing.assert_array_equal(together.reason[:, t], alone.reason)
         image = rig[0].depth_image(moving, moment=t)
         np.testing.assert_array_equal(image.surface, rig[0].depth_image(standing).surface)
-    assert set(np.unique(together.hidden_by)) == {-1, 0, 1, 2, 3}
+    assert set(np.unique(together.occluded_by)) == {-1, 0, 1, 2, 3}
 
 
 def test_of_two_surfaces_at_one_place_the_first_is_named():
@@ -167,9 +167,9 @@ def test_of_two_surfaces_at_one_place_the_first_is_named():
     others = [am.camera.Polygon(corners=t + np.array([0, 9, 0])) for t in triangles_of(rng, 20)]
     surfaces = [*others[:10], wall, wall, ball, ball, *others[10:], wall, ball]
     points = [[0.1, 0.5, 1], [0.0, 4, 1.0]]
-    assert camera().project(points, surfaces).hidden_by.tolist() == [10, 10]
+    assert camera().project(points, surfaces).occluded_by.tolist() == [10, 10]
     without = [s for s in surfaces if s is not wall]
-    assert camera().project(points, without).hidden_by.tolist() == [-1, 10]
+    assert camera().project(points, without).occluded_by.tolist() == [-1, 10]
     named = np.unique(camera().depth_image(surfaces).surface)
     assert not set(named) & {11, 13, 24, 25}
 
@@ -178,7 +178,7 @@ def test_a_surface_around_the_camera_hides_everything():
     c = camera()
     ball = am.camera.Capsule(ends=np.tile(c.center, (2, 1)), radius=0.1)
     found = c.project([[0, 0, 1], [0, 0.5, 1.2]], [ball])
-    assert (found.reason == am.camera.Reason.HIDDEN).all()
+    assert (found.reason == am.camera.Reason.OCCLUDED).all()
     image = c.depth_image([ball])
     np.testing.assert_array_equal(image.surface, 0)
     assert image.depth.min() > 0
@@ -193,8 +193,8 @@ def test_a_floor_that_passes_under_the_camera():
     np.testing.assert_array_equal(image.surface[~below][:-7], -1)
     row = SIZE[1] - 1
     np.testing.assert_allclose(image.depth[row], 300 / (row - K[1, 2]), rtol=1e-12)
-    hidden = c.project([[0, 2, -0.5], [0, 2, 0.5]], [floor])
-    assert hidden.hidden_by.tolist() == [0, -1]
+    occluded = c.project([[0, 2, -0.5], [0, 2, 0.5]], [floor])
+    assert occluded.occluded_by.tolist() == [0, -1]
 
 
 def test_edge_on_hides_nothing_and_both_sides_hide():
@@ -203,13 +203,13 @@ def test_edge_on_hides_nothing_and_both_sides_hide():
     assert c.project([[0.001, 0.5, 1], [-0.001, 0.5, 1]], [edge_on]).visible.all()
     corners = np.array([[-1, 0, 0], [1, 0, 0], [0, 0, 2.0]])
     for one in (corners, corners[::-1]):
-        assert c.project([0, 1, 1], [am.camera.Polygon(corners=one)]).hidden_by == 0
+        assert c.project([0, 1, 1], [am.camera.Polygon(corners=one)]).occluded_by == 0
 
 
 def test_clearance():
     wall = am.camera.Polygon(corners=[[-1, 0, 0], [1, 0, 0], [0, 0, 2.0]])
     just_behind = [0, 0.01, 1]
-    assert camera().project(just_behind, [wall]).hidden_by == 0
+    assert camera().project(just_behind, [wall]).occluded_by == 0
     assert camera().project(just_behind, [wall], clearance=0.02).visible
 
 

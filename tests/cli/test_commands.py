@@ -22,9 +22,9 @@ def test_bursts_of_missed_detections_are_made_and_estimated(scene, capsys):
     line = "corrupt p.csv -o a.csv --truth t.csv --missing 0.15 --corrupt missing_run=4"
     made = json.loads(run(f"{line} --noise 0.0003 --json", capsys))
     assert made["corruption"]["missing_run"] == 4.0
-    found = json.loads(run("estimate a.csv --runs --json", capsys))
+    found = json.loads(run("estimate a.csv --bursts --json", capsys))
     assert found["model"]["sensor"]["p_redetection"] == pytest.approx(0.25, abs=0.05)
-    run("estimate a.csv --runs -o runs.toml", capsys)
+    run("estimate a.csv --bursts -o runs.toml", capsys)
     run("track a.csv --method gnn --model runs.toml -o b.csv", capsys)
     assert "missing in (0, 1)" in refused(f"{line} --overwrite".replace("0.15", "0"), capsys)
 

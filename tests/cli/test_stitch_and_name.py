@@ -16,7 +16,7 @@ from tests.cli.runs import refused, run
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """A person of whom markers are hidden for a while, beside ghosts; and tracks of gnn alone."""
+    """A person of whom markers are occluded for a while, beside ghosts; and tracks of gnn alone."""
     folder = tmp_path_factory.mktemp("recorded")
     person, p, truth, alone = (
         str(folder / name) for name in ("person.csv", "p.c3d", "pt.c3d", "alone.c3d")

@@ -137,7 +137,7 @@ def test_bursts_of_missed_detections_are_distinguished_from_single_ones():
     quiet = am.simulate.SCENES["person"].make(activity="walk", frames=160, seed=seed)
     runs = {"missing": 0.15, "missing_run": 4.0, "noise": 3e-4, "clutter": 0.1, "seed": seed}
     d = am.simulate.corrupt(quiet, **runs).detections
-    found = am.estimate_model(d, misses="runs")
+    found = am.estimate_model(d, misses="bursts")
     sensor, stds = found.model.sensor, found.stds
     P_d = 1 - 0.15 / 0.85 / 4
     assert abs(sensor.p_detection - P_d) < 4 * stds["p_detection"]
@@ -149,7 +149,7 @@ def test_bursts_of_missed_detections_are_distinguished_from_single_ones():
     assert one.p_redetection is None
     assert one.p_detection == pytest.approx(0.85, abs=0.02)
     single = am.simulate.corrupt(quiet, **runs | {"missing_run": 0.0}).detections
-    found = am.estimate_model(single, misses="runs")
+    found = am.estimate_model(single, misses="bursts")
     assert found.model.sensor.p_redetection is None
     assert "no more bursts of missed detections than by chance" in str(found)
     assert found.model == am.estimate_model(single).model
@@ -166,23 +166,24 @@ def tracks_of(frames: list[list[tuple[float, int]]]) -> am.Tracks:
 
 def test_a_marker_that_was_lost_was_not_missed():
     moving = [[(0.1 * t, 0)] for t in range(12)]
-    hidden = [f if t not in (4, 5, 6, 9) else [] for t, f in enumerate(moving)]
-    assert count_sightings(tracks_of(hidden), 0.05) == Sightings(7 - 2, 2, 2, 2)
+    occluded = [f if t not in (4, 5, 6, 9) else [] for t, f in enumerate(moving)]
+    assert count_sightings(tracks_of(occluded), 0.05) == Sightings(7 - 2, 2, 2, 2)
     # What is there, near where it is expected, in no track: lost.
-    lost = [[(0.1 * t + 0.03, -1)] if t in (4, 5, 6) else f for t, f in enumerate(hidden)]
+    lost = [[(0.1 * t + 0.03, -1)] if t in (4, 5, 6) else f for t, f in enumerate(occluded)]
     assert count_sightings(tracks_of(lost), 0.05) == Sightings(7 - 1, 1, 1, 0)
-    far = [[(0.1 * t + 0.07, -1)] if t in (4, 5, 6) else f for t, f in enumerate(hidden)]
+    far = [[(0.1 * t + 0.07, -1)] if t in (4, 5, 6) else f for t, f in enumerate(occluded)]
     assert count_sightings(tracks_of(far), 0.05) == Sightings(7 - 2, 2, 2, 2)
-    # In a track that begins within the gap and goes on: lost. In one that was there: hidden.
+    # In a track that begins within the gap and goes on: lost. In one that was there: occluded.
     begun = [
-        [*f, (0.1 * t + (0.03 if t < 7 else 0.5), 1)] if t >= 4 else f for t, f in enumerate(hidden)
+        [*f, (0.1 * t + (0.03 if t < 7 else 0.5), 1)] if t >= 4 else f
+        for t, f in enumerate(occluded)
     ]
     assert count_sightings(tracks_of(begun), 0.05).misses == 1
-    old = [[*f, (0.1 * t + (0.03 if t in (4, 5, 6) else 0.5), 1)] for t, f in enumerate(hidden)]
+    old = [[*f, (0.1 * t + (0.03 if t in (4, 5, 6) else 0.5), 1)] for t, f in enumerate(occluded)]
     assert count_sightings(tracks_of(old), 0.05).misses == 2
     # The same seen backwards: a track that ends within the gap, near where the marker comes from.
     ended = [
         [*f, (0.1 * t + (0.5 if t < 4 else 0.03 if t == 6 else 0.3), 1)] if t < 7 else f
-        for t, f in enumerate(hidden)
+        for t, f in enumerate(occluded)
     ]
     assert count_sightings(tracks_of(ended), 0.05).misses == 1

@@ -14,7 +14,7 @@ MODEL = am.TrackingModel(
 )
 
 
-def hidden_at(truth, *spans):
+def occluded_at(truth, *spans):
     """Hide a marker in some frames; give the tracks that are left."""
     positions = truth.positions()
     for k, first, last in spans:

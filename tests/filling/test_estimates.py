@@ -23,7 +23,7 @@ from asterism.tracking.filling.scores import (
 )
 from asterism.tracking.filling.spans import Span, find_gaps, held_out, n_apart, usable_ends
 from asterism.tracking.rigidity.distances import distances_from
-from tests.filling.fills import MODEL, hidden_at, rigid
+from tests.filling.fills import MODEL, occluded_at, rigid
 
 
 @settings(max_examples=60, deadline=None)
@@ -177,7 +177,7 @@ def test_fills_do_not_use_the_points_left_out(monkeypatch):
     truth = rigid(frames=120, noise=1e-4)
     take = estimates.DenseTracks(
         times=truth.detections.times,
-        positions=hidden_at(truth, (0, 60, 60), (0, 40, 40), (3, 80, 84)).positions(),
+        positions=occluded_at(truth, (0, 60, 60), (0, 40, 40), (3, 80, 84)).positions(),
         model=MODEL,
     )
     assert np.isfinite(take.smoothed[60, 0]).all()
@@ -193,7 +193,7 @@ def test_smoothed_positions_are_no_truth(monkeypatch):
     """Neither an error nor the way through the gap is measured where a marker was smoothed."""
     truth = rigid(frames=90, noise=1e-4)
     holes = [(0, t, t) for t in (20, 40)]
-    positions = hidden_at(truth, (0, 60, 66), *holes).positions()
+    positions = occluded_at(truth, (0, 60, 66), *holes).positions()
     take = estimates.DenseTracks(times=truth.detections.times, positions=positions, model=MODEL)
     seen_by_carried = []
     carried = estimates.carried_estimate
@@ -208,8 +208,8 @@ def test_smoothed_positions_are_no_truth(monkeypatch):
     own = take.seen[found.windows, 0]
     assert not own.all()  # some windows have a hole
     for there, is_end in seen_by_carried:
-        hidden = np.isfinite(there[:-1, ~is_end]).all(axis=2)
-        np.testing.assert_array_equal(hidden, own[:, ~is_end])
+        occluded = np.isfinite(there[:-1, ~is_end]).all(axis=2)
+        np.testing.assert_array_equal(occluded, own[:, ~is_end])
         assert np.isfinite(there[:, is_end]).all()
     np.testing.assert_array_equal(np.isfinite(found.truth).all(axis=2), own[:, ~is_end])
     assert all(np.isfinite(one.values).all() for one in found.each)

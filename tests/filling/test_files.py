@@ -13,7 +13,7 @@ import asterism as am
 from asterism.io.captures.c3d_layout import read_c3d
 from asterism.simulate import Burst
 from tests.cli.runs import refused, run
-from tests.filling.fills import MODEL, hidden_at, rigid
+from tests.filling.fills import MODEL, occluded_at, rigid
 
 
 def test_flags_are_checked():
@@ -58,7 +58,7 @@ def test_files_give_back_the_flags(made, form, tmp_path):
 
 @pytest.mark.parametrize("known", [False, True])
 def test_c3d_has_residual_0_for_filled_points_alone(tmp_path, known):
-    tracks = hidden_at(rigid(), (2, 100, 110))
+    tracks = occluded_at(rigid(), (2, 100, 110))
     if known:
         residuals = np.linspace(0, 2e-3, tracks.detections.n_points)
         cameras = np.full(tracks.detections.n_points, 5)

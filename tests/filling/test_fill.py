@@ -12,7 +12,7 @@ import asterism as am
 from asterism.simulate import Burst
 from asterism.tracking.filling.ends import is_steady
 from asterism.tracking.filling.spans import Span
-from tests.filling.fills import MODEL, hidden_at, rigid
+from tests.filling.fills import MODEL, occluded_at, rigid
 from tests.paths import DATA
 
 
@@ -29,7 +29,7 @@ def errors(filling, truth):
 @pytest.mark.parametrize("n_markers", [4, 6])  # three neighbours are flat, and easily mirrored
 def test_a_rigid_body_carries_its_marker_exactly(n_axes, length, n_markers):
     truth = rigid(n_markers, n_axes=n_axes)
-    filling = am.fill_gaps(hidden_at(truth, (2, 100, 99 + length)), model=MODEL)
+    filling = am.fill_gaps(occluded_at(truth, (2, 100, 99 + length)), model=MODEL)
     e, std = errors(filling, truth)
     assert len(e) == length
     assert np.abs(e).max() < 1e-9
@@ -43,14 +43,14 @@ def test_irregular_times():
     rng = np.random.default_rng(3)
     times = np.cumsum(rng.uniform(0.006, 0.014, 300))
     truth = rigid(times=times, noise=1e-4)
-    filling = am.fill_gaps(hidden_at(truth, (2, 100, 130)), model=MODEL)
+    filling = am.fill_gaps(occluded_at(truth, (2, 100, 130)), model=MODEL)
     e, _ = errors(filling, truth)
     assert np.sqrt((e**2).sum(axis=1).mean()) < 1e-3
 
 
 def test_a_capture_too_short_to_try_says_so():
     truth = rigid(frames=60)
-    filling = am.fill_gaps(hidden_at(truth, (2, 15, 44)), model=MODEL)
+    filling = am.fill_gaps(occluded_at(truth, (2, 15, 44)), model=MODEL)
     (gap,) = filling.gaps
     assert gap.n_windows == 0
     assert gap.rms == {}
@@ -62,7 +62,7 @@ def test_a_capture_too_short_to_try_says_so():
 @pytest.mark.parametrize("n_markers", [1, 2, 3])
 def test_few_neighbours_or_none(n_markers):
     truth = rigid(n_markers, noise=1e-4)
-    filling = am.fill_gaps(hidden_at(truth, (0, 100, 109)), model=MODEL)
+    filling = am.fill_gaps(occluded_at(truth, (0, 100, 109)), model=MODEL)
     (gap,) = filling.gaps
     assert gap.is_filled
     assert gap.n_neighbours == n_markers - 1
@@ -74,7 +74,7 @@ def test_few_neighbours_or_none(n_markers):
 def test_fills_meet_their_ends_without_a_kink():
     truth = am.simulate.person(seed=2)
     spans = [(k, 60 + 3 * k, 60 + 3 * k + 25) for k in range(0, 50, 7)]
-    filled = am.fill_gaps(hidden_at(truth, *spans), model=MODEL).tracks.positions()
+    filled = am.fill_gaps(occluded_at(truth, *spans), model=MODEL).tracks.positions()
     whole = truth.positions()
     for k, first, last in spans:
         off = filled[first : last + 1, k] - whole[first : last + 1, k]
@@ -90,7 +90,7 @@ def test_fills_meet_their_ends_without_a_kink():
 
 def test_std_is_small_at_the_ends():
     truth = am.simulate.person(seed=3)
-    d = am.fill_gaps(hidden_at(truth, (8, 120, 160)), model=MODEL).tracks.detections
+    d = am.fill_gaps(occluded_at(truth, (8, 120, 160)), model=MODEL).tracks.detections
     std = d.stds[d.filled]
     assert std[[0, -1]].max() < std[10:-10].min()
 
@@ -110,7 +110,9 @@ def test_nothing_measured_is_changed():
 
 def test_only_gaps_with_two_ends_that_are_not_too_long():
     truth = rigid(frames=400)
-    tracks = hidden_at(truth, (0, 0, 20), (1, 380, 399), (2, 100, 148), (2, 200, 249), (3, 50, 350))
+    tracks = occluded_at(
+        truth, (0, 0, 20), (1, 380, 399), (2, 100, 148), (2, 200, 249), (3, 50, 350)
+    )
     filling = am.fill_gaps(tracks, model=MODEL, longest=0.5)
     assert [(g.track, g.first, g.last, g.is_filled) for g in filling.gaps] == [
         (2, 100, 148, True), (2, 200, 249, False), (3, 50, 350, False),
@@ -125,7 +127,7 @@ def test_only_gaps_with_two_ends_that_are_not_too_long():
 
 def test_a_marker_that_flickers_before_it_is_lost():
     truth = rigid(8, noise=1e-4)
-    tracks = hidden_at(truth, (2, 100, 120))
+    tracks = occluded_at(truth, (2, 100, 120))
     positions = tracks.positions()
     positions[97:100, 2] += [0.03, -0.02, 0.03]
     positions[121, 2] += [0.0, 0.04, 0.0]
@@ -152,7 +154,7 @@ def test_the_same_input_gives_the_same():
 @pytest.mark.parametrize("turn", [0, 1])
 def test_where_the_room_is_does_not_matter(turn):
     truth = am.simulate.corrupt(am.simulate.person(seed=6), noise=3e-4, seed=1)
-    tracks = hidden_at(truth, (11, 100, 130))
+    tracks = occluded_at(truth, (11, 100, 130))
     R = Rotation.from_euler("xyz", [0.3, 0.2, 1.0]).as_matrix() if turn else np.eye(3)
     moved = am.Tracks.from_dense(truth.detections.times, tracks.positions() @ R.T + [3, -2, 1.0])
     one, two = (am.fill_gaps(t, model=MODEL).tracks for t in (tracks, moved))
@@ -172,7 +174,7 @@ def people_filled():
             (int(k), int(a), int(a + rng.integers(5, 60)))
             for k, a in zip(rng.permutation(53)[:8], rng.integers(30, 500, 8), strict=True)
         ]
-        filling = am.fill_gaps(hidden_at(noisy, *spans), model=MODEL)
+        filling = am.fill_gaps(occluded_at(noisy, *spans), model=MODEL)
         assert all(gap.n_windows for gap in filling.gaps)
         one, its = errors(filling, noisy)
         e.append(one)
@@ -204,7 +206,7 @@ def test_points_missing_at_random_are_tried_too(missing, tried):
 
 
 def test_confidence_of_a_fill_is_that_of_its_ends():
-    truth = hidden_at(rigid(), (2, 100, 110))
+    truth = occluded_at(rigid(), (2, 100, 110))
     d = truth.detections
     confidence = np.full(d.n_points, 0.9)
     confidence[(d.frame_of == 111) & (truth.labels == 2)] = 0.4
@@ -248,7 +250,7 @@ def test_real_captures(name):
     (path,) = DATA.rglob(name)
     truth = am.simulate.corrupt(am.read(path).tracks)
     spans = [(k, 60 + 8 * k, 60 + 8 * k + 39) for k in range(1, 31, 3)]
-    filling = am.fill_gaps(hidden_at(truth, *spans), model=MODEL)
+    filling = am.fill_gaps(occluded_at(truth, *spans), model=MODEL)
     e, std = errors(filling, truth)
     # Splines through the same ends are off by 5 to 50 mm.
     assert np.median(np.linalg.norm(e, axis=1)) < 1.5e-3

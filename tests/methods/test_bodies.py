@@ -273,7 +273,7 @@ def test_a_stream_is_the_whole_capture_and_a_state_is_a_value(make):
 @pytest.mark.parametrize("make", [am.SMP, am.TrackSplitting, am.TOMHT, am.MHT])
 def test_a_window_beyond_the_longest_gap_carries_too(make):
     # What is learnt of decided frames alone ends before the gap begins: were a marker carried only
-    # once it is known there as hidden, its track would be over by then.
+    # once it is known there as occluded, its track would be over by then.
     rng = np.random.default_rng(12)
     _, seen = turning(rng, 150, 3, speed=0.3)
     frames = [points[1:] if 100 <= t < 130 else points for t, points in enumerate(seen)]

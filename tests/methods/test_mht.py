@@ -166,7 +166,7 @@ def test_what_is_left_out_is_reported():
     )
     assert few.info["limited"] > many.info["limited"]
     assert few.info["most_hypotheses"] == 3
-    assert few.info["most_dropped_odds"] > many.info["most_dropped_odds"]
+    assert few.info["max_dropped_odds"] > many.info["max_dropped_odds"]
     assert am.log_posterior(few, model) < am.log_posterior(many, model)
 
 

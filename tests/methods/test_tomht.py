@@ -229,7 +229,7 @@ def test_clutter_adds_no_room_for_branches():
     tracks = am.track(truth.detections, method, model=model)
     assert tracks.info["dropped_branches"] > 0
     assert tracks.info["largest_group"] > 50
-    assert tracks.info["most_branches"] <= 100 * 25 + tracks.info["largest_group"]
+    assert tracks.info["peak_branches"] <= 100 * 25 + tracks.info["largest_group"]
 
 
 def test_the_most_probable_partition_is_found_where_no_option_excludes_it():

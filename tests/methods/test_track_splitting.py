@@ -336,12 +336,12 @@ def test_confidence_is_calibrated_where_the_model_is_right():
 def test_limits_on_branches_are_kept_and_reported():
     d, model = crowd(3, spread=0.05).detections, crowd_model()
     few = am.track(d, am.TrackSplitting(max_branches=2, window=6), model=model)
-    assert few.info["most_branches"] == 2
+    assert few.info["peak_branches"] == 2
     assert few.info["dropped_branches"] > 0
     many = am.track(d, am.TrackSplitting(max_branches=200, window=6), model=model)
     assert many.info["dropped_branches"] == 0
     merged = am.track(d, am.TrackSplitting(max_branches=200, window=6, merge_last=1), model=model)
-    assert merged.info["most_branches"] < many.info["most_branches"]
+    assert merged.info["peak_branches"] < many.info["peak_branches"]
 
 
 def test_options_are_checked():

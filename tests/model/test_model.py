@@ -25,11 +25,11 @@ ONE = [[0.0, 0.0, 0.0]]
 def test_dense_positions_come_back(positions):
     times = np.arange(len(positions)) * 0.1
     tracks = am.Tracks.from_dense(times, positions)
-    hidden = np.isnan(positions).any(axis=2)
-    expected = np.where(hidden[..., None], np.nan, positions)
+    occluded = np.isnan(positions).any(axis=2)
+    expected = np.where(occluded[..., None], np.nan, positions)
     assert np.array_equal(tracks.positions(), expected, equal_nan=True)
-    assert tracks.detections.n_points == (~hidden).sum()
-    assert [len(points) for _, points in tracks.detections] == (~hidden).sum(axis=1).tolist()
+    assert tracks.detections.n_points == (~occluded).sum()
+    assert [len(points) for _, points in tracks.detections] == (~occluded).sum(axis=1).tolist()
 
 
 def test_frames_come_back():

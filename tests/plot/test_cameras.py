@@ -18,7 +18,7 @@ from asterism.plot.style import CYCLE
 
 K = am.camera.intrinsics(focal_length=900, principal_point=(639.5, 511.5))
 WALL = am.camera.Polygon(corners=[[0.5, 0, 0], [0.5, 0, 2], [2, 0, 2], [2, 0, 0]], name="wall")
-# Seen, seen, hidden by the wall, beside the image, behind the camera, absent.
+# Seen, seen, occluded by the wall, beside the image, behind the camera, absent.
 POINTS = np.array(
     [[0, 1, 1], [-0.5, 1, 1.5], [1, 1, 1], [9, 1, 1], [0, -9, 1], [np.nan] * 3], dtype=float
 )
@@ -43,12 +43,12 @@ def dots_of(axes, kind=PathCollection):
 def test_points_are_drawn_where_the_camera_sees_them(lens):
     camera, projection = filmed(lens, name="left")
     axes = plot_image(camera, projection)
-    seen, hidden = dots_of(axes)
+    seen, occluded = dots_of(axes)
     np.testing.assert_array_equal(seen.get_offsets(), projection.pixels[:2])
-    np.testing.assert_array_equal(hidden.get_offsets(), projection.pixels[2:3])
+    np.testing.assert_array_equal(occluded.get_offsets(), projection.pixels[2:3])
     assert [to_hex(c) for c in seen.get_facecolors()] == [c.lower() for c in CYCLE[:2]]
-    assert [to_hex(c) for c in hidden.get_facecolors()] == ["#ffffff"]
-    assert [to_hex(c) for c in hidden.get_edgecolors()] == [CYCLE[2].lower()]
+    assert [to_hex(c) for c in occluded.get_facecolors()] == ["#ffffff"]
+    assert [to_hex(c) for c in occluded.get_edgecolors()] == [CYCLE[2].lower()]
     title = axes.get_title(loc="left")
     assert title == "left: 2 seen, 1 occluded, 1 outside, 1 behind, 1 absent"
 
@@ -75,7 +75,7 @@ def test_the_connection_matrix_says_which_lines_and_in_which_colour():
     whole, broken = (c for c in axes.collections if isinstance(c, LineCollection))
     p = projection.pixels
     np.testing.assert_array_equal(whole.get_segments(), [[p[0], p[1]]])
-    np.testing.assert_array_equal(broken.get_segments(), [[p[1], p[2]]])  # to the hidden one
+    np.testing.assert_array_equal(broken.get_segments(), [[p[1], p[2]]])  # to the occluded one
     assert to_hex(whole.get_colors()[0]) == CYCLE[0].lower()
     assert to_hex(broken.get_colors()[0]) == CYCLE[1].lower()
     assert whole.get_linestyles()[0][1] is None
@@ -100,9 +100,9 @@ def test_colours_and_names_go_with_their_points():
     colours = ["red", "#00ff00", (0.0, 0.0, 1.0), "k", "k", "k"]
     names = ("A", None, "C$", "D", "E", "F")
     axes = plot_image(camera, projection, colours=colours, names=names)
-    seen, hidden = dots_of(axes)
+    seen, occluded = dots_of(axes)
     assert [to_hex(c) for c in seen.get_facecolors()] == ["#ff0000", "#00ff00"]
-    assert to_hex(hidden.get_edgecolors()[0]) == "#0000ff"
+    assert to_hex(occluded.get_edgecolors()[0]) == "#0000ff"
     assert {t.get_text(): t.xy for t in axes.texts} == {
         "A": pytest.approx(projection.pixels[0]),
         "C$": pytest.approx(projection.pixels[2]),

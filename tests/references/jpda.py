@@ -201,10 +201,10 @@ def jpda_by_hand(detections: am.Detections, method: am.JPDA, model: am.TrackingM
         for i, track in enumerate(tracks):
             as_if = track.sure(method, confirm)
             r = sigmoid(as_if)
-            hidden = beta[i, m] * r * (1 - p_seen[i]) / (1 - r * p_seen[i])
-            after = 1 - beta[i, m] + hidden
+            occluded = beta[i, m] * r * (1 - p_seen[i]) / (1 - r * p_seen[i])
+            after = 1 - beta[i, m] + occluded
             gone = beta[i, m] * (1 - r) / (1 - r * p_seen[i])
-            track.missed = hidden / after
+            track.missed = occluded / after
             track.score += min(math.log(after) - math.log(max(gone, 1e-300)) - as_if, 700)
             j = match[i]
             if j < 0:

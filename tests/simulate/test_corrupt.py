@@ -134,16 +134,16 @@ def test_noise_has_the_stated_size_on_each_axis():
 
 def test_bursts_hide_at_most_n_for_the_stated_time():
     truth = smooth(n_markers=200, frames=6000)
-    is_hidden = ~detected(corrupt(truth, burst=Burst(n=5, shortest=5, longest=60), seed=2))
-    at_once = is_hidden.sum(axis=1)
+    is_occluded = ~detected(corrupt(truth, burst=Burst(n=5, shortest=5, longest=60), seed=2))
+    at_once = is_occluded.sum(axis=1)
     assert at_once.max() == 5
     assert abs(at_once.mean() - 2.5) < 0.3
-    lengths = np.concatenate([_runs(is_hidden[:, k]) for k in range(200)])
+    lengths = np.concatenate([_runs(is_occluded[:, k]) for k in range(200)])
     assert lengths.min() >= 5
     # Two shadows may meet on a marker, so a few runs are longer; most are drawn evenly.
     assert np.quantile(lengths, 0.97) <= 60
     assert abs(np.median(lengths) - 32.5) < 4
-    assert (is_hidden.any(axis=0)).mean() > 0.9  # any marker may be the one
+    assert (is_occluded.any(axis=0)).mean() > 0.9  # any marker may be the one
 
 
 def test_ghosts_are_few_short_and_near():

@@ -177,7 +177,7 @@ def test_a_late_camera_sees_where_the_markers_will_be():
 def test_markers_are_occluded_by_the_scenes_own_surfaces():
     wall = Polygon(corners=[[-9, -1, -9], [9, -1, -9], [9, -1, 9], [-9, -1, 9]])
     truth = Truth(**vars(still([0, 0, 0], frames=3)) | {"surfaces": (wall,)})
-    assert (film(truth, one_camera()).projection.reason == Reason.HIDDEN).all()
+    assert (film(truth, one_camera()).projection.reason == Reason.OCCLUDED).all()
     assert film(truth, one_camera(), ()).observations.n_points == 3
 
 

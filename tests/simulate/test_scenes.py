@@ -77,7 +77,7 @@ def test_every_scene_can_be_filmed(name):
     middle, size = places.mean(axis=0), np.ptp(places, axis=0).max() + 1.0
     rig = am.Rig.ring(3, radius=3 * size, height=middle[2] + size, target=middle)
     shot = film(truth, rig)
-    assert (shot.projection.reason <= am.camera.Reason.HIDDEN).all()
+    assert (shot.projection.reason <= am.camera.Reason.OCCLUDED).all()
     assert shot.observations.n_points > 0
     assert all(s.n_moments in (1, 3) for s in truth.surfaces)
 

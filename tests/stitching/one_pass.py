@@ -19,7 +19,7 @@ MODEL = am.TrackingModel(
     population=am.Population(birth_density=0.1, p_disappear=0.001, max_speed=5, max_gap=4),
 )
 BODY = np.random.default_rng(1).uniform(-0.4, 0.4, (8, 3))
-PLACE = np.array([0.05, 0.02, 0.1])  # of the marker that is hidden
+PLACE = np.array([0.05, 0.02, 0.1])  # of the marker that is occluded
 WEIGHT = 0.25
 
 
@@ -37,12 +37,12 @@ class Found:
         return float(np.log(self.probability[k] / (1 - self.probability[k])))
 
 
-def one_pass(dense, *, advice=(), model=MODEL, confirm=15, max_hidden=None, may_cut=True):
+def one_pass(dense, *, advice=(), model=MODEL, confirm=15, max_occlusion=None, may_cut=True):
     """Stitch forward once; each column of (frames, labels, 3) is a label, and begins in order."""
     take = am.Tracks.from_dense(np.arange(len(dense)) / 100, dense)
     d = take.detections
     motion = motion_model(model, dense.shape[2])
-    options = stitch_options(model, confirm, 0.03, max_hidden, may_cut)
+    options = stitch_options(model, confirm, 0.03, max_occlusion, may_cut)
     stitcher = _engine.Stitcher(motion, options)
     if len(advice):
         of, before, weights = zip(*advice, strict=True)

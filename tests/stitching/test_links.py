@@ -89,8 +89,8 @@ def test_a_link_is_not_cut_where_the_steady_know_it():
 def test_a_marker_occluded_for_too_long_is_forgotten():
     dense = scene((0, 60, PLACE), (200, 299, PLACE))
     # It must still be known when its fragment is decided upon.
-    assert one_pass(dense, max_hidden=153).marker[9] == 8
-    assert one_pass(dense, max_hidden=152).marker[9] == 9
+    assert one_pass(dense, max_occlusion=153).marker[9] == 8
+    assert one_pass(dense, max_occlusion=152).marker[9] == 9
 
 
 def test_where_there_is_no_body_a_marker_goes_on_as_it_moved():

@@ -134,7 +134,7 @@ def test_points_on_a_line_go_where_they_are(seed):
 
 
 def carried_density(dense, then, now, y):
-    """Log density of y where 8 is carried from a frame, hidden since frame 61."""
+    """Log density of y where 8 is carried from a frame, occluded since frame 61."""
     by_hand = BodyByHand(3, NOISE, learnt_from=15, bonds_only=False)  # since all are known
     for points in dense[:61]:
         by_hand.see(range(9), points[:9])
@@ -230,8 +230,8 @@ def test_fragments_take_what_fits_all_of_them_best():
 
 def test_rivals_share_the_probability():
     up, right = np.array([0, 0.001, 0]), np.array([0.001, 0, 0])
-    hidden = [(0, 60, PLACE + right), (0, 60, PLACE - right)]
-    found = one_pass(scene(*hidden, (200, 299, PLACE + up), (200, 299, PLACE - up)))
+    occluded = [(0, 60, PLACE + right), (0, 60, PLACE - right)]
+    found = one_pass(scene(*occluded, (200, 299, PLACE + up), (200, 299, PLACE - up)))
     assert sorted(found.after[10:]) == [8, 9]
     # This one as that marker, as the other, and the rival as that one are equally probable.
     assert found.probability[10] == pytest.approx(1 / 3, abs=0.01)
@@ -260,8 +260,8 @@ def test_what_is_over_in_the_last_frame_may_still_be_gone_on_with():
 
 
 def test_who_is_around_a_marker_that_came_back_is_remembered_anew():
-    # One half is away when the marker is first hidden, the other half when it comes back again. In
-    # between it is seen last in the very frame in which it is known.
+    # One half is away when the marker is first occluded, the other half when it comes back again.
+    # In between it is seen last in the very frame in which it is known.
     half = [(0, 40, BODY[k]) for k in range(4)]
     back = [(70, 299, BODY[k]) for k in range(4)]
     own = (0, 60, PLACE), (100, 114, PLACE), (250, 299, PLACE)

@@ -151,8 +151,8 @@ def test_where_neighbours_predict_no_marker_motion_decides():
     found: list[float] = []
     for seed in range(4):
         made = am.simulate.smooth(seed=seed)
-        hidden = Burst(n=4, shortest=5, longest=12)
-        truth = am.simulate.corrupt(made, burst=hidden, noise=0.005, seed=seed)
+        occluded = Burst(n=4, shortest=5, longest=12)
+        truth = am.simulate.corrupt(made, burst=occluded, noise=0.005, seed=seed)
         found.append(am.evaluate(stitched(truth.detections).tracks, truth).idf1)
     assert np.mean(found) > 0.99  # 0.987 where the bodies always decide
 
@@ -263,7 +263,7 @@ def test_little_or_nothing(n_frames):
 
 def test_a_marker_that_is_forgotten_is_new():
     truth, model, remembered = person(6)
-    forgotten = stitched(truth.detections, model=model, max_hidden=30)
+    forgotten = stitched(truth.detections, model=model, max_occlusion=30)
     longest = max(join.first - join.last for join in forgotten.joins)
     assert longest <= 30 + 15
     assert forgotten.tracks.n_tracks > remembered.tracks.n_tracks
@@ -275,7 +275,7 @@ def test_a_marker_that_is_forgotten_is_new():
         ({"confirm": 1}, "confirm"),
         ({"confirm": 2.5}, "confirm"),
         ({"ghost_radius": 0}, "ghost_radius"),
-        ({"max_hidden": 0}, "max_hidden"),
+        ({"max_occlusion": 0}, "max_occlusion"),
     ],
 )
 def test_options_are_checked(wrong, text):

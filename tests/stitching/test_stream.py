@@ -143,7 +143,7 @@ def test_empty_frames_and_two_axes():
 def test_an_endless_run_remembers_what_it_may():
     rng = np.random.default_rng(3)
     _, model = disturbed(0)
-    method = am.tracking.Stitched(max_hidden=50, confirm=3)
+    method = am.tracking.Stitched(max_occlusion=50, confirm=3)
     state = method.init(model)
     place = np.zeros(3)
     for t in range(sized(1500, 300)):
@@ -160,7 +160,7 @@ def test_an_endless_run_remembers_what_it_may():
         ({"method": "smp"}, "method"),
         ({"lag": -1}, "lag"),
         ({"confirm": 1}, "confirm"),
-        ({"max_hidden": 0}, "max_hidden"),
+        ({"max_occlusion": 0}, "max_occlusion"),
         ({"ghost_radius": float("nan")}, "ghost_radius"),
     ],
 )

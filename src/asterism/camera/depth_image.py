@@ -62,7 +62,7 @@ class DepthImage:
         ndarray of bool, shape (...)
             True for occluded points; False for points outside the image.
         """
-        in_image = np.isin(projection.reason, (Reason.VISIBLE, Reason.HIDDEN))
+        in_image = np.isin(projection.reason, (Reason.VISIBLE, Reason.OCCLUDED))
         h, w = self.depth.shape
         u, v = np.where(in_image[..., None], np.rint(np.nan_to_num(projection.pixels)), 0.0).T
         i = np.clip(v.T.astype(np.int64), 0, h - 1), np.clip(u.T.astype(np.int64), 0, w - 1)

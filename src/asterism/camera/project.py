@@ -55,7 +55,7 @@ def project_points(
     compiled = compile_surfaces(surfaces, n_frames) if len(surfaces) else []
     if not p.size:
         n_frames, compiled = 1, []
-    pixels, depth, reason, hidden_by = _engine.project(
+    pixels, depth, reason, occluded_by = _engine.project(
         cameras=cameras,
         points=p.reshape(n_frames, -1, 3),
         surfaces=compiled,
@@ -66,7 +66,7 @@ def project_points(
         pixels=pixels.reshape(C, *shape, 2),
         depth=depth.reshape(C, *shape),
         reason=reason.reshape(C, *shape),
-        hidden_by=hidden_by.reshape(C, *shape),
+        occluded_by=occluded_by.reshape(C, *shape),
     )
 
 

@@ -40,7 +40,7 @@ class Reason(IntEnum):
     """The point is beyond the domain of the lens model."""
     OUTSIDE = 6
     """The point is outside the image."""
-    HIDDEN = 7
+    OCCLUDED = 7
     """The point is occluded by a surface."""
 
 
@@ -60,7 +60,7 @@ class Projection:
         Distance along the optical axis, metres.
     reason : ndarray of uint8, shape (...)
         `Reason` of each point.
-    hidden_by : ndarray of int32, shape (...)
+    occluded_by : ndarray of int32, shape (...)
         Number of the occluding surface nearest to the camera, -1 without one.
 
     Examples
@@ -80,7 +80,7 @@ class Projection:
     pixels: NDArray[np.float64]
     depth: NDArray[np.float64]
     reason: NDArray[np.uint8]
-    hidden_by: NDArray[np.int32]
+    occluded_by: NDArray[np.int32]
 
     def __repr__(self) -> str:
         n = int(self.visible.sum())
@@ -101,5 +101,5 @@ class Projection:
             pixels=self.pixels[key],
             depth=self.depth[key],
             reason=self.reason[key],
-            hidden_by=self.hidden_by[key],
+            occluded_by=self.occluded_by[key],
         )

@@ -41,7 +41,7 @@ class Summary:
     log_posterior : float or None
         Log posterior of the tracks, in nats above that of “everything is clutter”. Larger is
         better under the same model. None if the model gives a track probability zero.
-    n_doubtful : int or None
+    n_uncertain : int or None
         Number of detections with a confidence below `UNCERTAIN`; None without a confidence.
     info : dict
         Figures of the method, such as the error of approximations.
@@ -62,7 +62,7 @@ class Summary:
     seconds: float
     frames_per_second: float
     log_posterior: float | None
-    n_doubtful: int | None
+    n_uncertain: int | None
     info: dict[str, float]
     truncated: str = ""
 
@@ -94,8 +94,8 @@ class Summary:
 
     def _certainty(self) -> list[tuple[str, str]]:
         rows: list[tuple[str, str]] = []
-        if self.n_doubtful is not None:
-            rows.append((f"confidence below {UNCERTAIN:.0%}", f"{self.n_doubtful} labels"))
+        if self.n_uncertain is not None:
+            rows.append((f"confidence below {UNCERTAIN:.0%}", f"{self.n_uncertain} labels"))
         if self.info.get("bound", 0) > 0:
             groups = f"{self.info['approximate_groups']:.0f} groups too large for the exact sum"
             text = f"{groups}; error of their probabilities at most {self.info['bound']:.2g}"
@@ -163,7 +163,7 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
         seconds=seconds,
         frames_per_second=d.n_frames / seconds if seconds else 0.0,
         log_posterior=log_posterior if math.isfinite(log_posterior) else None,
-        n_doubtful=None
+        n_uncertain=None
         if tracks.confidence is None
         else int((tracks.confidence[order] < UNCERTAIN).sum()),
         info=info,

@@ -25,7 +25,7 @@ __all__ = ["frame_image", "image_axes", "plot_depth", "plot_image"]
 
 WORDS = {
     Reason.VISIBLE: "seen",
-    Reason.HIDDEN: "occluded",
+    Reason.OCCLUDED: "occluded",
     Reason.OUTSIDE: "outside",
     Reason.BEHIND: "behind",
     Reason.NEAR: "too near",
@@ -117,16 +117,16 @@ def plot_image(
             if is_flat and np.isfinite(edge).all():
                 axes.fill(*edge.T, color=GRID, alpha=0.5, linewidth=0, zorder=0)
     is_seen = projection.visible
-    is_drawn = is_seen | (projection.reason == Reason.HIDDEN)
+    is_drawn = is_seen | (projection.reason == Reason.OCCLUDED)
     if connections is not None:
         _draw_connections(axes, _checked(connections, n), projection.pixels, is_drawn, is_seen)
     axes.scatter(
         *projection.pixels[is_seen].T, s=20, c=colour_of[is_seen].tolist(), linewidths=0, zorder=3
     )
-    is_hidden = is_drawn & ~is_seen
+    is_occluded = is_drawn & ~is_seen
     axes.scatter(
-        *projection.pixels[is_hidden].T, s=20, facecolors="white",
-        edgecolors=colour_of[is_hidden].tolist(), linewidths=1.0, zorder=3,
+        *projection.pixels[is_occluded].T, s=20, facecolors="white",
+        edgecolors=colour_of[is_occluded].tolist(), linewidths=1.0, zorder=3,
     )  # fmt: skip
     for k in np.flatnonzero(is_drawn).tolist():
         if names is not None and names[k]:

@@ -25,7 +25,7 @@ N_POINTS, N_POLYGONS = 500, 6
 def run(seeds: int) -> Outcome:
     """Hide points behind polygons by curtains and by the z-buffer; paint polygons."""
     camera = _camera(SIZE)
-    different = painted_wrong = n_hidden = 0
+    different = painted_wrong = n_occluded = 0
     seconds = {"curtains": 0.0, "z-buffer": 0.0}
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
@@ -37,9 +37,9 @@ def run(seeds: int) -> Outcome:
         hides = camera.depth_image(polygons).hides(seen)
         seconds["curtains"] += middle - start
         seconds["z-buffer"] += time.perf_counter() - middle
-        is_hidden = seen.reason == am.camera.Reason.HIDDEN
-        n_hidden += int(is_hidden.sum())
-        different += int(((hides != is_hidden) & ~_at_edges(camera, polygons, seen)).sum())
+        is_occluded = seen.reason == am.camera.Reason.OCCLUDED
+        n_occluded += int(is_occluded.sum())
+        different += int(((hides != is_occluded) & ~_at_edges(camera, polygons, seen)).sum())
         corners = np.asarray(polygons[0].corners).reshape(-1, 3)
         plain = [polygons[0], am.camera.Polygon(corners=corners + np.array([0.1, 0.6, 0.05]))]
         painted_wrong += _n_painted_wrong(camera, plain)
@@ -47,7 +47,7 @@ def run(seeds: int) -> Outcome:
     n_wrong, n_cycles = _n_painted_wrong(camera, ring), len(camera.paint(ring).cycles)
     n_pixels = SIZE[0] * SIZE[1]
     claims = [
-        exact(f"a test at each point alone occludes the same points ({n_hidden:,})",
+        exact(f"a test at each point alone occludes the same points ({n_occluded:,})",
               "equal to the z-buffer", different, "number that differ away from edges",
               seeds * N_POINTS),
         exact(f"it tests fewer places ({N_POINTS} instead of {n_pixels:,})",
@@ -98,12 +98,12 @@ def _ring() -> list[am.camera.Polygon]:
 def _at_edges(
     camera: am.Camera, polygons: list[am.camera.Polygon], seen: am.camera.Projection
 ) -> NDArray[np.bool_]:
-    """Return which points have a pixel that, at their depth, is hidden only in part."""
+    """Return which points have a pixel that, at their depth, is occluded only in part."""
     is_in: NDArray[np.bool_] = np.isfinite(seen.pixels[:, 0])
     steps = np.array([(u, v) for u in (-1, -0.5, 0, 0.5, 1) for v in (-1, -0.5, 0, 0.5, 1)])
     rays = camera.rays(np.where(is_in[:, None], seen.pixels, 0.0)[:, None] + steps)
     beside = camera.center + rays * (seen.depth[:, None] / (rays @ camera.axis))[..., None]
-    blocked = camera.project(beside, polygons).hidden_by >= 0
+    blocked = camera.project(beside, polygons).occluded_by >= 0
     return is_in & (blocked.any(axis=1) != blocked.all(axis=1))
 
 
@@ -117,7 +117,7 @@ def _draw(camera: am.Camera) -> list[Axes]:
     points = np.column_stack(
         [rng.uniform(-1.3, 1.3, 60), rng.uniform(0.2, 0.8, 60), rng.uniform(-0.9, 0.9, 60)]
     )
-    titles = ("curtains: hollow points are hidden", "the same in a z-buffer",
+    titles = ("curtains: hollow points are occluded", "the same in a z-buffer",
               "three bars in a cycle, z-buffer", "the same, painter's algorithm")  # fmt: skip
     panels = titled_panels(*titles, width=11.5, height=8.2, n_rows=2)
     plot_image(camera, camera.project(points, curtains), colours=CYCLE[0], surfaces=curtains,
@@ -144,6 +144,6 @@ PART = Part(
     "the z-buffer; and where the painter's algorithm fails.",
     notes=(
         "The z-buffer holds the depth at the centre of the nearest pixel, a ray that of the point "
-        "itself: where a pixel is hidden in part, at an edge or on a slope, they may differ.",
+        "itself: where a pixel is occluded in part, at an edge or on a slope, they may differ.",
     ),
 )

@@ -223,7 +223,7 @@ def _discs(
     """Return centroid (T, K, 2) and share (T, K) of the visible part of each marker."""
     r = seeing.marker_radius
     middle = camera.project(positions, surfaces)
-    in_view = np.isin(middle.reason, (Reason.VISIBLE, Reason.HIDDEN))
+    in_view = np.isin(middle.reason, (Reason.VISIBLE, Reason.OCCLUDED))
     if not surfaces or not r:
         share = middle.visible.astype(np.float64)
         return np.where(middle.visible[..., None], middle.pixels, np.nan), share
@@ -242,9 +242,9 @@ def _discs(
     tolerant = camera.project(disc, surfaces, clearance=3 * r)
     exact = camera.project(disc, surfaces)
     # A marker with an occluded centre does not sit on the occluding surface.
-    is_occluded = (middle.reason == Reason.HIDDEN)[..., None]
+    is_occluded = (middle.reason == Reason.OCCLUDED)[..., None]
     seen = np.where(is_occluded, exact.visible, tolerant.visible)
-    counted = np.isin(exact.reason, (Reason.VISIBLE, Reason.HIDDEN))  # inside the image
+    counted = np.isin(exact.reason, (Reason.VISIBLE, Reason.OCCLUDED))  # inside the image
     with np.errstate(invalid="ignore", divide="ignore"):
         count = seen.sum(axis=-1)
         share = np.where(in_view & (count > 0), count / counted.sum(axis=-1), 0.0)

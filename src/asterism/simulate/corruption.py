@@ -19,7 +19,7 @@ from asterism.model import Capture, Detections, Tracks
 from asterism.simulate.corrupted_points import Points
 from asterism.simulate.episodes import Burst, Ghosts, Visits
 from asterism.simulate.false_points import anywhere, beside, ghost_points
-from asterism.simulate.missed_points import come_and_go, in_runs, merge, seen_by_rig, shadowed
+from asterism.simulate.missed_points import come_and_go, in_bursts, merge, seen_by_rig, shadowed
 from asterism.simulate.sampling import jittered, kept_frames
 from asterism.simulate.truth import Truth
 
@@ -214,7 +214,7 @@ def _not_missed(
     """Draw which points are detected; `run` is the mean length of a burst, or 0."""
     if not run:
         return (whole.markers < 0) | (rng.random(len(whole.markers)) >= missing)
-    is_missed = in_runs(rng, missing, run, n_frames, n_markers)
+    is_missed = in_bursts(rng, missing, run, n_frames, n_markers)
     is_missed = np.column_stack([is_missed, np.zeros(n_frames, dtype=bool)])  # [-1] is clutter
     return ~is_missed[whole.frames, whole.markers]
 

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from asterism.camera import Rig, Surface
     from asterism.simulate.episodes import Burst, Visits
 
-__all__ = ["come_and_go", "in_runs", "merge", "seen_by_rig", "shadowed"]
+__all__ = ["come_and_go", "in_bursts", "merge", "seen_by_rig", "shadowed"]
 
 
-def in_runs(
+def in_bursts(
     rng: np.random.Generator, share: float, length: float, n_frames: int, n_markers: int
 ) -> NDArray[np.bool_]:
     """Draw bursts of missed detections by the two-state channel of Gilbert (1960).

@@ -18,9 +18,9 @@ _Open = Annotated[
         "--open", help="Open population: estimate how often markers enter and leave the volume."
     ),
 ]
-_Runs = Annotated[
+_Bursts = Annotated[
     bool,
-    typer.Option("--runs", help="Estimate how long bursts of missed detections last."),
+    typer.Option("--bursts", help="Estimate how long bursts of missed detections last."),
 ]
 
 
@@ -28,7 +28,7 @@ def estimate(
     source: _In,
     out: _Out = None,
     open_population: _Open = False,
-    runs: _Runs = False,
+    bursts: _Bursts = False,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -45,7 +45,7 @@ def estimate(
 
         asterism estimate arena.csv --open -o model.toml
 
-        asterism estimate behind_limbs.csv --runs -o model.toml
+        asterism estimate behind_limbs.csv --bursts -o model.toml
     """
     import asterism as am
     from asterism.cli.outputs import check_ending, check_outputs
@@ -58,7 +58,7 @@ def estimate(
         found = am.estimate_model(
             capture,
             population="open" if open_population else "closed",
-            misses="runs" if runs else "independent",
+            misses="bursts" if bursts else "independent",
         )
     if out is not None:
         write_text(out, found.model.to_toml())

@@ -26,7 +26,7 @@ _Ghosts = Annotated[
     float,
     typer.Option("--ghost-radius", help="Distance of a ghost from its marker, metres."),
 ]
-_MaxHidden = Annotated[
+_MaxOcclusion = Annotated[
     int | None,
     typer.Option(help="Longest occlusion that is stitched, frames.", show_default="unlimited"),
 ]
@@ -39,7 +39,7 @@ def stitch(
     model: _Model = None,
     confirm: _Confirm = 15,
     ghost_radius: _Ghosts = 0.03,
-    max_hidden: _MaxHidden = None,
+    max_occlusion: _MaxOcclusion = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -77,7 +77,7 @@ def stitch(
         am.tracking.tracklet_model(given),
         confirm=confirm,
         ghost_radius=ghost_radius,
-        max_hidden=max_hidden,
+        max_occlusion=max_occlusion,
     )
     am.write(found.tracks, out, format=format)
     figures = {

@@ -77,7 +77,7 @@ def estimate_model(
     detections: Detections,
     *,
     population: Literal["closed", "open"] = "closed",
-    misses: Literal["independent", "runs"] = "independent",
+    misses: Literal["independent", "bursts"] = "independent",
 ) -> ModelEstimate:
     """Estimate the generative model from unlabelled detections.
 
@@ -91,9 +91,9 @@ def estimate_model(
         ("open"). It is not estimated, because a marker that disappears cannot be distinguished
         from a long occlusion. "closed" assumes one birth and one death in the capture and keeps
         tracks through long gaps; "open" estimates birth and death rates by stochastic EM.
-    misses : {"independent", "runs"}
-        Whether missed detections are independent or may come in bursts ("runs"), as occlusions by
-        limbs do. "runs" also estimates `Sensor.p_redetection`, if it differs significantly from
+    misses : {"independent", "bursts"}
+        Whether missed detections are independent or may come in bursts ("bursts"), as occlusions by
+        limbs do. "bursts" also estimates `Sensor.p_redetection`, if it differs significantly from
         P_d.
 
     Returns
@@ -119,8 +119,8 @@ def estimate_model(
     0.9
     """
     check_fields("population", [population], ("closed", "open"))
-    check_fields("misses", [misses], ("independent", "runs"))
-    in_runs = misses == "runs"
+    check_fields("misses", [misses], ("independent", "bursts"))
+    in_bursts = misses == "bursts"
     check_kind("detections", detections, Detections, "am.Detections.from_frames, or am.read")
     detections = detections.measured()
     if detections.n_frames < 3 or detections.n_points < 3:
@@ -135,7 +135,7 @@ def estimate_model(
     region = Region.of(detections)
 
     def rates_of(evidence: Evidence) -> Rates:
-        return _counts(evidence).rates(in_runs=in_runs)
+        return _counts(evidence).rates(in_bursts=in_bursts)
 
     runs = sample_runs(detections, activity, FIT_POINTS)
     fit, fitted, bounds = _fitted(runs, scales, region, rates_of)
@@ -151,7 +151,7 @@ def estimate_model(
             seen = evidence if tracks is None else Evidence.of(tracks, reach)
             return _model(fit, rates, seen, scales, region)
 
-        drawn = draw_rates(runs, fit, rates, bounds, model_of, in_runs=in_runs)
+        drawn = draw_rates(runs, fit, rates, bounds, model_of, in_bursts=in_bursts)
         fit, rates, counts, evidence = (
             drawn.fit,
             drawn.rates,
@@ -160,12 +160,12 @@ def estimate_model(
         )
     fit, sure = polish(evidence.tracks, _model(fit, rates, evidence, scales, region), fit, bounds)
     model = _model(fit, rates, evidence, scales, region)
-    stds = _stds(counts, region, is_open=population == "open", in_runs=in_runs)
+    stds = _stds(counts, region, is_open=population == "open", in_bursts=in_bursts)
     stds |= _motion_stds(fit, model, sure, min_noise)
     mean = sum(counts, Counts()) * (1 / len(counts))
     reasons = reasons_for(
         model, stds, n_axes=region.n_axes, n_links=evidence.n_links,
-        n_misses=mean.misses + mean.remisses, in_runs=in_runs, n_clutter=mean.clutter,
+        n_misses=mean.misses + mean.remisses, in_bursts=in_bursts, n_clutter=mean.clutter,
         n_frames=evidence.n_frames, min_noise=min_noise,
         events=(mean.births, mean.deaths) if population == "open" else None,
     )  # fmt: skip
@@ -298,11 +298,11 @@ def _model(
 
 
 def _stds(
-    counts: tuple[Counts, ...], region: Region, *, is_open: bool, in_runs: bool
+    counts: tuple[Counts, ...], region: Region, *, is_open: bool, in_bursts: bool
 ) -> dict[str, float]:
     """Return the standard deviations of rates, within and between drawn partitions."""
-    within = (sum(counts, Counts()) * (1 / len(counts))).stds(in_runs=in_runs)
-    each = [c.rates(in_runs=in_runs) for c in counts]
+    within = (sum(counts, Counts()) * (1 / len(counts))).stds(in_bursts=in_bursts)
+    each = [c.rates(in_bursts=in_bursts) for c in counts]
 
     def std(name: str) -> float:
         between = np.var([getattr(r, name) for r in each]) * (1 + 1 / len(each))

@@ -103,7 +103,7 @@ def reasons_for(
     n_axes: int,
     n_links: int,
     n_misses: float,
-    in_runs: bool,
+    in_bursts: bool,
     n_clutter: float,
     n_frames: int,
     events: tuple[float, float] | None,
@@ -121,7 +121,7 @@ def reasons_for(
         Number of coordinates, 2 or 3.
     n_links, n_misses, n_clutter, n_frames : float
         Numbers of links, missed detections, detections in no track, and frames that were counted.
-    in_runs : bool
+    in_bursts : bool
         Whether missed detections may come in bursts.
     events : (float, float) or None
         Numbers of births and deaths; None for a closed population.
@@ -138,7 +138,7 @@ def reasons_for(
     >>> import asterism as am
     >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
     >>> counts = {"n_links": 152, "n_misses": 0, "n_clutter": 0, "n_frames": 20}
-    >>> settings = {"n_axes": 3, "in_runs": False, "events": None, "min_noise": 2e-4}
+    >>> settings = {"n_axes": 3, "in_bursts": False, "events": None, "min_noise": 2e-4}
     >>> reasons_for(model, {}, **counts, **settings)[0]
     ('noise σ', '0.2 mm', 'lower bound; the capture shows less, as smoothed captures do')
     """
@@ -163,7 +163,7 @@ def reasons_for(
             f"missed detections come in bursts of {1 / sensor.p_redetection:.1f} frames on average"
         )
         again = [("redetection P_r", value, length)]
-    elif in_runs:
+    elif in_bursts:
         again = [("redetection P_r", "P_d", "no more bursts of missed detections than by chance")]
     births, deaths = ("assumed: one in the capture",) * 2
     if events is not None:

@@ -88,16 +88,16 @@ class Counts:
     def __mul__(self, share: float) -> Counts:
         return Counts(**{name: value * share for name, value in vars(self).items()})
 
-    def rates(self, *, in_runs: bool) -> Rates:
+    def rates(self, *, in_bursts: bool) -> Rates:
         """Estimate the rates with one pseudo-event each, so that none is 0 after a finite capture.
 
         Parameters
         ----------
-        in_runs : bool
+        in_bursts : bool
             Whether P_r may differ from P_d; it does if the difference is significant.
         """
         p = q = _share(*self._seen)
-        if in_runs and self._sure_of_runs > SURE_OF_RUNS:
+        if in_bursts and self._sure_of_runs > SURE_OF_RUNS:
             p, q = _share(self.hits, self.misses), _share(self.rehits, self.remisses)
         return Rates(
             p_detection=min(p, MAX_P_DETECTION),
@@ -117,19 +117,19 @@ class Counts:
         each = _log_likelihood(self.hits, self.misses) + _log_likelihood(self.rehits, self.remisses)
         return 2 * (each - _log_likelihood(*self._seen))
 
-    def stds(self, *, in_runs: bool) -> Rates:
+    def stds(self, *, in_bursts: bool) -> Rates:
         """Return the standard deviation of each rate, of a beta or a gamma distribution.
 
         Parameters
         ----------
-        in_runs : bool
+        in_bursts : bool
             As for `rates`.
 
         Returns
         -------
         Rates
         """
-        rates = self.rates(in_runs=in_runs)
+        rates = self.rates(in_bursts=in_bursts)
         p, q, z = rates.p_detection, rates.p_redetection, rates.p_disappear
         chances, again = self.hits + self.misses, self.rehits + self.remisses
         if p == q:  # one rate from all counts

@@ -59,7 +59,7 @@ def draw_rates(
     bounds: FitBounds,
     model_of: Callable[[MotionFit, Rates, list[Tracks] | None], TrackingModel],
     *,
-    in_runs: bool,
+    in_bursts: bool,
 ) -> Drawn:
     """Estimate rates and motion from partitions drawn from the posterior.
 
@@ -75,7 +75,7 @@ def draw_rates(
         Bounds of noise and motion.
     model_of : callable
         Function that returns the model for a motion, rates and the current tracks.
-    in_runs : bool
+    in_bursts : bool
         As for `Counts.rates`.
 
     Returns
@@ -89,7 +89,7 @@ def draw_rates(
     for n in range(N_ROUNDS):
         tracks = [_draw(piece, model, n * len(pieces) + k) for k, piece in enumerate(pieces)]
         kept = [*kept, sum((count(t, rates) for t in tracks), Counts())][-N_KEPT:]
-        rates = (sum(kept, Counts()) * (1 / len(kept))).rates(in_runs=in_runs)
+        rates = (sum(kept, Counts()) * (1 / len(kept))).rates(in_bursts=in_bursts)
         fit = (fit_one_motion if len(fit.levels) == 1 else fit_motion)(tracks, model, fit, bounds)
         model = model_of(fit, rates, tracks)
     return Drawn(tracks=tracks, counts=tuple(kept), rates=rates, fit=fit)

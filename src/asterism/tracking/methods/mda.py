@@ -144,7 +144,7 @@ class MDA(EngineMethod):
         counts = tree_counts(stats)
         return shared_counts(self, stats) | {
             "branches": counts.n_branches,
-            "most_branches": counts.most_branches,
+            "peak_branches": counts.peak_branches,
             "dropped_branches": counts.n_limited,
             "windows_with_a_gap": counts.n_beams,
             "gap": counts.gap,

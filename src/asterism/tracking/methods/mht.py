@@ -98,7 +98,7 @@ class MHT(EngineMethod):
         and more time.
     max_hypotheses : int
         Largest number of hypotheses of a cluster, ≥ 1. Larger values need more time;
-        ``info["limited"]`` counts the clusters with more, and ``info["most_dropped_odds"]`` is the
+        ``info["limited"]`` counts the clusters with more, and ``info["max_dropped_odds"]`` is the
         largest odds of a dropped hypothesis against the most probable one of its cluster.
     prune_odds : float
         Odds against a cluster's most probable hypothesis beyond which a hypothesis is dropped.
@@ -206,9 +206,9 @@ class MHT(EngineMethod):
         counts = tree_counts(stats)
         return shared_counts(self, stats) | {
             "branches": counts.n_branches,
-            "most_branches": counts.most_branches,
+            "peak_branches": counts.peak_branches,
             "most_hypotheses": counts.n_hypotheses,
             "merged": counts.n_merged,
             "limited": counts.n_limited,
-            "most_dropped_odds": counts.bound,
+            "max_dropped_odds": counts.bound,
         }

@@ -133,7 +133,7 @@ class TOMHT(EngineMethod):
         counts = tree_counts(stats)
         return shared_counts(self, stats) | {
             "branches": counts.n_branches,
-            "most_branches": counts.most_branches,
+            "peak_branches": counts.peak_branches,
             "dropped_branches": counts.n_limited,
             "most_hypotheses": counts.n_hypotheses,
             "nodes": counts.n_nodes,

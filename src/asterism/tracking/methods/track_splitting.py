@@ -150,7 +150,7 @@ class TrackSplitting(EngineMethod):
         counts = tree_counts(stats)
         return shared_counts(self, stats) | {
             "branches": counts.n_branches,
-            "most_branches": counts.most_branches,
+            "peak_branches": counts.peak_branches,
             "cut_branches": counts.n_cut,
             "dropped_branches": counts.n_limited,
             "shared_detections": counts.n_shared,

@@ -101,7 +101,7 @@ class Stitched(Method[StitchedState]):
         use more evidence and decide later.
     ghost_radius : float
         Typical distance of a ghost from its marker, metres, > 0.
-    max_hidden : int
+    max_occlusion : int
         Longest occlusion after which a marker can reappear under its old label, frames. It bounds
         the memory of endless streams; the default of 20000 frames is over a minute at 300 Hz.
     lag : int, optional
@@ -132,12 +132,12 @@ class Stitched(Method[StitchedState]):
     method: Method[Any] = field(default_factory=_over_three_frames)
     confirm: int = 15
     ghost_radius: float = 0.03
-    max_hidden: int = 20_000
+    max_occlusion: int = 20_000
     lag: int | None = None
 
     def __post_init__(self) -> None:
         check_kind("method", self.method, Method, "am.SMP(window=3)")
-        check_options(self.confirm, self.ghost_radius, self.max_hidden)
+        check_options(self.confirm, self.ghost_radius, self.max_occlusion)
         if self.lag is not None:
             check_number("lag", self.lag, above=0, below=10_000, closed=True, integer=True)
 
@@ -158,7 +158,7 @@ class Stitched(Method[StitchedState]):
         check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
         model = tracklet_model(model)
         tracklets = self.method.init(model, n_axes=n_axes, seed=seed)
-        options = stitch_options(model, self.confirm, self.ghost_radius, self.max_hidden)
+        options = stitch_options(model, self.confirm, self.ghost_radius, self.max_occlusion)
         lag = getattr(self.method, "window", 3) - 1 if self.lag is None else self.lag
         stitcher = _engine.LiveStitcher(motion_model(model, n_axes), options, lag=lag)
         return StitchedState(tracklets=tracklets, stitcher=stitcher, model=model, n_axes=n_axes)

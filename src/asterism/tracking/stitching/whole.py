@@ -144,7 +144,7 @@ def stitch(
     *,
     confirm: int = 15,
     ghost_radius: float = 0.03,
-    max_hidden: int | None = None,
+    max_occlusion: int | None = None,
 ) -> Stitching:
     """Stitch tracklets into tracks of markers, through gaps of any length.
 
@@ -175,7 +175,7 @@ def stitch(
     ghost_radius : float
         Typical distance of a ghost from its marker, metres, > 0. Larger values take more short
         tracklets near markers for ghosts.
-    max_hidden : int, optional
+    max_occlusion : int, optional
         Longest occlusion after which a marker can reappear under its old track, frames; unlimited
         by default.
 
@@ -213,12 +213,12 @@ def stitch(
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
-    check_options(confirm, ghost_radius, max_hidden)
+    check_options(confirm, ghost_radius, max_occlusion)
     tracks = tracks.measured()
     d = tracks.detections
     # Bonds found late in the capture help early in it, so each pass informs the next one in the
     # other direction. The last pass does not cut tracklets.
-    limits = (model, confirm, ghost_radius, max_hidden)
+    limits = (model, confirm, ghost_radius, max_occlusion)
     options = stitch_options(*limits)
     first = go_through(d, tracks.labels, model, options)
     back = go_through(d, first.tracklets, model, options, before=first, backward=True)
@@ -251,39 +251,39 @@ def stitch(
     )  # fmt: skip
 
 
-def check_options(confirm: int, ghost_radius: float, max_hidden: int | None) -> None:
+def check_options(confirm: int, ghost_radius: float, max_occlusion: int | None) -> None:
     """Raise `ParameterError` if an option of `stitch` is out of range.
 
     Parameters
     ----------
-    confirm, ghost_radius, max_hidden
+    confirm, ghost_radius, max_occlusion
         As for `stitch`.
 
     Examples
     --------
-    >>> check_options(confirm=1, ghost_radius=0.03, max_hidden=None)
+    >>> check_options(confirm=1, ghost_radius=0.03, max_occlusion=None)
     Traceback (most recent call last):
     ...
     asterism.errors.ParameterError: confirm: expected a whole number in [2, 100000], found 1
     """
     check_number("confirm", confirm, above=2, below=100_000, closed=True, integer=True)
     check_number("ghost_radius", ghost_radius, above=0, below=1e6)
-    if max_hidden is not None:
-        check_number("max_hidden", max_hidden, above=1, below=1e9, closed=True, integer=True)
+    if max_occlusion is not None:
+        check_number("max_occlusion", max_occlusion, above=1, below=1e9, closed=True, integer=True)
 
 
 def stitch_options(
     model: TrackingModel,
     confirm: int,
     ghost_radius: float,
-    max_hidden: int | None,
+    max_occlusion: int | None,
     may_cut: bool = True,
 ) -> _engine.StitchOptions:
     """Return the options of `stitch` as an engine object.
 
     Parameters
     ----------
-    model, confirm, ghost_radius, max_hidden
+    model, confirm, ghost_radius, max_occlusion
         As for `stitch`.
     may_cut : bool
         Whether links that the neighbours contradict are cut.
@@ -304,7 +304,7 @@ def stitch_options(
         ghost_radius=ghost_radius,
         confirm=confirm,
         max_gap=model.population.max_gap,
-        max_hidden=max_hidden or 0,
+        max_occlusion=max_occlusion or 0,
         may_cut=may_cut,
     )
 
