@@ -32,6 +32,7 @@ docs: $(VENV)/.docs
 
 bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/speed.py --markdown docs/tables/speed.md
+	$(BIN)/python benchmarks/dense.py --markdown docs/tables/dense.md
 	$(BIN)/python benchmarks/cameras.py --markdown docs/tables/cameras.md
 	$(BIN)/python benchmarks/smooth.py --markdown docs/tables/smooth.md
 	$(BIN)/python benchmarks/smooth.py --lengths 500 1000 2000 4000 8000 \
