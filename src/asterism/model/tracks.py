@@ -343,7 +343,10 @@ class Tracks:
             Track ``k`` holds ``order[offsets[k]:offsets[k + 1]]``.
         """
         members = np.flatnonzero(self.labels >= 0)
-        order = members[np.argsort(self.labels[members], kind="stable")]
+        labels = self.labels[members]
+        if self.n_tracks <= np.iinfo(np.uint16).max:  # NumPy sorts 16 bits in linear time
+            labels = labels.astype(np.uint16)
+        order = members[np.argsort(labels, kind="stable")]
         return order, np.concatenate([[0], np.cumsum(self.lengths)]).astype(np.int64)
 
     def positions(self) -> NDArray[np.float64]:
