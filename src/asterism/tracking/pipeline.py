@@ -99,10 +99,13 @@ def track(
         _check_recipe(recipe, given, detections, start)
         made = method_by_name(recipe.method, **recipe.options)
     model = tracklet_model(recipe.model) if recipe.stitch else recipe.model
-    tracks = associate(made, detections, model, seed=recipe.seed, start=start, progress=progress)
+    carried = recipe if made.name in METHODS else None
+    tracks = associate(
+        made, detections, model, seed=recipe.seed, start=start, recipe=carried, progress=progress
+    )
     if recipe.stitch:
-        tracks = stitch_tracklets(tracks, model).tracks
-    return dataclasses.replace(tracks, recipe=recipe if made.name in METHODS else None)
+        tracks = dataclasses.replace(stitch_tracklets(tracks, model).tracks, recipe=carried)
+    return tracks
 
 
 def _check_recipe(

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from asterism.model import Recipe
+
 __all__ = ["associate", "check_method"]
 
 
@@ -27,6 +29,7 @@ def associate(
     *,
     seed: int | None = None,
     start: Tracks | None = None,
+    recipe: Recipe | None = None,
     progress: Callable[[int], Any] | None = None,
 ) -> Tracks:
     """Associate the detections of a capture by one method.
@@ -43,6 +46,8 @@ def associate(
         Seed of the methods that draw random numbers.
     start : Tracks, optional
         Tracks of the same detections from which `MCMCDA` starts.
+    recipe : Recipe, optional
+        Settings of the call, which the result carries.
     progress : callable, optional
         Called from time to time with the number of finished frames.
 
@@ -84,7 +89,9 @@ def associate(
     info = dict(state.info)
     if detections.covariances is not None:
         info["isotropic_noise"] = True  # a track has one variance for all axes
-    tracks = Tracks(detections=detections, labels=labels, confidence=confidence, info=info)
+    tracks = Tracks(
+        detections=detections, labels=labels, confidence=confidence, info=info, recipe=recipe
+    )
     info["log_posterior"] = log_posterior(tracks, model)
     return tracks
 
