@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import html
 import json
 import re
 import zlib
@@ -88,3 +89,8 @@ def full_page(path):
     rig = am.Rig((*ring, amid))
     am.report(tracks, path, truth=truth, rig=rig, title=HOSTILE[0])
     return path, tracks, truth, rig
+
+
+def text_of(page):
+    """Return the text of a page without its markup."""
+    return html.unescape(re.sub(rb"<[^>]*>", b" ", page).decode())

@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.cli import main
 from asterism.reporting.judgement import judge
 from asterism.reporting.page import find_troubles
 from asterism.reporting.page.lenses import lens_table, pixels_by
 from asterism.reporting.page.packing import residuals
 from asterism.reporting.page.thinning import stride_for
-from tests.reporting.cases import HOSTILE, positions, spoilt_person, unpacked
+from tests.reporting.cases import HOSTILE, positions, spoilt_person, text_of, unpacked
 
 
 @pytest.fixture(scope="module")
@@ -41,10 +40,6 @@ def straight(n_frames=200, n_markers=4, apart=0.2):
 
 def tracks_of(places, names=(), rate=100.0):
     return am.Tracks.from_dense(np.arange(len(places)) / rate, places, names)
-
-
-def text_of(page):
-    return html.unescape(re.sub(rb"<[^>]*>", b" ", page).decode())
 
 
 def test_positions_come_back_within_half_a_cell(tmp_path, person):
@@ -361,33 +356,6 @@ def test_what_makes_no_sense_is_refused(tmp_path, person):
     with pytest.raises(am.FormatError):
         am.report(tracks, tmp_path / "nowhere" / "a.html")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_commands_write_pages(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    made = "simulate crossing -o in.csv --truth truth.csv -q "
-    made += "--corrupt missing=0.05 --corrupt clutter=0.05"
-    assert main(made.split()) == 0
-    assert (
-        main(["track", "in.csv", "-o", "out.csv", "--method", "jpda", "--report", "first.html"])
-        == 0
-    )
-    printed = capsys.readouterr().out
-    first = text_of((tmp_path / "first.html").read_bytes())
-    for word in ("jpda", "log posterior", "frames/s", "model: "):
-        assert word in first
-    assert "first.html" in printed
-    assert main(["report", "out.csv", "--truth", "truth.csv", "--title", "Mine", "--json"]) == 0
-    assert '"output": "out.html"' in capsys.readouterr().out
-    assert "Comparison with the truth" in text_of((tmp_path / "out.html").read_bytes())
-    for line in (
-        "report out.csv -o out.csv",
-        "report out.csv --truth in.html",
-        "track in.csv -o a.csv --report a.csv",
-    ):
-        assert main(line.split()) == 2
-        assert "Traceback" not in capsys.readouterr().err
-    assert not (tmp_path / "a.csv").exists()
 
 
 def test_the_page_opens_where_the_capture_does(tmp_path):

@@ -9,7 +9,7 @@ import numpy as np
 from asterism.records import record
 
 if TYPE_CHECKING:
-    from asterism.model.tracks import Tracks
+    from numpy.typing import NDArray
 
 __all__ = ["Gap", "gaps_of"]
 
@@ -45,18 +45,25 @@ class Gap:
         return self.last - self.first + 1
 
 
-def gaps_of(tracks: Tracks) -> tuple[Gap, ...]:
-    """Return the gaps of all tracks, ordered by track and then by time; see `Tracks.gaps`."""
-    order, _ = tracks.by_track
-    frame, track = tracks.detections.frame_of[order], tracks.labels[order]
-    before = np.flatnonzero((np.diff(track) == 0) & (np.diff(frame) > 1))
-    times = tracks.detections.times
+def gaps_of(
+    tracks: NDArray[np.int64], frames: NDArray[np.int64], times: NDArray[np.float64]
+) -> tuple[Gap, ...]:
+    """Return the gaps of all tracks, ordered by track and then by time.
+
+    Parameters
+    ----------
+    tracks, frames : ndarray of int, shape (M,)
+        Track and frame of each detection, ordered by track and then by time.
+    times : ndarray of shape (T,)
+        Times of the frames, seconds.
+    """
+    before = np.flatnonzero((np.diff(tracks) == 0) & (np.diff(frames) > 1))
     return tuple(
         Gap(
-            track=int(track[i]),
-            first=int(frame[i]) + 1,
-            last=int(frame[i + 1]) - 1,
-            seconds=float(times[frame[i + 1]] - times[frame[i]]),
+            track=int(tracks[i]),
+            first=int(frames[i]) + 1,
+            last=int(frames[i + 1]) - 1,
+            seconds=float(times[frames[i + 1]] - times[frames[i]]),
         )
         for i in before
     )

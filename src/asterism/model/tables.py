@@ -12,20 +12,43 @@ import numpy as np
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
-    from asterism.model.tracks import Tracks
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from asterism.model.detections import Detections
+    from asterism.model.gap import Gap
 
 __all__ = ["data_array", "data_frame", "html_table"]
 
 _MAX_ROWS = 100
 
 
-def html_table(tracks: Tracks) -> str:
-    """Return an HTML table with one row of figures for each track that has detections."""
-    order, offsets = tracks.by_track
-    frames = tracks.detections.frame_of[order]
-    n_gaps = np.bincount([gap.track for gap in tracks.gaps()], minlength=tracks.n_tracks)
+def html_table(
+    title: str,
+    names: Sequence[str],
+    frames: NDArray[np.int64],
+    offsets: NDArray[np.int64],
+    gaps: Sequence[Gap],
+) -> str:
+    """Return an HTML table with one row of figures for each track that has detections.
+
+    Parameters
+    ----------
+    title : str
+        Line above the table.
+    names : sequence of str
+        Name of each of the K tracks.
+    frames : ndarray of int, shape (M,)
+        Frame of each detection, ordered by track and then by time.
+    offsets : ndarray of int, shape (K + 1,)
+        Track ``k`` holds ``frames[offsets[k]:offsets[k + 1]]``.
+    gaps : sequence of Gap
+        Gaps of all tracks.
+    """
+    n_gaps = np.bincount([gap.track for gap in gaps], minlength=len(names))
     rows = [
-        f"<tr><th>{escape(tracks.display_names[k])}</th><td>{tracks.lengths[k]}</td>"
+        f"<tr><th>{escape(names[k])}</th><td>{b - a}</td>"
         f"<td>{n_gaps[k]}</td><td>{frames[a]}</td><td>{frames[b - 1]}</td></tr>"
         for k, (a, b) in enumerate(pairwise(offsets.tolist()))
         if b > a
@@ -33,32 +56,36 @@ def html_table(tracks: Tracks) -> str:
     heads = "".join(f"<th>{h}</th>" for h in ("track", "detections", "gaps", "first", "last"))
     more = f"<p>… and {len(rows) - _MAX_ROWS} more</p>" * (len(rows) > _MAX_ROWS)
     body = "".join(rows[:_MAX_ROWS])
-    return f"<p>{escape(repr(tracks))}</p><table><tr>{heads}</tr>{body}</table>{more}"
+    return f"<p>{escape(title)}</p><table><tr>{heads}</tr>{body}</table>{more}"
 
 
-def data_frame(tracks: Tracks) -> Any:
-    """Return a pandas ``DataFrame`` with one row a detection."""
-    d = tracks.detections
-    names = np.array([*tracks.display_names, ""], dtype=object)
+def data_frame(
+    d: Detections,
+    labels: NDArray[np.int64],
+    names: Sequence[str],
+    confidence: NDArray[np.float64] | None,
+) -> Any:
+    """Return a pandas ``DataFrame`` with one row a detection; see `Tracks.to_pandas`."""
     columns = {
         "frame": d.frame_of,
         "time_s": d.times[d.frame_of],
-        "track": tracks.labels,
-        "name": names[tracks.labels],
+        "track": labels,
+        "name": np.array([*names, ""], dtype=object)[labels],
         **{f"{axis}_m": d.points[:, k] for k, axis in enumerate("xyz"[: d.n_axes])},
     }
-    if tracks.confidence is not None:
-        columns["confidence"] = tracks.confidence
+    if confidence is not None:
+        columns["confidence"] = confidence
     return _library("pandas").DataFrame(columns)
 
 
-def data_array(tracks: Tracks) -> Any:
-    """Return an xarray ``DataArray`` of time, marker and axis."""
-    d, axes = tracks.detections, list("xyz"[: tracks.detections.n_axes])
+def data_array(
+    times: NDArray[np.float64], positions: NDArray[np.float64], names: Sequence[str]
+) -> Any:
+    """Return an xarray ``DataArray`` of time, marker and axis; see `Tracks.to_xarray`."""
     return _library("xarray").DataArray(
-        tracks.positions(),
+        positions,
         dims=("time", "marker", "axis"),
-        coords={"time": d.times, "marker": list(tracks.display_names), "axis": axes},
+        coords={"time": times, "marker": list(names), "axis": list("xyz"[: positions.shape[2]])},
         name="position",
         attrs={"units": "m"},
     )

@@ -16,6 +16,7 @@ from asterism.checks import check_kind, keep_array
 from asterism.errors import ParameterError
 from asterism.model.detections import Detections
 from asterism.model.gap import Gap, gaps_of
+from asterism.model.labels import check_labels
 from asterism.model.tables import data_array, data_frame, html_table
 from asterism.records import record
 
@@ -26,10 +27,7 @@ if TYPE_CHECKING:
 
     from asterism.model.recipe import Recipe
 
-__all__ = ["MAX_TRACKS", "Tracks"]
-
-MAX_TRACKS = 10_000_000
-"""Largest number of tracks that is accepted; larger labels are refused as mistakes."""
+__all__ = ["Tracks"]
 
 
 @record(eq=False)
@@ -82,22 +80,11 @@ class Tracks:
         )
         n = self.detections.n_points
         labels = keep_array("labels", self.labels, (n,), dtype=np.int64)
-        if labels.size and not -1 <= labels.min() <= labels.max() < MAX_TRACKS:
-            wrong = labels.min() if labels.min() < -1 else labels.max()
-            raise ParameterError(
-                "labels", f"track numbers from 0 to {MAX_TRACKS - 1}, or -1 for clutter", wrong
-            )
-        n_tracks = int(labels.max()) + 1 if labels.size else 0
+        n_tracks = check_labels(labels, self.detections.frame_of)
         names = tuple(self.names)
         if names and len(names) < n_tracks:
             raise ParameterError("names", f"a name or None for each of {n_tracks} tracks", names)
         names += (None,) * (n_tracks - len(names))
-        twice = _first_twice(self.detections.frame_of, labels, n_tracks)
-        if twice is not None:
-            raise ParameterError(
-                "labels", "at most one detection of a track in a frame",
-                f"two of track {twice[1]} in frame {twice[0]}",
-            )  # fmt: skip
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "labels", labels)
         object.__setattr__(self, "confidence", self._checked_confidence(n))
@@ -203,7 +190,9 @@ class Tracks:
         >>> am.Tracks.from_dense([0, 0.01, 0.02], at).gaps()
         (Gap(track=0, first=1, last=1, seconds=0.02),)
         """
-        return gaps_of(self)
+        order, _ = self.by_track
+        d = self.detections
+        return gaps_of(self.labels[order], d.frame_of[order], d.times)
 
     def to_pandas(self) -> Any:
         """Return a pandas ``DataFrame`` with one row a detection (extra ``asterism[tables]``).
@@ -223,7 +212,7 @@ class Tracks:
         >>> list(tracks.to_pandas().columns)
         ['frame', 'time_s', 'track', 'name', 'x_m', 'y_m', 'z_m']
         """
-        return data_frame(self)
+        return data_frame(self.detections, self.labels, self.display_names, self.confidence)
 
     def to_xarray(self) -> Any:
         """Return an xarray ``DataArray`` of time, marker and axis (extra ``asterism[tables]``).
@@ -242,7 +231,7 @@ class Tracks:
         >>> tracks.to_xarray().dims
         ('time', 'marker', 'axis')
         """
-        return data_array(self)
+        return data_array(self.detections.times, self.positions(), self.display_names)
 
     def measured(self) -> Self:
         """Return the tracks without filled detections; the object itself if there are none.
@@ -366,7 +355,9 @@ class Tracks:
 
     def _repr_html_(self) -> str:
         """Return an HTML table for notebooks, with one row of figures for each track."""
-        return html_table(self)
+        order, offsets = self.by_track
+        frames = self.detections.frame_of[order]
+        return html_table(repr(self), self.display_names, frames, offsets, self.gaps())
 
     def __repr__(self) -> str:
         n_clutter = int((self.labels < 0).sum())
@@ -374,27 +365,3 @@ class Tracks:
             f"{type(self).__name__}({self.n_tracks} tracks, {len(self.labels) - n_clutter} "
             f"detections in them, {n_clutter} clutter, {self.detections.n_frames} frames)"
         )
-
-
-def _first_twice(
-    frames: NDArray[np.int64], labels: NDArray[np.int64], n_tracks: int
-) -> tuple[int, int] | None:
-    """Return a frame and a track with two detections in it, or None if there are none."""
-    if labels.size and labels.min() < 0:
-        frames, labels = frames[labels >= 0], labels[labels >= 0]
-    if not labels.size:
-        return None
-    key = frames * n_tracks
-    key += labels
-    n_cells = (int(frames[-1]) + 1) * n_tracks
-    if n_cells <= 16 * len(key):  # marking frame and track is much faster than sorting
-        is_taken = np.zeros(n_cells, dtype=bool)
-        is_taken[key] = True
-        if np.count_nonzero(is_taken) == len(key):
-            return None
-    key.sort()
-    twice = np.flatnonzero(key[1:] == key[:-1])
-    if not len(twice):
-        return None
-    frame, track = divmod(int(key[int(twice[0])]), n_tracks)
-    return frame, track
