@@ -18,4 +18,5 @@ NB_MODULE(_engine, module) {
   bind_chain(module);
   bind_stitcher(module);
   bind_reconstruct(module);
+  bind_naming(module);
 }

@@ -20,6 +20,7 @@ from .model import (
     Capture,
     Detections,
     InteractingMotions,
+    MarkerSet,
     Population,
     RandomWalk,
     Sensor,
@@ -29,7 +30,15 @@ from .model import (
 )
 from .multiview import reconstruct
 from .reporting import report
-from .tracking import estimate_model, fill_gaps, learn_bonds, name_tracks, stitch, track
+from .tracking import (
+    estimate_model,
+    fill_gaps,
+    learn_marker_set,
+    merge_marker_sets,
+    name_tracks,
+    stitch,
+    track,
+)
 from .tracking.methods import GNN, JPDA, MCMCDA, MDA, MHT, SMP, TOMHT, TrackSplitting
 
 __all__ = [
@@ -48,6 +57,7 @@ __all__ = [
     "Detections",
     "FormatError",
     "InteractingMotions",
+    "MarkerSet",
     "Observations",
     "ParameterError",
     "Population",
@@ -65,8 +75,9 @@ __all__ = [
     "fill_gaps",
     "filter",
     "io",
-    "learn_bonds",
+    "learn_marker_set",
     "log_posterior",
+    "merge_marker_sets",
     "metrics",
     "model",
     "multiview",

@@ -247,7 +247,12 @@ def check_array(
 
 
 def keep_array(
-    name: str, value: ArrayLike, shape: tuple[int | str, ...], *, dtype: type = np.float64
+    name: str,
+    value: ArrayLike,
+    shape: tuple[int | str, ...],
+    *,
+    dtype: type = np.float64,
+    finite: bool = True,
 ) -> NDArray[Any]:
     """Check an array as `check_array` does, for an object that keeps it and must not change.
 
@@ -261,7 +266,7 @@ def keep_array(
     ParameterError
         If it does not fit.
     """
-    array = check_array(name, value, shape, dtype=dtype)
+    array = check_array(name, value, shape, dtype=dtype, finite=finite)
     if array.flags.writeable and np.may_share_memory(array, np.asarray(value)):
         array = array.copy()
     array.flags.writeable = False

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.errors import ParameterError
 from asterism.metrics.counts import check_labels, ratio
+from asterism.model.marker_set import other_side
 from asterism.records import record
 
 if TYPE_CHECKING:
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["NameScores", "name_scores"]
-
-_SIDE = re.compile(r"^(left|right|l|r)(?=.)|(?<=[_. ])(left|right|l|r)$", re.IGNORECASE)
-_OTHER_SIDE = {"l": "r", "r": "l", "left": "right", "right": "left"}
 
 
 @record(eq=False)
@@ -99,7 +96,7 @@ def name_scores(
     code: dict[str | None, int] = {None: -1} | {name: i for i, name in enumerate(known)}
     found = np.array([code[name] for name in [*given, None]])[labels]
     right = np.array([code[name] for name in [*true, None]])[truth_labels]
-    partners = np.array([code.get(_partner(name), -2) for name in known] + [-2])
+    partners = np.array([code.get(other_side(name or ""), -2) for name in known] + [-2])
     is_named = found >= 0
     is_swapped = is_named & (partners[found] == right)
     precision, recall, f1 = _by_name(found, right)
@@ -121,18 +118,6 @@ def _comparable(
         return sides
     given, true = ([name and name.rpartition(":")[2] for name in side] for side in sides)
     return given, true
-
-
-def _partner(name: str | None) -> str | None:
-    """Return the name of the marker at the same place of the other side of the body, or None."""
-    subject, colon, own = (name or "").rpartition(":")
-    match = _SIDE.search(own)
-    if match is None:
-        return None
-    side = match[0]
-    other = _OTHER_SIDE[side.lower()]
-    other = other.upper() if side.isupper() else other.title() if side.istitle() else other
-    return subject + colon + own[: match.start()] + other + own[match.end() :]
 
 
 def _by_name(found: NDArray[np.int64], right: NDArray[np.int64]) -> tuple[float, float, float]:

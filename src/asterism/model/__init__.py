@@ -5,6 +5,7 @@ from asterism.model.detections import Detections
 from asterism.model.gap import Gap
 from asterism.model.interacting_motions import InteractingMotions
 from asterism.model.linear_motion import LinearMotion
+from asterism.model.marker_set import MarkerSet
 from asterism.model.motion import DWNA, DWPA, Motion, RandomWalk, SingleMotion
 from asterism.model.population import Population
 from asterism.model.posterior import log_posterior, track_scores
@@ -25,6 +26,7 @@ __all__ = [
     "Gap",
     "InteractingMotions",
     "LinearMotion",
+    "MarkerSet",
     "Motion",
     "Population",
     "RandomWalk",

@@ -12,14 +12,18 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-__all__ = ["read_toml", "write_toml"]
+__all__ = ["read_toml", "write_text", "write_toml"]
 
 
 def write_toml(content: Mapping[str, Any], path: str | Path | None) -> str:
     """Return `content` as TOML text, and write it to `path` if one is given."""
     import tomli_w
 
-    text = tomli_w.dumps(content)
+    return write_text(tomli_w.dumps(content), path)
+
+
+def write_text(text: str, path: str | Path | None) -> str:
+    """Write a text to `path`, as a whole, if one is given; return the text."""
     if path is not None:
         path = check_path("path", path)
         unfinished = path.with_name(f".{path.name}.part")

@@ -11,6 +11,7 @@ from asterism.checks import check_fields, check_kind, check_path
 from asterism.errors import ParameterError
 from asterism.io.atomic import replacing
 from asterism.model import Capture, Tracks
+from asterism.model.upwards import up_axis
 from asterism.reporting.connections import connections_of
 from asterism.reporting.judgement import judge
 from asterism.reporting.page import Contents, page
@@ -19,14 +20,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from asterism.reporting.page.contents import Axis
+    from asterism.model.upwards import Axis
 
 __all__ = ["report"]
-
-_Y_UP = ("motive", "trc")
-"""Keys of `CAPTURE_FORMATS` whose programs have y up."""
-_BY_THE_GROUND, _OFF_THE_GROUND = 0.1, 0.3  # metres
-_FRAMES_FOR_UP = 500
 
 
 def report(
@@ -127,24 +123,7 @@ def _up(tracks: Tracks, rig: Rig | None, asked: Axis | None) -> tuple[Axis, str]
         axes: tuple[Axis, ...] = ("x", "y", "z")
         axis = axes[int(np.argmax(np.abs(mean)))]
         return axis, f"The {axis} axis points up, as in the images of the cameras."
-    d = tracks.detections
-    if isinstance(d, Capture) and d.format in _Y_UP:
-        return "y", "The y axis points up, as in most files of this format."
-    if d.n_axes == 3 and _stands_on_y(tracks):
-        text = "The y axis is taken to point up: the lowest points stay near y = 0, far from z = 0."
-        return "y", f"{text} Change it below the player if this is wrong."
-    return "z", "The z axis is taken to point up. Change it below the player if this is wrong."
-
-
-def _stands_on_y(tracks: Tracks) -> bool:
-    """Return whether the lowest points stay near the ground y = 0, and far from z = 0."""
-    d = tracks.detections
-    frames = range(0, d.n_frames, max(1, d.n_frames // _FRAMES_FOR_UP))
-    lowest = [d.frame(t).min(axis=0) for t in frames if len(d.frame(t))]
-    if not lowest:
-        return False
-    _, y, z = np.abs(np.median(lowest, axis=0))
-    return bool(y < _BY_THE_GROUND and z > _OFF_THE_GROUND)
+    return up_axis(tracks.detections)
 
 
 def _oddities(tracks: Tracks) -> list[str]:

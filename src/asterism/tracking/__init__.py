@@ -14,7 +14,13 @@ from asterism.tracking.methods import (
     Update,
     method_by_name,
 )
-from asterism.tracking.naming import Naming, name_tracks
+from asterism.tracking.naming import (
+    NameChange,
+    Naming,
+    learn_marker_set,
+    merge_marker_sets,
+    name_tracks,
+)
 from asterism.tracking.pipeline import track
 from asterism.tracking.plan import Plan, plan_tracking
 from asterism.tracking.rigidity import Bonds, learn_bonds
@@ -41,6 +47,7 @@ __all__ = [
     "Lifecycle",
     "Method",
     "ModelEstimate",
+    "NameChange",
     "Naming",
     "Plan",
     "Rigidity",
@@ -52,6 +59,8 @@ __all__ = [
     "estimate_model",
     "fill_gaps",
     "learn_bonds",
+    "learn_marker_set",
+    "merge_marker_sets",
     "method_by_name",
     "name_tracks",
     "plan_tracking",

@@ -29,6 +29,10 @@ _COMPUTED = re.compile(
 # The Oxford Foot Model: names such as LTIB1 could be markers, so they need LFOF0 in the same file.
 _OXFORD = re.compile(r"([LR])(ArchHeight(Index)?|D1M0|FOF\d|HDF\d|HE1|HLX\d|PROXFF|TIB\d)")
 
+# Points of a static trial that Plug-in-Gait scripts compute; they could be markers, so that
+# LViconLegLength must stand in the same file.
+_STATIC = re.compile(r"proj[LR]\w+|[LR](ViconLegLength|HFplantar|HJCHarrington|KAX|ANK1)|PEL\d")
+
 
 def _bare(name: str) -> str:
     """Return a name without its subject, ``Subject:LASI`` -> ``LASI``."""
@@ -99,6 +103,7 @@ def find_modelled(names: Sequence[str], groups: Mapping[str, Iterable[str]]) -> 
         prefix = name[: len(name) - len(_bare(name))]
         return found is not None and (f"{prefix}{found[1]}FOF", "0") in stems
 
+    has_static = any(_bare(name)[1:] == "ViconLegLength" for name in names)
     return [
         not is_unlabelled(name)
         and (
@@ -107,6 +112,7 @@ def find_modelled(names: Sequence[str], groups: Mapping[str, Iterable[str]]) -> 
             or _COMPUTED.fullmatch(_bare(name)) is not None
             or is_axis(name)
             or is_oxford(name)
+            or (has_static and _STATIC.fullmatch(_bare(name)) is not None)
         )
         for name in names
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import numpy as np
@@ -13,9 +13,8 @@ if TYPE_CHECKING:
     from asterism.camera import Rig
     from asterism.model import Tracks
 
-__all__ = ["Axis", "Connections", "Contents", "Judgement", "Score", "Verdict"]
+__all__ = ["Connections", "Contents", "Judgement", "Score", "Verdict"]
 
-Axis = Literal["x", "y", "z"]
 """The axis that points up."""
 
 

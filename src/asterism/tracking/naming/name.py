@@ -1,4 +1,4 @@
-"""Naming of tracks after the markers of an earlier capture, by their stable distances."""
+"""Names for the tracks of a capture, from a marker set."""
 
 from __future__ import annotations
 
@@ -9,342 +9,300 @@ import numpy as np
 
 from asterism.checks import check_kind
 from asterism.errors import ParameterError
-from asterism.model import Tracks
+from asterism.model import MarkerSet, Tracks
+from asterism.model.upwards import up_axis
 from asterism.records import record
-from asterism.tracking.rigidity.bonds import MAX_FRAMES, Bonds
-from asterism.tracking.rigidity.distances import MIN_TOGETHER, distances_between
+from asterism.tracking.naming.bodies import bodies_of
+from asterism.tracking.naming.probabilities import marker_odds, probabilities_of, track_odds
+from asterism.tracking.naming.search import Found, search
+from asterism.tracking.naming.stretches import NameChange, changes_of
+from asterism.tracking.naming.windows import WindowNames, Windows, scattered
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from asterism.model.upwards import Axis
+
 __all__ = ["Naming", "name_tracks"]
 
-BEAM = 400
-"""Number of partial assignments of names that the beam search keeps."""
-LOOKED_AT = 12
-"""Number of named tracks with which an unnamed one is compared, the steadiest first."""
-REPLACED = 0.004, 0.015
-"""Standard deviation of a distance if markers were attached again between captures: metres, and
-share of the distance."""
-LEFT = 0.0005, 0.0
-"""The same if the markers were left in place. The better fit of the two is used."""
-POSED = 0.02, 0.25
-"""Standard deviation of a distance without a bond from that in the pose: metres, and share."""
-ANYWHERE = 2.0
-"""Range over which the distances of wrong pairs are spread, metres."""
-MIN_LOG_ODDS, MAX_LOG_ODDS = -3.0, 7.0
-"""Bounds of the log odds of one distance or one side."""
-UNBONDED = -0.5, 0.0
-"""Bounds of the log odds of a distance without a bond, which varies because bodies move apart."""
-ENOUGH = 10.0
-"""Smallest log odds at which a remaining track is a piece of a named one."""
-WEIGHT = 0.25
-"""Factor on the sum of the log odds, because the distances of a body vary together."""
+MIN_LENGTH = 5
+"""Smallest number of detections of a track that is named first."""
+LONG = 60
+"""Number of detections above which a longer track is no better."""
+FIRST_FRAMES = 100
+"""Number of frames in which the first tracks are compared."""
+MIN_MEAN = 10.0
+"""Mean log odds of a name below which a marker set does not fit the capture at all."""
+MIN_DETECTIONS = 10
+"""Smallest number of detections of a name in a capture."""
+MIN_PROBABILITY = 0.5
+"""Probability below which a name is not given."""
 
 
 @record(eq=False)
 class Naming:
-    """Tracks named after the markers of an earlier capture.
+    """Result of `name_tracks`.
 
     Parameters
     ----------
     tracks : Tracks
-        Named tracks; tracks with the same marker are merged.
-    markers : ndarray of int, shape (K,)
-        Marker of each input track in the bonds, -1 for a track without a name.
+        One track for each name, in the order of the marker sets, then the tracks without a name.
+        Tracklets of one marker are one track; a track that changed marker is cut.
+    markers : tuple of (str or None), length K
+        Name of each input track in most of its frames, None without a name.
     probabilities : ndarray of shape (K,)
-        Probability of each name among the names considered; 0 for a track without a name. Check
-        names with a probability well below 1 by eye.
+        Probability of that name; of no name where it is None.
+    alternatives : tuple of (str or None), length K
+        Most probable other name of each input track, None for no name.
+    alternative_probabilities : ndarray of shape (K,)
+        Probability of that alternative.
+    changes : tuple of NameChange
+        Stretches of frames in which an input track is on another marker than in most of its frames.
+    missing : tuple of str
+        Names of the sets that no track has.
 
     Examples
     --------
     >>> import asterism as am
-    >>> truth = am.simulate.fingers(frames=40, seed=1)
-    >>> naming = am.name_tracks(truth, am.learn_bonds(truth))
-    >>> naming.n_named, naming.tracks.names[:3]
-    (23, ('T1', 'T2', 'T3'))
+    >>> truth = am.simulate.fingers(frames=60, seed=1)
+    >>> naming = am.name_tracks(truth, am.learn_marker_set(truth))
+    >>> naming, naming.tracks.names[:3]
+    (Naming(23 of 23 tracks), ('T1', 'T2', 'T3'))
     """
 
     tracks: Tracks
-    markers: NDArray[np.int64]
+    markers: tuple[str | None, ...]
     probabilities: NDArray[np.float64]
+    alternatives: tuple[str | None, ...]
+    alternative_probabilities: NDArray[np.float64]
+    changes: tuple[NameChange, ...]
+    missing: tuple[str, ...]
 
     @property
     def n_named(self) -> int:
-        """Number of tracks that were named."""
-        return int((self.markers >= 0).sum())
+        """Number of input tracks that have a name."""
+        return sum(name is not None for name in self.markers)
 
     def __repr__(self) -> str:
         return f"Naming({self.n_named} of {len(self.markers)} tracks)"
 
 
-def name_tracks(tracks: Tracks, bonds: Bonds) -> Naming:
-    """Name tracks after the markers of an earlier capture of the same body.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Named:
+    """Names that one marker set gives to some of the tracks."""
 
-    Two tracks with a stable distance are matched to two markers with about the same distance.
-    Tracks are named one by one, each from the named tracks with the most stable distances to it.
-    A beam search keeps the few hundred best assignments. The side of three other markers on which
-    a marker lies distinguishes a body from its mirror image. Existing names are not used.
+    markers: NDArray[np.int64]  # (N,), of each detection, -1 for none
+    of_track: NDArray[np.int64]  # (K,)
+    probabilities: NDArray[np.float64]  # (K,)
+    alternatives: NDArray[np.int64]  # (K,), -1 for none
+    alternative_probabilities: NDArray[np.float64]  # (K,)
+
+
+def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
+    """Name tracks by the marker sets of the subjects in the capture.
+
+    The names that exist together most probably are searched for the tracks of one moment; all other
+    tracks and moments follow from these. Names of the input are not used.
 
     Parameters
     ----------
     tracks : Tracks
-        Tracks, for example from `track` or `stitch`. Short tracks are named after longer ones.
-    bonds : Bonds
-        Bonds of the markers, from `learn_bonds`.
+        Tracks or tracklets, for example from `track`.
+    *marker_sets : MarkerSet
+        One set for each subject in the capture. Names of several sets must differ, for example by
+        the subject before a colon (`MarkerSet.of_subject`).
 
     Returns
     -------
     Naming
-        Named tracks with the probability of each name.
+        Named tracks, with the probability of each name and its best alternative. A set that does
+        not fit gives no name.
 
     Raises
     ------
     ParameterError
-        If the tracks have another number of axes than the bonds.
+        If no set is given, an argument has the wrong type, or two sets have the same name.
 
     Notes
     -----
-    The log odds of a distance are ``log t(z) / s - log 1/R``: Student's t with three degrees of
-    freedom of its error z in units of s, against a uniform distribution over the range R. The scale
-    s combines the variation in both captures and the displacement of a marker that is attached
-    again. The log odds are bounded, so that one wrong distance is outvoted.
+    Evidence: distances between tracks against those of the set (Student's t, four kinds of fit), and
+    the side of three others on which a track lies, which tells left from right. The search is a
+    local one from many starts, so that its result is not proved to be the best. Probabilities
+    compare the result with the exchange of two names and with no name.
 
     Examples
     --------
     >>> import asterism as am
-    >>> bonds = am.learn_bonds(am.simulate.fingers(frames=40, seed=1))
-    >>> later = am.simulate.fingers(frames=40, seed=2).detections
-    >>> naming = am.name_tracks(am.track(later, am.GNN()), bonds)
-    >>> naming
-    Naming(23 of 23 tracks)
-    >>> naming.tracks.names[:3]
-    ('T1', 'T2', 'T3')
+    >>> made = am.learn_marker_set(am.simulate.fingers(frames=60, seed=1))
+    >>> later = am.simulate.fingers(frames=60, seed=2).detections
+    >>> naming = am.name_tracks(am.track(later, am.GNN()), made)
+    >>> naming, naming.tracks.names[:3]
+    (Naming(23 of 23 tracks), ('T1', 'T2', 'T3'))
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
-    check_kind("bonds", bonds, Bonds, "am.learn_bonds(tracks)")
-    if tracks.detections.n_axes != bonds.places.shape[1]:
-        expected = f"{bonds.places.shape[1]} axes, as the bonds have"
-        raise ParameterError("tracks", expected, tracks.detections.n_axes)
-    long = _LongTracks.of(tracks)
-    named, probabilities = _search(long, _Known.of(bonds))
-    _name_pieces(long, _Known.of(bonds), named, probabilities)
-    markers = np.full(tracks.n_tracks, -1, dtype=np.int64)
-    sure = np.zeros(tracks.n_tracks)
-    markers[long.tracks], sure[long.tracks] = named, probabilities
-    return Naming(tracks=_renamed(tracks, markers, bonds), markers=markers, probabilities=sure)
+    if not marker_sets:
+        raise ParameterError("marker_sets", "at least one marker set", "none")
+    all_names: list[str] = []
+    for made in marker_sets:
+        check_kind("marker_sets", made, MarkerSet, "am.learn_marker_set(tracks)")
+        all_names += made.names
+    twice = [name for name in all_names if all_names.count(name) > 1]
+    if twice:
+        hint = "give each set its subject: marker_set.of_subject(name)"
+        raise ParameterError("marker_sets", "names that differ", f"{twice[0]} in two sets", hint)
+    up, _ = up_axis(tracks.detections)
+    found = _first(tracks, marker_sets, up)
+    named = [
+        None if own is None else _all(tracks, made, own, up)
+        for made, own in zip(marker_sets, found, strict=True)
+    ]
+    return _result(tracks, marker_sets, named)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _LongTracks:
-    """The n tracks that are long enough, with their mutual distances."""
+class _First:
+    """First names: those of the tracks of one moment."""
 
+    frame: int
     tracks: NDArray[np.int64]
-    positions: NDArray[np.float64]  # (F, n, D)
-    middle: NDArray[np.float64]  # (n, n), NaN for two with too few common frames
-    spread: NDArray[np.float64]
-    variance: NDArray[np.float64]  # predictive; infinite for these
-    seen: NDArray[np.bool_]  # (T, n)
-
-    @classmethod
-    def of(cls, tracks: Tracks) -> _LongTracks:
-        d = tracks.detections
-        every = max(1, -(-d.n_frames // MAX_FRAMES))
-        chosen = np.flatnonzero(tracks.lengths >= MIN_TOGETHER)
-        dense = tracks.positions()[:, chosen]
-        seen = np.isfinite(dense[..., 0])
-        between = distances_between(dense[::every])
-        is_known = between.n_frames * every >= MIN_TOGETHER
-        np.fill_diagonal(is_known, val=False)
-        return cls(
-            tracks=chosen,
-            positions=dense[::every],
-            middle=np.where(is_known, between.middle, np.nan),
-            spread=np.where(is_known, between.spread, np.nan),
-            variance=np.where(is_known, between.predictive_variance, np.inf),
-            seen=seen,
-        )
-
-    def order(self) -> list[int]:
-        """Return the order of naming: each track by its distances to earlier ones."""
-        cost = np.sqrt(self.variance)
-        n = len(cost)
-        if n == 0:
-            return []
-        nearest = np.sort(cost, axis=1)[:, : min(4, n)].sum(axis=1)
-        order = [int(np.argmin(nearest))]
-        best = cost[order[0]].copy()
-        best[order[0]] = np.nan
-        while len(order) < n:
-            k = int(np.nanargmin(best))
-            order.append(k)
-            best = np.fmin(best, cost[k])
-            best[order] = np.nan
-        return order
-
-    def steadiest(self, k: int, others: list[int]) -> list[int]:
-        """Return those of `others` with the most stable distances to a track."""
-        known = [b for b in others if np.isfinite(self.middle[k, b])]
-        return [known[b] for b in np.argsort(self.variance[k, known], kind="stable")[:LOOKED_AT]]
-
-    def height(self, k: int, three: list[int]) -> tuple[float, float]:
-        """Return median and spread of a track's height over the plane of three others."""
-        a, b, c = (self.positions[:, i] for i in three)
-        values = _height(self.positions[:, k], a, b, c)
-        values = np.sort(values[np.isfinite(values)])
-        if len(values) < 3:
-            return np.nan, np.nan
-        low, middle, high = values[(np.array([0.16, 0.5, 0.84]) * len(values)).astype(int)]
-        return float(middle), float(high - low) / 2
+    found: Found
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Known:
-    """Bonds as tables over K markers; pairs without a bond have their distance in the pose."""
-
-    is_bond: NDArray[np.bool_]  # (K, K)
-    distance: NDArray[np.float64]
-    spread: NDArray[np.float64]
-    places: NDArray[np.float64]  # (K, D)
-
-    @classmethod
-    def of(cls, bonds: Bonds) -> _Known:
-        K = len(bonds.names)
-        distance = np.linalg.norm(bonds.places[:, None] - bonds.places[None], axis=2)
-        spread = POSED[0] + POSED[1] * distance
-        is_bond = np.zeros((K, K), dtype=bool)
-        for pairs in (bonds.pairs, bonds.pairs[:, ::-1]):
-            at = tuple(pairs.T)
-            distance[at], spread[at], is_bond[at] = bonds.distances, bonds.spreads, True
-        return cls(is_bond=is_bond, distance=distance, spread=spread, places=bonds.places)
-
-    def log_odds(self, middle: float, spread: float) -> NDArray[np.float64]:
-        """Return the log odds that two tracks are each pair of markers, (K, K)."""
-        varied = spread**2 + self.spread**2
-        log_odds = np.nan_to_num(_log_odds(middle - self.distance, varied, self.distance))
-        return np.where(self.is_bond, log_odds, log_odds.clip(*UNBONDED))
-
-
-def _log_odds(
-    off: NDArray[np.float64], varied: NDArray[np.float64], size: NDArray[np.float64] | float
-) -> NDArray[np.float64]:
-    """Return bounded log odds of Student's t with three degrees of freedom against uniform."""
-    scale2 = np.stack([varied + (fixed + share * size) ** 2 for fixed, share in (LEFT, REPLACED)])
-    log_t = -2 * np.log1p(off**2 / scale2 / 3) - 0.5 * np.log(scale2) - 1.0  # log t(0) = -1.0
-    log_odds = log_t.max(axis=0) + np.log(ANYWHERE)
-    return np.clip(log_odds, MIN_LOG_ODDS, MAX_LOG_ODDS)
-
-
-def _height(
-    x: NDArray[np.float64],
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    c: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the signed height of x over the plane through a, b and c, right-handed."""
-    normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal, axis=-1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return ((x - a) * normal).sum(axis=-1) / length
+def _first(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list[_First | None]:
+    """Name the tracks of the frame with the most long tracks; each set names a body of its own."""
+    d = tracks.detections
+    used = np.flatnonzero(tracks.labels >= 0)
+    if not len(used):
+        return [None] * len(marker_sets)
+    worth = np.where(tracks.lengths >= MIN_LENGTH, np.minimum(tracks.lengths, LONG), 0)
+    by_frame = np.bincount(
+        d.frame_of[used], weights=worth[tracks.labels[used]], minlength=d.n_frames
+    )
+    frame = int(np.argmax(by_frame))
+    alive = tracks.labels[slice(*d.offsets[[frame, frame + 1]])]
+    alive = np.unique(alive[(alive >= 0) & (tracks.lengths[alive] >= MIN_LENGTH)])
+    if len(alive) < 2:
+        return [None] * len(marker_sets)
+    positions = _positions(tracks, alive)
+    subsets = [np.arange(len(alive)), *bodies_of(positions)]
+    results: dict[tuple[int, int], Found] = {}
+    for s, made in enumerate(marker_sets):
+        for b, subset in enumerate(subsets):
+            if len(marker_sets) > 1 and b == 0 and len(subsets) > len(marker_sets):
+                continue  # several subjects: each has a body of its own
+            own = search(made, positions[:, subset], up)
+            if own is not None and _fits(own):
+                results[s, b] = own
+    first: list[_First | None] = [None] * len(marker_sets)
+    while results:
+        s, b = max(results, key=lambda key: (results[key].score, -key[0], -key[1]))
+        first[s] = _First(frame=frame, tracks=alive[subsets[b]], found=results[s, b])
+        taken = set(subsets[b].tolist())
+        results = {
+            key: own
+            for key, own in results.items()
+            if key[0] != s and not taken & set(subsets[key[1]].tolist())
+        }
+    return first
 
 
-def _search(long: _LongTracks, known: _Known) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Name the tracks by the best assignment, with each name's probability in the final beam."""
-    n, K = len(long.tracks), len(known.places)
-    named = np.full((1, n), -1, dtype=np.int64)
-    is_used = np.zeros((1, K), dtype=bool)
-    score = np.zeros(1)
-    done: list[int] = []
-    for k in long.order():
-        others = long.steadiest(k, done)
-        more = _evidence(long, known, k, others, named)
-        more[is_used] = -np.inf
-        total = np.concatenate([score[:, None] + more, score[:, None]], axis=1)
-        best = np.argsort(-total, axis=None, kind="stable")[:BEAM]
-        best = best[np.isfinite(total.ravel()[best])]
-        way, marker = np.divmod(best, K + 1)
-        score, named, is_used = total.ravel()[best], named[way].copy(), is_used[way].copy()
-        is_named = marker < K
-        named[is_named, k] = marker[is_named]
-        is_used[np.flatnonzero(is_named), marker[is_named]] = True
-        done.append(k)
-    weights = np.exp(WEIGHT * (score - score.max()))
-    weights /= weights.sum()
-    best_way = named[int(np.argmax(score))]
-    probabilities = ((named == best_way) * weights[:, None]).sum(axis=0)
-    return best_way.copy(), np.where(best_way >= 0, probabilities, 0)
+def _fits(found: Found) -> bool:
+    n_named = int((found.names >= 0).sum())
+    return n_named > 0 and found.score >= MIN_MEAN * n_named
 
 
-def _evidence(
-    long: _LongTracks, known: _Known, k: int, others: list[int], named: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return the log odds of each marker for a track, for each assignment, (assignments, K)."""
-    ways, K = len(named), len(known.places)
-    out = np.zeros((ways, K))
-    for b in others:
-        table = known.log_odds(float(long.middle[k, b]), float(long.spread[k, b]))
-        has = named[:, b] >= 0
-        out[has] += table[:, named[has, b]].T
-    if known.places.shape[1] == 3 and len(others) >= 3:
-        out += _sides(long, known, k, others, named)
-    return out
+def _positions(tracks: Tracks, alive: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return positions of some tracks in frames in which most of them exist, (F, n, 3)."""
+    d = tracks.detections
+    column = np.full(tracks.n_tracks + 1, -1)  # the last element is for clutter
+    column[alive] = np.arange(len(alive))
+    used = np.flatnonzero(column[tracks.labels] >= 0)
+    counts = np.bincount(d.frame_of[used], minlength=d.n_frames)
+    frames = np.flatnonzero(counts >= 0.5 * counts.max())
+    frames = frames[np.unique(np.linspace(0, len(frames) - 1, FIRST_FRAMES).astype(np.int64))]
+    row = np.full(d.n_frames, -1)
+    row[frames] = np.arange(len(frames))
+    used = used[row[d.frame_of[used]] >= 0]
+    return scattered(
+        d.points[used], row[d.frame_of[used]], column[tracks.labels[used]], len(frames), len(alive)
+    )
 
 
-def _sides(
-    long: _LongTracks, known: _Known, k: int, others: list[int], named: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return log odds from the side of three others on which a track lies."""
-    out = np.zeros((len(named), len(known.places)))
-    for three in ([0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]):
-        if max(three) >= len(others):
-            continue
-        chosen = [others[i] for i in three]
-        height, spread = long.height(k, chosen)
-        if not spread < 0.5 * abs(height):
-            continue
-        own = named[:, chosen]
-        has = (own >= 0).all(axis=1)
-        a, b, c = (known.places[own[has, i]][:, None] for i in range(3))
-        there = _height(known.places[None], a, b, c)
-        bent = np.full(there.shape, (2 * spread + 0.2 * abs(height)) ** 2)
-        out[has] += np.nan_to_num(_log_odds(height - there, bent, 0.0))
-    return out
+def _all(tracks: Tracks, made: MarkerSet, first: _First, up: Axis) -> _Named:
+    """Name all tracks from the first names; the names of the whole capture are searched again."""
+    of_track = np.full(tracks.n_tracks, -1)
+    of_track[first.tracks] = first.found.names
+    windows = Windows(tracks.detections, tracks.labels)
+    names = WindowNames(windows=windows, made=made, size=first.found.size, track_markers=of_track)
+    start = windows.holding(first.frame)
+    names.sweep(start)
+    positions = names.positions(FIRST_FRAMES)
+    seen = np.flatnonzero(np.isfinite(positions[..., 0]).sum(axis=0) >= MIN_LENGTH)
+    found = search(made, positions[:, seen], up, start=seen)
+    assert found is not None
+    if not np.array_equal(found.names, seen):
+        marker_of = np.arange(len(made))
+        marker_of[seen] = found.names
+        names.renamed(marker_of)
+        names.sweep(start)
+    odds = marker_odds(found, len(made))
+    own = names.track_markers
+    probability, other, other_probability = probabilities_of(
+        own, odds, track_odds(names.exchanges, names.counts, own)
+    )
+    return _Named(
+        markers=names.markers,
+        of_track=own,
+        probabilities=probability,
+        alternatives=other,
+        alternative_probabilities=other_probability,
+    )
 
 
-def _name_pieces(
-    long: _LongTracks,
-    known: _Known,
-    named: NDArray[np.int64],
-    probabilities: NDArray[np.float64],
-) -> None:
-    """Name remaining tracks that are pieces of named ones, in place."""
-    counts = long.seen.sum(axis=0)
-    for k in sorted(np.flatnonzero(named < 0), key=lambda k: -counts[k]):
-        has = np.flatnonzero(named >= 0)
-        others = long.steadiest(int(k), has.tolist())
-        if not others:
-            continue
-        log_odds = _evidence(long, known, int(k), others, named[None])[0]
-        # Tracks with a common frame are different markers.
-        at_once = (long.seen[:, has] & long.seen[:, [k]]).any(axis=0)
-        log_odds[named[has[at_once]]] = -np.inf
-        best = int(np.argmax(log_odds))
-        if log_odds[best] < ENOUGH:
-            continue
-        weights = np.exp(WEIGHT * (log_odds - log_odds[best]))
-        named[k], probabilities[k] = (
-            best,
-            1 / (weights.sum() + np.exp(-WEIGHT * log_odds[best])),
-        )
-
-
-def _renamed(tracks: Tracks, markers: NDArray[np.int64], bonds: Bonds) -> Tracks:
-    """Merge the tracks of each marker and name them."""
-    into = np.arange(tracks.n_tracks)
-    for marker in np.unique(markers[markers >= 0]):
-        same = np.flatnonzero(markers == marker)
-        into[same] = same[0]
-    kept, into = np.unique(into, return_inverse=True)
-    labels = np.where(tracks.labels >= 0, into[tracks.labels], -1)
-    names = [bonds.names[markers[k]] if markers[k] >= 0 else None for k in kept]
-    return replace(tracks, labels=labels, names=tuple(names))
+def _result(
+    tracks: Tracks, marker_sets: tuple[MarkerSet, ...], named: list[_Named | None]
+) -> Naming:
+    """Merge the names of all sets: for each track those of the set that is most certain."""
+    K, N = tracks.n_tracks, tracks.detections.n_points
+    all_names = [name for made in marker_sets for name in made.names]
+    markers, of_track = np.full(N, -1), np.full(K, -1)
+    probability, other_probability = np.zeros(K), np.zeros(K)
+    other: list[str | None] = [None] * K
+    at = 0
+    for made, own in zip(marker_sets, named, strict=True):
+        if own is not None:
+            is_given = (own.of_track >= 0) & (own.probabilities >= MIN_PROBABILITY)
+            better = is_given & (own.probabilities > probability)
+            of_track[better] = at + own.of_track[better]
+            probability[better] = own.probabilities[better]
+            other_probability[better] = own.alternative_probabilities[better]
+            for k in np.flatnonzero(better):
+                other[k] = made.names[own.alternatives[k]] if own.alternatives[k] >= 0 else None
+            rows = np.flatnonzero(np.append(better, False)[tracks.labels] & (own.markers >= 0))
+            markers[rows] = at + own.markers[rows]
+        at += len(made)
+    n_given = np.bincount(markers[markers >= 0], minlength=len(all_names))
+    rare = n_given < MIN_DETECTIONS  # false alarms at the place of a marker that is not there
+    markers[np.append(rare, False)[markers]] = -1
+    of_track[np.append(rare, False)[of_track]] = -1
+    n_given[rare] = 0
+    kept = np.flatnonzero(n_given > 0)
+    number = np.full(len(all_names), -1)
+    number[kept] = np.arange(len(kept))
+    rest = (markers < 0) & (tracks.labels >= 0)
+    unnamed, column = np.unique(tracks.labels[rest], return_inverse=True)
+    out = np.full(N, -1)
+    out[markers >= 0] = number[markers[markers >= 0]]
+    out[rest] = len(kept) + column
+    names = [all_names[m] for m in kept] + [None] * len(unnamed)
+    is_none = of_track < 0
+    probability[is_none] = 1 - other_probability[is_none]
+    return Naming(
+        tracks=replace(tracks, labels=out, names=tuple(names)),
+        markers=tuple(all_names[m] if m >= 0 else None for m in of_track),
+        probabilities=probability,
+        alternatives=tuple(other),
+        alternative_probabilities=other_probability,
+        changes=changes_of(tracks, markers, of_track, all_names),
+        missing=tuple(all_names[m] for m in np.flatnonzero(n_given == 0)),
+    )

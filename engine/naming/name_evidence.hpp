@@ -1,0 +1,214 @@
+// Evidence for the names of tracks: distances between tracks, and heights of tracks over the planes
+// of three others, against those of a marker set.
+//
+//   score of an assignment = Σ_pairs T[p, m_i, m_j] + Σ_quads H(height) + Σ_named (prior_m - none)
+//
+//   T      log odds of a distance for all pairs of markers (`distance_evidence.hpp`)
+//   quad   a marker and three reference markers; the sign of its height over their plane tells a
+//          body from its mirror image
+//   prior  log odds of a marker that is often missing; none: those of a track without a name
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/parallel.hpp"
+#include "naming/distance_evidence.hpp"
+
+namespace asterism {
+
+using Names = std::vector<std::int32_t>;  // marker of each track, -1 for none
+
+struct MarkerTables {
+  std::int32_t M = 0;
+  std::vector<double> distance, movement, variation;  // (M, M), NaN where unknown
+  std::vector<double> prior;                          // (M,)
+};
+
+struct Quad {
+  std::int32_t marker;
+  std::int32_t reference[3];
+  double height, variance, weight;
+};
+
+struct TrackPairs {
+  std::int32_t K = 0;
+  std::vector<std::int32_t> first, second;  // (P,), tracks whose distance counts
+  std::vector<double> distance, spread;     // (P,), metres
+};
+
+// Positions of all tracks in some frames, NaN where a track has no detection, and the spread of
+// every distance between two tracks, NaN for two without a common frame.
+struct TrackPoses {
+  std::int32_t F = 0;
+  std::vector<double> positions;  // (F, K, 3)
+  std::vector<double> spread;     // (K, K)
+};
+
+class NameEvidence {
+ public:
+  NameEvidence(const MarkerTables& markers, std::vector<Quad> quads, TrackPairs pairs,
+               TrackPoses poses, double size, const FitWeights& weights, double none,
+               std::int32_t threads)
+      : M_(markers.M), K_(pairs.K), size_(size), none_(none), prior_(markers.prior), quads_(std::move(quads)),
+        pairs_(std::move(pairs)), poses_(std::move(poses)) {
+    const std::size_t P = pairs_.first.size();
+    table_.resize(P * M_ * M_);
+    in_parallel(static_cast<std::int64_t>(P), threads, [&](std::int32_t, std::int64_t p) {
+      fill(static_cast<std::size_t>(p), markers, weights);
+    });
+    own_pairs_.resize(K_);
+    for (std::size_t p = 0; p < P; ++p) {
+      own_pairs_[pairs_.first[p]].push_back(static_cast<std::int32_t>(p));
+      own_pairs_[pairs_.second[p]].push_back(static_cast<std::int32_t>(p));
+    }
+  }
+
+  std::int32_t n_tracks() const { return K_; }
+  std::int32_t n_markers() const { return M_; }
+  double none() const { return none_; }
+
+  // Writes the log odds of each marker for each track of `rows`, (K, M), given the names of the
+  // others; other rows are left as they are.
+  void scores(const Names& names, std::span<const std::int32_t> rows,
+              std::vector<double>& out) const {
+    out.resize(static_cast<std::size_t>(K_) * M_);
+    for (const std::int32_t k : rows) {
+      double* row = out.data() + static_cast<std::size_t>(k) * M_;
+      std::copy(prior_.begin(), prior_.end(), row);
+      for (const std::int32_t p : own_pairs_[k]) {
+        const std::int32_t other = names[pairs_.first[p] == k ? pairs_.second[p] : pairs_.first[p]];
+        if (other < 0) continue;
+        const float* t = table_.data() + (static_cast<std::size_t>(p) * M_ + other) * M_;
+        for (std::int32_t m = 0; m < M_; ++m) row[m] += t[m];  // the table is symmetric
+      }
+    }
+    track_of(names);
+    for (const Quad& q : quads_) {
+      if (!find_plane(q)) continue;
+      for (const std::int32_t k : rows) {
+        double& score = out[static_cast<std::size_t>(k) * M_ + q.marker];
+        // Heights cannot make up for such a score, so that they are not computed.
+        if (score < none_ - kHopeless || k == at_[0] || k == at_[1] || k == at_[2]) continue;
+        score += height_log_odds(q, k);
+      }
+    }
+  }
+
+  double total(const Names& names) const {
+    double sum = 0;
+    for (std::size_t p = 0; p < pairs_.first.size(); ++p) {
+      const std::int32_t a = names[pairs_.first[p]], b = names[pairs_.second[p]];
+      if (a >= 0 && b >= 0) sum += table_[(p * M_ + a) * M_ + b];
+    }
+    for (const std::int32_t m : names) sum += m >= 0 ? prior_[m] - none_ : 0;
+    track_of(names);
+    for (const Quad& q : quads_)
+      if (track_[q.marker] >= 0 && find_plane(q)) sum += height_log_odds(q, track_[q.marker]);
+    return sum;
+  }
+
+ private:
+  void fill(std::size_t p, const MarkerTables& markers, const FitWeights& weights) {
+    const double d = pairs_.distance[p], s = pairs_.spread[p];
+    const FitWeights known = weights_at(weights, d, true), unknown = weights_at(weights, d, false);
+    float* t = table_.data() + p * M_ * M_;
+    for (std::int32_t a = 0; a < M_; ++a)
+      for (std::int32_t b = 0; b < M_; ++b) {
+        const std::size_t at = static_cast<std::size_t>(a) * M_ + b;
+        if (a == b) {
+          t[at] = static_cast<float>(kMinOdds);
+        } else if (b < a) {
+          t[at] = t[static_cast<std::size_t>(b) * M_ + a];  // a distance has no direction
+        } else if (std::isnan(markers.distance[at])) {
+          t[at] = 0;
+        } else {
+          const double B = markers.variation[at];
+          t[at] = static_cast<float>(loose_weight(s * s + B * B)) *
+                  distance_log_odds(d, s, markers.distance[at], markers.movement[at], B, size_,
+                                    known, unknown);
+        }
+      }
+  }
+
+  void track_of(const Names& names) const {
+    track_.assign(M_, -1);
+    for (std::int32_t k = 0; k < K_; ++k)
+      if (names[k] >= 0) track_[names[k]] = k;
+  }
+
+  // Sets the plane of the references in each frame; false if one of them has no track.
+  bool find_plane(const Quad& q) const {
+    for (int i = 0; i < 3; ++i) {
+      at_[i] = track_[q.reference[i]];
+      if (at_[i] < 0) return false;
+    }
+    plane_.assign(4 * static_cast<std::size_t>(poses_.F), NAN);
+    for (std::int32_t f = 0; f < poses_.F; ++f) {
+      const double *a = point(f, at_[0]), *b = point(f, at_[1]), *c = point(f, at_[2]);
+      const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+      const double v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+      double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                     u[0] * v[1] - u[1] * v[0]};
+      const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+      if (!(length > 1e-12)) continue;  // NaN too
+      double* out = plane_.data() + 4 * static_cast<std::size_t>(f);
+      for (int x = 0; x < 3; ++x) out[x] = n[x] / length;
+      out[3] = out[0] * a[0] + out[1] * a[1] + out[2] * a[2];
+    }
+    widest_ = std::max({spread(at_[0], at_[1]), spread(at_[0], at_[2]), spread(at_[1], at_[2])});
+    return true;
+  }
+
+  // Bounded log odds of the mean height of a track over the plane that was set.
+  double height_log_odds(const Quad& q, std::int32_t k) const {
+    double sum = 0, squares = 0;
+    int n = 0;
+    for (std::int32_t f = 0; f < poses_.F; ++f) {
+      const double* plane = plane_.data() + 4 * static_cast<std::size_t>(f);
+      const double* x = point(f, k);
+      const double h = plane[0] * x[0] + plane[1] * x[1] + plane[2] * x[2] - plane[3];
+      if (std::isnan(h)) continue;
+      sum += h;
+      squares += h * h;
+      ++n;
+    }
+    if (n == 0) return 0;
+    const double mean = sum / n, varied = std::max(squares / n - mean * mean, 0.0);
+    const double v = varied / 4 + q.variance, off = mean - size_ * q.height;
+    const double y = 1 + off * off / (4 * v);
+    const double odds =
+        std::clamp(std::log(0.375 * kHeights / (std::sqrt(v * y) * y * y) + 0.02), -4.0, 3.0);
+    double widest = widest_;
+    for (const std::int32_t a : at_) widest = std::max(widest, spread(k, a));
+    return q.weight * odds / (1 + widest * widest / (kLooseSpread * kLooseSpread));
+  }
+
+  const double* point(std::int32_t f, std::int32_t k) const {
+    return poses_.positions.data() + 3 * (static_cast<std::size_t>(f) * K_ + k);
+  }
+  double spread(std::int32_t a, std::int32_t b) const {
+    const double s = poses_.spread[static_cast<std::size_t>(a) * K_ + b];
+    return std::isnan(s) ? 1e3 : s;
+  }
+
+  static constexpr double kHopeless = 24;  // largest sum of the heights of a marker's quads
+  static constexpr double kHeights = 0.3;  // range of the heights of wrong tracks, metres
+
+  std::int32_t M_, K_;
+  double size_, none_;
+  std::vector<double> prior_;
+  std::vector<Quad> quads_;
+  TrackPairs pairs_;
+  TrackPoses poses_;
+  std::vector<float> table_;                          // (P, M, M)
+  std::vector<std::vector<std::int32_t>> own_pairs_;  // of each track
+  mutable std::vector<std::int32_t> track_;           // of each marker, -1 for none
+  mutable std::vector<double> plane_;                 // (F, 4), normal and offset
+  mutable std::int32_t at_[3] = {0, 0, 0};            // tracks of the references
+  mutable double widest_ = 0;                         // spread of their distances
+};
+
+}  // namespace asterism

@@ -1,0 +1,119 @@
+"""Search for the names of tracks that exist at the same time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism import _engine
+from asterism.tracking.naming.evidence import (
+    FIRST_WEIGHTS,
+    ROUGH_WEIGHTS,
+    TrackStats,
+    evidence_of,
+    refit,
+)
+from asterism.tracking.naming.starts import starts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import MarkerSet
+    from asterism.model.upwards import Axis
+
+__all__ = ["Found", "search"]
+
+REFINED = 3
+"""Number of results of the rough search that are refined."""
+IN_TURN = 5
+"""Number of nearest tracks with which a track may exchange names in turn."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Found:
+    """Names of n tracks that exist at the same time."""
+
+    names: NDArray[np.int64]  # (n,), marker of each track, -1 for none
+    score: float  # log odds of all names together
+    size: float  # of the subject relative to the marker set
+    weights: tuple[float, ...]  # of the four kinds of fit of a distance
+    evidence: _engine.NameEvidence
+
+
+def search(
+    made: MarkerSet,
+    positions: NDArray[np.float64],
+    up: Axis,
+    start: NDArray[np.int64] | None = None,
+) -> Found | None:
+    """Search for the names of tracks that exist at the same time; None where nothing can start.
+
+    Parameters
+    ----------
+    made : MarkerSet
+        Markers of one subject.
+    positions : ndarray of shape (T, n, 3)
+        Positions of the tracks, metres, NaN without a detection.
+    up : {"x", "y", "z"}
+        Axis of the capture that points up.
+    start : ndarray of int, shape (n,), optional
+        Names from which the search starts as well.
+
+    Notes
+    -----
+    The posture of the set is laid over the points in several ways. From each of these starts a
+    search with wide tolerances settles; the best results are refined with the weights and the size
+    that fit them. The search is a local one: it ends where no move of `engine/naming/name_search.hpp`
+    improves the score.
+    """
+    first = starts(made, positions, up)
+    first += [start] if start is not None else []
+    if not first:
+        return None
+    stats = TrackStats.of(positions)
+    moves = {
+        "groups": _groups(made),
+        "partner": np.array(made.partners, dtype=np.int64),
+        "near": stats.near(IN_TURN),
+    }
+    rough = _engine.NameSearch(evidence_of(made, stats, size=1.0, weights=ROUGH_WEIGHTS), **moves)
+    settled: dict[bytes, tuple[float, NDArray[np.int64]]] = {}
+    for names in first:
+        names, score = rough.settled(names)
+        settled[names.tobytes()] = (score, names)
+    best = [n for _, n in sorted(settled.values(), key=lambda item: -item[0])[:REFINED]]
+    best = [rough.improved(best[0])[0], *best]
+    best += [start] if start is not None else []
+    size, weights = refit(made, stats, best[0]) or (1.0, FIRST_WEIGHTS)
+    evidence = evidence_of(made, stats, size=size, weights=weights)
+    fine = _engine.NameSearch(evidence, **moves)
+    names, _ = max((fine.settled(names) for names in best), key=lambda item: item[1])
+    size, weights = refit(made, stats, names) or (size, weights)
+    evidence = evidence_of(made, stats, size=size, weights=weights)
+    names, score = _engine.NameSearch(evidence, **moves).improved(names)
+    return Found(names=names, score=score, size=size, weights=weights, evidence=evidence)
+
+
+def _groups(made: MarkerSet) -> list[list[int]]:
+    """Return groups of near markers of one side: all branches of a tree of nearest neighbours.
+
+    A group is moved together with its partners on the other side. Markers without a partner are
+    grouped too; they are left without names and named anew.
+    """
+    from scipy.cluster.hierarchy import linkage
+    from scipy.spatial.distance import squareform
+
+    partner = made.partners
+    own = [m for m in range(len(made)) if partner[m] < 0 or m < partner[m]]
+    if len(own) < 2:
+        return [own] if own else []
+    distances = made.distances[np.ix_(own, own)]
+    distances = np.where(np.isfinite(distances), distances, 10.0)
+    np.fill_diagonal(distances, 0.0)
+    tree = linkage(squareform(distances, checks=False), "single")
+    groups = [[m] for m in own]
+    for first, second in tree[:, :2].astype(np.int64):
+        groups.append([*groups[first], *groups[second]])
+    return groups[::-1]

@@ -1,0 +1,84 @@
+"""Stretches of frames in which a track is on another marker than in most of its frames."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from asterism.model import Tracks
+
+__all__ = ["NameChange", "changes_of"]
+
+
+@record
+class NameChange:
+    """Stretch of frames in which a track is on another marker than in most of its frames.
+
+    Parameters
+    ----------
+    track : int
+        Number of the input track.
+    first, last : int
+        First and last frame of the stretch.
+    usual : str or None
+        Name of the track in most of its frames, None for none.
+    name : str or None
+        Name in the stretch.
+
+    Examples
+    --------
+    >>> change = NameChange(track=3, first=320, last=399, usual="LTOE", name="LMT5")
+    >>> change.name
+    'LMT5'
+    """
+
+    track: int
+    first: int
+    last: int
+    usual: str | None
+    name: str | None
+
+
+def changes_of(
+    tracks: Tracks,
+    markers: NDArray[np.int64],
+    usual: NDArray[np.int64],
+    names: Sequence[str],
+) -> tuple[NameChange, ...]:
+    """Return the stretches in which tracks are on other markers, by track and then by time.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Input tracks.
+    markers : ndarray of int, shape (N,)
+        Marker of each detection, -1 for none.
+    usual : ndarray of int, shape (K,)
+        Marker of each track.
+    names : sequence of str
+        Names of the markers.
+    """
+    order, _ = tracks.by_track
+    label, marker = tracks.labels[order], markers[order]
+    frame = tracks.detections.frame_of[order]
+    starts = np.flatnonzero(np.diff(label, prepend=-1) | np.diff(marker, prepend=-2))
+    ends = np.append(starts[1:], len(order)) - 1
+    return tuple(
+        NameChange(
+            track=int(label[a]),
+            first=int(frame[a]),
+            last=int(frame[b]),
+            usual=names[usual[label[a]]] if usual[label[a]] >= 0 else None,
+            name=names[marker[a]] if marker[a] >= 0 else None,
+        )
+        for a, b in zip(starts.tolist(), ends.tolist(), strict=True)
+        if marker[a] != usual[label[a]]
+    )
