@@ -29,7 +29,7 @@ def experiment(noise: float) -> am.Tracks:
 def by_segment(plot: Callable[..., Any]) -> Any:
     """Draw a walking person in the colours of the rigid segments."""
     truth = am.simulate.person(activity="walk", seed=2)
-    segments = am.learn_bonds(truth).segments(truth.names)
+    segments = am.tracking.learn_bonds(truth).segments(truth.names)
     return plot(truth.part(0, 150), segments=segments)
 
 

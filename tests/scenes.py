@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import asterism as am
 
@@ -129,3 +130,13 @@ def stitched(detections, method=None, *, model=None, seed=None, **options):
     model = am.tracking.tracklet_model(model or am.estimate_model(detections).model)
     tracklets = am.track(detections, method or am.SMP(window=3), model=model, seed=seed)
     return am.stitch(tracklets, model, **options)
+
+
+def moving(shape, n_frames=120, seed=0, noise=0.0):
+    """A rigid body that turns and wanders."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(n_frames) / 100
+    turns = Rotation.from_rotvec(np.cumsum(rng.normal(scale=0.03, size=(n_frames, 3)), axis=0))
+    places = np.stack([turns.apply(x) for x in shape], axis=1)
+    places += np.cumsum(rng.normal(scale=0.005, size=(n_frames, 1, 3)), axis=0)
+    return t, places + rng.normal(scale=noise, size=places.shape)

@@ -150,6 +150,7 @@ void bind_naming(nb::module_& module) {
       .def("__init__", &make, nb::kw_only(), "distances"_a, "movements"_a, "variations"_a, "prior"_a,
            "quads"_a, "heights"_a, "pairs"_a, "pair_distances"_a, "pair_spreads"_a, "positions"_a,
            "spreads"_a, "size"_a, "weights"_a, "none"_a, "threads"_a)
+      .def_prop_ro("n_markers", &NameEvidence::n_markers)
       .def("scores",
            [](const NameEvidence& self, const In<std::int64_t>& names) {
              const Names own = names_of(names, self);

@@ -12,7 +12,7 @@ from . import (
 )
 from .camera import Camera, Observations, Rig
 from .errors import AsterismError, FormatError, ParameterError, SolverLimit
-from .io import read, read_rig, write
+from .io import read, read_marker_set, read_rig, write
 from .metrics import evaluate
 from .model import (
     DWNA,
@@ -84,6 +84,7 @@ __all__ = [
     "name_tracks",
     "plot",
     "read",
+    "read_marker_set",
     "read_rig",
     "reconstruct",
     "report",

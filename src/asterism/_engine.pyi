@@ -512,3 +512,50 @@ class LiveStitcher:
     n_cuts: Final[int]
     n_markers: Final[int]
     n_remembered: Final[int]
+
+class NameEvidence:
+    def __init__(
+        self,
+        *,
+        distances: Floats,
+        movements: Floats,
+        variations: Floats,
+        prior: Floats,
+        quads: Ints,
+        heights: Floats,
+        pairs: Ints,
+        pair_distances: Floats,
+        pair_spreads: Floats,
+        positions: Floats,
+        spreads: Floats,
+        size: float,
+        weights: Floats,
+        none: float,
+        threads: int,
+    ) -> None: ...
+    @property
+    def n_markers(self) -> int: ...
+    def scores(self, names: Ints) -> Floats: ...
+    def total(self, names: Ints) -> float: ...
+
+class NameSearch:
+    def __init__(
+        self,
+        evidence: NameEvidence,
+        *,
+        groups: list[list[int]],
+        partner: Ints,
+        near: list[list[int]],
+    ) -> None: ...
+    def settled(self, names: Ints) -> tuple[Ints, float]: ...
+    def improved(self, names: Ints) -> tuple[Ints, float]: ...
+
+def window_scores(
+    points: Floats,
+    *,
+    holder: Ints,
+    neighbours: Ints,
+    distances: Floats,
+    variances: Floats,
+    weights: Floats,
+) -> Floats: ...

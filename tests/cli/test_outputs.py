@@ -20,8 +20,9 @@ FILES = {
     "track --run -o": ("track in.csv --run new -o OUT", ".csv"),
     "stitch": ("stitch truth.csv -o OUT", ".csv"),
     "fill": ("fill truth.csv -o OUT", ".csv"),
-    "bonds": ("bonds truth.csv -o OUT", ".toml"),
-    "name": ("name truth.csv --bonds bonds.toml -o OUT", ".csv"),
+    "markerset learn": ("markerset learn truth.csv -o OUT", ".toml"),
+    "markerset merge": ("markerset merge set.toml other.toml -o OUT", ".toml"),
+    "name": ("name truth.csv --markers set.toml -o OUT", ".csv"),
     "estimate": ("estimate in.csv -o OUT", ".toml"),
     "evaluate": ("evaluate in.csv truth.csv --by-frame OUT", ".csv"),
     "report": ("report truth.csv -o OUT", ".html"),
@@ -64,7 +65,7 @@ WORK = {
     "asterism.cli.commands.demo": ("_experiment",),
     "asterism.reproduction": ("load",),
     "asterism.io.calibrations.files": ("read_rig",),
-    "asterism.tracking.rigidity.bonds": ("read_toml",),
+    "asterism.model.marker_set_file": ("read_toml",),
 }
 
 
@@ -79,7 +80,8 @@ def inputs(tmp_path_factory):
     rig = am.Rig.ring(4, radius=5, height=2)
     am.io.write_rig(rig, folder / "rig.toml")
     am.io.write_observations(am.simulate.film(truth, rig).observations, folder / "seen.csv")
-    am.learn_bonds(truth).to_toml(folder / "bonds.toml")
+    am.learn_marker_set(truth).to_toml(folder / "set.toml")
+    am.learn_marker_set(sensed).to_toml(folder / "other.toml")
     return folder
 
 
@@ -160,8 +162,8 @@ def test_a_folder_with_files_needs_overwrite(here, idle, capsys, name):
     Path("full/notes.txt").write_text("precious")
     err = refused(FOLDERS[name].replace("OUT", "full"), capsys)
     assert "full, which holds files. Give --overwrite" in err
-    line = FOLDERS[name].replace("OUT", "bonds.toml --overwrite")
-    assert "expected a folder or a new name, found the file bonds.toml" in refused(line, capsys)
+    line = FOLDERS[name].replace("OUT", "set.toml --overwrite")
+    assert "expected a folder or a new name, found the file set.toml" in refused(line, capsys)
 
 
 @pytest.mark.parametrize("line", DEFAULTS)
@@ -184,8 +186,8 @@ INPUTS = {
     "track in.csv -o in.csv": "in.csv",
     "stitch truth.csv -o truth.csv": "truth.csv",
     "fill truth.csv -o truth.csv": "truth.csv",
-    "bonds bonds.toml -o bonds.toml": "bonds.toml",
-    "name truth.csv --bonds bonds.toml -o truth.csv": "truth.csv",
+    "markerset merge set.toml other.toml -o set.toml": "set.toml",
+    "name truth.csv --markers set.toml -o truth.csv": "truth.csv",
     "evaluate in.csv truth.csv --by-frame in.csv": "in.csv",
     "corrupt truth.csv -o truth.csv --truth new.csv": "truth.csv",
     "reconstruct seen.csv --rig rig.toml -o seen.csv": "seen.csv",

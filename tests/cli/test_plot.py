@@ -202,7 +202,7 @@ def test_many_tracks_are_coloured_by_segment(work, capsys):
     am.write(truth, "person.csv")
     read = am.io.read_tracks("person.csv")
     run("plot axes person.csv -o axes.svg", capsys)
-    segments = am.learn_bonds(read).segments(read.names)
+    segments = am.tracking.learn_bonds(read).segments(read.names)
     expected = am.plot.figure_bytes(am.plot.plot_axes(read, segments=segments), "svg")
     assert (work / "axes.svg").read_bytes() == expected
     run("plot trajectories person.csv -o time.png --by-time", capsys)

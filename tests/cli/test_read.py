@@ -29,17 +29,14 @@ def write_c3d(path, points, **options):
     path.write_bytes(make_c3d(points, **options))
 
 
-def test_bonds_leave_out_channels_without_a_name(tmp_path, capsys):
+def test_marker_sets_leave_out_channels_without_a_name(tmp_path, capsys):
     labels = ["LASI", "RASI", "SACR", "*12", "Unlabeled 7"]
     write_c3d(tmp_path / "a.c3d", walk(), labels=labels)
-    out, _ = printed("bonds a.c3d -o a.toml", capsys)
-    assert "2 tracks without a name" in out
-    assert "T00" not in (tmp_path / "a.toml").read_text()
-    report = json.loads(printed("bonds a.c3d --json", capsys)[0])
-    assert (report["n_markers"], report["n_left_out"], report["n_bonds"]) == (3, 2, 3)
+    printed("markerset learn a.c3d -o a.toml", capsys)
+    assert am.MarkerSet.from_toml(tmp_path / "a.toml").names == ("LASI", "RASI", "SACR")
     write_c3d(tmp_path / "b.c3d", walk(), labels=["*0", "*1", "", "U_4", "New 0001"])
-    err = refused("bonds b.c3d -o b.toml", capsys)
-    assert "a capture with named markers, found 5 tracks without a name in b.c3d" in err
+    err = refused("markerset learn b.c3d -o b.toml", capsys)
+    assert "a capture with named markers, found 5 tracks in b.c3d, none with a name" in err
     assert not (tmp_path / "b.toml").exists()
 
 
@@ -58,7 +55,7 @@ def test_a_truncated_capture_is_tracked_and_the_result_says_so(tmp_path, capsys)
     assert f"cut.c3d: {said}" in err
     assert said in json.loads((tmp_path / "runs/a/summary.json").read_text())["truncated"]
     assert said in printed("info out.c3d", capsys)[0]
-    _, err = printed("bonds cut.c3d -o a.toml", capsys)
+    _, err = printed("markerset learn cut.c3d -o a.toml", capsys)
     assert f"cut.c3d: {said}" in err
     (tmp_path / "none.c3d").write_bytes(raw[: begin + 79])
     assert "the first is complete" in refused("info none.c3d", capsys)

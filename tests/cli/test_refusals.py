@@ -109,7 +109,7 @@ def test_damaged_run_files(scene, capsys):
 
 
 def test_a_model_is_written_under_the_name_of_one(scene, capsys):
-    for line in ("estimate in.csv", "bonds truth.csv"):
+    for line in ("estimate in.csv", "markerset learn truth.csv"):
         assert main(f"{line} -o model.json".split()) == 2
         assert "--out: expected a name ending in .toml, found model.json" in capsys.readouterr().err
         assert not Path("model.json").exists()
@@ -133,7 +133,9 @@ def test_the_common_options_are_everywhere():
     from asterism.cli.program import command as program
 
     commands = dict(program.commands)
-    commands |= {f"camera {name}": c for name, c in commands.pop("camera").commands.items()}
+    for group in ("camera", "markerset"):
+        own = commands.pop(group).commands
+        commands |= {f"{group} {name}": command for name, command in own.items()}
     lists = {"methods", "scenes"}
     assert lists < commands.keys()
     assert "camera map" in commands

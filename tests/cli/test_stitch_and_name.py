@@ -1,4 +1,4 @@
-"""Stitching, bonds and names on the command line."""
+"""Stitching, marker sets and names on the command line."""
 
 from __future__ import annotations
 
@@ -80,20 +80,21 @@ def test_what_stitch_refuses(scene, capsys, line, says):
     assert not Path("out.csv").exists()
 
 
-def test_bonds_of_one_capture_name_the_next(person, capsys):
-    out = run("bonds person.csv -o subject.toml", capsys)
-    assert "rigid clusters" in out
-    report = json.loads(run("bonds person.csv --json", capsys))
-    assert report["n_bonds"] > report["n_rigid"] > 50
-    assert len(report["clusters"]) > 5
+def test_the_marker_set_of_one_capture_names_the_next(person, capsys):
+    out = run("markerset learn person.csv -o subject.toml", capsys)
+    assert "moving subjects" in out
+    report = json.loads(run("markerset show subject.toml --json", capsys))
+    assert len(report["markers"]) == 53
+    assert {one["name"]: one["partner"] for one in report["markers"]}["LKNE"] == "RKNE"
     run("track p.c3d --stitch -o tracked.c3d", capsys)
-    out = run("name tracked.c3d --bonds subject.toml -o named.c3d", capsys)
-    assert "markers not found" in out
+    out = run("name tracked.c3d --markers subject.toml -o named.c3d", capsys)
+    assert "names not found" in out
     truth, named = am.io.read_tracks("person.csv"), am.read("named.c3d")
     names = [name for name in named.names if name]
     assert set(names) <= set(truth.names)
     assert len(names) > 0.95 * truth.n_tracks
-    report = json.loads(run("name tracked.c3d --bonds subject.toml -o n.csv --json", capsys))
+    assert names == [name for name in truth.names if name in names]  # in the order of the set
+    report = json.loads(run("name tracked.c3d --markers subject.toml -o n.csv --json", capsys))
     assert report["n_named"] == len(report["names"]) >= len(names)
     assert {one["name"] for one in report["names"]} == set(names)
     # The names are right: each point that has one lies where that marker was.
@@ -107,20 +108,38 @@ def test_bonds_of_one_capture_name_the_next(person, capsys):
     assert np.quantile(off, 0.99) < 0.002
 
 
+def test_sets_are_merged_and_names_checked(person, capsys):
+    run("markerset learn person.csv -o one.toml", capsys)
+    run("markerset learn person.csv -o two.toml", capsys)
+    out = run("markerset merge one.toml two.toml -o both.toml", capsys)
+    assert "subjects" in out
+    assert am.MarkerSet.from_toml("both.toml").n_subjects == 2
+    assert "none" in run("markerset check both.toml person.csv", capsys)
+    truth = am.io.read_tracks("person.csv")
+    names = list(truth.names)
+    a, b = names.index("LTOE"), names.index("RTOE")
+    names[a], names[b] = names[b], names[a]
+    wrong = am.Tracks(detections=truth.detections, labels=truth.labels, names=tuple(names))
+    am.write(wrong, "wrong.csv")
+    assert main(["markerset", "check", "both.toml", "wrong.csv", "--json"]) == 1
+    doubts = json.loads(capsys.readouterr().out)["doubts"]
+    assert {(one["name"], one["found"]) for one in doubts} == {("LTOE", "RTOE"), ("RTOE", "LTOE")}
+
+
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("bonds in.csv", "asterism track"),
-        ("bonds truth.csv -o truth.csv", "a name ending in .toml"),
-        ("bonds truth.csv --neighbours 0", "neighbours"),
-        ("name in.csv --bonds b.toml -o out.csv", "asterism track --stitch"),
-        ("name truth.csv --bonds none.toml -o out.csv", "none.toml"),
-        ("name truth.csv --bonds truth.csv -o out.csv", "TOML"),
-        ("name truth.csv --bonds b.toml -o b.toml", "a name ending in .c3d"),
-        ("name truth.csv -o out.csv", "--bonds"),
+        ("markerset learn in.csv -o x.toml", "a capture with named markers"),
+        ("markerset learn truth.csv -o truth.csv", "a name ending in .toml"),
+        ("markerset show none.toml", "none.toml"),
+        ("markerset merge set.toml none.toml -o x.toml", "none.toml"),
+        ("name in.csv --markers set.toml -o out.csv", "asterism track"),
+        ("name truth.csv --markers none.toml -o out.csv", "none.toml"),
+        ("name truth.csv --markers truth.csv -o out.csv", "TOML"),
+        ("name truth.csv --markers set.toml -o set.toml", "a name ending in .c3d"),
+        ("name truth.csv -o out.csv", "--markers"),
     ],
 )
-def test_what_bonds_and_recognize_refuse(scene, capsys, line, says):
-    if "b.toml" in line:
-        am.learn_bonds(am.io.read_tracks("truth.csv")).to_toml("b.toml")
+def test_what_marker_sets_and_naming_refuse(scene, capsys, line, says):
+    am.learn_marker_set(am.io.read_tracks("truth.csv")).to_toml("set.toml")
     assert says in refused(line, capsys)

@@ -24,7 +24,7 @@ def files(tmp_path_factory):
     rig = am.Rig.ring(4, radius=5, height=2)
     am.io.write_rig(rig, folder / "rig.toml")
     am.io.write_observations(am.simulate.film(truth, rig).observations, folder / "seen.csv")
-    am.learn_bonds(truth).to_toml(folder / "bonds.toml")
+    am.learn_marker_set(truth).to_toml(folder / "set.toml")
     model = small_model().to_toml(folder / "model.toml")
     (folder / "misspelt.toml").write_text(model.replace("noise_sigma", "noise_sgima"))
     (folder / "bad.toml").write_text("a = [\n")

@@ -99,8 +99,12 @@ MISTAKES = {
     "a number for a calibration": (lambda: am.read_rig(3), "path: expected the name of a file"),
     "a number for image points": (lambda: am.io.read_observations(3), "path: expected the name of"),
     "a number for a model": (lambda: am.TrackingModel.from_toml(3), "path: expected the name of"),
-    "a number for bonds": (
-        lambda: am.tracking.Bonds.from_toml(3), "path: expected the name of a file",
+    "a number for a marker set": (
+        lambda: am.MarkerSet.from_toml(3), "path: expected the name of a file",
+    ),
+    "no marker set": (lambda: am.name_tracks(TRUTH), "marker_sets: expected at least one"),
+    "tracks for a marker set": (
+        lambda: am.name_tracks(TRUTH, TRUTH), "marker_sets: expected a MarkerSet",
     ),
     "a number for a page": (lambda: am.report(TRUTH, 3), "path: expected the name of a file"),
     "no state to go on from": (

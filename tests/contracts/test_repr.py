@@ -122,7 +122,10 @@ def instances():
             kind=2, corners=rng.normal(size=(4, 3)), origin=rng.normal(size=3), channels=(LONG,) * 6
         ),
         am.model.Gap(track=3, first=10, last=20, seconds=1 / 3),
-        am.learn_bonds(truth), am.name_tracks(tracks, am.learn_bonds(truth)),
+        am.tracking.learn_bonds(truth), am.learn_marker_set(truth),
+        am.name_tracks(tracks, am.learn_marker_set(truth)),
+        am.tracking.NameChange(track=3, first=5, last=17, usual=LONG, name=None),
+        am.tracking.NameDoubt(name=LONG, first=5, last=17, found=LONG, probability=1 / 3),
         am.tracking.Join(marker=3, last=5, first=17, probability=1 / 3),
         am.tracking.HypothesisCluster(
             targets=np.arange(9), detections=np.arange(90), origins=np.zeros((50, 9), dtype=int),

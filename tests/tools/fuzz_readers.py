@@ -198,9 +198,9 @@ def _text_reader(made: str, read_it: Callable[[Path], object]) -> Reader:
     return Reader(({"a.toml": made.encode()},), _read)
 
 
-def _bonds() -> str:
+def _marker_set() -> str:
     points = np.random.default_rng(1).normal(size=(1, 4, 3)).repeat(24, axis=0)
-    return am.learn_bonds(Tracks.from_dense(np.arange(24) / 100, points, "ABCD")).to_toml()
+    return am.learn_marker_set(Tracks.from_dense(np.arange(24) / 100, points, "ABCD")).to_toml()
 
 
 def _sightings() -> tuple[dict[str, bytes], ...]:
@@ -221,7 +221,7 @@ def readers() -> dict[str, Callable[[], Reader]]:
     made["observations"] = lambda: Reader(_observation_seeds(), _read_points)
     made["caliscope-xy"] = lambda: Reader(({"xy.csv": XY.encode()},), _read_points)
     made["sightings"] = lambda: Reader(_sightings(), _read_known_points)
-    made["bonds"] = lambda: _text_reader(_bonds(), am.tracking.Bonds.from_toml)
+    made["marker-set"] = lambda: _text_reader(_marker_set(), am.MarkerSet.from_toml)
     return made
 
 

@@ -79,7 +79,7 @@ def segments_of(tracks: am.Tracks) -> NDArray[np.int64] | None:
     names = [f"{k}" for k in range(len(tracks))]
     long = np.flatnonzero(tracks.lengths >= max(0.1 * tracks.detections.n_frames, 2)).tolist()
     renamed = dataclasses.replace(tracks, names=names).select(long)
-    return am.learn_bonds(renamed).segments(names)
+    return am.tracking.learn_bonds(renamed).segments(names)
 
 
 def confident_tracks(path: Path) -> am.Tracks:

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import typer
 
 import asterism
-from asterism.cli.commands.bonds import bonds
 from asterism.cli.commands.camera import app as camera
 from asterism.cli.commands.chain import chain
 from asterism.cli.commands.corrupt import corrupt
@@ -18,6 +17,7 @@ from asterism.cli.commands.evaluate import evaluate
 from asterism.cli.commands.fill import fill
 from asterism.cli.commands.film import film
 from asterism.cli.commands.info import info
+from asterism.cli.commands.markerset import app as markerset
 from asterism.cli.commands.methods import methods, scenes
 from asterism.cli.commands.name import name
 from asterism.cli.commands.plot import plot
@@ -59,7 +59,7 @@ def _root(  # pyright: ignore[reportUnusedFunction]
 
 
 _TITLES = {
-    "Tracks and markers": (track, stitch, fill, bonds, name, estimate, methods),
+    "Tracks and markers": (track, stitch, name, fill, estimate, methods),
     "Captures and results": (info, evaluate, report, plot, view),
     "Simulations and experiments": (corrupt, simulate, scenes, demo, reproduce),
     "Cameras": (film, reconstruct, chain),
@@ -67,6 +67,7 @@ _TITLES = {
 for _title, _commands in _TITLES.items():
     for _command in _commands:
         app.command(rich_help_panel=_title)(with_option_names(_command))
+app.add_typer(markerset, rich_help_panel="Tracks and markers")
 app.add_typer(camera, rich_help_panel="Cameras")
 
 

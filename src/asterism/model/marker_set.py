@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import field, replace
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
-from asterism.checks import check_number, keep_array
-from asterism.errors import ParameterError
+from asterism.checks import check_kind, check_number, check_path, keep_array
+from asterism.errors import FormatError, ParameterError
 from asterism.model.marker_geometry import (
     candidate_quads,
     choose_quads,
@@ -63,6 +63,9 @@ class MarkerSet:
     presences : array_like of shape (M,), optional
         Share of the captures of moving subjects in which each marker occurs, in [0, 1]; 1 by
         default. Some markers are worn in the static trial alone.
+    subject : str
+        Name of the subject, which named tracks have before a colon, as in ``Ann:LKNE``; by
+        default none.
     n_subjects : int
         Number of subjects from whom the set was learnt.
     up : {"x", "y", "z"}
@@ -93,6 +96,7 @@ class MarkerSet:
     height_spreads: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     segments: tuple[str | None, ...] = ()
     presences: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    subject: str = ""
     n_subjects: int = 1
     up: Literal["x", "y", "z"] = "z"
 
@@ -102,19 +106,20 @@ class MarkerSet:
         if twice:
             raise ParameterError("names", "each name once", f"{twice[0]} twice")
         M = len(names)
-        keep = {"names": names, "places": keep_array("places", self.places, (M, 3), finite=False)}
+        places = keep_array("places", self.places, (M, 3), finite=False)
+        keep: dict[str, Any] = {"names": names, "places": places}
         given = np.asarray(self.distances)
         keep["distances"] = (
             keep_array("distances", given, (M, M), finite=False)
             if given.size or not M
-            else pose_distances(keep["places"])
+            else pose_distances(places)
         )
         for name, default in (("movements", np.nan), ("variations", 0.0)):
             values = np.asarray(getattr(self, name))
             values = values if values.size or not M else np.full((M, M), default)
             keep[name] = keep_array(name, values, (M, M), finite=False)
         if self.quads is None:
-            keep |= _quads_of(keep["places"], keep["distances"])
+            keep |= _quads_of(places, keep["distances"])
         else:
             quads = keep_array("quads", self.quads, ("Q", 4), dtype=np.int64)
             if quads.size and not 0 <= quads.min() <= quads.max() < M:
@@ -131,6 +136,7 @@ class MarkerSet:
         if len(segments) != M:
             raise ParameterError("segments", f"one for each of {M} markers", len(segments))
         check_number("n_subjects", self.n_subjects, above=1, closed=True, integer=True)
+        check_kind("subject", self.subject, str)
         if self.up not in ("x", "y", "z"):
             raise ParameterError("up", '"x", "y" or "z"', repr(self.up))
         for name, value in (keep | {"segments": segments}).items():
@@ -141,9 +147,14 @@ class MarkerSet:
         return len(self.names)
 
     @property
+    def full_names(self) -> tuple[str, ...]:
+        """Names with the subject before a colon, if it has a name."""
+        return tuple(f"{self.subject}:{n}" if self.subject else n for n in self.names)
+
+    @property
     def knows_movement(self) -> bool:
         """Whether the set was learnt from a subject who moved."""
-        return bool(np.isfinite(self.movements).any())
+        return bool(np.isfinite(self.movements[~np.eye(len(self), dtype=bool)]).any())
 
     @property
     def sides(self) -> tuple[str | None, ...]:
@@ -186,25 +197,26 @@ class MarkerSet:
             height_spreads=self.height_spreads[kept],
             segments=tuple(self.segments[m] for m in markers),
             presences=self.presences[markers],
+            subject=self.subject,
             n_subjects=self.n_subjects,
             up=self.up,
         )
 
     def of_subject(self, subject: str) -> MarkerSet:
-        """Return the set with a subject before all names, as in ``Ann:LKNE``.
+        """Return the set with another name of its subject.
 
         Parameters
         ----------
         subject : str
-            Name of the subject; it replaces an earlier one.
+            Name of the subject, empty for none.
 
         Examples
         --------
         >>> import asterism as am
-        >>> am.MarkerSet(names=("C7",), places=[[0, 0, 1]]).of_subject("Ann").names
+        >>> am.MarkerSet(names=("C7",), places=[[0, 0, 1]]).of_subject("Ann").full_names
         ('Ann:C7',)
         """
-        return replace(self, names=tuple(f"{subject}:{n.rpartition(':')[2]}" for n in self.names))
+        return replace(self, subject=subject)
 
     def to_toml(self, path: str | Path | None = None) -> str:
         """Return the set as TOML text, and write it to `path` if one is given.
@@ -257,16 +269,18 @@ class MarkerSet:
         """
         from asterism.model.marker_set_file import read_fields
 
-        return cls(**read_fields(path))
+        path = check_path("path", path)
+        try:
+            return cls(**read_fields(path))
+        except ParameterError as error:
+            raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
 
     def __repr__(self) -> str:
         n = self.n_subjects
         return f"MarkerSet({len(self)} markers, {n} subject{'s' if n != 1 else ''})"
 
 
-def _quads_of(
-    places: NDArray[np.float64], distances: NDArray[np.float64]
-) -> dict[str, NDArray[np.float64]]:
+def _quads_of(places: NDArray[np.float64], distances: NDArray[np.float64]) -> dict[str, Any]:
     """Return quads, heights and their unknown spreads, from the places of one posture."""
     cost = np.where(np.eye(len(places), dtype=bool) | ~np.isfinite(distances), np.inf, distances)
     quads = candidate_quads(cost)

@@ -1,4 +1,4 @@
-"""Marker sets as TOML: one line a marker, a distance and a side, so that versions can be compared.
+"""Marker sets as TOML: one line a marker, a distance and a side. All lengths are metres.
 
 A set by hand needs the names and places alone::
 
@@ -36,46 +36,38 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 def to_text(made: MarkerSet) -> str:
     """Return a marker set as TOML text."""
-    lines = [f'format = "{FORMAT}"', f"subjects = {made.n_subjects}", f'up = "{made.up}"']
+    assert made.quads is not None
+    lines = [f'format = "{FORMAT}"']
+    if made.subject:
+        lines.append(f"subject = {json.dumps(made.subject, ensure_ascii=False)}")
+    lines += [f"subjects = {made.n_subjects}", f'up = "{made.up}"', ""]
+    # A key after a table would belong to it, so that the sides stand before the tables.
     lines += [
-        "",
-        "# place: metres, in one typical posture; presence: share of the captures of moving subjects",
-        "[markers]",
+        "# Sides: a marker, three others, its height over their plane (right-handed), spread."
     ]
+    lines += ["sides = ["]
+    for quad, *numbers in zip(made.quads, made.heights, made.height_spreads, strict=True):
+        names = ", ".join(json.dumps(made.names[m], ensure_ascii=False) for m in quad)
+        lines.append(f"  [{names}, {_numbers(numbers)[1:-1]}],")
+    lines += [
+        "]",
+        "",
+        "# Places in one posture; share of the captures of moving subjects with a marker.",
+    ]
+    lines += ["[markers]"]
     rows = zip(made.names, made.places, made.segments, made.presences, strict=True)
     for name, place, segment, presence in rows:
         own = [f"place = {_numbers(place)}"] if np.isfinite(place).all() else []
         own += [f"segment = {json.dumps(segment, ensure_ascii=False)}"] if segment else []
         own += [f"presence = {round(float(presence), 3):g}"] if presence < 1 else []
         lines.append(f"{_key(name)} = {{{', '.join(own)}}}")
-    lines += [
-        "",
-        "# distance, its movement within a subject and variation between subjects, metres",
-    ]
+    lines += ["", "# Distances: usual, movement within a subject, variation between subjects."]
     rounded = [np.round(x, 5) for x in (made.distances, made.movements, made.variations)]
     for i, name in enumerate(made.names):
         known = [j for j in range(i + 1, len(made)) if np.isfinite(made.distances[i, j])]
         lines += [f"[distances.{_key(name)}]"] if known else []
         lines += [f"{_key(made.names[j])} = {_numbers([x[i, j] for x in rounded])}" for j in known]
-    lines += [
-        "",
-        "# marker, three others, height over their plane (right-handed) and its spread, metres",
-    ]
-    assert made.quads is not None
-    lines.append("sides = [" if len(made.quads) else "sides = []")
-    for quad, *numbers in zip(made.quads, made.heights, made.height_spreads, strict=True):
-        names = ", ".join(json.dumps(made.names[m], ensure_ascii=False) for m in quad)
-        lines.append(f"  [{names}, {_numbers(numbers)[1:-1]}],")
-    lines += ["]"] if len(made.quads) else []
-    # A key after a table would belong to it, so that the sides stand before the tables.
-    at = (
-        lines.index(
-            "# place: metres, in one typical posture; presence: share of the captures of moving subjects"
-        )
-        - 1
-    )
-    sides = next(k for k, line in enumerate(lines) if line.startswith("# marker, three"))
-    return "\n".join([*lines[:at], *lines[sides - 1 :], *lines[at : sides - 1]]) + "\n"
+    return "\n".join(lines) + "\n"
 
 
 def read_fields(path: str | Path) -> dict[str, Any]:
@@ -84,22 +76,23 @@ def read_fields(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     FormatError
-        If the file cannot be read, is not TOML, or contains no marker set.
+        If the file cannot be read, is not TOML, or has another format.
+    ParameterError
+        If a value is missing, unknown or impossible.
     """
     content = read_toml(path, "a marker set in TOML")
     if content.get("format") != FORMAT:
         got = content.get("format", "none")
         hint = "write a marker set with asterism markerset learn"
         raise FormatError(path, "format", f'"{FORMAT}"', got, hint)
-    try:
-        return _fields(content)
-    except ParameterError as error:
-        raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
+    return _fields(content)
 
 
 def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
     check_fields(
-        "marker set", content, ("format", "subjects", "up", "sides", "markers", "distances")
+        "marker set",
+        content,
+        ("format", "subject", "subjects", "up", "sides", "markers", "distances"),
     )
     markers = _table(content, "markers")
     names = tuple(markers)
@@ -117,11 +110,9 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         segments.append(str(own["segment"]) if "segment" in own else None)
     fields: dict[str, Any] = {"names": names, "places": places, "presences": presences}
     fields["segments"] = tuple(segments)
-    fields |= {
-        new: content[old]
-        for old, new in (("subjects", "n_subjects"), ("up", "up"))
-        if old in content
-    }
+    for key, name in (("subject", "subject"), ("subjects", "n_subjects"), ("up", "up")):
+        if key in content:
+            fields[name] = content[key]
     if "distances" in content:
         values = np.full((3, len(names), len(names)), np.nan)
         values[:, range(len(names)), range(len(names))] = 0

@@ -16,7 +16,9 @@ from asterism.tracking.methods import (
 )
 from asterism.tracking.naming import (
     NameChange,
+    NameDoubt,
     Naming,
+    check_names,
     learn_marker_set,
     merge_marker_sets,
     name_tracks,
@@ -48,6 +50,7 @@ __all__ = [
     "Method",
     "ModelEstimate",
     "NameChange",
+    "NameDoubt",
     "Naming",
     "Plan",
     "Rigidity",
@@ -55,6 +58,7 @@ __all__ = [
     "StitchedState",
     "Stitching",
     "Update",
+    "check_names",
     "choose_method",
     "estimate_model",
     "fill_gaps",

@@ -57,7 +57,7 @@ def stitch(
         asterism stitch tracks.csv -o markers.csv --json
     """
     import asterism as am
-    from asterism.cli.commands.bonds import bond_figures, bond_rows
+    from asterism.cli.bond_rows import bond_figures, bond_rows
     from asterism.cli.outputs import check_outputs, read_model
     from asterism.cli.tracking import output_format
 

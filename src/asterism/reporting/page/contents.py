@@ -12,10 +12,9 @@ if TYPE_CHECKING:
 
     from asterism.camera import Rig
     from asterism.model import Tracks
+    from asterism.model.upwards import Axis
 
 __all__ = ["Connections", "Contents", "Judgement", "Score", "Verdict"]
-
-"""The axis that points up."""
 
 
 class Verdict(IntEnum):

@@ -11,16 +11,19 @@ from asterism.tracking.rigidity.distances import distances_between
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["bodies_of"]
+__all__ = ["bodies_of", "bodies_of_sets"]
 
 MAX_SPREAD = 0.06
-"""Largest spread of a distance that links two tracks, metres: neighbours across a joint vary less."""
+"""Largest spread of a distance that links two tracks, metres; across a joint it is smaller."""
 MAX_DISTANCE = 0.6
 """Largest distance of two tracks that are linked, metres."""
 MIN_FRAMES = 3
 """Smallest number of common frames of two tracks that are linked."""
 MIN_TRACKS = 4
 """Smallest number of tracks of a body."""
+TEMPERATURE = 12.0
+"""Factor by which the difference of the scores of two subjects is too large: all distances of a
+subject vary together."""
 
 
 def bodies_of(positions: NDArray[np.float64]) -> list[NDArray[np.int64]]:
@@ -43,3 +46,43 @@ def bodies_of(positions: NDArray[np.float64]) -> list[NDArray[np.int64]]:
     if len(bodies) == 1 and len(bodies[0]) == positions.shape[1]:
         return []
     return sorted(bodies, key=lambda body: (-len(body), int(body[0])))
+
+
+def bodies_of_sets(
+    scores: dict[tuple[int, int], float], n_sets: int, n_bodies: int
+) -> tuple[list[int], list[float]]:
+    """Give each marker set a body of its own, by the largest sum of scores.
+
+    Parameters
+    ----------
+    scores : dict
+        Score of a set (first of the key) on a body (second), for those that fit.
+    n_sets, n_bodies : int
+        Numbers of sets and bodies.
+
+    Returns
+    -------
+    bodies : list of int
+        Body of each set, -1 for none.
+    probabilities : list of float
+        Probability of it, against the exchange of two sets.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    table = np.zeros((n_sets, n_bodies))
+    for (s, b), score in scores.items():
+        table[s, b] = max(score, 0.0)
+    rows, columns = linear_sum_assignment(-table)
+    bodies = [-1] * n_sets
+    for s, b in zip(rows.tolist(), columns.tolist(), strict=True):
+        if table[s, b] > 0:
+            bodies[s] = b
+    probabilities = [1.0] * n_sets
+    for s, b in enumerate(bodies):
+        odds = [
+            table[s, c] + table[t, b] - table[s, b] - table[t, c]
+            for t, c in enumerate(bodies)
+            if t != s and b >= 0 and c >= 0 and table[s, c] > 0 and table[t, b] > 0
+        ]
+        probabilities[s] = 1 / (1 + sum(float(np.exp(min(x / TEMPERATURE, 50.0))) for x in odds))
+    return bodies, probabilities

@@ -21,7 +21,15 @@ if TYPE_CHECKING:
 
     from asterism.model import MarkerSet
 
-__all__ = ["FIRST_WEIGHTS", "ROUGH_WEIGHTS", "TrackStats", "evidence_of", "prior_of", "refit"]
+__all__ = [
+    "FIRST_WEIGHTS",
+    "NONE",
+    "ROUGH_WEIGHTS",
+    "TrackStats",
+    "evidence_of",
+    "prior_of",
+    "refit",
+]
 
 NEIGHBOURS = 16
 """Number of neighbours of a track whose distances are evidence."""

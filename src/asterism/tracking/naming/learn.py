@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -53,7 +53,8 @@ def learn_marker_set(*captures: Tracks) -> MarkerSet:
     Returns
     -------
     MarkerSet
-        Markers in the order in which they first occur, without the subject before a colon.
+        Markers in the order in which they first occur. A subject before a colon is the subject of
+        the set; with several subjects it stays in the names.
 
     Raises
     ------
@@ -71,7 +72,7 @@ def learn_marker_set(*captures: Tracks) -> MarkerSet:
         raise ParameterError("captures", "at least one capture with named tracks", "none")
     poses: list[NDArray[np.float64]] = []
     names: dict[str, int] = {}
-    own_names = [_named(capture) for capture in captures]
+    subject, own_names = _named(captures)
     for own in own_names:
         for name in own:
             names.setdefault(name, len(names))
@@ -101,6 +102,7 @@ def learn_marker_set(*captures: Tracks) -> MarkerSet:
         variations=np.zeros(distances.shape),
         segments=_segments(distances, movements),
         presences=_presences(poses, has_moved),
+        subject=subject,
         up=up_axis(captures[0].detections)[0],
         **_sides(distances, movements, poses, moved=any(has_moved)),
     )
@@ -183,20 +185,27 @@ def merge_marker_sets(*sets: MarkerSet) -> MarkerSet:
     )
 
 
-def _named(capture: Tracks) -> dict[str, int]:
-    """Return the tracks with a marker's name, by the name without its subject."""
-    check_kind("captures", capture, Tracks, "am.read(path).tracks")
-    own: dict[str, int] = {}
-    for k, name in enumerate(capture.names):
-        if not name or is_unlabelled(name) or not capture.lengths[k]:
-            continue
-        bare = name.rpartition(":")[2]
-        if bare in own:
-            raise ParameterError("captures", "each name once in a capture", f"{bare} twice")
-        own[bare] = k
-    if not own:
-        raise ParameterError("captures", "tracks with names", f"none of {capture.n_tracks} named")
-    return own
+def _named(captures: Sequence[Tracks]) -> tuple[str, list[dict[str, int]]]:
+    """Return the subject, if there is only one, and the tracks of each capture by name."""
+    all_named: list[dict[str, int]] = []
+    for capture in captures:
+        check_kind("captures", capture, Tracks, "am.read(path).tracks")
+        own: dict[str, int] = {}
+        for k, name in enumerate(capture.names):
+            if not name or is_unlabelled(name) or not capture.lengths[k]:
+                continue
+            if name in own:
+                raise ParameterError("captures", "each name once in a capture", f"{name} twice")
+            own[name] = k
+        if not own:
+            got = f"none of {capture.n_tracks} named"
+            raise ParameterError("captures", "tracks with names", got)
+        all_named.append(own)
+    subjects = {name.rpartition(":")[0] for own in all_named for name in own}
+    if len(subjects - {""}) > 1:
+        return "", all_named
+    subject = next(iter(subjects - {""}), "")
+    return subject, [{name.rpartition(":")[2]: k for name, k in own.items()} for own in all_named]
 
 
 def _pose(poses: NDArray[np.float64], distances: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -216,7 +225,7 @@ def _sides(
     poses: list[NDArray[np.float64]],
     *,
     moved: bool,
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Any]:
     """Choose reference planes for each marker, with its heights over them."""
     cost = np.nan_to_num(movements) + STEADY * distances
     cost[np.isnan(distances) | np.eye(len(distances), dtype=bool)] = np.inf
@@ -237,7 +246,7 @@ def _merged_sides(
     into: list[NDArray[np.int64]],
     sizes: NDArray[np.float64],
     distances: NDArray[np.float64],
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Any]:
     """Merge the reference planes of several sets; a set without one measures it in its posture."""
     M = len(distances)
     quads = np.unique(

@@ -12,7 +12,7 @@ from asterism.errors import ParameterError
 from asterism.model import MarkerSet, Tracks
 from asterism.model.upwards import up_axis
 from asterism.records import record
-from asterism.tracking.naming.bodies import bodies_of
+from asterism.tracking.naming.bodies import bodies_of, bodies_of_sets
 from asterism.tracking.naming.probabilities import marker_odds, probabilities_of, track_odds
 from asterism.tracking.naming.search import Found, search
 from asterism.tracking.naming.stretches import NameChange, changes_of
@@ -31,12 +31,17 @@ LONG = 60
 """Number of detections above which a longer track is no better."""
 FIRST_FRAMES = 100
 """Number of frames in which the first tracks are compared."""
-MIN_MEAN = 10.0
-"""Mean log odds of a name below which a marker set does not fit the capture at all."""
+MIN_MEAN = 1.0
+"""Mean log odds of a distance below which a marker set does not fit the capture at all. Sets of
+another protocol reach 0.4 on real captures, those of other subjects 1.6 and more."""
+MIN_SHARE = 0.5
+"""Smallest share of the tracks, or of the markers if these are fewer, that a set must name."""
 MIN_DETECTIONS = 10
 """Smallest number of detections of a name in a capture."""
 MIN_PROBABILITY = 0.5
 """Probability below which a name is not given."""
+MIN_SUBJECT = 0.75
+"""Probability of a subject below which no name is given, because all of them could be another's."""
 
 
 @record(eq=False)
@@ -96,6 +101,7 @@ class _Named:
     probabilities: NDArray[np.float64]  # (K,)
     alternatives: NDArray[np.int64]  # (K,), -1 for none
     alternative_probabilities: NDArray[np.float64]  # (K,)
+    required: float  # probability below which a name is not given
 
 
 def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
@@ -125,8 +131,8 @@ def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
 
     Notes
     -----
-    Evidence: distances between tracks against those of the set (Student's t, four kinds of fit), and
-    the side of three others on which a track lies, which tells left from right. The search is a
+    Evidence: distances between tracks against those of the set (Student's t, four kinds of fit),
+    and the side of three others on which a track lies, which tells left from right. The search is a
     local one from many starts, so that its result is not proved to be the best. Probabilities
     compare the result with the exchange of two names and with no name.
 
@@ -145,7 +151,7 @@ def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
     all_names: list[str] = []
     for made in marker_sets:
         check_kind("marker_sets", made, MarkerSet, "am.learn_marker_set(tracks)")
-        all_names += made.names
+        all_names += made.full_names
     twice = [name for name in all_names if all_names.count(name) > 1]
     if twice:
         hint = "give each set its subject: marker_set.of_subject(name)"
@@ -166,6 +172,7 @@ class _First:
     frame: int
     tracks: NDArray[np.int64]
     found: Found
+    probability: float  # that the body is this subject's, not another's of the given sets
 
 
 def _first(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list[_First | None]:
@@ -193,22 +200,23 @@ def _first(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list
             own = search(made, positions[:, subset], up)
             if own is not None and _fits(own):
                 results[s, b] = own
-    first: list[_First | None] = [None] * len(marker_sets)
-    while results:
-        s, b = max(results, key=lambda key: (results[key].score, -key[0], -key[1]))
-        first[s] = _First(frame=frame, tracks=alive[subsets[b]], found=results[s, b])
-        taken = set(subsets[b].tolist())
-        results = {
-            key: own
-            for key, own in results.items()
-            if key[0] != s and not taken & set(subsets[key[1]].tolist())
-        }
-    return first
+    body_of, probability = bodies_of_sets(
+        {key: own.score for key, own in results.items()}, len(marker_sets), len(subsets)
+    )
+    return [
+        None
+        if b < 0
+        else _First(
+            frame=frame, tracks=alive[subsets[b]], found=results[s, b], probability=probability[s]
+        )
+        for s, b in enumerate(body_of)
+    ]
 
 
 def _fits(found: Found) -> bool:
-    n_named = int((found.names >= 0).sum())
-    return n_named > 0 and found.score >= MIN_MEAN * n_named
+    n_tracks, n_named = len(found.names), int((found.names >= 0).sum())
+    expected = MIN_SHARE * min(n_tracks, found.evidence.n_markers)
+    return n_named >= max(expected, 1) and found.mean_log_odds >= MIN_MEAN
 
 
 def _positions(tracks: Tracks, alive: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -233,7 +241,13 @@ def _all(tracks: Tracks, made: MarkerSet, first: _First, up: Axis) -> _Named:
     of_track = np.full(tracks.n_tracks, -1)
     of_track[first.tracks] = first.found.names
     windows = Windows(tracks.detections, tracks.labels)
-    names = WindowNames(windows=windows, made=made, size=first.found.size, track_markers=of_track)
+    names = WindowNames(
+        windows=windows,
+        made=made,
+        size=first.found.size,
+        is_kept=first.found.weights[0] > first.found.weights[1],
+        track_markers=of_track,
+    )
     start = windows.holding(first.frame)
     names.sweep(start)
     positions = names.positions(FIRST_FRAMES)
@@ -246,16 +260,17 @@ def _all(tracks: Tracks, made: MarkerSet, first: _First, up: Axis) -> _Named:
         names.renamed(marker_of)
         names.sweep(start)
     odds = marker_odds(found, len(made))
-    own = names.track_markers
+    own = names.usual()
     probability, other, other_probability = probabilities_of(
         own, odds, track_odds(names.exchanges, names.counts, own)
     )
     return _Named(
         markers=names.markers,
         of_track=own,
-        probabilities=probability,
+        probabilities=first.probability * probability,
         alternatives=other,
         alternative_probabilities=other_probability,
+        required=MIN_PROBABILITY if first.probability >= MIN_SUBJECT else 1.0,
     )
 
 
@@ -264,20 +279,21 @@ def _result(
 ) -> Naming:
     """Merge the names of all sets: for each track those of the set that is most certain."""
     K, N = tracks.n_tracks, tracks.detections.n_points
-    all_names = [name for made in marker_sets for name in made.names]
+    all_names = [name for made in marker_sets for name in made.full_names]
     markers, of_track = np.full(N, -1), np.full(K, -1)
     probability, other_probability = np.zeros(K), np.zeros(K)
     other: list[str | None] = [None] * K
     at = 0
     for made, own in zip(marker_sets, named, strict=True):
         if own is not None:
-            is_given = (own.of_track >= 0) & (own.probabilities >= MIN_PROBABILITY)
+            is_given = (own.of_track >= 0) & (own.probabilities >= own.required)
             better = is_given & (own.probabilities > probability)
             of_track[better] = at + own.of_track[better]
             probability[better] = own.probabilities[better]
             other_probability[better] = own.alternative_probabilities[better]
             for k in np.flatnonzero(better):
-                other[k] = made.names[own.alternatives[k]] if own.alternatives[k] >= 0 else None
+                at_other = own.alternatives[k]
+                other[k] = made.full_names[at_other] if at_other >= 0 else None
             rows = np.flatnonzero(np.append(better, False)[tracks.labels] & (own.markers >= 0))
             markers[rows] = at + own.markers[rows]
         at += len(made)

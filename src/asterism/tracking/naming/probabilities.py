@@ -23,7 +23,7 @@ INDEPENDENT = 3
 
 
 def marker_odds(found: Found, n_markers: int) -> NDArray[np.float64]:
-    """Return the log odds of each marker's track for other markers, (M, M), -inf where not compared.
+    """Return the log odds of other names for each marker, (M, M), -inf where not compared.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def probabilities_of(
     of_tracks : ndarray of shape (K, M)
         Log odds of other names for each track.
     """
-    K, M = of_tracks.shape
+    K = len(of_tracks)
     probability, other = np.zeros(K), np.full(K, -1)
     other_probability = np.zeros(K)
     for k in np.flatnonzero(markers >= 0):

@@ -10,6 +10,7 @@ import numpy as np
 from asterism import _engine
 from asterism.tracking.naming.evidence import (
     FIRST_WEIGHTS,
+    NONE,
     ROUGH_WEIGHTS,
     TrackStats,
     evidence_of,
@@ -40,6 +41,7 @@ class Found:
     size: float  # of the subject relative to the marker set
     weights: tuple[float, ...]  # of the four kinds of fit of a distance
     evidence: _engine.NameEvidence
+    mean_log_odds: float  # of a distance between two named tracks
 
 
 def search(
@@ -65,20 +67,21 @@ def search(
     -----
     The posture of the set is laid over the points in several ways. From each of these starts a
     search with wide tolerances settles; the best results are refined with the weights and the size
-    that fit them. The search is a local one: it ends where no move of `engine/naming/name_search.hpp`
-    improves the score.
+    that fit them. The search is a local one: it ends where no move improves the score
+    (`engine/naming/name_search.hpp`).
     """
     first = starts(made, positions, up)
     first += [start] if start is not None else []
     if not first:
         return None
     stats = TrackStats.of(positions)
-    moves = {
-        "groups": _groups(made),
-        "partner": np.array(made.partners, dtype=np.int64),
-        "near": stats.near(IN_TURN),
-    }
-    rough = _engine.NameSearch(evidence_of(made, stats, size=1.0, weights=ROUGH_WEIGHTS), **moves)
+    groups, near = _groups(made), stats.near(IN_TURN)
+    partner = np.array(made.partners, dtype=np.int64)
+
+    def searching(evidence: _engine.NameEvidence) -> _engine.NameSearch:
+        return _engine.NameSearch(evidence, groups=groups, partner=partner, near=near)
+
+    rough = searching(evidence_of(made, stats, size=1.0, weights=ROUGH_WEIGHTS))
     settled: dict[bytes, tuple[float, NDArray[np.int64]]] = {}
     for names in first:
         names, score = rough.settled(names)
@@ -88,12 +91,21 @@ def search(
     best += [start] if start is not None else []
     size, weights = refit(made, stats, best[0]) or (1.0, FIRST_WEIGHTS)
     evidence = evidence_of(made, stats, size=size, weights=weights)
-    fine = _engine.NameSearch(evidence, **moves)
+    fine = searching(evidence)
     names, _ = max((fine.settled(names) for names in best), key=lambda item: item[1])
     size, weights = refit(made, stats, names) or (size, weights)
     evidence = evidence_of(made, stats, size=size, weights=weights)
-    names, score = _engine.NameSearch(evidence, **moves).improved(names)
-    return Found(names=names, score=score, size=size, weights=weights, evidence=evidence)
+    names, score = searching(evidence).improved(names)
+    named = names >= 0
+    n_pairs = int(named[stats.pairs].all(axis=1).sum())
+    return Found(
+        names=names,
+        score=score,
+        size=size,
+        weights=weights,
+        evidence=evidence,
+        mean_log_odds=(score + NONE * int(named.sum())) / max(n_pairs, 1),
+    )
 
 
 def _groups(made: MarkerSet) -> list[list[int]]:

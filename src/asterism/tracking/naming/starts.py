@@ -88,7 +88,8 @@ def _upright(place: NDArray[np.float64], point: NDArray[np.float64]) -> list[NDA
     for angle in np.arange(HEADINGS) * 2 * np.pi / HEADINGS:
         c, s = np.cos(angle), np.sin(angle)
         turned = scale * centred @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-        laid.append(turned + [*np.median(point[:, :2], axis=0), point[:, 2].min()])
+        foot = np.array([*np.median(point[:, :2], axis=0), point[:, 2].min()])
+        laid.append(turned + foot)
     return laid
 
 

@@ -66,18 +66,22 @@ def changes_of(
     names : sequence of str
         Names of the markers.
     """
+
+    def name_of(own: int) -> str | None:
+        return names[own] if own >= 0 else None
+
     order, _ = tracks.by_track
     label, marker = tracks.labels[order], markers[order]
     frame = tracks.detections.frame_of[order]
     starts = np.flatnonzero(np.diff(label, prepend=-1) | np.diff(marker, prepend=-2))
-    ends = np.append(starts[1:], len(order)) - 1
+    ends = np.append(starts, len(order))[1:] - 1
     return tuple(
         NameChange(
             track=int(label[a]),
             first=int(frame[a]),
             last=int(frame[b]),
-            usual=names[usual[label[a]]] if usual[label[a]] >= 0 else None,
-            name=names[marker[a]] if marker[a] >= 0 else None,
+            usual=name_of(int(usual[label[a]])),
+            name=name_of(int(marker[a])),
         )
         for a, b in zip(starts.tolist(), ends.tolist(), strict=True)
         if marker[a] != usual[label[a]]

@@ -24,8 +24,8 @@ PRIOR_FRAMES = 8
 """Number of frames that the marker set's movement of a distance counts as."""
 UNKNOWN_MOVEMENT = 0.005, 0.1
 """Movement of a distance that the set does not know: metres, and share of the distance."""
-ATTACHED = 0.008, 0.05
-"""Error of a distance of the set on another subject: metres, and share of the distance."""
+KEPT, ATTACHED = (0.004, 0.01), (0.008, 0.05)
+"""Error of a distance of the set on the same and on another subject: metres, and share."""
 NOISE = 0.003
 """Error of a distance in a few frames, metres."""
 LOOSE, MIN_WEIGHT = 0.015, 0.2
@@ -43,7 +43,9 @@ class Subject:
     weights: NDArray[np.float64]
 
     @classmethod
-    def of(cls, made: MarkerSet, size: float, positions: NDArray[np.float64]) -> Subject:
+    def of(
+        cls, made: MarkerSet, size: float, positions: NDArray[np.float64], *, is_kept: bool
+    ) -> Subject:
         """Measure a subject.
 
         Parameters
@@ -54,12 +56,14 @@ class Subject:
             Size of the subject relative to the set.
         positions : ndarray of shape (F, M, 3)
             Positions of the markers as named so far, metres, NaN where unknown.
+        is_kept : bool
+            Whether the markers are where they were when the set was learnt.
         """
         found = distances_between(positions)
         before = size * made.distances
         fixed, share = UNKNOWN_MOVEMENT
         movement = np.where(np.isfinite(made.movements), made.movements, fixed + share * before)
-        fixed, share = ATTACHED
+        fixed, share = KEPT if is_kept and made.knows_movement else ATTACHED
         error2 = (fixed + share * before) ** 2 + np.nan_to_num(made.variations) ** 2
         is_known = (found.n_frames >= MIN_FRAMES) & np.isfinite(found.middle)
         n = np.minimum(found.n_frames, 60)

@@ -1,18 +1,16 @@
-"""Bonds: stable distances between markers, estimated from one capture and used in the next."""
+"""Bonds: pairs of markers with a stable distance, estimated from a capture."""
 
 from __future__ import annotations
 
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asterism.checks import check_kind, check_number, keep_array
-from asterism.errors import FormatError, ParameterError
+from asterism.errors import ParameterError
 from asterism.io.captures.marker_names import is_unlabelled
 from asterism.model import Tracks
-from asterism.model.toml_file import read_toml, write_toml
 from asterism.records import record
 from asterism.tracking.rigidity.cliques import disjoint_cliques
 from asterism.tracking.rigidity.distances import (
@@ -23,7 +21,7 @@ from asterism.tracking.rigidity.distances import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -34,19 +32,16 @@ MAX_FRAMES = 1000
 LOOSE = 2.5
 """Largest spread of a rigid pair, as a multiple of that of the steadiest pairs of the capture. The
 share `BEND` of its distance is the other bound. Other bonds may vary more than a segment does."""
-FORMAT = "asterism bonds"
 
 
 @record(eq=False)
 class Bonds:
-    """Pairs of markers with a stable distance (bonds), and one pose of all markers.
+    """Pairs of markers with a stable distance (bonds).
 
     Parameters
     ----------
     names : tuple of str
         Names of the K markers, all different.
-    places : array_like of shape (K, D)
-        Positions in one pose, metres, relative to its centre; NaN for markers missing in it.
     pairs : array_like of int, shape (M, 2)
         Bonded markers, the lower index first.
     distances : array_like of shape (M,)
@@ -64,7 +59,7 @@ class Bonds:
     Examples
     --------
     >>> import asterism as am
-    >>> bonds = am.learn_bonds(am.simulate.person(frames=60, seed=1))
+    >>> bonds = am.tracking.learn_bonds(am.simulate.person(frames=60, seed=1))
     >>> bonds
     Bonds(53 markers, 412 pairs, 206 rigid, 10 clusters)
     >>> trunk = bonds.clusters[0]  # the largest rigid cluster
@@ -75,7 +70,6 @@ class Bonds:
     """
 
     names: tuple[str, ...]
-    places: NDArray[np.float64]
     pairs: NDArray[np.int64]
     distances: NDArray[np.float64]
     spreads: NDArray[np.float64]
@@ -86,9 +80,6 @@ class Bonds:
         if len(set(names)) < len(names) or not all(names):
             got = next((name for i, name in enumerate(names) if name in ("", *names[:i])), "")
             raise ParameterError("names", "names that are all different", repr(got))
-        places = np.asarray(self.places, dtype=np.float64)
-        if places.ndim != 2 or len(places) != len(names) or places.shape[1] not in (2, 3):
-            raise ParameterError("places", f"shape ({len(names)}, 2 or 3)", places.shape)
         pairs = keep_array("pairs", self.pairs, ("M", 2), dtype=np.int64)
         M = len(pairs)
         if M and (pairs.min() < 0 or pairs.max() >= len(names)):
@@ -99,7 +90,6 @@ class Bonds:
             expected = "two different markers, the lower first, once"
             raise ParameterError("pairs", expected, tuple(pairs[wrong[0]].tolist()))
         object.__setattr__(self, "names", names)
-        object.__setattr__(self, "places", places)
         object.__setattr__(self, "pairs", pairs)
         for name, kind in (
             ("distances", np.float64),
@@ -149,96 +139,11 @@ class Bonds:
         --------
         >>> import asterism as am
         >>> truth = am.simulate.person(seed=1)
-        >>> am.learn_bonds(truth).segments(["LFHD", "RFHD", "LKNE", None]).tolist()
+        >>> am.tracking.learn_bonds(truth).segments(["LFHD", "RFHD", "LKNE", None]).tolist()
         [0, 0, 5, -1]
         """
         of = {self.names[k]: s for s, cluster in enumerate(self.clusters) for k in cluster}
         return np.array([of.get(name or "", -1) for name in names], dtype=np.int64)
-
-    def to_toml(self, path: str | Path | None = None) -> str:
-        """Return the bonds as TOML text, and write it to a file if a path is given.
-
-        Parameters
-        ----------
-        path : str or Path, optional
-            File to write; an existing one is replaced.
-
-        Returns
-        -------
-        str
-            Text of the file; distances are rounded to micrometres.
-
-        Raises
-        ------
-        FormatError
-            If the file cannot be written.
-
-        Examples
-        --------
-        >>> import asterism as am
-        >>> bonds = am.learn_bonds(am.simulate.cube(frames=40, seed=1))
-        >>> print(bonds.to_toml()[:26])
-        format = "asterism bonds"
-        """
-        markers: list[dict[str, Any]] = []
-        for name, place in zip(self.names, self.places, strict=True):
-            own: dict[str, Any] = {"name": name}
-            if np.isfinite(place).all():
-                own["place"] = [round(float(x), 6) for x in place]
-            markers.append(own)
-        bonds = [
-            {
-                "between": [self.names[i], self.names[j]],
-                "distance": round(float(distance), 6),
-                "spread": round(float(spread), 6),
-                "frames": int(n),
-            }
-            for (i, j), distance, spread, n in zip(
-                self.pairs, self.distances, self.spreads, self.frames, strict=True
-            )
-        ]
-        content = {"format": FORMAT, "axes": self.places.shape[1], "marker": markers, "bond": bonds}
-        return write_toml(content, path)
-
-    @classmethod
-    def from_toml(cls, path: str | Path) -> Self:
-        """Read bonds from a TOML file, as `to_toml` writes it.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to read.
-
-        Returns
-        -------
-        Bonds
-
-        Raises
-        ------
-        FormatError
-            If the file cannot be read, is not TOML, or contains no bonds.
-
-        Examples
-        --------
-        >>> import asterism as am
-        >>> from tempfile import TemporaryDirectory
-        >>> bonds = am.learn_bonds(am.simulate.cube(frames=40, seed=1))
-        >>> with TemporaryDirectory() as folder:
-        ...     text = bonds.to_toml(f"{folder}/cube.toml")
-        ...     am.tracking.Bonds.from_toml(f"{folder}/cube.toml")
-        Bonds(8 markers, 28 pairs, 28 rigid, 1 clusters)
-        """
-        content = read_toml(path, "bonds in TOML")
-        path = Path(path)
-        if content.get("format") != FORMAT:
-            got = content.get("format", "none")
-            raise FormatError(
-                path, "format", f'"{FORMAT}"', got, "write such a file with asterism bonds"
-            )
-        try:
-            return cls(**_from_plain(content))
-        except ParameterError as error:
-            raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
 
     def __repr__(self) -> str:
         return (
@@ -270,7 +175,7 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, min_frames: int = MIN_T
     Returns
     -------
     Bonds
-        Pairs with their distances, and one pose of all markers.
+        Pairs with their distances.
 
     Raises
     ------
@@ -280,7 +185,7 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, min_frames: int = MIN_T
     Examples
     --------
     >>> import asterism as am
-    >>> bonds = am.learn_bonds(am.simulate.cube(frames=40, seed=1))
+    >>> bonds = am.tracking.learn_bonds(am.simulate.cube(frames=40, seed=1))
     >>> bonds
     Bonds(8 markers, 28 pairs, 28 rigid, 1 clusters)
     >>> bonds.pairs[0].tolist(), round(float(bonds.distances[0]), 3)
@@ -308,79 +213,8 @@ def learn_bonds(tracks: Tracks, *, neighbours: int = 12, min_frames: int = MIN_T
     i, j = np.nonzero(np.triu(chosen))
     return Bonds(
         names=tuple(names),
-        places=_pose(positions, between.middle),
         pairs=np.stack([i, j], axis=1),
         distances=between.middle[i, j],
         spreads=between.spread[i, j],
         frames=between.n_frames[i, j] * every,
     )
-
-
-def _pose(positions: NDArray[np.float64], usual: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Choose the frame with the most markers, and of these the one nearest to usual distances."""
-    if not positions.size:
-        return np.zeros(positions.shape[1:])
-    counts = np.isfinite(positions[..., 0]).sum(axis=1)
-    fullest = np.flatnonzero(counts == counts.max())
-    fullest = fullest[:: max(1, len(fullest) // 100)]
-    off: list[float] = []
-    for pose in positions[fullest]:
-        distance = np.linalg.norm(pose[:, None] - pose[None], axis=2)
-        off.append(float(np.nan_to_num(np.abs(distance - usual)).sum()))
-    pose = positions[fullest[int(np.argmin(off))]]
-    return pose - np.nanmean(pose, axis=0) if counts.max() else np.full(pose.shape, np.nan)
-
-
-def _from_plain(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of `Bonds` from the content of a file."""
-    axes = content.get("axes")
-    if type(axes) is not int or axes not in (2, 3):  # 3.0 is equal to 3, and no length
-        raise ParameterError("axes", "2 or 3", axes)
-    markers, bonds = _tables(content, "marker"), _tables(content, "bond")
-    names = [str(_get(own, f"marker {n}", "name")) for n, own in enumerate(markers, 1)]
-    number = {name: k for k, name in enumerate(names)}
-    places = np.full((len(names), axes), np.nan)
-    for n, own in enumerate(markers):
-        if "place" in own:
-            places[n] = keep_array(f"place of {names[n]}", own["place"], (axes,))
-    pairs: list[list[int]] = []
-    values: dict[str, list[float]] = {"distance": [], "spread": [], "frames": []}
-    for n, own in enumerate(bonds, 1):
-        between = _get(own, f"bond {n}", "between")
-        if not isinstance(between, list) or len(cast("list[Any]", between)) != 2:
-            raise ParameterError(f"bond {n}", "between = two names", repr(between))
-        ends = [str(name) for name in cast("list[Any]", between)]
-        for name in ends:
-            if name not in number:
-                raise ParameterError(f"bond {n}", "the names of two markers", name)
-        pairs.append(sorted(number[name] for name in ends))
-        for key, all_ in values.items():
-            value = _get(own, f"bond {n}", key)
-            check_number(
-                f"{key} of bond {n}", value, above=0, below=2**53, closed=True,
-                integer=key == "frames",
-            )  # fmt: skip
-            all_.append(value)
-    return {
-        "names": tuple(names),
-        "places": places,
-        "pairs": np.array(pairs, dtype=np.int64).reshape(-1, 2),
-        "distances": np.array(values["distance"], dtype=np.float64),
-        "spreads": np.array(values["spread"], dtype=np.float64),
-        "frames": np.array(values["frames"], dtype=np.int64),
-    }
-
-
-def _tables(content: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
-    value = content.get(name, [])
-    if not isinstance(value, list) or not all(
-        isinstance(own, dict) for own in cast("list[Any]", value)
-    ):
-        raise ParameterError(name, f"tables [[{name}]]", type(value).__name__)
-    return cast("list[dict[str, Any]]", value)
-
-
-def _get(table: Mapping[str, Any], where: str, key: str) -> Any:
-    if key not in table:
-        raise ParameterError(where, f"a {key}", "none")
-    return table[key]

@@ -1,0 +1,88 @@
+"""What was named, as rows of a printed table and as plain values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from asterism.model import Capture
+
+if TYPE_CHECKING:
+    import asterism as am
+
+__all__ = ["naming_figures", "naming_rows"]
+
+UNCERTAIN = 0.9
+"""Probability of a name below which it is listed."""
+MOST = 8
+"""Number of rows of a list."""
+
+
+def naming_rows(found: am.tracking.Naming) -> list[tuple[str, str]]:
+    """Return the result of `name_tracks` as rows: names, missing ones, uncertain ones, changes."""
+    names = [name for name in found.tracks.names if name is not None]
+    rows = [
+        ("names given", f"{len(names)}, to {found.n_named} of {len(found.markers)} tracks"),
+        ("names not found", ", ".join(found.missing) or "none"),
+    ]
+    uncertain = sorted(
+        (float(p), str(name), other)
+        for p, name, other in zip(
+            found.probabilities, found.markers, found.alternatives, strict=True
+        )
+        if name is not None and p < UNCERTAIN
+    )
+    for n, (p, name, other) in enumerate(uncertain[:MOST]):
+        rows.append(("" if n else f"below {UNCERTAIN:.0%}", f"{name} {p:.0%}, else {other}"))
+    if len(uncertain) > MOST:
+        rows.append(("", f"and {len(uncertain) - MOST} more"))
+    at = _first_frame(found)
+    for n, change in enumerate(found.changes[:MOST]):
+        text = f"track {change.track}, frames {at + change.first} to {at + change.last}: "
+        text += f"{change.name or 'no name'} instead of {change.usual or 'no name'}"
+        rows.append(("" if n else "changes of marker", text))
+    if len(found.changes) > MOST:
+        rows.append(("", f"and {len(found.changes) - MOST} more"))
+    return rows
+
+
+def naming_figures(found: am.tracking.Naming) -> dict[str, Any]:
+    """Return the result of `name_tracks` as plain values, with the frame numbers of the file."""
+    at = _first_frame(found)
+    rows = zip(
+        found.markers,
+        found.probabilities.tolist(),
+        found.alternatives,
+        found.alternative_probabilities.tolist(),
+        strict=True,
+    )
+    return {
+        "n_tracks": len(found.markers),
+        "n_named": found.n_named,
+        "names": [
+            {
+                "track": k,
+                "name": name,
+                "probability": p,
+                "alternative": other,
+                "alternative_probability": q,
+            }
+            for k, (name, p, other, q) in enumerate(rows)
+            if name is not None
+        ],
+        "changes": [
+            {
+                "track": change.track,
+                "first": at + change.first,
+                "last": at + change.last,
+                "usual": change.usual,
+                "name": change.name,
+            }
+            for change in found.changes
+        ],
+        "not_found": list(found.missing),
+    }
+
+
+def _first_frame(found: am.tracking.Naming) -> int:
+    capture = found.tracks.detections
+    return capture.first_frame if isinstance(capture, Capture) else 0
