@@ -27,9 +27,9 @@ class MotionLikelihood:
         kind: Shorts,
         steps: Floats,
     ) -> None: ...
-    def sum(
-        self, *, squares: Floats, transitions: Floats, variance: float, velocity_variance: float
-    ) -> float: ...
+    def sums(
+        self, *, squares: Floats, transitions: Floats, variances: Floats, velocity_variance: float
+    ) -> Floats: ...
 
 class ScoreModel:
     def __init__(

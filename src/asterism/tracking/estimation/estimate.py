@@ -185,10 +185,8 @@ def _fitted(
         min_noise=scales.noise_floor,
         max_acceleration=2 * SAFE_SHARE * scales.spacing / scales.step**2,
     )
-    fit = bounds.fit(
-        math.log(scales.noise), (math.log(low), math.log(low * high) / 2, math.log(high)), 0.95
-    )
-
+    levels = (low, math.sqrt(low * high), high)
+    fit = bounds.clip(MotionFit(noise=scales.noise, levels=levels, stay=0.95))
     model = _first_model(fit, scales, region)
     evidence = gather_evidence(runs, _wider(model), reach)
     for refine in (False, True):
@@ -330,14 +328,14 @@ def _log_evidence(evidence: Evidence, model: TrackingModel, region: Region) -> f
 
 
 def _motion_stds(
-    fit: MotionFit, model: TrackingModel, sure: tuple[float, ...] | None, min_noise: float
+    fit: MotionFit, model: TrackingModel, sure: tuple[float, ...], min_noise: float
 ) -> dict[str, float]:
-    if sure is None:
-        return {}
     levels = motion_levels(model)[2]
     names = ["motion"] if len(levels) == 1 else [f"motion_{k + 1}" for k in range(len(levels))]
     stds = {n: s * x for n, s, x in zip(names, sure[1:], levels, strict=True)}
-    return stds if fit.noise <= min_noise else {"noise_sigma": sure[0] * fit.noise} | stds
+    if fit.noise > min_noise:
+        stds = {"noise_sigma": sure[0] * fit.noise} | stds
+    return {name: std for name, std in stds.items() if np.isfinite(std)}
 
 
 def _bridgeable(fit: MotionFit, p_seen: float, n_links: int, scales: Scales) -> int:
