@@ -33,13 +33,13 @@ def test_the_likelihood_is_that_of_the_filter(fit, n_axes, own_noise):
         truth = replace(truth, detections=replace(truth.detections, covariances=spread))
     model = small_model(motion=fit.motion(0.8), noise_sigma=fit.noise)
     densities = am.filter.filter_states(truth, model).log_densities
-    found = TrackLikelihood([truth], 0.8, 10**6).sums([fit, fit])
+    found = TrackLikelihood(truth, 0.8, 10**6).sums([fit, fit])
     assert found == pytest.approx([densities.sum()] * 2, rel=1e-9)
 
 
 def test_a_capture_too_large_is_sampled_in_pieces():
     truth = wanderers(np.random.default_rng(1), n_markers=30, n_frames=600)
-    likelihood = TrackLikelihood([truth], 0.8, 4000)
+    likelihood = TrackLikelihood(truth, 0.8, 4000)
     assert 3000 < likelihood.n_points < 5000
     assert 0.9 < likelihood.n_links / likelihood.n_points < 1
     whole = am.filter.filter_states(
@@ -51,7 +51,7 @@ def test_a_capture_too_large_is_sampled_in_pieces():
 
 def test_a_numerical_failure_is_not_a_number():
     truth = wanderers(np.random.default_rng(5))
-    likelihood = TrackLikelihood([truth], 0.8, 10**6)
+    likelihood = TrackLikelihood(truth, 0.8, 10**6)
     for fit in FITS.values():
         assert np.isnan(likelihood.sums([replace(fit, noise=np.nan)])[0])
 

@@ -148,7 +148,7 @@ class FitBounds:
 
 
 def fit_motion(
-    tracks: list[Tracks],
+    tracks: Tracks,
     model: TrackingModel,
     start: MotionFit,
     bounds: FitBounds,
@@ -159,7 +159,7 @@ def fit_motion(
 
     Parameters
     ----------
-    tracks : list of Tracks
+    tracks : Tracks
         Tracks of runs of consecutive frames.
     model : TrackingModel
         Model for the filter; its motion and noise are replaced.
@@ -197,7 +197,7 @@ def fit_motion(
 
 
 def fit_one_motion(
-    tracks: list[Tracks], model: TrackingModel, start: MotionFit, bounds: FitBounds
+    tracks: Tracks, model: TrackingModel, start: MotionFit, bounds: FitBounds
 ) -> MotionFit:
     """Fit one motion of each class to tracks, and return the best fit.
 
@@ -213,7 +213,7 @@ def fit_one_motion(
     -------
     MotionFit
     """
-    velocity = model.velocity_sigma(tracks[0].detections.n_axes)
+    velocity = model.velocity_sigma(tracks.detections.n_axes)
     likelihood = _likelihood(tracks, model, FIT_POINTS)
     middle = math.log(start.levels[len(start.levels) // 2])
     best, best_gain = start, -math.inf
@@ -224,7 +224,7 @@ def fit_one_motion(
 
         level = middle
         if kind == "random_walk":
-            level = math.log(velocity) + math.log(tracks[0].detections.step or 1.0) / 2
+            level = math.log(velocity) + math.log(tracks.detections.step or 1.0) / 2
         first = [math.log(start.noise), level]
         top = math.inf if kind == "random_walk" else math.log(bounds.max_acceleration)
         limits = [(math.log(bounds.min_noise), math.inf), (-math.inf, top)]
@@ -235,7 +235,7 @@ def fit_one_motion(
 
 
 def polish(
-    tracks: list[Tracks], model: TrackingModel, fit: MotionFit, bounds: FitBounds
+    tracks: Tracks, model: TrackingModel, fit: MotionFit, bounds: FitBounds
 ) -> tuple[MotionFit, tuple[float, ...]]:
     """Refine a fit by a Newton step, and estimate the standard deviations of its parameters.
 
@@ -313,8 +313,8 @@ def _determined(information: NDArray[np.float64]) -> NDArray[np.int64]:
     return own
 
 
-def _likelihood(tracks: list[Tracks], model: TrackingModel, n_points: int) -> TrackLikelihood:
-    return TrackLikelihood(tracks, model.velocity_sigma(tracks[0].detections.n_axes), n_points)
+def _likelihood(tracks: Tracks, model: TrackingModel, n_points: int) -> TrackLikelihood:
+    return TrackLikelihood(tracks, model.velocity_sigma(tracks.detections.n_axes), n_points)
 
 
 def _search(

@@ -84,14 +84,14 @@ def maximise(
         step *= min(1.0, MAX_STEP / float(np.abs(step).max()))
         for _ in range(MAX_HALVINGS):
             following = np.clip(x + step, low, high)
-            if log_likelihoods(following[None])[0] > value:
+            reached, slope, _ = at(following)
+            if reached > value:
                 break
             step /= 2
         else:
             break
-        change, x, before = following - x, following, gradient
-        value, gradient, _ = at(x)
-        _update(curvature, change, before - gradient)
+        _update(curvature, following - x, gradient - slope)
+        x, value, gradient = following, reached, slope
     return x, value
 
 
