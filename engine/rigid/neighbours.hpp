@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <map>
@@ -104,6 +105,7 @@ class Neighbours {
       if (bonds.empty() || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one, bonds);
       for (Bond& bond : bonds)
         if (const Point* other = places_.find(bond.other)) bond.add(std::sqrt(squared_distance(one.at, *other, D_)));
+      sort(bonds);
     }
   }
 
@@ -114,6 +116,7 @@ class Neighbours {
       std::erase_if(bonds, [&](const Bond& bond) { return bond.other == marker; });
   }
 
+  // The bonds of a marker, by increasing variance and then by the number of the other marker.
   std::span<const Bond> of(std::int32_t marker) const {
     const auto at = bonds_.find(marker);
     if (at == bonds_.end()) return {};
@@ -125,6 +128,22 @@ class Neighbours {
   static constexpr std::int64_t kLookEvery = 32;  // frames
   static constexpr std::size_t kMaxNeighbours = 24, kNearest = 12;
   static constexpr std::int64_t kTrial = 60;  // frames before a neighbour may be replaced
+
+  // Variances change little from frame to frame, so an insertion sort is fast.
+  void sort(std::vector<Bond>& bonds) const {
+    std::array<double, kMaxNeighbours> variances;
+    for (std::size_t k = 0; k < bonds.size(); ++k) {
+      const Bond bond = bonds[k];
+      const std::pair own(variance(bond), bond.other);
+      std::size_t at = k;
+      for (; at > 0 && own < std::pair(variances[at - 1], bonds[at - 1].other); --at) {
+        bonds[at] = bonds[at - 1];
+        variances[at] = variances[at - 1];
+      }
+      bonds[at] = bond;
+      variances[at] = own.first;
+    }
+  }
 
   // Adds the nearest markers as neighbours. If the list is full, a new one replaces the neighbour
   // with the largest variance.
