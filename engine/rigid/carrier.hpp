@@ -120,8 +120,8 @@ class Carrier {
   }
   // Whether the accuracy was assessed often enough for predictions to be used.
   bool is_assessed(std::int32_t marker) const {
-    const auto at = accuracy_.find(marker);
-    return at != accuracy_.end() && at->second.n_assessed >= kMinAssessed;
+    const Accuracy* accuracy = accuracy_.find(marker);
+    return accuracy != nullptr && accuracy->n_assessed >= kMinAssessed;
   }
 
   // Adds an anchor of the marker in `then`, frame number `frame`, if any neighbour is detected
@@ -163,7 +163,7 @@ class Carrier {
   bool bonds_only_;
   std::int64_t n_frames_ = 0;
   Neighbours neighbours_;
-  std::map<std::int32_t, Accuracy> accuracy_;
+  FlatMap<std::int32_t, Accuracy> accuracy_;
   Scratch<Memory> s_;
 };
 

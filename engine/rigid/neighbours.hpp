@@ -8,12 +8,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <map>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "base/flat_map.hpp"
 #include "base/scratch.hpp"
+#include "base/shared_copy.hpp"
 #include "filter/kalman.hpp"
 #include "rigid/bond.hpp"
 
@@ -101,7 +102,9 @@ class Neighbours {
     places_.clear();
     for (const MarkerPoint& one : seen) places_.set(one.marker, one.at);
     for (const MarkerPoint& one : seen) {
-      std::vector<Bond>& bonds = bonds_[one.marker];
+      SharedCopy<Bonds>& shared = bonds_[one.marker];
+      if (!shared.has_value()) shared = SharedCopy<Bonds>(Bonds{});
+      Bonds& bonds = shared.own();
       if (bonds.empty() || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one, bonds);
       for (Bond& bond : bonds)
         if (const Point* other = places_.find(bond.other)) bond.add(std::sqrt(squared_distance(one.at, *other, D_)));
@@ -112,15 +115,16 @@ class Neighbours {
   // Removes a marker that will not be detected again.
   void forget(std::int32_t marker) {
     bonds_.erase(marker);
+    const auto is_gone = [&](const Bond& bond) { return bond.other == marker; };
     for (auto& [own, bonds] : bonds_)
-      std::erase_if(bonds, [&](const Bond& bond) { return bond.other == marker; });
+      if (std::any_of(bonds->begin(), bonds->end(), is_gone)) std::erase_if(bonds.own(), is_gone);
   }
 
   // The bonds of a marker, by increasing variance and then by the number of the other marker.
   std::span<const Bond> of(std::int32_t marker) const {
-    const auto at = bonds_.find(marker);
-    if (at == bonds_.end()) return {};
-    return at->second;
+    const SharedCopy<Bonds>* bonds = bonds_.find(marker);
+    if (bonds == nullptr) return {};
+    return **bonds;
   }
   double variance(const Bond& bond) const { return predictive_variance(bond, r_); }
 
@@ -129,8 +133,10 @@ class Neighbours {
   static constexpr std::size_t kMaxNeighbours = 24, kNearest = 12;
   static constexpr std::int64_t kTrial = 60;  // frames before a neighbour may be replaced
 
+  using Bonds = std::vector<Bond>;
+
   // Variances change little from frame to frame, so an insertion sort is fast.
-  void sort(std::vector<Bond>& bonds) const {
+  void sort(Bonds& bonds) const {
     std::array<double, kMaxNeighbours> variances;
     for (std::size_t k = 0; k < bonds.size(); ++k) {
       const Bond bond = bonds[k];
@@ -148,7 +154,7 @@ class Neighbours {
   // Adds the nearest markers as neighbours. If the list is full, a new one replaces the neighbour
   // with the largest variance.
   void look_around(std::span<const MarkerPoint> seen, const MarkerPoint& one,
-                   std::vector<Bond>& bonds) {
+                   Bonds& bonds) {
     near_.clear();
     for (const MarkerPoint& other : seen)
       if (other.marker != one.marker)
@@ -173,7 +179,7 @@ class Neighbours {
   int D_;
   double r_;
   std::int64_t n_frames_ = 0;
-  std::map<std::int32_t, std::vector<Bond>> bonds_;
+  FlatMap<std::int32_t, SharedCopy<Bonds>> bonds_;  // copies share those of markers not detected
   Scratch<Places> places_;
   std::vector<std::pair<double, std::int32_t>> near_;
 };
