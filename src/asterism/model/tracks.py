@@ -16,6 +16,7 @@ from asterism.checks import check_kind, keep_array
 from asterism.errors import ParameterError
 from asterism.model.detections import Detections
 from asterism.model.gap import Gap, gaps_of
+from asterism.model.one_a_frame import first_twice
 from asterism.model.tables import data_array, data_frame, html_table
 from asterism.records import record
 
@@ -92,7 +93,7 @@ class Tracks:
         if names and len(names) < n_tracks:
             raise ParameterError("names", f"a name or None for each of {n_tracks} tracks", names)
         names += (None,) * (n_tracks - len(names))
-        twice = _first_twice(self.detections.frame_of, labels, n_tracks)
+        twice = first_twice(self.detections.offsets, labels, n_tracks)
         if twice is not None:
             raise ParameterError(
                 "labels", "at most one detection of a track in a frame",
@@ -374,27 +375,3 @@ class Tracks:
             f"{type(self).__name__}({self.n_tracks} tracks, {len(self.labels) - n_clutter} "
             f"detections in them, {n_clutter} clutter, {self.detections.n_frames} frames)"
         )
-
-
-def _first_twice(
-    frames: NDArray[np.int64], labels: NDArray[np.int64], n_tracks: int
-) -> tuple[int, int] | None:
-    """Return a frame and a track with two detections in it, or None if there are none."""
-    if labels.size and labels.min() < 0:
-        frames, labels = frames[labels >= 0], labels[labels >= 0]
-    if not labels.size:
-        return None
-    key = frames * n_tracks
-    key += labels
-    n_cells = (int(frames[-1]) + 1) * n_tracks
-    if n_cells <= 16 * len(key):  # marking frame and track is much faster than sorting
-        is_taken = np.zeros(n_cells, dtype=bool)
-        is_taken[key] = True
-        if np.count_nonzero(is_taken) == len(key):
-            return None
-    key.sort()
-    twice = np.flatnonzero(key[1:] == key[:-1])
-    if not len(twice):
-        return None
-    frame, track = divmod(int(key[int(twice[0])]), n_tracks)
-    return frame, track
