@@ -294,23 +294,31 @@ def polish(
 def _determined(information: NDArray[np.float64]) -> NDArray[np.int64]:
     """Select the parameters for which the likelihood has a maximum, the others being fixed.
 
+    Of several motions, levels may be fixed that the tracks do not determine, as that of jolts in
+    tracks without any: they hardly correlate with the other parameters. The noise and the level of
+    a single motion do, so without a maximum neither is determined.
+
     Parameters
     ----------
     information : ndarray of shape (n, n)
-        Observed information of all parameters.
+        Observed information of the noise and of each level.
 
     Returns
     -------
     ndarray of int, shape (m,)
         Parameters whose information is positive definite.
     """
+    none = np.arange(0)
     own = np.flatnonzero(np.isfinite(information).all(axis=1))
-    while len(own):
+    while len(own) > 1 and own[0] == 0:
         curvatures, directions = np.linalg.eigh(information[np.ix_(own, own)])
         if curvatures[0] > FLAT * curvatures[-1]:
-            break
-        own = np.delete(own, np.argmax(np.abs(directions[:, 0])))
-    return own
+            return own
+        flattest = int(np.argmax(np.abs(directions[:, 0])))
+        if flattest == 0 or len(information) == 2:
+            return none
+        own = np.delete(own, flattest)
+    return none
 
 
 def _likelihood(tracks: Tracks, model: TrackingModel, n_points: int) -> TrackLikelihood:
