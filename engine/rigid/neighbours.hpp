@@ -55,6 +55,7 @@ class Places {
     const MarkerPoint& slot = slots_[place(marker)];
     return slot.marker == marker ? &slot.at : nullptr;
   }
+  std::size_t size() const { return n_; }
   std::size_t capacity() const { return slots_.size(); }
 
  private:

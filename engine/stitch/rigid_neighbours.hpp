@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <deque>
@@ -182,7 +183,10 @@ class RigidNeighbours {
 
   Known& known(const StitchMemory& s, std::int64_t t) {
     for (std::size_t k = 0; k < w_.n_known; ++k)
-      if (w_.known[k].frame == t) return w_.known[k];
+      if (w_.known[k].frame == t) {
+        assert(is_current(s, w_.known[k]));
+        return w_.known[k];
+      }
     if (w_.n_known == w_.known.size()) w_.known.emplace_back();
     Known& known = w_.known[w_.n_known++];
     known.frame = t;
@@ -193,6 +197,17 @@ class RigidNeighbours {
       if (f.marker >= 0) known.places.set(f.marker, one.at);
     });
     return known;
+  }
+  // Whether the positions are those that would be listed now.
+  static bool is_current(const StitchMemory& s, const Known& known) {
+    std::size_t n = 0, n_equal = 0;
+    for_each_known(s.frames.find(known.frame)->seen, &Frame::One::tracklet, s.tracklets,
+                   [&](const Frame::One& one, const Tracklet& f) {
+      const Point* at = f.marker < 0 ? nullptr : known.places.find(f.marker);
+      n += f.marker >= 0;
+      n_equal += at != nullptr && *at == one.at;
+    });
+    return n_equal == n && known.places.size() == n;
   }
   // The positions of the markers in a frame.
   const Places& places(const StitchMemory& s, std::int64_t t) { return known(s, t).places; }
