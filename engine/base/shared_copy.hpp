@@ -15,6 +15,7 @@ class SharedCopy {
 
   bool has_value() const { return value_ != nullptr; }
   const Value* operator->() const { return value_.get(); }
+  const Value& operator*() const { return *value_; }
   // Returns a reference that may be written. A shared value is cloned first.
   Value& own() {
     if (value_.use_count() > 1) value_ = std::make_shared<Value>(std::as_const(*value_));

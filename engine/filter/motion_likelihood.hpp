@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -19,57 +18,9 @@
 #include <vector>
 
 #include "filter/imm.hpp"
+#include "math/lanes.hpp"
 
 namespace asterism {
-
-// Number of tracks filtered in parallel. Two doubles fit in a vector register of every 64-bit
-// processor.
-inline constexpr int kLanes = 2;
-
-struct Lanes {
-  std::array<double, kLanes> at{};
-
-  Lanes() = default;
-  Lanes(double value) { at.fill(value); }  // broadcasts a number to all lanes
-
-  friend Lanes operator+(Lanes a, const Lanes& b) {
-    for (int i = 0; i < kLanes; ++i) a.at[i] += b.at[i];
-    return a;
-  }
-  friend Lanes operator-(Lanes a, const Lanes& b) {
-    for (int i = 0; i < kLanes; ++i) a.at[i] -= b.at[i];
-    return a;
-  }
-  friend Lanes operator*(Lanes a, const Lanes& b) {
-    for (int i = 0; i < kLanes; ++i) a.at[i] *= b.at[i];
-    return a;
-  }
-  friend Lanes operator/(Lanes a, const Lanes& b) {
-    for (int i = 0; i < kLanes; ++i) a.at[i] /= b.at[i];
-    return a;
-  }
-};
-
-// exp(x) for x ≤ 0, to a relative accuracy of 2e-16. Unlike std::exp, the compiler can vectorise
-// it: it is 2^k times the Taylor series of the remainder, which is at most ½ log 2.
-inline Lanes exp_of_negative(const Lanes& x) {
-  constexpr double kRound = 6755399441055744.0;  // 1.5 · 2^52: adding it rounds to an integer
-  constexpr double kLn2High = 0x1.62e42fefap-1, kLn2Low = 0x1.cf79abc9e3b39803p-40;
-  Lanes result;
-  for (int i = 0; i < kLanes; ++i) {
-    const double y = x.at[i] < -700 ? -700 : x.at[i];
-    const double rounded = y * std::numbers::log2e + kRound;
-    const double k = rounded - kRound;
-    const double r = (y - k * kLn2High) - k * kLn2Low;
-    double sum = 1.0 / 6227020800;
-    for (const double factorial : {479001600.0, 39916800.0, 3628800.0, 362880.0, 40320.0, 5040.0,
-                                   720.0, 120.0, 24.0, 6.0, 2.0, 1.0, 1.0})
-      sum = sum * r + 1 / factorial;
-    const auto exponent = (std::bit_cast<std::uint64_t>(rounded) + 1023) << 52;
-    result.at[i] = sum * std::bit_cast<double>(exponent);
-  }
-  return result;
-}
 
 // The step between two frames at level 1: F = [1 dt; 0 1] and its process noise. A random walk has
 // dt = 0 and no velocity noise.
@@ -115,10 +66,10 @@ class MotionLikelihood {
   // Returns the sum of the log densities of all detections, each given the earlier detections of
   // its track.
   double sum(const LeveledMotion& m) const {
-    double total = 0;
-    for (const Group& group : groups_)
-      total += m.M == 1 ? sum_of<1>(m, group) : m.M == 2 ? sum_of<2>(m, group) : sum_of<3>(m, group);
-    return total;
+#if defined(__GNUC__) && defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) return sum_by_four(m);
+#endif
+    return sum_of_all(m);
   }
 
  private:
@@ -130,6 +81,7 @@ class MotionLikelihood {
   struct Group {
     std::array<Lanes, kMaxAxes> first{};
     Lanes first_r;
+    std::array<double, kLanes> n_linked{};  // detections after the first
     std::vector<Observation> steps;
   };
   template <int M>
@@ -149,12 +101,24 @@ class MotionLikelihood {
       o.r.at[lane] = points[i].r;
       o.detected.at[lane] = 1;
     }
+    group.n_linked[lane] = static_cast<double>(end - begin - 1);
     for (std::int64_t t = frames[begin] + 1; t <= frames[end - 1]; ++t)
       group.steps[t - frames[begin] - 1].kind[lane] = kind[t];
   }
 
+#if defined(__GNUC__) && defined(__x86_64__)
+  // The same for processors with registers of four doubles, with the same result.
+  [[gnu::target("avx2")]] double sum_by_four(const LeveledMotion& m) const { return sum_of_all(m); }
+#endif
+  ASTERISM_INLINED double sum_of_all(const LeveledMotion& m) const {
+    double total = 0;
+    for (const Group& group : groups_)
+      total += m.M == 1 ? sum_of<1>(m, group) : m.M == 2 ? sum_of<2>(m, group) : sum_of<3>(m, group);
+    return total;
+  }
+
   template <int M>
-  double sum_of(const LeveledMotion& m, const Group& group) const {
+  ASTERISM_INLINED double sum_of(const LeveledMotion& m, const Group& group) const {
     Modes<M> s;
     for (int b = 0; b < M; ++b) {
       s.w[b] = m.w0[b];
@@ -162,24 +126,31 @@ class MotionLikelihood {
       s.p00[b] = Lanes(m.r) + group.first_r;
       s.p11[b] = m.velocity_variance;
     }
-    Lanes total;
+    LogProduct factors;
+    Lanes exponents;
     for (const Observation& o : group.steps) {
       if constexpr (M > 1) mix(m, s);
       predict(m, o, s);
-      total = total + update(m, o, s);
+      update(o, m.r, s, factors, exponents);
     }
-    return std::accumulate(total.at.begin(), total.at.end(), 0.0);
+    const double constant = -0.5 * D_ * std::log(2 * std::numbers::pi);
+    double total = 0;
+    for (int i = 0; i < kLanes; ++i)
+      if (group.n_linked[i] > 0)
+        total += group.n_linked[i] * constant + factors.log(i) - exponents.at[i];
+    return total;
   }
 
   // Replaces the state of each mode by the mixture of the modes that can lead to it. Means and
   // covariances are summed relative to the first mode, which limits cancellation between similar
   // modes.
   template <int M>
-  void mix(const LeveledMotion& m, Modes<M>& s) const {
+  ASTERISM_INLINED void mix(const LeveledMotion& m, Modes<M>& s) const {
     const Modes<M> before = s;
     Modes<M> e;  // of each mode minus the first; covariances include the spread of the means
     const Lanes axes = 1.0 / D_;
-    const auto spread = [&](const auto& x, const auto& v, Lanes& xx, Lanes& xv, Lanes& vv) {
+    const auto spread = [&](const auto& x, const auto& v, Lanes& xx, Lanes& xv,
+                            Lanes& vv) ASTERISM_INLINED_LAMBDA {
       xx = xv = vv = 0.0;
       for (int d = 0; d < kMaxAxes; ++d) {
         xx = xx + x[d] * x[d];
@@ -232,7 +203,7 @@ class MotionLikelihood {
   }
 
   template <int M>
-  void predict(const LeveledMotion& m, const Observation& o, Modes<M>& s) const {
+  ASTERISM_INLINED void predict(const LeveledMotion& m, const Observation& o, Modes<M>& s) const {
     Lanes dt, q00, q01, q11;
     for (int i = 0; i < kLanes; ++i) {
       const UnitStep& step = steps_[o.kind[i]];
@@ -250,16 +221,16 @@ class MotionLikelihood {
     }
   }
 
-  // Updates the state with the detections of a step. Returns their log densities, 0 in lanes
-  // without a detection.
+  // Updates the state with the detections of a step. The density of each is a constant times
+  // exp(-e) times a factor; the factors are multiplied, the e are summed.
   template <int M>
-  Lanes update(const LeveledMotion& m, const Observation& o, Modes<M>& s) const {
-    const Lanes r = Lanes(m.r) + o.r;
-    std::array<Lanes, M> S, inverse, half;  // half the NIS
+  ASTERISM_INLINED void update(const Observation& o, double variance, Modes<M>& s,
+                               LogProduct& factors, Lanes& exponents) const {
+    const Lanes r = Lanes(variance) + o.r;
+    std::array<Lanes, M> inverse, half;  // 1/S, half the NIS
     std::array<std::array<Lanes, kMaxAxes>, M> innovation;
     for (int b = 0; b < M; ++b) {
-      S[b] = s.p00[b] + r;
-      inverse[b] = Lanes(1.0) / S[b];
+      inverse[b] = Lanes(1.0) / (s.p00[b] + r);
       Lanes square;
       for (int d = 0; d < kMaxAxes; ++d) {
         innovation[b][d] = o.y[d] - s.x[b][d];
@@ -268,24 +239,19 @@ class MotionLikelihood {
       half[b] = square * inverse[b] * 0.5;
     }
     Lanes nearest = half[0], sum;
-    for (int b = 1; b < M; ++b)
-      for (int i = 0; i < kLanes; ++i) nearest.at[i] = std::min(nearest.at[i], half[b].at[i]);
+    for (int b = 1; b < M; ++b) nearest = minimum(nearest, half[b]);
     std::array<Lanes, M> each;
     for (int b = 0; b < M; ++b) {
       each[b] = inverse[b];
-      if (D_ == 3)
-        for (int i = 0; i < kLanes; ++i) each[b].at[i] *= std::sqrt(inverse[b].at[i]);
+      if (D_ == 3) each[b] = each[b] * square_root(inverse[b]);
       if constexpr (M > 1) each[b] = each[b] * s.w[b] * exp_of_negative(nearest - half[b]);
       sum = sum + each[b];
     }
-    Lanes log_density;
-    const double constant = -0.5 * D_ * std::log(2 * std::numbers::pi);
-    for (int i = 0; i < kLanes; ++i)
-      if (o.detected.at[i] > 0) log_density.at[i] = constant + std::log(sum.at[i]) - nearest.at[i];
+    factors.multiply(where(o.detected, sum, 1.0));
+    exponents = exponents + where(o.detected, nearest, 0.0);
+    const Lanes share = Lanes(1.0) / sum;
     for (int b = 0; b < M; ++b) {
-      if constexpr (M > 1)
-        for (int i = 0; i < kLanes; ++i)
-          if (o.detected.at[i] > 0) s.w[b].at[i] = std::max(each[b].at[i] / sum.at[i], 1e-300);
+      if constexpr (M > 1) s.w[b] = where(o.detected, maximum(each[b] * share, 1e-300), s.w[b]);
       const Lanes gain = inverse[b] * o.detected;
       const Lanes k0 = s.p00[b] * gain, k1 = s.p01[b] * gain;
       for (int d = 0; d < kMaxAxes; ++d) {
@@ -297,7 +263,6 @@ class MotionLikelihood {
       s.p00[b] = s.p00[b] * left;
       s.p01[b] = s.p01[b] * left;
     }
-    return log_density;
   }
 
   int D_;

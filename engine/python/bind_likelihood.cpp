@@ -28,22 +28,32 @@ void make(MotionLikelihood* self, int n_axes, const In<double>& points,
                               std::move(units));
 }
 
-double sum(const MotionLikelihood& self, const In<double>& squares, const In<double>& transitions,
-           double variance, double velocity_variance) {
-  LeveledMotion m;
-  require(squares.ndim() == 1 && squares.shape(0) >= 1 && squares.shape(0) <= kMaxModes,
-          "squares: of 1 to 3 levels");
-  m.M = static_cast<int>(squares.shape(0));
-  require(transitions.ndim() == 2 && transitions.shape(0) == squares.shape(0) &&
-              transitions.shape(1) == squares.shape(0),
-          "transitions: shape (modes, modes)");
-  std::copy_n(squares.data(), m.M, m.squares.begin());
-  std::copy_n(transitions.data(), m.M * m.M, m.T.begin());
-  m.w0 = stationary(m.T, m.M);
-  m.r = variance;
-  m.velocity_variance = velocity_variance;
-  nb::gil_scoped_release release;
-  return self.sum(m);
+// Returns the log likelihood for each of several parameter sets.
+Out<double> sums(const MotionLikelihood& self, const In<double>& squares,
+                 const In<double>& transitions, const In<double>& variances,
+                 double velocity_variance) {
+  require(squares.ndim() == 2 && squares.shape(1) >= 1 && squares.shape(1) <= kMaxModes,
+          "squares: shape (sets, 1 to 3 levels)");
+  const std::size_t n = squares.shape(0), M = squares.shape(1);
+  require(transitions.ndim() == 3 && transitions.shape(0) == n && transitions.shape(1) == M &&
+              transitions.shape(2) == M,
+          "transitions: shape (sets, modes, modes)");
+  require(variances.ndim() == 1 && variances.shape(0) == n, "variances: shape (sets,)");
+  Owned<double> out(n);
+  {
+    nb::gil_scoped_release release;
+    for (std::size_t k = 0; k < n; ++k) {
+      LeveledMotion m;
+      m.M = static_cast<int>(M);
+      std::copy_n(squares.data() + k * M, M, m.squares.begin());
+      std::copy_n(transitions.data() + k * M * M, M * M, m.T.begin());
+      m.w0 = stationary(m.T, m.M);
+      m.r = variances.data()[k];
+      m.velocity_variance = velocity_variance;
+      out.data[k] = self.sum(m);
+    }
+  }
+  return out.give({n});
 }
 
 }  // namespace
@@ -52,6 +62,6 @@ void bind_likelihood(nb::module_& module) {
   nb::class_<MotionLikelihood>(module, "MotionLikelihood")
       .def("__init__", &make, nb::kw_only(), "n_axes"_a, "points"_a, "frames"_a, "offsets"_a,
            "kind"_a, "steps"_a)
-      .def("sum", &sum, nb::kw_only(), "squares"_a, "transitions"_a, "variance"_a,
+      .def("sums", &sums, nb::kw_only(), "squares"_a, "transitions"_a, "variances"_a,
            "velocity_variance"_a);
 }

@@ -15,29 +15,43 @@ using namespace asterism;
 
 namespace {
 
-// Returns (tracklet of each point; for each tracklet its marker, the previous tracklet, the
-// probability).
-nb::tuple run_stitcher(Stitcher& stitcher, const MotionModel& m, const In<double>& times,
-                       const In<std::int32_t>& kind, const In<double>& F, const In<double>& Q,
-                       const In<std::int64_t>& offsets, const In<double>& points,
-                       const In<std::int64_t>& labels) {
-  const FrameRun frames(m, times, kind, F, Q, offsets, points);
+// A pass through a capture, which is given in parts so that no part need fit in memory twice.
+struct StitcherPass {
+  Stitcher stitcher;
+  std::vector<Decision> decisions;  // by tracklet
+
+  StitcherPass(const MotionModel& m, const StitchOptions& options) : stitcher(m, options) {}
+
+  auto decide() {
+    return [this](const Decision& d) {
+      const auto n = static_cast<std::size_t>(d.tracklet) + 1;
+      if (n > decisions.size()) decisions.resize(n);
+      decisions[n - 1] = d;
+    };
+  }
+};
+
+// Processes the next frames and returns the tracklet of each point.
+Out<std::int32_t> run_stitcher(StitcherPass& pass, const In<double>& times,
+                               const In<std::int32_t>& kind, const In<double>& F,
+                               const In<double>& Q, const In<std::int64_t>& offsets,
+                               const In<double>& points, const In<std::int64_t>& labels) {
+  const FrameRun frames(pass.stitcher.motion(), times, kind, F, Q, offsets, points);
   require(labels.size() == frames.points.size(), "labels: one for each point");
   std::vector<std::int32_t> tracklet_of(labels.size(), -1);
-  std::vector<Decision> decisions;  // by tracklet
-  const auto decide = [&](const Decision& d) {
-    if (static_cast<std::size_t>(d.tracklet) >= decisions.size()) decisions.resize(d.tracklet + 1);
-    decisions[d.tracklet] = d;
-  };
   frames.each([&](std::size_t t, std::size_t from, std::span<const Point> frame) {
-    stitcher.step(frames.line.step(t), frame, flat(labels).subspan(from, frame.size()),
-                  std::span(tracklet_of).subspan(from, frame.size()), decide);
+    pass.stitcher.step(frames.line.step(t), frame, flat(labels).subspan(from, frame.size()),
+                       std::span(tracklet_of).subspan(from, frame.size()), pass.decide());
   });
-  stitcher.finish(decide);
-  return nb::make_tuple(array_of<std::int32_t>(tracklet_of),
-                        array_of<std::int32_t>(decisions, &Decision::marker),
-                        array_of<std::int32_t>(decisions, &Decision::after),
-                        array_of<double>(decisions, &Decision::probability));
+  return array_of<std::int32_t>(tracklet_of);
+}
+
+// Returns for each tracklet its marker, the previous tracklet, and the probability.
+nb::tuple finish_stitcher(StitcherPass& pass) {
+  pass.stitcher.finish(pass.decide());
+  return nb::make_tuple(array_of<std::int32_t>(pass.decisions, &Decision::marker),
+                        array_of<std::int32_t>(pass.decisions, &Decision::after),
+                        array_of<double>(pass.decisions, &Decision::probability));
 }
 
 // Processes one frame of a stream on a copy: (new state, markers, earlier detections whose marker
@@ -217,24 +231,25 @@ void bind_stitcher(nb::module_& module) {
       .def(nb::init<double, double, std::int64_t, std::int64_t, std::int64_t, bool>(),
            nb::kw_only(), "noise"_a, "ghost_radius"_a, "confirm"_a, "max_gap"_a, "max_occlusion"_a,
            "may_cut"_a);
-  nb::class_<Stitcher>(module, "Stitcher")
+  nb::class_<StitcherPass>(module, "Stitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&>(), "motion"_a, "options"_a)
       .def_prop_ro_static("ODDS_FACTOR", [](nb::handle) { return TrackletAssignment::kOddsFactor; })
-      .def("run", &run_stitcher, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a,
-           "points"_a, "labels"_a)
+      .def("run", &run_stitcher, "times"_a, "kind"_a, "F"_a, "Q"_a, "offsets"_a, "points"_a,
+           "labels"_a)
+      .def("finish", &finish_stitcher)
       .def(
           "advise",
-          [](Stitcher& self, const In<std::int64_t>& labels, const In<std::int64_t>& before,
+          [](StitcherPass& self, const In<std::int64_t>& labels, const In<std::int64_t>& before,
              const In<double>& weights) {
             require(labels.ndim() == 1 && before.size() == labels.size() &&
                         weights.size() == labels.size(),
                     "labels, before and weights: shape (n,)");
             for (std::size_t i = 0; i < labels.size(); ++i)
-              self.advise(labels.data()[i], {before.data()[i], weights.data()[i]});
+              self.stitcher.advise(labels.data()[i], {before.data()[i], weights.data()[i]});
           },
           "labels"_a, "before"_a, "weights"_a)
-      .def_prop_ro("n_cuts", &Stitcher::n_cuts)
-      .def_prop_ro("n_markers", &Stitcher::n_markers);
+      .def_prop_ro("n_cuts", [](const StitcherPass& self) { return self.stitcher.n_cuts(); })
+      .def_prop_ro("n_markers", [](const StitcherPass& self) { return self.stitcher.n_markers(); });
   nb::class_<LiveStitcher>(module, "LiveStitcher")
       .def(nb::init<const MotionModel&, const StitchOptions&, std::int64_t>(), "motion"_a,
            "options"_a, nb::kw_only(), "lag"_a)

@@ -41,8 +41,8 @@ bool Carrier::carry(std::int32_t marker, const Anchor& from, const Places& now, 
       s_.pairs.push_back({from.around[k].at, *at, from.weight[k]});
   if (s_.pairs.empty()) return false;
   const RigidPrediction found(s_.pairs, from.at, D_, r_);
-  const auto at = accuracy_.find(marker);
-  out.place = place(found, at == accuracy_.end() ? Accuracy{} : at->second, frames, r);
+  const Accuracy* accuracy = accuracy_.find(marker);
+  out.place = place(found, accuracy == nullptr ? Accuracy{} : *accuracy, frames, r);
   out.n_neighbours = static_cast<std::int32_t>(s_.pairs.size());
   out.nearest = std::sqrt(found.nearest2());
   return true;

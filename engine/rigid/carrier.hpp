@@ -86,12 +86,15 @@ class Carrier {
   // Pairs of positions of the marker's most stable neighbours that are detected in both frames.
   template <typename Then, typename Now>
   std::span<const RigidPair> pair(std::int32_t marker, const Then& then, const Now& now) {
-    list_steadiest(marker, kSteadiest, [&](std::int32_t other) {
-      return then.find(other) != nullptr && now.find(other) != nullptr;
-    });
     s_.pairs.clear();
-    for (const auto& [variance, other] : s_.steadiest)
-      s_.pairs.push_back({*then.find(other), *now.find(other), 1 / variance});
+    for (const Bond& bond : neighbours_.of(marker)) {
+      if (bonds_only_ && !is_bond(bond, r_)) continue;
+      const Point* before = then.find(bond.other);
+      const Point* at = before != nullptr ? now.find(bond.other) : nullptr;
+      if (at == nullptr) continue;
+      s_.pairs.push_back({*before, *at, 1 / neighbours_.variance(bond)});
+      if (s_.pairs.size() == kSteadiest) break;
+    }
     return s_.pairs;
   }
 
@@ -117,8 +120,8 @@ class Carrier {
   }
   // Whether the accuracy was assessed often enough for predictions to be used.
   bool is_assessed(std::int32_t marker) const {
-    const auto at = accuracy_.find(marker);
-    return at != accuracy_.end() && at->second.n_assessed >= kMinAssessed;
+    const Accuracy* accuracy = accuracy_.find(marker);
+    return accuracy != nullptr && accuracy->n_assessed >= kMinAssessed;
   }
 
   // Adds an anchor of the marker in `then`, frame number `frame`, if any neighbour is detected
@@ -128,14 +131,16 @@ class Carrier {
                 std::vector<Anchor>& anchors) {
     const Point* own = then.find(marker);
     if (own == nullptr) return;
-    list_steadiest(marker, kRemembered,
-                   [&](std::int32_t other) { return then.find(other) != nullptr; });
-    if (s_.steadiest.empty()) return;
-    Anchor& anchor = anchors.emplace_back(Anchor{frame, *own, {}, {}});
-    for (const auto& [variance, other] : s_.steadiest) {
-      anchor.around.push_back({other, *then.find(other)});
-      anchor.weight.push_back(1 / variance);
+    Anchor anchor{frame, *own, {}, {}};
+    for (const Bond& bond : neighbours_.of(marker)) {
+      if (bonds_only_ && !is_bond(bond, r_)) continue;
+      const Point* at = then.find(bond.other);
+      if (at == nullptr) continue;
+      anchor.around.push_back({bond.other, *at});
+      anchor.weight.push_back(1 / neighbours_.variance(bond));
+      if (anchor.around.size() == kRemembered) break;
     }
+    if (!anchor.around.empty()) anchors.push_back(std::move(anchor));
   }
   // The position of a marker carried over `frames` frames. `r` is the additional variance.
   Carried place(const RigidPrediction& found, const Accuracy& accuracy, std::int64_t frames,
@@ -149,17 +154,7 @@ class Carrier {
   static constexpr std::size_t kRemembered = 16;  // neighbours of an anchor
   static constexpr std::int64_t kAssessEvery = 4, kMinAssessed = 3;
 
-  // Lists the up to `n_max` most stable neighbours for which may_carry(neighbour) holds.
-  template <typename May>
-  void list_steadiest(std::int32_t marker, std::size_t n_max, May&& may_carry) {
-    s_.steadiest.clear();
-    for (const Bond& bond : neighbours_.of(marker))
-      if ((!bonds_only_ || is_bond(bond, r_)) && may_carry(bond.other))
-        keep_smallest(s_.steadiest, n_max, {neighbours_.variance(bond), bond.other});
-  }
-
   struct Memory {
-    std::vector<std::pair<double, std::int32_t>> steadiest;
     std::vector<RigidPair> pairs;
   };
 
@@ -168,7 +163,7 @@ class Carrier {
   bool bonds_only_;
   std::int64_t n_frames_ = 0;
   Neighbours neighbours_;
-  std::map<std::int32_t, Accuracy> accuracy_;
+  FlatMap<std::int32_t, Accuracy> accuracy_;
   Scratch<Memory> s_;
 };
 

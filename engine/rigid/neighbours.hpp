@@ -5,14 +5,16 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
-#include <map>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "base/flat_map.hpp"
 #include "base/scratch.hpp"
+#include "base/shared_copy.hpp"
 #include "filter/kalman.hpp"
 #include "rigid/bond.hpp"
 
@@ -53,6 +55,7 @@ class Places {
     const MarkerPoint& slot = slots_[place(marker)];
     return slot.marker == marker ? &slot.at : nullptr;
   }
+  std::size_t size() const { return n_; }
   std::size_t capacity() const { return slots_.size(); }
 
  private:
@@ -100,24 +103,29 @@ class Neighbours {
     places_.clear();
     for (const MarkerPoint& one : seen) places_.set(one.marker, one.at);
     for (const MarkerPoint& one : seen) {
-      std::vector<Bond>& bonds = bonds_[one.marker];
-      if (bonds.empty() || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one, bonds);
-      for (Bond& bond : bonds)
+      SharedCopy<Bonds>& shared = bonds_[one.marker];
+      if (!shared.has_value()) shared = SharedCopy<Bonds>(Bonds{});
+      Bonds& bonds = shared.own();
+      if (bonds.size() == 0 || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one, bonds);
+      for (Bond& bond : bonds.span())
         if (const Point* other = places_.find(bond.other)) bond.add(std::sqrt(squared_distance(one.at, *other, D_)));
+      sort(bonds);
     }
   }
 
   // Removes a marker that will not be detected again.
   void forget(std::int32_t marker) {
     bonds_.erase(marker);
+    const auto is_gone = [&](const Bond& bond) { return bond.other == marker; };
     for (auto& [own, bonds] : bonds_)
-      std::erase_if(bonds, [&](const Bond& bond) { return bond.other == marker; });
+      if (std::ranges::any_of(bonds->span(), is_gone)) bonds.own().remove_if(is_gone);
   }
 
+  // The bonds of a marker, by increasing variance and then by the number of the other marker.
   std::span<const Bond> of(std::int32_t marker) const {
-    const auto at = bonds_.find(marker);
-    if (at == bonds_.end()) return {};
-    return at->second;
+    const SharedCopy<Bonds>* bonds = bonds_.find(marker);
+    if (bonds == nullptr) return {};
+    return (*bonds)->span();
   }
   double variance(const Bond& bond) const { return predictive_variance(bond, r_); }
 
@@ -126,27 +134,65 @@ class Neighbours {
   static constexpr std::size_t kMaxNeighbours = 24, kNearest = 12;
   static constexpr std::int64_t kTrial = 60;  // frames before a neighbour may be replaced
 
+  // The bonds of a marker, in one piece of memory, because the next state of a stream clones them.
+  class Bonds {
+   public:
+    std::span<const Bond> span() const { return {all_.data(), n_}; }
+    std::span<Bond> span() { return {all_.data(), n_}; }
+    std::size_t size() const { return n_; }
+    Bond& operator[](std::size_t k) { return all_[k]; }
+    void add(const Bond& bond) { all_[n_++] = bond; }
+    template <typename IsGone>
+    void remove_if(IsGone&& is_gone) {
+      n_ -= std::ranges::remove_if(span(), is_gone).size();
+    }
+
+   private:
+    std::array<Bond, kMaxNeighbours> all_{};
+    std::size_t n_ = 0;
+  };
+
+  // Variances change little from frame to frame, so an insertion sort is fast.
+  void sort(Bonds& bonds) const {
+    std::array<double, kMaxNeighbours> variances;
+    for (std::size_t k = 0; k < bonds.size(); ++k) variances[k] = variance(bonds[k]);
+    for (std::size_t k = 1; k < bonds.size(); ++k) {
+      const auto is_before = [&](double own, std::int32_t other, std::size_t at) {
+        return own < variances[at] || (own == variances[at] && other < bonds[at].other);
+      };
+      if (!is_before(variances[k], bonds[k].other, k - 1)) continue;
+      const Bond bond = bonds[k];
+      const double own = variances[k];
+      std::size_t at = k;
+      for (; at > 0 && is_before(own, bond.other, at - 1); --at) {
+        bonds[at] = bonds[at - 1];
+        variances[at] = variances[at - 1];
+      }
+      bonds[at] = bond;
+      variances[at] = own;
+    }
+  }
+
   // Adds the nearest markers as neighbours. If the list is full, a new one replaces the neighbour
   // with the largest variance.
   void look_around(std::span<const MarkerPoint> seen, const MarkerPoint& one,
-                   std::vector<Bond>& bonds) {
+                   Bonds& bonds) {
     near_.clear();
     for (const MarkerPoint& other : seen)
       if (other.marker != one.marker)
         near_.push_back({squared_distance(one.at, other.at, D_), other.marker});
-    const std::size_t n = std::min(bonds.empty() ? kMaxNeighbours : kNearest, near_.size());
+    const std::size_t n = std::min(bonds.size() == 0 ? kMaxNeighbours : kNearest, near_.size());
     std::partial_sort(near_.begin(), near_.begin() + static_cast<std::ptrdiff_t>(n), near_.end());
     for (std::size_t k = 0; k < n; ++k) {
       const std::int32_t other = near_[k].second;
-      if (std::any_of(bonds.begin(), bonds.end(), [&](const Bond& b) { return b.other == other; }))
+      if (std::ranges::any_of(bonds.span(), [&](const Bond& b) { return b.other == other; }))
         continue;
       if (bonds.size() < kMaxNeighbours) {
-        bonds.push_back({other});
+        bonds.add({other});
         continue;
       }
-      const auto worst = std::max_element(bonds.begin(), bonds.end(), [&](const Bond& a, const Bond& b) {
-        return variance(a) < variance(b);
-      });
+      const auto worst = std::ranges::max_element(
+          bonds.span(), {}, [&](const Bond& bond) { return variance(bond); });
       if (worst->n >= kTrial && worst->mean * worst->mean > near_[k].first) *worst = {other};
     }
   }
@@ -154,7 +200,7 @@ class Neighbours {
   int D_;
   double r_;
   std::int64_t n_frames_ = 0;
-  std::map<std::int32_t, std::vector<Bond>> bonds_;
+  FlatMap<std::int32_t, SharedCopy<Bonds>> bonds_;  // copies share those of markers not detected
   Scratch<Places> places_;
   std::vector<std::pair<double, std::int32_t>> near_;
 };

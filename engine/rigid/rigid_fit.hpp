@@ -142,8 +142,9 @@ inline std::array<double, 9> rotation(const std::array<double, 4>& q) {
 
 }  // namespace rigid
 
-// Without `may_turn` the fit is a translation.
-inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D, bool may_turn = true) {
+// The number of axes is a constant of the compiler, which unrolls the loops over them.
+template <int D>
+RigidFit fit_rigid_in(std::span<const RigidPair> pairs) {
   RigidFit fit;
   double all = 0;
   for (const RigidPair& p : pairs) {
@@ -157,7 +158,7 @@ inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D, bool may_turn
     fit.from[d] /= all;
     fit.to[d] /= all;
   }
-  const bool can_turn = may_turn && D > 1 && pairs.size() >= min_for_rotation(D);
+  const bool can_turn = D > 1 && pairs.size() >= min_for_rotation(D);
   if (can_turn) {
     double S[3][3] = {}, size = 0;
     for (const RigidPair& p : pairs)
@@ -166,7 +167,7 @@ inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D, bool may_turn
         size += 0.5 * p.weight * (a * a + b * b);
         for (int j = 0; j < D; ++j) S[i][j] += p.weight * a * (p.b[j] - fit.to[j]);
       }
-    if (D == 2) {
+    if constexpr (D == 2) {
       const double angle = std::atan2(S[0][1] - S[1][0], S[0][0] + S[1][1]);
       const double c = std::cos(angle), s = std::sin(angle);
       fit.R = {c, -s, 0, s, c, 0, 0, 0, 1};
@@ -188,6 +189,10 @@ inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D, bool may_turn
   const double free = n - (can_turn ? 0.5 * D * (D + 1) : D);
   fit.rms = std::sqrt(left / all / D * n / std::max(free, 1.0));
   return fit;
+}
+
+inline RigidFit fit_rigid(std::span<const RigidPair> pairs, int D) {
+  return D == 3 ? fit_rigid_in<3>(pairs) : D == 2 ? fit_rigid_in<2>(pairs) : fit_rigid_in<1>(pairs);
 }
 
 // tr([d]× J⁻¹ [d]×ᵀ); infinite for collinear points.

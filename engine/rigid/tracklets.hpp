@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cstdint>
 #include <deque>
-#include <map>
 #include <memory>
 #include <utility>
 #include <vector>
 
+#include "base/flat_map.hpp"
+#include "base/shared_copy.hpp"
 #include "filter/imm.hpp"
 #include "rigid/carrier.hpp"
 
@@ -33,33 +34,42 @@ struct Continuation {
   MotionState state;
   double log_likelihood = 0;
 };
-struct Tracklet {
-  std::int64_t label = -1;
-  std::int32_t marker = Decision::kOpen;
-  std::int64_t first = 0, last = 0;
-  std::int32_t n = 0;
-  std::vector<TrackletPoint> detections;  // until a decision
-  MotionState state;         // while its motion is compared
+// What is needed until a tracklet is decided. The filter states are those of its last detection.
+struct Comparison {
+  std::vector<TrackletPoint> detections;
+  MotionState state;
   double alone = 0;  // log likelihood of its second and later detections as a new marker
   std::vector<Continuation> continuations;
-  double link_gain = 0;  // mean log-likelihood ratio of its links by neighbours
-  std::int32_t guess = -1;  // best candidate among the occluded markers, while undecided
   // All candidates with their log-likelihood ratios.
   std::vector<std::pair<std::int32_t, double>> guesses;
 };
+struct Tracklet {
+  std::int64_t label = -1;
+  std::int32_t marker = Decision::kOpen;
+  std::int32_t n = 0;
+  std::int64_t first = 0, last = 0;
+  double link_gain = 0;  // mean log-likelihood ratio of its links by neighbours
+  std::int32_t guess = -1;  // best candidate among the occluded markers, while undecided
+  SharedCopy<Comparison> open;
+};
 struct Marker {
   std::int32_t tracklet = -1;
+  bool is_occluded = false;
   std::int64_t label = -1;  // of that tracklet
   std::int64_t last = 0;
-  bool is_occluded = false;
-  // While it is occluded, from the first comparison with a tracklet. Most occlusions end before.
-  bool is_prepared = false;
-  MotionState state;  // predicted to the newest frame
-  std::vector<Anchor> anchors;
   double mean_gain = 3;  // mean log-likelihood ratio of its detections by neighbours
+  // While it is occluded, from the first comparison with a tracklet. Most occlusions end before.
+  SharedCopy<std::vector<Anchor>> anchors;
+  SharedCopy<MotionState> state;  // predicted to the newest frame
+
+  bool is_prepared() const { return state.has_value(); }
+  void release() {
+    anchors = {};
+    state = {};
+  }
 };
-using Tracklets = std::map<std::int32_t, Tracklet>;
-using Markers = std::map<std::int32_t, Marker>;
+using Tracklets = FlatMap<std::int32_t, Tracklet>;
+using Markers = FlatMap<std::int32_t, Marker>;
 
 struct Frame {
   struct One {
@@ -70,9 +80,13 @@ struct Frame {
   MotionStep step;        // the step that leads to the frame
   std::vector<One> seen;  // by increasing tracklet
 
-  const Point* find(std::int32_t tracklet) const {
+  const One* one(std::int32_t tracklet) const {
     const auto at = std::ranges::lower_bound(seen, tracklet, {}, &One::tracklet);
-    return at != seen.end() && at->tracklet == tracklet ? &at->at : nullptr;
+    return at != seen.end() && at->tracklet == tracklet ? &*at : nullptr;
+  }
+  const Point* find(std::int32_t tracklet) const {
+    const One* found = one(tracklet);
+    return found == nullptr ? nullptr : &found->at;
   }
   void sort() {
     std::sort(seen.begin(), seen.end(),

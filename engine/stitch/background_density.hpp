@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <vector>
 
 #include "rigid/tracklets.hpp"
 
@@ -32,12 +33,23 @@ class BackgroundDensity {
   }
   double log_density(const Point& y, const Frame& at, std::int32_t own) const {
     double ghosts = 0;
-    for (const auto& one : at.seen) {
-      const double far = squared_distance(one.at, y, D_) / radius2_;
-      if (one.tracklet != own && far < 40) ghosts += std::exp(-0.5 * far);
-    }
+    for (const auto& one : at.seen)
+      if (one.tracklet != own) ghosts += peak_at(squared_distance(one.at, y, D_));
+    return log_density(ghosts, at);
+  }
+  // The sum of the peaks of all others at each detection of a frame. Each pair is computed once.
+  void sum_peaks(const Frame& at, std::vector<double>& sums) const {
+    sums.assign(at.seen.size(), 0);
+    for (std::size_t i = 0; i < sums.size(); ++i)
+      for (std::size_t j = i + 1; j < sums.size(); ++j) {
+        const double peak = peak_at(squared_distance(at.seen[i].at, at.seen[j].at, D_));
+        sums[i] += peak;
+        sums[j] += peak;
+      }
+  }
+  double log_density(double sum_of_peaks, const Frame& at) const {
     const double n = std::max<double>(static_cast<double>(at.seen.size()), 1);
-    return std::log(1 / volume_ + ghosts / n * peak_);
+    return std::log(1 / volume_ + sum_of_peaks / n * peak_);
   }
   // Whether a ghost of another tracklet may be at this position.
   bool is_near_another(const Point& y, const Frame& at, std::int32_t own) const {
@@ -47,6 +59,12 @@ class BackgroundDensity {
   }
 
  private:
+  // A peak relative to its height, by the squared distance from the marker.
+  double peak_at(double distance2) const {
+    const double far = distance2 / radius2_;
+    return far < 40 ? std::exp(-0.5 * far) : 0;
+  }
+
   int D_;
   double noise_, radius2_, peak_;
   bool has_box_ = false;

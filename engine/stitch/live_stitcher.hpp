@@ -52,7 +52,7 @@ class LiveStitcher {
     for (SharedCopy<Recent>& frame : recent_)
       if (!frame->is_taken)
         report_waiting(frame.own(), report);
-      else if (!frame->open.empty())
+      else if (may_change(*frame))
         report_taken(frame.own(), report);
     if (recent_.size() > n_waiting_ + n_kept_) recent_.pop_front();
   }
@@ -94,6 +94,14 @@ class LiveStitcher {
     frame.is_taken = true;
     std::vector<Point>().swap(frame.points);
     std::vector<std::int64_t>().swap(frame.labels);
+  }
+  // Whether the marker of a detection has changed or is final. Otherwise copies share the frame.
+  bool may_change(const Recent& frame) const {
+    return std::ranges::any_of(frame.open, [&](std::int32_t i) {
+      const Known& known = frame.known[i];
+      return known.tracklet < 0 || !stitcher_.is_open(known.tracklet) ||
+             std::max(stitcher_.marker_of(known.tracklet), -1) != known.reported;
+    });
   }
   template <typename Report>
   void report_taken(Recent& frame, Report&& report) {

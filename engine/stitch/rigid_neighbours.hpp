@@ -2,13 +2,18 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "base/flat_map.hpp"
 #include "base/scratch.hpp"
 #include "rigid/carrier.hpp"
 #include "rigid/tracklets.hpp"
@@ -27,10 +32,17 @@ class RigidNeighbours {
   }
   void forget(std::int32_t marker) { carrier_.forget(marker); }
 
-  // Prepares the evaluation of the links of the newest frame.
-  void begin_links(const StitchMemory& s) {
+  // Removes what belongs to the frame before.
+  void begin_frame() {
     w_.n_common = 0;
-    list_markers(s, s.frames.newest(), w_.places_now);
+    forget_places();
+  }
+  // Removes the positions of markers, because a tracklet has a marker now, or a detection another
+  // tracklet.
+  void forget_places() {
+    w_.n_known = 0;
+    w_.looked_at = -1;
+    w_.peaks.clear();
   }
   // Log-likelihood ratio of a tracklet's link into the newest frame, predicted by its neighbours,
   // against the background density. The most stable neighbours are used first, and the nearest ones
@@ -40,7 +52,7 @@ class RigidNeighbours {
     const Common& common = common_with(s, f.last);
     if (common.pairs.size() < min_for_rotation(D_) + 2) return false;
     const Point then = *s.frames.find(f.last)->find(own.tracklet);
-    const double background = s.background.log_density(own.at, s.frames.newest(), own.tracklet);
+    const double background = not_carried_now(s, own);
     // Segments hardly deform between two frames, so the residual of the fit alone gives the
     // variance.
     const auto say = [&](std::span<const RigidPair> pairs) {
@@ -49,7 +61,8 @@ class RigidNeighbours {
     };
     gain = -std::numeric_limits<double>::infinity();
     if (f.marker >= 0)
-      if (const auto pairs = carrier_.pair(f.marker, common.places, w_.places_now); pairs.size() == kSteadiest)
+      if (const auto pairs = carrier_.pair(f.marker, places(s, f.last), places(s, s.frames.now()));
+          pairs.size() == kSteadiest)
         gain = say(pairs);
     if (gain >= enough) return true;
     pair_nearest(common, own.tracklet, then);
@@ -60,33 +73,24 @@ class RigidNeighbours {
   // Stores the positions of the neighbours of an occluded marker. The last detections may already
   // be those of a ghost, so several earlier frames are stored.
   void remember_around(const StitchMemory& s, std::int32_t k, Marker& marker) {
-    marker.anchors.clear();
-    for (const std::int64_t back : Carrier::kAnchors) {
-      const Frame* then = s.frames.find(marker.last - back);
-      if (then == nullptr) continue;
-      list_markers(s, *then, w_.places);
-      carrier_.remember(k, w_.places, marker.last - back, marker.anchors);
-    }
+    std::vector<Anchor> anchors;
+    for (const std::int64_t back : Carrier::kAnchors)
+      if (const std::int64_t then = marker.last - back; s.frames.find(then) != nullptr)
+        carrier_.remember(k, places(s, then), then, anchors);
+    marker.anchors = SharedCopy<std::vector<Anchor>>(std::move(anchors));
   }
   // Log-likelihood ratio for a tracklet to be the occluded marker k, predicted by the neighbours of
   // k. For each anchor, it is averaged over some detections of the tracklet, without the worst,
   // which may be a ghost. The anchors are alternatives, so their likelihoods are averaged.
   double log_odds(const StitchMemory& s, const Tracklet& f, std::int32_t id, std::int32_t k,
                   const Marker& marker) {
-    const std::size_t every = std::max<std::size_t>(f.detections.size() / kLooks, 1);
-    w_.looks.assign(marker.anchors.size(), {});
-    Carriage way;
-    for (std::size_t i = 0; i < f.detections.size(); i += every) {
-      const Frame* at = s.frames.find(f.detections[i].frame);
-      if (at == nullptr) continue;
-      list_markers(s, *at, w_.places);
-      const double not_carried = s.background.log_density(f.detections[i].at, *at, id);
-      for (std::size_t a = 0; a < marker.anchors.size(); ++a) {
-        // Over long gaps a segment returns to its shape, so the variance does not grow with the
-        // gap.
-        if (carrier_.carry(k, marker.anchors[a], w_.places, Carrier::kLag, kNoise * square(noise_), way))
-          w_.looks[a].add(way.place.log_density(f.detections[i].at, D_) - not_carried);
-      }
+    if (w_.looked_at != id) look(s, f, id);
+    const std::vector<Anchor>& anchors = *marker.anchors;
+    w_.looks.assign(anchors.size(), {});
+    for (const Moment& moment : w_.moments) {
+      const Ways& ways = carry(s, k, anchors, moment.frame);
+      for (std::size_t a = 0; a < anchors.size(); ++a)
+        if (ways[a]) w_.looks[a].add(ways[a]->log_density(moment.at, D_) - moment.not_carried);
     }
     double max_gain = -std::numeric_limits<double>::infinity(), total = 0;
     for (const Looks& looks : w_.looks) max_gain = std::max(max_gain, looks.mean());
@@ -102,10 +106,36 @@ class RigidNeighbours {
 
   static double square(double x) { return x * x; }
 
-  // The markers of an earlier frame, and the tracklets detected in it and in the newest frame.
+  // A detection of a tracklet that is compared with occluded markers, and its background density.
+  struct Moment {
+    std::int64_t frame = 0;
+    Point at{};
+    double not_carried = 0;
+  };
+  // The positions predicted from the anchors of an occluded marker.
+  using Ways = std::array<std::optional<Carried>, Carrier::kAnchors.size()>;
+  // What is known of a frame that is kept.
+  struct Known {
+    std::int64_t frame = 0;
+    Places places;
+    FlatMap<std::int32_t, Ways> ways;  // by occluded marker
+  };
+
+  // Selects the moments of a tracklet. They are the same for all occluded markers.
+  void look(const StitchMemory& s, const Tracklet& f, std::int32_t id) {
+    w_.looked_at = id;
+    w_.moments.clear();
+    const std::vector<TrackletPoint>& detections = f.open->detections;
+    const std::size_t every = std::max<std::size_t>(detections.size() / kLooks, 1);
+    for (std::size_t i = 0; i < detections.size(); i += every)
+      if (const Frame* at = s.frames.find(detections[i].frame); at != nullptr)
+        w_.moments.push_back({detections[i].frame, detections[i].at,
+                              s.background.log_density(detections[i].at, *at, id)});
+  }
+
+  // The tracklets detected in an earlier frame and in the newest one.
   struct Common {
     std::int64_t then = 0;
-    Places places;
     std::vector<std::pair<std::int32_t, RigidPair>> pairs;
   };
   const Common& common_with(const StitchMemory& s, std::int64_t then) {
@@ -115,7 +145,6 @@ class RigidNeighbours {
     Common& common = w_.common[w_.n_common++];
     common.then = then;
     common.pairs.clear();
-    list_markers(s, *s.frames.find(then), common.places);
     const auto& before = s.frames.find(then)->seen;
     auto a = before.begin();
     for (const auto& b : s.frames.newest().seen) {
@@ -138,30 +167,68 @@ class RigidNeighbours {
   }
   // Updates the mean log-likelihood ratio with which neighbours predict each detected marker.
   void assess(const StitchMemory& s, std::span<const MarkerPoint> seen, Markers& markers) {
-    const Frame* then = s.frames.find(s.frames.now() - Carrier::kLag);
-    if (then == nullptr) return;
-    list_markers(s, *then, w_.places);
-    list_markers(s, s.frames.newest(), w_.places_now);
+    const std::int64_t then = s.frames.now() - Carrier::kLag;
+    if (s.frames.find(then) == nullptr) return;
     const auto update = [&](const MarkerPoint& one, const RigidPrediction& found,
                             const Accuracy& accuracy) {
       Marker& marker = markers.at(one.marker);
       const Carried place =
           carrier_.place(found, accuracy, Carrier::kLag, kNoise * square(noise_));
       const double gain =
-          place.log_density(one.at, D_) -
-          s.background.log_density(one.at, s.frames.newest(), marker.tracklet);
+          place.log_density(one.at, D_) - not_carried_now(s, *s.frames.newest().one(marker.tracklet));
       marker.mean_gain += 0.2 * (std::clamp(gain, -20.0, 20.0) - marker.mean_gain);
     };
-    carrier_.assess(seen, w_.places, w_.places_now, update);
+    carrier_.assess(seen, places(s, then), places(s, s.frames.now()), update);
   }
 
+  Known& known(const StitchMemory& s, std::int64_t t) {
+    for (std::size_t k = 0; k < w_.n_known; ++k)
+      if (w_.known[k].frame == t) {
+        assert(is_current(s, w_.known[k]));
+        return w_.known[k];
+      }
+    if (w_.n_known == w_.known.size()) w_.known.emplace_back();
+    Known& known = w_.known[w_.n_known++];
+    known.frame = t;
+    known.ways.clear();
+    known.places.clear();
+    for_each_known(s.frames.find(t)->seen, &Frame::One::tracklet, s.tracklets,
+                   [&](const Frame::One& one, const Tracklet& f) {
+      if (f.marker >= 0) known.places.set(f.marker, one.at);
+    });
+    return known;
+  }
+  // Whether the positions are those that would be listed now.
+  static bool is_current(const StitchMemory& s, const Known& known) {
+    std::size_t n = 0, n_equal = 0;
+    for_each_known(s.frames.find(known.frame)->seen, &Frame::One::tracklet, s.tracklets,
+                   [&](const Frame::One& one, const Tracklet& f) {
+      const Point* at = f.marker < 0 ? nullptr : known.places.find(f.marker);
+      n += f.marker >= 0;
+      n_equal += at != nullptr && *at == one.at;
+    });
+    return n_equal == n && known.places.size() == n;
+  }
   // The positions of the markers in a frame.
-  static void list_markers(const StitchMemory& s, const Frame& at, Places& places) {
-    places.clear();
-    for (const auto& one : at.seen)
-      if (const auto f = s.tracklets.find(one.tracklet);
-          f != s.tracklets.end() && f->second.marker >= 0)
-        places.set(f->second.marker, one.at);
+  const Places& places(const StitchMemory& s, std::int64_t t) { return known(s, t).places; }
+  // Where an occluded marker was in a frame, by its anchors. It is the same for all tracklets.
+  const Ways& carry(const StitchMemory& s, std::int32_t k, std::span<const Anchor> anchors,
+                    std::int64_t t) {
+    Known& then = known(s, t);
+    if (const Ways* ways = then.ways.find(k); ways != nullptr) return *ways;
+    Ways& ways = then.ways[k];
+    Carriage way;
+    // Over long gaps a segment returns to its shape, so the variance does not grow with the gap.
+    for (std::size_t a = 0; a < anchors.size(); ++a)
+      if (carrier_.carry(k, anchors[a], then.places, Carrier::kLag, kNoise * square(noise_), way))
+        ways[a] = way.place;
+    return ways;
+  }
+  // Background density of a detection of the newest frame.
+  double not_carried_now(const StitchMemory& s, const Frame::One& one) {
+    const Frame& now = s.frames.newest();
+    if (w_.peaks.empty()) s.background.sum_peaks(now, w_.peaks);
+    return s.background.log_density(w_.peaks[static_cast<std::size_t>(&one - now.seen.data())], now);
   }
 
   struct Looks {
@@ -184,7 +251,11 @@ class RigidNeighbours {
     std::vector<std::pair<double, std::int32_t>> nearest;
     std::vector<Looks> looks;
     std::vector<RigidPair> pairs;
-    Places places, places_now;
+    std::deque<Known> known;  // references stay valid
+    std::size_t n_known = 0;
+    std::vector<double> peaks;  // of the newest frame
+    std::int32_t looked_at = -1;  // the tracklet of `moments`
+    std::vector<Moment> moments;
   };
 
   int D_;

@@ -20,7 +20,6 @@
 #include <cstdint>
 #include <span>
 #include <tuple>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -65,7 +64,8 @@ class Stitcher {
             std::span<const std::int64_t> labels, std::span<std::int32_t> tracklet_of,
             Decide&& decide) {
     so_far_.frames.add(step, static_cast<std::size_t>(opt_.confirm + opt_.max_gap + 2));
-    predict_all(step);
+    neighbours_.begin_frame();
+    predict_markers(step);
     add_points(points, labels, tracklet_of);
     cut_links(labels, tracklet_of);
     for (std::size_t i = 0; i < points.size(); ++i)
@@ -86,8 +86,8 @@ class Stitcher {
   }
   // The tracklet that a detection with this label would continue, -1 if it would begin one.
   std::int32_t tracklet_with(std::int64_t label) const {
-    const auto at = of_label_.find(label);
-    return at != of_label_.end() && can_continue(at->second) ? at->second : -1;
+    const std::int32_t* id = of_label_.find(label);
+    return id != nullptr && can_continue(*id) ? *id : -1;
   }
   // Computes the best candidates of all undecided tracklets, as if no further frame came.
   void guess() {
@@ -119,15 +119,10 @@ class Stitcher {
   bool is_brief(const Tracklet& f) const { return f.last - f.first + 1 < opt_.confirm; }
   bool is_short(const Tracklet& f) const { return is_over(f) && is_brief(f); }
 
-  void predict_all(const MotionStep& step) {
-    for (auto& [id, f] : so_far_.tracklets) {
-      if (f.marker != Decision::kOpen || f.n >= kMotionDetections) continue;
-      predict(m_, step, f.state);
-      for (Continuation& c : f.continuations) predict(m_, step, c.state);
-    }
+  void predict_markers(const MotionStep& step) {
     for (auto& [id, marker] : markers_)
-      if (marker.is_prepared && now() - marker.last <= kMotionFrames)
-        predict(m_, step, marker.state);
+      if (marker.is_prepared() && now() - marker.last <= kMotionFrames)
+        predict(m_, step, marker.state.own());
   }
 
   void add_points(std::span<const Point> points, std::span<const std::int64_t> labels,
@@ -144,11 +139,11 @@ class Stitcher {
   }
   // A tracklet cannot continue if it is over, or if its marker was found in another tracklet.
   bool can_continue(std::int32_t id) const {
-    const auto at = so_far_.tracklets.find(id);
-    if (at == so_far_.tracklets.end() || is_over(at->second)) return false;
-    if (at->second.marker < 0) return at->second.marker == Decision::kOpen;
-    const auto marker = markers_.find(at->second.marker);
-    return marker != markers_.end() && marker->second.tracklet == id;
+    const Tracklet* f = so_far_.tracklets.find(id);
+    if (f == nullptr || is_over(*f)) return false;
+    if (f->marker < 0) return f->marker == Decision::kOpen;
+    const Marker* marker = markers_.find(f->marker);
+    return marker != nullptr && marker->tracklet == id;
   }
   std::int32_t begin(std::int64_t label) {
     const std::int32_t id = n_tracklets_++;
@@ -156,13 +151,14 @@ class Stitcher {
     f.label = label;
     f.link_gain = usual_gain_;
     f.first = f.last = now();
+    f.open = SharedCopy<Comparison>(Comparison{});
     of_label_[label] = id;
     return id;
   }
 
   bool may_be_ghost_of_another(const Tracklet& f, std::int32_t own) const {
     std::size_t n = 0, n_near = 0;
-    for (const TrackletPoint& detection : f.detections)
+    for (const TrackletPoint& detection : f.open->detections)
       if (const Frame* at = so_far_.frames.find(detection.frame); at != nullptr) {
         ++n;
         n_near += so_far_.background.is_near_another(detection.at, *at, own);
@@ -186,20 +182,19 @@ class Stitcher {
   void cut_links(std::span<const std::int64_t> labels, std::span<std::int32_t> tracklet_of) {
     Frame& now = so_far_.frames.newest();
     w_.cut.clear();
-    neighbours_.begin_links(so_far_);
-    for (Frame::One& one : now.seen) {
-      Tracklet& f = so_far_.tracklets.at(one.tracklet);
-      if (f.n == 0 || so_far_.frames.find(f.last) == nullptr) continue;
+    for_each_known(now.seen, &Frame::One::tracklet, so_far_.tracklets,
+                   [&](Frame::One& one, Tracklet& f) {
+      if (f.n == 0 || so_far_.frames.find(f.last) == nullptr) return;
       const double min_gain = std::min(kContradicted, f.link_gain - kFall);
       double gain = 0;
-      if (!neighbours_.link(so_far_, one, f, min_gain, gain)) continue;
+      if (!neighbours_.link(so_far_, one, f, min_gain, gain)) return;
       if (opt_.may_cut && gain < min_gain) {
         w_.cut.push_back(&one);
       } else {
         f.link_gain += 0.2 * (gain - f.link_gain);
         usual_gain_ += 0.01 * (gain - usual_gain_);
       }
-    }
+    });
     if (w_.cut.empty()) return;
     n_cuts_ += static_cast<std::int64_t>(w_.cut.size());
     for (Frame::One* one : w_.cut) {
@@ -208,28 +203,39 @@ class Stitcher {
       so_far_.tracklets.at(one->tracklet).link_gain = link_gain;
     }
     now.sort();
+    neighbours_.forget_places();
   }
   void add_detection(std::int32_t id, const Point& y) {
     so_far_.background.add(y);
     Tracklet& f = so_far_.tracklets.at(id);
     if (f.marker >= 0) {
       Marker& marker = markers_.at(f.marker);
-      marker.is_occluded = marker.is_prepared = false;
+      marker.is_occluded = false;
+      marker.release();
       marker.last = f.last = now();
       ++f.n;
       return;
     }
-    if (f.n == 0) {
-      f.state = begin_state(m_, y);
-    } else if (f.n < kMotionDetections) {
-      f.alone += update(m_, Prediction(m_, f.state), y, f.state);
-      for (Continuation& c : f.continuations)
-        c.log_likelihood += update(m_, Prediction(m_, c.state), y, c.state);
-    }
+    if (f.marker == Decision::kOpen) compare(f, y);
     ++f.n;
     f.last = now();
-    if (static_cast<std::int64_t>(f.detections.size()) < opt_.confirm)
-      f.detections.push_back({now(), y});
+  }
+  // Updates the motions under which an undecided tracklet may have reached a detection. They are
+  // predicted only now, because most false alarms have no second detection.
+  void compare(Tracklet& f, const Point& y) {
+    Comparison& open = f.open.own();
+    if (f.n == 0) open.state = begin_state(m_, y);
+    if (f.n > 0 && f.n < kMotionDetections) {
+      const auto next = [&](MotionState& state) {
+        for (std::int64_t t = f.last + 1; t <= now(); ++t)
+          predict(m_, so_far_.frames.find(t)->step, state);
+        return update(m_, Prediction(m_, state), y, state);
+      };
+      open.alone += next(open.state);
+      for (Continuation& c : open.continuations) c.log_likelihood += next(c.state);
+    }
+    if (static_cast<std::int64_t>(open.detections.size()) < opt_.confirm)
+      open.detections.push_back({now(), y});
   }
   void mark_occluded() {
     for (auto& [k, marker] : markers_) {
@@ -243,29 +249,30 @@ class Stitcher {
     for (auto& [k, marker] : markers_) prepare(k, marker);
   }
   void prepare(std::int32_t k, Marker& marker) {
-    if (!marker.is_occluded || marker.is_prepared) return;
-    marker.is_prepared = true;
+    if (!marker.is_occluded || marker.is_prepared()) return;
     neighbours_.remember_around(so_far_, k, marker);
-    marker.state = so_far_.frames.motion(m_, marker.tracklet);
+    marker.state = SharedCopy<MotionState>(so_far_.frames.motion(m_, marker.tracklet));
   }
   // Extrapolates every occluded marker's motion to the tracklets that begin in this frame.
   void extrapolate() {
-    for (const auto& one : so_far_.frames.newest().seen) {
-      Tracklet& f = so_far_.tracklets.at(one.tracklet);
-      if (f.n != 1 || f.marker != Decision::kOpen) continue;
+    for_each_known(so_far_.frames.newest().seen, &Frame::One::tracklet, so_far_.tracklets,
+                   [&](const Frame::One& one, Tracklet& f) {
+      if (f.n != 1 || f.marker != Decision::kOpen) return;
       prepare_all();
+      std::vector<Continuation>& all = f.open.own().continuations;
       for (const auto& [k, marker] : markers_) {
         if (!marker.is_occluded || now() - marker.last > kMotionFrames) continue;
-        Continuation& c = f.continuations.emplace_back(Continuation{k, marker.state, 0});
+        Continuation& c = all.emplace_back(Continuation{k, *marker.state, 0});
         c.log_likelihood = update(m_, Prediction(m_, c.state), one.at, c.state);
       }
-    }
+    });
   }
   void learn() {
     w_.seen.clear();
-    for (const auto& one : so_far_.frames.newest().seen)
-      if (const std::int32_t k = so_far_.tracklets.at(one.tracklet).marker; k >= 0)
-        w_.seen.push_back({k, one.at});
+    for_each_known(so_far_.frames.newest().seen, &Frame::One::tracklet, so_far_.tracklets,
+                   [&](const Frame::One& one, const Tracklet& f) {
+      if (f.marker >= 0) w_.seen.push_back({f.marker, one.at});
+    });
     neighbours_.learn(so_far_, w_.seen, markers_);
   }
   template <typename Decide>
@@ -295,42 +302,36 @@ class Stitcher {
       out.marker = may_be_ghost ? Decision::kGhost : n_markers_++;
     }
     f.marker = out.marker;
+    f.open = {};
     if (out.marker < 0) return out;
+    neighbours_.forget_places();
     Marker& marker = markers_[out.marker];
     out.after = marker.tracklet;
     marker.tracklet = id;
     marker.label = f.label;
     marker.last = f.last;
     marker.is_occluded = f.last < now();
-    marker.is_prepared = false;
-    f.detections.clear();
-    f.continuations.clear();
+    marker.release();
     return out;
   }
 
   // Removes tracklets that cannot continue, and markers occluded for long.
   void forget() {
-    for (auto at = so_far_.tracklets.begin(); at != so_far_.tracklets.end();) {
-      const Tracklet& f = at->second;
+    so_far_.tracklets.erase_if([&](const auto& entry) {
+      const auto& [id, f] = entry;
       const bool is_gone = f.marker != Decision::kOpen &&
                            now() - f.last > opt_.confirm + 2 * opt_.max_gap + 2;
-      if (!is_gone) {
-        ++at;
-        continue;
-      }
-      if (const auto of = of_label_.find(f.label); of != of_label_.end() && of->second == at->first)
-        of_label_.erase(of);
-      at = so_far_.tracklets.erase(at);
-    }
+      if (!is_gone) return false;
+      if (const std::int32_t* of = of_label_.find(f.label); of != nullptr && *of == id)
+        of_label_.erase(f.label);
+      return true;
+    });
     if (opt_.max_occlusion == 0) return;
-    for (auto at = markers_.begin(); at != markers_.end();) {
-      if (now() - at->second.last <= opt_.max_occlusion) {
-        ++at;
-        continue;
-      }
-      neighbours_.forget(at->first);
-      at = markers_.erase(at);
-    }
+    markers_.erase_if([&](const auto& entry) {
+      if (now() - entry.second.last <= opt_.max_occlusion) return false;
+      neighbours_.forget(entry.first);
+      return true;
+    });
   }
 
   struct Memory {
@@ -346,7 +347,7 @@ class Stitcher {
   double usual_gain_ = 0;  // mean log-likelihood ratio of a link by neighbours
   StitchMemory so_far_;
   Markers markers_;
-  std::unordered_map<std::int64_t, std::int32_t> of_label_;
+  FlatMap<std::int64_t, std::int32_t> of_label_;
   RigidNeighbours neighbours_;
   TrackletAssignment assignment_;
   Scratch<Memory> w_;  // scratch of one frame

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "base/flat_map.hpp"
 #include "base/scratch.hpp"
 #include "math/log_sums.hpp"
 #include "rigid/tracklets.hpp"
@@ -44,7 +44,7 @@ class TrackletAssignment {
     double max_gain = kNever;
     w_.scored.clear();
     for (const auto& [k, marker] : markers) {
-      const double gain = score(s, neighbours, id, k, marker, is_short(f));
+      const double gain = score(s, neighbours, id, f, k, marker, is_short(f));
       max_gain = std::max(max_gain, gain);
       if (gain > 0) w_.scored.emplace_back(k, gain);
     }
@@ -65,7 +65,7 @@ class TrackletAssignment {
       ++row;
       for (std::int32_t c = 0; c < n; ++c) {
         const std::int32_t k = w_.scored[c].first;
-        const double gain = score(s, neighbours, other, k, markers.at(k), is_short(g));
+        const double gain = score(s, neighbours, other, g, k, markers.at(k), is_short(g));
         if (!(gain > 0)) continue;
         w_.candidates.push_back({row, c, gain, 0});
         w_.rivals[c] += odds(gain);
@@ -90,15 +90,16 @@ class TrackletAssignment {
       f.guess = -1;
       if (f.marker != Decision::kOpen || f.n == 0) continue;
       if (std::has_single_bit(static_cast<std::uint32_t>(f.n)) && f.last == s.frames.now()) {
-        f.guesses.clear();
+        auto& guesses = f.open.own().guesses;
+        guesses.clear();
         for (const auto& [k, marker] : markers)
-          if (const double gain = score(s, neighbours, id, k, marker, is_short(f)); gain > 0)
-            f.guesses.emplace_back(k, gain);
+          if (const double gain = score(s, neighbours, id, f, k, marker, is_short(f)); gain > 0)
+            guesses.emplace_back(k, gain);
       }
       const auto row = static_cast<std::int32_t>(w_.open.size());
       w_.open.push_back(id);
-      for (const auto& [k, gain] : f.guesses)
-        if (const auto at = markers.find(k); at != markers.end() && at->second.is_occluded)
+      for (const auto& [k, gain] : f.open->guesses)
+        if (const Marker* marker = markers.find(k); marker != nullptr && marker->is_occluded)
           w_.candidates.push_back({row, k, gain, 0});
     }
     if (w_.candidates.empty()) return;
@@ -121,9 +122,8 @@ class TrackletAssignment {
   static double odds(double gain) { return std::exp(std::min(kOddsFactor * gain, 500.0)); }
 
   // Log odds that a tracklet is the reappearing marker k.
-  double score(const StitchMemory& s, RigidNeighbours& neighbours, std::int32_t id, std::int32_t k,
-               const Marker& marker, bool is_short) const {
-    const Tracklet& f = s.tracklets.at(id);
+  double score(const StitchMemory& s, RigidNeighbours& neighbours, std::int32_t id,
+               const Tracklet& f, std::int32_t k, const Marker& marker, bool is_short) const {
     if (!marker.is_occluded || marker.last >= f.first) return kNever;
     const double body = neighbours.log_odds(s, f, id, k, marker), motion = by_motion(s, f, id, k);
     const double at_rest = std::clamp(1 / (1 + std::exp(marker.mean_gain)), kMinMotion, 0.5);
@@ -133,17 +133,17 @@ class TrackletAssignment {
   }
   static double by_motion(const StitchMemory& s, const Tracklet& f, std::int32_t id,
                           std::int32_t k) {
-    for (const Continuation& c : f.continuations)
+    for (const Continuation& c : f.open->continuations)
       if (c.marker == k)
         if (const Frame* at = s.frames.find(f.first); at != nullptr)
-          return c.log_likelihood - f.alone -
-                 s.background.log_density(f.detections.front().at, *at, id);
+          return c.log_likelihood - f.open->alone -
+                 s.background.log_density(f.open->detections.front().at, *at, id);
     return kNever;
   }
   double advised(const Tracklet& f, const Marker& marker) const {
-    const auto at = advice_.find(f.label);
-    if (at == advice_.end()) return 0;
-    return marker.label == at->second.continues ? at->second.weight : -0.5 * at->second.weight;
+    const JoinAdvice* advice = advice_.find(f.label);
+    if (advice == nullptr) return 0;
+    return marker.label == advice->continues ? advice->weight : -0.5 * advice->weight;
   }
 
   struct Memory {
@@ -154,7 +154,7 @@ class TrackletAssignment {
     Assignment assignment;
   };
 
-  std::unordered_map<std::int64_t, JoinAdvice> advice_;
+  FlatMap<std::int64_t, JoinAdvice> advice_;
   Scratch<Memory> w_;  // scratch of one comparison
 };
 

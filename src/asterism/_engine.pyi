@@ -27,9 +27,9 @@ class MotionLikelihood:
         kind: Shorts,
         steps: Floats,
     ) -> None: ...
-    def sum(
-        self, *, squares: Floats, transitions: Floats, variance: float, velocity_variance: float
-    ) -> float: ...
+    def sums(
+        self, *, squares: Floats, transitions: Floats, variances: Floats, velocity_variance: float
+    ) -> Floats: ...
 
 class ScoreModel:
     def __init__(
@@ -479,10 +479,9 @@ class Stitcher:
     ODDS_FACTOR: float
     def __init__(self, motion: MotionModel, options: StitchOptions) -> None: ...
     def advise(self, labels: Ints, before: Ints, weights: Floats) -> None: ...
-    # (tracklet of each point; for each tracklet its marker, the previous tracklet, the probability)
+    # tracklet of each point of the next frames
     def run(
         self,
-        motion: MotionModel,
         times: Floats,
         kind: Shorts,
         F: Floats,
@@ -490,7 +489,9 @@ class Stitcher:
         offsets: Ints,
         points: Floats,
         labels: Ints,
-    ) -> tuple[Shorts, Shorts, Shorts, Floats]: ...
+    ) -> Shorts: ...
+    # for each tracklet its marker, the previous tracklet, and the probability
+    def finish(self) -> tuple[Shorts, Shorts, Floats]: ...
     n_cuts: Final[int]
     n_markers: Final[int]
 

@@ -67,25 +67,27 @@ def check_number(
     ...
     asterism.errors.ParameterError: p_detection: expected a number in (0, 1), found 1.5
     """
-    kind = "a whole number" if integer else "a number"
-    left, right = ("[", "]") if closed else ("(", ")")
-    if math.isinf(above) and math.isinf(below):
-        expected = f"a finite {kind[2:]}"
-    elif math.isinf(below):
-        expected = f"{kind} {'≥' if closed else '>'} {above:g}"
-    elif math.isinf(above):
-        expected = f"{kind} {'≤' if closed else '<'} {below:g}"
-    else:
-        expected = f"{kind} in {left}{above:g}, {below:g}{right}"
+
+    def expected() -> str:
+        kind = "a whole number" if integer else "a number"
+        left, right = ("[", "]") if closed else ("(", ")")
+        if math.isinf(above) and math.isinf(below):
+            return f"a finite {kind[2:]}"
+        if math.isinf(below):
+            return f"{kind} {'≥' if closed else '>'} {above:g}"
+        if math.isinf(above):
+            return f"{kind} {'≤' if closed else '<'} {below:g}"
+        return f"{kind} in {left}{above:g}, {below:g}{right}"
+
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise ParameterError(name, expected, repr(value), hint)
+        raise ParameterError(name, expected(), repr(value), hint)
     # A file may hold a whole number that no float can.
     number = math.inf if isinstance(value, int) and abs(value) > 1e300 else float(value)
     if integer and not number.is_integer():
-        raise ParameterError(name, expected, f"{number:g}", hint)
+        raise ParameterError(name, expected(), f"{number:g}", hint)
     inside = above <= number <= below if closed else above < number < below
     if not (math.isfinite(number) and inside):
-        raise ParameterError(name, expected, f"{number:g}", hint)
+        raise ParameterError(name, expected(), f"{number:g}", hint)
 
 
 def check_kind(name: str, value: object, kind: type, hint: str = "") -> None:
@@ -225,21 +227,24 @@ def check_array(
     ParameterError
         If it does not fit.
     """
-    wanted = f"an array of shape ({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
+
+    def wanted() -> str:  # streams check every frame, and need no text for it
+        return f"an array of shape ({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
+
     try:
         array = np.asarray(value)
         if array.dtype.kind not in ("biuf" if dtype is np.float64 else "biu") and array.size:
-            raise ParameterError(name, f"{wanted} of numbers", f"type {array.dtype}")
+            raise ParameterError(name, f"{wanted()} of numbers", f"type {array.dtype}")
         array = np.ascontiguousarray(array, dtype=dtype)
     except (TypeError, ValueError) as error:
         if isinstance(error, ParameterError):
             raise
-        raise ParameterError(name, f"{wanted} of numbers", str(error)) from error
+        raise ParameterError(name, f"{wanted()} of numbers", str(error)) from error
     fits = array.ndim == len(shape) and all(
         isinstance(want, str) or want == have for want, have in zip(shape, array.shape, strict=True)
     )
     if not fits:
-        raise ParameterError(name, wanted, f"shape {array.shape}")
+        raise ParameterError(name, wanted(), f"shape {array.shape}")
     if finite and array.dtype.kind == "f" and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ParameterError(name, "finite numbers", f"{array[place]} at index {place}")

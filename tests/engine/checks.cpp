@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -11,8 +12,10 @@
 #include "mcmc/tracker/capture_sweep.hpp"
 #include "mcmc/chain/chain_stats.hpp"
 #include "rigid/neighbours.hpp"
+#include "base/flat_map.hpp"
 #include "base/parallel.hpp"
 #include "mcmc/chain/trace.hpp"
+#include "math/lanes.hpp"
 #include "math/random.hpp"
 #include "multiview/candidate_choice.hpp"
 
@@ -229,6 +232,54 @@ void choices_of_candidates_are_the_best_or_tell_by_how_much_not() {
   CHECK(n_packed > 20 && n_cut > 5);
 }
 
+// A flat map holds what std::map holds, whatever is inserted and removed.
+void flat_maps_are_maps() {
+  Random random(3);
+  for (int repeat = 0; repeat < 300; ++repeat) {
+    FlatMap<int, int> flat;
+    std::map<int, int> map;
+    for (int n = 0; n < repeat % 40; ++n) {
+      const int key = static_cast<int>(random.below(60));
+      if (random.below(4) == 0) {
+        flat.erase(key);
+        map.erase(key);
+      } else {
+        flat[key] = map[key] = n;
+      }
+    }
+    flat.erase_if([](const auto& entry) { return entry.first % 7 == 0; });
+    std::erase_if(map, [](const auto& entry) { return entry.first % 7 == 0; });
+    CHECK(std::equal(flat.begin(), flat.end(), map.begin(), map.end(), [](const auto& a, const auto& b) {
+      return a.first == b.first && a.second == b.second;
+    }));
+    for (int key = -1; key < 61; ++key) {
+      const int* found = flat.find(key);
+      CHECK((found != nullptr) == map.contains(key) && (found == nullptr || *found == map.at(key)));
+    }
+  }
+}
+
+// The logarithm of a product, and what is no number.
+void products_of_many_numbers() {
+  LogProduct product;
+  double expected = 0;
+  for (int n = 0; n < 5000; ++n) {
+    const double x = std::exp(37 * std::sin(n * 0.7));
+    product.multiply(x);
+    expected += std::log(x);
+  }
+  for (int i = 0; i < kLanes; ++i) CHECK(std::abs(product.log(i) - expected) < 1e-9);
+  for (const double wrong : {std::numeric_limits<double>::infinity(), std::nan("")}) {
+    LogProduct invalid;
+    invalid.multiply(2);
+    invalid.multiply(wrong);
+    invalid.multiply(2);
+    CHECK(std::isnan(invalid.log(0)));
+  }
+  for (const double x : {0.0, -1e-9, -0.3, -1.0, -50.0, -600.0})
+    CHECK(std::abs(exp_of_negative(x).at[1] / std::exp(x) - 1) < 1e-15);
+}
+
 int main() {
   choices_of_candidates_are_the_best_or_tell_by_how_much_not();
   a_block_gains_what_the_capture_gains();
@@ -237,4 +288,6 @@ int main() {
   each_half_has_half_of_the_time();
   mixing_that_is_not_known();
   places_by_number();
+  flat_maps_are_maps();
+  products_of_many_numbers();
 }

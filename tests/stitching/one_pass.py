@@ -47,10 +47,11 @@ def one_pass(dense, *, advice=(), model=MODEL, confirm=15, max_occlusion=None, m
     if len(advice):
         of, before, weights = zip(*advice, strict=True)
         stitcher.advise(np.array(of), np.array(before), np.array(weights, dtype=float))
-    out = stitcher.run(
-        motion, d.times, *steps_of(model.motion, d.times), d.offsets, d.points, take.labels
+    tracklets = stitcher.run(
+        d.times, *steps_of(model.motion, d.times), d.offsets, d.points, take.labels
     )
-    return Found(out[0], out[1].tolist(), out[2].tolist(), out[3], stitcher.n_cuts)
+    markers, after, probabilities = stitcher.finish()
+    return Found(tracklets, markers.tolist(), after.tolist(), probabilities, stitcher.n_cuts)
 
 
 def scene(*seen, frames=300, body=BODY):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import tomllib
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import asterism as am
 from asterism.model import Recipe
+from asterism.model.recipe import sha256_of
 from asterism.model.toml_file import write_toml
 from asterism.tracking import ChainOptions, Gate, Lifecycle, Rigidity, method_by_name
 from tests.contracts.methods import METHODS
@@ -49,3 +51,16 @@ def test_a_recipe_stands_alone_and_is_of_one_input():
     start = am.Tracks(detections=DETECTIONS, labels=np.full(DETECTIONS.n_points, -1))
     with pytest.raises(am.ParameterError, match="start: expected none"):
         am.track(DETECTIONS, recipe=recipe, start=start)
+
+
+def test_the_hash_of_the_input_is_computed_when_it_is_read(monkeypatch):
+    recipe = am.track(DETECTIONS, "gnn", model=small_model()).recipe
+    stored = pickle.loads(pickle.dumps(recipe))
+    assert len(pickle.dumps(recipe)) < DETECTIONS.points.nbytes
+    other = am.track(DETECTIONS.part(0, 20), "gnn", model=small_model()).recipe
+    assert recipe == stored
+    assert recipe != other
+    with monkeypatch.context() as patch:
+        patch.setattr("asterism.model.recipe.sha256_of", None)
+        lazy = am.track(DETECTIONS, "gnn", model=small_model()).recipe
+    assert lazy.sha256 == recipe.sha256 == sha256_of(DETECTIONS)

@@ -42,9 +42,9 @@ class GateGroups:
     >>> truth = am.simulate.cube(frames=20, seed=1)
     >>> groups = gate_groups(truth, am.estimate_model(truth.detections).model)
     >>> groups
-    GateGroups(145 groups in 20 frames, the largest of 8 tracks)
+    GateGroups(150 groups in 20 frames, the largest of 2 tracks)
     >>> groups.largest.tolist()[:3]
-    [0, 8, 1]
+    [0, 2, 1]
     """
 
     times: NDArray[np.float64]
@@ -101,7 +101,7 @@ def gate_groups(
     >>> truth = am.simulate.cube(frames=20, seed=1)
     >>> groups = gate_groups(truth, am.estimate_model(truth.detections).model)
     >>> int(groups.largest.max())  # at most so many tracks compete for detections
-    8
+    2
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

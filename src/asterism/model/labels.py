@@ -15,17 +15,19 @@ __all__ = ["MAX_TRACKS", "check_labels"]
 
 MAX_TRACKS = 10_000_000
 """Largest number of tracks that is accepted; larger labels are refused as mistakes."""
+CHECKED_POINTS = 500_000
+"""Number of detections that are checked at once."""
 
 
-def check_labels(labels: NDArray[np.int64], frames: NDArray[np.int64]) -> int:
+def check_labels(labels: NDArray[np.int64], offsets: NDArray[np.int64]) -> int:
     """Check that labels are track numbers, each at most once in a frame; return how many tracks.
 
     Parameters
     ----------
     labels : ndarray of int, shape (N,)
         Track of each detection, -1 for clutter.
-    frames : ndarray of int, shape (N,)
-        Frame of each detection, increasing.
+    offsets : ndarray of int, shape (T + 1,)
+        First detection of each frame.
 
     Returns
     -------
@@ -43,7 +45,7 @@ def check_labels(labels: NDArray[np.int64], frames: NDArray[np.int64]) -> int:
             "labels", f"track numbers from 0 to {MAX_TRACKS - 1}, or -1 for clutter", wrong
         )
     n_tracks = int(labels.max()) + 1 if labels.size else 0
-    twice = _first_twice(frames, labels, n_tracks)
+    twice = _first_twice(offsets, labels, n_tracks)
     if twice is not None:
         raise ParameterError(
             "labels", "at most one detection of a track in a frame",
@@ -53,9 +55,36 @@ def check_labels(labels: NDArray[np.int64], frames: NDArray[np.int64]) -> int:
 
 
 def _first_twice(
+    offsets: NDArray[np.int64], labels: NDArray[np.int64], n_tracks: int
+) -> tuple[int, int] | None:
+    """Return a frame and a track with two detections in it, or None if there are none.
+
+    Parameters
+    ----------
+    offsets : ndarray of int, shape (T + 1,)
+        First detection of each frame.
+    labels : ndarray of int, shape (N,)
+        Track of each detection, -1 for clutter.
+    n_tracks : int
+        Number of tracks.
+    """
+    t, T = 0, len(offsets) - 1
+    while t < T:  # in parts, which take little memory
+        end = int(np.searchsorted(offsets, offsets[t] + CHECKED_POINTS))
+        end = min(max(end, t + 1), T)
+        counts = np.diff(offsets[t : end + 1])
+        own = labels[offsets[t] : offsets[end]]
+        twice = _twice_in(np.repeat(np.arange(end - t), counts), own, n_tracks)
+        if twice is not None:
+            return t + twice[0], twice[1]
+        t = end
+    return None
+
+
+def _twice_in(
     frames: NDArray[np.int64], labels: NDArray[np.int64], n_tracks: int
 ) -> tuple[int, int] | None:
-    """Return a frame and a track with two detections in it, or None if there are none."""
+    """Do the same for the frame of each detection."""
     if labels.size and labels.min() < 0:
         frames, labels = frames[labels >= 0], labels[labels >= 0]
     if not labels.size:

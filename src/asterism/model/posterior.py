@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from asterism import _engine
 from asterism.checks import check_kind
 from asterism.model.compiled import motion_model, score_model, steps_of, with_noise
@@ -21,10 +23,12 @@ from asterism.model.tracking_model import TrackingModel
 from asterism.model.tracks import Tracks
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 __all__ = ["log_posterior", "track_scores"]
+
+SCORED_POINTS = 500_000
+"""Number of detections whose tracks are scored in a call."""
 
 
 def track_scores(tracks: Tracks, model: TrackingModel) -> NDArray[np.float64]:
@@ -55,10 +59,18 @@ def track_scores(tracks: Tracks, model: TrackingModel) -> NDArray[np.float64]:
     d = tracks.detections
     order, offsets = tracks.by_track
     kind, F, Q = steps_of(model.motion, d.times)
-    scores = _engine.score_tracks(
-        motion_model(model, d.n_axes), score_model(model),
-        with_noise(d.points, d.covariances)[order], d.frame_of[order], offsets, d.times, kind, F, Q,
-    )  # fmt: skip
+    points = with_noise(d.points, d.covariances)
+    scores = np.zeros(tracks.n_tracks)
+    k = 0
+    while k < tracks.n_tracks:  # in parts, whose copies take little memory
+        last = int(np.searchsorted(offsets, offsets[k] + SCORED_POINTS, side="right")) - 1
+        end = max(last, k + 1)
+        own = order[offsets[k] : offsets[end]]
+        scores[k:end] = _engine.score_tracks(
+            motion_model(model, d.n_axes), score_model(model), points[own], d.frame_of[own],
+            offsets[k : end + 1] - offsets[k], d.times, kind, F, Q,
+        )  # fmt: skip
+        k = end
     scores[tracks.lengths == 0] = 0.0
     return scores
 

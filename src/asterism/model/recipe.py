@@ -19,10 +19,53 @@ if TYPE_CHECKING:
 
     from asterism.model.detections import Detections
 
-__all__ = ["Recipe", "sha256_of", "versions"]
+__all__ = ["InputHash", "Recipe", "sha256_of", "versions"]
 
 NONE = "none"
 """Text for an option that is None, here and on the command line."""
+
+
+class InputHash:
+    """SHA-256 of the input of a tracking, computed when it is first read.
+
+    Most results are never repeated, and the hash of a large capture takes longer than its
+    association. Detections and labels are read-only, so the time at which it is computed has no
+    effect.
+
+    Parameters
+    ----------
+    source : str or tuple of Detections and ndarray or None
+        Hash in hexadecimal, or the detections and the initial labels, if any.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.Detections.from_frames([0.0], [[[0, 0, 1]]])
+    >>> InputHash((d, None)) == InputHash(sha256_of(d))
+    True
+    """
+
+    def __init__(self, source: str | tuple[Detections, NDArray[np.int64] | None]) -> None:
+        self._source = source
+
+    @property
+    def sha256(self) -> str:
+        """Hash in hexadecimal."""
+        if not isinstance(self._source, str):
+            self._source = sha256_of(*self._source)
+        return self._source
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, InputHash) and self.sha256 == other.sha256
+
+    def __hash__(self) -> int:
+        return hash(self.sha256)
+
+    def __repr__(self) -> str:
+        return f"InputHash({self.sha256!r})"
+
+    def __reduce__(self) -> tuple[type[InputHash], tuple[str]]:
+        return InputHash, (self.sha256,)  # a stored recipe does not contain the capture
 
 
 @record
@@ -45,8 +88,8 @@ class Recipe:
         Whether the method starts from given tracks, which are then needed to repeat it.
     reason : str
         Reason why this method was selected; empty if the caller named the method.
-    sha256 : str
-        Hash of the detections and of the initial labels (`sha256_of`).
+    input_hash : InputHash
+        Hash of the detections and of the initial labels.
     versions : dict of str
         Versions of the software on which the result can depend.
 
@@ -70,8 +113,13 @@ class Recipe:
     seed: int | None
     has_start: bool
     reason: str
-    sha256: str
+    input_hash: InputHash
     versions: dict[str, str]
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the detections and of the initial labels (`sha256_of`)."""
+        return self.input_hash.sha256
 
     @property
     def chosen(self) -> str:
@@ -141,7 +189,7 @@ class Recipe:
             seed=seed,
             has_start=_value(method, "method.start", bool),
             reason=_value({"reason": "", **method}, "method.reason", str),
-            sha256=_value(_table(values, "input"), "input.sha256", str),
+            input_hash=InputHash(_value(_table(values, "input"), "input.sha256", str)),
             versions={str(k): str(v) for k, v in _table(values, "versions").items()},
         )
 

@@ -80,7 +80,7 @@ class Tracks:
         )
         n = self.detections.n_points
         labels = keep_array("labels", self.labels, (n,), dtype=np.int64)
-        n_tracks = check_labels(labels, self.detections.frame_of)
+        n_tracks = check_labels(labels, self.detections.offsets)
         names = tuple(self.names)
         if names and len(names) < n_tracks:
             raise ParameterError("names", f"a name or None for each of {n_tracks} tracks", names)

@@ -122,6 +122,7 @@ def choose_method(
     detections = detections.measured()
     method = GNN()
     state, labels, _ = method.run(method.init(model, n_axes=detections.n_axes), detections)
+    labels.flags.writeable = False  # no other object refers to it: no need to copy
     tracks = Tracks(detections=detections, labels=labels)
     n_rigid, n_compared = partners(tracks, model.sensor.noise_sigma)
     if n_compared and n_rigid >= ON_BODIES * n_compared:
@@ -177,12 +178,14 @@ def _sampled(tracks: Tracks) -> NDArray[np.float64]:
     d = tracks.detections
     frames = np.unique(np.linspace(0, d.n_frames - 1, SAMPLES).astype(np.int64))
     longest = np.argsort(-tracks.lengths, kind="stable")[:MAX_TRACKS]
-    row = np.full(d.n_frames, -1)
-    row[frames] = np.arange(len(frames))
     column = np.full(tracks.n_tracks + 1, -1)  # the last element is for clutter
     column[longest] = np.arange(len(longest))
-    i, j = row[d.frame_of], column[tracks.labels]
-    is_in = (i >= 0) & (j >= 0)
+    counts = d.counts[frames]
+    i = np.repeat(np.arange(len(frames)), counts)
+    # Points of the sampled frames: the first of each, and the rank within the frame.
+    own = np.repeat(d.offsets[frames] - np.cumsum(counts) + counts, counts) + np.arange(len(i))
+    j = column[tracks.labels[own]]
+    is_in = j >= 0
     sampled = np.full((len(frames), len(longest), d.n_axes), np.nan)
-    sampled[i[is_in], j[is_in]] = d.points[is_in]
+    sampled[i[is_in], j[is_in]] = d.points[own[is_in]]
     return sampled

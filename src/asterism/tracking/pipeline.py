@@ -100,9 +100,11 @@ def track(
         made = method_by_name(recipe.method, **recipe.options)
     model = tracklet_model(recipe.model) if recipe.stitch else recipe.model
     carried = recipe if made.name in METHODS else None
+    # Stitched tracks have no log posterior.
     tracks = associate(
-        made, detections, model, seed=recipe.seed, start=start, recipe=carried, progress=progress
-    )
+        made, detections, model, seed=recipe.seed, start=start, recipe=carried,
+        score=not recipe.stitch, progress=progress,
+    )  # fmt: skip
     if recipe.stitch:
         tracks = dataclasses.replace(stitch_tracklets(tracks, model).tracks, recipe=carried)
     return tracks

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from asterism.checks import check_kind, check_number
 from asterism.errors import ParameterError
 from asterism.model import Detections, Recipe, TrackingModel
-from asterism.model.recipe import sha256_of, versions
+from asterism.model.recipe import InputHash, versions
 from asterism.records import record
 from asterism.tracking.choose import choose_method
 from asterism.tracking.estimation import estimate_model
@@ -117,7 +117,7 @@ def plan_tracking(
         seed=seed,
         has_start=start is not None,
         reason=reason,
-        sha256=sha256_of(detections, None if start is None else start.labels),
+        input_hash=InputHash((detections, None if start is None else start.labels)),
         versions=versions(),
     )
     return Plan(recipe=recipe, method=method, estimate=estimate)

@@ -40,7 +40,7 @@ from asterism.tracking.estimation.motion_fit import (
     polish,
 )
 from asterism.tracking.estimation.rates import Counts, Rates
-from asterism.tracking.estimation.sampling import sample_runs
+from asterism.tracking.estimation.sampling import Runs, sample_runs
 from asterism.tracking.estimation.scales import first_scales
 from asterism.tracking.estimation.stochastic_em import draw_rates
 
@@ -137,27 +137,21 @@ def estimate_model(
     def rates_of(evidence: Evidence) -> Rates:
         return _counts(evidence).rates(in_bursts=in_bursts)
 
-    runs = sample_runs(detections, activity, FIT_POINTS)
+    runs = Runs(pieces=sample_runs(detections, activity, FIT_POINTS))
     fit, fitted, bounds = _fitted(runs, scales, region, rates_of)
     reach, min_noise = scales.spacing / 2, bounds.min_noise
-    runs = sample_runs(detections, activity, COUNT_POINTS)
+    runs = Runs(pieces=sample_runs(detections, activity, COUNT_POINTS))
     model = _model(fit, rates_of(fitted), fitted, scales, region)
     evidence = gather_evidence(runs, model, reach)
     counts = (_counts(evidence),)
     rates = rates_of(evidence)
     if population == "open":
 
-        def model_of(fit: MotionFit, rates: Rates, tracks: list[Tracks] | None) -> TrackingModel:
-            seen = evidence if tracks is None else Evidence.of(tracks, reach)
-            return _model(fit, rates, seen, scales, region)
+        def model_of(fit: MotionFit, rates: Rates, evidence: Evidence) -> TrackingModel:
+            return _model(fit, rates, evidence, scales, region)
 
-        drawn = draw_rates(runs, fit, rates, bounds, model_of, in_bursts=in_bursts)
-        fit, rates, counts, evidence = (
-            drawn.fit,
-            drawn.rates,
-            drawn.counts,
-            Evidence.of(drawn.tracks, reach),
-        )
+        drawn = draw_rates(evidence, fit, rates, bounds, model_of, reach, in_bursts=in_bursts)
+        fit, rates, counts, evidence = drawn.fit, drawn.rates, drawn.counts, drawn.evidence
     fit, sure = polish(evidence.tracks, _model(fit, rates, evidence, scales, region), fit, bounds)
     model = _model(fit, rates, evidence, scales, region)
     stds = _stds(counts, region, is_open=population == "open", in_bursts=in_bursts)
@@ -173,7 +167,7 @@ def estimate_model(
 
 
 def _fitted(
-    runs: list[Detections],
+    runs: Runs,
     scales: Scales,
     region: Region,
     rates_of: Callable[[Evidence], Rates],
@@ -185,42 +179,47 @@ def _fitted(
         min_noise=scales.noise_floor,
         max_acceleration=2 * SAFE_SHARE * scales.spacing / scales.step**2,
     )
-    fit = bounds.fit(
-        math.log(scales.noise), (math.log(low), math.log(low * high) / 2, math.log(high)), 0.95
-    )
-
+    levels = (low, math.sqrt(low * high), high)
+    fit = bounds.clip(MotionFit(noise=scales.noise, levels=levels, stay=0.95))
     model = _first_model(fit, scales, region)
     evidence = gather_evidence(runs, _wider(model), reach)
-    for refine in (False, True):
-        fit = fit_motion(evidence.tracks, model, fit, bounds, refine=refine)
-        model = _model(fit, rates_of(evidence), evidence, scales, region)
-        evidence = gather_evidence(runs, _wider(model), reach)
+    fit = fit_motion(evidence.tracks, model, fit, bounds)
+    model = _model(fit, rates_of(evidence), evidence, scales, region)
+    evidence = gather_evidence(runs, _wider(model), reach)
+    fit = fit_motion(evidence.tracks, model, fit, bounds, refine=True)
     min_noise = max(scales.noise_floor, min(MIN_NOISE, scales.spacing / 100))
     bounds = replace(bounds, min_noise=min_noise)
 
+    def tracked(trial: MotionFit, evidence: Evidence) -> tuple[Evidence, TrackingModel]:
+        """Track with a fit and with the rates of earlier tracks."""
+        by = _model(trial, rates_of(evidence), evidence, scales, region)
+        return gather_evidence(runs, by, reach), by
+
     # The motion is fitted to tracks of a wider model. The rates, and the tracks by which motions
     # are compared, are those of the model itself.
-    def tried(trial: MotionFit, evidence: Evidence) -> tuple[float, MotionFit, Evidence]:
-        trial = replace(trial, noise=max(trial.noise, min_noise))
-        by = _model(trial, rates_of(evidence), evidence, scales, region)
-        found = gather_evidence(runs, by, reach)
+    def gain(trial: MotionFit, found: Evidence, by: TrackingModel) -> float:
         model = _model(trial, rates_of(found), found, scales, region)
         # The bounds are those with which the tracks were found.
-        bounds = {"max_speed": by.population.max_speed, "max_gap": by.population.max_gap}
-        model = replace(model, population=replace(model.population, **bounds))
-        return _log_evidence(found, model, region), trial, found
+        limits = {"max_speed": by.population.max_speed, "max_gap": by.population.max_gap}
+        model = replace(model, population=replace(model.population, **limits))
+        return _log_evidence(found, model, region)
 
-    three = tried(fit, evidence)
+    three = bounds.clip(fit)
+    of_three, by_three = tracked(three, evidence)
     # One motion is fitted to tracks of its own, those of the quietest motion. Tracks of three
     # motions contain jolts, true or wrong, that a single motion would have to explain.
-    one = tried(replace(fit, levels=fit.levels[:1], stay=1.0), evidence)
-    one = tried(fit_one_motion(one[2].tracks, model, one[1], bounds), one[2])
+    one = bounds.clip(replace(fit, levels=fit.levels[:1], stay=1.0))
+    of_one, _ = tracked(one, evidence)
+    one = bounds.clip(fit_one_motion(of_one.tracks, model, one, bounds))
+    of_one, by_one = tracked(one, of_one)
     # One motion is rejected if it loses markers that three motions keep, however well it predicts
     # the remaining ones.
-    is_blind = one[2].n_lost > BLIND * three[2].n_lost + 1
-    gains_enough = three[0] - one[0] > MIN_GAIN * sum(run.n_points for run in runs)
-    _, fit, evidence = three if is_blind or gains_enough else one
-    return fit, evidence, bounds
+    if of_one.n_lost > BLIND * of_three.n_lost + 1:
+        return three, of_three, bounds
+    more = gain(three, of_three, by_three) - gain(one, of_one, by_one)
+    if more > MIN_GAIN * runs.joined.n_points:
+        return three, of_three, bounds
+    return one, of_one, bounds
 
 
 def _check_units(detections: Detections) -> None:
@@ -279,7 +278,7 @@ def _counts(evidence: Evidence) -> Counts:
 def _model(
     fit: MotionFit, rates: Rates, evidence: Evidence, scales: Scales, region: Region
 ) -> TrackingModel:
-    top = float(np.quantile(evidence.speeds, 0.9999))
+    top = evidence.top_speed
     return TrackingModel(
         motion=fit.motion(max(evidence.velocity_rms, top / 4, 1e-9)),
         sensor=Sensor(
@@ -322,22 +321,22 @@ def _log_evidence(evidence: Evidence, model: TrackingModel, region: Region) -> f
     log_clutter = math.log(sensor.clutter_density)
     events = (sensor.clutter_density + population.birth_density) * region.volume
     total = -events * evidence.n_frames
-    for found in evidence.tracks:
-        scores = track_scores(found, model)
+    for piece, labels in zip(evidence.runs.pieces, evidence.labels, strict=True):
+        scores = track_scores(Tracks(detections=piece, labels=labels), model)
         # The model forbids a track of one detection, so it counts as clutter.
-        total += float(scores[np.isfinite(scores)].sum()) + log_clutter * len(found.labels)
+        total += float(scores[np.isfinite(scores)].sum()) + log_clutter * len(labels)
     return total
 
 
 def _motion_stds(
-    fit: MotionFit, model: TrackingModel, sure: tuple[float, ...] | None, min_noise: float
+    fit: MotionFit, model: TrackingModel, sure: tuple[float, ...], min_noise: float
 ) -> dict[str, float]:
-    if sure is None:
-        return {}
     levels = motion_levels(model)[2]
     names = ["motion"] if len(levels) == 1 else [f"motion_{k + 1}" for k in range(len(levels))]
     stds = {n: s * x for n, s, x in zip(names, sure[1:], levels, strict=True)}
-    return stds if fit.noise <= min_noise else {"noise_sigma": sure[0] * fit.noise} | stds
+    if fit.noise > min_noise:
+        stds = {"noise_sigma": sure[0] * fit.noise} | stds
+    return {name: std for name, std in stds.items() if np.isfinite(std)}
 
 
 def _bridgeable(fit: MotionFit, p_seen: float, n_links: int, scales: Scales) -> int:

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.errors import ParameterError
-from asterism.model import Detections, TrackingModel, Tracks
 from asterism.records import record
 from asterism.tracking.estimation.occlusions import Sightings, count_sightings
+from asterism.tracking.estimation.scales import extents
 from asterism.tracking.methods.gnn import GNN
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from asterism.model import Detections, TrackingModel, Tracks
+    from asterism.tracking.estimation.sampling import Runs
 
 __all__ = ["Evidence", "Region", "gather_evidence"]
 
@@ -54,7 +57,7 @@ class Region:
         -------
         Region
         """
-        extent = np.ptp(detections.points, axis=0)
+        extent = extents(detections.points)
         longest = max(float(extent.max()), 1e-3)
         return cls(
             volume=float(np.prod(np.maximum(extent, 0.1 * longest))),
@@ -63,35 +66,48 @@ class Region:
         )
 
 
-@record
+@record(eq=False)
 class Evidence:
-    """Counts from tracks, over all pieces of a capture.
+    """Counts from the tracks of some runs of a capture.
 
     Parameters
     ----------
-    tracks : list of Tracks
-        Tracks of each piece.
+    runs : Runs
+        Runs of consecutive frames.
+    labels : list of ndarray of int
+        Tracks of each run.
+    tracks : Tracks
+        Tracks of all runs.
     n_misses : int
         Number of missed detections inside tracks.
     sightings : Sightings
         Counts of detected and missed markers. A lost marker is not a missed one.
-    n_clutter : int
-        Number of points in no track.
-    n_frames : int
-        Number of frames of all pieces.
-    speeds : ndarray of shape (L,)
-        Speed of each link, m/s.
+    top_speed : float
+        Speed that one in ten thousand links exceeds, m/s.
     velocity_rms : float
         Root mean square of a velocity coordinate, m/s.
+    n_links : int
+        Number of pairs of consecutive detections in tracks.
     """
 
-    tracks: list[Tracks]
+    runs: Runs
+    labels: list[NDArray[np.int64]]
+    tracks: Tracks
     n_misses: int
     sightings: Sightings
-    n_clutter: int
-    n_frames: int
-    speeds: NDArray[np.float64]
+    top_speed: float
     velocity_rms: float
+    n_links: int
+
+    @property
+    def n_clutter(self) -> int:
+        """Number of points in no track."""
+        return len(self.tracks.labels) - int(self.tracks.lengths.sum())
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames of all runs."""
+        return self.tracks.detections.n_frames
 
     @property
     def n_lost(self) -> int:
@@ -99,13 +115,15 @@ class Evidence:
         return self.n_misses + self.n_clutter
 
     @classmethod
-    def of(cls, tracks: list[Tracks], reach: float) -> Evidence:
-        """Count in the tracks of each piece.
+    def of(cls, runs: Runs, labels: list[NDArray[np.int64]], reach: float) -> Evidence:
+        """Count in the tracks of each run.
 
         Parameters
         ----------
-        tracks : list of Tracks
-            Tracks of each piece.
+        runs : Runs
+            Runs of consecutive frames.
+        labels : list of ndarray of int
+            Tracks of each run.
         reach : float
             As in `count_sightings`, metres.
 
@@ -118,22 +136,12 @@ class Evidence:
         ParameterError
             If the tracks have too few links.
         """
-        misses = clutter = 0
-        speeds: list[NDArray[np.float64]] = []
-        squares: list[NDArray[np.float64]] = []
-        for found in tracks:
-            d = found.detections
-            order, _ = found.by_track
-            frame = d.frame_of[order]
-            is_link = np.diff(found.labels[order]) == 0
-            dt = np.diff(d.times[frame])[is_link]
-            moves = np.diff(d.points[order], axis=0)[is_link]
-            misses += int((np.diff(frame)[is_link] - 1).sum())
-            clutter += int((found.labels < 0).sum())
-            speeds.append(np.linalg.norm(moves, axis=1) / dt)
-            squares.append(((moves / dt[:, None]) ** 2).mean(axis=1))
-        seen = [count_sightings(found, reach) for found in tracks]
-        n_links = sum(map(len, speeds))
+        tracks = runs.tracks(labels)
+        d = tracks.detections
+        order, _ = tracks.by_track
+        frame = d.frame_of[order]
+        is_link = np.diff(tracks.labels[order]) == 0
+        n_links = int(np.count_nonzero(is_link))
         if n_links < MIN_LINKS:
             raise ParameterError(
                 "detections",
@@ -141,28 +149,27 @@ class Evidence:
                 f"{n_links}",
                 "give a model",
             )
+        velocities = np.diff(d.points[order], axis=0)[is_link]
+        velocities /= np.diff(d.times[frame])[is_link, None]
+        squares = (velocities**2).sum(axis=1)
         return cls(
+            runs=runs,
+            labels=labels,
             tracks=tracks,
-            n_misses=misses,
-            sightings=Sightings(*map(sum, zip(*seen, strict=True))),
-            n_clutter=clutter,
-            n_frames=sum(found.detections.n_frames for found in tracks),
-            speeds=np.concatenate(speeds),
-            velocity_rms=math.sqrt(float(np.concatenate(squares).mean())),
+            n_misses=int((np.diff(frame)[is_link] - 1).sum()),
+            sightings=count_sightings(tracks, reach),
+            top_speed=math.sqrt(float(np.quantile(squares, 0.9999))),
+            velocity_rms=math.sqrt(float(squares.mean()) / d.n_axes),
+            n_links=n_links,
         )
 
-    @property
-    def n_links(self) -> int:
-        """Number of pairs of consecutive detections in tracks."""
-        return len(self.speeds)
 
-
-def gather_evidence(pieces: list[Detections], model: TrackingModel, reach: float) -> Evidence:
-    """Track the pieces of a capture with GNN and count the events in the tracks.
+def gather_evidence(runs: Runs, model: TrackingModel, reach: float) -> Evidence:
+    """Track each run with GNN and count the events in the tracks.
 
     Parameters
     ----------
-    pieces : list of Detections
+    runs : Runs
         Runs of consecutive frames of the capture.
     model : TrackingModel
         Model for the tracking.
@@ -179,6 +186,5 @@ def gather_evidence(pieces: list[Detections], model: TrackingModel, reach: float
         If too few points could be linked.
     """
     method = GNN()
-    start = method.init(model, n_axes=pieces[0].n_axes)
-    found = [Tracks(detections=piece, labels=method.run(start, piece)[1]) for piece in pieces]
-    return Evidence.of(found, reach)
+    start = method.init(model, n_axes=runs.pieces[0].n_axes)
+    return Evidence.of(runs, [method.run(start, piece)[1] for piece in runs.pieces], reach)

@@ -1,9 +1,9 @@
 """Maximum-likelihood fit of motion and noise to tracks.
 
 The likelihood is that of the filter used for tracking: the log densities of the innovations are
-summed over the tracks and maximised by a simplex search. A marker has one motion (DWNA or a random
-walk), or switches between three DWNA: quiet, busy, and the short jolts of impacts, which one motion
-would lose. The observed information yields the standard deviations of the parameters.
+summed over the tracks and maximised by a quasi-Newton method. A marker has one motion (DWNA or a
+random walk), or switches between three DWNA: quiet, busy, and the short jolts of impacts, which one
+motion would lose. The observed information yields the standard deviations of the parameters.
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ from asterism.model import (
 )
 from asterism.records import record
 from asterism.tracking.estimation.likelihood import TrackLikelihood
+from asterism.tracking.estimation.quasi_newton import maximise
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -36,8 +37,11 @@ Kind = Literal["dwna", "random_walk"]
 KINDS: tuple[Kind, ...] = ("dwna", "random_walk")
 SEARCH_POINTS, FIT_POINTS = 1500, 4000
 """Numbers of detections in the likelihood of a search from afar, and of a fit."""
-REFINED = 0.4
-"""Size of the first steps of a search near the maximum, relative to those of one from afar."""
+MIN_RATIO = math.log(2)
+"""Smallest logarithm of the ratio of two levels. The likelihood has further maxima at equal levels,
+at which the noise has to explain the quiet motion."""
+STAY = (-1.0, 7.0)
+"""Bounds of the log odds that a marker stays quiet, or busy, for another frame."""
 MIN_GAIN = 0.05
 """Smallest gain of a motion over a simpler one, nats per detection. The few wrong links in tracks
 look like jolts to the fit; on their own they gain less than this."""
@@ -46,7 +50,7 @@ ROUGH = 0.1
 MAX_NEWTON_STEP = 0.3
 """Largest Newton step of a logarithm towards the maximum of the likelihood."""
 FLAT = 1e-10
-"""Ratio of curvatures below which the likelihood has no maximum to double precision."""
+"""Ratio of curvatures below which a parameter has no maximum to double precision."""
 JOLT = 0.1
 """Share of jolts among the transitions from quiet or busy; a jolt lasts two frames on average."""
 
@@ -125,31 +129,26 @@ class FitBounds:
     min_noise: float
     max_acceleration: float
 
-    def fit(self, log_noise: float, log_levels: tuple[float, ...], stay: float) -> MotionFit:
-        """Return the fit with these parameters, limited to the bounds.
+    def clip(self, fit: MotionFit) -> MotionFit:
+        """Return a fit limited to the bounds.
 
         Parameters
         ----------
-        log_noise : float
-            Logarithm of σ in metres.
-        log_levels : tuple of float
-            Logarithm of σ_a in m/s² for each mode.
-        stay : float
-            As for `MotionFit`.
+        fit : MotionFit
+            Motion and noise.
 
         Returns
         -------
         MotionFit
         """
-        return MotionFit(
-            noise=max(math.exp(log_noise), self.min_noise),
-            levels=tuple(min(math.exp(x), self.max_acceleration) for x in log_levels),
-            stay=stay,
-        )
+        levels = fit.levels
+        if fit.kind == "dwna":
+            levels = tuple(min(level, self.max_acceleration) for level in levels)
+        return replace(fit, noise=max(fit.noise, self.min_noise), levels=levels)
 
 
 def fit_motion(
-    tracks: list[Tracks],
+    tracks: Tracks,
     model: TrackingModel,
     start: MotionFit,
     bounds: FitBounds,
@@ -160,7 +159,7 @@ def fit_motion(
 
     Parameters
     ----------
-    tracks : list of Tracks
+    tracks : Tracks
         Tracks of runs of consecutive frames.
     model : TrackingModel
         Model for the filter; its motion and noise are replaced.
@@ -169,8 +168,8 @@ def fit_motion(
     bounds : FitBounds
         Bounds of noise and motion.
     refine : bool
-        Whether `start` is a fit to earlier tracks. The search then has smaller steps and a larger
-        sample of the detections.
+        Whether `start` is a fit to earlier tracks. The search then uses a larger sample of the
+        detections.
 
     Returns
     -------
@@ -178,28 +177,27 @@ def fit_motion(
     """
 
     def unpack(x: NDArray[np.float64]) -> MotionFit:
-        busy = x[1] + abs(x[2])
-        return bounds.fit(
-            x[0],
-            (x[1], busy, busy + abs(x[3])),
-            1 / (1 + math.exp(-min(max(x[4], -1.0), 7.0))),
-        )
+        noise, jolt, busy, quiet, odds = map(float, x)
+        levels = (jolt - busy - quiet, jolt - busy, jolt)
+        stay = 1 / (1 + math.exp(-odds))
+        return MotionFit(noise=math.exp(noise), levels=tuple(map(math.exp, levels)), stay=stay)
 
-    log_levels = np.log(start.levels)
-    first = [
-        math.log(start.noise),
-        log_levels[0],
-        log_levels[1] - log_levels[0],
-        log_levels[2] - log_levels[1],
-        math.log(start.stay / (1 - start.stay)),
+    quiet, busy, jolt = map(math.log, start.levels)
+    odds = math.log(start.stay / (1 - start.stay))
+    first = [math.log(start.noise), jolt, jolt - busy, busy - quiet, odds]
+    limits = [
+        (math.log(bounds.min_noise), math.inf),
+        (-math.inf, math.log(bounds.max_acceleration)),
+        (MIN_RATIO, math.inf),
+        (MIN_RATIO, math.inf),
+        STAY,
     ]
     likelihood = _likelihood(tracks, model, FIT_POINTS if refine else SEARCH_POINTS)
-    spread = (REFINED if refine else 1) * np.array([0.4, 0.4, 0.4, 0.4, 0.8])
-    return _search(likelihood, unpack, first, spread)[0]
+    return bounds.clip(_search(likelihood, unpack, first, limits)[0])
 
 
 def fit_one_motion(
-    tracks: list[Tracks], model: TrackingModel, start: MotionFit, bounds: FitBounds
+    tracks: Tracks, model: TrackingModel, start: MotionFit, bounds: FitBounds
 ) -> MotionFit:
     """Fit one motion of each class to tracks, and return the best fit.
 
@@ -215,30 +213,30 @@ def fit_one_motion(
     -------
     MotionFit
     """
-    velocity = model.velocity_sigma(tracks[0].detections.n_axes)
+    velocity = model.velocity_sigma(tracks.detections.n_axes)
     likelihood = _likelihood(tracks, model, FIT_POINTS)
     middle = math.log(start.levels[len(start.levels) // 2])
-    best, best_cost = start, math.inf
+    best, best_gain = start, -math.inf
     for kind in KINDS:
 
         def unpack(x: NDArray[np.float64], kind: Kind = kind) -> MotionFit:
-            plain = bounds.fit(x[0], (x[1],), 1.0)
-            level = math.exp(x[1]) if kind == "random_walk" else plain.levels[0]
-            return replace(plain, levels=(level,), kind=kind)
+            return MotionFit(noise=math.exp(x[0]), levels=(math.exp(x[1]),), kind=kind)
 
         level = middle
         if kind == "random_walk":
-            level = math.log(velocity) + math.log(tracks[0].detections.step or 1.0) / 2
+            level = math.log(velocity) + math.log(tracks.detections.step or 1.0) / 2
         first = [math.log(start.noise), level]
-        plain, cost = _search(likelihood, unpack, first, np.array([0.4, 0.7]))
-        if cost < best_cost - MIN_GAIN:
-            best, best_cost = plain, cost
+        top = math.inf if kind == "random_walk" else math.log(bounds.max_acceleration)
+        limits = [(math.log(bounds.min_noise), math.inf), (-math.inf, top)]
+        plain, gain = _search(likelihood, unpack, first, limits)
+        if gain > best_gain + MIN_GAIN:
+            best, best_gain = bounds.clip(plain), gain
     return best
 
 
 def polish(
-    tracks: list[Tracks], model: TrackingModel, fit: MotionFit, bounds: FitBounds
-) -> tuple[MotionFit, tuple[float, ...] | None]:
+    tracks: Tracks, model: TrackingModel, fit: MotionFit, bounds: FitBounds
+) -> tuple[MotionFit, tuple[float, ...]]:
     """Refine a fit by a Newton step, and estimate the standard deviations of its parameters.
 
     Parameters
@@ -252,9 +250,9 @@ def polish(
     -------
     fit : MotionFit
         Fit at the maximum, within the bounds.
-    stds : tuple of float or None
+    stds : tuple of float
         Standard deviations of the logarithms of the noise and of each level, from the inverse of
-        the observed information; None if the likelihood has no maximum.
+        the observed information; NaN for a parameter on which the likelihood has no maximum.
     """
     likelihood = _likelihood(tracks, model, FIT_POINTS)
     first = np.log([fit.noise, *fit.levels])
@@ -263,65 +261,81 @@ def polish(
         noise, *levels = map(float, np.exp(x))
         return replace(fit, noise=noise, levels=tuple(levels))
 
-    def cost(x: NDArray[np.float64]) -> float:
-        return -likelihood.n_points * likelihood.mean(at(x))
+    def costs(points: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+        return -likelihood.sums([at(x) for x in points])
 
     # The step is about one standard deviation. With several motions the likelihood is rough at
     # that scale, because links that no mode predicts change from mode to mode.
     h = 1 / math.sqrt(likelihood.n_links) if len(fit.levels) == 1 else ROUGH
-    steps = h * np.eye(len(first))
-    middle = cost(first)
-    up, down = (np.array([cost(first + sign * e) for e in steps]) for sign in (1, -1))
+    n = len(first)
+    steps = h * np.eye(n)
+    pairs = list(zip(*np.tril_indices(n, -1), strict=True))
+    corners = [steps[a] + steps[b] for a, b in pairs]
+    middle, *others = costs(
+        [first, *(first + sign * e for sign in (1, -1) for e in [*steps, *corners])]
+    )
+    up, up_up, down, down_down = np.split(np.array(others), np.cumsum([n, len(pairs), n]))
     gradient = (up - down) / (2 * h)
     information: NDArray[Any] = np.diag(up - 2 * middle + down)
-    for a, b in zip(*np.tril_indices(len(first), -1), strict=True):
-        corners = cost(first + steps[a] + steps[b]) + cost(first - steps[a] - steps[b])
+    for k, (a, b) in enumerate(pairs):
         sides = up[a] + down[a] + up[b] + down[b] - 2 * middle
-        information[a, b] = information[b, a] = (corners - sides) / 2
+        information[a, b] = information[b, a] = (up_up[k] + down_down[k] - sides) / 2
     information = information / h**2
-    if not np.isfinite(information).all():
-        return fit, None
-    curvatures = np.linalg.eigvalsh(information)
-    if curvatures[0] <= FLAT * curvatures[-1]:
-        return fit, None
-    stds = tuple(map(float, np.sqrt(np.diag(np.linalg.inv(information)))))
-    step = np.linalg.solve(information, gradient).astype(np.float64)
-    if np.abs(step).max() > MAX_NEWTON_STEP or cost(first - step) > middle:
-        return fit, stds
-    summit = at(first - step)
-    return replace(
-        summit,
-        noise=max(summit.noise, bounds.min_noise),
-        levels=summit.levels
-        if fit.kind == "random_walk"
-        else tuple(min(a, bounds.max_acceleration) for a in summit.levels),
-    ), stds
+    stds, step = np.full(n, np.nan), np.zeros(n)
+    own = _determined(information)
+    within = information[np.ix_(own, own)]
+    stds[own] = np.sqrt(np.diag(np.linalg.inv(within)))
+    step[own] = np.linalg.solve(within, gradient[own])
+    if np.abs(step).max() > MAX_NEWTON_STEP or costs([first - step])[0] > middle:
+        return fit, tuple(map(float, stds))
+    return bounds.clip(at(first - step)), tuple(map(float, stds))
 
 
-def _likelihood(tracks: list[Tracks], model: TrackingModel, n_points: int) -> TrackLikelihood:
-    return TrackLikelihood(tracks, model.velocity_sigma(tracks[0].detections.n_axes), n_points)
+def _determined(information: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Select the parameters for which the likelihood has a maximum, the others being fixed.
+
+    Of several motions, levels may be fixed that the tracks do not determine, as that of jolts in
+    tracks without any: they hardly correlate with the other parameters. The noise and the level of
+    a single motion do, so without a maximum neither is determined.
+
+    Parameters
+    ----------
+    information : ndarray of shape (n, n)
+        Observed information of the noise and of each level.
+
+    Returns
+    -------
+    ndarray of int, shape (m,)
+        Parameters whose information is positive definite.
+    """
+    none = np.arange(0)
+    own = np.flatnonzero(np.isfinite(information).all(axis=1))
+    while len(own) > 1 and own[0] == 0:
+        curvatures, directions = np.linalg.eigh(information[np.ix_(own, own)])
+        if curvatures[0] > FLAT * curvatures[-1]:
+            return own
+        flattest = int(np.argmax(np.abs(directions[:, 0])))
+        if flattest == 0 or len(information) == 2:
+            return none
+        own = np.delete(own, flattest)
+    return none
+
+
+def _likelihood(tracks: Tracks, model: TrackingModel, n_points: int) -> TrackLikelihood:
+    return TrackLikelihood(tracks, model.velocity_sigma(tracks.detections.n_axes), n_points)
 
 
 def _search(
     likelihood: TrackLikelihood,
     unpack: Callable[[NDArray[np.float64]], MotionFit],
     first: list[float],
-    spread: NDArray[np.float64],
+    limits: list[tuple[float, float]],
 ) -> tuple[MotionFit, float]:
-    from scipy.optimize import minimize
+    """Return the most likely motion, and its log likelihood in nats per detection."""
 
-    def cost(x: NDArray[np.float64]) -> float:
-        return -likelihood.mean(unpack(x))
+    def likelihoods(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return likelihood.sums([unpack(x) for x in points])
 
-    found = minimize(
-        cost,
-        np.array(first),
-        method="Nelder-Mead",
-        options={
-            "initial_simplex": np.vstack([first, first + np.diag(spread)]),
-            "maxiter": 70,
-            "xatol": 0.03,
-            "fatol": 3e-3,
-        },
-    )
-    return unpack(found.x), float(found.fun)
+    low, high = np.array(limits).T
+    x, value = maximise(likelihoods, np.array(first), low, high)
+    return unpack(x), value / likelihood.n_points

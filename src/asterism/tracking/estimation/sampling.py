@@ -2,21 +2,70 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.model import Detections, Tracks
+from asterism.records import record
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from asterism.model import Detections
-
-__all__ = ["sample_runs"]
+__all__ = ["Runs", "sample_runs"]
 
 N_RUNS = 8
 """Largest number of runs."""
 MIN_FRAMES = 20
 """Smallest number of frames in a run."""
+
+
+@record(eq=False)
+class Runs:
+    """Runs of frames, tracked each by itself and counted together.
+
+    Parameters
+    ----------
+    pieces : list of Detections
+        Runs in the order of their times.
+    """
+
+    pieces: list[Detections]
+
+    @cached_property
+    def joined(self) -> Detections:
+        """All runs as one capture, one after the other."""
+        if len(self.pieces) == 1:
+            return self.pieces[0]
+        ends = np.cumsum([0, *(piece.n_points for piece in self.pieces)])
+        offsets = [piece.offsets[:-1] + end for piece, end in zip(self.pieces, ends, strict=False)]
+        own = [p.covariances for p in self.pieces if p.covariances is not None]
+        return Detections(
+            times=np.concatenate([piece.times for piece in self.pieces]),
+            offsets=np.concatenate([*offsets, ends[-1:]]),
+            points=np.concatenate([piece.points for piece in self.pieces]),
+            covariances=np.concatenate(own) if own else None,
+        )
+
+    def tracks(self, labels: Sequence[NDArray[np.int64]]) -> Tracks:
+        """Return the tracks of all runs. No track extends over two runs.
+
+        Parameters
+        ----------
+        labels : sequence of ndarray of int
+            Labels of each run.
+
+        Returns
+        -------
+        Tracks
+        """
+        counts = [int(own.max(initial=-1)) + 1 for own in labels]
+        shifts = np.cumsum([0, *counts])
+        shifted = [np.where(own < 0, -1, own + n) for own, n in zip(labels, shifts, strict=False)]
+        return Tracks(detections=self.joined, labels=np.concatenate(shifted))
 
 
 def sample_runs(

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections
 
-__all__ = ["Scales", "first_scales"]
+__all__ = ["Scales", "extents", "first_scales"]
 
 LINKED_POINTS = 15_000
 """Number of points that are linked to the next frames, in frames spread over the capture."""
@@ -51,6 +51,18 @@ class Scales:
     acceleration_low: float
     acceleration_high: float
     spacing: float
+
+
+def extents(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the extent of points along each axis, shape (D,).
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, D)
+        Points.
+    """
+    # Along a column NumPy is ten times faster than over rows of three.
+    return np.array([np.ptp(points[:, d]) for d in range(points.shape[1])])
 
 
 def first_scales(detections: Detections) -> tuple[Scales, NDArray[np.float64]]:
@@ -85,7 +97,7 @@ def first_scales(detections: Detections) -> tuple[Scales, NDArray[np.float64]]:
             "none that are nearer to their next position than to other points",
             "give a model",
         )
-    extent = float(np.ptp(d.points, axis=0).max())
+    extent = float(extents(d.points).max())
     floor = max(extent, 1e-3) * 1e-6
     speeds = np.linalg.norm(velocities, axis=1)
     quiet, busy = np.quantile(bends, [0.3, 0.99])
@@ -139,11 +151,17 @@ class _Links(NamedTuple):
 def _follow(d: Detections, stride: int) -> _Links:
     """Follow the points of every `stride`-th frame over the next two frames with points."""
     filled = np.flatnonzero(d.counts)
-    points, times = d.points, d.times[filled]
-    offsets = np.append(d.offsets[filled], d.n_points)
-    frame = np.repeat(np.arange(len(filled)), np.diff(offsets))
-    is_first = (frame % stride == 0) & (frame < len(filled) - 2)
-    first = np.flatnonzero(is_first)
+    rank = np.arange(len(filled))
+    is_first = (rank % stride == 0) & (rank < len(filled) - 2)
+    is_used = rank % stride < 3
+    used = filled[is_used]
+    points = d.points
+    if stride > 3:  # frames that are not used would be copied
+        points = points[np.repeat(is_used, d.counts[filled])]
+    times = d.times[used]
+    offsets = np.concatenate([[0], np.cumsum(d.counts[used])])
+    frame = np.repeat(np.arange(len(used)), d.counts[used])
+    first = np.flatnonzero(is_first[is_used][frame])
     link, spacing, distance = _sure_links(points, offsets, frame, first)
     is_linked = link >= 0
     a, b = first[is_linked], link[is_linked]
@@ -151,7 +169,7 @@ def _follow(d: Detections, stride: int) -> _Links:
     onward, _, _ = _sure_links(points, offsets, frame, b)
     c, before, b = onward[onward >= 0], velocity[onward >= 0], b[onward >= 0]
     jolt = (points[c] - points[b]) / np.diff(times)[frame[b], None] - before
-    return _Links(velocity, jolt, spacing, filled[frame[first]].astype(np.int64), distance)
+    return _Links(velocity, jolt, spacing, used[frame[first]].astype(np.int64), distance)
 
 
 def _sure_links(

@@ -13,8 +13,10 @@ import numpy as np
 
 from asterism.model import Detections, TrackingModel, Tracks
 from asterism.records import record
+from asterism.tracking.estimation.evidence import Evidence
 from asterism.tracking.estimation.motion_fit import FitBounds, MotionFit, fit_motion, fit_one_motion
 from asterism.tracking.estimation.rates import Counts, Rates, count
+from asterism.tracking.estimation.sampling import Runs
 from asterism.tracking.methods.mcmcda import MCMCDA
 
 if TYPE_CHECKING:
@@ -30,14 +32,14 @@ DRAWN_POINTS = 15_000
 _WALK = MCMCDA(keep="draw", confidence=0.0, end_odds=1.0)
 
 
-@record
+@record(eq=False)
 class Drawn:
     """Result of stochastic EM.
 
     Parameters
     ----------
-    tracks : list of Tracks
-        Last partition of each piece.
+    evidence : Evidence
+        Last partition of the pieces.
     counts : tuple of Counts
         Counts of the last rounds.
     rates : Rates
@@ -46,18 +48,19 @@ class Drawn:
         Fit to the last partition.
     """
 
-    tracks: list[Tracks]
+    evidence: Evidence
     counts: tuple[Counts, ...]
     rates: Rates
     fit: MotionFit
 
 
 def draw_rates(
-    pieces: list[Detections],
+    evidence: Evidence,
     fit: MotionFit,
     rates: Rates,
     bounds: FitBounds,
-    model_of: Callable[[MotionFit, Rates, list[Tracks] | None], TrackingModel],
+    model_of: Callable[[MotionFit, Rates, Evidence], TrackingModel],
+    reach: float,
     *,
     in_bursts: bool,
 ) -> Drawn:
@@ -65,8 +68,8 @@ def draw_rates(
 
     Parameters
     ----------
-    pieces : list of Detections
-        Runs of consecutive frames of the capture.
+    evidence : Evidence
+        Runs of consecutive frames of the capture, and their first tracks.
     fit : MotionFit
         Initial motion.
     rates : Rates
@@ -74,7 +77,9 @@ def draw_rates(
     bounds : FitBounds
         Bounds of noise and motion.
     model_of : callable
-        Function that returns the model for a motion, rates and the current tracks.
+        Function that returns the model for a motion, rates and the current partition.
+    reach : float
+        As in `count_sightings`, metres.
     in_bursts : bool
         As for `Counts.rates`.
 
@@ -82,17 +87,19 @@ def draw_rates(
     -------
     Drawn
     """
-    pieces = _some(pieces)
-    model = model_of(fit, rates, None)
-    tracks: list[Tracks] = []
+    runs = Runs(pieces=_some(evidence.runs.pieces))
+    n_runs = len(runs.pieces)
+    model = model_of(fit, rates, evidence)
     kept: list[Counts] = []
     for n in range(N_ROUNDS):
-        tracks = [_draw(piece, model, n * len(pieces) + k) for k, piece in enumerate(pieces)]
+        tracks = [_draw(piece, model, n * n_runs + k) for k, piece in enumerate(runs.pieces)]
         kept = [*kept, sum((count(t, rates) for t in tracks), Counts())][-N_KEPT:]
         rates = (sum(kept, Counts()) * (1 / len(kept))).rates(in_bursts=in_bursts)
-        fit = (fit_one_motion if len(fit.levels) == 1 else fit_motion)(tracks, model, fit, bounds)
-        model = model_of(fit, rates, tracks)
-    return Drawn(tracks=tracks, counts=tuple(kept), rates=rates, fit=fit)
+        evidence = Evidence.of(runs, [found.labels for found in tracks], reach)
+        fit_again = fit_one_motion if len(fit.levels) == 1 else fit_motion
+        fit = fit_again(evidence.tracks, model, fit, bounds)
+        model = model_of(fit, rates, evidence)
+    return Drawn(evidence=evidence, counts=tuple(kept), rates=rates, fit=fit)
 
 
 def _draw(piece: Detections, model: TrackingModel, seed: int) -> Tracks:

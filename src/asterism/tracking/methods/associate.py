@@ -30,6 +30,7 @@ def associate(
     seed: int | None = None,
     start: Tracks | None = None,
     recipe: Recipe | None = None,
+    score: bool = True,
     progress: Callable[[int], Any] | None = None,
 ) -> Tracks:
     """Associate the detections of a capture by one method.
@@ -48,13 +49,15 @@ def associate(
         Tracks of the same detections from which `MCMCDA` starts.
     recipe : Recipe, optional
         Settings of the call, which the result carries.
+    score : bool
+        Whether the log posterior is computed.
     progress : callable, optional
         Called from time to time with the number of finished frames.
 
     Returns
     -------
     Tracks
-        Tracks with ``info["log_posterior"]`` and the method's own counts.
+        Tracks with ``info["log_posterior"]``, if it is computed, and the method's own counts.
 
     Raises
     ------
@@ -86,13 +89,15 @@ def associate(
         hint = "use mcmcda, the only method that starts from given tracks"
         raise ParameterError("start", "none", "tracks", hint)
     state, labels, confidence = method.run(state, detections, progress=progress)
+    labels.flags.writeable = False  # the method returns an array of its own: no need to copy
     info = dict(state.info)
     if detections.covariances is not None:
         info["isotropic_noise"] = True  # a track has one variance for all axes
     tracks = Tracks(
         detections=detections, labels=labels, confidence=confidence, info=info, recipe=recipe
     )
-    info["log_posterior"] = log_posterior(tracks, model)
+    if score:
+        info["log_posterior"] = log_posterior(tracks, model)
     return tracks
 
 

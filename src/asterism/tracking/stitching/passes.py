@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Pass", "go_through"]
 
+FRAMES_A_CALL = 1000
+"""Number of frames of one call. The engine's copy of their points takes little memory."""
 MIN_ADVICE, MAX_ADVICE = 1.0, 5.0
 """Bounds of the log odds that a join of one pass adds in the next."""
 
@@ -91,22 +93,25 @@ def go_through(
     -------
     Pass
     """
-    times, offsets, points = detections.times, detections.offsets, detections.points
-    labels = labels.astype(np.int64)
-    if backward:
-        times = np.ascontiguousarray(-times[::-1])
-        offsets = np.ascontiguousarray(detections.n_points - offsets[::-1])
-        points = np.ascontiguousarray(points[::-1])
-        labels = np.ascontiguousarray(labels[::-1])
-    motion = motion_model(model, detections.n_axes)
-    stitcher = _engine.Stitcher(motion, options)
+    d = detections
+    stitcher = _engine.Stitcher(motion_model(model, d.n_axes), options)
     if before is not None:
         before.advise(stitcher)
+    way = -1 if backward else 1
+    times = np.ascontiguousarray((way * d.times)[::way])
     kind, F, Q = steps_of(model.motion, times)
-    tracklets, markers, after, probabilities = stitcher.run(
-        motion, times, kind, F, Q, offsets, points, labels
-    )
+    tracklets = np.full(d.n_points, -1, dtype=np.int32)
+    for t in range(0, d.n_frames, FRAMES_A_CALL):
+        end = min(t + FRAMES_A_CALL, d.n_frames)
+        offsets = d.offsets[t : end + 1] if way > 0 else d.offsets[::-1][t : end + 1]
+        own = slice(offsets[0], offsets[-1]) if way > 0 else slice(offsets[-1], offsets[0])
+        tracklets[own][::way] = stitcher.run(
+            times[t:end], kind[t:end], F, Q, np.abs(offsets - offsets[0]),
+            np.ascontiguousarray(d.points[own][::way]),
+            np.ascontiguousarray(labels[own][::way], dtype=np.int64),
+        )  # fmt: skip
+    markers, after, probabilities = stitcher.finish()
     return Pass(
-        tracklets=tracklets[::-1] if backward else tracklets,
-        markers=markers, after=after, probabilities=probabilities, n_cuts=stitcher.n_cuts,
+        tracklets=tracklets, markers=markers, after=after, probabilities=probabilities,
+        n_cuts=stitcher.n_cuts,
     )  # fmt: skip

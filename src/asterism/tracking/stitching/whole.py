@@ -220,15 +220,16 @@ def stitch(
     # other direction. The last pass does not cut tracklets.
     limits = (model, confirm, ghost_radius, max_occlusion)
     options = stitch_options(*limits)
-    first = go_through(d, tracks.labels, model, options)
-    back = go_through(d, first.tracklets, model, options, before=first, backward=True)
+    found = go_through(d, tracks.labels, model, options)
+    n_cuts = found.n_cuts
+    found = go_through(d, found.tracklets, model, options, before=found, backward=True)
+    n_cuts += found.n_cuts
     options = stitch_options(*limits, may_cut=False)
-    found = go_through(d, back.tracklets, model, options, before=back)
+    found = go_through(d, found.tracklets, model, options, before=found)
     tracklets, markers, after = found.tracklets, found.markers, found.after
-    n_cuts = first.n_cuts + back.n_cuts
-    labels = np.full(d.n_points, -1, dtype=np.int64)
-    inside = tracklets >= 0
-    labels[inside] = np.maximum(markers[tracklets[inside]], -1)
+    # The last element is the label of clutter.
+    labels = np.append(np.maximum(markers, -1), -1).astype(np.int64)[tracklets]
+    labels.flags.writeable = False  # no other object refers to it: no need to copy
     n_markers = int(markers.max(initial=-1)) + 1
     n_joins = int(((after >= 0) & (markers >= 0)).sum())
     result = Tracks(
