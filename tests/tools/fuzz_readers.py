@@ -31,6 +31,7 @@ from asterism.multiview.rig_check import check_rig
 from asterism.multiview.rig_info import describe_rig
 from tests.io.c3d_bytes import DEC, SGI, integers, make_c3d, reals, text
 from tests.io.calibrations.rigs import NAMES, rig_for
+from tests.io.marker_sets.models import model
 from tests.tools import fuzzing
 
 if TYPE_CHECKING:
@@ -203,6 +204,23 @@ def _bonds() -> str:
     return am.learn_bonds(Tracks.from_dense(np.arange(24) / 100, points, "ABCD")).to_toml()
 
 
+def _marker_set_seeds() -> tuple[dict[str, bytes], ...]:
+    return tuple(
+        {name: model(version=version).encode()}
+        for name, version in (("a.vsk", "2.5"), ("a.vst", "3.2"))
+    )
+
+
+def _read_marker_set(path: Path, _: bool) -> Callable[[Path], None]:
+    made = am.io.read_marker_set(path)
+
+    def look(folder: Path) -> None:
+        made.to_toml(folder / "out.toml")
+        am.io.read_marker_set(folder / "out.toml")
+
+    return look
+
+
 def _sightings() -> tuple[dict[str, bytes], ...]:
     return (
         {"points.csv": b"camera,x,y,z,u,v\ncam1,1,2,3,4.5,5\ncam2,1e-3,2,3,4,5\n"},
@@ -221,6 +239,7 @@ def readers() -> dict[str, Callable[[], Reader]]:
     made["observations"] = lambda: Reader(_observation_seeds(), _read_points)
     made["caliscope-xy"] = lambda: Reader(({"xy.csv": XY.encode()},), _read_points)
     made["sightings"] = lambda: Reader(_sightings(), _read_known_points)
+    made["marker-set"] = lambda: Reader(_marker_set_seeds(), _read_marker_set)
     made["bonds"] = lambda: _text_reader(_bonds(), am.tracking.Bonds.from_toml)
     return made
 

@@ -15,6 +15,7 @@ from asterism.io.captures import (
     read_tracks,
     write,
 )
+from asterism.io.marker_sets import read_marker_set
 from asterism.io.observations import read_observations, write_observations
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "CaptureInfo",
     "describe",
     "read",
+    "read_marker_set",
     "read_observations",
     "read_rig",
     "read_tracks",
