@@ -206,3 +206,4 @@ def test_real_template_names_gait(subject):
     assert not wrong
     own = name_scores(naming.tracks.labels, truth.labels, naming.tracks.names, truth.names)
     assert own.swapped_sides_percent == 0
+    assert own.name_f1 >= 0.97

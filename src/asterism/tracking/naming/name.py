@@ -35,8 +35,9 @@ MIN_MEAN = 10.0
 """Mean log odds of a name below which a marker set does not fit the capture at all."""
 MIN_DETECTIONS = 10
 """Smallest number of detections of a name in a capture."""
-MIN_PROBABILITY = 0.5
-"""Probability below which a name is not given."""
+MIN_PROBABILITY = 0.2
+"""Probability below which a name is not given: of three markers that a set hardly tells apart, such
+as those of a hand, each has a third."""
 
 
 @record(eq=False)
