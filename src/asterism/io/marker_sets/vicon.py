@@ -36,12 +36,13 @@ _N_AXES = {
     "JointFree": 3, "JointBall": 3, "JointUniversal": 2, "JointHardySpicer": 2, "JointHinge": 1,
     "JointSlider": 0, "JointDummy": 0,
 }  # fmt: skip
+_LOOSE = ("JointFree", "JointSlider")
 _AXIS_KEYS = {1: "AXIS", 2: "AXIS-PAIR"}
 _TURN = 0.1
 """Standard deviation of a joint, per axis, radians; those of limbs move more."""
-_SHIFT, _FREE_SHIFT = 0.01, 0.08
-"""Error of the centre of a joint, and of a free one, whose place is never calibrated: standard
-deviation per axis, metres."""
+_SHIFT, _LOOSE_SHIFT = 0.01, 0.08
+"""Error of the centre of a joint, and of a free or sliding one, whose place is not calibrated:
+standard deviation per axis, metres."""
 
 
 def read(path: Path) -> MarkerSet:
@@ -153,7 +154,7 @@ def _segment(
         name=name, parent=parent, R_pre=rotation(vector("PRE-ORIENTATION", _MOST_TURNED)),
         pre=vector("PRE-POSITION", _FARTHEST) / 1000, R_post=R_post, post=post / 1000,
         axes=axes, turns=turns,
-        shift=0.0 if is_fixed else _FREE_SHIFT if joint.tag == "JointFree" else _SHIFT,
+        shift=0.0 if is_fixed else _LOOSE_SHIFT if joint.tag in _LOOSE else _SHIFT,
     )  # fmt: skip
 
 
