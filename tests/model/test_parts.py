@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import asterism as am
-from asterism.model.one_a_frame import first_twice
+from asterism.model.labels import check_labels
 from tests.scenes import small_model, stitched, wanderers
 
 
@@ -15,14 +15,16 @@ def test_tracks_are_checked_in_parts(monkeypatch, size):
     truth = wanderers(np.random.default_rng(3), missing=0.3, clutter=1)
     offsets, labels = truth.detections.offsets, truth.labels
     frame = truth.detections.frame_of
-    assert first_twice(offsets, labels, truth.n_tracks) is None
-    monkeypatch.setattr("asterism.model.one_a_frame.CHECKED_POINTS", size)
-    assert first_twice(offsets, labels, truth.n_tracks) is None
+    assert check_labels(labels, offsets) == truth.n_tracks
+    monkeypatch.setattr("asterism.model.labels.CHECKED_POINTS", size)
+    assert check_labels(labels, offsets) == truth.n_tracks
     for i in range(len(labels)):
         for j in np.flatnonzero((frame == frame[i]) & (labels >= 0) & (labels != labels[i])):
             wrong = labels.copy()
             wrong[i] = labels[j]
-            assert first_twice(offsets, wrong, truth.n_tracks) == (frame[i], labels[j])
+            message = f"two of track {labels[j]} in frame {frame[i]}"
+            with pytest.raises(am.ParameterError, match=message):
+                check_labels(wrong, offsets)
 
 
 @pytest.mark.parametrize("size", [1, 20, 200])

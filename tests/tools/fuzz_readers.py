@@ -31,6 +31,7 @@ from asterism.multiview.rig_check import check_rig
 from asterism.multiview.rig_info import describe_rig
 from tests.io.c3d_bytes import DEC, SGI, integers, make_c3d, reals, text
 from tests.io.calibrations.rigs import NAMES, rig_for
+from tests.io.marker_sets.models import model
 from tests.tools import fuzzing
 
 if TYPE_CHECKING:
@@ -190,17 +191,30 @@ def _read_known_points(path: Path, _: bool) -> Callable[[Path], None]:
     return lambda folder: None
 
 
-def _text_reader(made: str, read_it: Callable[[Path], object]) -> Reader:
-    def _read(path: Path, _: bool) -> Callable[[Path], None]:
-        read_it(path)
-        return lambda folder: None
-
-    return Reader(({"a.toml": made.encode()},), _read)
-
-
-def _marker_set() -> str:
+def _marker_set() -> bytes:
     points = np.random.default_rng(1).normal(size=(1, 4, 3)).repeat(24, axis=0)
-    return am.learn_marker_set(Tracks.from_dense(np.arange(24) / 100, points, "ABCD")).to_toml()
+    tracks = Tracks.from_dense(np.arange(24) / 100, points, "ABCD")
+    return am.learn_marker_set(tracks).to_toml().encode()
+
+
+def _marker_set_seeds() -> tuple[dict[str, bytes], ...]:
+    return (
+        {"a.toml": _marker_set()},
+        *(
+            {name: model(version=version).encode()}
+            for name, version in (("a.vsk", "2.5"), ("a.vst", "3.2"))
+        ),
+    )
+
+
+def _read_marker_set(path: Path, _: bool) -> Callable[[Path], None]:
+    made = am.io.read_marker_set(path)
+
+    def look(folder: Path) -> None:
+        made.to_toml(folder / "out.toml")
+        am.io.read_marker_set(folder / "out.toml")
+
+    return look
 
 
 def _sightings() -> tuple[dict[str, bytes], ...]:
@@ -221,7 +235,7 @@ def readers() -> dict[str, Callable[[], Reader]]:
     made["observations"] = lambda: Reader(_observation_seeds(), _read_points)
     made["caliscope-xy"] = lambda: Reader(({"xy.csv": XY.encode()},), _read_points)
     made["sightings"] = lambda: Reader(_sightings(), _read_known_points)
-    made["marker-set"] = lambda: _text_reader(_marker_set(), am.MarkerSet.from_toml)
+    made["marker-set"] = lambda: Reader(_marker_set_seeds(), _read_marker_set)
     return made
 
 

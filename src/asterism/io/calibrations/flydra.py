@@ -22,11 +22,11 @@ from asterism.io.calibrations.parts import (
     build_rig,
     faults_at,
     per_metre,
-    read_bytes,
     split_numbers,
     whole_size,
 )
 from asterism.io.units import parse_unit
+from asterism.io.whole_file import read_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path

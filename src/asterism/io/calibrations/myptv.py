@@ -20,11 +20,11 @@ from asterism.io.calibrations.parts import (
     build_camera,
     build_rig,
     pose,
-    read_bytes,
     split_numbers,
     whole_size,
 )
 from asterism.io.units import PER_METRE, from_metres
+from asterism.io.whole_file import read_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path

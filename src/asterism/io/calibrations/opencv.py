@@ -19,11 +19,11 @@ from asterism.io.calibrations.parts import (
     nearest_rotation,
     per_metre,
     pose,
-    read_bytes,
     split_numbers,
     whole_size,
 )
 from asterism.io.units import parse_unit
+from asterism.io.whole_file import read_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -32,42 +32,13 @@ __all__ = [
     "nearest_rotation",
     "per_metre",
     "pose",
-    "read_bytes",
     "split_numbers",
     "whole_size",
 ]
 
-_LARGEST = 64 << 20  # bytes; a thousand cameras with all their thresholds take less
 _SLACK = 5e-3  # largest entry of RᵀR - I of a rotation written with three decimals
 _SMALLEST, _GREATEST = 1e-3, 1e9  # smallest focal length, largest number of any real camera
 _MOST_PIXELS = 100_000  # along an edge, the limit of `Camera`
-
-
-def read_bytes(path: Path, *, most: int = _LARGEST) -> bytes:
-    """Read a whole file, unless it is larger than any calibration.
-
-    Parameters
-    ----------
-    path : Path
-        File to read.
-    most : int
-        Largest length, bytes.
-
-    Returns
-    -------
-    bytes
-        Content of the file.
-
-    Raises
-    ------
-    FormatError
-        If the file is longer.
-    """
-    with path.open("rb") as file:
-        raw = file.read(most + 1)
-    if len(raw) > most:
-        raise FormatError(path, "its length", f"at most {most} bytes", "more")
-    return raw
 
 
 @contextmanager

@@ -13,8 +13,8 @@ import numpy as np
 
 from asterism.checks import check_fields, check_file
 from asterism.errors import FormatError, ParameterError, not_read
-from asterism.io.calibrations.parts import read_bytes
 from asterism.io.units import PER_METRE, parse_unit
+from asterism.io.whole_file import read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

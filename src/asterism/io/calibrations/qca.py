@@ -23,8 +23,8 @@ from asterism.io.calibrations.parts import (
     split_numbers,
     whole_size,
 )
-from asterism.io.calibrations.xml_tree import load, to_bytes
 from asterism.io.units import from_metres
+from asterism.io.xml_tree import load, to_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path

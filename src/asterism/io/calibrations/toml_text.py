@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asterism.errors import FormatError
-from asterism.io.calibrations.parts import read_bytes
+from asterism.io.whole_file import read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -15,8 +15,8 @@ from asterism.camera import ViconRadial
 from asterism.errors import FormatError
 from asterism.io.calibrations.limits import names_of, no_skew, refuse_lens
 from asterism.io.calibrations.parts import build_camera, build_rig, pose, split_numbers, whole_size
-from asterism.io.calibrations.xml_tree import load, to_bytes
 from asterism.io.units import from_metres
+from asterism.io.xml_tree import load, to_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -38,8 +38,6 @@ MIN_SHARE = 0.5
 """Smallest share of the tracks, or of the markers if these are fewer, that a set must name."""
 MIN_DETECTIONS = 10
 """Smallest number of detections of a name in a capture."""
-MIN_PROBABILITY = 0.5
-"""Probability below which a name is not given."""
 MIN_SUBJECT = 0.75
 """Probability of a subject below which no name is given, because all of them could be another's."""
 
@@ -101,7 +99,7 @@ class _Named:
     probabilities: NDArray[np.float64]  # (K,)
     alternatives: NDArray[np.int64]  # (K,), -1 for none
     alternative_probabilities: NDArray[np.float64]  # (K,)
-    required: float  # probability below which a name is not given
+    is_given: NDArray[np.bool_]  # (K,), whether the name is more probable than none
 
 
 def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
@@ -261,8 +259,11 @@ def _all(tracks: Tracks, made: MarkerSet, first: _First, up: Axis) -> _Named:
         names.sweep(start)
     odds = marker_odds(found, len(made))
     own = names.usual()
-    probability, other, other_probability = probabilities_of(
-        own, odds, track_odds(names.exchanges, names.counts, own)
+    probability, other, other_probability, none = probabilities_of(
+        own,
+        odds,
+        track_odds(names.exchanges, names.counts),
+        track_odds(names.without, names.counts),
     )
     return _Named(
         markers=names.markers,
@@ -270,7 +271,7 @@ def _all(tracks: Tracks, made: MarkerSet, first: _First, up: Axis) -> _Named:
         probabilities=first.probability * probability,
         alternatives=other,
         alternative_probabilities=other_probability,
-        required=MIN_PROBABILITY if first.probability >= MIN_SUBJECT else 1.0,
+        is_given=(probability > none) & (first.probability >= MIN_SUBJECT),
     )
 
 
@@ -286,8 +287,7 @@ def _result(
     at = 0
     for made, own in zip(marker_sets, named, strict=True):
         if own is not None:
-            is_given = (own.of_track >= 0) & (own.probabilities >= own.required)
-            better = is_given & (own.probabilities > probability)
+            better = own.is_given & (own.probabilities > probability)
             of_track[better] = at + own.of_track[better]
             probability[better] = own.probabilities[better]
             other_probability[better] = own.alternative_probabilities[better]

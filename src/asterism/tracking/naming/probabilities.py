@@ -56,30 +56,27 @@ def marker_odds(found: Found, n_markers: int) -> NDArray[np.float64]:
     return odds
 
 
-def track_odds(
-    exchanges: NDArray[np.float64], counts: NDArray[np.int64], markers: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return the log odds of each track for other markers, (K, M), from its windows.
+def track_odds(sums: NDArray[np.float64], counts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the log odds of each track for other names, from sums over its windows.
 
     Parameters
     ----------
-    exchanges : ndarray of shape (K, M)
-        Sum over the windows of the gains of an exchange.
+    sums : ndarray of shape (K, ...)
+        Sum of the gains over the windows of each track.
     counts : ndarray of int, shape (K,)
         Number of windows of each track.
-    markers : ndarray of int, shape (K,)
-        Marker of each track, -1 for none.
     """
-    odds = exchanges * (np.minimum(counts, INDEPENDENT) / np.maximum(counts, 1))[:, None]
-    named = np.flatnonzero(markers >= 0)
-    odds[named, markers[named]] = -np.inf
-    return odds
+    share = np.minimum(counts, INDEPENDENT) / np.maximum(counts, 1)
+    return sums * share.reshape(-1, *(1,) * (sums.ndim - 1))
 
 
 def probabilities_of(
-    markers: NDArray[np.int64], of_markers: NDArray[np.float64], of_tracks: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return the probability of each name, and the best alternative with its probability.
+    markers: NDArray[np.int64],
+    of_markers: NDArray[np.float64],
+    of_tracks: NDArray[np.float64],
+    of_none: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the probability of each name, the best alternative with its own, and that of none.
 
     Parameters
     ----------
@@ -89,15 +86,18 @@ def probabilities_of(
         Log odds of other names for all that has one name.
     of_tracks : ndarray of shape (K, M)
         Log odds of other names for each track.
+    of_none : ndarray of shape (K,)
+        Log odds of no name for each track.
     """
     K = len(of_tracks)
-    probability, other = np.zeros(K), np.full(K, -1)
+    probability, other, none = np.zeros(K), np.full(K, -1), np.ones(K)
     other_probability = np.zeros(K)
     for k in np.flatnonzero(markers >= 0):
-        odds = np.logaddexp(of_markers[markers[k]], of_tracks[k]) / TEMPERATURE
-        weights = np.exp(np.minimum(odds, 50.0))
+        odds = np.logaddexp(of_markers[markers[k]], of_tracks[k])
+        odds[markers[k]] = -np.inf
+        weights = np.exp(np.minimum(np.append(odds, of_none[k]) / TEMPERATURE, 50.0))
         total = 1 + weights.sum()
-        probability[k] = 1 / total
-        other[k] = int(np.argmax(weights))
-        other_probability[k] = weights[other[k]] / total
-    return probability, other, other_probability
+        probability[k], none[k] = 1 / total, weights[-1] / total
+        other[k] = int(np.argmax(weights[:-1])) if len(weights) > 1 else -1
+        other_probability[k] = weights[other[k]] / total if other[k] >= 0 else 0.0
+    return probability, other, other_probability, none

@@ -120,6 +120,7 @@ class WindowNames:
     markers: NDArray[np.int64] = field(init=False)  # (N,), of each detection
     evidence: NDArray[np.float64] = field(init=False)  # (K, M), sum over the windows
     exchanges: NDArray[np.float64] = field(init=False)  # (K, M), gain of another name, all windows
+    without: NDArray[np.float64] = field(init=False)  # (K,), gain of no name, all windows
     counts: NDArray[np.int64] = field(init=False)  # (K,), windows of each track
     changes: list[_Change] = field(init=False, default_factory=list["_Change"])
 
@@ -143,7 +144,7 @@ class WindowNames:
                 is_kept=self.is_kept,
             )
             self.evidence, self.exchanges = np.zeros((K, M)), np.zeros((K, M))
-            self.counts = np.zeros(K, dtype=np.int64)
+            self.without, self.counts = np.zeros(K), np.zeros(K, dtype=np.int64)
             stretches = _Stretches(K, M)
             for w in order:
                 self._name(w, subject, stretches)
@@ -221,6 +222,8 @@ class WindowNames:
         self.counts[alive] += 1
         self.evidence[alive] += scores
         self.exchanges[alive] += gains
+        own = np.where(names >= 0, scores[np.arange(len(names)), names], MIN_LOG_ODDS)
+        self.without[alive] += MIN_LOG_ODDS - own
         stretches.add(w, alive, gains)
 
     def _known(self, w: int, alive: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -1,4 +1,4 @@
-"""XML of calibrations, from files that may be damaged or malicious."""
+"""XML of calibrations and marker sets, from files that may be damaged or malicious."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 from asterism.errors import FormatError
-from asterism.io.calibrations.parts import read_bytes
+from asterism.io.whole_file import read_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 __all__ = ["load", "to_bytes"]
 
-_DEEPEST = 64  # levels; real files have five
+_DEEPEST = 64  # levels; real files have at most 24
 _PIECE = 1 << 16  # bytes parsed at a time
 
 
 class _Forbidden(Exception):
-    """The file has a structure that no calibration has."""
+    """The file has a structure that no real file has."""
 
 
 class _CarefulBuilder(ElementTree.TreeBuilder):
@@ -73,7 +73,7 @@ def load(path: Path, root: str) -> ElementTree.Element:
         place = f"line {line}, column {column + 1}"
         raise FormatError(path, place, "XML", str(error)) from error
     except _Forbidden as error:
-        raise FormatError(path, "its structure", "a plain calibration", str(error)) from error
+        raise FormatError(path, "its structure", "elements alone", str(error)) from error
     except (LookupError, ValueError) as error:
         raise FormatError(path, "its encoding", "one that XML knows", str(error)) from error
     if tree.tag != root:
