@@ -190,14 +190,20 @@ double Prediction::radius(double gate, double min_log_likelihood, double max_r) 
 double update(const MotionModel& m, const Prediction& p, const Point& y, MotionState& s) {
   std::array<double, kMaxModes> each{};
   const double total = p.log_likelihood(y, each);
+  update(m, each, total, y, s);
+  return total;
+}
+
+void update(const MotionModel& m, const std::array<double, kMaxModes>& each,
+            double log_likelihood, const Point& y, MotionState& s) {
   with_states(m.axis.n, [&](auto n) {
     for (int b = 0; b < m.M; ++b) update_axis_with<n>(m.axis, y, s.mode[b]);
   });
+  if (m.M == 1) return;
   for (int b = 0; b < m.M; ++b) {
-    const double w = std::exp(each[b] - total);
-    if (m.M > 1) s.w[b] = w > 1e-300 ? w : 1e-300;
+    const double w = std::exp(each[b] - log_likelihood);
+    s.w[b] = w > 1e-300 ? w : 1e-300;
   }
-  return total;
 }
 
 }  // namespace asterism

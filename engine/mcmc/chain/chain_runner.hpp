@@ -108,7 +108,7 @@ class ChainRunner {
   static constexpr double kLookedAtAbove = -9;
 
   struct Hot {
-    Toggle toggle;
+    typename Sampler<Filter>::Listed move;
     double upto = 0;
   };
 
@@ -121,7 +121,7 @@ class ChainRunner {
     const double at = sampler_.random().uniform() * hot_.back().upto;
     const auto hot = std::upper_bound(hot_.begin(), hot_.end(), at,
                                       [](double x, const Hot& h) { return x < h.upto; });
-    sampler_.step(hot->toggle, observe);
+    sampler_.step(hot->move, observe);
   }
 
   // Lists the involutive moves at the ambiguous links of this part. They are in detailed balance
@@ -178,10 +178,10 @@ class ChainRunner {
     add_hot({Toggle::Kind::skip, y, p.before(y), p.after(y)});
   }
   void add_hot(const Toggle& toggle) {
-    const double gain = sampler_.gain_of(toggle);
-    if (gain < -kHotWithin) return;
-    const double before = hot_.empty() ? 0 : hot_.back().upto;
-    hot_.push_back({toggle, before + std::exp(std::min(gain, 0.0) / 4)});
+    Hot hot{{toggle}, hot_.empty() ? 0 : hot_.back().upto};
+    if (!sampler_.weigh(hot.move, -kHotWithin)) return;
+    hot.upto += std::exp(std::min(hot.move.gain, 0.0) / 4);
+    hot_.push_back(hot);
   }
   static constexpr double kHotWithin = 12;
 

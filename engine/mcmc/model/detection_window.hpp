@@ -5,6 +5,7 @@
 // a marker may reach almost any detection.
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cstdint>
 #include <deque>
@@ -36,6 +37,7 @@ class DetectionWindow {
   struct Steps {
     MotionStep step;               // from the frame before
     std::vector<AxisStep> single;  // with one motion model: from d frames before, at index d - 1
+    double log_peak = 0;           // upper bound of the log density of any detection of the frame
   };
   struct Frame {
     double time = 0;
@@ -53,6 +55,8 @@ class DetectionWindow {
   // Number of the newest frame; that of the first is 0.
   std::int64_t now() const { return first_ + static_cast<std::int64_t>(frames_.size()) - 1; }
   int max_gap() const { return sm_.max_gap; }
+  // Changes whenever the window changes.
+  std::int64_t version() const { return version_; }
   // Last frame whose detections may have successors. Detections of later frames represent the
   // continuation of a track after a block (see Partition::continue_with).
   std::int64_t last_open() const { return last_open_; }
@@ -83,6 +87,7 @@ class DetectionWindow {
   // Adds the next frame. Returns the numbers of its detections in order of arrival.
   std::span<const std::int32_t> add(double time, const MotionStep& step,
                                     std::span<const Point> points, std::int64_t first_number) {
+    ++version_;
     Frame& frame = frames_.emplace_back();
     frame.time = time;
     const std::int64_t t = now();
@@ -108,6 +113,13 @@ class DetectionWindow {
     }
     auto steps = std::make_shared<Steps>();
     steps->step = step;
+    steps->log_peak = -std::numeric_limits<double>::infinity();
+    for (int b = 0; b < m_.M; ++b) {
+      AxisState exact;  // a state without uncertainty before the step
+      exact.P = step.mode[b].Q;
+      const double S = innovation_variance(m_.axis, exact);
+      steps->log_peak = std::max(steps->log_peak, log_density(m_.axis.D, S, 0));
+    }
     if (m_.M == 1) compose(*steps, t);
     frame.steps = std::move(steps);
     return frame.ids;
@@ -115,6 +127,7 @@ class DetectionWindow {
 
   // Becomes the part of a window that contains the given detections, numbered in the given order.
   void take_part(const DetectionWindow& whole, std::span<const std::int32_t> ids) {
+    ++version_;
     first_ = whole.first_;
     last_open_ = whole.last_open_;
     frames_.resize(whole.frames_.size());
@@ -133,6 +146,7 @@ class DetectionWindow {
 
   // Removes the oldest frame. Its detections must not be referenced any more.
   void drop() {
+    ++version_;
     for (const std::int32_t id : frames_.front().ids) unused_.push_back(id);
     frames_.pop_front();
     ++first_;
@@ -168,7 +182,7 @@ class DetectionWindow {
   std::vector<Detection> detections_;
   std::vector<std::int32_t> unused_;
   std::deque<Frame> frames_;
-  std::int64_t first_ = 0;
+  std::int64_t first_ = 0, version_ = 0;
   std::int64_t last_open_ = std::numeric_limits<std::int64_t>::max();
 };
 

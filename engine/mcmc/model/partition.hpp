@@ -12,16 +12,19 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <unordered_map>
 #include <vector>
 
+#include "base/scratch.hpp"
 #include "math/index_set.hpp"
 #include "mcmc/model/continuations.hpp"
 #include "mcmc/model/detection_window.hpp"
 #include "mcmc/model/edits.hpp"
+#include "mcmc/model/link_gains.hpp"
 #include "mcmc/model/path_filter.hpp"
 
 namespace asterism {
@@ -59,6 +62,26 @@ class Partition {
   bool is_continuation(std::int32_t i) const { return window_[i].frame > window_.last_open(); }
   const State& state(std::int32_t i) const { return state_[i]; }
   double score(std::int32_t i) const { return score_[i]; }
+  // The time of the partition advances with every change of a track. `changed` is the time of the
+  // last change of the track of i, or of i itself if it is in none.
+  std::int64_t clock() const { return clock_; }
+  std::int64_t changed(std::int32_t i) const {
+    return track_of_[i] >= 0 ? tracks_[track_of_[i]].stamp : stamp_[i];
+  }
+  // The gain of the score by a link from the present state of i to j; a reference to NaN if it is
+  // not known yet.
+  double& known_gain(std::int32_t i, std::int32_t j) const {
+    return gains_.of(stamp_[i], window_.version(), j);
+  }
+  double link_gain(std::int32_t i, std::int32_t j) const {
+    double& gain = known_gain(i, j);
+    if (std::isnan(gain)) {
+      const auto gap = static_cast<int>(window_[j].frame - window_[i].frame);
+      filter_.expect(m_, window_, state_[i], window_[i].frame, gap, expected_);
+      gain = gap_score(gap) + Filter::log_likelihood(m_, expected_, window_[j].y);
+    }
+    return gain;
+  }
 
   // Detections in no track, in a track, and in a track after another detection; none is settled.
   const IndexSet& free() const { return free_; }
@@ -74,6 +97,10 @@ class Partition {
   // The previous or next detection of the track, -1 if there is none.
   std::int32_t before(std::int32_t i) const {
     return place_[i] > 0 ? track(track_of_[i]).nodes[place_[i] - 1] : -1;
+  }
+  // The detection before the n-th of a tail, which is not the first of the track.
+  std::int32_t before(const Edit<Filter>& edit, std::size_t n) const {
+    return n == 0 ? tracks_[edit.track].nodes[edit.keep - 1] : edit.tail.nodes[n - 1];
   }
   std::int32_t after(std::int32_t i) const {
     const Track& t = track(track_of_[i]);
@@ -94,11 +121,21 @@ class Partition {
     const std::int32_t i = last(k);
     return score_[i] + end_score(i);
   }
+  // The edit must be filtered.
   double score_of(const Edit<Filter>& edit) const {
     if (!edit.tail.nodes.empty()) return edit.tail.scores.back() + end_score(edit.tail.nodes.back());
     if (edit.keep == 0) return 0;
     const std::int32_t i = tracks_[edit.track].nodes[edit.keep - 1];
     return score_[i] + end_score(i);
+  }
+  // An upper bound of the score of an edit, of which some detections may be planned.
+  double max_score_of(const Edit<Filter>& edit) const {
+    const Tail<Filter>& tail = edit.tail;
+    const std::size_t n = tail.states.size();
+    if (n == tail.nodes.size()) return score_of(edit);
+    double score = n > 0 ? tail.scores.back() : edit.keep > 0 ? score_[before(edit, 0)] : 0;
+    for (std::size_t k = n; k < tail.nodes.size(); ++k) score += max_gain(edit, k);
+    return score + end_score(tail.nodes.back());
   }
   double log_posterior() const {
     double sum = 0;
@@ -108,23 +145,45 @@ class Partition {
 
   // Appends a detection to the tail of an edit, with its continuation if it has one.
   void append(Edit<Filter>& edit, std::int32_t j) const {
+    edit.tail.nodes.push_back(j);
+    filter_next(edit, [](double) { return true; });
+  }
+  // Filters the next planned detection of an edit, with its continuation. Before the update of the
+  // state, calls goes_on(gain of the score by the detection); if that is false, returns false and
+  // leaves the detection planned.
+  template <typename GoesOn>
+  bool filter_next(Edit<Filter>& edit, GoesOn&& goes_on) const {
     Tail<Filter>& tail = edit.tail;
-    State& state = tail.states.emplace_back();
-    if (edit.keep == 0 && tail.nodes.empty()) {
-      state = filter_.begin(m_, window_[j].y, window_[j].frame);
+    const std::size_t n = tail.states.size();
+    const std::int32_t j = tail.nodes[n];
+    if (edit.keep == 0 && n == 0) {
+      if (!goes_on(begin_score())) return false;
+      tail.states.push_back(filter_.begin(m_, window_[j].y, window_[j].frame));
       tail.scores.push_back(begin_score());
     } else {
-      const bool is_first = tail.nodes.empty();
-      const std::int32_t i =
-          is_first ? tracks_[edit.track].nodes[edit.keep - 1] : tail.nodes.back();
-      const State& from = is_first ? state_[i] : tail.states[tail.states.size() - 2];
+      const std::int32_t i = before(edit, n);
       const int gap = static_cast<int>(window_[j].frame - window_[i].frame);
-      filter_.expect(m_, window_, from, window_[i].frame, gap, expected_);
-      const double gain = gap_score(gap) + filter_.take(m_, expected_, window_[j].y, state);
-      tail.scores.push_back((is_first ? score_[i] : tail.scores.back()) + gain);
+      filter_.expect(m_, window_, n == 0 ? state_[i] : tail.states.back(), window_[i].frame, gap,
+                     expected_);
+      const double gain = gap_score(gap) + filter_.weigh(m_, expected_, window_[j].y);
+      if (!goes_on(gain)) return false;
+      tail.scores.push_back((n == 0 ? score_[i] : tail.scores.back()) + gain);
+      filter_.take(m_, expected_, window_[j].y, tail.states.emplace_back());
     }
-    tail.nodes.push_back(j);
-    if (is_continuation(j)) tail.scores.back() += later_.advance(m_, window_, filter_, j, state);
+    if (is_continuation(j))
+      tail.scores.back() += later_.advance(m_, window_, filter_, j, tail.states.back());
+    return true;
+  }
+  // The largest gain of the score by the n-th detection of a tail. That of the first one is known.
+  // Otherwise its variance is at least that of the sensor and of the last step's process noise,
+  // which bounds its density.
+  double max_gain(const Edit<Filter>& edit, std::size_t n) const {
+    const std::int32_t j = edit.tail.nodes[n];
+    const double later = is_continuation(j) ? later_.max_gain(window_, j) : 0;
+    if (n == 0) return later + (edit.keep == 0 ? begin_score() : link_gain(before(edit, 0), j));
+    const std::int64_t frame = window_[j].frame;
+    const auto gap = static_cast<int>(frame - window_[before(edit, n)].frame);
+    return gap_score(gap) + window_.frame(frame).steps->log_peak + later;
   }
   // Whether every continuation is in a track after the edits.
   bool keeps_continuations(std::span<const Edit<Filter>> edits) const {
@@ -156,6 +215,7 @@ class Partition {
       assert(all_.has(edit.track));
       Track& t = tracks_[edit.track];
       assert(edit.keep >= t.n_frozen && edit.keep <= t.size());
+      t.stamp = ++clock_;
       for (std::int32_t p = edit.keep; p < t.size(); ++p) release(t.nodes[p]);
       t.nodes.resize(edit.keep);
     }
@@ -313,6 +373,7 @@ class Partition {
     track_of_.resize(n, kFree);
     place_.resize(n);
     state_.resize(n);
+    stamp_.resize(n);
     score_.resize(n);
     for (IndexSet* set : {&free_, &taken_, &linked_, &leapt_}) set->reserve_up_to(n);
   }
@@ -333,6 +394,7 @@ class Partition {
     track_of_[i] = k;
     place_[i] = tracks_[k].size();
     state_[i] = state;
+    stamp_[i] = ++clock_;
     score_[i] = score;
     tracks_[k].nodes.push_back(i);
     if (!is_frozen(i)) list(i);
@@ -350,6 +412,7 @@ class Partition {
   }
   void release(std::int32_t i) {
     track_of_[i] = kFree;
+    stamp_[i] = ++clock_;
     taken_.remove(i);
     linked_.remove(i);
     leapt_.remove(i);
@@ -367,6 +430,7 @@ class Partition {
     }
     tracks_[k].n_frozen = tracks_[k].n_gone = 0;
     tracks_[k].id = -1;
+    tracks_[k].stamp = ++clock_;
     all_.add(k);
     young_.add(k);
     return k;
@@ -389,8 +453,11 @@ class Partition {
   IndexSet free_, taken_, linked_, leapt_, all_, young_;
   std::vector<std::int32_t> track_of_, place_;
   std::vector<State> state_;
+  std::vector<std::int64_t> stamp_;  // of the state, or of the release
+  std::int64_t clock_ = 0;
   std::vector<double> score_;
   mutable Filter filter_;
+  mutable Scratch<LinkGains> gains_;
   mutable typename Filter::Expected expected_{};  // scratch
   std::vector<std::int32_t> origin_;  // of a part: numbers of its detections in the whole partition
 };

@@ -31,16 +31,18 @@ class Moves {
   Moves(const Partition<Filter>& partition, const GrowthOptions& growth)
       : p_(partition), edits_(partition), growth_(partition, growth) {}
 
-  // Draws ω'. Returns false if the draw is impossible, so that the chain stays.
+  // Draws ω'. Returns false if the draw is impossible, so that the chain stays. It must then be
+  // weighed.
   bool propose(Move move, Random& random, Change<Filter>& out) {
     out.move = move;
     out.n_edits = 0;
     out.log_forward = 0;
     out.with = -1;
-    if (!draw(random, out) || !p_.keeps_continuations(out.all())) return false;
-    edits_.weigh(out);
-    return out.log_forward > Growth<Filter>::kNever;
+    return draw(random, out) && p_.keeps_continuations(out.all()) &&
+           out.log_forward > Growth<Filter>::kNever;
   }
+  // Computes the gain of the proposed move. Returns false if it does not exceed out.min_gain.
+  bool weigh(Change<Filter>& out) const { return edits_.weigh(out); }
 
   double log_reverse(const Change<Filter>& q) {
     if (q.n_edits == 0) return q.log_forward;  // the reverse move has the same probability
