@@ -168,9 +168,15 @@ double Prediction::log_likelihood(const Point& point, std::array<double, kMaxMod
     best = std::max(best, each[b]);
   }
   if (M == 1 || std::isinf(best)) return best;
+  // Terms below half of the last digit of the sum, which is at least 1, do not change it. The best
+  // mode contributes exactly 1.
+  constexpr double kNegligible = -37.5;
   double sum = 0;
-  for (int b = 0; b < M; ++b) sum += std::exp(each[b] - best);
-  return best + std::log(sum);
+  for (int b = 0; b < M; ++b) {
+    const double below = each[b] - best;
+    if (below > kNegligible) sum += below == 0 ? 1.0 : std::exp(below);
+  }
+  return sum == 1 ? best : best + std::log(sum);
 }
 
 double Prediction::radius(double gate, double min_log_likelihood, double max_r) const {

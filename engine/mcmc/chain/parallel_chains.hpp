@@ -9,6 +9,8 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "base/parallel.hpp"
@@ -26,41 +28,57 @@ class ParallelChains {
   ParallelChains(const ChainOptions& chain, std::int32_t n_chains, std::int32_t n_threads)
       : chain_(chain), n_chains_(n_chains), n_threads_(n_threads) {}
 
+  // The groups that a search left unchanged, by their first track or detection, with the moves at
+  // their ambiguous links.
+  using Unchanged = std::unordered_map<std::int32_t, std::pair<Group, HotList<Filter>>>;
+
   // Sets each group to the best state that its chains find.
-  void search(Partition<Filter>& whole, std::span<const Group> groups, const Budgets& budgets,
+  Unchanged search(Partition<Filter>& whole, std::span<const Group> groups, const Budgets& budgets,
               std::uint64_t seed, ChainStats& stats) {
     struct Found {
       double gain = 0;
       ChainStats stats;
+      HotList<Filter> list;
       std::optional<Partition<Filter>> part;
     };
     std::vector<Found> found(groups.size() * n_chains_);
     each_chain(whole, found.size(), [&](ChainRunner<Filter>& runner, std::size_t task) {
       const std::size_t g = task / n_chains_;
       Found& own = found[task];
-      own.gain = runner.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.stats);
+      own.gain = runner.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.list,
+                               own.stats);
       if (own.gain > 0) own.part = runner.partition();
     });
+    Unchanged unchanged;
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const auto first = found.begin() + static_cast<std::ptrdiff_t>(g) * n_chains_;
       const auto last = first + n_chains_;
       for (auto one = first; one != last; ++one) stats.add(one->stats);
       const auto best = std::max_element(
           first, last, [](const Found& a, const Found& b) { return a.gain < b.gain; });
-      if (best->gain > 0) whole.take_over(*best->part, groups[g].tracks);
+      if (best->gain > 0)
+        whole.take_over(*best->part, groups[g].tracks);
+      else
+        unchanged.emplace(groups[g].first(), std::pair(groups[g], std::move(first->list)));
     }
+    return unchanged;
   }
 
   // For each detection of the whole partition, the fraction of the chains' states in which it has
-  // its present predecessor; 1 for detections in no group.
+  // its present predecessor; 1 for detections in no group. `unchanged` are those of a search that
+  // preceded immediately, if any.
   std::vector<double> sample(const Partition<Filter>& whole, std::span<const Group> groups,
-                             const Budgets& budgets, std::uint64_t seed, ChainStats& stats) {
+                             const Unchanged& unchanged, const Budgets& budgets,
+                             std::uint64_t seed, ChainStats& stats) {
     std::vector<Halves> found(groups.size() * n_chains_);
     std::vector<ChainStats> counts(found.size());
     each_chain(whole, found.size(), [&](ChainRunner<Filter>& runner, std::size_t task) {
       const std::size_t g = task / n_chains_;
-      runner.sample(whole, groups[g], seed_of(seed, task), budgets.of(g), found[task],
-                    counts[task]);
+      // Numbers of tracks are not reused while the tracks exist, so equal groups are the same.
+      const auto at = unchanged.find(groups[g].first());
+      const bool is_known = at != unchanged.end() && at->second.first == groups[g];
+      runner.sample(whole, groups[g], seed_of(seed, task), budgets.of(g),
+                    is_known ? &at->second.second : nullptr, found[task], counts[task]);
     });
     for (const ChainStats& one : counts) stats.add(one);
     std::vector<double> shares(whole.window().n_ids(), 1.0);

@@ -37,7 +37,9 @@ class DetectionWindow {
   struct Steps {
     MotionStep step;               // from the frame before
     std::vector<AxisStep> single;  // with one motion model: from d frames before, at index d - 1
-    double log_peak = 0;           // upper bound of the log density of any detection of the frame
+    // Upper bounds of the log density of a detection of the frame: right after the first detection
+    // of its track, and later.
+    double log_peak = 0, log_later_peak = 0;
   };
   struct Frame {
     double time = 0;
@@ -113,13 +115,7 @@ class DetectionWindow {
     }
     auto steps = std::make_shared<Steps>();
     steps->step = step;
-    steps->log_peak = -std::numeric_limits<double>::infinity();
-    for (int b = 0; b < m_.M; ++b) {
-      AxisState exact;  // a state without uncertainty before the step
-      exact.P = step.mode[b].Q;
-      const double S = innovation_variance(m_.axis, exact);
-      steps->log_peak = std::max(steps->log_peak, log_density(m_.axis.D, S, 0));
-    }
+    bound_peaks(*steps, t);
     if (m_.M == 1) compose(*steps, t);
     frame.steps = std::move(steps);
     return frame.ids;
@@ -153,6 +149,30 @@ class DetectionWindow {
   }
 
  private:
+  // A covariance is at least that of a state which was known exactly before the last step, or before
+  // the last two with a detection between them. It is at least the smallest of the modes if they
+  // are mixed.
+  void bound_peaks(Steps& steps, std::int64_t t) const {
+    const double never = -std::numeric_limits<double>::infinity();
+    steps.log_peak = steps.log_later_peak = never;
+    for (int b = 0; b < m_.M; ++b) {
+      AxisState exact;
+      exact.P = steps.step.mode[b].Q;
+      const double S = innovation_variance(m_.axis, exact);
+      steps.log_peak = std::max(steps.log_peak, log_density(m_.axis.D, S, 0));
+      if (t == first_) continue;
+      const MotionStep& before = frames_[t - 1 - first_].steps->step;
+      for (int a = 0; a < m_.M; ++a) {
+        AxisState s;
+        s.P = before.mode[a].Q;
+        s.P = KalmanGain(m_.axis, s).P;
+        predict(m_.axis, steps.step.mode[b], s);
+        const double later_S = innovation_variance(m_.axis, s);
+        steps.log_later_peak = std::max(steps.log_later_peak, log_density(m_.axis.D, later_S, 0));
+      }
+    }
+    if (t == first_) steps.log_later_peak = steps.log_peak;
+  }
   // F and Q over d frames: x ↦ F₂ F₁ x, Q = F₂ Q₁ F₂ᵀ + Q₂. The process noise of separate steps is
   // accumulated; that of one long step would differ.
   void compose(Steps& steps, std::int64_t t) const {

@@ -175,15 +175,16 @@ class Partition {
     return true;
   }
   // The largest gain of the score by the n-th detection of a tail. That of the first one is known.
-  // Otherwise its variance is at least that of the sensor and of the last step's process noise,
-  // which bounds its density.
+  // Otherwise its density is bounded.
   double max_gain(const Edit<Filter>& edit, std::size_t n) const {
     const std::int32_t j = edit.tail.nodes[n];
     const double later = is_continuation(j) ? later_.max_gain(window_, j) : 0;
     if (n == 0) return later + (edit.keep == 0 ? begin_score() : link_gain(before(edit, 0), j));
     const std::int64_t frame = window_[j].frame;
     const auto gap = static_cast<int>(frame - window_[before(edit, n)].frame);
-    return gap_score(gap) + window_.frame(frame).steps->log_peak + later;
+    const auto& steps = *window_.frame(frame).steps;
+    const bool is_second = edit.keep == 0 && n == 1 && gap == 1;
+    return gap_score(gap) + (is_second ? steps.log_peak : steps.log_later_peak) + later;
   }
   // Whether every continuation is in a track after the edits.
   bool keeps_continuations(std::span<const Edit<Filter>> edits) const {
