@@ -32,27 +32,29 @@ class PricedOptions {
 
   // The resources that occur are numbered anew, in their order, because a cluster uses few of them.
   explicit PricedOptions(std::span<const std::vector<PackingOption>> trees) {
+    thread_local std::vector<std::int32_t> new_number;  // by resource, -1 between the calls
     std::vector<std::int32_t> resources;
     for (const auto& options : trees)
       for (const PackingOption& option : options)
-        resources.insert(resources.end(), option.uses.begin(), option.uses.end());
-    uses_.reserve(resources.size());
+        for (const std::int32_t r : option.uses) {
+          if (r >= static_cast<std::int32_t>(new_number.size())) new_number.resize(r + 1, -1);
+          if (std::exchange(new_number[r], 0) < 0) resources.push_back(r);
+        }
     std::ranges::sort(resources);
-    const auto repeated = std::ranges::unique(resources);
-    resources.erase(repeated.begin(), repeated.end());
+    for (std::size_t k = 0; k < resources.size(); ++k)
+      new_number[resources[k]] = static_cast<std::int32_t>(k);
     for (const auto& options : trees) {
       first_.push_back(n_options());
       for (const PackingOption& option : options) {
         const auto begin = static_cast<std::int32_t>(uses_.size());
-        for (const std::int32_t r : option.uses)
-          uses_.push_back(static_cast<std::int32_t>(std::ranges::lower_bound(resources, r) -
-                                                    resources.begin()));
+        for (const std::int32_t r : option.uses) uses_.push_back(new_number[r]);
         options_.push_back({option.log_weight, begin, static_cast<std::int32_t>(uses_.size()),
                             n_options() - first_.back()});
         reduced_.push_back(option.log_weight);
       }
     }
     first_.push_back(n_options());
+    for (const std::int32_t r : resources) new_number[r] = -1;
     price_.assign(resources.size(), 0);
     sort();
   }
