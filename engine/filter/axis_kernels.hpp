@@ -3,28 +3,54 @@
 // legend holds here, choose n once and call these.
 #pragma once
 
+#include <array>
 #include <cassert>
 
 #include "filter/kalman.hpp"
+#include "math/row.hpp"
 
 namespace asterism {
 
+// Mean and covariance of an axis model, by rows.
 template <int n>
-inline void predict_axis(const AxisStep& step, const AxisState& s, AxisState& out) {
-  AxisMatrix FP{}, P = step.Q;
-  for (int i = 0; i < n; ++i)
-    for (int k = 0; k < n; ++k)
-      for (int j = 0; j < n; ++j) FP[i * n + j] += step.F[i * n + k] * s.P[k * n + j];
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j)
-      for (int k = 0; k < n; ++k) P[i * n + j] += FP[i * n + k] * step.F[j * n + k];
-  for (int d = 0; d < kMaxAxes; ++d) {
-    AxisVector x{};
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) x[i] += step.F[i * n + j] * s.x[d][j];
-    for (int i = 0; i < n; ++i) out.x[d][i] = x[i];
+struct AxisRows {
+  std::array<Row<n>, kMaxAxes> x;
+  std::array<Row<n>, n> P;
+
+  static AxisRows of(const AxisState& s) {
+    AxisRows out;
+    for (int d = 0; d < kMaxAxes; ++d) out.x[d] = Row<n>::of(s.x[d].data());
+    for (int i = 0; i < n; ++i) out.P[i] = Row<n>::of(s.P.data() + i * n);
+    return out;
   }
-  for (int k = 0; k < n * n; ++k) out.P[k] = P[k];
+  void write(AxisState& s) const {
+    for (int d = 0; d < kMaxAxes; ++d) x[d].write(s.x[d].data());
+    for (int i = 0; i < n; ++i) P[i].write(s.P.data() + i * n);
+  }
+};
+
+template <int n>
+inline void predict_axis(const AxisStep& step, const AxisRows<n>& s, AxisState& out) {
+  std::array<Row<n>, n> F_column, FP;
+  for (int j = 0; j < n; ++j) {
+    std::array<double, n> column;
+    for (int i = 0; i < n; ++i) column[i] = step.F[i * n + j];
+    F_column[j] = Row<n>::of(column.data());
+  }
+  for (int i = 0; i < n; ++i) {
+    FP[i] = step.F[i * n] * s.P[0];
+    for (int k = 1; k < n; ++k) FP[i] = FP[i] + step.F[i * n + k] * s.P[k];
+  }
+  AxisRows<n> next;
+  for (int i = 0; i < n; ++i) {
+    next.P[i] = Row<n>::of(step.Q.data() + i * n);
+    for (int k = 0; k < n; ++k) next.P[i] = next.P[i] + FP[i][k] * F_column[k];
+  }
+  for (int d = 0; d < kMaxAxes; ++d) {
+    next.x[d] = s.x[d][0] * F_column[0];
+    for (int j = 1; j < n; ++j) next.x[d] = next.x[d] + s.x[d][j] * F_column[j];
+  }
+  next.write(out);
 }
 
 template <int n>

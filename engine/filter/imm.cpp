@@ -44,59 +44,59 @@ namespace {
 //
 // The axes share one covariance, so the spread of the means is averaged over the axes.
 
-using Deviation = std::array<AxisVector, kMaxAxes>;
+template <int n>
+using Deviation = std::array<Row<n>, kMaxAxes>;
 
 // Mean over the axes of e eᵀ.
 template <int n>
-inline AxisMatrix mean_square(const Deviation& e, int D) {
-  AxisMatrix E{};
-  for (int i = 0; i < n; ++i)
-    for (int j = i; j < n; ++j) {
-      double sum = 0;
-      for (int d = 0; d < kMaxAxes; ++d) sum += e[d][i] * e[d][j];
-      E[i * n + j] = E[j * n + i] = sum / D;
-    }
+inline std::array<Row<n>, n> mean_square(const Deviation<n>& e, int D) {
+  std::array<Row<n>, n> E;
+  for (int i = 0; i < n; ++i) {
+    E[i] = e[0][i] * e[0];
+    for (int d = 1; d < kMaxAxes; ++d) E[i] = E[i] + e[d][i] * e[d];
+    E[i] = E[i] / D;
+  }
   return E;
 }
 
 template <int n, int M>
 struct ModeSpread {
-  std::array<Deviation, M> e;
-  std::array<AxisMatrix, M> PE;  // P_a + E_a; of mode 0, P_0
+  Deviation<n> first;  // mean of mode 0
+  std::array<Deviation<n>, M> e;
+  std::array<std::array<Row<n>, n>, M> PE;  // P_a + E_a; of mode 0, P_0
 
   ModeSpread(const MotionState& s, int D) {
-    PE[0] = s.mode[0].P;
+    const AxisRows<n> own = AxisRows<n>::of(s.mode[0]);
+    first = own.x;
+    PE[0] = own.P;
     for (int a = 1; a < M; ++a) {
-      for (int d = 0; d < kMaxAxes; ++d)
-        for (int i = 0; i < n; ++i) e[a][d][i] = s.mode[a].x[d][i] - s.mode[0].x[d][i];
+      const AxisRows<n> other = AxisRows<n>::of(s.mode[a]);
+      for (int d = 0; d < kMaxAxes; ++d) e[a][d] = other.x[d] - first[d];
       PE[a] = mean_square<n>(e[a], D);
-      for (int k = 0; k < n * n; ++k) PE[a][k] = s.mode[a].P[k] + PE[a][k];
+      for (int i = 0; i < n; ++i) PE[a][i] = other.P[i] + PE[a][i];
     }
   }
 
-  // Mean and covariance of a mixture of the modes, with weights that sum to 1. `first` is the mean
-  // of mode 0.
-  void mix(const Deviation& first, const std::array<double, kMaxModes>& weights, int D,
-           AxisState& out) const {
-    Deviation shift{};
-    AxisMatrix P;
-    for (int k = 0; k < n * n; ++k) P[k] = PE[0][k] * weights[0];
+  // Mean and covariance of a mixture of the modes, with weights that sum to 1.
+  AxisRows<n> mix(const std::array<double, kMaxModes>& weights, int D) const {
+    AxisRows<n> out;
+    Deviation<n> shift;
+    for (int i = 0; i < n; ++i) out.P[i] = weights[0] * PE[0][i];
     for (int a = 1; a < M; ++a) {
       for (int d = 0; d < kMaxAxes; ++d)
-        for (int i = 0; i < n; ++i) shift[d][i] += weights[a] * e[a][d][i];
-      for (int k = 0; k < n * n; ++k) P[k] += weights[a] * PE[a][k];
+        shift[d] = a == 1 ? weights[a] * e[a][d] : shift[d] + weights[a] * e[a][d];
+      for (int i = 0; i < n; ++i) out.P[i] = out.P[i] + weights[a] * PE[a][i];
     }
-    for (int d = 0; d < kMaxAxes; ++d)
-      for (int i = 0; i < n; ++i) out.x[d][i] = first[d][i] + shift[d][i];
-    const AxisMatrix moved = mean_square<n>(shift, D);
-    for (int k = 0; k < n * n; ++k) out.P[k] = P[k] - moved[k];
+    for (int d = 0; d < kMaxAxes; ++d) out.x[d] = first[d] + shift[d];
+    const std::array<Row<n>, n> moved = mean_square<n>(shift, D);
+    for (int i = 0; i < n; ++i) out.P[i] = out.P[i] - moved[i];
+    return out;
   }
 };
 
 template <int n, int M>
 inline void predict_modes(const MotionModel& m, const MotionStep& step, MotionState& s) {
   const ModeSpread<n, M> spread(s, m.axis.D);
-  const Deviation first = s.mode[0].x;
   const std::array<double, kMaxModes> before = s.w;
   for (int b = 0; b < M; ++b) {
     std::array<double, kMaxModes> share{};
@@ -104,8 +104,7 @@ inline void predict_modes(const MotionModel& m, const MotionStep& step, MotionSt
     for (int a = 0; a < M; ++a) total += share[a] = before[a] * m.T[a * M + b];
     for (int a = 0; a < M; ++a) share[a] /= total;
     s.w[b] = total;
-    spread.mix(first, share, m.axis.D, s.mode[b]);
-    predict_axis<n>(step.mode[b], s.mode[b], s.mode[b]);
+    predict_axis<n>(step.mode[b], spread.mix(share, m.axis.D), s.mode[b]);
   }
 }
 
@@ -124,7 +123,7 @@ inline void with_modes(const MotionModel& m, F&& f) {
 AxisState collapse(const MotionModel& m, const MotionState& s) {
   AxisState out = s.mode[0];
   with_modes(m, [&](auto n, auto M) {
-    if constexpr (M > 1) ModeSpread<n, M>(s, m.axis.D).mix(s.mode[0].x, s.w, m.axis.D, out);
+    if constexpr (M > 1) ModeSpread<n, M>(s, m.axis.D).mix(s.w, m.axis.D).write(out);
   });
   return out;
 }
@@ -132,7 +131,7 @@ AxisState collapse(const MotionModel& m, const MotionState& s) {
 void predict(const MotionModel& m, const MotionStep& step, MotionState& s) {
   with_modes(m, [&](auto n, auto M) {
     if constexpr (M == 1)
-      predict_axis<n>(step.mode[0], s.mode[0], s.mode[0]);
+      predict_axis<n>(step.mode[0], AxisRows<n>::of(s.mode[0]), s.mode[0]);
     else
       predict_modes<n, M>(m, step, s);
   });

@@ -8,7 +8,7 @@
 namespace asterism {
 
 void predict(const AxisModel& m, const AxisStep& step, AxisState& s) {
-  with_states(m.n, [&](auto n) { predict_axis<n>(step, s, s); });
+  with_states(m.n, [&](auto n) { predict_axis<n>(step, AxisRows<n>::of(s), s); });
 }
 
 KalmanGain::KalmanGain(const AxisModel& m, const AxisState& s) {

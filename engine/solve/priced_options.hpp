@@ -85,8 +85,10 @@ class PricedOptions {
     std::vector<std::int32_t> order(options_.size());
     for (std::size_t o = 0; o < order.size(); ++o) order[o] = static_cast<std::int32_t>(o);
     for (std::size_t i = 0; i + 1 < first_.size(); ++i)
-      std::stable_sort(order.begin() + first_[i], order.begin() + first_[i + 1],
-                       [&](std::int32_t a, std::int32_t b) { return reduced_[a] > reduced_[b]; });
+      std::sort(order.begin() + first_[i], order.begin() + first_[i + 1],
+                [&](std::int32_t a, std::int32_t b) {
+                  return reduced_[a] != reduced_[b] ? reduced_[a] > reduced_[b] : a < b;
+                });
     std::vector<Option> options;
     std::vector<double> reduced;
     for (const std::int32_t o : order) {
@@ -189,8 +191,9 @@ class PricedOptions {
   std::vector<std::int32_t> repaired(const std::vector<std::int32_t>& chosen) {
     std::vector<std::int32_t> order(n_trees()), out(chosen);
     for (std::int32_t i = 0; i < n_trees(); ++i) order[i] = i;
-    std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-      return reduced_[chosen[a]] > reduced_[chosen[b]];
+    std::ranges::sort(order, [&](std::int32_t a, std::int32_t b) {
+      const double x = reduced_[chosen[a]], y = reduced_[chosen[b]];
+      return x != y ? x > y : a < b;
     });
     is_used_.assign(users_.size(), 0);
     for (const std::int32_t i : order) {
