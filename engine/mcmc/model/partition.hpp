@@ -93,7 +93,11 @@ class Partition {
   const IndexSet& tracks() const { return all_; }
   const IndexSet& young() const { return young_; }
 
-  std::int32_t last(std::int32_t k) const { return track(k).nodes.back(); }
+  // First and last detection of a track, and their frames.
+  std::int32_t first(std::int32_t k) const { return ends_[k].first; }
+  std::int32_t last(std::int32_t k) const { return ends_[k].last; }
+  std::int64_t first_frame(std::int32_t k) const { return ends_[k].first_frame; }
+  std::int64_t last_frame(std::int32_t k) const { return ends_[k].last_frame; }
   // The previous or next detection of the track, -1 if there is none.
   std::int32_t before(std::int32_t i) const {
     return place_[i] > 0 ? track(track_of_[i]).nodes[place_[i] - 1] : -1;
@@ -219,6 +223,7 @@ class Partition {
       t.stamp = ++clock_;
       for (std::int32_t p = edit.keep; p < t.size(); ++p) release(t.nodes[p]);
       t.nodes.resize(edit.keep);
+      if (edit.keep > 0) end_at(edit.track, t.nodes.back());
     }
     for (const Edit<Filter>& edit : edits) {
       Track& t = tracks_[edit.track];
@@ -346,7 +351,10 @@ class Partition {
       --t.n_frozen;
       ++t.n_gone;
       for (const std::int32_t j : t.nodes) --place_[j];
-      if (t.nodes.empty()) remove_track(k);
+      if (t.nodes.empty())
+        remove_track(k);
+      else
+        begin_at(k, t.nodes.front());
     }
     window_.drop();
   }
@@ -397,8 +405,18 @@ class Partition {
     state_[i] = state;
     stamp_[i] = ++clock_;
     score_[i] = score;
+    if (place_[i] == 0) begin_at(k, i);
+    end_at(k, i);
     tracks_[k].nodes.push_back(i);
     if (!is_frozen(i)) list(i);
+  }
+  void begin_at(std::int32_t k, std::int32_t i) {
+    ends_[k].first = i;
+    ends_[k].first_frame = window_[i].frame;
+  }
+  void end_at(std::int32_t k, std::int32_t i) {
+    ends_[k].last = i;
+    ends_[k].last_frame = window_[i].frame;
   }
   void adopt(std::int32_t k, std::int32_t i, const State& state, double score) {
     put(k, i, state, score);
@@ -423,6 +441,7 @@ class Partition {
     std::int32_t k = static_cast<std::int32_t>(tracks_.size());
     if (unused_.empty()) {
       tracks_.emplace_back();
+      ends_.emplace_back();
       all_.reserve_up_to(k + 1);
       young_.reserve_up_to(k + 1);
     } else {
@@ -450,6 +469,12 @@ class Partition {
   std::int64_t n_after_ = 0;  // frames of the capture after the window
   Continuations<Filter> later_;
   std::vector<Track> tracks_;
+  // Beside the tracks, because moves compare the ends of all of them.
+  struct Ends {
+    std::int32_t first = -1, last = -1;
+    std::int64_t first_frame = 0, last_frame = 0;
+  };
+  std::vector<Ends> ends_;
   std::vector<std::int32_t> unused_;
   IndexSet free_, taken_, linked_, leapt_, all_, young_;
   std::vector<std::int32_t> track_of_, place_;

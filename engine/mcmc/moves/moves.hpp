@@ -174,18 +174,23 @@ class Moves {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
     starts_.clear();
-    for (const std::int32_t other : p_.young().items())
-      if (p_.window().is_linkable(p_.last(k), node(other, 0))) starts_.push_back(other);
+    each_start_after(p_.last(k), [&](std::int32_t other) { starts_.push_back(other); });
     if (starts_.empty()) return false;
     const std::int32_t other = draw_one(starts_, random, q);
     edits_.append(q.edit(k, p_.track(k).size()), other, 0);
     q.edit(other, 0);
     return true;
   }
-  // The number of tracks without settled detections whose first detection may follow i.
+  // Calls visit for the tracks without settled detections whose first detection may follow i.
+  template <typename Visit>
+  void each_start_after(std::int32_t i, Visit&& visit) const {
+    const std::int64_t frame = p_.window()[i].frame;
+    for (const std::int32_t k : p_.young().items())
+      if (p_.first_frame(k) > frame && p_.window().is_linkable(i, p_.first(k))) visit(k);
+  }
   std::int32_t n_starts_after(std::int32_t i) const {
     std::int32_t n = 0;
-    for (const std::int32_t k : p_.young().items()) n += p_.window().is_linkable(i, node(k, 0));
+    each_start_after(i, [&](std::int32_t) { ++n; });
     return n;
   }
 
@@ -261,7 +266,7 @@ class Moves {
       if (window[d].frame > last && window[p_.before(d)].frame < last && window.is_linkable(a, d))
         visit(d);
     for (const std::int32_t k : p_.young().items())
-      if (window[node(k, 0)].frame > last && window.is_linkable(a, node(k, 0))) visit(node(k, 0));
+      if (p_.first_frame(k) > last && window.is_linkable(a, p_.first(k))) visit(p_.first(k));
   }
   // The number of partners of the link a → d in ω', after the exchange of the tails.
   std::int32_t n_partners_after(const Change<Filter>& q) const {
@@ -304,10 +309,10 @@ class Moves {
         offer(p_.track_of(j), p_.place_of(j), i, j);
     }
     for (const std::int32_t k : p_.tracks().items())
-      if (k != own && window[p_.last(k)].frame < frame)
+      if (p_.last_frame(k) < frame && k != own)
         offer(k, p_.track(k).size(), p_.last(k), -1);
     for (const std::int32_t k : p_.young().items())
-      if (k != own && window[node(k, 0)].frame > frame) offer(k, 0, -1, node(k, 0));
+      if (p_.first_frame(k) > frame && k != own) offer(k, 0, -1, p_.first(k));
     if (own >= 0) offer(own, p_.place_of(x), p_.before(x), p_.after(x));
   }
   bool draw_insertion(Random& random, Change<Filter>& q) {
@@ -336,8 +341,10 @@ class Moves {
     const std::int32_t own = p_.track_of(b);
     if (p_.track(own).n_gone + p_.place_of(b) < 2) return false;
     starts_.clear();
+    const std::int64_t frame = p_.window()[b].frame;
     for (const std::int32_t k : p_.tracks().items())
-      if (k != own && p_.window().is_linkable(p_.last(k), b)) starts_.push_back(k);
+      if (p_.last_frame(k) < frame && k != own && p_.window().is_linkable(p_.last(k), b))
+        starts_.push_back(k);
     if (starts_.empty()) return false;
     const std::int32_t other = draw_one(starts_, random, q);
     q.with = b;
