@@ -19,9 +19,9 @@ using namespace asterism;
 namespace {
 
 // Returns (marginals with the miss last, log of the total weight, best event, bound, largest number
-// of states).
+// of states). `negligible` and `min_work` are those of CutOptions.
 nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_miss,
-                          std::int64_t max_states) {
+                          std::int64_t max_states, double negligible, double min_work) {
   require(log_weights.ndim() == 2 && log_miss.ndim() == 1 &&
               log_weights.shape(0) == log_miss.shape(0),
           "log_weights: shape (n, m), log_miss: shape (n,)");
@@ -46,7 +46,8 @@ nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_m
       }
     std::vector<double> paired(pairings.size()), missed(n);
     summary =
-        JointEvents(pairings, weights, flat(log_miss), static_cast<std::int32_t>(m), max_states)
+        JointEvents(pairings, weights, flat(log_miss), static_cast<std::int32_t>(m), max_states,
+                    {negligible, min_work})
             .solve(paired, missed, best);
     for (std::size_t e = 0; e < pairings.size(); ++e)
       marginals[pairings[e].row * (m + 1) + pairings[e].column] = paired[e];
@@ -207,7 +208,8 @@ void bind_solvers(nb::module_& module) {
              "drop"_a, "max_nodes"_a);
   module.def("packing_losses", &packing_losses, "first_option"_a, "log_weights"_a,
              "first_use"_a, "uses"_a);
-  module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a);
+  module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a,
+             "negligible"_a = 0.0, "min_work"_a = 0.0);
 
   nb::exception<FrontierLimit>(module, "FrontierLimit");
 }

@@ -86,10 +86,6 @@ MatchingGraph graph_of(std::span<const Candidate> group, const GroupNumbering& b
   return graph;
 }
 
-// Groups below these sizes are summed exactly in no time.
-constexpr std::size_t kFew = 32;          // pairings
-constexpr double kLittleWork = 1 << 22;   // multiplications of a pass
-
 }  // namespace
 
 JointSummary JointEvents::solve(std::span<double> marginals, std::span<double> missed,
@@ -100,13 +96,13 @@ JointSummary JointEvents::solve(std::span<double> marginals, std::span<double> m
   std::fill(marginals.begin(), marginals.end(), 0.0);
   std::fill(missed.begin(), missed.end(), 1.0);
   std::fill(best.begin(), best.end(), -1);
+  for (std::size_t g = 0; g < groups_.size(); ++g) assignment_.solve(groups_[g], best_);
+  double log_exact = 0;  // log of the fraction of the events that was summed
+  if (cut_.negligible > 0) log_exact += std::log1p(-cut());
   std::vector<char> has_any(n_, 0);
   for (const Candidate& c : groups_.order) has_any[c.row] = 1;
   for (std::int32_t i = 0; i < n_; ++i)
     if (!has_any[i]) summary_.log_total += log_miss_[i];
-  for (std::size_t g = 0; g < groups_.size(); ++g) assignment_.solve(groups_[g], best_);
-  double log_exact = 0;  // log of the fraction of the events that was summed
-  if (negligible_ > 0) log_exact += std::log1p(-cut());
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const double bound = is_single(g) ? solve_single(g) : solve_group(g);
     summary_.n_beams += bound > 0;
@@ -147,21 +143,32 @@ JointEvents::Priced JointEvents::price(std::size_t g) const {
   return out;
 }
 
+// Whether even a frontier of all rows would take little work.
+bool JointEvents::is_quick(std::span<const Candidate> group) const {
+  int n_rows = 1;
+  for (std::size_t e = 1; e < group.size(); ++e) n_rows += group[e].row != group[e - 1].row;
+  return std::ldexp(2.0 * static_cast<double>(group.size()), n_rows) <= cut_.min_work;
+}
+
 double JointEvents::cut() {
   NegligibleLinks negligible;
-  std::vector<std::int32_t> found;
   std::vector<char> is_cut(groups_.order.size(), 0);
   double omitted = 0;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
-    if (is_single(g) || groups_[g].size() <= kFew) continue;
+    const std::span<const Candidate> group = groups_[g];
+    if (is_single(g) || is_quick(group)) continue;
     const Priced priced = price(g);
-    if (EliminationOrder(graph_of(groups_[g], priced.by)).first().work <= kLittleWork) continue;
-    found.clear();
-    omitted += negligible.find(groups_[g], priced.by, priced.partner, priced.left, priced.price,
-                               negligible_, found);
-    for (const std::int32_t e : found) is_cut[groups_.starts[g] + e] = 1;
-    summary_.n_beams += !found.empty();
-    summary_.n_cut += static_cast<std::int64_t>(found.size());
+    if (EliminationOrder(graph_of(group, priced.by)).first().work <= cut_.min_work) continue;
+    const std::span<const double> bounds =
+        negligible.bounds(group, priced.by, priced.partner, priced.left, priced.price);
+    const std::int64_t n_before = summary_.n_cut;
+    for (std::size_t e = 0; e < group.size(); ++e) {
+      if (!(bounds[e] <= cut_.negligible)) continue;
+      is_cut[groups_.starts[g] + e] = 1;
+      omitted += bounds[e];
+      ++summary_.n_cut;
+    }
+    summary_.n_beams += summary_.n_cut > n_before;
   }
   if (summary_.n_cut > 0) groups_ = groups_without(groups_, is_cut, n_, n_columns_);
   return std::min(omitted, 1.0);

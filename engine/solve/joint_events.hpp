@@ -35,18 +35,24 @@ struct JointSummary {
   std::int64_t n_states = 1, n_beams = 0, n_cut = 0;
 };
 
+// In a group whose exact sum needs more than `min_work` multiplications, links are cut if their
+// marginal is at most `negligible`.
+struct CutOptions {
+  double negligible = 0;
+  double min_work = 1 << 22;
+};
+
 class JointEvents {
  public:
   // Pairings ordered by row, each with its gain. `log_weights` are the log w of the pairings,
-  // passed separately because a gain loses digits if the logs are large. In groups whose exact sum
-  // would be long, links are cut if their marginal is at most `negligible`.
+  // passed separately because a gain loses digits if the logs are large.
   JointEvents(std::span<const Candidate> pairings, std::span<const double> log_weights,
               std::span<const double> log_miss, std::int32_t n_columns, std::int64_t max_states,
-              double negligible = 0)
+              const CutOptions& cut = {})
       : log_weights_(log_weights),
         log_miss_(log_miss),
         max_states_(max_states),
-        negligible_(negligible),
+        cut_(cut),
         n_(static_cast<std::int32_t>(log_miss.size())),
         n_columns_(n_columns),
         groups_(connected_groups(pairings, n_, n_columns)) {}
@@ -67,6 +73,7 @@ class JointEvents {
     std::vector<double> left, price;
   };
   Priced price(std::size_t g) const;
+  bool is_quick(std::span<const Candidate> group) const;
   // Cuts negligible links and divides the groups anew. Returns the bound of the omitted mass.
   double cut();
 
@@ -87,7 +94,7 @@ class JointEvents {
 
   std::span<const double> log_weights_, log_miss_;
   std::int64_t max_states_;
-  double negligible_;
+  CutOptions cut_;
   std::int32_t n_, n_columns_;
   Groups groups_;
   Assignment assignment_;

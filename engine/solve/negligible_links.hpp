@@ -1,4 +1,5 @@
-// Finds links of a group whose marginal is provably small, so that the group can be divided.
+// Upper bounds of the marginals of the links of a group. Links that are provably negligible may be
+// cut, so that the group divides.
 //
 //   r_v(G) = Z(G - v) / Z(G) = 1 / (a_v + Σ_u w_vu r_u(G - v))          Z: sum over the matchings
 //   P(v, u matched) = w_vu r_u(G - v) / (a_v + Σ_u' w_vu' r_u'(G - v))
@@ -17,7 +18,7 @@
 //
 // where `worst` lets one of the d have lost its partner, so that its r may be as large as 1 / a_d.
 // The equations are repeated from A = 1 / a and B = 1 / a; the bounds hold after every round. By the
-// union bound, the events with any of the links that are found have at most the sum of their bounds.
+// union bound, the events with any link of a set have at most the sum of its bounds.
 #pragma once
 
 #include <algorithm>
@@ -32,14 +33,15 @@ namespace asterism {
 
 class NegligibleLinks {
  public:
-  // `left` and `price` are the dual prices of rows and columns (solve/joint_events.hpp) and
-  // `partner` the best event: of row i, n_rows + its column, or -1. Appends to `found` the numbers of
-  // the links of the group whose marginal is at most `limit`. Returns the sum of their bounds.
-  double find(std::span<const Candidate> group, const GroupNumbering& by,
-              std::span<const std::int32_t> partner, std::span<const double> left,
-              std::span<const double> price, double limit, std::vector<std::int32_t>& found) {
+  // Returns an upper bound of the marginal of every link. `left` and `price` are the dual prices of
+  // rows and columns (solve/joint_events.hpp) and `partner` the best event: of row i, n_rows + its
+  // column, or -1. The span is valid until the next call.
+  std::span<const double> bounds(std::span<const Candidate> group, const GroupNumbering& by,
+                                 std::span<const std::int32_t> partner,
+                                 std::span<const double> left, std::span<const double> price) {
     const std::int32_t n = by.n_rows(), m = by.n_columns();
-    if (std::ranges::any_of(left, [](double x) { return !(x < kMaxGain); })) return 0;
+    bound_.assign(group.size(), 1);
+    if (std::ranges::any_of(left, [](double x) { return !(x < kMaxGain); })) return bound_;
     w_.resize(group.size());
     for (std::size_t e = 0; e < group.size(); ++e)
       w_[e] = std::exp(group[e].gain - left[by.row_of[e]] - price[by.column_of[e]]);
@@ -51,18 +53,14 @@ class NegligibleLinks {
     low_.resize(n + m);
     for (int round = 0; round < kRounds; ++round) refine(group, by, partner);
 
-    double sum = 0;
     for (std::size_t e = 0; e < group.size(); ++e) {
       const std::int32_t i = by.row_of[e], own = partner[i];
       if (own == n + by.column_of[e]) continue;
       const double with = w_[e] * high_[n + by.column_of[e]];
       const double without = a_[i] + (own < 0 ? 0 : own_[i] * low_[own]);
-      const double bound = with / (with + without);
-      if (!(bound <= limit)) continue;
-      found.push_back(static_cast<std::int32_t>(e));
-      sum += bound;
+      bound_[e] = with / (with + without);
     }
-    return sum;
+    return bound_;
   }
 
  private:
@@ -95,7 +93,8 @@ class NegligibleLinks {
     }
   }
 
-  std::vector<double> w_, a_;            // by link, by vertex
+  std::vector<double> bound_, w_;        // by link
+  std::vector<double> a_;                // by vertex
   std::vector<double> high_, low_;       // by vertex
   std::vector<double> own_, sum_, worst_;
 };
