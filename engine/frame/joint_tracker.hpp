@@ -185,7 +185,7 @@ class JointTracker {
     s_.best.resize(live_.size());
     s_.marginals.resize(s_.eligible.size());
     JointEvents events(s_.eligible, s_.gains, s_.log_miss,
-                       static_cast<std::int32_t>(points.size()), opt_.max_states, {kNoMarginal});
+                       static_cast<std::int32_t>(points.size()), opt_.max_states, kNoMarginal);
     const JointSummary summary = events.solve(s_.marginals, s_.all_missed, s_.best);
     stats.n_beams += summary.n_beams;
     stats.n_states = std::max(stats.n_states, summary.n_states);

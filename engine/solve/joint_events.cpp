@@ -3,6 +3,7 @@
 #include "solve/joint_events.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -98,7 +99,7 @@ JointSummary JointEvents::solve(std::span<double> marginals, std::span<double> m
   std::fill(best.begin(), best.end(), -1);
   for (std::size_t g = 0; g < groups_.size(); ++g) assignment_.solve(groups_[g], best_);
   double log_exact = 0;  // log of the fraction of the events that was summed
-  if (cut_.negligible > 0) log_exact += std::log1p(-cut());
+  if (negligible_ > 0) log_exact += std::log1p(-cut());
   std::vector<char> has_any(n_, 0);
   for (const Candidate& c : groups_.order) has_any[c.row] = 1;
   for (std::int32_t i = 0; i < n_; ++i)
@@ -143,11 +144,20 @@ JointEvents::Priced JointEvents::price(std::size_t g) const {
   return out;
 }
 
-// Whether even a frontier of all rows would take little work.
-bool JointEvents::is_quick(std::span<const Candidate> group) const {
-  int n_rows = 1;
-  for (std::size_t e = 1; e < group.size(); ++e) n_rows += group[e].row != group[e - 1].row;
-  return std::ldexp(2.0 * static_cast<double>(group.size()), n_rows) <= cut_.min_work;
+std::vector<double> JointEvents::marginal_bounds() {
+  std::vector<std::int32_t> best(n_, -1);
+  std::vector<double> out(groups_.order.size());
+  NegligibleLinks negligible;
+  best_ = best;
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    assignment_.solve(groups_[g], best_);
+    const Priced priced = price(g);
+    const std::span<const double> bounds =
+        negligible.bounds(groups_[g], priced.by, priced.partner, priced.left, priced.price);
+    for (std::size_t e = 0; e < bounds.size(); ++e)
+      out[groups_.sources[groups_.starts[g] + e]] = bounds[e];
+  }
+  return out;
 }
 
 double JointEvents::cut() {
@@ -156,14 +166,16 @@ double JointEvents::cut() {
   double omitted = 0;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const std::span<const Candidate> group = groups_[g];
-    if (is_single(g) || is_quick(group)) continue;
+    if (is_single(g)) continue;
     const Priced priced = price(g);
-    if (EliminationOrder(graph_of(group, priced.by)).first().work <= cut_.min_work) continue;
+    const MatchingGraph graph = graph_of(group, priced.by);
+    EliminationOrder order(graph);
+    if (order.may_fit(max_frontier()) && order.best().peak <= max_frontier()) continue;
     const std::span<const double> bounds =
         negligible.bounds(group, priced.by, priced.partner, priced.left, priced.price);
     const std::int64_t n_before = summary_.n_cut;
     for (std::size_t e = 0; e < group.size(); ++e) {
-      if (!(bounds[e] <= cut_.negligible)) continue;
+      if (!(bounds[e] <= negligible_)) continue;
       is_cut[groups_.starts[g] + e] = 1;
       omitted += bounds[e];
       ++summary_.n_cut;
@@ -206,10 +218,15 @@ double JointEvents::solve_group(std::size_t g) {
   return result.bound;
 }
 
+// The largest frontier whose states are few enough for the exact sum.
+std::int32_t JointEvents::max_frontier() const {
+  return static_cast<std::int32_t>(std::bit_width(static_cast<std::uint64_t>(max_states_))) - 1;
+}
+
 MatchingMarginals JointEvents::sum(const MatchingGraph& graph, std::int32_t n,
                                    std::span<const std::int32_t> partner) const {
   const Elimination elimination = EliminationOrder(graph).best();
-  if (elimination.peak < 62 && std::int64_t{1} << elimination.peak <= max_states_)
+  if (elimination.peak <= max_frontier())
     return JointExact(graph, elimination).solve();
   if (elimination.peak <= 64)
     return JointBeam<1>(graph, elimination, n, partner, max_states_).solve();

@@ -8,13 +8,14 @@
 // Divided by the prices, every factor is at most 1 and the best event weighs exactly 1. Plain
 // doubles therefore suffice: a term that underflows is negligible against the total.
 //
-// On request, a group whose exact sum would be long is first divided: links whose marginal is
-// provably negligible are cut (solve/negligible_links.hpp), and count in the bound.
+// On request, a group that needs too many states is first divided: links whose marginal is provably
+// negligible are cut (solve/negligible_links.hpp), and count in the bound.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <stdexcept>
+#include <vector>
 
 #include "solve/assignment.hpp"
 #include "solve/connected_components.hpp"
@@ -35,24 +36,18 @@ struct JointSummary {
   std::int64_t n_states = 1, n_beams = 0, n_cut = 0;
 };
 
-// In a group whose exact sum needs more than `min_work` multiplications, links are cut if their
-// marginal is at most `negligible`.
-struct CutOptions {
-  double negligible = 0;
-  double min_work = 1 << 22;
-};
-
 class JointEvents {
  public:
   // Pairings ordered by row, each with its gain. `log_weights` are the log w of the pairings,
-  // passed separately because a gain loses digits if the logs are large.
+  // passed separately because a gain loses digits if the logs are large. In groups that need more
+  // than `max_states`, links are cut if their marginal is at most `negligible`.
   JointEvents(std::span<const Candidate> pairings, std::span<const double> log_weights,
               std::span<const double> log_miss, std::int32_t n_columns, std::int64_t max_states,
-              const CutOptions& cut = {})
+              double negligible = 0)
       : log_weights_(log_weights),
         log_miss_(log_miss),
         max_states_(max_states),
-        cut_(cut),
+        negligible_(negligible),
         n_(static_cast<std::int32_t>(log_miss.size())),
         n_columns_(n_columns),
         groups_(connected_groups(pairings, n_, n_columns)) {}
@@ -61,6 +56,9 @@ class JointEvents {
   // the column of each row, -1 for a miss.
   JointSummary solve(std::span<double> marginals, std::span<double> missed,
                      std::span<std::int32_t> best);
+
+  // Upper bounds of the marginals of the pairings, by which links are cut.
+  std::vector<double> marginal_bounds();
 
   // After `solve`, the groups without the cut links.
   const Groups& groups() const { return groups_; }
@@ -73,7 +71,7 @@ class JointEvents {
     std::vector<double> left, price;
   };
   Priced price(std::size_t g) const;
-  bool is_quick(std::span<const Candidate> group) const;
+  std::int32_t max_frontier() const;
   // Cuts negligible links and divides the groups anew. Returns the bound of the omitted mass.
   double cut();
 
@@ -94,7 +92,7 @@ class JointEvents {
 
   std::span<const double> log_weights_, log_miss_;
   std::int64_t max_states_;
-  CutOptions cut_;
+  double negligible_;
   std::int32_t n_, n_columns_;
   Groups groups_;
   Assignment assignment_;

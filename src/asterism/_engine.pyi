@@ -316,8 +316,8 @@ def joint_marginals(
     log_miss: Floats,
     max_states: int,
     negligible: float = 0.0,
-    min_work: float = 0.0,
 ) -> tuple[Floats, float, Shorts, float, int]: ...
+def marginal_bounds(log_weights: Floats, log_miss: Floats) -> Floats: ...
 def marry(
     first: Ints, receivers: Shorts, costs: Floats, n_receivers: int
 ) -> tuple[Shorts, int]: ...
