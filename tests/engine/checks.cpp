@@ -125,7 +125,7 @@ double gain_of_exchange(const Swept::Part& part, std::int64_t from, bool is_cut)
     const std::int32_t other = starts[1 - k];
     const auto& nodes = p.track(p.track_of(other)).nodes;
     if (!is_cut)
-      for (std::size_t n = p.place_of(other); n < nodes.size(); ++n) p.append(edits[k], nodes[n]);
+      for (std::size_t n = p.place_of(other); n < nodes.size(); ++n) append(p, edits[k], nodes[n]);
   }
   double gain = 0;
   for (const auto& edit : edits) gain += p.score_of(edit) - p.score_of(edit.track);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "math/random.hpp"
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 #include "mcmc/moves/involutive_moves.hpp"
 #include "mcmc/moves/moves.hpp"
@@ -155,7 +156,7 @@ class Sampler {
           ++edit.keep;
         now.erase(at);
       }
-      for (std::size_t n = edit.keep; n < nodes.size(); ++n) partition_.append(edit, nodes[n]);
+      for (std::size_t n = edit.keep; n < nodes.size(); ++n) append(partition_, edit, nodes[n]);
     }
     for (const auto& [first, k] : now) edits_.emplace_back().track = static_cast<std::int32_t>(k);
     partition_.apply(edits_);

@@ -12,6 +12,14 @@ namespace asterism {
 
 class LinkGains {
  public:
+  // A copy of a partition has stamps of its own.
+  LinkGains() = default;
+  LinkGains(const LinkGains&) {}
+  LinkGains& operator=(const LinkGains&) {
+    entries_.clear();
+    return *this;
+  }
+
   // The place of the gain of the link to detection j from the state with this stamp, NaN if the gain
   // is unknown. A key is used for one link only, but another key may later use the same place.
   double& of(std::int64_t stamp, std::int64_t version, std::int32_t j) {

@@ -12,14 +12,12 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <unordered_map>
 #include <vector>
 
-#include "base/scratch.hpp"
 #include "math/index_set.hpp"
 #include "mcmc/model/continuations.hpp"
 #include "mcmc/model/detection_window.hpp"
@@ -43,6 +41,8 @@ class Partition {
 
   const DetectionWindow& window() const { return window_; }
   Filter& filter() const { return filter_; }  // mutable: it only caches values
+  typename Filter::Expected& expected() const { return expected_; }  // working memory
+  const Continuations<Filter>& continuations() const { return later_; }
   const MotionModel& motion() const { return m_; }
   const ScoreModel& model() const { return sm_; }
 
@@ -73,15 +73,6 @@ class Partition {
   double& known_gain(std::int32_t i, std::int32_t j) const {
     return gains_.of(stamp_[i], window_.version(), j);
   }
-  double link_gain(std::int32_t i, std::int32_t j) const {
-    double& gain = known_gain(i, j);
-    if (std::isnan(gain)) {
-      const auto gap = static_cast<int>(window_[j].frame - window_[i].frame);
-      filter_.expect(m_, window_, state_[i], window_[i].frame, gap, expected_);
-      gain = gap_score(gap) + Filter::log_likelihood(m_, expected_, window_[j].y);
-    }
-    return gain;
-  }
 
   // Detections in no track, in a track, and in a track after another detection; none is settled.
   const IndexSet& free() const { return free_; }
@@ -94,17 +85,13 @@ class Partition {
   const IndexSet& young() const { return young_; }
 
   // First and last detection of a track, and their frames.
-  std::int32_t first(std::int32_t k) const { return ends_[k].first; }
-  std::int32_t last(std::int32_t k) const { return ends_[k].last; }
-  std::int64_t first_frame(std::int32_t k) const { return ends_[k].first_frame; }
-  std::int64_t last_frame(std::int32_t k) const { return ends_[k].last_frame; }
+  std::int32_t first(std::int32_t k) const { return begins_[k].detection; }
+  std::int32_t last(std::int32_t k) const { return ends_[k].detection; }
+  std::int64_t first_frame(std::int32_t k) const { return begins_[k].frame; }
+  std::int64_t last_frame(std::int32_t k) const { return ends_[k].frame; }
   // The previous or next detection of the track, -1 if there is none.
   std::int32_t before(std::int32_t i) const {
     return place_[i] > 0 ? track(track_of_[i]).nodes[place_[i] - 1] : -1;
-  }
-  // The detection before the n-th of a tail, which is not the first of the track.
-  std::int32_t before(const Edit<Filter>& edit, std::size_t n) const {
-    return n == 0 ? tracks_[edit.track].nodes[edit.keep - 1] : edit.tail.nodes[n - 1];
   }
   std::int32_t after(std::int32_t i) const {
     const Track& t = track(track_of_[i]);
@@ -132,82 +119,10 @@ class Partition {
     const std::int32_t i = tracks_[edit.track].nodes[edit.keep - 1];
     return score_[i] + end_score(i);
   }
-  // An upper bound of the score of an edit, of which some detections may be planned.
-  double max_score_of(const Edit<Filter>& edit) const {
-    const Tail<Filter>& tail = edit.tail;
-    const std::size_t n = tail.states.size();
-    if (n == tail.nodes.size()) return score_of(edit);
-    double score = n > 0 ? tail.scores.back() : edit.keep > 0 ? score_[before(edit, 0)] : 0;
-    for (std::size_t k = n; k < tail.nodes.size(); ++k) score += max_gain(edit, k);
-    return score + end_score(tail.nodes.back());
-  }
   double log_posterior() const {
     double sum = 0;
     for (const std::int32_t k : all_.items()) sum += score_of(k);
     return sum;
-  }
-
-  // Appends a detection to the tail of an edit, with its continuation if it has one.
-  void append(Edit<Filter>& edit, std::int32_t j) const {
-    edit.tail.nodes.push_back(j);
-    filter_next(edit, [](double) { return true; });
-  }
-  // Filters the next planned detection of an edit, with its continuation. Before the update of the
-  // state, calls goes_on(gain of the score by the detection); if that is false, returns false and
-  // leaves the detection planned.
-  template <typename GoesOn>
-  bool filter_next(Edit<Filter>& edit, GoesOn&& goes_on) const {
-    Tail<Filter>& tail = edit.tail;
-    const std::size_t n = tail.states.size();
-    const std::int32_t j = tail.nodes[n];
-    if (edit.keep == 0 && n == 0) {
-      if (!goes_on(begin_score())) return false;
-      tail.states.push_back(filter_.begin(m_, window_[j].y, window_[j].frame));
-      tail.scores.push_back(begin_score());
-    } else {
-      const std::int32_t i = before(edit, n);
-      const int gap = static_cast<int>(window_[j].frame - window_[i].frame);
-      filter_.expect(m_, window_, n == 0 ? state_[i] : tail.states.back(), window_[i].frame, gap,
-                     expected_);
-      const double gain = gap_score(gap) + filter_.weigh(m_, expected_, window_[j].y);
-      if (!goes_on(gain)) return false;
-      tail.scores.push_back((n == 0 ? score_[i] : tail.scores.back()) + gain);
-      filter_.take(m_, expected_, window_[j].y, tail.states.emplace_back());
-    }
-    if (is_continuation(j))
-      tail.scores.back() += later_.advance(m_, window_, filter_, j, tail.states.back());
-    return true;
-  }
-  // The largest gain of the score by the n-th detection of a tail. That of the first one is known.
-  // Otherwise its density is bounded.
-  double max_gain(const Edit<Filter>& edit, std::size_t n) const {
-    const std::int32_t j = edit.tail.nodes[n];
-    const double later = is_continuation(j) ? later_.max_gain(window_, j) : 0;
-    if (n == 0) return later + (edit.keep == 0 ? begin_score() : link_gain(before(edit, 0), j));
-    const std::int64_t frame = window_[j].frame;
-    const auto gap = static_cast<int>(frame - window_[before(edit, n)].frame);
-    const auto& steps = *window_.frame(frame).steps;
-    const bool is_second = edit.keep == 0 && n == 1 && gap == 1;
-    return gap_score(gap) + (is_second ? steps.log_peak : steps.log_later_peak) + later;
-  }
-  // Whether every continuation is in a track after the edits.
-  bool keeps_continuations(std::span<const Edit<Filter>> edits) const {
-    for (const Edit<Filter>& edit : edits) {
-      if (edit.track < 0 || edit.keep == track(edit.track).size()) continue;
-      const std::int32_t end = last(edit.track);
-      if (is_continuation(end) && std::ranges::none_of(edits, [&](const Edit<Filter>& other) {
-            return !other.tail.nodes.empty() && other.tail.nodes.back() == end;
-          }))
-        return false;
-    }
-    return true;
-  }
-
-  // Appends the present next detection, whose state and score stay valid without earlier changes.
-  void append_same(Edit<Filter>& edit, std::int32_t j) const {
-    edit.tail.nodes.push_back(j);
-    edit.tail.states.push_back(state_[j]);
-    edit.tail.scores.push_back(score_[j]);
   }
 
   // Applies the edits. A track without detections is removed and its number reused.
@@ -351,10 +266,7 @@ class Partition {
       --t.n_frozen;
       ++t.n_gone;
       for (const std::int32_t j : t.nodes) --place_[j];
-      if (t.nodes.empty())
-        remove_track(k);
-      else
-        begin_at(k, t.nodes.front());
+      t.nodes.empty() ? remove_track(k) : begin_at(k, t.nodes.front());
     }
     window_.drop();
   }
@@ -410,14 +322,8 @@ class Partition {
     tracks_[k].nodes.push_back(i);
     if (!is_frozen(i)) list(i);
   }
-  void begin_at(std::int32_t k, std::int32_t i) {
-    ends_[k].first = i;
-    ends_[k].first_frame = window_[i].frame;
-  }
-  void end_at(std::int32_t k, std::int32_t i) {
-    ends_[k].last = i;
-    ends_[k].last_frame = window_[i].frame;
-  }
+  void begin_at(std::int32_t k, std::int32_t i) { begins_[k] = {i, window_[i].frame}; }
+  void end_at(std::int32_t k, std::int32_t i) { ends_[k] = {i, window_[i].frame}; }
   void adopt(std::int32_t k, std::int32_t i, const State& state, double score) {
     put(k, i, state, score);
     filter_.adopt(state_[i]);
@@ -441,6 +347,7 @@ class Partition {
     std::int32_t k = static_cast<std::int32_t>(tracks_.size());
     if (unused_.empty()) {
       tracks_.emplace_back();
+      begins_.emplace_back();
       ends_.emplace_back();
       all_.reserve_up_to(k + 1);
       young_.reserve_up_to(k + 1);
@@ -470,11 +377,11 @@ class Partition {
   Continuations<Filter> later_;
   std::vector<Track> tracks_;
   // Beside the tracks, because moves compare the ends of all of them.
-  struct Ends {
-    std::int32_t first = -1, last = -1;
-    std::int64_t first_frame = 0, last_frame = 0;
+  struct End {
+    std::int32_t detection = -1;
+    std::int64_t frame = 0;
   };
-  std::vector<Ends> ends_;
+  std::vector<End> begins_, ends_;
   std::vector<std::int32_t> unused_;
   IndexSet free_, taken_, linked_, leapt_, all_, young_;
   std::vector<std::int32_t> track_of_, place_;
@@ -483,7 +390,7 @@ class Partition {
   std::int64_t clock_ = 0;
   std::vector<double> score_;
   mutable Filter filter_;
-  mutable Scratch<LinkGains> gains_;
+  mutable LinkGains gains_;
   mutable typename Filter::Expected expected_{};  // scratch
   std::vector<std::int32_t> origin_;  // of a part: numbers of its detections in the whole partition
 };

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "math/random.hpp"
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 
 namespace asterism {
@@ -56,10 +57,10 @@ class Growth {
       const auto place = keep_ + static_cast<std::int32_t>(edit.tail.nodes.size());
       if (n_same == place && own_ >= 0 && place < p_.track(own_).size() &&
           p_.track(own_).nodes[place] == j) {
-        p_.append_same(edit, j);
+        append_same(p_, edit, j);
         ++n_same;
       } else {
-        p_.append(edit, j);
+        append(p_, edit, j);
       }
     }
   }

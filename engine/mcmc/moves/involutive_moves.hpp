@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 #include "mcmc/moves/change.hpp"
 #include "mcmc/moves/track_edits.hpp"
@@ -35,7 +36,7 @@ class Toggles {
   bool propose(const Toggle& t, Change<Filter>& out) const {
     out.n_edits = 0;
     out.log_forward = out.log_reverse = 0;
-    return draw(t, out) && p_.keeps_continuations(out.all());
+    return draw(t, out) && keeps_continuations<Filter>(p_, out.all());
   }
   // Computes the gain of the proposed move. Returns false if it does not exceed out.min_gain.
   bool weigh(Change<Filter>& out) const { return edits_.weigh(out); }

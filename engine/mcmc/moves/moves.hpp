@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "math/random.hpp"
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 #include "mcmc/moves/change.hpp"
 #include "mcmc/moves/growth.hpp"
@@ -38,7 +39,7 @@ class Moves {
     out.n_edits = 0;
     out.log_forward = 0;
     out.with = -1;
-    return draw(random, out) && p_.keeps_continuations(out.all()) &&
+    return draw(random, out) && keeps_continuations<Filter>(p_, out.all()) &&
            out.log_forward > Growth<Filter>::kNever;
   }
   // Computes the gain of the proposed move. Returns false if it does not exceed out.min_gain.
@@ -56,7 +57,7 @@ class Moves {
         return -log(p_.free().size() + p_.track(first.track).size()) +
                growth_.log_probability(first.track, 1, true);
       case Move::split:
-        return -log(p_.tracks().size() + 1) - log(n_starts_after(node(first.track, first.keep - 1)) + 1);
+        return -log(p_.tracks().size() + 1) - log(n_starts_after(before(p_, first, 0)) + 1);
       case Move::merge:
         return -log(p_.tracks().size() - 1) - log(n_new - 1 - min_kept(first.track));
       case Move::extension:
@@ -93,9 +94,6 @@ class Moves {
     }();
     const auto at = static_cast<std::size_t>(n);
     return at < table.size() ? table[at] : std::log(static_cast<double>(n));
-  }
-  std::int32_t node(std::int32_t track, std::int32_t place) const {
-    return p_.track(track).nodes[place];
   }
   // Smallest number of detections that a track keeps when it is cut, or in an update.
   std::int32_t min_kept(std::int32_t track) const {
@@ -146,7 +144,7 @@ class Moves {
     const std::int32_t i = draw_one(p_.free(), random, q);
     if (i < 0) return false;
     Edit<Filter>& e = q.edit(-1, 0);
-    p_.append(e, i);
+    append(p_, e, i);
     q.log_forward += growth_.grow(e, true, random);
     return e.tail.nodes.size() > 1;
   }

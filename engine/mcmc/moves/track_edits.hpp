@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 #include "mcmc/moves/change.hpp"
 
@@ -22,19 +23,19 @@ class TrackEdits {
     double most = 0;  // an upper bound of the gain
     std::size_t n_last = 0;
     for (const Edit<Filter>& e : q.all()) {
-      most += p_.max_score_of(e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
+      most += max_score_of(p_, e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
       n_last = std::max(n_last, e.tail.nodes.size());
     }
     if (!(most > q.min_gain - kRounding)) return false;
     for (std::size_t n = 0; n < n_last; ++n)
       for (Edit<Filter>& e : q.all()) {
         if (n < e.tail.states.size() || n >= e.tail.nodes.size()) continue;
-        const double max_gain = p_.max_gain(e, n);
+        const double highest = max_gain(p_, e, n);
         const auto goes_on = [&](double gain) {
-          most += gain - max_gain;
+          most += gain - highest;
           return most > q.min_gain - kRounding;
         };
-        if (!p_.filter_next(e, goes_on)) return false;
+        if (!filter_next(p_, e, goes_on)) return false;
       }
     q.gain = 0;
     for (const Edit<Filter>& e : q.all())
