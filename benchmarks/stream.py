@@ -1,8 +1,8 @@
-"""Stitching in a stream: what a frame takes, how long an answer waits, and whether memory grows.
+"""A stream: what a frame takes, how long an answer waits, and whether memory grows.
 
 A person of 53 markers at 100 Hz in bursts (up to 5 markers occluded at a time for 5 to 60 frames,
-up to 3 ghosts, 0.3 mm of noise), frame by frame from Python: the method alone, and stitched.
-Memory is that of the process after a third of the stream and after all of it.
+up to 3 ghosts, 0.3 mm of noise), frame by frame from Python: each method alone, and two of them
+stitched. Memory is that of the process after a third of the stream and after all of it.
 
     python benchmarks/stream.py [--frames N] [--markdown FILE]
 """
@@ -18,12 +18,12 @@ import numpy as np
 
 import asterism as am
 from asterism.simulate import Burst, Ghosts
+from methods import METHODS as PLAIN
 from report import conditions, publish, table
 
 METHODS: dict[str, am.tracking.Method[Any]] = {
-    "gnn": am.GNN(),
+    **PLAIN,
     "gnn, stitched": am.tracking.Stitched(method=am.GNN()),
-    "smp, window=3": am.SMP(window=3),
     "smp, window=3, stitched": am.tracking.Stitched(method=am.SMP(window=3)),
 }
 

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <unordered_map>
@@ -42,7 +44,7 @@ class ParallelChains {
       std::optional<Partition<Filter>> part;
     };
     std::vector<Found> found(groups.size() * n_chains_);
-    each_chain(whole, found.size(), [&](ChainRunner<Filter>& runner, std::size_t task) {
+    each_chain(whole, groups, [&](ChainRunner<Filter>& runner, std::size_t task) {
       const std::size_t g = task / n_chains_;
       Found& own = found[task];
       own.gain = runner.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.list,
@@ -72,7 +74,7 @@ class ParallelChains {
                              std::uint64_t seed, ChainStats& stats) {
     std::vector<Halves> found(groups.size() * n_chains_);
     std::vector<ChainStats> counts(found.size());
-    each_chain(whole, found.size(), [&](ChainRunner<Filter>& runner, std::size_t task) {
+    each_chain(whole, groups, [&](ChainRunner<Filter>& runner, std::size_t task) {
       const std::size_t g = task / n_chains_;
       // Numbers of tracks are not reused while the tracks exist, so equal groups are the same.
       const auto at = unchanged.find(groups[g].first());
@@ -96,14 +98,20 @@ class ParallelChains {
     return Random(seed ^ static_cast<std::uint64_t>(task)).next();
   }
 
+  // Runs the chains of all groups. The longest begin first, so that no thread waits for one at the
+  // end.
   template <typename Run>
-  void each_chain(const Partition<Filter>& whole, std::size_t n, Run&& run) {
+  void each_chain(const Partition<Filter>& whole, std::span<const Group> groups, Run&& run) {
     auto& runners = s_.runners;
     while (static_cast<std::int32_t>(runners.size()) < n_threads_)
       runners.push_back(std::make_unique<ChainRunner<Filter>>(whole.empty(), chain_));
-    in_parallel(static_cast<std::int64_t>(n), n_threads_, [&](std::int32_t w, std::int64_t task) {
-      run(*runners[w], static_cast<std::size_t>(task));
-    });
+    std::vector<std::size_t> order(groups.size() * n_chains_);
+    std::iota(order.begin(), order.end(), 0);
+    if (n_threads_ > 1)
+      std::ranges::stable_sort(order, std::greater{},
+                               [&](std::size_t task) { return groups[task / n_chains_].n_open; });
+    in_parallel(static_cast<std::int64_t>(order.size()), n_threads_,
+                [&](std::int32_t w, std::int64_t k) { run(*runners[w], order[k]); });
   }
 
   // Computes split R̂ (Gelman et al. 2013) of the log posterior over the halves of all chains, and
