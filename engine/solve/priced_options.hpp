@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -97,16 +98,28 @@ class PricedOptions {
     }
     options_ = std::move(options);
     reduced_ = std::move(reduced);
-    for (std::vector<std::int32_t>& users : users_) users.clear();
-    users_.resize(price_.size());
+    list_users();
     tree_of_.resize(options_.size());
     max_log_weight_.assign(n_trees(), -std::numeric_limits<double>::infinity());
     for (std::int32_t i = 0; i < n_trees(); ++i)
       for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
         tree_of_[o] = i;
         max_log_weight_[i] = std::max(max_log_weight_[i], log_weight(o));
-        for (const std::int32_t r : uses_of(o)) users_[r].push_back(o);
       }
+  }
+  void list_users() {
+    first_user_.assign(price_.size() + 1, 0);
+    for (const std::int32_t r : uses_) ++first_user_[r + 1];
+    std::partial_sum(first_user_.begin(), first_user_.end(), first_user_.begin());
+    std::vector<std::int32_t> next(first_user_.begin(), first_user_.end() - 1);
+    users_.resize(uses_.size());
+    for (std::int32_t o = 0; o < n_options(); ++o)
+      for (const std::int32_t r : uses_of(o)) users_[next[r]++] = o;
+  }
+  // The options that use a resource.
+  std::span<const std::int32_t> users_of(std::int32_t resource) const {
+    return std::span(users_).subspan(first_user_[resource],
+                                     first_user_[resource + 1] - first_user_[resource]);
   }
 
   // Lowers the bound by descent on the prices: the price of a resource rises if several chosen
@@ -195,7 +208,7 @@ class PricedOptions {
       const double x = reduced_[chosen[a]], y = reduced_[chosen[b]];
       return x != y ? x > y : a < b;
     });
-    is_used_.assign(users_.size(), 0);
+    is_used_.assign(price_.size(), 0);
     for (const std::int32_t i : order) {
       if (!fits(out[i])) out[i] = best_fitting(i, [&](std::int32_t o) { return reduced_[o]; });
       mark(out[i], 1);
@@ -243,7 +256,7 @@ class PricedOptions {
   std::vector<std::int32_t> uses_;
   std::vector<double> reduced_, price_;  // reduced weight of each option; price of each resource
   std::vector<double> max_log_weight_;   // of the options of each tree
-  std::vector<std::vector<std::int32_t>> users_;
+  std::vector<std::int32_t> users_, first_user_;  // of resource r: first_user_[r] to [r + 1]
   std::vector<std::int32_t> first_, tree_of_;
   Packing known_;  // the best packing found so far
   std::vector<char> is_used_;

@@ -250,7 +250,7 @@ class SetPacking : PricedOptions {
 
   // The smallest resource that two of the chosen options use, or -1.
   std::int32_t conflict(const Node& node) {
-    is_used_.assign(users_.size(), 0);
+    is_used_.assign(price_.size(), 0);
     std::int32_t first = -1;
     for (const std::int32_t o : node.chosen)
       for (const std::int32_t r : uses_of(o)) {
@@ -270,7 +270,7 @@ class SetPacking : PricedOptions {
     for (const std::int32_t owner : claimants) {
       Node child = node;
       bool is_possible = true;
-      for (const std::int32_t o : users_[resource])
+      for (const std::int32_t o : users_of(resource))
         if (tree_of_[o] != owner) is_possible = is_possible && ban(child, o);
       for (std::int32_t o = first_[owner]; is_possible && o < first_[owner + 1]; ++o)
         if (!uses(o, resource)) is_possible = ban(child, o);
@@ -278,7 +278,7 @@ class SetPacking : PricedOptions {
     }
     Node child = node;
     bool is_possible = true;
-    for (const std::int32_t o : users_[resource])
+    for (const std::int32_t o : users_of(resource))
       if (is_claimant(tree_of_[o])) is_possible = is_possible && ban(child, o);
     if (is_possible) push(std::move(child));
   }

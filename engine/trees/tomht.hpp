@@ -118,6 +118,7 @@ class HypothesisForest {
         if (!is_seed && !track.is_confirmed() && track.best_score - b.score > opt_.delete_drop)
           continue;
         PackingOption option{grower.log_ratio(b), {}};
+        option.uses.reserve(open_.frames.size());
         open_.each_detection(i, b, [&](std::int32_t r) { option.uses.push_back(r); });
         has_free = has_free || option.uses.empty();
         const std::int32_t column = open_.taken(i, b, *open_.frames.front());
