@@ -2,7 +2,8 @@
 
 A person of 53 markers at 100 Hz in bursts (up to 5 markers occluded at a time for 5 to 60 frames,
 up to 3 ghosts, 0.3 mm of noise), frame by frame from Python: each method alone, and two of them
-stitched, in processor time. Memory is that of the process after a third of the stream and after all of it.
+stitched, in processor time. Memory is that of the process after a third of the stream and after all
+of it.
 
     python benchmarks/stream.py [--frames N] [--markdown FILE]
 """
@@ -60,8 +61,8 @@ def main() -> None:
         ms = [f"{np.percentile(taken, q):.3f}" for q in (50, 99, 99.9, 100)]
         rows.append([name, f"{np.mean(taken):.3f}", *ms, f"{held[-1] - held[-2]:+.1f}"])
         print(*rows[-1], flush=True)
-    head = ["processor ms a frame", "mean", "median", "99 %", "99.9 %", "most", "MB more at the end"]
-    lines = [*table(head, rows), "", f"{options.frames} frames. {conditions()}."]
+    head = ["ms a frame", "mean", "median", "99 %", "99.9 %", "most", "MB more at the end"]
+    lines = [*table(head, rows), "", f"{options.frames} frames, processor time. {conditions()}."]
     publish(lines, options.markdown)
 
 
