@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
+
+#include "filter/axis_kernels.hpp"
 
 namespace asterism {
 
@@ -41,84 +44,108 @@ namespace {
 //
 // The axes share one covariance, so the spread of the means is averaged over the axes.
 
+template <int n>
+using Deviation = std::array<Row<n>, kMaxAxes>;
+
 // Mean over the axes of e eᵀ.
 template <int n>
-AxisMatrix mean_square(const std::array<AxisVector, kMaxAxes>& e, int D) {
-  AxisMatrix E{};
-  for (int i = 0; i < n; ++i)
-    for (int j = i; j < n; ++j) {
-      double sum = 0;
-      for (int d = 0; d < kMaxAxes; ++d) sum += e[d][i] * e[d][j];
-      E[i * n + j] = E[j * n + i] = sum / D;
-    }
+inline std::array<Row<n>, n> mean_square(const Deviation<n>& e, int D) {
+  std::array<Row<n>, n> E;
+  for (int i = 0; i < n; ++i) {
+    E[i] = e[0][i] * e[0];
+    for (int d = 1; d < kMaxAxes; ++d) E[i] = E[i] + e[d][i] * e[d];
+    E[i] = E[i] / D;
+  }
   return E;
 }
 
+template <int n, int M>
 struct ModeSpread {
-  std::array<std::array<AxisVector, kMaxAxes>, kMaxModes> e{};
-  std::array<AxisMatrix, kMaxModes> E{};
+  Deviation<n> first;  // mean of mode 0
+  std::array<Deviation<n>, M> e;
+  std::array<std::array<Row<n>, n>, M> PE;  // P_a + E_a; of mode 0, P_0
 
-  ModeSpread(const MotionModel& m, const MotionState& s) {
-    with_states(m.axis.n, [&](auto n_states) {
-      constexpr int n = n_states;
-      for (int a = 1; a < m.M; ++a) {
-        for (int d = 0; d < kMaxAxes; ++d)
-          for (int i = 0; i < n; ++i) e[a][d][i] = s.mode[a].x[d][i] - s.mode[0].x[d][i];
-        E[a] = mean_square<n>(e[a], m.axis.D);
-      }
-    });
+  ModeSpread(const MotionState& s, int D) {
+    const AxisRows<n> own = AxisRows<n>::of(s.mode[0]);
+    first = own.x;
+    PE[0] = own.P;
+    for (int a = 1; a < M; ++a) {
+      const AxisRows<n> other = AxisRows<n>::of(s.mode[a]);
+      for (int d = 0; d < kMaxAxes; ++d) e[a][d] = other.x[d] - first[d];
+      PE[a] = mean_square<n>(e[a], D);
+      for (int i = 0; i < n; ++i) PE[a][i] = other.P[i] + PE[a][i];
+    }
+  }
+
+  // Mean and covariance of a mixture of the modes, with weights that sum to 1.
+  AxisRows<n> mix(const std::array<double, kMaxModes>& weights, int D) const {
+    AxisRows<n> out;
+    Deviation<n> shift;
+    for (int i = 0; i < n; ++i) out.P[i] = weights[0] * PE[0][i];
+    for (int a = 1; a < M; ++a) {
+      for (int d = 0; d < kMaxAxes; ++d)
+        shift[d] = a == 1 ? weights[a] * e[a][d] : shift[d] + weights[a] * e[a][d];
+      for (int i = 0; i < n; ++i) out.P[i] = out.P[i] + weights[a] * PE[a][i];
+    }
+    for (int d = 0; d < kMaxAxes; ++d) out.x[d] = first[d] + shift[d];
+    const std::array<Row<n>, n> moved = mean_square<n>(shift, D);
+    for (int i = 0; i < n; ++i) out.P[i] = out.P[i] - moved[i];
+    return out;
   }
 };
 
-// Mean and covariance of a mixture of the modes of a state, with weights that sum to 1.
-AxisState mix(const MotionModel& m, const MotionState& s, const ModeSpread& spread,
-              const std::array<double, kMaxModes>& weights) {
-  return with_states(m.axis.n, [&](auto n_states) {
-    constexpr int n = n_states;
-    AxisState mixed = s.mode[0];
-    std::array<AxisVector, kMaxAxes> shift{};
-    for (int k = 0; k < n * n; ++k) mixed.P[k] *= weights[0];
-    for (int a = 1; a < m.M; ++a) {
-      for (int d = 0; d < kMaxAxes; ++d)
-        for (int i = 0; i < n; ++i) shift[d][i] += weights[a] * spread.e[a][d][i];
-      for (int k = 0; k < n * n; ++k)
-        mixed.P[k] += weights[a] * (s.mode[a].P[k] + spread.E[a][k]);
-    }
-    for (int d = 0; d < kMaxAxes; ++d)
-      for (int i = 0; i < n; ++i) mixed.x[d][i] += shift[d][i];
-    const AxisMatrix moved = mean_square<n>(shift, m.axis.D);
-    for (int k = 0; k < n * n; ++k) mixed.P[k] -= moved[k];
-    return mixed;
+template <int n, int M>
+inline void predict_modes(const MotionModel& m, const MotionStep& step, MotionState& s) {
+  const ModeSpread<n, M> spread(s, m.axis.D);
+  const std::array<double, kMaxModes> before = s.w;
+  for (int b = 0; b < M; ++b) {
+    std::array<double, kMaxModes> share{};
+    double total = 0;
+    for (int a = 0; a < M; ++a) total += share[a] = before[a] * m.T[a * M + b];
+    for (int a = 0; a < M; ++a) share[a] /= total;
+    s.w[b] = total;
+    predict_axis<n>(step.mode[b], spread.mix(share, m.axis.D), s.mode[b]);
+  }
+}
+
+// Calls f with the number of states and of modes as compile-time constants.
+template <typename F>
+inline void with_modes(const MotionModel& m, F&& f) {
+  with_states(m.axis.n, [&](auto n) {
+    if (m.M == 1) return f(n, std::integral_constant<int, 1>{});
+    if (m.M == 2) return f(n, std::integral_constant<int, 2>{});
+    f(n, std::integral_constant<int, 3>{});
   });
 }
 
 }  // namespace
 
 AxisState collapse(const MotionModel& m, const MotionState& s) {
-  return m.M == 1 ? s.mode[0] : mix(m, s, ModeSpread(m, s), s.w);
+  AxisState out = s.mode[0];
+  with_modes(m, [&](auto n, auto M) {
+    if constexpr (M > 1) ModeSpread<n, M>(s, m.axis.D).mix(s.w, m.axis.D).write(out);
+  });
+  return out;
 }
 
 void predict(const MotionModel& m, const MotionStep& step, MotionState& s) {
-  if (m.M > 1) {
-    const MotionState before = s;
-    const ModeSpread spread(m, before);
-    for (int b = 0; b < m.M; ++b) {
-      std::array<double, kMaxModes> share{};
-      double total = 0;
-      for (int a = 0; a < m.M; ++a) total += share[a] = before.w[a] * m.T[a * m.M + b];
-      for (int a = 0; a < m.M; ++a) share[a] /= total;
-      s.w[b] = total;
-      s.mode[b] = mix(m, before, spread, share);
-    }
-  }
-  for (int b = 0; b < m.M; ++b) predict(m.axis, step.mode[b], s.mode[b]);
+  with_modes(m, [&](auto n, auto M) {
+    if constexpr (M == 1)
+      predict_axis<n>(step.mode[0], AxisRows<n>::of(s.mode[0]), s.mode[0]);
+    else
+      predict_modes<n, M>(m, step, s);
+  });
 }
 
 Prediction::Prediction(const MotionModel& m, const MotionState& s) : M(m.M), D(m.axis.D) {
+  with_states(m.axis.n, [&](auto n) {
+    for (int b = 0; b < M; ++b) {
+      y[b] = observed_axis<n>(m.axis, s.mode[b]);
+      S[b] = innovation_variance_axis<n>(m.axis, s.mode[b]);
+    }
+  });
   for (int b = 0; b < M; ++b) {
     if (M > 1) w[b] = s.w[b];
-    y[b] = observed(m.axis, s.mode[b]);
-    S[b] = innovation_variance(m.axis, s.mode[b]);
     log_peak[b] = log_density(D, S[b], 0) + (M > 1 ? std::log(w[b]) : 0.0);
     if (std::isfinite(log_peak[b])) continue;
     // The filter has over- or underflowed. The density of this mode is set to zero everywhere.
@@ -140,9 +167,15 @@ double Prediction::log_likelihood(const Point& point, std::array<double, kMaxMod
     best = std::max(best, each[b]);
   }
   if (M == 1 || std::isinf(best)) return best;
+  // Terms below half of the last digit of the sum, which is at least 1, do not change it. The best
+  // mode contributes exactly 1.
+  constexpr double kNegligible = -37.5;
   double sum = 0;
-  for (int b = 0; b < M; ++b) sum += std::exp(each[b] - best);
-  return best + std::log(sum);
+  for (int b = 0; b < M; ++b) {
+    const double below = each[b] - best;
+    if (below > kNegligible) sum += below == 0 ? 1.0 : std::exp(below);
+  }
+  return sum == 1 ? best : best + std::log(sum);
 }
 
 double Prediction::radius(double gate, double min_log_likelihood, double max_r) const {
@@ -162,12 +195,20 @@ double Prediction::radius(double gate, double min_log_likelihood, double max_r) 
 double update(const MotionModel& m, const Prediction& p, const Point& y, MotionState& s) {
   std::array<double, kMaxModes> each{};
   const double total = p.log_likelihood(y, each);
-  for (int b = 0; b < m.M; ++b) {
-    update(m.axis, y, s.mode[b]);
-    const double w = std::exp(each[b] - total);
-    if (m.M > 1) s.w[b] = w > 1e-300 ? w : 1e-300;
-  }
+  update(m, each, total, y, s);
   return total;
+}
+
+void update(const MotionModel& m, const std::array<double, kMaxModes>& each,
+            double log_likelihood, const Point& y, MotionState& s) {
+  with_states(m.axis.n, [&](auto n) {
+    for (int b = 0; b < m.M; ++b) update_axis_with<n>(m.axis, y, s.mode[b]);
+  });
+  if (m.M == 1) return;
+  for (int b = 0; b < m.M; ++b) {
+    const double w = std::exp(each[b] - log_likelihood);
+    s.w[b] = w > 1e-300 ? w : 1e-300;
+  }
 }
 
 }  // namespace asterism

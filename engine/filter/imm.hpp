@@ -72,5 +72,8 @@ struct Prediction {
 // Updates the state with a detection. `p` must be the prediction from this state. Returns log p(y |
 // past).
 double update(const MotionModel& m, const Prediction& p, const Point& y, MotionState& s);
+// The same with the known results of p.log_likelihood(y, each).
+void update(const MotionModel& m, const std::array<double, kMaxModes>& each,
+            double log_likelihood, const Point& y, MotionState& s);
 
 }  // namespace asterism

@@ -3,56 +3,20 @@
 
 #include <algorithm>
 
+#include "filter/axis_kernels.hpp"
+
 namespace asterism {
 
 void predict(const AxisModel& m, const AxisStep& step, AxisState& s) {
-  predict_mean(m, step, s, s);
-  with_states(m.n, [&](auto n_states) {
-    constexpr int n = n_states;
-    AxisMatrix FP{}, P = step.Q;
-    for (int i = 0; i < n; ++i)
-      for (int k = 0; k < n; ++k) {
-        const double f = step.F[i * n + k];
-        for (int j = 0; j < n; ++j) FP[i * n + j] += f * s.P[k * n + j];
-      }
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j)
-        for (int k = 0; k < n; ++k) P[i * n + j] += FP[i * n + k] * step.F[j * n + k];
-    s.P = P;
-  });
+  with_states(m.n, [&](auto n) { predict_axis<n>(step, AxisRows<n>::of(s), s); });
 }
 
 KalmanGain::KalmanGain(const AxisModel& m, const AxisState& s) {
-  with_states(m.n, [&](auto n_states) {
-    constexpr int n = n_states;
-    S = innovation_variance(m, s);
-    assert(S > 0);
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j < n; ++j) K[i] += s.P[i * n + j] * m.H[j];
-      K[i] /= S;
-    }
-    AxisMatrix A{}, AP{};
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) A[i * n + j] = (i == j ? 1.0 : 0.0) - K[i] * m.H[j];
-    for (int i = 0; i < n; ++i)
-      for (int k = 0; k < n; ++k)
-        for (int j = 0; j < n; ++j) AP[i * n + j] += A[i * n + k] * s.P[k * n + j];
-    for (int i = 0; i < n; ++i)
-      for (int j = i; j < n; ++j) {
-        double sum = K[i] * m.r * K[j];
-        for (int k = 0; k < n; ++k) sum += AP[i * n + k] * A[j * n + k];
-        P[i * n + j] = P[j * n + i] = sum;
-      }
-  });
+  with_states(m.n, [&](auto n) { gain_axis<n>(m, s, *this); });
 }
 
 void update(const AxisModel& m, const Point& y, AxisState& s) {
-  const KalmanGain gain(m, s);
-  const Point predicted = observed(m, s);
-  const double share = gain.share(y);
-  for (int d = 0; d < m.D; ++d)
-    for (int i = 0; i < m.n; ++i) s.x[d][i] += share * gain.K[i] * (y[d] - predicted[d]);
-  s.P = gain.covariance(m.n, share);
+  with_states(m.n, [&](auto n) { update_axis_with<n>(m, y, s); });
 }
 
 AxisState smooth_back(const AxisModel& m, const AxisMatrix& F, const AxisState& filtered,

@@ -108,6 +108,8 @@ class JointTracker {
 
   // Log weight relative to a miss below which a pairing is ignored.
   static constexpr double kNegligible = -20.7;
+  // Marginal up to which the links of a large group are cut.
+  static constexpr double kNoMarginal = 1e-6;
   static constexpr double kMaxOdds = 700;
 
   static double probability(double log_odds) { return 1 / (1 + std::exp(-log_odds)); }
@@ -183,7 +185,7 @@ class JointTracker {
     s_.best.resize(live_.size());
     s_.marginals.resize(s_.eligible.size());
     JointEvents events(s_.eligible, s_.gains, s_.log_miss,
-                       static_cast<std::int32_t>(points.size()), opt_.max_states);
+                       static_cast<std::int32_t>(points.size()), opt_.max_states, kNoMarginal);
     const JointSummary summary = events.solve(s_.marginals, s_.all_missed, s_.best);
     stats.n_beams += summary.n_beams;
     stats.n_states = std::max(stats.n_states, summary.n_states);

@@ -46,7 +46,7 @@ class FrameWays {
       Ways& ways = ways_[i];
       ways.first.push_back(0);
       for (Branch& parent : tree.more.branches) {
-        grower.split(*open.frames.back(), tree, std::move(parent), ways.branches, stats);
+        grower.split(*open.frames.back(), tree, parent, ways.branches, stats);
         ways.first.push_back(static_cast<std::int32_t>(ways.branches.size()));
       }
       for (const Branch& b : ways.branches)

@@ -118,7 +118,7 @@ class Chain {
         if (is_new) edits.emplace_back();
         Edit<Filter>& edit = edits[at->second];
         require(is_new || window.is_linkable(edit.tail.nodes.back(), i), "labels: tracks of the model");
-        p.append(edit, i);
+        append(p, edit, i);
       }
     for (const Edit<Filter>& edit : edits)
       require(edit.tail.nodes.size() > 1, "labels: at least two detections of each track");

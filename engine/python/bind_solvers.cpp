@@ -18,15 +18,31 @@ using namespace asterism;
 
 namespace {
 
-// Returns (marginals with the miss last, log of the total weight, best event, bound, largest number
-// of states).
-nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_miss,
-                          std::int64_t max_states) {
+// The possible pairings of a matrix of log weights, and their weights.
+std::pair<std::vector<Candidate>, std::vector<double>> pairings_of(const In<double>& log_weights,
+                                                                   const In<double>& log_miss) {
   require(log_weights.ndim() == 2 && log_miss.ndim() == 1 &&
               log_weights.shape(0) == log_miss.shape(0),
           "log_weights: shape (n, m), log_miss: shape (n,)");
   constexpr std::size_t max_size = std::size_t{1} << 30;
   require(log_weights.shape(0) < max_size && log_weights.shape(1) < max_size, "sizes below 2^30");
+  std::pair<std::vector<Candidate>, std::vector<double>> out;
+  for (std::size_t i = 0; i < log_weights.shape(0); ++i)
+    for (std::size_t j = 0; j < log_weights.shape(1); ++j) {
+      const double w = log_weights.data()[i * log_weights.shape(1) + j];
+      if (!(w > -std::numeric_limits<double>::infinity())) continue;
+      out.first.push_back({static_cast<std::int32_t>(i), static_cast<std::int32_t>(j),
+                           w - log_miss.data()[i], 0});
+      out.second.push_back(w);
+    }
+  return out;
+}
+
+// Returns (marginals with the miss last, log of the total weight, best event, bound, largest number
+// of states). In groups that need more states, links with a marginal of at most `negligible` are cut.
+nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_miss,
+                          std::int64_t max_states, double negligible) {
+  const auto [pairings, weights] = pairings_of(log_weights, log_miss);
   require(max_states >= 1 && max_states <= std::int64_t{1} << 30, "max_states: 1 to 2^30");
   const std::size_t n = log_weights.shape(0), m = log_weights.shape(1);
   std::vector<double> marginals(n * (m + 1));
@@ -34,19 +50,10 @@ nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_m
   JointSummary summary;
   {
     nb::gil_scoped_release release;
-    std::vector<Candidate> pairings;
-    std::vector<double> weights;
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t j = 0; j < m; ++j) {
-        const double w = log_weights.data()[i * m + j];
-        if (!(w > -std::numeric_limits<double>::infinity())) continue;
-        pairings.push_back({static_cast<std::int32_t>(i), static_cast<std::int32_t>(j),
-                            w - log_miss.data()[i], 0});
-        weights.push_back(w);
-      }
     std::vector<double> paired(pairings.size()), missed(n);
     summary =
-        JointEvents(pairings, weights, flat(log_miss), static_cast<std::int32_t>(m), max_states)
+        JointEvents(pairings, weights, flat(log_miss), static_cast<std::int32_t>(m), max_states,
+                    negligible)
             .solve(paired, missed, best);
     for (std::size_t e = 0; e < pairings.size(); ++e)
       marginals[pairings[e].row * (m + 1) + pairings[e].column] = paired[e];
@@ -54,6 +61,18 @@ nb::tuple joint_marginals(const In<double>& log_weights, const In<double>& log_m
   }
   return nb::make_tuple(array_of<double>(marginals, {n, m + 1}), summary.log_total,
                         array_of<std::int32_t>(best), summary.bound, summary.n_states);
+}
+
+// Returns the upper bounds of the marginals by which links are cut, 0 for no link.
+Out<double> marginal_bounds(const In<double>& log_weights, const In<double>& log_miss) {
+  const auto [pairings, weights] = pairings_of(log_weights, log_miss);
+  const std::size_t n = log_weights.shape(0), m = log_weights.shape(1);
+  JointEvents events(pairings, weights, flat(log_miss), static_cast<std::int32_t>(m), 1);
+  const std::vector<double> found = events.marginal_bounds();
+  std::vector<double> bounds(n * m);
+  for (std::size_t e = 0; e < pairings.size(); ++e)
+    bounds[pairings[e].row * m + pairings[e].column] = found[e];
+  return array_of<double>(bounds, {n, m});
 }
 
 std::vector<Point> plain_points(const In<double>& array, const char* what) {
@@ -207,7 +226,10 @@ void bind_solvers(nb::module_& module) {
              "drop"_a, "max_nodes"_a);
   module.def("packing_losses", &packing_losses, "first_option"_a, "log_weights"_a,
              "first_use"_a, "uses"_a);
-  module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a);
+  module.def("joint_marginals", &joint_marginals, "log_weights"_a, "log_miss"_a, "max_states"_a,
+             "negligible"_a = 0.0);
+
+  module.def("marginal_bounds", &marginal_bounds, "log_weights"_a, "log_miss"_a);
 
   nb::exception<FrontierLimit>(module, "FrontierLimit");
 }

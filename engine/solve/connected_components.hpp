@@ -59,6 +59,23 @@ inline Groups connected_groups(std::span<const Candidate> candidates, std::int32
   return groups;
 }
 
+// The connected groups of what remains of `groups` without some of its candidates, marked by their
+// places in `groups.order`.
+inline Groups groups_without(const Groups& groups, std::span<const char> is_cut, std::int32_t n_rows,
+                             std::int32_t n_columns) {
+  std::vector<std::int32_t> at(groups.order.size()), kept;  // by source
+  for (std::size_t k = 0; k < at.size(); ++k) at[groups.sources[k]] = static_cast<std::int32_t>(k);
+  std::vector<Candidate> candidates;
+  for (std::size_t e = 0; e < at.size(); ++e)
+    if (!is_cut[at[e]]) {
+      kept.push_back(static_cast<std::int32_t>(e));
+      candidates.push_back(groups.order[at[e]]);
+    }
+  Groups out = connected_groups(candidates, n_rows, n_columns);
+  for (std::int32_t& source : out.sources) source = kept[source];
+  return out;
+}
+
 // Groups items that share a resource, directly or through other items. Each group is increasing,
 // and groups are ordered by their first item. `each_use(item, visit)` calls visit(resource) for
 // each resource of an item.

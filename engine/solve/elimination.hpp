@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <vector>
 
@@ -45,6 +46,13 @@ class EliminationOrder {
  public:
   explicit EliminationOrder(const MatchingGraph& graph) : graph_(graph) {}
 
+  // Whether the frontier of one of these orders always has at most so many vertices. The trials are
+  // short where it grows further.
+  bool may_fit(std::int32_t max_frontier) {
+    for (const std::int32_t start : starts())
+      if (greedy(start, max_frontier).peak <= max_frontier) return true;
+    return false;
+  }
   // The cheapest of several greedy orders, each from another promising first vertex.
   Elimination best() {
     Elimination best;
@@ -90,8 +98,9 @@ class EliminationOrder {
   }
 
   // Always eliminates the vertex that leaves the smallest frontier. Ties go to the vertex that was
-  // met first.
-  Elimination greedy(std::int32_t start) {
+  // met first. Stops where the frontier has more than `max_frontier` vertices.
+  Elimination greedy(std::int32_t start,
+                     std::int32_t max_frontier = std::numeric_limits<std::int32_t>::max()) {
     const std::int32_t n = graph_.size();
     is_gone_.assign(n, 0);
     is_active_.assign(n, 0);
@@ -116,6 +125,7 @@ class EliminationOrder {
       for (const std::int32_t u : step.entering) enter(u);
       frontier += static_cast<std::int32_t>(step.entering.size()) - step.is_active;
       e.peak = std::max(e.peak, frontier);
+      if (frontier > max_frontier) return e;
       e.work += std::ldexp(static_cast<double>(step.links.size() + 1), std::min(frontier, 900));
       e.steps.push_back(std::move(step));
       if (static_cast<std::int32_t>(e.steps.size()) == n) return e;

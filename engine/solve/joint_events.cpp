@@ -3,6 +3,7 @@
 #include "solve/joint_events.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -47,8 +48,9 @@ MatchingMarginals only_best(const MatchingGraph& graph, std::int32_t n,
 
 // The smallest prices p ≥ 0 at which every track prefers its detection in the best event, and the
 // remaining gain of each track. Prices rise from 0 and converge because the event is optimal.
-void price(std::span<const Candidate> group, const GroupNumbering& by,
-           std::span<const std::int32_t> partner, std::span<double> left, std::span<double> p) {
+void find_prices(std::span<const Candidate> group, const GroupNumbering& by,
+                 std::span<const std::int32_t> partner, std::span<double> left,
+                 std::span<double> p) {
   const std::int32_t n = by.n_rows();
   std::vector<std::size_t> own(n, 0);
   for (std::size_t e = 0; e < group.size(); ++e)
@@ -72,6 +74,19 @@ void price(std::span<const Candidate> group, const GroupNumbering& by,
   }
 }
 
+// The links of a group, without weights.
+MatchingGraph graph_of(std::span<const Candidate> group, const GroupNumbering& by) {
+  const std::int32_t n = by.n_rows();
+  MatchingGraph graph;
+  graph.links.resize(n + by.n_columns());
+  for (std::size_t e = 0; e < group.size(); ++e) {
+    const std::int32_t i = by.row_of[e], j = n + by.column_of[e];
+    graph.links[i].push_back({j, static_cast<std::int32_t>(e)});
+    graph.links[j].push_back({i, static_cast<std::int32_t>(e)});
+  }
+  return graph;
+}
+
 }  // namespace
 
 JointSummary JointEvents::solve(std::span<double> marginals, std::span<double> missed,
@@ -79,15 +94,17 @@ JointSummary JointEvents::solve(std::span<double> marginals, std::span<double> m
   marginals_ = marginals;
   missed_ = missed;
   best_ = best;
+  std::fill(marginals.begin(), marginals.end(), 0.0);
   std::fill(missed.begin(), missed.end(), 1.0);
   std::fill(best.begin(), best.end(), -1);
+  for (std::size_t g = 0; g < groups_.size(); ++g) assignment_.solve(groups_[g], best_);
+  double log_exact = 0;  // log of the fraction of the events that was summed
+  if (negligible_ > 0) log_exact += std::log1p(-cut());
   std::vector<char> has_any(n_, 0);
   for (const Candidate& c : groups_.order) has_any[c.row] = 1;
   for (std::int32_t i = 0; i < n_; ++i)
     if (!has_any[i]) summary_.log_total += log_miss_[i];
-  double log_exact = 0;  // log of the fraction of the events that was summed
   for (std::size_t g = 0; g < groups_.size(); ++g) {
-    assignment_.solve(groups_[g], best_);
     const double bound = is_single(g) ? solve_single(g) : solve_group(g);
     summary_.n_beams += bound > 0;
     log_exact += std::log1p(-bound);
@@ -110,22 +127,70 @@ double JointEvents::solve_single(std::size_t g) {
   return 0;
 }
 
-double JointEvents::solve_group(std::size_t g) {
+JointEvents::Priced JointEvents::price(std::size_t g) const {
   const std::span<const Candidate> group = groups_[g];
-  GroupNumbering by;
-  by.number(group);
-  const std::int32_t n = by.n_rows(), m = by.n_columns();
-  std::vector<std::int32_t> partner(n + m, -1);
+  Priced out;
+  out.by.number(group);
+  const std::int32_t n = out.by.n_rows(), m = out.by.n_columns();
+  out.partner.assign(n + m, -1);
   for (std::size_t e = 0; e < group.size(); ++e)
     if (best_[group[e].row] == group[e].column) {
-      partner[by.row_of[e]] = n + by.column_of[e];
-      partner[n + by.column_of[e]] = by.row_of[e];
+      out.partner[out.by.row_of[e]] = n + out.by.column_of[e];
+      out.partner[n + out.by.column_of[e]] = out.by.row_of[e];
     }
-  std::vector<double> u(n), p(m);
-  price(group, by, partner, u, p);
+  out.left.resize(n);
+  out.price.resize(m);
+  find_prices(group, out.by, out.partner, out.left, out.price);
+  return out;
+}
 
-  MatchingGraph graph;
-  graph.links.resize(n + m);
+std::vector<double> JointEvents::marginal_bounds() {
+  std::vector<std::int32_t> best(n_, -1);
+  std::vector<double> out(groups_.order.size());
+  NegligibleLinks negligible;
+  best_ = best;
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    assignment_.solve(groups_[g], best_);
+    const Priced priced = price(g);
+    const std::span<const double> bounds =
+        negligible.bounds(groups_[g], priced.by, priced.partner, priced.left, priced.price);
+    for (std::size_t e = 0; e < bounds.size(); ++e)
+      out[groups_.sources[groups_.starts[g] + e]] = bounds[e];
+  }
+  return out;
+}
+
+double JointEvents::cut() {
+  NegligibleLinks negligible;
+  std::vector<char> is_cut(groups_.order.size(), 0);
+  double omitted = 0;
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const std::span<const Candidate> group = groups_[g];
+    if (is_single(g)) continue;
+    const Priced priced = price(g);
+    const MatchingGraph graph = graph_of(group, priced.by);
+    EliminationOrder order(graph);
+    if (order.may_fit(max_frontier()) && order.best().peak <= max_frontier()) continue;
+    const std::span<const double> bounds =
+        negligible.bounds(group, priced.by, priced.partner, priced.left, priced.price);
+    const std::int64_t n_before = summary_.n_cut;
+    for (std::size_t e = 0; e < group.size(); ++e) {
+      if (!(bounds[e] <= negligible_)) continue;
+      is_cut[groups_.starts[g] + e] = 1;
+      omitted += bounds[e];
+      ++summary_.n_cut;
+    }
+    summary_.n_beams += summary_.n_cut > n_before;
+  }
+  if (summary_.n_cut > 0) groups_ = groups_without(groups_, is_cut, n_, n_columns_);
+  return std::min(omitted, 1.0);
+}
+
+double JointEvents::solve_group(std::size_t g) {
+  const std::span<const Candidate> group = groups_[g];
+  auto [by, partner, u, p] = price(g);
+  const std::int32_t n = by.n_rows(), m = by.n_columns();
+  MatchingGraph graph = graph_of(group, by);
   graph.alone.resize(n + m);
   graph.weight.resize(group.size());
   double log_scale = 0;
@@ -141,10 +206,7 @@ double JointEvents::solve_group(std::size_t g) {
   }
   for (std::size_t e = 0; e < group.size(); ++e) {
     const std::int32_t i = by.row_of[e], j = by.column_of[e];
-    const auto edge = static_cast<std::int32_t>(e);
     graph.weight[e] = std::exp(log_weight(g, e) - (u[i] + p[j]));
-    graph.links[i].push_back({n + j, edge});
-    graph.links[n + j].push_back({i, edge});
   }
 
   MatchingMarginals result = sum(graph, n, partner);
@@ -156,10 +218,15 @@ double JointEvents::solve_group(std::size_t g) {
   return result.bound;
 }
 
+// The largest frontier whose states are few enough for the exact sum.
+std::int32_t JointEvents::max_frontier() const {
+  return static_cast<std::int32_t>(std::bit_width(static_cast<std::uint64_t>(max_states_))) - 1;
+}
+
 MatchingMarginals JointEvents::sum(const MatchingGraph& graph, std::int32_t n,
                                    std::span<const std::int32_t> partner) const {
   const Elimination elimination = EliminationOrder(graph).best();
-  if (elimination.peak < 62 && std::int64_t{1} << elimination.peak <= max_states_)
+  if (elimination.peak <= max_frontier())
     return JointExact(graph, elimination).solve();
   if (elimination.peak <= 64)
     return JointBeam<1>(graph, elimination, n, partner, max_states_).solve();

@@ -7,14 +7,19 @@
 //
 // Divided by the prices, every factor is at most 1 and the best event weighs exactly 1. Plain
 // doubles therefore suffice: a term that underflows is negligible against the total.
+//
+// On request, a group that needs too many states is first divided: links whose marginal is provably
+// negligible are cut (solve/negligible_links.hpp), and count in the bound.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <stdexcept>
+#include <vector>
 
 #include "solve/assignment.hpp"
 #include "solve/connected_components.hpp"
+#include "solve/negligible_links.hpp"
 
 namespace asterism {
 
@@ -27,30 +32,49 @@ struct FrontierLimit : std::runtime_error {
 
 struct JointSummary {
   double log_total = 0, bound = 0;
-  // Largest number of states of a layer; groups that were not solved exactly.
-  std::int64_t n_states = 1, n_beams = 0;
+  // Largest number of states of a layer; groups that were not solved exactly; links cut.
+  std::int64_t n_states = 1, n_beams = 0, n_cut = 0;
 };
 
 class JointEvents {
  public:
   // Pairings ordered by row, each with its gain. `log_weights` are the log w of the pairings,
-  // passed separately because a gain loses digits if the logs are large.
+  // passed separately because a gain loses digits if the logs are large. In groups that need more
+  // than `max_states`, links are cut if their marginal is at most `negligible`.
   JointEvents(std::span<const Candidate> pairings, std::span<const double> log_weights,
-              std::span<const double> log_miss, std::int32_t n_columns, std::int64_t max_states)
+              std::span<const double> log_miss, std::int32_t n_columns, std::int64_t max_states,
+              double negligible = 0)
       : log_weights_(log_weights),
         log_miss_(log_miss),
         max_states_(max_states),
+        negligible_(negligible),
         n_(static_cast<std::int32_t>(log_miss.size())),
+        n_columns_(n_columns),
         groups_(connected_groups(pairings, n_, n_columns)) {}
 
-  // Writes the marginals of the pairings and of each row's miss. `best` receives the column of each
-  // row, -1 for a miss.
+  // Writes the marginals of the pairings, 0 for cut ones, and of each row's miss. `best` receives
+  // the column of each row, -1 for a miss.
   JointSummary solve(std::span<double> marginals, std::span<double> missed,
                      std::span<std::int32_t> best);
 
+  // Upper bounds of the marginals of the pairings, by which links are cut.
+  std::vector<double> marginal_bounds();
+
+  // After `solve`, the groups without the cut links.
   const Groups& groups() const { return groups_; }
 
  private:
+  // The best event of a group with its prices.
+  struct Priced {
+    GroupNumbering by;
+    std::vector<std::int32_t> partner;  // of the rows, then of the columns; -1 for none
+    std::vector<double> left, price;
+  };
+  Priced price(std::size_t g) const;
+  std::int32_t max_frontier() const;
+  // Cuts negligible links and divides the groups anew. Returns the bound of the omitted mass.
+  double cut();
+
   double log_weight(std::size_t g, std::size_t e) const {
     return log_weights_[groups_.sources[groups_.starts[g] + e]];
   }
@@ -68,7 +92,8 @@ class JointEvents {
 
   std::span<const double> log_weights_, log_miss_;
   std::int64_t max_states_;
-  std::int32_t n_;
+  double negligible_;
+  std::int32_t n_, n_columns_;
   Groups groups_;
   Assignment assignment_;
   std::span<double> marginals_, missed_;

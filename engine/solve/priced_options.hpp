@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -30,19 +31,32 @@ class PricedOptions {
     double log_weight = 0;
   };
 
+  // The resources that occur are numbered anew, in their order, because a cluster uses few of them.
   explicit PricedOptions(std::span<const std::vector<PackingOption>> trees) {
+    thread_local std::vector<std::int32_t> new_number;  // by resource, -1 between the calls
+    std::vector<std::int32_t> resources;
+    for (const auto& options : trees)
+      for (const PackingOption& option : options)
+        for (const std::int32_t r : option.uses) {
+          if (r >= static_cast<std::int32_t>(new_number.size())) new_number.resize(r + 1, -1);
+          if (std::exchange(new_number[r], 0) < 0) resources.push_back(r);
+        }
+    std::ranges::sort(resources);
+    for (std::size_t k = 0; k < resources.size(); ++k)
+      new_number[resources[k]] = static_cast<std::int32_t>(k);
     for (const auto& options : trees) {
-      first_.push_back(static_cast<std::int32_t>(options_.size()));
+      first_.push_back(n_options());
       for (const PackingOption& option : options) {
-        options_.push_back(&option);
+        const auto begin = static_cast<std::int32_t>(uses_.size());
+        for (const std::int32_t r : option.uses) uses_.push_back(new_number[r]);
+        options_.push_back({option.log_weight, begin, static_cast<std::int32_t>(uses_.size()),
+                            n_options() - first_.back()});
         reduced_.push_back(option.log_weight);
       }
     }
-    first_.push_back(static_cast<std::int32_t>(options_.size()));
-    std::int32_t n_resources = 0;
-    for (const PackingOption* o : options_)
-      for (const std::int32_t r : o->uses) n_resources = std::max(n_resources, r + 1);
-    price_.assign(n_resources, 0);
+    first_.push_back(n_options());
+    for (const std::int32_t r : resources) new_number[r] = -1;
+    price_.assign(resources.size(), 0);
     sort();
   }
 
@@ -56,6 +70,14 @@ class PricedOptions {
     for (std::int32_t i = 0; i < n_trees(); ++i) sum += max_reduced(i);
     return sum;
   }
+  std::int32_t n_options() const { return static_cast<std::int32_t>(options_.size()); }
+  double log_weight(std::int32_t option) const { return options_[option].log_weight; }
+  // Number of an option within its tree, in the caller's numbering.
+  std::int32_t number(std::int32_t option) const { return options_[option].number; }
+  std::span<const std::int32_t> uses_of(std::int32_t option) const {
+    return std::span(uses_).subspan(options_[option].begin,
+                                    options_[option].end - options_[option].begin);
+  }
   std::int32_t n_trees() const { return static_cast<std::int32_t>(first_.size()) - 1; }
 
   // Sorts the options of every tree by reduced weight, largest first, and lists the users of each
@@ -64,30 +86,40 @@ class PricedOptions {
     std::vector<std::int32_t> order(options_.size());
     for (std::size_t o = 0; o < order.size(); ++o) order[o] = static_cast<std::int32_t>(o);
     for (std::size_t i = 0; i + 1 < first_.size(); ++i)
-      std::stable_sort(order.begin() + first_[i], order.begin() + first_[i + 1],
-                       [&](std::int32_t a, std::int32_t b) { return reduced_[a] > reduced_[b]; });
-    std::vector<const PackingOption*> options;
+      std::sort(order.begin() + first_[i], order.begin() + first_[i + 1],
+                [&](std::int32_t a, std::int32_t b) {
+                  return reduced_[a] != reduced_[b] ? reduced_[a] > reduced_[b] : a < b;
+                });
+    std::vector<Option> options;
     std::vector<double> reduced;
-    std::vector<std::int32_t> number;
     for (const std::int32_t o : order) {
       options.push_back(options_[o]);
       reduced.push_back(reduced_[o]);
-      number.push_back(number_.empty() ? o - first_[tree_of(o)] : number_[o]);
     }
     options_ = std::move(options);
     reduced_ = std::move(reduced);
-    number_ = std::move(number);
-    users_.assign(price_.size(), {});
+    list_users();
     tree_of_.resize(options_.size());
-    for (std::size_t i = 0; i + 1 < first_.size(); ++i)
+    max_log_weight_.assign(n_trees(), -std::numeric_limits<double>::infinity());
+    for (std::int32_t i = 0; i < n_trees(); ++i)
       for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
-        tree_of_[o] = static_cast<std::int32_t>(i);
-        for (const std::int32_t r : options_[o]->uses) users_[r].push_back(o);
+        tree_of_[o] = i;
+        max_log_weight_[i] = std::max(max_log_weight_[i], log_weight(o));
       }
   }
-  std::int32_t tree_of(std::int32_t option) const {
-    return static_cast<std::int32_t>(
-        std::upper_bound(first_.begin(), first_.end() - 1, option) - first_.begin() - 1);
+  void list_users() {
+    first_user_.assign(price_.size() + 1, 0);
+    for (const std::int32_t r : uses_) ++first_user_[r + 1];
+    std::partial_sum(first_user_.begin(), first_user_.end(), first_user_.begin());
+    std::vector<std::int32_t> next(first_user_.begin(), first_user_.end() - 1);
+    users_.resize(uses_.size());
+    for (std::int32_t o = 0; o < n_options(); ++o)
+      for (const std::int32_t r : uses_of(o)) users_[next[r]++] = o;
+  }
+  // The options that use a resource.
+  std::span<const std::int32_t> users_of(std::int32_t resource) const {
+    return std::span(users_).subspan(first_user_[resource],
+                                     first_user_[resource + 1] - first_user_[resource]);
   }
 
   // Lowers the bound by descent on the prices: the price of a resource rises if several chosen
@@ -110,7 +142,7 @@ class PricedOptions {
             std::max_element(reduced_.begin() + first_[i], reduced_.begin() + first_[i + 1]) -
             reduced_.begin());
         dual += reduced_[chosen[i]];
-        for (const std::int32_t r : options_[chosen[i]]->uses) used[r] += 1;
+        for (const std::int32_t r : uses_of(chosen[i])) used[r] += 1;
       }
       if (dual < min_dual - kBetter) {
         min_dual = dual;
@@ -147,24 +179,23 @@ class PricedOptions {
     reprice(price_);
   }
   void reprice(const std::vector<double>& price) {
-    for (std::size_t o = 0; o < options_.size(); ++o) {
-      reduced_[o] = options_[o]->log_weight;
-      for (const std::int32_t r : options_[o]->uses) reduced_[o] -= price[r];
+    for (std::int32_t o = 0; o < n_options(); ++o) {
+      reduced_[o] = log_weight(o);
+      for (const std::int32_t r : uses_of(o)) reduced_[o] -= price[r];
     }
   }
 
   Packing packing(const std::vector<std::int32_t>& chosen) const {
     Packing out;
     for (const std::int32_t o : chosen) {
-      out.own.push_back(number_[o]);
-      out.log_weight += options_[o]->log_weight;
+      out.own.push_back(number(o));
+      out.log_weight += log_weight(o);
     }
     return out;
   }
 
   bool uses(std::int32_t option, std::int32_t resource) const {
-    const std::vector<std::int32_t>& list = options_[option]->uses;
-    return std::find(list.begin(), list.end(), resource) != list.end();
+    return std::ranges::find(uses_of(option), resource) != uses_of(option).end();
   }
 
   // Makes a packing of the chosen options, of which several may use one resource. Trees take the
@@ -173,22 +204,23 @@ class PricedOptions {
   std::vector<std::int32_t> repaired(const std::vector<std::int32_t>& chosen) {
     std::vector<std::int32_t> order(n_trees()), out(chosen);
     for (std::int32_t i = 0; i < n_trees(); ++i) order[i] = i;
-    std::stable_sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-      return reduced_[chosen[a]] > reduced_[chosen[b]];
+    std::ranges::sort(order, [&](std::int32_t a, std::int32_t b) {
+      const double x = reduced_[chosen[a]], y = reduced_[chosen[b]];
+      return x != y ? x > y : a < b;
     });
-    is_used_.assign(users_.size(), 0);
+    is_used_.assign(price_.size(), 0);
     for (const std::int32_t i : order) {
-      if (!fits(out[i])) out[i] = best_fitting(i, reduced_);
+      if (!fits(out[i])) out[i] = best_fitting(i, [&](std::int32_t o) { return reduced_[o]; });
       mark(out[i], 1);
     }
-    std::vector<double> log_weight;
-    for (const PackingOption* o : options_) log_weight.push_back(o->log_weight);
     for (bool is_better = true; is_better;) {
       is_better = false;
       for (std::int32_t i = 0; i < n_trees(); ++i) {
+        if (!(max_log_weight_[i] > log_weight(out[i]) + kBetter)) continue;
         mark(out[i], 0);
-        const std::int32_t best = best_fitting(i, log_weight);
-        if (log_weight[best] > log_weight[out[i]] + kBetter) {
+        const std::int32_t best =
+            best_fitting(i, [&](std::int32_t o) { return log_weight(o); });
+        if (log_weight(best) > log_weight(out[i]) + kBetter) {
           out[i] = best;
           is_better = true;
         }
@@ -198,15 +230,16 @@ class PricedOptions {
     return out;
   }
   bool fits(std::int32_t option) const {
-    return std::ranges::none_of(options_[option]->uses, [&](std::int32_t r) { return is_used_[r]; });
+    return std::ranges::none_of(uses_of(option), [&](std::int32_t r) { return is_used_[r]; });
   }
   void mark(std::int32_t option, char is_used) {
-    for (const std::int32_t r : options_[option]->uses) is_used_[r] = is_used;
+    for (const std::int32_t r : uses_of(option)) is_used_[r] = is_used;
   }
-  std::int32_t best_fitting(std::int32_t tree, const std::vector<double>& value) const {
+  template <typename Value>
+  std::int32_t best_fitting(std::int32_t tree, Value&& value) const {
     std::int32_t best = -1;
     for (std::int32_t o = first_[tree]; o < first_[tree + 1]; ++o)
-      if ((best < 0 || value[o] > value[best]) && fits(o)) best = o;
+      if ((best < 0 || value(o) > value(best)) && fits(o)) best = o;
     return best;
   }
   void keep_if_better(const std::vector<std::int32_t>& chosen) {
@@ -214,10 +247,16 @@ class PricedOptions {
     if (known_.own.empty() || one.log_weight > known_.log_weight) known_ = std::move(one);
   }
 
-  std::vector<const PackingOption*> options_;  // by tree, the best first
+  struct Option {
+    double log_weight = 0;
+    std::int32_t begin = 0, end = 0;  // of its resources in `uses_`
+    std::int32_t number = 0;
+  };
+  std::vector<Option> options_;  // by tree, the best first
+  std::vector<std::int32_t> uses_;
   std::vector<double> reduced_, price_;  // reduced weight of each option; price of each resource
-  std::vector<std::int32_t> number_;  // of an option within its tree, in the caller's numbering
-  std::vector<std::vector<std::int32_t>> users_;
+  std::vector<double> max_log_weight_;   // of the options of each tree
+  std::vector<std::int32_t> users_, first_user_;  // of resource r: first_user_[r] to [r + 1]
   std::vector<std::int32_t> first_, tree_of_;
   Packing known_;  // the best packing found so far
   std::vector<char> is_used_;

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -55,7 +56,7 @@ class SetPacking : PricedOptions {
       const double max_of_tree = max_reduced(i);
       for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o) {
         loss[o] = std::max(0.0, max_of_tree - reduced_[o]);  // 0 if both are infinite
-        if (number_[o] == known_.own[i]) best[i] = o;
+        if (number(o) == known_.own[i]) best[i] = o;
       }
       loss[best[i]] = 0;
     }
@@ -65,7 +66,7 @@ class SetPacking : PricedOptions {
     for (std::int32_t i = 0; i < n_trees(); ++i) {
       out.of[i].resize(first_[i + 1] - first_[i]);
       for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o)
-        out.of[i][number_[o]] = loss[o] + others[o];
+        out.of[i][number(o)] = loss[o] + others[o];
     }
     return out;
   }
@@ -114,20 +115,20 @@ class SetPacking : PricedOptions {
     // By resource, of its owner; of others.
     std::vector<double> without(price_.size(), 0), taken(price_);
     for (std::int32_t i = 0; i < n_trees(); ++i)
-      for (const std::int32_t r : options_[best[i]]->uses) {
+      for (const std::int32_t r : uses_of(best[i])) {
         owner[r] = i;
         without[r] = kNever;
         for (std::int32_t o = first_[i]; o < first_[i + 1]; ++o)
           if (loss[o] < without[r] && !uses(o, r)) without[r] = loss[o];
       }
     for (std::int32_t o = 0; o < first_.back(); ++o)
-      for (const std::int32_t r : options_[o]->uses)
+      for (const std::int32_t r : uses_of(o))
         if (owner[r] != tree_of_[o]) taken[r] = std::min(taken[r], loss[o]);
     std::vector<double> out(options_.size(), 0);
     std::vector<std::pair<std::int32_t, double>> losers;
     for (std::int32_t o = 0; o < first_.back(); ++o) {
       losers.clear();
-      for (const std::int32_t r : options_[o]->uses) {
+      for (const std::int32_t r : uses_of(o)) {
         if (owner[r] < 0 || owner[r] == tree_of_[o]) continue;
         const auto at = std::ranges::find(losers, owner[r], &std::pair<std::int32_t, double>::first);
         if (at == losers.end())
@@ -137,7 +138,7 @@ class SetPacking : PricedOptions {
       }
       double given_up = 0;
       for (const auto& [tree, min_loss] : losers) given_up += min_loss;
-      for (const std::int32_t r : options_[best[tree_of_[o]]]->uses)
+      for (const std::int32_t r : uses_of(best[tree_of_[o]]))
         if (taken[r] > out[o] && !uses(o, r)) out[o] = taken[r];
       out[o] = std::max(out[o], given_up);
     }
@@ -149,6 +150,7 @@ class SetPacking : PricedOptions {
     heap_.clear();
     drop_ = drop;
     n_pushed_ = 0;
+    sum_of_prices_ = std::accumulate(price_.begin(), price_.end(), 0.0);
     n_left_ = max_nodes + k;
     Node root;
     root.is_banned.assign(options_.size(), 0);
@@ -191,9 +193,9 @@ class SetPacking : PricedOptions {
   void push(Node node) {
     node.bound = 0;
     if (node.is_packing) {
-      for (const std::int32_t o : node.chosen) node.bound += options_[o]->log_weight;
+      for (const std::int32_t o : node.chosen) node.bound += log_weight(o);
     } else {
-      for (const double x : price_) node.bound += x;
+      node.bound = sum_of_prices_;
       for (const std::int32_t o : node.chosen) node.bound += reduced_[o];
     }
     // The node contains no packing that would count.
@@ -248,10 +250,10 @@ class SetPacking : PricedOptions {
 
   // The smallest resource that two of the chosen options use, or -1.
   std::int32_t conflict(const Node& node) {
-    is_used_.assign(users_.size(), 0);
+    is_used_.assign(price_.size(), 0);
     std::int32_t first = -1;
     for (const std::int32_t o : node.chosen)
-      for (const std::int32_t r : options_[o]->uses) {
+      for (const std::int32_t r : uses_of(o)) {
         if (is_used_[r] && (first < 0 || r < first)) first = r;
         is_used_[r] = 1;
       }
@@ -268,7 +270,7 @@ class SetPacking : PricedOptions {
     for (const std::int32_t owner : claimants) {
       Node child = node;
       bool is_possible = true;
-      for (const std::int32_t o : users_[resource])
+      for (const std::int32_t o : users_of(resource))
         if (tree_of_[o] != owner) is_possible = is_possible && ban(child, o);
       for (std::int32_t o = first_[owner]; is_possible && o < first_[owner + 1]; ++o)
         if (!uses(o, resource)) is_possible = ban(child, o);
@@ -276,7 +278,7 @@ class SetPacking : PricedOptions {
     }
     Node child = node;
     bool is_possible = true;
-    for (const std::int32_t o : users_[resource])
+    for (const std::int32_t o : users_of(resource))
       if (is_claimant(tree_of_[o])) is_possible = is_possible && ban(child, o);
     if (is_possible) push(std::move(child));
   }
@@ -295,7 +297,7 @@ class SetPacking : PricedOptions {
 
   std::vector<Packing> packings_;
   std::vector<Node> heap_;
-  double drop_ = 0;  // of the current search
+  double drop_ = 0, sum_of_prices_ = 0;  // of the current search
   std::int64_t n_pushed_ = 0;
   std::int64_t n_left_ = 0;  // nodes that may still be taken
 };

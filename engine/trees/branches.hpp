@@ -191,11 +191,10 @@ class BranchGrower {
             std::int32_t max_branches, TreeStats& stats) {
     grown_.clear();
     for (Branch& parent : track.more.branches)
-      split(frame, track, std::move(parent), grown_, stats);
+      split(frame, track, parent, grown_, stats);
     prune(frame.number, n_open, max_branches, stats);
-    track.more.branches.resize(kept_.size());
-    for (std::size_t k = 0; k < kept_.size(); ++k)
-      track.more.branches[k] = std::move(grown_[kept_[k]]);
+    track.more.branches.clear();
+    for (const std::int32_t b : kept_) track.more.branches.push_back(grown_[b]);
   }
 
   // Prediction for a track missed in the last `gap` frames. Its state must be predicted to the
@@ -211,8 +210,8 @@ class BranchGrower {
   }
 
   // Adds the continuations of a branch in a further frame: one for each detection in its gate, then
-  // the missed detection.
-  void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch parent,
+  // the missed detection, into which the branch itself turns.
+  void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch& parent,
              std::vector<Branch>& out, TreeStats& stats) const {
     const std::int64_t slot = frame.number % kMaxWindow;
     parent.path[slot] = -1;
@@ -222,7 +221,7 @@ class BranchGrower {
         parent.score += live_.miss_gain(parent.unpredicted());
         ++parent.gap;
       }
-      out.push_back(std::move(parent));
+      out.push_back(parent);
       return;
     }
     predict(live_.m, frame.step, parent.state);
@@ -241,10 +240,10 @@ class BranchGrower {
         ++stats.n_cut;
         return;
       }
-      Branch child = parent;
+      Branch& child = out.emplace_back(parent);  // branches are large, so it is not copied again
       all.choose(y, child.state);
       const double hit_gain = hit + update(live_.m, prediction, y, child.state);
-      if (!std::isfinite(hit_gain)) return;
+      if (!std::isfinite(hit_gain)) return out.pop_back();
       child.score += opt_.is_joint ? hit_gain : hit_gain - frame.crowding(track.more.key, j);
       if (advice != nullptr) child.score += advice->of(j);
       child.lambda = lambda;
@@ -255,7 +254,6 @@ class BranchGrower {
       child.gap = child.carried = 0;
       child.path[slot] = j;
       child.distance2[slot] = d2;
-      out.push_back(std::move(child));
     };
     const bool is_reappearance = advice != nullptr && advice->is_reappearance;
     if (all.is_carried()) {
@@ -275,7 +273,7 @@ class BranchGrower {
       parent.score += miss;
     ++parent.gap;
     parent.has_ended = is_reappearance || parent.unpredicted() >= live_.sm.max_gap;
-    out.push_back(std::move(parent));
+    out.push_back(parent);
   }
 
   // Adds the claims of a track's best branch on the detections of the next frame.

@@ -11,6 +11,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -117,6 +118,7 @@ class HypothesisForest {
         if (!is_seed && !track.is_confirmed() && track.best_score - b.score > opt_.delete_drop)
           continue;
         PackingOption option{grower.log_ratio(b), {}};
+        option.uses.reserve(open_.frames.size());
         open_.each_detection(i, b, [&](std::int32_t r) { option.uses.push_back(r); });
         has_free = has_free || option.uses.empty();
         const std::int32_t column = open_.taken(i, b, *open_.frames.front());
@@ -156,20 +158,19 @@ class HypothesisForest {
     stats.largest_group = std::max<std::int64_t>(stats.largest_group, cluster.size());
     const std::int64_t n_tracks = weigh(cluster);
     rank(cluster);
-    std::ranges::stable_sort(s_.ranked, {}, &Ranked::loss);
     // New trees have a share of their own: their first detections gain little, so that in a long
     // window the many similar branches of old tracks would crowd them out.
     const auto n_max =
         static_cast<std::ptrdiff_t>(cluster.size()) + open_.branches.max_branches * n_tracks;
     std::array<std::ptrdiff_t, 2> n_left{n_max, n_max};
-    const auto is_pruned = [&](const Ranked& r) {
-      if (r.loss > open_.branches.prune_drop) return true;
-      const bool is_limited = n_left[open_.is_seed(r.tree)]-- <= 0;
-      stats.n_limited += is_limited;
-      return is_limited;
-    };
-    if (std::erase_if(s_.ranked, is_pruned) == 0) return;
-    std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::pair(r.tree, r.branch); });
+    const auto n_ranked = s_.ranked.size();
+    std::erase_if(s_.ranked, [&](const Ranked& r) {
+      const bool is_pruned = r.loss > open_.branches.prune_drop;
+      n_left[open_.is_seed(r.tree)] -= !is_pruned;
+      return is_pruned;
+    });
+    if (n_left[0] < 0 || n_left[1] < 0) limit_number(n_max, stats);
+    if (s_.ranked.size() == n_ranked) return;
     auto next = s_.ranked.begin();
     for (const std::int32_t i : cluster) {
       // Number of a branch that is kept.
@@ -188,6 +189,14 @@ class HypothesisForest {
         return is_kept || option.uses.empty();
       });
     }
+  }
+  // Keeps the n ranked branches with the smallest losses of the old trees and of the new ones.
+  void limit_number(std::ptrdiff_t n, TreeStats& stats) {
+    std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::tuple(r.loss, r.tree, r.branch); });
+    std::array<std::ptrdiff_t, 2> n_left{n, n};
+    stats.n_limited += static_cast<std::int64_t>(std::erase_if(
+        s_.ranked, [&](const Ranked& r) { return n_left[open_.is_seed(r.tree)]-- <= 0; }));
+    std::ranges::sort(s_.ranked, {}, [](const Ranked& r) { return std::pair(r.tree, r.branch); });
   }
   template <typename Keep>
   static void keep_options(TreeOptions& tree, Keep&& keep) {
@@ -209,6 +218,7 @@ class HypothesisForest {
   // Computes the loss of every option of a cluster. Returns the number of tracks in the best
   // hypothesis, at least one.
   std::int64_t weigh(const std::vector<std::int32_t>& cluster) {
+    if (cluster.size() == 1) return weigh_alone(s_.trees[cluster.front()]);
     std::vector<std::vector<PackingOption>> options;
     for (const std::int32_t i : cluster) options.push_back(std::move(s_.trees[i].options));
     const SetPacking::Losses losses = SetPacking(options).losses();
@@ -222,6 +232,14 @@ class HypothesisForest {
       n_tracks += best.branch != kNothing;
     }
     return std::max<std::int64_t>(n_tracks, 1);
+  }
+  // The same for a tree that shares no detection with another.
+  static std::int64_t weigh_alone(TreeOptions& tree) {
+    const auto best = std::ranges::max_element(tree.options, {}, &PackingOption::log_weight);
+    for (std::size_t o = 0; o < tree.choices.size(); ++o)
+      tree.choices[o].loss = std::max(0.0, best->log_weight - tree.options[o].log_weight);
+    tree.choices[best - tree.options.begin()].loss = kBest;
+    return 1;
   }
   // Lists the branches of a cluster with their losses.
   void rank(const std::vector<std::int32_t>& cluster) {

@@ -312,8 +312,12 @@ def packing_losses(
     first_option: Ints, log_weights: Floats, first_use: Ints, uses: Shorts
 ) -> tuple[float, Floats]: ...
 def joint_marginals(
-    log_weights: Floats, log_miss: Floats, max_states: int
+    log_weights: Floats,
+    log_miss: Floats,
+    max_states: int,
+    negligible: float = 0.0,
 ) -> tuple[Floats, float, Shorts, float, int]: ...
+def marginal_bounds(log_weights: Floats, log_miss: Floats) -> Floats: ...
 def marry(
     first: Ints, receivers: Shorts, costs: Floats, n_receivers: int
 ) -> tuple[Shorts, int]: ...

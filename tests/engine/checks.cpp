@@ -128,7 +128,7 @@ double gain_of_exchange(const Swept::Part& part, std::int64_t from, bool is_cut)
     const std::int32_t other = starts[1 - k];
     const auto& nodes = p.track(p.track_of(other)).nodes;
     if (!is_cut)
-      for (std::size_t n = p.place_of(other); n < nodes.size(); ++n) p.append(edits[k], nodes[n]);
+      for (std::size_t n = p.place_of(other); n < nodes.size(); ++n) append(p, edits[k], nodes[n]);
   }
   double gain = 0;
   for (const auto& edit : edits) gain += p.score_of(edit) - p.score_of(edit.track);
@@ -177,6 +177,58 @@ void a_block_gains_what_the_capture_gains() {
     }
     CHECK(n_checked > 20);
   }
+}
+
+// The evaluation of a move ends as soon as its gain is bounded too low. So no detection may gain more
+// than its bound, in tracks with gaps, uneven steps and points with variances of their own.
+template <typename Filter>
+void no_gain_exceeds_its_bound(int n_modes) {
+  MotionModel m;
+  m.axis = {2, 3, {1, 0}, {1e-8, 0, 0, 1e-8}, 1e-4};  // less than after a later detection
+  m.M = n_modes;
+  if (n_modes == 3) m.T = {0.9, 0.05, 0.05, 0.1, 0.8, 0.1, 0.2, 0.3, 0.5};
+  m.w0 = stationary(m.T, m.M);
+  const ScoreModel sm{.log_birth = -2, .log_clutter = -1, .log_survive = -1e-3,
+                      .p_disappear = 1e-3, .p_detection = 0.9, .p_redetection = 0.05,
+                      .max_speed = 100, .speed_margin = 100, .max_gap = 3};
+  Random random(1);
+  Partition<Filter> p(m, sm);
+  constexpr int T = 16, K = 3;
+  double time = 0;
+  for (int t = 0; t < T; ++t) {
+    const double dt = 0.5 + random.uniform();
+    time += dt;
+    MotionStep step;
+    for (int b = 0; b < n_modes; ++b) {
+      const double q = 1e-3 * std::pow(20.0, b);
+      step.mode[b].F = {1, dt, 0, 1};
+      step.mode[b].Q = {q * dt * dt * dt * dt / 4, q * dt * dt * dt / 2, q * dt * dt * dt / 2, q * dt * dt};
+    }
+    std::vector<Point> points;
+    for (int k = 0; k < K; ++k)
+      points.push_back(Point{{1e-3 * time + 1e-4 * random.uniform(), 0.03 * k, 0},
+                             random.uniform() < 0.1 ? 1e-4 : 0.0});
+    p.add_frame(time, step, points, K * t);
+  }
+  double smallest = 1;  // distance of a gain from its bound
+  for (int trial = 0; trial < 2000; ++trial) {
+    Edit<Filter> edit;
+    std::int32_t k = random.below(K);
+    for (std::int64_t t = random.below(5); t < T; t += random.uniform() < 0.7 ? 1 : 1 + random.below(3)) {
+      if (random.uniform() < 0.2) k = random.below(K);
+      edit.tail.nodes.push_back(p.window().frame(t).ids[k]);
+    }
+    for (std::size_t n = 0; n < edit.tail.nodes.size(); ++n) {
+      const double bound = max_gain(p, edit, n), of_all = max_score_of(p, edit);
+      filter_next(p, edit, [&](double gain) {
+        CHECK(gain <= bound + 1e-9);
+        if (n > 0) smallest = std::min(smallest, bound - gain);
+        return true;
+      });
+      CHECK(max_score_of(p, edit) <= of_all + 1e-9);
+    }
+  }
+  CHECK(smallest < 0.5);
 }
 
 // Candidates of image points, and the optimal choice by enumeration of all sets.
@@ -283,6 +335,8 @@ void products_of_many_numbers() {
 int main() {
   choices_of_candidates_are_the_best_or_tell_by_how_much_not();
   a_block_gains_what_the_capture_gains();
+  no_gain_exceeds_its_bound<OneMotion>(1);
+  no_gain_exceeds_its_bound<SeveralMotions>(3);
   exceptions_reach_the_caller();
   budgets_of_nothing_and_of_everything();
   each_half_has_half_of_the_time();

@@ -12,6 +12,7 @@ class AmbiguousLinks {
  public:
   struct Link {
     std::int32_t from = 0, to = 0;
+    bool operator==(const Link&) const = default;
   };
 
   void add_frame() { frames_.emplace_back(); }

@@ -33,6 +33,15 @@ struct Halves {
   std::int64_t all_moves() const { return std::accumulate(n_moves.begin(), n_moves.end(), std::int64_t{0}); }
 };
 
+// The involutive moves of a chain at ambiguous links, each with its cumulative weight.
+template <typename Filter>
+struct Hot {
+  typename Sampler<Filter>::Listed move;
+  double upto = 0;
+};
+template <typename Filter>
+using HotList = std::vector<Hot<Filter>>;
+
 template <typename Filter>
 class ChainRunner {
  public:
@@ -43,14 +52,16 @@ class ChainRunner {
         is_draw_(options.is_draw) {}
 
   // Searches for the best partition, returns its gain over the start, and stays there. With
-  // `is_draw` it stays at the last state instead and returns infinity.
-  double search(const Partition<Filter>& whole, const Group& group,
-                std::uint64_t seed, const Budget& budget, ChainStats& stats) {
+  // `is_draw` it stays at the last state instead and returns infinity. `list` receives the moves at
+  // ambiguous links, as they are at the start.
+  double search(const Partition<Filter>& whole, const Group& group, std::uint64_t seed,
+                const Budget& budget, HotList<Filter>& list, ChainStats& stats) {
     sampler_.partition().take_part(whole, group.tracks, group.free);
     sampler_.begin(seed);
     sampler_.weigh_above(sampler_.kOnlyWhatMayBeTaken);
     sampler_.begin_best();
     list_hot(group);
+    list = hot_;
     const auto look_at_none = [](const Change<Filter>&, bool) {};
     std::int64_t n = 0;
     for (; !budget.is_over(n); ++n) step(look_at_none);
@@ -62,14 +73,20 @@ class ChainRunner {
   }
   const Partition<Filter>& partition() const { return sampler_.partition(); }
 
-  // Estimates the probability of the links of the initial partition.
-  void sample(const Partition<Filter>& whole, const Group& group,
-              std::uint64_t seed, const Budget& budget, Halves& out, ChainStats& stats) {
+  // Estimates the probability of the links of the initial partition. `list` are the moves at
+  // ambiguous links if they are known from a search, else null.
+  void sample(const Partition<Filter>& whole, const Group& group, std::uint64_t seed,
+              const Budget& budget, const HotList<Filter>* list, Halves& out, ChainStats& stats) {
     Partition<Filter>& p = sampler_.partition();
     p.take_part(whole, group.tracks, group.free);
     sampler_.begin(seed);
     sampler_.begin_best();
-    list_hot(group);
+    if (list == nullptr) {
+      list_hot(group);
+    } else {
+      hot_ = *list;
+      for (Hot<Filter>& hot : hot_) hot.move.weighed = p.clock();
+    }
     sampler_.weigh_above(kLookedAtAbove);
     marginals_.begin();
     out.detections.clear();
@@ -107,11 +124,6 @@ class ChainRunner {
   // Log ratio without the reverse move below which a rejected move is not evaluated further.
   static constexpr double kLookedAtAbove = -9;
 
-  struct Hot {
-    Toggle toggle;
-    double upto = 0;
-  };
-
   template <typename Observe>
   void step(Observe&& observe) {
     if (hot_.empty() || sampler_.random().uniform() >= hot_share_) {
@@ -120,8 +132,8 @@ class ChainRunner {
     }
     const double at = sampler_.random().uniform() * hot_.back().upto;
     const auto hot = std::upper_bound(hot_.begin(), hot_.end(), at,
-                                      [](double x, const Hot& h) { return x < h.upto; });
-    sampler_.step(hot->toggle, observe);
+                                      [](double x, const Hot<Filter>& h) { return x < h.upto; });
+    sampler_.step(hot->move, observe);
   }
 
   // Lists the involutive moves at the ambiguous links of this part. They are in detailed balance
@@ -178,10 +190,10 @@ class ChainRunner {
     add_hot({Toggle::Kind::skip, y, p.before(y), p.after(y)});
   }
   void add_hot(const Toggle& toggle) {
-    const double gain = sampler_.gain_of(toggle);
-    if (gain < -kHotWithin) return;
-    const double before = hot_.empty() ? 0 : hot_.back().upto;
-    hot_.push_back({toggle, before + std::exp(std::min(gain, 0.0) / 4)});
+    Hot<Filter> hot{{toggle}, hot_.empty() ? 0 : hot_.back().upto};
+    if (!sampler_.weigh(hot.move, -kHotWithin)) return;
+    hot.upto += std::exp(std::min(hot.move.gain, 0.0) / 4);
+    hot_.push_back(hot);
   }
   static constexpr double kHotWithin = 12;
 
@@ -189,7 +201,7 @@ class ChainRunner {
   Marginals<Filter> marginals_;
   double hot_share_;
   bool is_draw_;
-  std::vector<Hot> hot_;
+  HotList<Filter> hot_;
   std::vector<std::int32_t> local_;
   std::vector<char> has_skip_;  // detections that already have a skip move
 };

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "math/random.hpp"
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 #include "mcmc/moves/involutive_moves.hpp"
 #include "mcmc/moves/moves.hpp"
@@ -77,9 +78,11 @@ class Sampler {
     const int back = static_cast<int>(inverse(change_.move));
     const double log_u = std::log(random_.uniform());
     // log_reverse is at most 0, so a ratio that is too small without it stays too small.
-    change_.log_ratio = change_.gain + (best_gain_ - last_gain_) + then.log[back] -
-                        now.log[kind] - change_.log_forward;
     const double threshold = std::min(log_u, weighed_above_);
+    const double log_proposal = (best_gain_ - last_gain_) + then.log[back] - now.log[kind];
+    change_.min_gain = threshold - log_proposal + change_.log_forward;
+    if (!moves_.weigh(change_)) return false;
+    change_.log_ratio = change_.gain + log_proposal - change_.log_forward;
     if (!(change_.log_ratio > threshold)) return false;
     const bool is_weighed = change_.log_ratio > weighed_above_;
     change_.log_reverse = moves_.log_reverse(change_);
@@ -92,16 +95,36 @@ class Sampler {
     return step([](const Change<Filter>&, bool) {});
   }
 
-  // Makes one move of a list; see mcmc/moves/involutive_moves.hpp.
+  // A move of a list (mcmc/moves/involutive_moves.hpp). Its gain is kept while its tracks do not
+  // change, because the moves of a list are proposed again and again.
+  struct Listed {
+    Toggle toggle;
+    double gain = 0;
+    std::int64_t weighed = -1;  // time of the partition
+
+    bool is_known(const Partition<Filter>& p) const {
+      return weighed >= std::max(p.changed(toggle.y), p.changed(toggle.a)) &&
+             (toggle.c < 0 || weighed >= p.changed(toggle.c));
+    }
+  };
   template <typename Observe>
-  bool step(const Toggle& toggle, Observe&& observe) {
-    if (!propose(toggle)) return false;
-    change_.log_ratio = change_.gain;
+  bool step(Listed& move, Observe&& observe) {
+    if (!toggles_.propose(move.toggle, change_)) return false;
+    if (!move.is_known(partition_)) {
+      weigh_completely();
+      move.gain = change_.gain;
+      move.weighed = partition_.clock();
+    }
+    change_.gain = change_.log_ratio = move.gain;
     return take(std::log(random_.uniform()), true, observe);
   }
-  // The gain of a move; -inf if it is impossible.
-  double gain_of(const Toggle& toggle) {
-    return propose(toggle) ? change_.gain : -std::numeric_limits<double>::infinity();
+  // Computes the gain of a move. Returns false if it is impossible or not above `min_gain`.
+  bool weigh(Listed& move, double min_gain) {
+    change_.min_gain = min_gain;
+    if (!toggles_.propose(move.toggle, change_) || !toggles_.weigh(change_)) return false;
+    move.gain = change_.gain;
+    move.weighed = partition_.clock();
+    return true;
   }
   Random& random() { return random_; }
 
@@ -133,7 +156,7 @@ class Sampler {
           ++edit.keep;
         now.erase(at);
       }
-      for (std::size_t n = edit.keep; n < nodes.size(); ++n) partition_.append(edit, nodes[n]);
+      for (std::size_t n = edit.keep; n < nodes.size(); ++n) append(partition_, edit, nodes[n]);
     }
     for (const auto& [first, k] : now) edits_.emplace_back().track = static_cast<std::int32_t>(k);
     partition_.apply(edits_);
@@ -147,10 +170,6 @@ class Sampler {
   static constexpr double kOnlyWhatMayBeTaken = std::numeric_limits<double>::infinity();
 
  private:
-  bool propose(const Toggle& toggle) {
-    return toggles_.propose(toggle, change_);
-  }
-
   template <typename Observe>
   bool take(double log_u, bool is_weighed, Observe&& observe) {
     const bool is_taken = change_.log_ratio > log_u;
@@ -168,11 +187,17 @@ class Sampler {
       save();
       is_best_ = false;
     }
+    if (!change_.is_filtered()) weigh_completely();
     partition_.apply(change_.all());
     gain_ += change_.gain;
     is_best_ = is_best_ || gain_ > max_gain_ + kBetter;
     max_gain_ = std::max(max_gain_, gain_);
     return true;
+  }
+
+  void weigh_completely() {
+    change_.min_gain = -std::numeric_limits<double>::infinity();
+    toggles_.weigh(change_);
   }
 
   struct Shares {

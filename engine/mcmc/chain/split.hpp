@@ -38,6 +38,9 @@ struct Group {
   std::vector<AmbiguousLinks::Link> ambiguous;
   std::int64_t n_new = 0;   // tracks and free detections with a detection in the newest frame
   std::int64_t n_open = 0;  // detections that are not settled
+
+  std::int32_t first() const { return tracks.empty() ? -1 - free.front() : tracks.front(); }
+  bool operator==(const Group&) const = default;
 };
 
 struct Split {

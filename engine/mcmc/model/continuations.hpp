@@ -39,9 +39,16 @@ class Continuations {
     for (const LaterPoint& next : *of(i)) {
       const State from = state;
       filter.expect(m, window, from, frame, static_cast<int>(next.frame - frame), expected);
-      gain += filter.take(m, expected, next.y, state);
+      gain += filter.weigh(m, expected, next.y);
+      filter.take(m, expected, next.y, state);
       frame = next.frame;
     }
+    return gain;
+  }
+  // A bound of what `advance` returns.
+  double max_gain(const DetectionWindow& window, std::int32_t i) const {
+    double gain = 0;
+    for (const LaterPoint& next : *of(i)) gain += window.frame(next.frame).steps->log_peak;
     return gain;
   }
 

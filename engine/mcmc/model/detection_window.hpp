@@ -5,6 +5,7 @@
 // a marker may reach almost any detection.
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cstdint>
 #include <deque>
@@ -36,6 +37,9 @@ class DetectionWindow {
   struct Steps {
     MotionStep step;               // from the frame before
     std::vector<AxisStep> single;  // with one motion model: from d frames before, at index d - 1
+    // Upper bounds of the log density of a detection of the frame: right after the first detection
+    // of its track, and later.
+    double log_peak = 0, log_later_peak = 0;
   };
   struct Frame {
     double time = 0;
@@ -53,6 +57,8 @@ class DetectionWindow {
   // Number of the newest frame; that of the first is 0.
   std::int64_t now() const { return first_ + static_cast<std::int64_t>(frames_.size()) - 1; }
   int max_gap() const { return sm_.max_gap; }
+  // Changes whenever the window changes.
+  std::int64_t version() const { return version_; }
   // Last frame whose detections may have successors. Detections of later frames represent the
   // continuation of a track after a block (see Partition::continue_with).
   std::int64_t last_open() const { return last_open_; }
@@ -61,8 +67,7 @@ class DetectionWindow {
   bool is_linkable(std::int32_t i, std::int32_t j) const {
     const Detection &a = detections_[i], &b = detections_[j];
     const std::int64_t gap = b.frame - a.frame;
-    if (gap < 1 || gap > sm_.max_gap || a.frame > last_open_) return false;
-    return is_reachable(sm_, a.y, b.y, b.time - a.time, m_.axis.D);
+    return gap >= 1 && gap <= sm_.max_gap && a.frame <= last_open_ && is_near(a, b);
   }
 
   // Calls visit(j) for every detection of a frame that may follow i.
@@ -83,6 +88,7 @@ class DetectionWindow {
   // Adds the next frame. Returns the numbers of its detections in order of arrival.
   std::span<const std::int32_t> add(double time, const MotionStep& step,
                                     std::span<const Point> points, std::int64_t first_number) {
+    ++version_;
     Frame& frame = frames_.emplace_back();
     frame.time = time;
     const std::int64_t t = now();
@@ -108,6 +114,7 @@ class DetectionWindow {
     }
     auto steps = std::make_shared<Steps>();
     steps->step = step;
+    bound_peaks(*steps, t);
     if (m_.M == 1) compose(*steps, t);
     frame.steps = std::move(steps);
     return frame.ids;
@@ -115,6 +122,7 @@ class DetectionWindow {
 
   // Becomes the part of a window that contains the given detections, numbered in the given order.
   void take_part(const DetectionWindow& whole, std::span<const std::int32_t> ids) {
+    ++version_;
     first_ = whole.first_;
     last_open_ = whole.last_open_;
     frames_.resize(whole.frames_.size());
@@ -133,12 +141,42 @@ class DetectionWindow {
 
   // Removes the oldest frame. Its detections must not be referenced any more.
   void drop() {
+    ++version_;
     for (const std::int32_t id : frames_.front().ids) unused_.push_back(id);
     frames_.pop_front();
     ++first_;
   }
 
  private:
+  // As is_reachable, without a loop of unknown length: the coordinates beyond the axes are 0.
+  bool is_near(const Detection& a, const Detection& b) const {
+    const double reach = sm_.max_speed * (b.time - a.time) + sm_.speed_margin;
+    return squared_distance(a.y, b.y, kMaxAxes) <= reach * reach;
+  }
+  // A covariance is at least that of a state which was known exactly before the last step, or before
+  // the last two with a detection between them. It is at least the smallest of the modes if they
+  // are mixed.
+  void bound_peaks(Steps& steps, std::int64_t t) const {
+    const double never = -std::numeric_limits<double>::infinity();
+    steps.log_peak = steps.log_later_peak = never;
+    for (int b = 0; b < m_.M; ++b) {
+      AxisState exact;
+      exact.P = steps.step.mode[b].Q;
+      const double S = innovation_variance(m_.axis, exact);
+      steps.log_peak = std::max(steps.log_peak, log_density(m_.axis.D, S, 0));
+      if (t == first_) continue;
+      const MotionStep& before = frames_[t - 1 - first_].steps->step;
+      for (int a = 0; a < m_.M; ++a) {
+        AxisState s;
+        s.P = before.mode[a].Q;
+        s.P = KalmanGain(m_.axis, s).P;
+        predict(m_.axis, steps.step.mode[b], s);
+        const double later_S = innovation_variance(m_.axis, s);
+        steps.log_later_peak = std::max(steps.log_later_peak, log_density(m_.axis.D, later_S, 0));
+      }
+    }
+    if (t == first_) steps.log_later_peak = steps.log_peak;
+  }
   // F and Q over d frames: x ↦ F₂ F₁ x, Q = F₂ Q₁ F₂ᵀ + Q₂. The process noise of separate steps is
   // accumulated; that of one long step would differ.
   void compose(Steps& steps, std::int64_t t) const {
@@ -168,7 +206,7 @@ class DetectionWindow {
   std::vector<Detection> detections_;
   std::vector<std::int32_t> unused_;
   std::deque<Frame> frames_;
-  std::int64_t first_ = 0;
+  std::int64_t first_ = 0, version_ = 0;
   std::int64_t last_open_ = std::numeric_limits<std::int64_t>::max();
 };
 

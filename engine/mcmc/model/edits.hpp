@@ -16,6 +16,7 @@ struct PartitionTrack {
   std::int32_t n_frozen = 0;
   std::int32_t n_gone = 0;  // detections before the first that have left the window
   std::int64_t id = -1;     // public label, once part of the track is settled
+  std::int64_t stamp = 0;   // changes with the track; see Partition::clock
 
   std::int32_t size() const { return static_cast<std::int32_t>(nodes.size()); }
   std::int32_t whole_size() const { return n_gone + size(); }
@@ -23,7 +24,8 @@ struct PartitionTrack {
   std::int32_t first_open() const { return std::max(n_frozen - 1, 0); }
 };
 
-// The part of a track after the detections that an edit keeps, with filter states and scores.
+// The part of a track after the detections that an edit keeps. The first of its detections have
+// filter states and scores, in order; those after them are planned.
 template <typename Filter>
 struct Tail {
   std::vector<std::int32_t> nodes;

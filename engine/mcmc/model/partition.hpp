@@ -22,6 +22,7 @@
 #include "mcmc/model/continuations.hpp"
 #include "mcmc/model/detection_window.hpp"
 #include "mcmc/model/edits.hpp"
+#include "mcmc/model/link_gains.hpp"
 #include "mcmc/model/path_filter.hpp"
 
 namespace asterism {
@@ -40,6 +41,8 @@ class Partition {
 
   const DetectionWindow& window() const { return window_; }
   Filter& filter() const { return filter_; }  // mutable: it only caches values
+  typename Filter::Expected& expected() const { return expected_; }  // working memory
+  const Continuations<Filter>& continuations() const { return later_; }
   const MotionModel& motion() const { return m_; }
   const ScoreModel& model() const { return sm_; }
 
@@ -59,6 +62,17 @@ class Partition {
   bool is_continuation(std::int32_t i) const { return window_[i].frame > window_.last_open(); }
   const State& state(std::int32_t i) const { return state_[i]; }
   double score(std::int32_t i) const { return score_[i]; }
+  // The time of the partition advances with every change of a track. `changed` is the time of the
+  // last change of the track of i, or of i itself if it is in none.
+  std::int64_t clock() const { return clock_; }
+  std::int64_t changed(std::int32_t i) const {
+    return track_of_[i] >= 0 ? tracks_[track_of_[i]].stamp : stamp_[i];
+  }
+  // The gain of the score by a link from the present state of i to j; a reference to NaN if it is
+  // not known yet.
+  double& known_gain(std::int32_t i, std::int32_t j) const {
+    return gains_.of(stamp_[i], window_.version(), j);
+  }
 
   // Detections in no track, in a track, and in a track after another detection; none is settled.
   const IndexSet& free() const { return free_; }
@@ -70,7 +84,11 @@ class Partition {
   const IndexSet& tracks() const { return all_; }
   const IndexSet& young() const { return young_; }
 
-  std::int32_t last(std::int32_t k) const { return track(k).nodes.back(); }
+  // First and last detection of a track, and their frames.
+  std::int32_t first(std::int32_t k) const { return begins_[k].detection; }
+  std::int32_t last(std::int32_t k) const { return ends_[k].detection; }
+  std::int64_t first_frame(std::int32_t k) const { return begins_[k].frame; }
+  std::int64_t last_frame(std::int32_t k) const { return ends_[k].frame; }
   // The previous or next detection of the track, -1 if there is none.
   std::int32_t before(std::int32_t i) const {
     return place_[i] > 0 ? track(track_of_[i]).nodes[place_[i] - 1] : -1;
@@ -94,6 +112,7 @@ class Partition {
     const std::int32_t i = last(k);
     return score_[i] + end_score(i);
   }
+  // The edit must be filtered.
   double score_of(const Edit<Filter>& edit) const {
     if (!edit.tail.nodes.empty()) return edit.tail.scores.back() + end_score(edit.tail.nodes.back());
     if (edit.keep == 0) return 0;
@@ -106,46 +125,6 @@ class Partition {
     return sum;
   }
 
-  // Appends a detection to the tail of an edit, with its continuation if it has one.
-  void append(Edit<Filter>& edit, std::int32_t j) const {
-    Tail<Filter>& tail = edit.tail;
-    State& state = tail.states.emplace_back();
-    if (edit.keep == 0 && tail.nodes.empty()) {
-      state = filter_.begin(m_, window_[j].y, window_[j].frame);
-      tail.scores.push_back(begin_score());
-    } else {
-      const bool is_first = tail.nodes.empty();
-      const std::int32_t i =
-          is_first ? tracks_[edit.track].nodes[edit.keep - 1] : tail.nodes.back();
-      const State& from = is_first ? state_[i] : tail.states[tail.states.size() - 2];
-      const int gap = static_cast<int>(window_[j].frame - window_[i].frame);
-      filter_.expect(m_, window_, from, window_[i].frame, gap, expected_);
-      const double gain = gap_score(gap) + filter_.take(m_, expected_, window_[j].y, state);
-      tail.scores.push_back((is_first ? score_[i] : tail.scores.back()) + gain);
-    }
-    tail.nodes.push_back(j);
-    if (is_continuation(j)) tail.scores.back() += later_.advance(m_, window_, filter_, j, state);
-  }
-  // Whether every continuation is in a track after the edits.
-  bool keeps_continuations(std::span<const Edit<Filter>> edits) const {
-    for (const Edit<Filter>& edit : edits) {
-      if (edit.track < 0 || edit.keep == track(edit.track).size()) continue;
-      const std::int32_t end = last(edit.track);
-      if (is_continuation(end) && std::ranges::none_of(edits, [&](const Edit<Filter>& other) {
-            return !other.tail.nodes.empty() && other.tail.nodes.back() == end;
-          }))
-        return false;
-    }
-    return true;
-  }
-
-  // Appends the present next detection, whose state and score stay valid without earlier changes.
-  void append_same(Edit<Filter>& edit, std::int32_t j) const {
-    edit.tail.nodes.push_back(j);
-    edit.tail.states.push_back(state_[j]);
-    edit.tail.scores.push_back(score_[j]);
-  }
-
   // Applies the edits. A track without detections is removed and its number reused.
   void apply(std::span<Edit<Filter>> edits) {
     for (Edit<Filter>& edit : edits) {
@@ -156,8 +135,10 @@ class Partition {
       assert(all_.has(edit.track));
       Track& t = tracks_[edit.track];
       assert(edit.keep >= t.n_frozen && edit.keep <= t.size());
+      t.stamp = ++clock_;
       for (std::int32_t p = edit.keep; p < t.size(); ++p) release(t.nodes[p]);
       t.nodes.resize(edit.keep);
+      if (edit.keep > 0) end_at(edit.track, t.nodes.back());
     }
     for (const Edit<Filter>& edit : edits) {
       Track& t = tracks_[edit.track];
@@ -285,7 +266,7 @@ class Partition {
       --t.n_frozen;
       ++t.n_gone;
       for (const std::int32_t j : t.nodes) --place_[j];
-      if (t.nodes.empty()) remove_track(k);
+      t.nodes.empty() ? remove_track(k) : begin_at(k, t.nodes.front());
     }
     window_.drop();
   }
@@ -313,6 +294,7 @@ class Partition {
     track_of_.resize(n, kFree);
     place_.resize(n);
     state_.resize(n);
+    stamp_.resize(n);
     score_.resize(n);
     for (IndexSet* set : {&free_, &taken_, &linked_, &leapt_}) set->reserve_up_to(n);
   }
@@ -333,10 +315,15 @@ class Partition {
     track_of_[i] = k;
     place_[i] = tracks_[k].size();
     state_[i] = state;
+    stamp_[i] = ++clock_;
     score_[i] = score;
+    if (place_[i] == 0) begin_at(k, i);
+    end_at(k, i);
     tracks_[k].nodes.push_back(i);
     if (!is_frozen(i)) list(i);
   }
+  void begin_at(std::int32_t k, std::int32_t i) { begins_[k] = {i, window_[i].frame}; }
+  void end_at(std::int32_t k, std::int32_t i) { ends_[k] = {i, window_[i].frame}; }
   void adopt(std::int32_t k, std::int32_t i, const State& state, double score) {
     put(k, i, state, score);
     filter_.adopt(state_[i]);
@@ -350,6 +337,7 @@ class Partition {
   }
   void release(std::int32_t i) {
     track_of_[i] = kFree;
+    stamp_[i] = ++clock_;
     taken_.remove(i);
     linked_.remove(i);
     leapt_.remove(i);
@@ -359,6 +347,8 @@ class Partition {
     std::int32_t k = static_cast<std::int32_t>(tracks_.size());
     if (unused_.empty()) {
       tracks_.emplace_back();
+      begins_.emplace_back();
+      ends_.emplace_back();
       all_.reserve_up_to(k + 1);
       young_.reserve_up_to(k + 1);
     } else {
@@ -367,6 +357,7 @@ class Partition {
     }
     tracks_[k].n_frozen = tracks_[k].n_gone = 0;
     tracks_[k].id = -1;
+    tracks_[k].stamp = ++clock_;
     all_.add(k);
     young_.add(k);
     return k;
@@ -385,12 +376,21 @@ class Partition {
   std::int64_t n_after_ = 0;  // frames of the capture after the window
   Continuations<Filter> later_;
   std::vector<Track> tracks_;
+  // Beside the tracks, because moves compare the ends of all of them.
+  struct End {
+    std::int32_t detection = -1;
+    std::int64_t frame = 0;
+  };
+  std::vector<End> begins_, ends_;
   std::vector<std::int32_t> unused_;
   IndexSet free_, taken_, linked_, leapt_, all_, young_;
   std::vector<std::int32_t> track_of_, place_;
   std::vector<State> state_;
+  std::vector<std::int64_t> stamp_;  // of the state, or of the release
+  std::int64_t clock_ = 0;
   std::vector<double> score_;
   mutable Filter filter_;
+  mutable LinkGains gains_;
   mutable typename Filter::Expected expected_{};  // scratch
   std::vector<std::int32_t> origin_;  // of a part: numbers of its detections in the whole partition
 };

@@ -6,7 +6,8 @@
 //   expect      prediction from a state after a gap
 //   center, radius, log_likelihood   of a prediction: its position, the radius within which the log
 //               likelihood exceeds a value, and the log likelihood of a point
-//   take        state after the update with a point
+//   weigh       the log likelihood of the point with which `take` will update
+//   take        state after the update with this point
 #pragma once
 
 #include <algorithm>
@@ -97,7 +98,10 @@ class OneMotion {
       return e.log_peak - 0.5 * (m.axis.D * std::log1p(y.r / e.S) + d2 / (e.S + y.r));
     return e.log_peak - 0.5 * d2 / e.S;
   }
-  double take(const MotionModel& m, const Expected& e, const Point& y, State& out) const {
+  static double weigh(const MotionModel& m, Expected& e, const Point& y) {
+    return log_likelihood(m, e, y);
+  }
+  void take(const MotionModel& m, const Expected& e, const Point& y, State& out) const {
     const KalmanGain& gain = pattern_of(e).gain;
     const double share = gain.share(y);
     static_cast<AxisState&>(out) = e.state;
@@ -105,7 +109,6 @@ class OneMotion {
       for (int i = 0; i < m.axis.n; ++i) out.x[d][i] += share * gain.K[i] * (y[d] - e.center[d]);
     out.P = gain.covariance(m.axis.n, share);
     out.node = y.r > 0 ? -1 : e.node;
-    return log_likelihood(m, e, y);
   }
 
  private:
@@ -142,6 +145,8 @@ class SeveralMotions {
   struct Expected {
     State state;
     Prediction prediction;
+    std::array<double, kMaxModes> each{};  // of the point of `weigh`
+    double log_likelihood = 0;
   };
 
   void remember(const DetectionWindow&) {}
@@ -164,9 +169,12 @@ class SeveralMotions {
     std::array<double, kMaxModes> each{};
     return e.prediction.log_likelihood(y, each);
   }
-  static double take(const MotionModel& m, const Expected& e, const Point& y, State& out) {
+  static double weigh(const MotionModel&, Expected& e, const Point& y) {
+    return e.log_likelihood = e.prediction.log_likelihood(y, e.each);
+  }
+  static void take(const MotionModel& m, const Expected& e, const Point& y, State& out) {
     out = e.state;
-    return update(m, e.prediction, y, out);
+    update(m, e.each, e.log_likelihood, y, out);
   }
 };
 

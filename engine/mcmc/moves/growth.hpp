@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "math/random.hpp"
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 
 namespace asterism {
@@ -47,17 +48,19 @@ class Growth {
       const bool is_first = edit.tail.nodes.empty();
       const std::int32_t i =
           is_first ? p_.track(own_).nodes[keep_ - 1] : edit.tail.nodes.back();
-      const State& state = is_first ? p_.state(i) : edit.tail.states.back();
+      // For unchanged detections the state of the partition, from which gains are remembered.
+      const bool is_present = n_same == keep_ + static_cast<std::int32_t>(edit.tail.nodes.size());
+      const State& state = is_present ? p_.state(i) : edit.tail.states.back();
       const std::int32_t j = opt_.is_informed ? draw_informed(i, state, is_forced, random, log_p)
                                               : draw_uniform(i, is_forced, random, log_p);
       if (j < 0) return log_p;
       const auto place = keep_ + static_cast<std::int32_t>(edit.tail.nodes.size());
       if (n_same == place && own_ >= 0 && place < p_.track(own_).size() &&
           p_.track(own_).nodes[place] == j) {
-        p_.append_same(edit, j);
+        append_same(p_, edit, j);
         ++n_same;
       } else {
-        p_.append(edit, j);
+        append(p_, edit, j);
       }
     }
   }
@@ -86,20 +89,17 @@ class Growth {
   void list_free(std::int32_t i) {
     const DetectionWindow& window = p_.window();
     free_.clear();
-    const std::int64_t frame = window[i].frame;
-    const std::int64_t last = std::min(frame + window.max_gap(), window.now());
-    for (std::int64_t t = frame + 1; t <= last; ++t) {
-      const std::size_t n = free_.size();
-      for (const std::int32_t j : window.frame(t).ids)
-        if (is_free(j) && window.is_linkable(i, j))
-          free_.push_back({static_cast<std::int32_t>(t - frame), j});
-      std::sort(free_.begin() + static_cast<std::ptrdiff_t>(n), free_.end());
+    const auto offer = [&](std::int32_t j) {
+      if (window.is_linkable(i, j))
+        free_.push_back({static_cast<std::int32_t>(window[j].frame - window[i].frame), j});
+    };
+    for (const std::int32_t j : p_.free().items()) offer(j);
+    if (own_ >= 0) {
+      const auto& nodes = p_.track(own_).nodes;
+      for (std::size_t n = keep_; n < nodes.size(); ++n)
+        if (!p_.is_continuation(nodes[n])) offer(nodes[n]);
     }
-  }
-  // Whether a detection is in no track, or in the part of the edited track that it does not keep.
-  bool is_free(std::int32_t j) const {
-    return p_.is_free(j) ? !p_.is_continuation(j)
-                         : own_ >= 0 && p_.track_of(j) == own_ && p_.place_of(j) >= keep_;
+    std::sort(free_.begin(), free_.end());
   }
   double log_stop() const {
     const int max_gap = p_.window().max_gap();
@@ -149,20 +149,17 @@ class Growth {
   // Lists the possible successors of i and their weights. Returns the total weight, including that
   // of stopping.
   double weigh(std::int32_t i, const State& state, bool is_forced) {
-    const DetectionWindow& window = p_.window();
-    const std::int64_t frame = window[i].frame;
+    const bool is_present = &state == &p_.state(i);
     choices_.clear();
     weights_.clear();
     list_free(i);
     double sum = 0;
     int expected_gap = 0;
-    for (const auto& [gap, j] : free_) {
-      if (gap != expected_gap)
-        p_.filter().expect(p_.motion(), window, state, frame, gap, expected_, expected_gap);
-      expected_gap = gap;
-      const double gain =
-          p_.gap_score(gap) + Filter::log_likelihood(p_.motion(), expected_, window[j].y);
-      choices_.push_back(j);
+    for (const Follower& f : free_) {
+      double unknown = std::numeric_limits<double>::quiet_NaN();
+      double& gain = is_present ? p_.known_gain(i, f.detection) : unknown;
+      if (std::isnan(gain)) gain = gain_of(i, state, f, std::exchange(expected_gap, f.gap));
+      choices_.push_back(f.detection);
       weights_.push_back(std::exp(std::min(gain, 500.0)) + opt_.floor);
       sum += weights_.back();
     }
@@ -170,6 +167,14 @@ class Growth {
     choices_.push_back(-1);
     weights_.push_back(std::exp(p_.end_score(i)));
     return sum + weights_.back();
+  }
+  // The gain by one successor. `expected_gap` is the gap of the present prediction, 0 for none.
+  double gain_of(std::int32_t i, const State& state, const Follower& f, int expected_gap) {
+    const DetectionWindow& window = p_.window();
+    if (f.gap != expected_gap)
+      p_.filter().expect(p_.motion(), window, state, window[i].frame, f.gap, expected_, expected_gap);
+    return p_.gap_score(f.gap) +
+           Filter::log_likelihood(p_.motion(), expected_, window[f.detection].y);
   }
 
   std::int32_t draw_informed(std::int32_t i, const State& state, bool is_forced, Random& random,

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 #include "mcmc/moves/change.hpp"
 #include "mcmc/moves/track_edits.hpp"
@@ -31,14 +32,14 @@ class Toggles {
  public:
   explicit Toggles(const Partition<Filter>& partition) : p_(partition), edits_(partition) {}
 
-  // Returns false if the move is impossible.
+  // Returns false if the move is impossible. It must then be weighed.
   bool propose(const Toggle& t, Change<Filter>& out) const {
     out.n_edits = 0;
     out.log_forward = out.log_reverse = 0;
-    if (!draw(t, out) || !p_.keeps_continuations(out.all())) return false;
-    edits_.weigh(out);
-    return true;
+    return draw(t, out) && keeps_continuations<Filter>(p_, out.all());
   }
+  // Computes the gain of the proposed move. Returns false if it does not exceed out.min_gain.
+  bool weigh(Change<Filter>& out) const { return edits_.weigh(out); }
 
  private:
   bool draw(const Toggle& t, Change<Filter>& out) const {
@@ -109,13 +110,12 @@ class Toggles {
     if (p_.is_free(a)) {
       if (p_.is_free(y)) {
         Edit<Filter>& e = q.edit(-1, 0);
-        p_.append(e, a);
-        p_.append(e, y);
+        e.tail.nodes = {a, y};
         return true;
       }
       if (!is_taken(y) || !is_first(y)) return false;
       Edit<Filter>& e = q.edit(p_.track_of(y), 0);
-      p_.append(e, a);
+      e.tail.nodes.push_back(a);
       edits_.append(e, e.track, 0);
       return true;
     }

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "math/random.hpp"
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 #include "mcmc/moves/change.hpp"
 #include "mcmc/moves/growth.hpp"
@@ -31,16 +32,18 @@ class Moves {
   Moves(const Partition<Filter>& partition, const GrowthOptions& growth)
       : p_(partition), edits_(partition), growth_(partition, growth) {}
 
-  // Draws ω'. Returns false if the draw is impossible, so that the chain stays.
+  // Draws ω'. Returns false if the draw is impossible, so that the chain stays. It must then be
+  // weighed.
   bool propose(Move move, Random& random, Change<Filter>& out) {
     out.move = move;
     out.n_edits = 0;
     out.log_forward = 0;
     out.with = -1;
-    if (!draw(random, out) || !p_.keeps_continuations(out.all())) return false;
-    edits_.weigh(out);
-    return out.log_forward > Growth<Filter>::kNever;
+    return draw(random, out) && keeps_continuations<Filter>(p_, out.all()) &&
+           out.log_forward > Growth<Filter>::kNever;
   }
+  // Computes the gain of the proposed move. Returns false if it does not exceed out.min_gain.
+  bool weigh(Change<Filter>& out) const { return edits_.weigh(out); }
 
   double log_reverse(const Change<Filter>& q) {
     if (q.n_edits == 0) return q.log_forward;  // the reverse move has the same probability
@@ -54,7 +57,7 @@ class Moves {
         return -log(p_.free().size() + p_.track(first.track).size()) +
                growth_.log_probability(first.track, 1, true);
       case Move::split:
-        return -log(p_.tracks().size() + 1) - log(n_starts_after(node(first.track, first.keep - 1)) + 1);
+        return -log(p_.tracks().size() + 1) - log(n_starts_after(before(p_, first, 0)) + 1);
       case Move::merge:
         return -log(p_.tracks().size() - 1) - log(n_new - 1 - min_kept(first.track));
       case Move::extension:
@@ -91,9 +94,6 @@ class Moves {
     }();
     const auto at = static_cast<std::size_t>(n);
     return at < table.size() ? table[at] : std::log(static_cast<double>(n));
-  }
-  std::int32_t node(std::int32_t track, std::int32_t place) const {
-    return p_.track(track).nodes[place];
   }
   // Smallest number of detections that a track keeps when it is cut, or in an update.
   std::int32_t min_kept(std::int32_t track) const {
@@ -144,7 +144,7 @@ class Moves {
     const std::int32_t i = draw_one(p_.free(), random, q);
     if (i < 0) return false;
     Edit<Filter>& e = q.edit(-1, 0);
-    p_.append(e, i);
+    append(p_, e, i);
     q.log_forward += growth_.grow(e, true, random);
     return e.tail.nodes.size() > 1;
   }
@@ -172,18 +172,23 @@ class Moves {
     const std::int32_t k = draw_one(p_.tracks(), random, q);
     if (k < 0) return false;
     starts_.clear();
-    for (const std::int32_t other : p_.young().items())
-      if (p_.window().is_linkable(p_.last(k), node(other, 0))) starts_.push_back(other);
+    each_start_after(p_.last(k), [&](std::int32_t other) { starts_.push_back(other); });
     if (starts_.empty()) return false;
     const std::int32_t other = draw_one(starts_, random, q);
     edits_.append(q.edit(k, p_.track(k).size()), other, 0);
     q.edit(other, 0);
     return true;
   }
-  // The number of tracks without settled detections whose first detection may follow i.
+  // Calls visit for the tracks without settled detections whose first detection may follow i.
+  template <typename Visit>
+  void each_start_after(std::int32_t i, Visit&& visit) const {
+    const std::int64_t frame = p_.window()[i].frame;
+    for (const std::int32_t k : p_.young().items())
+      if (p_.first_frame(k) > frame && p_.window().is_linkable(i, p_.first(k))) visit(k);
+  }
   std::int32_t n_starts_after(std::int32_t i) const {
     std::int32_t n = 0;
-    for (const std::int32_t k : p_.young().items()) n += p_.window().is_linkable(i, node(k, 0));
+    each_start_after(i, [&](std::int32_t) { ++n; });
     return n;
   }
 
@@ -259,7 +264,7 @@ class Moves {
       if (window[d].frame > last && window[p_.before(d)].frame < last && window.is_linkable(a, d))
         visit(d);
     for (const std::int32_t k : p_.young().items())
-      if (window[node(k, 0)].frame > last && window.is_linkable(a, node(k, 0))) visit(node(k, 0));
+      if (p_.first_frame(k) > last && window.is_linkable(a, p_.first(k))) visit(p_.first(k));
   }
   // The number of partners of the link a → d in ω', after the exchange of the tails.
   std::int32_t n_partners_after(const Change<Filter>& q) const {
@@ -302,10 +307,10 @@ class Moves {
         offer(p_.track_of(j), p_.place_of(j), i, j);
     }
     for (const std::int32_t k : p_.tracks().items())
-      if (k != own && window[p_.last(k)].frame < frame)
+      if (p_.last_frame(k) < frame && k != own)
         offer(k, p_.track(k).size(), p_.last(k), -1);
     for (const std::int32_t k : p_.young().items())
-      if (k != own && window[node(k, 0)].frame > frame) offer(k, 0, -1, node(k, 0));
+      if (p_.first_frame(k) > frame && k != own) offer(k, 0, -1, p_.first(k));
     if (own >= 0) offer(own, p_.place_of(x), p_.before(x), p_.after(x));
   }
   bool draw_insertion(Random& random, Change<Filter>& q) {
@@ -334,8 +339,10 @@ class Moves {
     const std::int32_t own = p_.track_of(b);
     if (p_.track(own).n_gone + p_.place_of(b) < 2) return false;
     starts_.clear();
+    const std::int64_t frame = p_.window()[b].frame;
     for (const std::int32_t k : p_.tracks().items())
-      if (k != own && p_.window().is_linkable(p_.last(k), b)) starts_.push_back(k);
+      if (p_.last_frame(k) < frame && k != own && p_.window().is_linkable(p_.last(k), b))
+        starts_.push_back(k);
     if (starts_.empty()) return false;
     const std::int32_t other = draw_one(starts_, random, q);
     q.with = b;

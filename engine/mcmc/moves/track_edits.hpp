@@ -2,8 +2,11 @@
 // edit.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <vector>
 
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 #include "mcmc/moves/change.hpp"
 
@@ -14,16 +17,35 @@ class TrackEdits {
  public:
   explicit TrackEdits(const Partition<Filter>& partition) : p_(partition) {}
 
-  // Computes the gain of a proposed change.
-  void weigh(Change<Filter>& q) const {
+  // Computes the gain of a proposed change, whose edits may be planned. Returns false as soon as the
+  // gain cannot exceed `min_gain`, even if each of the remaining detections had its largest gain.
+  bool weigh(Change<Filter>& q) const {
+    double most = 0;  // an upper bound of the gain
+    std::size_t n_last = 0;
+    for (const Edit<Filter>& e : q.all()) {
+      most += max_score_of(p_, e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
+      n_last = std::max(n_last, e.tail.nodes.size());
+    }
+    if (!(most > q.min_gain - kRounding)) return false;
+    for (std::size_t n = 0; n < n_last; ++n)
+      for (Edit<Filter>& e : q.all()) {
+        if (n < e.tail.states.size() || n >= e.tail.nodes.size()) continue;
+        const double highest = max_gain(p_, e, n);
+        const auto goes_on = [&](double gain) {
+          most += gain - highest;
+          return most > q.min_gain - kRounding;
+        };
+        if (!filter_next(p_, e, goes_on)) return false;
+      }
     q.gain = 0;
     for (const Edit<Filter>& e : q.all())
       q.gain += p_.score_of(e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
+    return q.gain > q.min_gain;
   }
-  // Appends the detections of a track from an index on.
+  // Plans the detections of a track from an index on.
   void append(Edit<Filter>& edit, std::int32_t track, std::int32_t from) const {
     const auto& nodes = p_.track(track).nodes;
-    for (std::size_t n = from; n < nodes.size(); ++n) p_.append(edit, nodes[n]);
+    edit.tail.nodes.insert(edit.tail.nodes.end(), nodes.begin() + from, nodes.end());
   }
   // Whether the track without x is still valid.
   bool may_go(std::int32_t x) const {
@@ -39,7 +61,7 @@ class TrackEdits {
   // Inserts y into a track at an index.
   void put_in(std::int32_t y, std::int32_t track, std::int32_t place, Change<Filter>& q) const {
     Edit<Filter>& e = q.edit(track, place);
-    p_.append(e, y);
+    e.tail.nodes.push_back(y);
     append(e, track, place);
   }
   // Replaces a detection by a free one. Returns false if a link would be impossible.
@@ -66,9 +88,11 @@ class TrackEdits {
   void put_in_place_of(std::int32_t y, std::int32_t x, Change<Filter>& q) const {
     const std::int32_t k = p_.track_of(x);
     Edit<Filter>& e = q.edit(k, p_.place_of(x));
-    p_.append(e, y);
+    e.tail.nodes.push_back(y);
     append(e, k, p_.place_of(x) + 1);
   }
+
+  static constexpr double kRounding = 1e-6;  // far above the rounding of a sum of scores
 
   const Partition<Filter>& p_;
 };

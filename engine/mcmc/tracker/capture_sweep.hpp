@@ -28,6 +28,7 @@
 #include "mcmc/chain/ambiguous_links.hpp"
 #include "mcmc/chain/budgets.hpp"
 #include "mcmc/chain/split.hpp"
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 
 namespace asterism {
@@ -212,7 +213,7 @@ class CaptureSweep {
     const auto follow = [&](Edit<Filter>& edit, std::int32_t i) {
       for (; i != kNone && local_.contains(i); i = after_[i]) {
         if (i >= end_of(block.last)) p.continue_with(local_.at(i), later_points(i, from, to));
-        p.append(edit, local_.at(i));
+        append(p, edit, local_.at(i));
       }
     };
     // In order of their first detections.

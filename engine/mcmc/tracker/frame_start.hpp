@@ -11,6 +11,7 @@
 #include "base/scratch.hpp"
 #include "mcmc/chain/ambiguous_links.hpp"
 #include "mcmc/chain/chain_stats.hpp"
+#include "mcmc/model/edit_filter.hpp"
 #include "mcmc/model/partition.hpp"
 #include "solve/assignment.hpp"
 
@@ -65,7 +66,7 @@ class FrameStart {
       Edit<Filter>& edit = s_.edits.emplace_back();
       edit.track = s_.rows[r];
       edit.keep = p.track(edit.track).size();
-      p.append(edit, ids[j]);
+      append(p, edit, ids[j]);
     }
     s_.missed.clear();
     for (std::int32_t r = 0; r < n_rows; ++r)
@@ -116,8 +117,8 @@ class FrameStart {
       } else if (is_here && p.is_free(i)) {
         s_.row_given[c] = kNewTrack;
         Edit<Filter>& edit = s_.edits.emplace_back();
-        p.append(edit, i);
-        p.append(edit, j);
+        append(p, edit, i);
+        append(p, edit, j);
       } else if (!is_new) {
         ++stats.n_refused;
       }

@@ -107,7 +107,7 @@ class McmcTracker {
           sweep_.put_back(blocks[b], part);
         } else {
           const auto shares =
-              chains_.sample(part.partition, split.groups, budgets, seed, stats.chain);
+              chains_.sample(part.partition, split.groups, {}, budgets, seed, stats.chain);
           sweep_.keep_states(blocks[b], part);
           take_shares(blocks[b], part, shares, sure);
         }
@@ -189,14 +189,15 @@ class McmcTracker {
   void run_chains(const std::vector<char>& is_sure, Allowed&& allowed, std::uint64_t phase,
             SampledStats& stats, WantsConfidence&& wants_confidence) {
     const Split split = split_up(partition_, ambiguous_, is_sure, stats);
-    chains_.search(partition_, split.groups,
-                  allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1), seed_of(phase),
-                  stats.chain);
+    const auto unchanged = chains_.search(
+        partition_, split.groups, allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1),
+        seed_of(phase), stats.chain);
     if (!wants_confidence()) return;
     // The search may have changed the tracks.
     const Split now = Splitter<Filter>(partition_, opt_.split).split(ambiguous_, is_sure);
-    keep_shares(chains_.sample(partition_, now.groups, allowed(now.groups, opt_.confidence, 1),
-                              seed_of(phase + 1), stats.chain));
+    keep_shares(chains_.sample(partition_, now.groups, unchanged,
+                               allowed(now.groups, opt_.confidence, 1), seed_of(phase + 1),
+                               stats.chain));
   }
 
   // Stores the confidences of a block for the frames that are at least as far inside it as in any

@@ -48,8 +48,9 @@ class JPDA(EngineMethod):
     ----------
     max_states : int
         Largest number of states of the exact sum over a group's events, 1 to 2^30. Larger groups
-        are summed over a beam of that size, and ``info["bound"]`` bounds the error. Larger values
-        need more time and memory.
+        are divided at links whose marginal is at most 10⁻⁶; what is still larger is summed over a
+        beam of that size. ``info["bound"]`` bounds the error. Larger values need more time and
+        memory.
     guard : bool
         Whether to prevent coalescence of tracks. Of all events that differ only by a permutation
         of tracks, only the most probable one updates them (JPDA*; Blom & Bloem 2000). Marginals
