@@ -108,6 +108,26 @@ def test_the_marker_set_of_one_capture_names_the_next(person, capsys):
     assert np.quantile(off, 0.99) < 0.002
 
 
+def test_one_command_tracks_names_and_fills(person, capsys):
+    run("markerset learn person.csv -o subject.toml", capsys)
+    line = "track p.c3d --markers subject.toml --fill -o named.c3d --report page.html --run runs/a"
+    out = run(line, capsys)
+    for row in ("names given", "names not found", "gaps filled", "page.html"):
+        assert row in out
+    truth, named = am.io.read_tracks("person.csv"), am.read("named.c3d")
+    assert set(filter(None, named.names)) <= set(truth.names)
+    assert len([name for name in named.names if name]) > 0.95 * truth.n_tracks
+    assert named.filled.any()
+    summary = json.loads(Path("runs/a/summary.json").read_text())
+    assert summary["naming"]["n_named"] >= 50
+    assert summary["filled"]["n_filled"] > 0
+    run("track --from runs/a/run.toml -o again.c3d", capsys)
+    assert Path("again.c3d").read_bytes() == Path("named.c3d").read_bytes()
+    am.MarkerSet.from_toml("subject.toml").of_subject("Ann").to_toml("other.toml")
+    err = refused("track --from runs/a/run.toml --markers other.toml -o b.c3d", capsys)
+    assert "--markers: expected those of" in err
+
+
 def test_sets_are_merged_and_names_checked(person, capsys):
     run("markerset learn person.csv -o one.toml", capsys)
     run("markerset learn person.csv -o two.toml", capsys)

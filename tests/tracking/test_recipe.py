@@ -64,3 +64,24 @@ def test_the_hash_of_the_input_is_computed_when_it_is_read(monkeypatch):
         patch.setattr("asterism.model.recipe.sha256_of", None)
         lazy = am.track(DETECTIONS, "gnn", model=small_model()).recipe
     assert lazy.sha256 == recipe.sha256 == sha256_of(DETECTIONS)
+
+
+def test_names_and_filled_gaps_are_repeated():
+    truth = am.simulate.person(frames=120, seed=3)
+    made = am.learn_marker_set(truth)
+    capture = am.simulate.corrupt(truth, missing=0.05, clutter=0.05, noise=3e-4, seed=1).detections
+    tracks = am.track(capture, marker_set=made, fill=True)
+    assert set(filter(None, tracks.names)) == set(truth.names)
+    assert tracks.names[: len(made)] == made.names
+    assert tracks.detections.filled.any()
+    again = am.track(capture, marker_set=[made], recipe=tracks.recipe)
+    assert (again.labels == tracks.labels).all()
+    assert (again.detections.points == tracks.detections.points).all()
+    assert am.model.Recipe.from_dict(tracks.recipe.to_dict()) == tracks.recipe
+    with pytest.raises(am.ParameterError, match="marker_set: expected the marker sets of that run"):
+        am.track(capture, recipe=tracks.recipe)
+    other = made.of_subject("Ann")
+    with pytest.raises(am.ParameterError, match="marker_set"):
+        am.track(capture, marker_set=other, recipe=tracks.recipe)
+    with pytest.raises(am.ParameterError, match="no setting beside it, found fill"):
+        am.track(capture, marker_set=made, fill=True, recipe=tracks.recipe)

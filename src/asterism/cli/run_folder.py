@@ -11,7 +11,7 @@ import logging
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import asterism as am
 from asterism.checks import check_fields
@@ -40,16 +40,23 @@ class Run:
         Path of the capture.
     format : str
         Format of the result, a key of `asterism.io.CAPTURE_FORMATS`.
+    markers : tuple of Path
+        Marker sets by which the tracks are named.
     """
 
     recipe: Recipe
     source: Path
     format: str
+    markers: tuple[Path, ...] = ()
 
     def write(self, path: Path) -> None:
         """Write the run as ``run.toml``."""
         values = self.recipe.to_dict()
         values["input"] = {"path": str(self.source.resolve()), **values["input"]}
+        values["names"] = {
+            "paths": [str(path.resolve()) for path in self.markers],
+            **values["names"],
+        }
         write_text(path, write_toml({**values, "output": {"format": self.format}}, None))
 
     @classmethod
@@ -63,7 +70,7 @@ class Run:
         """
         values = read_toml(path, "a run.toml")
         try:
-            names = ("input", "output", "method", "model", "versions")
+            names = ("input", "output", "method", "names", "model", "versions")
             check_fields("run", values, names)
             for name in names:
                 if not isinstance(values.get(name), dict):
@@ -72,12 +79,16 @@ class Run:
             for name, text in (("input.path", source), ("output.format", format)):
                 if not isinstance(text, str):
                     raise ParameterError(name, "a text", repr(text))
+            markers = values["names"].pop("paths", [])
+            if not isinstance(markers, list):
+                raise ParameterError("names.paths", "a list of files", repr(markers))
             check_fields("output.format", [format], am.io.CAPTURE_FORMATS)
             recipe = Recipe.from_dict(values)
             am.tracking.method_by_name(recipe.method, **recipe.options)
         except ParameterError as error:
             raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
-        return cls(recipe=recipe, source=Path(source), format=format)
+        paths = tuple(Path(str(path)) for path in cast("list[Any]", markers))
+        return cls(recipe=recipe, source=Path(source), format=format, markers=paths)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import asterism as am
+from asterism.cli.naming import naming_figures, naming_rows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,8 +46,14 @@ class Summary:
         Number of detections with a confidence below `UNCERTAIN`; None without a confidence.
     info : dict
         Figures of the method, such as the error of approximations.
+    naming : dict or None
+        Names and their probabilities as plain values; None without marker sets.
+    filled : dict or None
+        Number of gaps and of those that were filled; None if none were to be filled.
     truncated : str
         Place at which the capture is cut off, and the missing part; empty for a complete one.
+    named : tuple of (str, str)
+        Names as rows of the printed table.
     """
 
     input: str
@@ -64,7 +71,10 @@ class Summary:
     log_posterior: float | None
     n_uncertain: int | None
     info: dict[str, float]
+    naming: dict[str, Any] | None = None
+    filled: dict[str, int] | None = None
     truncated: str = ""
+    named: tuple[tuple[str, str], ...] = ()
 
     def rows(self) -> list[tuple[str, str]]:
         """Return the figures as rows of the printed table."""
@@ -80,12 +90,19 @@ class Summary:
             ("gaps", str(self.n_gaps)),
             *((("longest gaps"), gap) if i == 0 else ("", gap) for i, gap in enumerate(gaps)),
             *stitching_rows(self.info),
+            *self.named,
+            *self._filled(),
             *self._certainty(),
             *self._posterior(),
             *([("input truncated", self.truncated)] if self.truncated else []),
             ("time", f"{self.seconds:.3g} s, {self.frames_per_second:,.0f} frames/s"),
             ("written", self.output),
         ]
+
+    def _filled(self) -> list[tuple[str, str]]:
+        if self.filled is None:
+            return []
+        return [("gaps filled", f"{self.filled['n_filled']} of {self.filled['n_gaps']}")]
 
     def _posterior(self) -> list[tuple[str, str]]:
         if self.log_posterior is None:
@@ -113,7 +130,9 @@ class Summary:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain values."""
-        return dataclasses.asdict(self)
+        values = dataclasses.asdict(self)
+        del values["named"]  # the same as `naming`, as it is printed
+        return values
 
 
 def stitching_rows(info: Mapping[str, float]) -> list[tuple[str, str]]:
@@ -124,13 +143,13 @@ def stitching_rows(info: Mapping[str, float]) -> list[tuple[str, str]]:
     return [("stitching", text)]
 
 
-def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> Summary:
+def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: float) -> Summary:
     """Compute the figures of a finished tracking.
 
     Parameters
     ----------
-    tracks : Tracks
-        Result of `track` for a `Capture`.
+    result : Tracked
+        Result of `am.tracking.carry_out` for a `Capture`.
     out : Path
         File of the result.
     method : str
@@ -138,6 +157,7 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
     seconds : float
         Running time.
     """
+    tracks, naming, filling = result.tracks, result.naming, result.filling
     d = tracks.detections
     assert isinstance(d, am.Capture)
     order, _ = tracks.by_track
@@ -167,5 +187,10 @@ def summarize(tracks: am.Tracks, *, out: Path, method: str, seconds: float) -> S
         if tracks.confidence is None
         else int((tracks.confidence[order] < UNCERTAIN).sum()),
         info=info,
+        naming=None if naming is None else naming_figures(naming),
+        filled=None
+        if filling is None
+        else {"n_gaps": len(filling.gaps), "n_filled": filling.n_filled},
         truncated=d.truncated,
+        named=() if naming is None else tuple(naming_rows(naming)),
     )

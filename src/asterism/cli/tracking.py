@@ -123,10 +123,12 @@ def _carry_out(run: Run, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
     method.init(recipe.model, n_axes=capture.n_axes)  # loads the engine before the time is measured
     start = time.perf_counter()
     with progress(f"tracking with {recipe.method}", capture.n_frames) as advance:
-        tracks = am.track(
-            capture, recipe=recipe, progress=advance,
+        result = am.tracking.carry_out(
+            recipe, capture, progress=advance,
             start=capture.tracks if recipe.has_start else None,
+            marker_sets=[am.read_marker_set(path) for path in run.markers],
         )  # fmt: skip
+        tracks = result.tracks
     seconds = time.perf_counter() - start
     if capture.n_points and not tracks.n_tracks:
         log.warning(
@@ -135,7 +137,7 @@ def _carry_out(run: Run, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
             capture.path,
         )
     am.write(tracks, out, format=run.format)
-    summary = summarize(tracks, out=out, method=recipe.method, seconds=seconds)
+    summary = summarize(result, out=out, method=recipe.method, seconds=seconds)
     for name, text in summary.rows():
         log.info("%s %s", name, text)
     return tracks, summary

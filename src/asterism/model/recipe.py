@@ -88,6 +88,11 @@ class Recipe:
         Whether the method starts from given tracks, which are then needed to repeat it.
     reason : str
         Reason why this method was selected; empty if the caller named the method.
+    markers : str
+        SHA-256 of the marker sets by which the tracks are named, which are then needed to repeat
+        the recipe; empty for none.
+    fill : bool
+        Whether gaps are filled.
     input_hash : InputHash
         Hash of the detections and of the initial labels.
     versions : dict of str
@@ -113,6 +118,8 @@ class Recipe:
     seed: int | None
     has_start: bool
     reason: str
+    markers: str
+    fill: bool
     input_hash: InputHash
     versions: dict[str, str]
 
@@ -137,7 +144,7 @@ class Recipe:
         >>> import asterism as am
         >>> recipe = am.track(am.simulate.cube(frames=20, seed=1).detections, "gnn").recipe
         >>> list(recipe.to_dict())
-        ['input', 'method', 'model', 'versions']
+        ['input', 'method', 'names', 'model', 'versions']
         """
         return {
             "input": {"sha256": self.sha256},
@@ -150,6 +157,7 @@ class Recipe:
                 # TOML has no null value.
                 "options": _replaced(self.options, None, NONE),
             },
+            "names": {"markers": self.markers, "fill": self.fill},
             "model": self.model.to_dict(),
             "versions": self.versions,
         }
@@ -175,8 +183,10 @@ class Recipe:
         >>> am.model.Recipe.from_dict(recipe.to_dict()) == recipe
         True
         """
-        check_fields("recipe", map(str, values), ("input", "method", "model", "versions"))
-        method = _table(values, "method")
+        sections = ("input", "method", "names", "model", "versions")
+        check_fields("recipe", map(str, values), sections)
+        method, names = _table(values, "method"), _table(values, "names")
+        check_fields("names", map(str, names), ("markers", "fill"))
         keys = ("name", "seed", "start", "stitch", "reason", "options")
         check_fields("method", map(str, method), keys)
         if (seed := method.get("seed")) is not None:
@@ -189,6 +199,8 @@ class Recipe:
             seed=seed,
             has_start=_value(method, "method.start", bool),
             reason=_value({"reason": "", **method}, "method.reason", str),
+            markers=_value(names, "names.markers", str),
+            fill=_value(names, "names.fill", bool),
             input_hash=InputHash(_value(_table(values, "input"), "input.sha256", str)),
             versions={str(k): str(v) for k, v in _table(values, "versions").items()},
         )

@@ -23,7 +23,7 @@ from asterism.tracking.naming import (
     merge_marker_sets,
     name_tracks,
 )
-from asterism.tracking.pipeline import track
+from asterism.tracking.pipeline import Tracked, carry_out, track
 from asterism.tracking.plan import Plan, plan_tracking
 from asterism.tracking.rigidity import Bonds, learn_bonds
 from asterism.tracking.stitching import (
@@ -57,7 +57,9 @@ __all__ = [
     "Stitched",
     "StitchedState",
     "Stitching",
+    "Tracked",
     "Update",
+    "carry_out",
     "check_names",
     "choose_method",
     "estimate_model",

@@ -1,4 +1,4 @@
-"""Tracking pipeline: model, method, association, stitching."""
+"""Tracking pipeline: model, method, association, stitching, names, gaps."""
 
 from __future__ import annotations
 
@@ -8,22 +8,56 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from asterism.checks import check_kind
 from asterism.errors import ParameterError
-from asterism.model import Detections, Recipe, TrackingModel, Tracks
+from asterism.model import Detections, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import sha256_of, versions
+from asterism.records import record
+from asterism.tracking.filling import fill_gaps
 from asterism.tracking.methods import METHODS, method_by_name
 from asterism.tracking.methods.associate import associate
-from asterism.tracking.plan import plan_tracking
+from asterism.tracking.naming import name_tracks
+from asterism.tracking.plan import hash_of_sets, plan_tracking
 from asterism.tracking.stitching import stitch as stitch_tracklets
 from asterism.tracking.stitching import tracklet_model
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    from asterism.tracking.filling import Filling
     from asterism.tracking.methods import Method
+    from asterism.tracking.naming import Naming
 
-__all__ = ["track"]
+__all__ = ["Tracked", "carry_out", "track"]
 
 log = logging.getLogger(__name__)
+
+
+@record(eq=False)
+class Tracked:
+    """Result of a recipe, with the reports of its last steps.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Result of the last step.
+    naming : Naming, optional
+        Names with their probabilities; None without marker sets.
+    filling : Filling, optional
+        Every gap; None if gaps are not filled.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.simulate.cube(frames=40, seed=1).detections
+    >>> am.tracking.carry_out(am.tracking.plan_tracking(d, "gnn").recipe, d).tracks.n_tracks
+    8
+    """
+
+    tracks: Tracks
+    naming: Naming | None = None
+    filling: Filling | None = None
+
+    def __repr__(self) -> str:
+        return f"Tracked({self.tracks!r})"
 
 
 def track(
@@ -34,6 +68,8 @@ def track(
     stitch: bool | Literal["auto"] = "auto",
     seed: int | None = None,
     start: Tracks | None = None,
+    marker_set: MarkerSet | Sequence[MarkerSet] = (),
+    fill: bool = False,
     recipe: Recipe | None = None,
     progress: Callable[[int], Any] | None = None,
 ) -> Tracks:
@@ -57,19 +93,24 @@ def track(
     start : Tracks, optional
         Initial tracks of the same detections, for example those of a file. `MCMCDA` repairs them
         by merging, splitting and switching.
+    marker_set : MarkerSet or sequence of MarkerSet, optional
+        Marker set of the subject, or of each subject, by which `name_tracks` names the tracks.
+    fill : bool
+        Whether `fill_gaps` fills the gaps of the tracks.
     recipe : Recipe, optional
         ``tracks.recipe`` of an earlier call, which is repeated bit for bit. It replaces `method`,
-        `model`, `stitch` and `seed`.
+        `model`, `stitch`, `seed` and `fill`; initial tracks and marker sets are given again.
     progress : callable, optional
         Called from time to time with the number of finished frames.
 
     Returns
     -------
     Tracks
-        Labels for the same detections, without filled ones; tracks are numbered in the order of
-        confirmation. ``recipe`` repeats the call (None for a method that is not in `METHODS`). If
-        no method was given, ``recipe.chosen`` is the selected method and the reason.
-        ``info["log_posterior"]`` is the score by which methods are compared (`log_posterior`);
+        Labels for the same detections; filled ones are added with `fill` only. Tracks are numbered
+        in the order of confirmation, named tracks in the order of the marker sets. ``recipe``
+        repeats the call (None for a method that is not in `METHODS`). If no method was given,
+        ``recipe.chosen`` is the selected method and the reason. ``info["log_posterior"]`` is the
+        score by which methods are compared (`log_posterior`);
         stitched tracks have none, because the model excludes gaps of that length. The rest of
         ``info`` depends on the method.
 
@@ -90,14 +131,61 @@ def track(
     >>> bool((again.labels == tracks.labels).all())
     True
     """
+    sets = (marker_set,) if isinstance(marker_set, MarkerSet) else tuple(marker_set)
+    made = None
     if recipe is None:
-        plan = plan_tracking(detections, method, model=model, stitch=stitch, seed=seed, start=start)
+        plan = plan_tracking(
+            detections, method, model=model, stitch=stitch, seed=seed, start=start,
+            marker_sets=sets, fill=fill,
+        )  # fmt: skip
         recipe, made = plan.recipe, plan.method
     else:
-        given = {"method": method, "model": model, "seed": seed}
+        given = {"method": method, "model": model, "seed": seed, "fill": fill or None}
         given["stitch"] = None if stitch == "auto" else stitch
-        _check_recipe(recipe, given, detections, start)
-        made = method_by_name(recipe.method, **recipe.options)
+        _check_recipe(recipe, given, detections, start, sets)
+    return carry_out(
+        recipe, detections, made, start=start, marker_sets=sets, progress=progress
+    ).tracks
+
+
+def carry_out(
+    recipe: Recipe,
+    detections: Detections,
+    method: Method[Any] | None = None,
+    *,
+    start: Tracks | None = None,
+    marker_sets: Sequence[MarkerSet] = (),
+    progress: Callable[[int], Any] | None = None,
+) -> Tracked:
+    """Carry out a recipe: associate, stitch, name and fill, with a report of each last step.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        Settings, for example of `plan_tracking`; the input is not compared with its hash.
+    detections : Detections
+        Unnamed points.
+    method : Method, optional
+        Method of the recipe; needed only if it is not in `METHODS`.
+    start : Tracks, optional
+        Initial tracks of a recipe that has some.
+    marker_sets : sequence of MarkerSet
+        Marker sets of a recipe that names tracks.
+    progress : callable, optional
+        Called from time to time with the number of finished frames of the association.
+
+    Returns
+    -------
+    Tracked
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> d = am.simulate.cube(frames=40, seed=1).detections
+    >>> am.tracking.carry_out(am.tracking.plan_tracking(d, "gnn").recipe, d).naming is None
+    True
+    """
+    made = method_by_name(recipe.method, **recipe.options) if method is None else method
     model = tracklet_model(recipe.model) if recipe.stitch else recipe.model
     carried = recipe if made.name in METHODS else None
     # Stitched tracks have no log posterior.
@@ -107,11 +195,19 @@ def track(
     )  # fmt: skip
     if recipe.stitch:
         tracks = dataclasses.replace(stitch_tracklets(tracks, model).tracks, recipe=carried)
-    return tracks
+    naming = name_tracks(tracks, *marker_sets) if recipe.markers else None
+    tracks = tracks if naming is None else naming.tracks
+    filling = fill_gaps(tracks, model=recipe.model) if recipe.fill else None
+    tracks = tracks if filling is None else filling.tracks
+    return Tracked(tracks=tracks, naming=naming, filling=filling)
 
 
 def _check_recipe(
-    recipe: Recipe, given: dict[str, Any], detections: Detections, start: Tracks | None
+    recipe: Recipe,
+    given: dict[str, Any],
+    detections: Detections,
+    start: Tracks | None,
+    marker_sets: Sequence[MarkerSet],
 ) -> None:
     """Raise `ParameterError` unless the recipe is the only setting and has the same input."""
     check_kind("recipe", recipe, Recipe, "tracks.recipe")
@@ -122,6 +218,9 @@ def _check_recipe(
     if recipe.has_start != (start is not None):
         expected = "the initial tracks of that run" if recipe.has_start else "none"
         raise ParameterError("start", expected, "none" if start is None else "tracks")
+    if (found := hash_of_sets(marker_sets)) != recipe.markers:
+        expected = f"the marker sets of that run, SHA-256 {recipe.markers}"
+        raise ParameterError("marker_set", expected if recipe.markers else "none", found or "none")
     found = sha256_of(detections, None if start is None else start.labels)
     if found != recipe.sha256:
         hint = "track the same input, or plan a new run"

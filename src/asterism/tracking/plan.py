@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import TYPE_CHECKING, Any, Literal
 
 from asterism.checks import check_kind, check_number
 from asterism.errors import ParameterError
-from asterism.model import Detections, Recipe, TrackingModel
+from asterism.model import Detections, MarkerSet, Recipe, TrackingModel
 from asterism.model.recipe import InputHash, versions
 from asterism.records import record
 from asterism.tracking.choose import choose_method
@@ -14,10 +15,12 @@ from asterism.tracking.estimation import estimate_model
 from asterism.tracking.methods import SMP, Method, method_by_name, options_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from asterism.model import Tracks
     from asterism.tracking.estimation import ModelEstimate
 
-__all__ = ["Plan", "plan_tracking"]
+__all__ = ["Plan", "hash_of_sets", "plan_tracking"]
 
 
 @record
@@ -55,6 +58,8 @@ def plan_tracking(
     stitch: bool | Literal["auto"] = "auto",
     seed: int | None = None,
     start: Tracks | None = None,
+    marker_sets: Sequence[MarkerSet] = (),
+    fill: bool = False,
 ) -> Plan:
     """Decide the model, the method and the stitching of a tracking, without running it.
 
@@ -72,6 +77,10 @@ def plan_tracking(
         Seed of the methods that draw random numbers; 0 by default.
     start : Tracks, optional
         Initial tracks, which `MCMCDA` repairs.
+    marker_sets : sequence of MarkerSet
+        Marker sets by which the tracks are named, as for `track`.
+    fill : bool
+        Whether gaps are filled.
 
     Returns
     -------
@@ -117,10 +126,21 @@ def plan_tracking(
         seed=seed,
         has_start=start is not None,
         reason=reason,
+        markers=hash_of_sets(marker_sets),
+        fill=fill,
         input_hash=InputHash((detections, None if start is None else start.labels)),
         versions=versions(),
     )
     return Plan(recipe=recipe, method=method, estimate=estimate)
+
+
+def hash_of_sets(marker_sets: Sequence[MarkerSet]) -> str:
+    """Return the SHA-256 of marker sets, in hexadecimal; empty for none."""
+    if not marker_sets:
+        return ""
+    for made in marker_sets:
+        check_kind("marker_set", made, MarkerSet, "am.read_marker_set(path)")
+    return hashlib.sha256("".join(made.to_toml() for made in marker_sets).encode()).hexdigest()
 
 
 def _checked(method: Method[Any] | str) -> Method[Any]:

@@ -62,6 +62,15 @@ _Stitch = Annotated[
         help="Make short tracklets and stitch them through occlusions, whatever auto selects.",
     ),
 ]
+_Markers = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--markers",
+        metavar="SET",
+        help="Marker set that names the tracks, TOML, VSK or VST; one for each subject.",
+    ),
+]
+_Fill = Annotated[bool, typer.Option("--fill", help="Fill the gaps of the tracks.")]
 _Run = Annotated[
     Path | None,
     typer.Option(
@@ -91,6 +100,8 @@ def track(
     seed: _Seed = None,
     start: _Start = False,
     stitch: _Stitch = False,
+    markers: _Markers = None,
+    fill: _Fill = False,
     run: _Run = None,
     overwrite: Overwrite = False,
     repeat: _From = None,
@@ -119,6 +130,8 @@ def track(
 
         asterism track trial.c3d --report trial.html
 
+        asterism track trial.c3d --markers subject.toml --fill
+
         asterism track trial.c3d --run runs/first
 
         asterism track --from runs/first/run.toml -o again.c3d
@@ -133,9 +146,11 @@ def track(
     job: Run | None = None
     if repeat is not None:
         settings = {"--method": method, "--option": option, "--model": model, "--seed": seed,
-                    "--start": start or None, "--stitch": stitch or None}  # fmt: skip
+                    "--start": start or None, "--stitch": stitch or None,
+                    "--fill": fill or None}  # fmt: skip
         job = _run_of(repeat, source, [k for k, v in settings.items() if v not in (None, [])])
         source, format = job.source, format or job.format
+        markers = markers or list(job.markers)
     if source is None:
         raise ParameterError("IN", "a capture to track", "nothing", "see asterism track --help")
     chosen_format = output_format(out, format, format_of(source).name)
@@ -143,14 +158,15 @@ def track(
         out = default_output(source, chosen_format)
         out = out if run is None else run / out.name
     outputs = _outputs(out, run) | {"--report": report}
-    check_outputs(outputs, [source, model, repeat], overwrite=overwrite)
+    check_outputs(outputs, [source, model, repeat, *(markers or [])], overwrite=overwrite)
+    sets = [am.read_marker_set(path) for path in markers or []]
     chosen_method = made_method(method, option or [])
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
     given = None if model is None else read_model(model)
     capture = am.read(source)
     if job is not None:
         assert repeat is not None
-        recipe, estimate = _checked(job, capture, repeat), None
+        recipe, estimate = _checked(job, capture, sets, repeat), None
     else:
         if start and method not in (None, am.tracking.AUTO, am.MCMCDA.name):
             expected = f"--method {am.MCMCDA.name}, or no --method"
@@ -161,6 +177,7 @@ def track(
             plan = am.tracking.plan_tracking(
                 capture, chosen_method, model=given, stitch=True if stitch else "auto",
                 seed=seed or 0, start=capture.tracks if start else None,
+                marker_sets=sets, fill=fill,
             )  # fmt: skip
         recipe, estimate = plan.recipe, plan.estimate
     if run is not None:
@@ -172,7 +189,7 @@ def track(
             print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
         if recipe.chosen:
             print_table([("method", recipe.chosen)])
-    job = Run(recipe=recipe, source=source, format=chosen_format)
+    job = Run(recipe=recipe, source=source, format=chosen_format, markers=tuple(markers or []))
     tracks, summary = carry_out(job, capture, out, run)
     if report is not None:
         _write_report(tracks, report, recipe, estimate, summary)
@@ -235,11 +252,15 @@ def _run_of(path: Path, source: Path | None, settings: list[str]) -> Run:
     return job
 
 
-def _checked(job: Run, capture: am.Capture, path: Path) -> Recipe:
-    """Return the recipe of a run, if the capture is its input."""
+def _checked(job: Run, capture: am.Capture, sets: list[am.MarkerSet], path: Path) -> Recipe:
+    """Return the recipe of a run, if the capture and the marker sets are its input."""
     from asterism.model.recipe import sha256_of
+    from asterism.tracking.plan import hash_of_sets
 
     recipe = job.recipe
+    if (found := hash_of_sets(sets)) != recipe.markers:
+        expected = f"those of {path}, SHA-256 {recipe.markers}" if recipe.markers else "none"
+        raise ParameterError("--markers", expected, found or "none")
     found = sha256_of(capture, capture.labels if recipe.has_start else None)
     if found != recipe.sha256:
         raise FormatError(
