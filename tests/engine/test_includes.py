@@ -9,7 +9,8 @@ from tests.paths import ROOT
 ENGINE = ROOT / "engine"
 ROOMS = (
     "math", "base", "filter", "solve", "rigid", "tracks", "frame", "trees", "mht",
-    "mcmc/model", "mcmc/moves", "mcmc/chain", "mcmc/tracker", "stitch", "camera", "multiview",
+    "mcmc/model", "mcmc/moves", "mcmc/chain", "mcmc/tracker", "stitch", "naming",
+    "camera", "multiview",
     "python",
 )  # fmt: skip
 """From the ground up; a file includes files of its own room and of rooms before it."""

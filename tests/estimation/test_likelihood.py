@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.tracking.estimation.fitted_motion import MotionFit
 from asterism.tracking.estimation.likelihood import TrackLikelihood
-from asterism.tracking.estimation.motion_fit import MotionFit
 from asterism.tracking.estimation.quasi_newton import maximise
 from tests.scenes import small_model, wanderers
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import field, replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -241,7 +242,7 @@ class MarkerSet:
         from asterism.model.marker_set_file import to_text
         from asterism.model.toml_file import write_text
 
-        return write_text(to_text(self), path)
+        return write_text(to_text(SimpleNamespace(**vars(self))), path)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:

@@ -23,10 +23,9 @@ from asterism.model.toml_file import read_toml
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
+    from types import SimpleNamespace
 
     from numpy.typing import NDArray
-
-    from asterism.model.marker_set import MarkerSet
 
 __all__ = ["FORMAT", "read_fields", "to_text"]
 
@@ -34,9 +33,8 @@ FORMAT = "asterism marker set 1"
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def to_text(made: MarkerSet) -> str:
-    """Return a marker set as TOML text."""
-    assert made.quads is not None
+def to_text(made: SimpleNamespace) -> str:
+    """Return the fields of a `MarkerSet` as TOML text."""
     lines = [f'format = "{FORMAT}"']
     if made.subject:
         lines.append(f"subject = {json.dumps(made.subject, ensure_ascii=False)}")
@@ -64,7 +62,7 @@ def to_text(made: MarkerSet) -> str:
     lines += ["", "# Distances: usual, movement within a subject, variation between subjects."]
     rounded = [np.round(x, 5) for x in (made.distances, made.movements, made.variations)]
     for i, name in enumerate(made.names):
-        known = [j for j in range(i + 1, len(made)) if np.isfinite(made.distances[i, j])]
+        known = [j for j in range(i + 1, len(made.names)) if np.isfinite(made.distances[i, j])]
         lines += [f"[distances.{_key(name)}]"] if known else []
         lines += [f"{_key(made.names[j])} = {_numbers([x[i, j] for x in rounded])}" for j in known]
     return "\n".join(lines) + "\n"

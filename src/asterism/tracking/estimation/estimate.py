@@ -30,11 +30,11 @@ from asterism.model import (
 )
 from asterism.model.posterior import track_scores
 from asterism.tracking.estimation.evidence import Evidence, Region, gather_evidence
+from asterism.tracking.estimation.fitted_motion import MotionFit
 from asterism.tracking.estimation.model_estimate import ModelEstimate, motion_levels, reasons_for
 from asterism.tracking.estimation.motion_fit import (
     MIN_GAIN,
     FitBounds,
-    MotionFit,
     fit_motion,
     fit_one_motion,
     polish,

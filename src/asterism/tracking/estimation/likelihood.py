@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from asterism.tracking.estimation.motion_fit import MotionFit
+    from asterism.tracking.estimation.fitted_motion import MotionFit
 
 __all__ = ["TrackLikelihood"]
 

@@ -10,19 +10,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.model import (
-    DWNA,
-    InteractingMotions,
-    Motion,
-    RandomWalk,
-    TrackingModel,
-    Tracks,
-)
 from asterism.records import record
+from asterism.tracking.estimation.fitted_motion import Kind, MotionFit
 from asterism.tracking.estimation.likelihood import TrackLikelihood
 from asterism.tracking.estimation.quasi_newton import maximise
 
@@ -31,9 +24,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["MIN_GAIN", "FitBounds", "MotionFit", "fit_motion", "fit_one_motion", "polish"]
+    from asterism.model import TrackingModel, Tracks
 
-Kind = Literal["dwna", "random_walk"]
+__all__ = ["MIN_GAIN", "FitBounds", "fit_motion", "fit_one_motion", "polish"]
+
 KINDS: tuple[Kind, ...] = ("dwna", "random_walk")
 SEARCH_POINTS, FIT_POINTS = 1500, 4000
 """Numbers of detections in the likelihood of a search from afar, and of a fit."""
@@ -51,66 +45,6 @@ MAX_NEWTON_STEP = 0.3
 """Largest Newton step of a logarithm towards the maximum of the likelihood."""
 FLAT = 1e-10
 """Ratio of curvatures below which a parameter has no maximum to double precision."""
-JOLT = 0.1
-"""Share of jolts among the transitions from quiet or busy; a jolt lasts two frames on average."""
-
-
-@record
-class MotionFit:
-    """Fitted motion and noise.
-
-    Parameters
-    ----------
-    noise : float
-        σ, standard deviation of a measured coordinate, metres.
-    levels : tuple of float
-        Strength of each mode. DWNA: σ_a, m/s², of one mode or increasing of three (quiet, busy,
-        jolt). Random walk: σ_w, m/√s, of one mode.
-    stay : float
-        Probability that a marker stays quiet, or busy, for another frame; 1 for one mode.
-    kind : {"dwna", "random_walk"}
-        Class of the motion.
-    """
-
-    noise: float
-    levels: tuple[float, ...]
-    stay: float = 1.0
-    kind: Kind = "dwna"
-
-    @property
-    def transitions(self) -> NDArray[np.float64]:
-        """Probability of switching from mode (row) to mode (column) in a step."""
-        if len(self.levels) == 1:
-            return np.ones((1, 1))
-        leave = 1 - self.stay
-        return np.array(
-            [
-                [self.stay, (1 - JOLT) * leave, JOLT * leave],
-                [(1 - JOLT) * leave, self.stay, JOLT * leave],
-                [0.25, 0.25, 0.5],
-            ]
-        )
-
-    def motion(self, velocity_sigma: float) -> Motion:
-        """Return the motion model.
-
-        Parameters
-        ----------
-        velocity_sigma : float
-            Prior standard deviation of a velocity coordinate, m/s.
-
-        Returns
-        -------
-        Motion
-        """
-        if self.kind == "random_walk":
-            return RandomWalk(walk_sigma=self.levels[0])
-        models = tuple(
-            DWNA(acceleration_sigma=a, velocity_sigma=velocity_sigma) for a in self.levels
-        )
-        if len(models) == 1:
-            return models[0]
-        return InteractingMotions(models=models, transitions=self.transitions)
 
 
 @record

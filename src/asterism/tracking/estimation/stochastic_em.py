@@ -14,7 +14,8 @@ import numpy as np
 from asterism.model import Detections, TrackingModel, Tracks
 from asterism.records import record
 from asterism.tracking.estimation.evidence import Evidence
-from asterism.tracking.estimation.motion_fit import FitBounds, MotionFit, fit_motion, fit_one_motion
+from asterism.tracking.estimation.fitted_motion import MotionFit
+from asterism.tracking.estimation.motion_fit import FitBounds, fit_motion, fit_one_motion
 from asterism.tracking.estimation.rates import Counts, Rates, count
 from asterism.tracking.estimation.sampling import Runs
 from asterism.tracking.methods.mcmcda import MCMCDA
