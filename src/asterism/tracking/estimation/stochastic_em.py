@@ -14,7 +14,6 @@ import numpy as np
 from asterism.model import Detections, TrackingModel, Tracks
 from asterism.records import record
 from asterism.tracking.estimation.evidence import Evidence
-from asterism.tracking.estimation.fitted_motion import MotionFit
 from asterism.tracking.estimation.motion_fit import FitBounds, fit_motion, fit_one_motion
 from asterism.tracking.estimation.rates import Counts, Rates, count
 from asterism.tracking.estimation.sampling import Runs
@@ -22,6 +21,8 @@ from asterism.tracking.methods.mcmcda import MCMCDA
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from asterism.tracking.estimation.fitted_motion import MotionFit
 
 __all__ = ["Drawn", "draw_rates"]
 

@@ -28,6 +28,8 @@ __all__ = ["Found", "search"]
 
 REFINED = 3
 """Number of results of the rough search that are refined."""
+SAME_SIZE, SAME_WEIGHT = 0.002, 0.05
+"""Differences of the size and of a weight up to which the evidence is not computed again."""
 IN_TURN = 5
 """Number of nearest tracks with which a track may exchange names in turn."""
 
@@ -87,15 +89,18 @@ def search(
         names, score = rough.settled(names)
         settled[names.tobytes()] = (score, names)
     best = [n for _, n in sorted(settled.values(), key=lambda item: -item[0])[:REFINED]]
-    best = [rough.improved(best[0])[0], *best]
-    best += [start] if start is not None else []
+    # Given names are nearly right, so that the rough result needs no improvement beside them.
+    best = [rough.improved(best[0])[0] if start is None else start, *best]
     size, weights = refit(made, stats, best[0]) or (1.0, FIRST_WEIGHTS)
     evidence = evidence_of(made, stats, size=size, weights=weights)
     fine = searching(evidence)
     names, _ = max((fine.settled(names) for names in best), key=lambda item: item[1])
-    size, weights = refit(made, stats, names) or (size, weights)
-    evidence = evidence_of(made, stats, size=size, weights=weights)
-    names, score = searching(evidence).improved(names)
+    again = refit(made, stats, names)
+    if again is not None and _differs(again, (size, weights)):
+        size, weights = again
+        evidence = evidence_of(made, stats, size=size, weights=weights)
+        fine = searching(evidence)
+    names, score = fine.improved(names)
     named = names >= 0
     n_pairs = int(named[stats.pairs].all(axis=1).sum())
     return Found(
@@ -106,6 +111,12 @@ def search(
         evidence=evidence,
         mean_log_odds=(score + NONE * int(named.sum())) / max(n_pairs, 1),
     )
+
+
+def _differs(one: tuple[float, tuple[float, ...]], other: tuple[float, tuple[float, ...]]) -> bool:
+    """Return whether two fits of size and weights differ enough to change log odds."""
+    size = abs(one[0] - other[0]) > SAME_SIZE
+    return size or max(abs(a - b) for a, b in zip(one[1], other[1], strict=True)) > SAME_WEIGHT
 
 
 def _groups(made: MarkerSet) -> list[list[int]]:
