@@ -57,7 +57,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/identity.py --markdown docs/tables/identity.md
 	$(BIN)/python benchmarks/field.py --markdown docs/tables --figure docs/images/field_growth.svg
 	$(BIN)/python benchmarks/fills.py --markdown docs/tables/fills.md
-	$(BIN)/python benchmarks/recognition.py --markdown docs/tables/recognition.md
+	$(BIN)/python benchmarks/names.py --markdown docs/tables/names.md
 	$(BIN)/python benchmarks/bodies.py --markdown docs/tables/bodies.md
 	$(BIN)/python benchmarks/reconstruction.py --markdown docs/tables/reconstruction.md
 	$(BIN)/python benchmarks/estimation.py --markdown docs/tables/estimation.md

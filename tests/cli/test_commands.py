@@ -273,7 +273,7 @@ def test_examples_in_the_help_are_indented(capsys):
         examples = [line for line in lines if line.strip().startswith(f"asterism {command} ")]
         indented = [line for line in examples if line.startswith("     asterism")]
         assert indented == examples, command
-        assert examples or command in ("methods", "scenes", "camera"), command
+        assert examples or command in ("methods", "scenes", "camera", "markerset"), command
 
 
 WRITES = {"-o", "--by-frame"}

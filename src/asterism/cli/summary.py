@@ -157,7 +157,7 @@ def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: f
     seconds : float
         Running time.
     """
-    tracks, naming, filling = result.tracks, result.naming, result.filling
+    tracks, naming, filling = result.tracks.measured(), result.naming, result.filling
     d = tracks.detections
     assert isinstance(d, am.Capture)
     order, _ = tracks.by_track

@@ -185,6 +185,7 @@ def carry_out(
     >>> am.tracking.carry_out(am.tracking.plan_tracking(d, "gnn").recipe, d).naming is None
     True
     """
+    _warn_of_versions(recipe)
     made = method_by_name(recipe.method, **recipe.options) if method is None else method
     model = tracklet_model(recipe.model) if recipe.stitch else recipe.model
     carried = recipe if made.name in METHODS else None
@@ -225,6 +226,9 @@ def _check_recipe(
     if found != recipe.sha256:
         hint = "track the same input, or plan a new run"
         raise ParameterError("detections", f"SHA-256 {recipe.sha256}", found, hint)
+
+
+def _warn_of_versions(recipe: Recipe) -> None:
     for name, version in versions().items():
         before = recipe.versions.get(name)
         if before != version:

@@ -31,11 +31,14 @@ LONG = 60
 """Number of detections above which a longer track is no better."""
 FIRST_FRAMES = 100
 """Number of frames in which the first tracks are compared."""
-MIN_MEAN = 1.0
-"""Mean log odds of a distance below which a marker set does not fit the capture at all. Sets of
-another protocol reach 0.4 on real captures, those of other subjects 1.6 and more."""
-MIN_SHARE = 0.5
-"""Smallest share of the tracks, or of the markers if these are fewer, that a set must name."""
+MIN_MEAN, MIN_FIT = 0.7, 0.6
+"""Mean log odds of a distance, and share of the score that exact distances would have, below which
+a marker set does not fit the capture at all. On real captures of whole bodies, sets of another
+protocol reach 0.6 and 0.65, hardly ever both; labelling templates 0.8 and 0.65, and sets of other
+subjects 1.6 and 0.85 and more."""
+MIN_SHARE, MIN_FOUND = 0.5, 0.4
+"""Smallest share of the tracks, or of the markers if these are fewer, that a set must name, and
+smallest share of its markers that must be there."""
 MIN_DETECTIONS = 10
 """Smallest number of detections of a name in a capture."""
 MIN_SUBJECT = 0.75
@@ -212,9 +215,13 @@ def _first(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list
 
 
 def _fits(found: Found) -> bool:
-    n_tracks, n_named = len(found.names), int((found.names >= 0).sum())
-    expected = MIN_SHARE * min(n_tracks, found.evidence.n_markers)
-    return n_named >= max(expected, 1) and found.mean_log_odds >= MIN_MEAN
+    n_named, n_markers = int((found.names >= 0).sum()), found.evidence.n_markers
+    expected = max(MIN_SHARE * min(len(found.names), n_markers), MIN_FOUND * n_markers)
+    return n_named >= max(expected, 1) and _is_good(found)
+
+
+def _is_good(found: Found) -> bool:
+    return found.mean_log_odds >= MIN_MEAN and found.fit >= MIN_FIT
 
 
 def _positions(tracks: Tracks, alive: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,6 +44,7 @@ class Found:
     weights: tuple[float, ...]  # of the four kinds of fit of a distance
     evidence: _engine.NameEvidence
     mean_log_odds: float  # of a distance between two named tracks
+    fit: float  # score relative to that of tracks at exactly the distances of the set
 
 
 def search(
@@ -101,16 +102,31 @@ def search(
         evidence = evidence_of(made, stats, size=size, weights=weights)
         fine = searching(evidence)
     names, score = fine.improved(names)
-    named = names >= 0
-    n_pairs = int(named[stats.pairs].all(axis=1).sum())
+    exact = evidence_of(made, _at_the_set(made, stats, names, size), size=size, weights=weights)
+    n_named = int((names >= 0).sum())
+    n_pairs = int((names >= 0)[stats.pairs].all(axis=1).sum())
+    best = exact.total(names) + NONE * n_named
     return Found(
         names=names,
         score=score,
         size=size,
         weights=weights,
         evidence=evidence,
-        mean_log_odds=(score + NONE * int(named.sum())) / max(n_pairs, 1),
+        mean_log_odds=(score + NONE * n_named) / max(n_pairs, 1),
+        fit=(score + NONE * n_named) / best if best > 0 else 0.0,
     )
+
+
+def _at_the_set(
+    made: MarkerSet, stats: TrackStats, names: NDArray[np.int64], size: float
+) -> TrackStats:
+    """Return the tracks as if their distances were those of the markers that they are named."""
+    i, j = stats.pairs.T
+    middle = stats.distances.middle.copy()
+    exact = np.where((names[i] >= 0) & (names[j] >= 0), made.distances[names[i], names[j]], np.nan)
+    known = np.isfinite(exact)
+    middle[i[known], j[known]] = size * exact[known]
+    return replace(stats, distances=replace(stats.distances, middle=middle))
 
 
 def _differs(one: tuple[float, tuple[float, ...]], other: tuple[float, tuple[float, ...]]) -> bool:
