@@ -3,9 +3,9 @@
 A person of 53 markers at 100 Hz in bursts (up to 5 markers occluded at a time for 5 to 60 frames,
 up to 3 ghosts, 0.3 mm of noise), frame by frame from Python. The stream goes forward and backward
 through the recorded frames. Each frame is processed by a method alone. Where stitching is measured,
-it is also processed by the same method, stitched; the third row is the difference, frame by frame. Times are of the processor in the
-thread, because others share the machine. Memory is that of the process after a third of the stream
-and after all of it.
+it is also processed by the same method, stitched; the third row is the difference, frame by frame.
+Times are of the processor in the thread, because others share the machine. Memory is that of the
+process after a third of the stream and after all of it.
 
     python benchmarks/stream.py [--frames N] [--recorded N] [--methods NAME …] [--markdown FILE]
 """

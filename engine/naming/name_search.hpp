@@ -6,7 +6,7 @@
 //   swaps     two tracks exchange their names
 //   cycles    three near tracks exchange theirs in turn
 //   regroup   a group of markers and of their partners on the other side: the sides are exchanged,
-//             or the group is left without names and named anew from its surroundings
+//             or the group is left without names and named anew from its surroundings outwards
 #pragma once
 
 #include <algorithm>
@@ -48,13 +48,26 @@ class NameSearch {
   NamedState settled(Names names, std::span<const std::int32_t> rows, int rounds) {
     std::set<Names> seen;
     for (int round = 0; round < rounds; ++round) {
-      Names next = assigned(names, rows);
+      Names next = assigned(names, rows, evidence_.none());
       const bool is_known = next == names || !seen.insert(next).second;
       names = std::move(next);
       if (is_known) break;
     }
     const double score = evidence_.total(names);
     return {std::move(names), score};
+  }
+
+  // The same for tracks without names, from those next to named ones outwards: a track waits until
+  // its neighbours give it a high score.
+  NamedState grown(Names names, std::span<const std::int32_t> rows) {
+    for (const double least : {12.0, 6.0, 2.0})
+      for (int round = 0; round < kGrown; ++round) {
+        Names next = assigned(names, rows, least);
+        const bool is_same = next == names;
+        names = std::move(next);
+        if (is_same) break;
+      }
+    return settled(std::move(names), rows, kGrown);
   }
 
   void swaps(NamedState& state) {
@@ -99,11 +112,13 @@ class NameSearch {
               open[track[own]] = -1;
               rows.push_back(track[own]);
             }
-        // An exchange that costs this much is not made good by what follows from it.
-        if (evidence_.total(exchanged) > state.score - kHopelessShare * std::abs(state.score))
+        // What follows from the exchange of a small group does not make good such a loss; a whole
+        // body may have been named as its mirror image.
+        if (2 * rows.size() >= all_.size() ||
+            evidence_.total(exchanged) > state.score - kHopelessShare * std::abs(state.score))
           keep_better(best, settled(std::move(exchanged), all_, 3));
         std::ranges::sort(rows);
-        if (rows.size() >= 3) keep_better(best, settled(std::move(open), rows, 8));
+        if (rows.size() >= 3) keep_better(best, grown(std::move(open), rows));
       }
       if (!(best.score > state.score + kGain)) return;
       state = std::move(best);
@@ -135,8 +150,9 @@ class NameSearch {
     if (other.score > best.score + kGain) best = std::move(other);
   }
 
-  // Names by one exact assignment, each track's score given the names of all others.
-  Names assigned(const Names& names, std::span<const std::int32_t> rows) {
+  // Names by one exact assignment, each track's score given the names of all others; a score of at
+  // most `least` gives none.
+  Names assigned(const Names& names, std::span<const std::int32_t> rows, double least) {
     evidence_.scores(names, rows, scores_);
     Names out = names;
     for (const std::int32_t k : rows) out[k] = -1;
@@ -146,7 +162,7 @@ class NameSearch {
     candidates_.clear();
     for (const std::int32_t k : rows)
       for (std::int32_t m = 0; m < evidence_.n_markers(); ++m)
-        if (const double gain = at(k, m) - evidence_.none(); gain > 0 && !is_taken[m])
+        if (const double gain = at(k, m) - least; gain > 0 && !is_taken[m])
           candidates_.push_back({k, m, gain, 0});
     assignment_.solve_groups(candidates_, evidence_.n_markers(), out);
     return out;
@@ -179,6 +195,7 @@ class NameSearch {
 
   static constexpr int kRounds = 30;
   static constexpr int kRegroups = 4;
+  static constexpr int kGrown = 8;  // rounds with one smallest score
   static constexpr std::size_t kSwaps = 20, kCycles = 30;  // changes whose exact score is computed
   static constexpr double kGain = 1e-6;
   static constexpr double kHopelessShare = 0.15;

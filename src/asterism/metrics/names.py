@@ -96,7 +96,7 @@ def name_scores(
     code: dict[str | None, int] = {None: -1} | {name: i for i, name in enumerate(known)}
     found = np.array([code[name] for name in [*given, None]])[labels]
     right = np.array([code[name] for name in [*true, None]])[truth_labels]
-    partners = np.array([code.get(other_side(name or ""), -2) for name in known] + [-2])
+    partners = np.array([code.get(other_side(name or "") or "", -2) for name in known] + [-2])
     is_named = found >= 0
     is_swapped = is_named & (partners[found] == right)
     precision, recall, f1 = _by_name(found, right)

@@ -13,10 +13,9 @@ if TYPE_CHECKING:
 
 __all__ = ["bodies_of", "bodies_of_sets"]
 
-MAX_SPREAD = 0.06
-"""Largest spread of a distance that links two tracks, metres; across a joint it is smaller."""
-MAX_DISTANCE = 0.6
-"""Largest distance of two tracks that are linked, metres."""
+LINKS = ((0.06, 0.6), (0.03, 0.4), (0.02, 0.3), (0.01, 0.25))
+"""Largest spread and largest distance of two tracks that are linked, metres. Across a joint both
+are smaller than the first; the others separate subjects who move close to each other in step."""
 MIN_FRAMES = 3
 """Smallest number of common frames of two tracks that are linked."""
 MIN_TRACKS = 4
@@ -26,20 +25,34 @@ TEMPERATURE = 12.0
 subject vary together."""
 
 
-def bodies_of(positions: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+def bodies_of(positions: NDArray[np.float64], n_subjects: int) -> list[NDArray[np.int64]]:
     """Return the tracks of each body, the largest first; nothing if there is only one body.
 
     Parameters
     ----------
     positions : ndarray of shape (F, n, 3)
         Positions of n tracks, metres, NaN without a detection.
+    n_subjects : int
+        Number of subjects. Links are made stricter until there are as many bodies.
     """
+    bodies: list[NDArray[np.int64]] = []
+    for max_spread, max_distance in LINKS:
+        bodies = _linked(positions, max_spread, max_distance)
+        if len(bodies) >= n_subjects:
+            break
+    return bodies
+
+
+def _linked(
+    positions: NDArray[np.float64], max_spread: float, max_distance: float
+) -> list[NDArray[np.int64]]:
+    """Return the groups of tracks that links connect."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 
     found = distances_between(positions)
-    linked = (found.n_frames >= MIN_FRAMES) & (found.spread < MAX_SPREAD)
-    linked &= np.nan_to_num(found.middle, nan=np.inf) < MAX_DISTANCE
+    linked = (found.n_frames >= MIN_FRAMES) & (found.spread < max_spread)
+    linked &= np.nan_to_num(found.middle, nan=np.inf) < max_distance
     n, component = connected_components(csr_matrix(linked), directed=False)
     bodies = [np.flatnonzero(component == c) for c in range(n)]
     bodies = [body for body in bodies if len(body) >= MIN_TRACKS]

@@ -160,8 +160,10 @@ def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
     up, _ = up_axis(tracks.detections)
     found = _first(tracks, marker_sets, up)
     named = [
-        None if own is None else _all(tracks, made, own, up)
-        for made, own in zip(marker_sets, found, strict=True)
+        None
+        if own is None
+        else _all(_without(tracks, [*found[:s], *found[s + 1 :]]), made, own, up)
+        for s, (made, own) in enumerate(zip(marker_sets, found, strict=True))
     ]
     return _result(tracks, marker_sets, named)
 
@@ -192,7 +194,7 @@ def _first(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list
     if len(alive) < 2:
         return [None] * len(marker_sets)
     positions = _positions(tracks, alive)
-    subsets = [np.arange(len(alive)), *bodies_of(positions)]
+    subsets = [np.arange(len(alive)), *bodies_of(positions, len(marker_sets))]
     results: dict[tuple[int, int], Found] = {}
     for s, made in enumerate(marker_sets):
         for b, subset in enumerate(subsets):
@@ -218,6 +220,15 @@ def _fits(found: Found) -> bool:
     n_named, n_markers = int((found.names >= 0).sum()), found.evidence.n_markers
     expected = max(MIN_SHARE * min(len(found.names), n_markers), MIN_FOUND * n_markers)
     return n_named >= max(expected, 1) and _is_good(found)
+
+
+def _without(tracks: Tracks, others: list[_First | None]) -> Tracks:
+    """Return the tracks with those of other bodies as clutter."""
+    is_other = np.zeros(tracks.n_tracks + 1, dtype=bool)  # the last element is for clutter
+    for other in others:
+        if other is not None:
+            is_other[other.tracks] = True
+    return replace(tracks, labels=np.where(is_other[tracks.labels], -1, tracks.labels))
 
 
 def _is_good(found: Found) -> bool:
