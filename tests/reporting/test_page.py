@@ -369,3 +369,20 @@ def test_the_page_opens_where_the_capture_does(tmp_path):
     nothing = am.Detections.from_frames([0, 0.01], [np.empty((0, 3))] * 2)
     empty = am.Tracks(detections=nothing, labels=[])
     assert unpacked(written(tmp_path, empty))[0]["opens"] == 0
+
+
+def test_uncertain_names_and_changes_of_marker_are_listed():
+    truth = am.simulate.person(frames=60, seed=1)
+    naming = am.name_tracks(truth, am.learn_marker_set(truth))
+    assert [f for f in find_troubles(naming.tracks, None, naming) if "name" in f.kind] == []
+    p, other = naming.probabilities.copy(), list(naming.alternatives)
+    p[3], other[3] = 0.6, "LKNE"
+    change = am.tracking.NameChange(track=5, first=20, last=40, usual="C7", name=truth.names[5])
+    unsure = dataclasses.replace(
+        naming, probabilities=p, alternatives=tuple(other), changes=(change,)
+    )
+    found = {f.kind: f for f in find_troubles(naming.tracks, None, unsure)}
+    assert found["uncertain name"].track == naming.tracks.names.index(truth.names[3])
+    assert "probability 60%; LKNE has" in found["uncertain name"].reason
+    assert (found["changed marker"].track, found["changed marker"].frame) == (5, 20)
+    assert "frames 20 to 40: the track was on C7" in found["changed marker"].reason

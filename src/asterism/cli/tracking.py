@@ -82,7 +82,7 @@ def default_output(source: Path, format: str) -> Path:
 
 def carry_out(
     run: Run, capture: am.Capture, out: Path, folder: Path | None
-) -> tuple[am.Tracks, Summary]:
+) -> tuple[am.tracking.Tracked, Summary]:
     """Track a capture, and write the result and the files of the run.
 
     Parameters
@@ -98,18 +98,18 @@ def carry_out(
 
     Returns
     -------
-    Tracks, Summary
+    Tracked, Summary
     """
     if folder is None:
         return _carry_out(run, capture, out)
     with writing_log(folder):
         run.write(folder / CONFIG)
-        tracks, summary = _carry_out(run, capture, out)
+        result, summary = _carry_out(run, capture, out)
         write_text(folder / SUMMARY, to_json(summary.to_dict()) + "\n")
-        return tracks, summary
+        return result, summary
 
 
-def _carry_out(run: Run, capture: am.Capture, out: Path) -> tuple[am.Tracks, Summary]:
+def _carry_out(run: Run, capture: am.Capture, out: Path) -> tuple[am.tracking.Tracked, Summary]:
     recipe = run.recipe
     for warning in capture.warnings:
         log.info("%s: %s", capture.path, warning)
@@ -140,4 +140,4 @@ def _carry_out(run: Run, capture: am.Capture, out: Path) -> tuple[am.Tracks, Sum
     summary = summarize(result, out=out, method=recipe.method, seconds=seconds)
     for name, text in summary.rows():
         log.info("%s %s", name, text)
-    return tracks, summary
+    return result, summary

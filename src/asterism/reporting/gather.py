@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from asterism.model.upwards import Axis
+    from asterism.tracking import Naming
 
 __all__ = ["report"]
 
@@ -31,6 +32,7 @@ def report(
     *,
     truth: Tracks | None = None,
     rig: Rig | None = None,
+    naming: Naming | None = None,
     made: str = "",
     summary: Iterable[tuple[str, str]] = (),
     title: str | None = None,
@@ -52,6 +54,8 @@ def report(
         True tracks, as for `evaluate`. Wrong labels are marked, and scores are shown.
     rig : Rig, optional
         The cameras, drawn in the scene; the player looks through each. Only with 3-D tracks.
+    naming : Naming, optional
+        Result of `name_tracks` that gave the names; uncertain ones are listed as findings.
     made : str
         Sentence about the method and the model of the tracks.
     summary : iterable of (str, str)
@@ -107,6 +111,7 @@ def report(
         connections=connections_of(tracks),
         judgement=None if truth is None else judge(tracks, truth),
         rig=rig,
+        naming=naming,
     )
     text = page(contents)
     with replacing(path) as file:

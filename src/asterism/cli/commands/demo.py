@@ -74,7 +74,8 @@ def demo(
         )
         why_all += plan.recipe.chosen or ""
         run = Run(recipe=plan.recipe, source=out / "capture.c3d", format="c3d")
-        tracks, summary = carry_out(run, capture, folder / "tracked.c3d", folder)
+        result, summary = carry_out(run, capture, folder / "tracked.c3d", folder)
+        tracks = result.tracks
         am.write(tracks, folder / "tracked.csv")
         _draw(tracks, truth, folder)
         found = am.evaluate(tracks, truth).to_dict()

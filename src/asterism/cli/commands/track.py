@@ -190,9 +190,9 @@ def track(
         if recipe.chosen:
             print_table([("method", recipe.chosen)])
     job = Run(recipe=recipe, source=source, format=chosen_format, markers=tuple(markers or []))
-    tracks, summary = carry_out(job, capture, out, run)
+    result, summary = carry_out(job, capture, out, run)
     if report is not None:
-        _write_report(tracks, report, recipe, estimate, summary)
+        _write_report(result, report, recipe, estimate, summary)
     if prints:
         rows = summary.rows() + ([("report", str(report))] if report is not None else [])
         print_table(rows, title=f"\nTracked with {recipe.method}")
@@ -271,7 +271,7 @@ def _checked(job: Run, capture: am.Capture, sets: list[am.MarkerSet], path: Path
 
 
 def _write_report(
-    tracks: am.Tracks,
+    result: am.tracking.Tracked,
     page: Path,
     recipe: Recipe,
     estimate: am.tracking.ModelEstimate | None,
@@ -298,7 +298,7 @@ def _write_report(
         name, value, _ = reasons[0]
         made += f"The model was estimated from the capture ({name} {value}; the others are below)."
     with progress("writing the report"):
-        am.report(tracks, page, made=made, summary=rows)
+        am.report(result.tracks, page, naming=result.naming, made=made, summary=rows)
 
 
 def _print_capture(capture: am.Capture) -> None:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from asterism.camera import Rig
     from asterism.model import Tracks
     from asterism.model.upwards import Axis
+    from asterism.tracking import Naming
 
 __all__ = ["Connections", "Contents", "Judgement", "Score", "Verdict"]
 
@@ -112,6 +113,8 @@ class Contents:
         Comparison with the truth, None without a truth.
     rig : Rig or None
         Cameras, None if they are not known.
+    naming : Naming or None
+        Result of the naming by which the tracks have their names, None without one.
     """
 
     title: str
@@ -124,3 +127,4 @@ class Contents:
     connections: Connections
     judgement: Judgement | None = None
     rig: Rig | None = None
+    naming: Naming | None = None

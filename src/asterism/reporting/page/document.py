@@ -52,7 +52,7 @@ def page(contents: Contents) -> bytes:
         scripts and styles but its own.
     """
     script, style = _bundled("player.js"), _bundled("player.css")
-    findings = find_troubles(contents.tracks, contents.judgement)
+    findings = find_troubles(contents.tracks, contents.judgement, contents.naming)
     order = _by_trouble(contents, findings)
     play = played(contents, order)
     head = element(

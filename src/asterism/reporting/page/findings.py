@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asterism.model import Capture
 from asterism.reporting.page.errors import errors
 from asterism.reporting.page.runs import gaps_of
 from asterism.reporting.page.strange_steps import StrangeStep, strange_steps
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Tracks
     from asterism.reporting.page.contents import Judgement
+    from asterism.tracking import Naming
 
 __all__ = ["DOUBTFUL", "Finding", "find_troubles"]
 
@@ -25,7 +27,8 @@ DOUBTFUL = 0.9
 LONG = 0.1
 """Shortest long gap, seconds."""
 _WEIGHT = {  # what each kind counts beside the others
-    "wrong marker": 100.0, "switch": 80.0, "likely swap": 50.0, "jump": 10.0, "low confidence": 4.0,
+    "wrong marker": 100.0, "switch": 80.0, "likely swap": 50.0, "changed marker": 30.0,
+    "uncertain name": 20.0, "jump": 10.0, "low confidence": 4.0,
     "begun midway": 3.0, "ends early": 2.0, "long gap": 1.0, "missed": 1.0,
 }  # fmt: skip
 
@@ -55,7 +58,9 @@ class Finding:
     reason: str
 
 
-def find_troubles(tracks: Tracks, judgement: Judgement | None = None) -> list[Finding]:
+def find_troubles(
+    tracks: Tracks, judgement: Judgement | None = None, naming: Naming | None = None
+) -> list[Finding]:
     """Find the places at which tracks are most likely wrong.
 
     Parameters
@@ -64,6 +69,8 @@ def find_troubles(tracks: Tracks, judgement: Judgement | None = None) -> list[Fi
         Tracks of the page.
     judgement : Judgement, optional
         Comparison with the truth, whose errors are added.
+    naming : Naming, optional
+        Result of the naming, whose uncertain names and changes of marker are added.
 
     Returns
     -------
@@ -76,6 +83,8 @@ def find_troubles(tracks: Tracks, judgement: Judgement | None = None) -> list[Fi
             _finding(kind, track, frame, size, reason)
             for kind, track, frame, size, reason in errors(tracks, judgement)
         ]
+    if naming is not None:
+        found += _names(tracks, naming)
     return sorted(found, key=lambda f: (-f.weight, f.frame, f.track))
 
 
@@ -83,6 +92,29 @@ def _finding(kind: str, track: Any, frame: Any, size: float, reason: str) -> Fin
     return Finding(
         kind=kind, track=int(track), frame=int(frame), weight=_WEIGHT[kind] * size, reason=reason
     )
+
+
+def _names(tracks: Tracks, naming: Naming) -> Iterator[Finding]:
+    order, starts = tracks.by_track
+    frame = tracks.detections.frame_of
+    number = {name: k for k, name in enumerate(tracks.names) if name is not None}
+    least: dict[str, int] = {}  # the input track whose name is the least certain
+    for i, name in enumerate(naming.markers):
+        if name in number and naming.probabilities[i] < DOUBTFUL:
+            other = least.get(name, i)
+            least[name] = min(other, i, key=lambda j: float(naming.probabilities[j]))
+    for name, i in least.items():
+        p, q = naming.probabilities[i], naming.alternative_probabilities[i]
+        reason = f"probability {p:.0%}; {naming.alternatives[i] or 'no name'} has {q:.0%}"
+        first = frame[order[starts[number[name]]]]
+        yield _finding("uncertain name", number[name], first, 1 - float(p), reason)
+    d = tracks.detections
+    at = d.first_frame if isinstance(d, Capture) else 0
+    for change in naming.changes:
+        if change.name in number:
+            reason = f"frames {at + change.first} to {at + change.last}: the track was on "
+            reason += f"{change.usual or 'no marker'} and was cut"
+            yield _finding("changed marker", number[change.name], change.first, 1.0, reason)
 
 
 def _doubts(tracks: Tracks) -> Iterator[Finding]:
