@@ -116,7 +116,7 @@ def made_distances(places):
         ("subjects = 1", "subject = 3", "subject"),
         ("place = [", "place = [1, ", "place of A"),
         ("place = [", 'place = ["x", ', "place of A"),
-        ("place = [", "palce = [", "place"),
+        ("place = [", "places = [", "place"),
         ("[distances.A]", "[distances.X]", "no X"),
         ("B = [", "B = [inf, ", "distances.A.B"),
         ('["A", ', '["X", ', "no X"),
