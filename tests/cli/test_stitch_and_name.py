@@ -142,8 +142,11 @@ def test_sets_are_merged_and_names_checked(person, capsys):
     wrong = am.Tracks(detections=truth.detections, labels=truth.labels, names=tuple(names))
     am.write(wrong, "wrong.csv")
     assert main(["markerset", "check", "both.toml", "wrong.csv", "--json"]) == 1
-    doubts = json.loads(capsys.readouterr().out)["doubts"]
-    assert {(one["name"], one["found"]) for one in doubts} == {("LTOE", "RTOE"), ("RTOE", "LTOE")}
+    conflicts = json.loads(capsys.readouterr().out)["conflicts"]
+    assert {(one["name"], one["found"]) for one in conflicts} == {
+        ("LTOE", "RTOE"),
+        ("RTOE", "LTOE"),
+    }
 
 
 @pytest.mark.parametrize(

@@ -126,7 +126,7 @@ def instances():
         am.name_tracks(tracks, am.learn_marker_set(truth)),
         am.tracking.Tracked(tracks=tracks),
         am.tracking.NameChange(track=3, first=5, last=17, usual=LONG, name=None),
-        am.tracking.NameDoubt(name=LONG, first=5, last=17, found=LONG, probability=1 / 3),
+        am.tracking.NameConflict(name=LONG, first=5, last=17, found=LONG, probability=1 / 3),
         am.tracking.Join(marker=3, last=5, first=17, probability=1 / 3),
         am.tracking.HypothesisCluster(
             targets=np.arange(9), detections=np.arange(90), origins=np.zeros((50, 9), dtype=int),

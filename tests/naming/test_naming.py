@@ -199,6 +199,9 @@ def test_names_of_a_labelled_capture_are_checked():
     a, b = names.index("LTOE"), names.index("RTOE")
     names[a], names[b] = names[b], names[a]
     wrong = am.Tracks(detections=truth.detections, labels=truth.labels, names=tuple(names))
-    doubts = am.tracking.check_names(wrong, made)
-    assert {(doubt.name, doubt.found) for doubt in doubts} == {("RTOE", "LTOE"), ("LTOE", "RTOE")}
-    assert all(doubt.first == 0 for doubt in doubts)
+    conflicts = am.tracking.check_names(wrong, made)
+    assert {(conflict.name, conflict.found) for conflict in conflicts} == {
+        ("RTOE", "LTOE"),
+        ("LTOE", "RTOE"),
+    }
+    assert all(conflict.first == 0 for conflict in conflicts)

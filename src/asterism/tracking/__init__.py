@@ -16,7 +16,7 @@ from asterism.tracking.methods import (
 )
 from asterism.tracking.naming import (
     NameChange,
-    NameDoubt,
+    NameConflict,
     Naming,
     check_names,
     learn_marker_set,
@@ -50,7 +50,7 @@ __all__ = [
     "Method",
     "ModelEstimate",
     "NameChange",
-    "NameDoubt",
+    "NameConflict",
     "Naming",
     "Plan",
     "Rigidity",

@@ -122,22 +122,22 @@ def check(path: _Set, captures: _Checked, quiet: Quiet = False, json: Json = Fal
         tracks = _named(source, None)
         capture = tracks.detections
         at = capture.first_frame if isinstance(capture, am.Capture) else 0
-        for doubt in am.tracking.check_names(tracks, made):
-            frames = f"{at + doubt.first} to {at + doubt.last}"
-            found = doubt.found or "none"
-            rows.append((source.name, doubt.name, frames, found, f"{doubt.probability:.0%}"))
+        for conflict in am.tracking.check_names(tracks, made):
+            frames = f"{at + conflict.first} to {at + conflict.last}"
+            found = conflict.found or "none"
+            rows.append((source.name, conflict.name, frames, found, f"{conflict.probability:.0%}"))
             plain.append(
                 {
                     "capture": str(source),
-                    "name": doubt.name,
-                    "first": at + doubt.first,
-                    "last": at + doubt.last,
-                    "found": doubt.found,
-                    "probability": doubt.probability,
+                    "name": conflict.name,
+                    "first": at + conflict.first,
+                    "last": at + conflict.last,
+                    "found": conflict.found,
+                    "probability": conflict.probability,
                 }
             )
     if json:
-        print_json({"marker_set": str(path), "doubts": plain})
+        print_json({"marker_set": str(path), "conflicts": plain})
     elif rows and not quiet:
         head = ("capture", "name", "frames", "by the set", "probability")
         print_table(rows, head, title="Names that contradict the marker set")

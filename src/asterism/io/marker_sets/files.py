@@ -65,7 +65,7 @@ def read_marker_set(path: str | Path) -> MarkerSet:
         with path.open("rb") as file:
             head = as_utf8(file.read(_HEAD)).removeprefix(b"\xef\xbb\xbf").lstrip()
         # An empty or damaged file is reported by the reader of its ending.
-        if head.startswith(b"<") or path.suffix.lower() in vicon.ENDINGS:
+        if head.startswith(b"<") or path.suffix.lower() in vicon.SUFFIXES:
             return vicon.read(path)
     except OSError as error:
         raise not_read(path, error) from error

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
     from asterism.model import MarkerSet
 
-__all__ = ["ENDINGS", "read"]
+__all__ = ["SUFFIXES", "read"]
 
-ENDINGS = (".vsk", ".vst")
+SUFFIXES = (".vsk", ".vst")
 _PRESENCES = {"required": 1.0, "optional": 0.5, "constraint": 0.0}
 """Presence of a marker by its status; a constraint is worn during the calibration alone."""
 _MOST = 500  # segments or markers; a body with both hands has fewer than 200

@@ -12,14 +12,14 @@ from asterism.tracking.naming.name import name_tracks
 if TYPE_CHECKING:
     from asterism.model import MarkerSet, Tracks
 
-__all__ = ["NameDoubt", "check_names"]
+__all__ = ["NameConflict", "check_names"]
 
 MIN_FRAMES = 3
 """Shortest stretch that is listed, frames."""
 
 
 @record
-class NameDoubt:
+class NameConflict:
     """Stretch of frames in which a track's own name contradicts the marker sets.
 
     Parameters
@@ -35,8 +35,8 @@ class NameDoubt:
 
     Examples
     --------
-    >>> doubt = NameDoubt(name="RNAV", first=0, last=167, found="RHLX", probability=0.98)
-    >>> doubt.found
+    >>> conflict = NameConflict(name="RNAV", first=0, last=167, found="RHLX", probability=0.98)
+    >>> conflict.found
     'RHLX'
     """
 
@@ -47,7 +47,7 @@ class NameDoubt:
     probability: float
 
 
-def check_names(tracks: Tracks, *marker_sets: MarkerSet) -> tuple[NameDoubt, ...]:
+def check_names(tracks: Tracks, *marker_sets: MarkerSet) -> tuple[NameConflict, ...]:
     """Return the stretches in which the names of a labelled capture contradict marker sets.
 
     Parameters
@@ -59,7 +59,7 @@ def check_names(tracks: Tracks, *marker_sets: MarkerSet) -> tuple[NameDoubt, ...
 
     Returns
     -------
-    tuple of NameDoubt
+    tuple of NameConflict
         By track, then by time.
 
     Raises
@@ -84,16 +84,18 @@ def check_names(tracks: Tracks, *marker_sets: MarkerSet) -> tuple[NameDoubt, ...
     given = np.array([code.get(name or "", -1) for name in [*own, None]])[tracks.labels]
     by_sets = np.array([code.get(name or "", -1) for name in [*found, None]])[naming.tracks.labels]
     order, _ = tracks.by_track
-    track, is_doubt = tracks.labels[order], (given != by_sets)[order] & (given[order] >= 0)
+    track, is_conflict = tracks.labels[order], (given != by_sets)[order] & (given[order] >= 0)
     frame = tracks.detections.frame_of[order]
     other = by_sets[order]
     starts = np.flatnonzero(
-        np.diff(track, prepend=-1) | np.diff(is_doubt, prepend=False) | np.diff(other, prepend=-2)
+        np.diff(track, prepend=-1)
+        | np.diff(is_conflict, prepend=False)
+        | np.diff(other, prepend=-2)
     )
     ends = np.append(starts, len(order))[1:] - 1
     names = sorted(known)
     return tuple(
-        NameDoubt(
+        NameConflict(
             name=str(tracks.names[track[a]]),
             first=int(frame[a]),
             last=int(frame[b]),
@@ -101,5 +103,5 @@ def check_names(tracks: Tracks, *marker_sets: MarkerSet) -> tuple[NameDoubt, ...
             probability=float(naming.probabilities[track[a]]),
         )
         for a, b in zip(starts.tolist(), ends.tolist(), strict=True)
-        if is_doubt[a] and frame[b] - frame[a] + 1 >= MIN_FRAMES
+        if is_conflict[a] and frame[b] - frame[a] + 1 >= MIN_FRAMES
     )

@@ -56,7 +56,7 @@ PRIOR = 6.0
 """Factor on the log of a marker's presence, because the log odds of distances, which vary together,
 are too large as well."""
 RARE = 0.01
-"""Smallest presence that is told from none."""
+"""Smallest presence that differs from none."""
 UNKNOWN_HEIGHT = 0.012, 0.3
 """Standard deviation of a height whose spread is unknown: metres, and share of the height."""
 HEIGHT_ERROR = 0.006, 0.15

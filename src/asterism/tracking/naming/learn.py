@@ -112,7 +112,7 @@ def merge_marker_sets(*sets: MarkerSet) -> MarkerSet:
     """Merge the marker sets of several subjects into one, for subjects who are in none of them.
 
     Each subject is brought to the mean size. Where three or more sets have a distance, its median
-    is used, so that one subject with two exchanged names does not spoil it.
+    is used, so that one subject with two exchanged names does not distort it.
 
     Parameters
     ----------

@@ -134,7 +134,7 @@ class WindowNames:
         K, M = len(self.track_markers), len(self.made)
         for n in range(SWEEPS):
             before = self.markers.copy()
-            # A set that fits exactly finds the tracks that changed marker, before they spoil
+            # A set that fits exactly finds the tracks that changed marker, before they distort
             # what is measured.
             uses_set = n < 2 and self.is_kept and self.made.knows_movement
             subject = Subject.of(
