@@ -168,11 +168,8 @@ def track(
         assert repeat is not None
         recipe, estimate = _checked(job, capture, sets, repeat), None
     else:
-        if start and method not in (None, am.tracking.AUTO, am.MCMCDA.name):
-            expected = f"--method {am.MCMCDA.name}, or no --method"
-            raise ParameterError("--start", expected, f"--method {method}")
-        if start and not (capture.labels >= 0).any():
-            raise ParameterError("--start", "a capture with tracks", f"none in {source}")
+        if start:
+            _check_start(method, capture, source)
         with progress("estimating the model"):
             plan = am.tracking.plan_tracking(
                 capture, chosen_method, model=given, stitch=True if stitch else "auto",
@@ -198,13 +195,28 @@ def track(
         print_table(rows, title=f"\nTracked with {recipe.method}")
     if json:
         page = {} if report is None else {"report": str(report)}
-        settings = {
-            "options": recipe.options,
-            "stitch": recipe.stitch,
-            "model": recipe.model.to_dict(),
-        }
-        settings |= {"chosen": recipe.chosen} if recipe.chosen else {}
-        print_json(summary.to_dict() | settings | page)
+        print_json(summary.to_dict() | _settings_of(recipe) | page)
+
+
+def _check_start(method: str | None, capture: am.Capture, source: Path) -> None:
+    """Raise unless the capture has tracks from which the method can start."""
+    import asterism as am
+
+    if method not in (None, am.tracking.AUTO, am.MCMCDA.name):
+        expected = f"--method {am.MCMCDA.name}, or no --method"
+        raise ParameterError("--start", expected, f"--method {method}")
+    if not (capture.labels >= 0).any():
+        raise ParameterError("--start", "a capture with tracks", f"none in {source}")
+
+
+def _settings_of(recipe: Recipe) -> dict[str, Any]:
+    """Return the settings of a recipe as plain values."""
+    settings = {
+        "options": recipe.options,
+        "stitch": recipe.stitch,
+        "model": recipe.model.to_dict(),
+    }
+    return settings | ({"chosen": recipe.chosen} if recipe.chosen else {})
 
 
 def _outputs(out: Path, run: Path | None) -> dict[str, Path | Folder | None]:
