@@ -15,24 +15,24 @@ using namespace asterism;
 namespace {
 
 template <typename To, typename From>
-std::vector<To> copied(const In<From>& array) {
+std::vector<To> values_as(const In<From>& array) {
   return {array.data(), array.data() + array.size()};
 }
 
-void require_below(const std::vector<std::int32_t>& values, std::int32_t least, std::int32_t n,
+void require_within(const std::vector<std::int32_t>& values, std::int32_t least, std::int32_t n,
                    const char* what) {
   for (const std::int32_t x : values) require(x >= least && x < n, what);
 }
 
-Names names_of(const In<std::int64_t>& names, const NameEvidence& evidence) {
+Names names_given(const In<std::int64_t>& names, const NameEvidence& evidence) {
   require(names.ndim() == 1 && names.size() == static_cast<std::size_t>(evidence.n_tracks()),
           "names: shape (K,)");
-  Names out = copied<std::int32_t>(names);
-  require_below(out, -1, evidence.n_markers(), "names: markers, or -1");
+  Names out = values_as<std::int32_t>(names);
+  require_within(out, -1, evidence.n_markers(), "names: markers, or -1");
   return out;
 }
 
-void make(NameEvidence* self, const In<double>& distances, const In<double>& movements,
+void make_evidence(NameEvidence* self, const In<double>& distances, const In<double>& movements,
           const In<double>& variations, const In<double>& prior, const In<std::int64_t>& quads, const In<double>& heights,
           const In<std::int64_t>& pairs, const In<double>& pair_distances,
           const In<double>& pair_spreads, const In<double>& positions, const In<double>& spreads,
@@ -42,10 +42,10 @@ void make(NameEvidence* self, const In<double>& distances, const In<double>& mov
   markers.M = static_cast<std::int32_t>(distances.shape(0));
   require(movements.size() == distances.size() && variations.size() == distances.size(),
           "movements, variations: (M, M)");
-  markers.distance = copied<double>(distances);
-  markers.movement = copied<double>(movements);
-  markers.variation = copied<double>(variations);
-  markers.prior = copied<double>(prior);
+  markers.distance = values_as<double>(distances);
+  markers.movement = values_as<double>(movements);
+  markers.variation = values_as<double>(variations);
+  markers.prior = values_as<double>(prior);
   require(markers.prior.size() == distances.shape(0), "prior: (M,)");
   require(spreads.ndim() == 2 && spreads.shape(0) == spreads.shape(1), "spreads: (K, K)");
   TrackPairs tracks;
@@ -57,17 +57,17 @@ void make(NameEvidence* self, const In<double>& distances, const In<double>& mov
     tracks.first.push_back(static_cast<std::int32_t>(pairs.data()[2 * p]));
     tracks.second.push_back(static_cast<std::int32_t>(pairs.data()[2 * p + 1]));
   }
-  require_below(tracks.first, 0, tracks.K, "pairs: tracks");
-  require_below(tracks.second, 0, tracks.K, "pairs: tracks");
-  tracks.distance = copied<double>(pair_distances);
-  tracks.spread = copied<double>(pair_spreads);
+  require_within(tracks.first, 0, tracks.K, "pairs: tracks");
+  require_within(tracks.second, 0, tracks.K, "pairs: tracks");
+  tracks.distance = values_as<double>(pair_distances);
+  tracks.spread = values_as<double>(pair_spreads);
   TrackPoses poses;
   require(positions.ndim() == 3 && positions.shape(2) == 3 &&
               positions.shape(1) == static_cast<std::size_t>(tracks.K),
           "positions: (F, K, 3)");
   poses.F = static_cast<std::int32_t>(positions.shape(0));
-  poses.positions = copied<double>(positions);
-  poses.spread = copied<double>(spreads);
+  poses.positions = values_as<double>(positions);
+  poses.spread = values_as<double>(spreads);
   require(quads.ndim() == 2 && quads.shape(1) == 4, "quads: (Q, 4)");
   require(heights.ndim() == 2 && heights.shape(1) == 3 && heights.shape(0) == quads.shape(0),
           "heights: (Q, 3), height, variance and weight");
@@ -89,24 +89,24 @@ void make(NameEvidence* self, const In<double>& distances, const In<double>& mov
                           none, threads);
 }
 
-void make_search(NameSearch* self, const NameEvidence& evidence,
+void make_name_search(NameSearch* self, const NameEvidence& evidence,
                  const std::vector<std::vector<std::int32_t>>& groups,
                  const In<std::int64_t>& partner,
                  const std::vector<std::vector<std::int32_t>>& near) {
-  std::vector<std::int32_t> partners = copied<std::int32_t>(partner);
+  std::vector<std::int32_t> partners = values_as<std::int32_t>(partner);
   require(partners.size() == static_cast<std::size_t>(evidence.n_markers()), "partner: (M,)");
-  require_below(partners, -1, evidence.n_markers(), "partner: markers, or -1");
-  for (const auto& group : groups) require_below(group, 0, evidence.n_markers(), "groups: markers");
+  require_within(partners, -1, evidence.n_markers(), "partner: markers, or -1");
+  for (const auto& group : groups) require_within(group, 0, evidence.n_markers(), "groups: markers");
   require(near.size() == static_cast<std::size_t>(evidence.n_tracks()), "near: one list a track");
-  for (const auto& list : near) require_below(list, 0, evidence.n_tracks(), "near: tracks");
+  for (const auto& list : near) require_within(list, 0, evidence.n_tracks(), "near: tracks");
   new (self) NameSearch(evidence, groups, std::move(partners), near);
 }
 
 // Runs a search from a start; returns names and score.
 template <typename Run>
-nb::tuple found(NameSearch& search, const In<std::int64_t>& names, Run&& run) {
+nb::tuple searched(NameSearch& search, const In<std::int64_t>& names, Run&& run) {
   NamedState state;
-  Names start = names_of(names, search.evidence());
+  Names start = names_given(names, search.evidence());
   {
     nb::gil_scoped_release release;
     state = run(std::move(start));
@@ -114,7 +114,7 @@ nb::tuple found(NameSearch& search, const In<std::int64_t>& names, Run&& run) {
   return nb::make_tuple(array_of<std::int64_t>(state.names), state.score);
 }
 
-Out<double> window(const In<double>& points, const In<std::int64_t>& holder,
+Out<double> scores_in_window(const In<double>& points, const In<std::int64_t>& holder,
                    const In<std::int64_t>& neighbours, const In<double>& distances,
                    const In<double>& variances, const In<double>& weights) {
   require(points.ndim() == 3 && points.shape(2) == 3, "points: (F, A, 3)");
@@ -131,9 +131,9 @@ Out<double> window(const In<double>& points, const In<std::int64_t>& holder,
     require(m >= 0 && m < tables.M, "neighbours: markers");
   for (const auto& table : {tables.distance, tables.variance, tables.weight})
     require(table.size() == tables.neighbour.size(), "distances, variances, weights: (M, R)");
-  const std::vector<std::int32_t> own = copied<std::int32_t>(holder);
+  const std::vector<std::int32_t> own = values_as<std::int32_t>(holder);
   require(own.size() == static_cast<std::size_t>(tables.M), "holder: (M,)");
-  require_below(own, -1, A, "holder: tracks, or -1");
+  require_within(own, -1, A, "holder: tracks, or -1");
   Owned<double> out(static_cast<std::size_t>(A) * tables.M);
   {
     nb::gil_scoped_release release;
@@ -147,13 +147,13 @@ Out<double> window(const In<double>& points, const In<std::int64_t>& holder,
 
 void bind_naming(nb::module_& module) {
   nb::class_<NameEvidence>(module, "NameEvidence")
-      .def("__init__", &make, nb::kw_only(), "distances"_a, "movements"_a, "variations"_a, "prior"_a,
+      .def("__init__", &make_evidence, nb::kw_only(), "distances"_a, "movements"_a, "variations"_a, "prior"_a,
            "quads"_a, "heights"_a, "pairs"_a, "pair_distances"_a, "pair_spreads"_a, "positions"_a,
            "spreads"_a, "size"_a, "weights"_a, "none"_a, "threads"_a)
       .def_prop_ro("n_markers", &NameEvidence::n_markers)
       .def("scores",
            [](const NameEvidence& self, const In<std::int64_t>& names) {
-             const Names own = names_of(names, self);
+             const Names own = names_given(names, self);
              std::vector<std::int32_t> all(self.n_tracks());
              std::iota(all.begin(), all.end(), 0);
              std::vector<double> out;
@@ -164,22 +164,22 @@ void bind_naming(nb::module_& module) {
            "names"_a)
       .def("total",
            [](const NameEvidence& self, const In<std::int64_t>& names) {
-             return self.total(names_of(names, self));
+             return self.total(names_given(names, self));
            },
            "names"_a);
-  module.def("window_scores", &window, "points"_a, nb::kw_only(), "holder"_a, "neighbours"_a,
+  module.def("window_scores", &scores_in_window, "points"_a, nb::kw_only(), "holder"_a, "neighbours"_a,
              "distances"_a, "variances"_a, "weights"_a);
   nb::class_<NameSearch>(module, "NameSearch")
-      .def("__init__", &make_search, nb::keep_alive<1, 2>(), "evidence"_a, nb::kw_only(),
+      .def("__init__", &make_name_search, nb::keep_alive<1, 2>(), "evidence"_a, nb::kw_only(),
            "groups"_a, "partner"_a, "near"_a)
       .def("settled",
            [](NameSearch& self, const In<std::int64_t>& names) {
-             return found(self, names, [&](Names start) { return self.settled(std::move(start)); });
+             return searched(self, names, [&](Names start) { return self.settled(std::move(start)); });
            },
            "names"_a)
       .def("improved",
            [](NameSearch& self, const In<std::int64_t>& names) {
-             return found(self, names, [&](Names start) { return self.improved(std::move(start)); });
+             return searched(self, names, [&](Names start) { return self.improved(std::move(start)); });
            },
            "names"_a);
 }
