@@ -219,7 +219,8 @@ def _first(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list
 def _fits(found: Found) -> bool:
     n_named, n_markers = int((found.names >= 0).sum()), found.evidence.n_markers
     expected = max(MIN_SHARE * min(len(found.names), n_markers), MIN_FOUND * n_markers)
-    return n_named >= max(expected, 1) and _is_good(found)
+    is_close = found.mean_log_odds >= MIN_MEAN and found.fit >= MIN_FIT
+    return n_named >= max(expected, 1) and is_close
 
 
 def _without(tracks: Tracks, others: list[_First | None]) -> Tracks:
@@ -229,10 +230,6 @@ def _without(tracks: Tracks, others: list[_First | None]) -> Tracks:
         if other is not None:
             is_other[other.tracks] = True
     return replace(tracks, labels=np.where(is_other[tracks.labels], -1, tracks.labels))
-
-
-def _is_good(found: Found) -> bool:
-    return found.mean_log_odds >= MIN_MEAN and found.fit >= MIN_FIT
 
 
 def _positions(tracks: Tracks, alive: NDArray[np.int64]) -> NDArray[np.float64]:
