@@ -83,7 +83,7 @@ def probabilities_of(
     markers : ndarray of int, shape (K,)
         Marker of each track, -1 for none.
     of_markers : ndarray of shape (M, M)
-        Log odds of other names for all that has one name.
+        Log odds of other names for all tracks of one name together.
     of_tracks : ndarray of shape (K, M)
         Log odds of other names for each track.
     of_none : ndarray of shape (K,)
