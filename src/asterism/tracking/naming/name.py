@@ -13,10 +13,17 @@ from asterism.model import MarkerSet, Tracks
 from asterism.model.upwards import up_axis
 from asterism.records import record
 from asterism.tracking.naming.bodies import bodies_of, bodies_of_sets
+from asterism.tracking.naming.exchanges import without_exchanges
+from asterism.tracking.naming.joining import joined
 from asterism.tracking.naming.probabilities import marker_odds, probabilities_of, track_odds
 from asterism.tracking.naming.search import Found, search
 from asterism.tracking.naming.stretches import NameChange, changes_of
-from asterism.tracking.naming.windows import WindowNames, Windows, scattered
+from asterism.tracking.naming.windows import (
+    WindowNames,
+    Windows,
+    most_of_each,
+    scattered,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -158,14 +165,13 @@ def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
         hint = "give each set its subject: marker_set.of_subject(name)"
         raise ParameterError("marker_sets", "names that differ", f"{twice[0]} in two sets", hint)
     up, _ = up_axis(tracks.detections)
-    found = _first(tracks, marker_sets, up)
+    whole = without_exchanges(joined(tracks))
+    found = _first(whole, marker_sets, up)
     named = [
-        None
-        if own is None
-        else _all(_without(tracks, [*found[:s], *found[s + 1 :]]), made, own, up)
+        None if own is None else _all(_without(whole, [*found[:s], *found[s + 1 :]]), made, own, up)
         for s, (made, own) in enumerate(zip(marker_sets, found, strict=True))
     ]
-    return _result(tracks, marker_sets, named)
+    return _result(tracks, whole, marker_sets, named)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -291,49 +297,54 @@ def _all(tracks: Tracks, made: MarkerSet, first: _First, up: Axis) -> _Named:
 
 
 def _result(
-    tracks: Tracks, marker_sets: tuple[MarkerSet, ...], named: list[_Named | None]
+    tracks: Tracks, whole: Tracks, marker_sets: tuple[MarkerSet, ...], named: list[_Named | None]
 ) -> Naming:
-    """Merge the names of all sets: for each track those of the set that is most certain."""
-    K, N = tracks.n_tracks, tracks.detections.n_points
+    """Merge the names of all sets: for each track those of the set that is most certain.
+
+    The names are those of the `whole` tracks, which may join or exchange the given ones.
+    """
+    K, N = whole.n_tracks, tracks.detections.n_points
     all_names = [name for made in marker_sets for name in made.full_names]
-    markers, of_track = np.full(N, -1), np.full(K, -1)
-    probability, other_probability = np.zeros(K), np.zeros(K)
-    other: list[str | None] = [None] * K
+    markers, of_whole = np.full(N, -1), np.full(K, -1)
+    probability, other_probability, other = np.zeros(K), np.zeros(K), np.full(K, -1)
     at = 0
     for made, own in zip(marker_sets, named, strict=True):
         if own is not None:
             better = own.is_given & (own.probabilities > probability)
-            of_track[better] = at + own.of_track[better]
+            of_whole[better] = at + own.of_track[better]
             probability[better] = own.probabilities[better]
             other_probability[better] = own.alternative_probabilities[better]
-            for k in np.flatnonzero(better):
-                at_other = own.alternatives[k]
-                other[k] = made.full_names[at_other] if at_other >= 0 else None
-            rows = np.flatnonzero(np.append(better, False)[tracks.labels] & (own.markers >= 0))
+            known = own.alternatives >= 0
+            other[better] = np.where(known, at + own.alternatives, -1)[better]
+            rows = np.flatnonzero(np.append(better, False)[whole.labels] & (own.markers >= 0))
             markers[rows] = at + own.markers[rows]
         at += len(made)
     n_given = np.bincount(markers[markers >= 0], minlength=len(all_names))
     rare = n_given < MIN_DETECTIONS  # false alarms at the place of a marker that is not there
     markers[np.append(rare, False)[markers]] = -1
-    of_track[np.append(rare, False)[of_track]] = -1
+    of_whole[np.append(rare, False)[of_whole]] = -1
     n_given[rare] = 0
+    is_none = of_whole < 0
+    probability[is_none] = 1 - other_probability[is_none]
     kept = np.flatnonzero(n_given > 0)
     number = np.full(len(all_names), -1)
     number[kept] = np.arange(len(kept))
-    rest = (markers < 0) & (tracks.labels >= 0)
-    unnamed, column = np.unique(tracks.labels[rest], return_inverse=True)
+    rest = (markers < 0) & (whole.labels >= 0)
+    unnamed, column = np.unique(whole.labels[rest], return_inverse=True)
     out = np.full(N, -1)
     out[markers >= 0] = number[markers[markers >= 0]]
     out[rest] = len(kept) + column
-    names = [all_names[m] for m in kept] + [None] * len(unnamed)
-    is_none = of_track < 0
-    probability[is_none] = 1 - other_probability[is_none]
+    holder = most_of_each(tracks.labels, whole.labels, tracks.n_tracks)
+    of_track = most_of_each(tracks.labels, markers, tracks.n_tracks)
+    names: list[str | None] = [*all_names, None]  # the last element is for none
     return Naming(
-        tracks=replace(tracks, labels=out, names=tuple(names)),
-        markers=tuple(all_names[m] if m >= 0 else None for m in of_track),
-        probabilities=probability,
-        alternatives=tuple(other),
-        alternative_probabilities=other_probability,
+        tracks=replace(
+            tracks, labels=out, names=(*(all_names[m] for m in kept), *[None] * len(unnamed))
+        ),
+        markers=tuple(names[m] for m in of_track),
+        probabilities=probability[holder],
+        alternatives=tuple(names[m] for m in other[holder]),
+        alternative_probabilities=other_probability[holder],
         changes=changes_of(tracks, markers, of_track, all_names),
         missing=tuple(all_names[m] for m in np.flatnonzero(n_given == 0)),
     )

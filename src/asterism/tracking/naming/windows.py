@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections, MarkerSet
 
-__all__ = ["WindowNames", "Windows"]
+__all__ = ["WindowNames", "Windows", "most_of_each", "scattered"]
 
 LENGTH = 15
 """Length of a window, frames."""
@@ -94,6 +94,19 @@ def scattered(
     return dense
 
 
+def most_of_each(
+    tracks: NDArray[np.int64], values: NDArray[np.int64], n_tracks: int
+) -> NDArray[np.int64]:
+    """Return the value, -1 or above, that most detections of each track have, (K,)."""
+    used = np.flatnonzero(tracks >= 0)
+    width = int(values.max(initial=-1)) + 2
+    cells, counts = np.unique(tracks[used] * width + values[used] + 1, return_counts=True)
+    most = np.full(n_tracks, -1)
+    order = np.argsort(counts, kind="stable")  # the largest count is written last
+    most[cells[order] // width] = cells[order] % width - 1
+    return most
+
+
 @dataclass(eq=False, kw_only=True)
 class WindowNames:
     """Names of the tracks in each window.
@@ -156,15 +169,7 @@ class WindowNames:
 
     def usual(self) -> NDArray[np.int64]:
         """Return the marker that each track has in most of its detections, (K,), -1 for none."""
-        tracks, K, M = self.windows.tracks, len(self.track_markers), len(self.made)
-        used = np.flatnonzero(tracks >= 0)
-        cells, counts = np.unique(
-            tracks[used] * (M + 1) + self.markers[used] + 1, return_counts=True
-        )
-        usual = np.full(K, -1)
-        order = np.argsort(counts, kind="stable")  # the largest count is written last
-        usual[cells[order] // (M + 1)] = cells[order] % (M + 1) - 1
-        return usual
+        return most_of_each(self.windows.tracks, self.markers, len(self.track_markers))
 
     def positions(self, n_frames: int) -> NDArray[np.float64]:
         """Return the positions of the markers in frames spread over the capture, (F, M, 3)."""

@@ -1,0 +1,131 @@
+"""Stretches in which two tracks have exchanged their markers, found without any names.
+
+Distances to steady neighbours show an exchange: those of both tracks change at the same time, each
+to what the other's were before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.tracking.naming.windows import scattered
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import Tracks
+
+__all__ = ["without_exchanges"]
+
+SAMPLED = 60
+"""Number of frames, spread over the capture, in which tracks are compared."""
+MIN_FRAMES = 5
+"""Smallest number of these frames of a stretch, of the rest, and of a distance in each."""
+NEIGHBOURS = 8
+"""Number of neighbours to which distances are measured."""
+MAX_DISTANCE = 0.3
+"""Largest distance of two tracks that may be exchanged, metres."""
+NOISE = 0.005
+"""Spread of a distance that never changes, metres."""
+MIN_COMMON = 0.7
+"""Smallest share of the frames with both tracks in which a neighbour exists too."""
+MIN_SPREAD = 0.015
+"""Spread, metres, that some distance of two tracks has if they have been exchanged."""
+MIN_DECREASE = 0.3
+"""Smallest mean decrease of the log of a spread by an exchange."""
+
+
+def without_exchanges(tracks: Tracks) -> Tracks:
+    """Exchange two tracks back in the stretch in which they have each other's marker.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture. Only stretches of at least `MIN_FRAMES` of `SAMPLED` frames spread
+        over the capture are found.
+
+    Returns
+    -------
+    Tracks
+        Tracks of the same detections.
+    """
+    d = tracks.detections
+    chosen = np.unique(np.linspace(0, d.n_frames - 1, SAMPLED).astype(np.int64))
+    row = np.full(d.n_frames, -1)
+    row[chosen] = np.arange(len(chosen))
+    used = np.flatnonzero((tracks.labels >= 0) & (row[d.frame_of] >= 0))
+    counts = np.bincount(tracks.labels[used], minlength=tracks.n_tracks)
+    alive = np.flatnonzero(counts >= 2 * MIN_FRAMES)
+    column = np.full(tracks.n_tracks, -1)
+    column[alive] = np.arange(len(alive))
+    used = used[column[tracks.labels[used]] >= 0]
+    at = scattered(
+        d.points[used], row[d.frame_of[used]], column[tracks.labels[used]], len(chosen), len(alive)
+    )
+    labels = tracks.labels.copy()
+    for a, b, first, last in _found(at):
+        begin, end = chosen[first], chosen[last] if last < len(chosen) else d.n_frames
+        rows = slice(*d.offsets[[begin, end]])
+        one, other = alive[[a, b]]
+        own = labels[rows]
+        labels[rows] = np.where(own == one, other, np.where(own == other, one, own))
+    return tracks if np.array_equal(labels, tracks.labels) else replace(tracks, labels=labels)
+
+
+def _found(at: NDArray[np.float64]) -> list[tuple[int, int, int, int]]:
+    """Return pairs of columns of positions (F, n, 3), with the stretch in which they changed."""
+    distance = np.linalg.norm(at[:, :, None] - at[:, None], axis=3)  # (F, n, n)
+    n_common = np.isfinite(distance).sum(axis=0)
+    middle = np.full(n_common.shape, np.inf)
+    enough = (n_common >= 2 * MIN_FRAMES) & ~np.eye(len(middle), dtype=bool)
+    middle[enough] = np.nanmedian(distance[:, enough], axis=0)
+    spread = np.zeros(n_common.shape)
+    spread[enough] = np.nanstd(distance[:, enough], axis=0)
+    found: list[tuple[float, int, int, int, int]] = []
+    for a, b in zip(*np.nonzero(np.triu(middle < MAX_DISTANCE)), strict=True):
+        far = np.maximum(middle[a], middle[b])
+        far[np.minimum(n_common[a], n_common[b]) < MIN_COMMON * n_common[a, b]] = np.inf
+        neighbours = np.argsort(far, kind="stable")[:NEIGHBOURS]
+        neighbours = neighbours[np.isfinite(far[neighbours])]
+        if len(neighbours) < 3 or spread[[a, b]][:, neighbours].max() < MIN_SPREAD:
+            continue
+        decrease, first, last = _best(distance[:, a, neighbours], distance[:, b, neighbours])
+        if decrease > MIN_DECREASE:
+            found.append((decrease, int(a), int(b), first, last))
+    done: set[int] = set()
+    result: list[tuple[int, int, int, int]] = []
+    for _, a, b, first, last in sorted(found, reverse=True):
+        if not done & {a, b}:
+            result.append((a, b, first, last))
+            done |= {a, b}
+    return result
+
+
+def _best(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, int, int]:
+    """Return the stretch whose exchange makes two series (F, C) steadiest, with the decrease.
+
+    The decrease is that of the log of the spreads, in the mean of both series and all columns.
+    """
+    both = np.isfinite(x) & np.isfinite(y)
+    n = both.sum(axis=0)
+    x, y = np.where(both, x, 0.0), np.where(both, y, 0.0)
+
+    def within(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+        return sums[None] - sums[:, None]  # (first, last, C)
+
+    def log_spread(s: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 0.5 * np.log(np.maximum(squares / n - (s / n) ** 2, 0) + NOISE**2)
+
+    move, move2 = within(y - x), within(y**2 - x**2)
+    sx, sy, sx2, sy2 = x.sum(axis=0), y.sum(axis=0), (x**2).sum(axis=0), (y**2).sum(axis=0)
+    before = log_spread(sx, sx2) + log_spread(sy, sy2)
+    after = log_spread(sx + move, sx2 + move2) + log_spread(sy - move, sy2 - move2)
+    gain = 0.5 * (before - after).mean(axis=2)
+    inside = within(both.astype(np.float64))
+    gain[np.minimum(inside, n - inside).min(axis=2) < MIN_FRAMES] = -np.inf
+    first, last = np.unravel_index(int(np.argmax(gain)), gain.shape)
+    return float(gain[first, last]), int(first), int(last)
