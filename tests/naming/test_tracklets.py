@@ -81,10 +81,18 @@ def test_an_exchange_is_undone(seed, first, last):
     n = truth.detections.n_frames
     for one, other in near[:: len(near) // 4]:
         wrong = exchanged(truth, one, other, int(first * n), int(last * n))
-        right = without_exchanges(wrong).labels
-        is_own = right == truth.labels
-        is_other = right == exchanged(truth, one, other, 0, n).labels
-        assert max(is_own.mean(), is_other.mean()) > 1 - 3 / n
+        assert is_pure(without_exchanges(wrong), truth)
+
+
+def test_short_exchanges_in_a_long_capture_are_undone():
+    truth = am.simulate.person(frames=2000, seed=1)
+    one, other = (truth.names.index(name) for name in ("RTHI", "RKNE"))
+    for stretches in ([(900, 1000)], [(550, 1300)], [(300, 400), (1500, 1700)], [(1900, 2000)]):
+        wrong = truth
+        for first, last in stretches:
+            wrong = exchanged(wrong, one, other, first, last)
+        right = without_exchanges(wrong)
+        assert is_pure(right, truth)
 
 
 @pytest.mark.parametrize("seed", range(4))

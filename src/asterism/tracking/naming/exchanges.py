@@ -16,14 +16,16 @@ from asterism.tracking.naming.windows import scattered
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.model import Tracks
+    from asterism.model import Detections, Tracks
 
 __all__ = ["without_exchanges"]
 
+LENGTH = 600
+"""Number of frames in which tracks are compared at a time, overlapping by half."""
 SAMPLED = 60
-"""Number of frames, spread over the capture, in which tracks are compared."""
+"""Number of these frames in which distances are measured."""
 MIN_FRAMES = 5
-"""Smallest number of these frames of a stretch, of the rest, and of a distance in each."""
+"""Smallest number of sampled frames of a stretch, of the rest, and of a distance in each."""
 NEIGHBOURS = 8
 """Number of neighbours to which distances are measured."""
 MAX_DISTANCE = 0.3
@@ -39,40 +41,60 @@ MIN_DECREASE = 0.3
 
 
 def without_exchanges(tracks: Tracks) -> Tracks:
-    """Exchange two tracks back in the stretch in which they have each other's marker.
+    """Exchange two tracks back from where they have each other's marker.
 
     Parameters
     ----------
     tracks : Tracks
-        Tracks of a capture. Only stretches of at least `MIN_FRAMES` of `SAMPLED` frames spread
-        over the capture are found.
+        Tracks of a capture. Exchanges that last less than `MIN_FRAMES` of the `SAMPLED` frames
+        are not found.
 
     Returns
     -------
     Tracks
         Tracks of the same detections.
     """
-    d = tracks.detections
-    chosen = np.unique(np.linspace(0, d.n_frames - 1, SAMPLED).astype(np.int64))
+    n = tracks.detections.n_frames
+    labels = tracks.labels.copy()
+    for start in range(0, max(n - LENGTH // 2, 1), LENGTH // 2):
+        _exchange_back(tracks.detections, labels, start, min(start + LENGTH, n))
+    return tracks if np.array_equal(labels, tracks.labels) else replace(tracks, labels=labels)
+
+
+def _exchange_back(d: Detections, labels: NDArray[np.int64], start: int, end: int) -> None:
+    """Exchange labels in place, as the frames from `start` to `end` show."""
+    chosen = np.unique(np.linspace(start, end - 1, SAMPLED).astype(np.int64))
     row = np.full(d.n_frames, -1)
     row[chosen] = np.arange(len(chosen))
-    used = np.flatnonzero((tracks.labels >= 0) & (row[d.frame_of] >= 0))
-    counts = np.bincount(tracks.labels[used], minlength=tracks.n_tracks)
-    alive = np.flatnonzero(counts >= 2 * MIN_FRAMES)
-    column = np.full(tracks.n_tracks, -1)
-    column[alive] = np.arange(len(alive))
-    used = used[column[tracks.labels[used]] >= 0]
-    at = scattered(
-        d.points[used], row[d.frame_of[used]], column[tracks.labels[used]], len(chosen), len(alive)
-    )
-    labels = tracks.labels.copy()
+    used = np.flatnonzero((labels >= 0) & (row[d.frame_of] >= 0))
+    alive, column, counts = np.unique(labels[used], return_inverse=True, return_counts=True)
+    is_long = counts >= 2 * MIN_FRAMES
+    used, column = used[is_long[column]], (np.cumsum(is_long) - 1)[column[is_long[column]]]
+    alive = alive[is_long]
+    at = scattered(d.points[used], row[d.frame_of[used]], column, len(chosen), len(alive))
     for a, b, first, last in _found(at):
-        begin, end = chosen[first], chosen[last] if last < len(chosen) else d.n_frames
-        rows = slice(*d.offsets[[begin, end]])
-        one, other = alive[[a, b]]
-        own = labels[rows]
-        labels[rows] = np.where(own == one, other, np.where(own == other, one, own))
-    return tracks if np.array_equal(labels, tracks.labels) else replace(tracks, labels=labels)
+        pair = alive[[a, b]]
+        for edge in sorted({first, last} - {0, len(chosen)}):  # each exchanges all frames after it
+            around = chosen[[max(edge - 2, 0), min(edge + 1, len(chosen) - 1)]]
+            rows = slice(d.offsets[_moment(d, labels, pair, *around)], None)
+            own = labels[rows]
+            is_one, is_other = own == pair[0], own == pair[1]
+            own[is_one], own[is_other] = pair[1], pair[0]
+
+
+def _moment(
+    d: Detections, labels: NDArray[np.int64], pair: NDArray[np.int64], first: int, last: int
+) -> int:
+    """Return the frame in (first, last] from which an exchange of two tracks shortens their way."""
+    rows = np.arange(*d.offsets[[first, last + 1]])
+    rows = rows[np.isin(labels[rows], pair)]
+    column = np.searchsorted(np.sort(pair), labels[rows])
+    at = scattered(d.points[rows], d.frame_of[rows] - first, column, last - first + 1, 2)
+    for t in range(1, len(at)):  # an occluded marker stays where it was
+        at[t] = np.where(np.isnan(at[t]), at[t - 1], at[t])
+    kept = np.linalg.norm(at[1:] - at[:-1], axis=2).sum(axis=1)
+    exchanged = np.linalg.norm(at[1:] - at[:-1, ::-1], axis=2).sum(axis=1)
+    return first + 1 + int(np.argmax(np.nan_to_num(kept - exchanged, nan=-np.inf)))
 
 
 def _found(at: NDArray[np.float64]) -> list[tuple[int, int, int, int]]:

@@ -1,13 +1,13 @@
 """Names for all tracks of a capture, window by window, from the names of some.
 
 Windows are named outwards from the frame of the first names, then again, in order of time, with the
-subject as measured in all of them. A track keeps its name from window to window, unless the windows
-of a stretch together favour another one: so tracks that changed marker are found.
+subject as measured in all of them. A track keeps its name from window to window, unless all of its
+windows together favour another one, or a single one does so by far.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,8 +33,8 @@ FULL_BONUS = 5
 """Number of detections in a window from which on the whole bonus counts."""
 MIN_LOG_ODDS = 6.0
 """Log odds of a name below which a track has none in a window."""
-MIN_GAIN, MIN_STRETCH_GAIN = 2.0, 16.0
-"""Log odds by which all windows of a track, or those of a stretch, must favour another name."""
+MIN_GAIN = 2.0
+"""Log odds by which all windows of two tracks must favour the exchange of their names."""
 SWEEPS = 4
 """Number of times that all windows are named."""
 SUBJECT_FRAMES = 150
@@ -135,7 +135,6 @@ class WindowNames:
     exchanges: NDArray[np.float64] = field(init=False)  # (K, M), gain of another name, all windows
     without: NDArray[np.float64] = field(init=False)  # (K,), gain of no name, all windows
     counts: NDArray[np.int64] = field(init=False)  # (K,), windows of each track
-    changes: list[_Change] = field(init=False, default_factory=list["_Change"])
 
     def __post_init__(self) -> None:
         tracks = self.windows.tracks
@@ -147,24 +146,15 @@ class WindowNames:
         K, M = len(self.track_markers), len(self.made)
         for n in range(SWEEPS):
             before = self.markers.copy()
-            # A set that fits exactly finds the tracks that changed marker, before they distort
-            # what is measured.
-            uses_set = n < 2 and self.is_kept and self.made.knows_movement
-            subject = Subject.of(
-                self.made,
-                self.size,
-                self.positions(0 if uses_set else SUBJECT_FRAMES),
-                is_kept=self.is_kept,
-            )
+            measured = self.positions(SUBJECT_FRAMES)
+            subject = Subject.of(self.made, self.size, measured, is_kept=self.is_kept)
             self.evidence, self.exchanges = np.zeros((K, M)), np.zeros((K, M))
             self.without, self.counts = np.zeros(K), np.zeros(K, dtype=np.int64)
-            stretches = _Stretches(K, M)
             for w in order:
-                self._name(w, subject, stretches)
+                self._name(w, subject)
             order = list(range(len(self.windows)))
             self._decide()
-            changed = n > 0 and self._change(stretches)
-            if n > 0 and not changed and np.array_equal(before, self.markers):
+            if n > 0 and np.array_equal(before, self.markers):
                 break
 
     def usual(self) -> NDArray[np.int64]:
@@ -187,9 +177,8 @@ class WindowNames:
         of = np.append(marker_of, -1)
         self.track_markers = of[self.track_markers]
         self.markers = of[self.markers]
-        self.changes = [replace(own, marker=int(of[own.marker])) for own in self.changes]
 
-    def _name(self, w: int, subject: Subject, stretches: _Stretches) -> None:
+    def _name(self, w: int, subject: Subject) -> None:
         rows = self.windows.rows(w)
         if not len(rows):
             return
@@ -202,7 +191,7 @@ class WindowNames:
             sampled = dense  # a track of a single frame needs that frame
         names = np.full(len(alive), -1)
         names[column] = self.markers[rows]
-        known = self._known(w, alive)
+        known = self.track_markers[alive]
         bonus = np.tile(prior_of(self.made), (len(alive), 1))
         has = np.flatnonzero(known >= 0)
         bonus[has, known[has]] += BONUS * np.minimum(lengths[has] / FULL_BONUS, 1)
@@ -229,15 +218,6 @@ class WindowNames:
         self.exchanges[alive] += gains
         own = np.where(names >= 0, scores[np.arange(len(names)), names], MIN_LOG_ODDS)
         self.without[alive] += MIN_LOG_ODDS - own
-        stretches.add(w, alive, gains)
-
-    def _known(self, w: int, alive: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the markers that tracks have had, with the changes of this window."""
-        known = self.track_markers[alive].copy()
-        for change in self.changes:
-            if change.first <= w <= change.last:
-                known[alive == change.track] = change.marker
-        return known
 
     def _decide(self) -> None:
         """Set the marker of each track by all its windows; two tracks may exchange theirs."""
@@ -266,64 +246,6 @@ class WindowNames:
             if len(gain_of) == 1 and gain_of[j] > MIN_GAIN and j not in done:
                 own[k], own[j] = own[j], own[k]
                 done |= {k, j}
-
-    def _change(self, stretches: _Stretches) -> bool:
-        """Exchange the names of tracks in the stretches that favour it most; True if any do."""
-        done: set[int] = set()
-        for k, marker, first, last in stretches.best():
-            if k in done:
-                continue
-            rows = np.concatenate([self.windows.rows(w) for w in range(first, last + 1)])
-            holders = np.unique(self.windows.tracks[rows[self.markers[rows] == marker]])
-            own = self.markers[rows[self.windows.tracks[rows] == k]]
-            own = own[own >= 0]
-            if len(own) == 0 or len(holders) > 1 or done & set(holders.tolist()):
-                continue
-            usual = int(np.bincount(own).argmax())
-            for track, new in ((k, marker), *((j, usual) for j in holders.tolist())):
-                self.changes.append(_Change(track=track, first=first, last=last, marker=new))
-                self.markers[rows[self.windows.tracks[rows] == track]] = new
-            done |= {k, *holders.tolist()}
-        return bool(done)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Change:
-    """Name of a track in a stretch of windows that differs from its name before."""
-
-    track: int
-    first: int
-    last: int
-    marker: int
-
-
-class _Stretches:
-    """For each track and marker, the stretch of windows with the largest sum of gains."""
-
-    def __init__(self, n_tracks: int, n_markers: int) -> None:
-        shape = n_tracks, n_markers
-        self.sum, self.largest = np.zeros(shape), np.zeros(shape)
-        self.since, self.first, self.last = (np.full(shape, -1, dtype=np.int32) for _ in range(3))
-
-    def add(self, w: int, tracks: NDArray[np.int64], gains: NDArray[np.float64]) -> None:
-        """Add the gains of a window, (A, M); windows come in order of time."""
-        before, since = self.sum[tracks], self.since[tracks]
-        since = np.where(before > 0, since, w)
-        total = np.maximum(before, 0) + gains
-        is_larger = total > self.largest[tracks]
-        self.sum[tracks], self.since[tracks] = total, since
-        self.largest[tracks] = np.where(is_larger, total, self.largest[tracks])
-        self.first[tracks] = np.where(is_larger, since, self.first[tracks])
-        self.last[tracks] = np.where(is_larger, w, self.last[tracks])
-
-    def best(self) -> list[tuple[int, int, int, int]]:
-        """Return track, marker, first and last window of the changes, the largest gain first."""
-        k, m = np.nonzero(self.largest > MIN_STRETCH_GAIN)
-        order = np.argsort(-self.largest[k, m], kind="stable")
-        return [
-            (int(k[i]), int(m[i]), int(self.first[k[i], m[i]]), int(self.last[k[i], m[i]]))
-            for i in order
-        ]
 
 
 def _holders(
