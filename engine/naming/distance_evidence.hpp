@@ -18,6 +18,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
 
 namespace asterism {
 
@@ -60,23 +63,60 @@ inline FitWeights weights_at(const FitWeights& weights, double d, bool knows_mov
   return out;
 }
 
-// Bounded log odds of the distance against a uniform distribution over kRange.
-inline float distance_log_odds(double d, double s, double D, double W, double B, double size,
-                               const FitWeights& known, const FitWeights& unknown) {
-  const bool knows_movement = !std::isnan(W);
-  const FitWeights& w = knows_movement ? known : unknown;
-  const float move = static_cast<float>(knows_movement ? s * s / 4 + W * W / 2 : s * s);
-  float density = 0;
-  for (int c = 0; c < kFits; ++c) {
-    const FitKind& kind = kFitKinds[c];
-    const double a = kind.fixed, b = kind.share * D;
-    const float v = static_cast<float>(a * a + b * b + (kind.varies ? B * B : 0)) + move;
-    const float off = static_cast<float>(d - (kind.is_scaled ? size : 1) * D);
-    const float y = 1 + off * off / (4 * v);
-    density += static_cast<float>(w[c]) * 0.375f / (std::sqrt(v * y) * y * y);
-  }
-  const float odds = std::log(density * static_cast<float>(kRange) + 1e-9f);
-  return std::clamp(odds, static_cast<float>(kMinOdds), static_cast<float>(kMaxOdds));
+// Bounded log odds of a distance whose probability density is `density`, against a uniform
+// distribution over kRange.
+inline float bounded_log_odds(float density) {
+  constexpr float kMinRatio = 0.0183f;  // below exp(kMinOdds): most pairs need no logarithm
+  const float ratio = density * static_cast<float>(kRange);
+  if (ratio < kMinRatio) return static_cast<float>(kMinOdds);
+  return std::clamp(std::log(ratio), static_cast<float>(kMinOdds), static_cast<float>(kMaxOdds));
 }
+
+// What the density of a distance needs of all pairs of M markers.
+class PairDensities {
+ public:
+  // distance, movement, variation: (M, M), NaN where unknown.
+  PairDensities(std::int32_t M, std::span<const double> distance, std::span<const double> movement,
+                std::span<const double> variation, double size)
+      : M_(M), known_(distance.size()) {
+    for (int c = 0; c < kFits; ++c) {
+      const FitKind& kind = kFitKinds[c];
+      location_[c].resize(distance.size());
+      variance_[c].resize(distance.size());
+      for (std::size_t i = 0; i < distance.size(); ++i) {
+        const double a = kind.fixed, b = kind.share * distance[i], W = movement[i];
+        known_[i] = !std::isnan(W);
+        location_[c][i] = static_cast<float>((kind.is_scaled ? size : 1) * distance[i]);
+        variance_[c][i] =
+            static_cast<float>(a * a + b * b + (kind.varies ? variation[i] * variation[i] : 0) +
+                               (known_[i] > 0 ? W * W / 2 : 0));
+      }
+    }
+  }
+
+  // Writes the densities of a distance d of spread s for marker a and all markers after it.
+  void densities(std::int32_t a, double d, double s, const FitWeights& known,
+                 const FitWeights& unknown, float* out) const {
+    const std::size_t row = static_cast<std::size_t>(a) * M_;
+    const float squared = static_cast<float>(s * s), distance = static_cast<float>(d);
+    for (std::int32_t b = a + 1; b < M_; ++b) out[b] = 0;
+    for (int c = 0; c < kFits; ++c) {
+      const float *location = location_[c].data() + row, *variance = variance_[c].data() + row;
+      const float* is_known = known_.data() + row;
+      const auto with = static_cast<float>(0.375 * known[c]);
+      const auto without = static_cast<float>(0.375 * unknown[c]);
+      for (std::int32_t b = a + 1; b < M_; ++b) {
+        const float v = variance[b] + squared * (is_known[b] > 0 ? 0.25f : 1.0f);
+        const float off = distance - location[b], y = 1 + off * off / (4 * v);
+        out[b] += (is_known[b] > 0 ? with : without) / (std::sqrt(v * y) * y * y);
+      }
+    }
+  }
+
+ private:
+  std::int32_t M_;
+  std::vector<float> known_;  // 1 or 0: whether the movement is known
+  std::array<std::vector<float>, kFits> location_, variance_;
+};
 
 }  // namespace asterism

@@ -9,12 +9,12 @@
 //   prior  log odds of a marker that is often missing; none: those of a track without a name
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "base/parallel.hpp"
 #include "naming/distance_evidence.hpp"
 
 namespace asterism {
@@ -50,15 +50,14 @@ struct TrackPoses {
 class NameEvidence {
  public:
   NameEvidence(const MarkerTables& markers, std::vector<Quad> quads, TrackPairs pairs,
-               TrackPoses poses, double size, const FitWeights& weights, double none,
-               std::int32_t threads)
+               TrackPoses poses, double size, const FitWeights& weights, double none)
       : M_(markers.M), K_(pairs.K), size_(size), none_(none), prior_(markers.prior), quads_(std::move(quads)),
         pairs_(std::move(pairs)), poses_(std::move(poses)) {
     const std::size_t P = pairs_.first.size();
     table_.resize(P * M_ * M_);
-    in_parallel(static_cast<std::int64_t>(P), threads, [&](std::int32_t, std::int64_t p) {
-      fill(static_cast<std::size_t>(p), markers, weights);
-    });
+    const PairDensities densities(M_, markers.distance, markers.movement, markers.variation, size);
+    for (std::size_t p = 0; p < P; ++p) fill(p, markers, densities, weights);
+    planes_.resize(quads_.size());
     own_pairs_.resize(K_);
     for (std::size_t p = 0; p < P; ++p) {
       own_pairs_[pairs_.first[p]].push_back(static_cast<std::int32_t>(p));
@@ -86,12 +85,12 @@ class NameEvidence {
       }
     }
     track_of(names);
-    for (const Quad& q : quads_) {
+    for (std::size_t q = 0; q < quads_.size(); ++q) {
       if (!find_plane(q)) continue;
       for (const std::int32_t k : rows) {
-        double& score = out[static_cast<std::size_t>(k) * M_ + q.marker];
+        double& score = out[static_cast<std::size_t>(k) * M_ + quads_[q].marker];
         // Heights cannot make up for such a score, so that they are not computed.
-        if (score < none_ - kHopeless || k == at_[0] || k == at_[1] || k == at_[2]) continue;
+        if (score < none_ - kHopeless || std::ranges::count(planes_[q].track, k)) continue;
         score += height_log_odds(q, k);
       }
     }
@@ -105,32 +104,40 @@ class NameEvidence {
     }
     for (const std::int32_t m : names) sum += m >= 0 ? prior_[m] - none_ : 0;
     track_of(names);
-    for (const Quad& q : quads_)
-      if (track_[q.marker] >= 0 && find_plane(q)) sum += height_log_odds(q, track_[q.marker]);
+    for (std::size_t q = 0; q < quads_.size(); ++q) {
+      const std::int32_t k = track_[quads_[q].marker];
+      if (k >= 0 && find_plane(q)) sum += height_log_odds(q, k);
+    }
     return sum;
   }
 
  private:
-  void fill(std::size_t p, const MarkerTables& markers, const FitWeights& weights) {
+  // Plane of the references of a quad, kept because most assignments of a search share it.
+  struct Plane {
+    std::int32_t track[3] = {-1, -1, -1};
+    std::vector<double> frames;    // (F, 4), normal and offset
+    double widest = 0;             // spread of the distances between the references
+    std::vector<double> log_odds;  // of the height of each track, NaN if not computed
+  };
+
+  void fill(std::size_t p, const MarkerTables& markers, const PairDensities& densities,
+            const FitWeights& weights) {
     const double d = pairs_.distance[p], s = pairs_.spread[p];
     const FitWeights known = weights_at(weights, d, true), unknown = weights_at(weights, d, false);
     float* t = table_.data() + p * M_ * M_;
-    for (std::int32_t a = 0; a < M_; ++a)
-      for (std::int32_t b = 0; b < M_; ++b) {
+    for (std::int32_t a = 0; a < M_; ++a) {
+      float* row = t + static_cast<std::size_t>(a) * M_;
+      densities.densities(a, d, s, known, unknown, row);
+      row[a] = static_cast<float>(kMinOdds);
+      for (std::int32_t b = 0; b < a; ++b) row[b] = t[static_cast<std::size_t>(b) * M_ + a];
+      for (std::int32_t b = a + 1; b < M_; ++b) {
         const std::size_t at = static_cast<std::size_t>(a) * M_ + b;
-        if (a == b) {
-          t[at] = static_cast<float>(kMinOdds);
-        } else if (b < a) {
-          t[at] = t[static_cast<std::size_t>(b) * M_ + a];  // a distance has no direction
-        } else if (std::isnan(markers.distance[at])) {
-          t[at] = 0;
-        } else {
-          const double B = markers.variation[at];
-          t[at] = static_cast<float>(loose_weight(s * s + B * B)) *
-                  distance_log_odds(d, s, markers.distance[at], markers.movement[at], B, size_,
-                                    known, unknown);
-        }
+        const double B = markers.variation[at];
+        row[b] = std::isnan(markers.distance[at])
+                     ? 0
+                     : static_cast<float>(loose_weight(s * s + B * B)) * bounded_log_odds(row[b]);
       }
+    }
   }
 
   void track_of(const Names& names) const {
@@ -139,35 +146,46 @@ class NameEvidence {
       if (names[k] >= 0) track_[names[k]] = k;
   }
 
-  // Sets the plane of the references in each frame; false if one of them has no track.
-  bool find_plane(const Quad& q) const {
-    for (int i = 0; i < 3; ++i) {
-      at_[i] = track_[q.reference[i]];
-      if (at_[i] < 0) return false;
-    }
-    plane_.assign(4 * static_cast<std::size_t>(poses_.F), NAN);
+  // Finds the plane of the references of a quad in each frame; false if one of them has no track.
+  bool find_plane(std::size_t at) const {
+    const Quad& q = quads_[at];
+    Plane& found = planes_[at];
+    std::int32_t track[3];
+    for (int i = 0; i < 3; ++i)
+      if (track[i] = track_[q.reference[i]]; track[i] < 0) return false;
+    if (std::ranges::equal(track, found.track)) return true;
+    std::ranges::copy(track, found.track);
+    found.frames.assign(4 * static_cast<std::size_t>(poses_.F), NAN);
     for (std::int32_t f = 0; f < poses_.F; ++f) {
-      const double *a = point(f, at_[0]), *b = point(f, at_[1]), *c = point(f, at_[2]);
+      const double *a = point(f, track[0]), *b = point(f, track[1]), *c = point(f, track[2]);
       const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
       const double v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
       double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
                      u[0] * v[1] - u[1] * v[0]};
       const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
       if (!(length > 1e-12)) continue;  // NaN too
-      double* out = plane_.data() + 4 * static_cast<std::size_t>(f);
+      double* out = found.frames.data() + 4 * static_cast<std::size_t>(f);
       for (int x = 0; x < 3; ++x) out[x] = n[x] / length;
       out[3] = out[0] * a[0] + out[1] * a[1] + out[2] * a[2];
     }
-    widest_ = std::max({spread(at_[0], at_[1]), spread(at_[0], at_[2]), spread(at_[1], at_[2])});
+    found.widest = std::max(
+        {spread(track[0], track[1]), spread(track[0], track[2]), spread(track[1], track[2])});
+    found.log_odds.assign(K_, NAN);
     return true;
   }
 
-  // Bounded log odds of the mean height of a track over the plane that was set.
-  double height_log_odds(const Quad& q, std::int32_t k) const {
+  // Bounded log odds of the mean height of a track over the plane that was found.
+  double height_log_odds(std::size_t at, std::int32_t k) const {
+    double& known = planes_[at].log_odds[k];
+    if (std::isnan(known)) known = compute_height_log_odds(quads_[at], planes_[at], k);
+    return known;
+  }
+
+  double compute_height_log_odds(const Quad& q, const Plane& found, std::int32_t k) const {
     double sum = 0, squares = 0;
     int n = 0;
     for (std::int32_t f = 0; f < poses_.F; ++f) {
-      const double* plane = plane_.data() + 4 * static_cast<std::size_t>(f);
+      const double* plane = found.frames.data() + 4 * static_cast<std::size_t>(f);
       const double* x = point(f, k);
       const double h = plane[0] * x[0] + plane[1] * x[1] + plane[2] * x[2] - plane[3];
       if (std::isnan(h)) continue;
@@ -181,8 +199,8 @@ class NameEvidence {
     const double y = 1 + off * off / (4 * v);
     const double odds =
         std::clamp(std::log(0.375 * kHeights / (std::sqrt(v * y) * y * y) + 0.02), -4.0, 3.0);
-    double widest = widest_;
-    for (const std::int32_t a : at_) widest = std::max(widest, spread(k, a));
+    double widest = found.widest;
+    for (const std::int32_t a : found.track) widest = std::max(widest, spread(k, a));
     return q.weight * odds / (1 + widest * widest / (kLooseSpread * kLooseSpread));
   }
 
@@ -206,9 +224,7 @@ class NameEvidence {
   std::vector<float> table_;                          // (P, M, M)
   std::vector<std::vector<std::int32_t>> own_pairs_;  // of each track
   mutable std::vector<std::int32_t> track_;           // of each marker, -1 for none
-  mutable std::vector<double> plane_;                 // (F, 4), normal and offset
-  mutable std::int32_t at_[3] = {0, 0, 0};            // tracks of the references
-  mutable double widest_ = 0;                         // spread of their distances
+  mutable std::vector<Plane> planes_;                 // of each quad, as last found
 };
 
 }  // namespace asterism

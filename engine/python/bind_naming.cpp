@@ -36,7 +36,7 @@ void make_evidence(NameEvidence* self, const In<double>& distances, const In<dou
           const In<double>& variations, const In<double>& prior, const In<std::int64_t>& quads, const In<double>& heights,
           const In<std::int64_t>& pairs, const In<double>& pair_distances,
           const In<double>& pair_spreads, const In<double>& positions, const In<double>& spreads,
-          double size, const In<double>& weights, double none, std::int32_t threads) {
+          double size, const In<double>& weights, double none) {
   MarkerTables markers;
   require(distances.ndim() == 2 && distances.shape(0) == distances.shape(1), "distances: (M, M)");
   markers.M = static_cast<std::int32_t>(distances.shape(0));
@@ -86,7 +86,7 @@ void make_evidence(NameEvidence* self, const In<double>& distances, const In<dou
   std::copy_n(weights.data(), kFits, w.begin());
   nb::gil_scoped_release release;
   new (self) NameEvidence(markers, std::move(own), std::move(tracks), std::move(poses), size, w,
-                          none, threads);
+                          none);
 }
 
 void make_name_search(NameSearch* self, const NameEvidence& evidence,
@@ -149,7 +149,7 @@ void bind_naming(nb::module_& module) {
   nb::class_<NameEvidence>(module, "NameEvidence")
       .def("__init__", &make_evidence, nb::kw_only(), "distances"_a, "movements"_a, "variations"_a, "prior"_a,
            "quads"_a, "heights"_a, "pairs"_a, "pair_distances"_a, "pair_spreads"_a, "positions"_a,
-           "spreads"_a, "size"_a, "weights"_a, "none"_a, "threads"_a)
+           "spreads"_a, "size"_a, "weights"_a, "none"_a)
       .def_prop_ro("n_markers", &NameEvidence::n_markers)
       .def("scores",
            [](const NameEvidence& self, const In<std::int64_t>& names) {

@@ -536,7 +536,6 @@ class NameEvidence:
         size: float,
         weights: Floats,
         none: float,
-        threads: int,
     ) -> None: ...
     @property
     def n_markers(self) -> int: ...

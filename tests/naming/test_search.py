@@ -49,7 +49,6 @@ def made_up(seed, n_tracks=7, n_markers=8):
         "size": 1.03,
         "weights": np.array(WEIGHTS),
         "none": -8.0,
-        "threads": 1,
     }
 
 

@@ -140,7 +140,6 @@ def evidence_of(
         size=size,
         weights=np.array(weights),
         none=NONE,
-        threads=1,
     )
 
 

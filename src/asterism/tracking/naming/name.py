@@ -200,15 +200,23 @@ def _first(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list
     if len(alive) < 2:
         return [None] * len(marker_sets)
     positions = _positions(tracks, alive)
-    subsets = [np.arange(len(alive)), *bodies_of(positions, len(marker_sets))]
+    subsets = [np.arange(len(alive))]
     results: dict[tuple[int, int], Found] = {}
-    for s, made in enumerate(marker_sets):
-        for b, subset in enumerate(subsets):
-            if len(marker_sets) > 1 and b == 0 and len(subsets) > len(marker_sets):
-                continue  # several subjects: each has a body of its own
-            own = search(made, positions[:, subset], up)
+
+    def try_set(s: int, b: int) -> None:
+        if len(subsets[b]) >= MIN_FOUND * len(marker_sets[s]):
+            own = search(marker_sets[s], positions[:, subsets[b]], up)
             if own is not None and _fits(own):
                 results[s, b] = own
+
+    if len(marker_sets) == 1:
+        try_set(0, 0)
+    if not results:  # several subjects, each with a body of its own; or others without a set
+        subsets += bodies_of(positions, len(marker_sets))
+        is_apart = len(marker_sets) == 1 or len(subsets) > len(marker_sets)
+        for s in range(len(marker_sets)):
+            for b in range(is_apart, len(subsets)):
+                try_set(s, b)
     body_of, probability = bodies_of_sets(
         {key: own.score for key, own in results.items()}, len(marker_sets), len(subsets)
     )

@@ -64,7 +64,7 @@ def search(
     up : {"x", "y", "z"}
         Axis of the capture that points up.
     start : ndarray of int, shape (n,), optional
-        Names from which the search starts as well.
+        Names from which the search starts instead, nearly right.
 
     Notes
     -----
@@ -73,8 +73,7 @@ def search(
     that fit them. The search is a local one: it ends where no move improves the score
     (`engine/naming/name_search.hpp`).
     """
-    first = starts(made, positions, up)
-    first += [start] if start is not None else []
+    first = [start] if start is not None else starts(made, positions, up)
     if not first:
         return None
     stats = TrackStats.of(positions)
@@ -84,18 +83,18 @@ def search(
     def searching(evidence: _engine.NameEvidence) -> _engine.NameSearch:
         return _engine.NameSearch(evidence, groups=groups, partner=partner, near=near)
 
-    rough = searching(evidence_of(made, stats, size=1.0, weights=ROUGH_WEIGHTS))
-    settled: dict[bytes, tuple[float, NDArray[np.int64]]] = {}
-    for names in first:
-        names, score = rough.settled(names)
-        settled[names.tobytes()] = (score, names)
-    best = [n for _, n in sorted(settled.values(), key=lambda item: -item[0])[:REFINED]]
-    # Given names are nearly right, so that the rough result needs no improvement beside them.
-    best = [rough.improved(best[0])[0] if start is None else start, *best]
-    size, weights = refit(made, stats, best[0]) or (1.0, FIRST_WEIGHTS)
+    if start is None:
+        rough = searching(evidence_of(made, stats, size=1.0, weights=ROUGH_WEIGHTS))
+        settled: dict[bytes, tuple[float, NDArray[np.int64]]] = {}
+        for names in first:
+            names, score = rough.settled(names)
+            settled[names.tobytes()] = (score, names)
+        first = [n for _, n in sorted(settled.values(), key=lambda item: -item[0])[:REFINED]]
+        first = [rough.improved(first[0])[0], *first]
+    size, weights = refit(made, stats, first[0]) or (1.0, FIRST_WEIGHTS)
     evidence = evidence_of(made, stats, size=size, weights=weights)
     fine = searching(evidence)
-    names, _ = max((fine.settled(names) for names in best), key=lambda item: item[1])
+    names, _ = max((fine.settled(names) for names in first), key=lambda item: item[1])
     again = refit(made, stats, names)
     if again is not None and _differs(again, (size, weights)):
         size, weights = again
