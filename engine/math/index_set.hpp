@@ -13,8 +13,8 @@ class IndexSet {
     if (static_cast<std::int32_t>(where_.size()) < n) where_.resize(n, -1);
   }
   void clear() {
+    for (const std::int32_t i : items_) where_[i] = -1;
     items_.clear();
-    where_.assign(where_.size(), -1);
   }
   std::int32_t size() const { return static_cast<std::int32_t>(items_.size()); }
   std::int32_t operator[](std::int32_t k) const { return items_[k]; }

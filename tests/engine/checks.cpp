@@ -227,6 +227,16 @@ void no_gain_exceeds_its_bound(int n_modes) {
       });
       CHECK(max_score_of(p, edit) <= of_all + 1e-9);
     }
+    // Detections that are not filtered count with their present gain.
+    p.apply(std::span(&edit, 1));
+    const auto& nodes = p.track(edit.track).nodes;
+    Edit<Filter> same{edit.track, random.below(p.track(edit.track).size() - 1)};
+    same.tail.nodes.assign(nodes.begin() + same.keep, nodes.end());
+    const std::size_t n_filtered = 1 + random.below(static_cast<std::int32_t>(same.tail.nodes.size()));
+    for (std::size_t n = 0; n < n_filtered; ++n) filter_next(p, same, [](double) { return true; });
+    CHECK(std::abs(max_score_of(p, same, n_filtered) - p.score_of(edit.track)) < 1e-9);
+    Edit<Filter> none{edit.track};
+    p.apply(std::span(&none, 1));
   }
   CHECK(smallest < 0.5);
 }

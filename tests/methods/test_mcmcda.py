@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -277,6 +278,28 @@ def test_groups_that_nothing_joins_are_walked_apart():
     cells = am.MCMCDA(chain=ChainOptions(groups="cells", distance=0.2))
     cut = am.track(d, cells, model=model, seed=1).info
     assert cut["cut_links"] > 0
+
+
+def test_groups_are_divided_by_the_moves_at_their_links():
+    # Three motions make many links ambiguous whose tracks have much better ones.
+    scene = am.simulate.dense(n_markers=40, frames=sized(60, 20), seed=3)
+    truth = am.simulate.corrupt(scene, missing=0.1, clutter=0.1, noise=0.005, seed=4)
+    model = am.estimate_model(truth.detections).model
+    (own,) = model.motion.modes
+    assert isinstance(own, am.DWNA)
+    motions = tuple(
+        replace(own, acceleration_sigma=k * own.acceleration_sigma) for k in (0.5, 1, 10)
+    )
+    transitions = np.array([[0.95, 0.045, 0.005], [0.045, 0.95, 0.005], [0.25, 0.25, 0.5]])
+    motion = am.InteractingMotions(models=motions, transitions=transitions)
+    model = replace(model, motion=motion)
+    best = am.track(truth.detections, am.MCMCDA(confidence=0), model=model, seed=1)
+    # The whole groups, because a draw may use any move.
+    draw = am.track(truth.detections, am.MCMCDA(confidence=0, keep="draw"), model=model, seed=1)
+    assert best.info["groups"] > 1.2 * draw.info["groups"]
+    assert best.info["moves"] < 0.7 * draw.info["moves"]
+    assert best.info["log_posterior"] > draw.info["log_posterior"] - 1e-6
+    assert am.evaluate(best, truth).idf1 > 0.99
 
 
 def test_tracks_that_keep_their_distances_are_sure():

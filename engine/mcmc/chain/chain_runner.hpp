@@ -33,15 +33,6 @@ struct Halves {
   std::int64_t all_moves() const { return std::accumulate(n_moves.begin(), n_moves.end(), std::int64_t{0}); }
 };
 
-// The involutive moves of a chain at ambiguous links, each with its cumulative weight.
-template <typename Filter>
-struct Hot {
-  typename Sampler<Filter>::Listed move;
-  double upto = 0;
-};
-template <typename Filter>
-using HotList = std::vector<Hot<Filter>>;
-
 template <typename Filter>
 class ChainRunner {
  public:
@@ -51,17 +42,26 @@ class ChainRunner {
         hot_share_(options.share_at_ambiguous),
         is_draw_(options.is_draw) {}
 
-  // Searches for the best partition, returns its gain over the start, and stays there. With
-  // `is_draw` it stays at the last state instead and returns infinity. `list` receives the moves at
-  // ambiguous links, as they are at the start.
-  double search(const Partition<Filter>& whole, const Group& group, std::uint64_t seed,
-                const Budget& budget, HotList<Filter>& list, ChainStats& stats) {
+  // Lists the plausible moves at the ambiguous links of a group. Their detections have the numbers
+  // of the whole partition.
+  std::vector<HotMove> list(const Partition<Filter>& whole, const Group& group) {
     sampler_.partition().take_part(whole, group.tracks, group.free);
-    sampler_.begin(seed);
+    list_hot(group.ambiguous);
+    std::vector<HotMove> out;
+    for (const Hot& hot : hot_) {
+      const auto origin = [&](std::int32_t i) { return i < 0 ? -1 : sampler_.partition().origin(i); };
+      const auto& [kind, y, a, c] = hot.move.toggle;
+      out.push_back({{kind, origin(y), origin(a), origin(c)}, hot.gain});
+    }
+    return out;
+  }
+
+  // Searches for the best partition, returns its gain over the start, and stays there. With
+  // `is_draw` it stays at the last state instead and returns infinity.
+  double search(const Partition<Filter>& whole, const Group& group, std::uint64_t seed,
+                const Budget& budget, ChainStats& stats) {
+    begin(whole, group, seed);
     sampler_.weigh_above(sampler_.kOnlyWhatMayBeTaken);
-    sampler_.begin_best();
-    list_hot(group);
-    list = hot_;
     const auto look_at_none = [](const Change<Filter>&, bool) {};
     std::int64_t n = 0;
     for (; !budget.is_over(n); ++n) step(look_at_none);
@@ -73,20 +73,11 @@ class ChainRunner {
   }
   const Partition<Filter>& partition() const { return sampler_.partition(); }
 
-  // Estimates the probability of the links of the initial partition. `list` are the moves at
-  // ambiguous links if they are known from a search, else null.
+  // Estimates the probability of the links of the initial partition.
   void sample(const Partition<Filter>& whole, const Group& group, std::uint64_t seed,
-              const Budget& budget, const HotList<Filter>* list, Halves& out, ChainStats& stats) {
-    Partition<Filter>& p = sampler_.partition();
-    p.take_part(whole, group.tracks, group.free);
-    sampler_.begin(seed);
-    sampler_.begin_best();
-    if (list == nullptr) {
-      list_hot(group);
-    } else {
-      hot_ = *list;
-      for (Hot<Filter>& hot : hot_) hot.move.weighed = p.clock();
-    }
+              const Budget& budget, Halves& out, ChainStats& stats) {
+    const Partition<Filter>& p = sampler_.partition();
+    begin(whole, group, seed);
     sampler_.weigh_above(kLookedAtAbove);
     marginals_.begin();
     out.detections.clear();
@@ -124,6 +115,22 @@ class ChainRunner {
   // Log ratio without the reverse move below which a rejected move is not evaluated further.
   static constexpr double kLookedAtAbove = -9;
 
+  // Places the chain at the start of a group.
+  void begin(const Partition<Filter>& whole, const Group& group, std::uint64_t seed) {
+    Partition<Filter>& p = sampler_.partition();
+    p.take_part(whole, group.tracks, group.free);
+    sampler_.begin(seed);
+    sampler_.begin_best();
+    if (!group.is_listed) return list_hot(group.ambiguous);
+    hot_.clear();
+    number_locally();
+    for (const auto& [toggle, gain] : group.moves) {
+      const auto& [kind, y, a, c] = toggle;
+      add_listed({kind, local(y), local(a), local(c)}, gain);
+    }
+    forget_numbers();
+  }
+
   template <typename Observe>
   void step(Observe&& observe) {
     if (hot_.empty() || sampler_.random().uniform() >= hot_share_) {
@@ -132,44 +139,53 @@ class ChainRunner {
     }
     const double at = sampler_.random().uniform() * hot_.back().upto;
     const auto hot = std::upper_bound(hot_.begin(), hot_.end(), at,
-                                      [](double x, const Hot<Filter>& h) { return x < h.upto; });
+                                      [](double x, const Hot& h) { return x < h.upto; });
     sampler_.step(hot->move, observe);
   }
 
   // Lists the involutive moves at the ambiguous links of this part. They are in detailed balance
   // because the list and its probabilities are fixed.
-  void list_hot(const Group& group) {
+  void list_hot(std::span<const AmbiguousLinks::Link> links) {
     hot_.clear();
     if (hot_share_ == 0) return;
+    has_skip_.assign(sampler_.partition().window().n_ids(), false);
+    number_locally();
+    for (const auto& [from, to] : links) list_at(local(from), local(to));
+    forget_numbers();
+  }
+  void list_at(std::int32_t a, std::int32_t y) {
     const Partition<Filter>& p = sampler_.partition();
-    const std::int32_t n = p.window().n_ids();
-    has_skip_.assign(n, false);
-    for (std::int32_t i = 0; i < n; ++i) {
+    if (a < 0 || y < 0 || p.is_frozen(y)) return;  // a settled link is not ambiguous any more
+    const std::int32_t x = p.track_of(a) < 0 ? -1 : p.after(a);
+    const std::int32_t c = p.track_of(y) < 0 ? -1 : p.before(y);
+    add_skips(a, y);
+    if (p.track_of(a) < 0 || x == y) {
+      add_hot({Toggle::Kind::begin, y, a});
+      return;
+    }
+    if (c >= 0) {
+      add_hot({Toggle::Kind::relocate, y, a, c});
+      if (x < 0) add_hot({Toggle::Kind::transfer, y, a, c});
+    }
+    if (x < 0 || p.is_frozen(x)) return;
+    add_hot({Toggle::Kind::swap, y, x});
+    add_hot({Toggle::Kind::trade, y, x});
+  }
+  // `local` returns the number in this part of a detection of the whole partition, -1 for others,
+  // between `number_locally` and `forget_numbers`.
+  void number_locally() {
+    const Partition<Filter>& p = sampler_.partition();
+    for (std::int32_t i = 0; i < p.window().n_ids(); ++i) {
       if (static_cast<std::int32_t>(local_.size()) <= p.origin(i)) local_.resize(p.origin(i) + 1, -1);
       local_[p.origin(i)] = i;
     }
-    const auto local = [&](std::int32_t i) {
-      return i < static_cast<std::int32_t>(local_.size()) ? local_[i] : -1;
-    };
-    for (const auto& [from, to] : group.ambiguous) {
-      const std::int32_t a = local(from), y = local(to);
-      if (a < 0 || y < 0 || p.is_frozen(y)) continue;  // a settled link is not ambiguous any more
-      const std::int32_t x = p.track_of(a) < 0 ? -1 : p.after(a);
-      const std::int32_t c = p.track_of(y) < 0 ? -1 : p.before(y);
-      add_skips(a, y);
-      if (p.track_of(a) < 0 || x == y) {
-        add_hot({Toggle::Kind::begin, y, a});
-        continue;
-      }
-      if (c >= 0) {
-        add_hot({Toggle::Kind::relocate, y, a, c});
-        if (x < 0) add_hot({Toggle::Kind::transfer, y, a, c});
-      }
-      if (x < 0 || p.is_frozen(x)) continue;
-      add_hot({Toggle::Kind::swap, y, x});
-      add_hot({Toggle::Kind::trade, y, x});
-    }
-    for (std::int32_t i = 0; i < n; ++i) local_[p.origin(i)] = -1;
+  }
+  std::int32_t local(std::int32_t i) const {
+    return i >= 0 && i < static_cast<std::int32_t>(local_.size()) ? local_[i] : -1;
+  }
+  void forget_numbers() {
+    const Partition<Filter>& p = sampler_.partition();
+    for (std::int32_t i = 0; i < p.window().n_ids(); ++i) local_[p.origin(i)] = -1;
   }
   // Adds the move that makes an absent link, or those that remove either end of a present link.
   void add_skips(std::int32_t a, std::int32_t y) {
@@ -190,10 +206,12 @@ class ChainRunner {
     add_hot({Toggle::Kind::skip, y, p.before(y), p.after(y)});
   }
   void add_hot(const Toggle& toggle) {
-    Hot<Filter> hot{{toggle}, hot_.empty() ? 0 : hot_.back().upto};
-    if (!sampler_.weigh(hot.move, -kHotWithin)) return;
-    hot.upto += std::exp(std::min(hot.move.gain, 0.0) / 4);
-    hot_.push_back(hot);
+    double gain = 0;
+    if (sampler_.estimate(toggle, -kHotWithin, gain)) add_listed(toggle, gain);
+  }
+  void add_listed(const Toggle& toggle, double gain) {
+    const double before = hot_.empty() ? 0 : hot_.back().upto;
+    hot_.push_back({{toggle}, gain, before + std::exp(std::min(gain, 0.0) / 4)});
   }
   static constexpr double kHotWithin = 12;
 
@@ -201,7 +219,12 @@ class ChainRunner {
   Marginals<Filter> marginals_;
   double hot_share_;
   bool is_draw_;
-  HotList<Filter> hot_;
+  // The plausible moves at ambiguous links, each with its cumulative weight.
+  struct Hot {
+    typename Sampler<Filter>::Listed move;
+    double gain = 0, upto = 0;  // the gain is an estimate at the start
+  };
+  std::vector<Hot> hot_;
   std::vector<std::int32_t> local_;
   std::vector<char> has_skip_;  // detections that already have a skip move
 };

@@ -9,10 +9,7 @@
 #include <limits>
 #include <memory>
 #include <numeric>
-#include <optional>
 #include <span>
-#include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include "base/parallel.hpp"
@@ -30,57 +27,50 @@ class ParallelChains {
   ParallelChains(const ChainOptions& chain, std::int32_t n_chains, std::int32_t n_threads)
       : chain_(chain), n_chains_(n_chains), n_threads_(n_threads) {}
 
-  // The groups that a search left unchanged, by their first track or detection, with the moves at
-  // their ambiguous links.
-  using Unchanged = std::unordered_map<std::int32_t, std::pair<Group, HotList<Filter>>>;
+  // Lists the plausible moves of each group, by which it may be divided. A draw from the posterior
+  // needs the whole group, because it may also reach partitions by several implausible moves.
+  void list(const Partition<Filter>& whole, std::span<Group> groups) {
+    if (chain_.share_at_ambiguous == 0 || chain_.is_draw) return;
+    each(whole, groups, 1, [&](ChainRunner<Filter>& runner, std::size_t g) {
+      groups[g].moves = runner.list(whole, groups[g]);
+      groups[g].is_listed = true;
+    });
+  }
 
   // Sets each group to the best state that its chains find.
-  Unchanged search(Partition<Filter>& whole, std::span<const Group> groups, const Budgets& budgets,
+  void search(Partition<Filter>& whole, std::span<Group> groups, const Budgets& budgets,
               std::uint64_t seed, ChainStats& stats) {
     struct Found {
       double gain = 0;
       ChainStats stats;
-      HotList<Filter> list;
-      std::optional<Partition<Filter>> part;
+      std::vector<Edit<Filter>> edits;
     };
     std::vector<Found> found(groups.size() * n_chains_);
-    each_chain(whole, groups, [&](ChainRunner<Filter>& runner, std::size_t task) {
+    each(whole, groups, n_chains_, [&](ChainRunner<Filter>& runner, std::size_t task) {
       const std::size_t g = task / n_chains_;
       Found& own = found[task];
-      own.gain = runner.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.list,
-                               own.stats);
-      if (own.gain > 0) own.part = runner.partition();
+      own.gain = runner.search(whole, groups[g], seed_of(seed, task), budgets.of(g), own.stats);
+      if (own.gain > 0) own.edits = whole.edits_to(runner.partition(), groups[g].tracks);
     });
-    Unchanged unchanged;
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const auto first = found.begin() + static_cast<std::ptrdiff_t>(g) * n_chains_;
       const auto last = first + n_chains_;
       for (auto one = first; one != last; ++one) stats.add(one->stats);
       const auto best = std::max_element(
           first, last, [](const Found& a, const Found& b) { return a.gain < b.gain; });
-      if (best->gain > 0)
-        whole.take_over(*best->part, groups[g].tracks);
-      else
-        unchanged.emplace(groups[g].first(), std::pair(groups[g], std::move(first->list)));
+      if (best->gain > 0) change(whole, groups[g], best->edits);
     }
-    return unchanged;
   }
 
   // For each detection of the whole partition, the fraction of the chains' states in which it has
-  // its present predecessor; 1 for detections in no group. `unchanged` are those of a search that
-  // preceded immediately, if any.
+  // its present predecessor; 1 for detections in no group.
   std::vector<double> sample(const Partition<Filter>& whole, std::span<const Group> groups,
-                             const Unchanged& unchanged, const Budgets& budgets,
-                             std::uint64_t seed, ChainStats& stats) {
+                             const Budgets& budgets, std::uint64_t seed, ChainStats& stats) {
     std::vector<Halves> found(groups.size() * n_chains_);
     std::vector<ChainStats> counts(found.size());
-    each_chain(whole, groups, [&](ChainRunner<Filter>& runner, std::size_t task) {
+    each(whole, groups, n_chains_, [&](ChainRunner<Filter>& runner, std::size_t task) {
       const std::size_t g = task / n_chains_;
-      // Numbers of tracks are not reused while the tracks exist, so equal groups are the same.
-      const auto at = unchanged.find(groups[g].first());
-      const bool is_known = at != unchanged.end() && at->second.first == groups[g];
-      runner.sample(whole, groups[g], seed_of(seed, task), budgets.of(g),
-                    is_known ? &at->second.second : nullptr, found[task], counts[task]);
+      runner.sample(whole, groups[g], seed_of(seed, task), budgets.of(g), found[task], counts[task]);
     });
     for (const ChainStats& one : counts) stats.add(one);
     std::vector<double> shares(whole.window().n_ids(), 1.0);
@@ -98,18 +88,35 @@ class ParallelChains {
     return Random(seed ^ static_cast<std::uint64_t>(task)).next();
   }
 
-  // Runs the chains of all groups. The longest begin first, so that no thread waits for one at the
-  // end.
+  // Applies the result of a search to a group.
+  static void change(Partition<Filter>& whole, Group& group, std::span<Edit<Filter>> edits) {
+    if (edits.empty()) return;
+    std::vector<std::int32_t>& free = group.free;
+    for (const std::int32_t k : group.tracks)
+      for (std::int32_t n = whole.track(k).n_frozen; n < whole.track(k).size(); ++n)
+        free.push_back(whole.track(k).nodes[n]);
+    whole.apply(edits);
+    for (const Edit<Filter>& edit : edits)
+      if (!whole.tracks().has(edit.track))
+        std::erase(group.tracks, edit.track);
+      else if (std::ranges::find(group.tracks, edit.track) == group.tracks.end())
+        group.tracks.push_back(edit.track);
+    std::erase_if(free, [&](std::int32_t i) { return !whole.is_free(i); });
+    group.is_listed = false;
+  }
+
+  // Runs so many tasks for each group. The longest begin first, so that no thread waits for one at
+  // the end.
   template <typename Run>
-  void each_chain(const Partition<Filter>& whole, std::span<const Group> groups, Run&& run) {
+  void each(const Partition<Filter>& whole, std::span<const Group> groups, std::int32_t n_tasks, Run&& run) {
     auto& runners = s_.runners;
     while (static_cast<std::int32_t>(runners.size()) < n_threads_)
       runners.push_back(std::make_unique<ChainRunner<Filter>>(whole.empty(), chain_));
-    std::vector<std::size_t> order(groups.size() * n_chains_);
+    std::vector<std::size_t> order(groups.size() * n_tasks);
     std::iota(order.begin(), order.end(), 0);
     if (n_threads_ > 1)
       std::ranges::stable_sort(order, std::greater{},
-                               [&](std::size_t task) { return groups[task / n_chains_].n_open; });
+                               [&](std::size_t task) { return groups[task / n_tasks].n_open; });
     in_parallel(static_cast<std::int64_t>(order.size()), n_threads_,
                 [&](std::int32_t w, std::int64_t k) { run(*runners[w], order[k]); });
   }

@@ -118,12 +118,11 @@ class Sampler {
     change_.gain = change_.log_ratio = move.gain;
     return take(std::log(random_.uniform()), true, observe);
   }
-  // Computes the gain of a move. Returns false if it is impossible or not above `min_gain`.
-  bool weigh(Listed& move, double min_gain) {
+  // Estimates the gain of a move. Returns false if it is impossible or not above `min_gain`.
+  bool estimate(const Toggle& toggle, double min_gain, double& gain) {
     change_.min_gain = min_gain;
-    if (!toggles_.propose(move.toggle, change_) || !toggles_.weigh(change_)) return false;
-    move.gain = change_.gain;
-    move.weighed = partition_.clock();
+    if (!toggles_.propose(toggle, change_) || !toggles_.estimate(change_)) return false;
+    gain = change_.gain;
     return true;
   }
   Random& random() { return random_; }

@@ -2,7 +2,8 @@
 // independently.
 //
 //   whole       one group
-//   likelihood  joined by ambiguous links; tracks without any need no chain
+//   likelihood  joined by ambiguous links, and then by the plausible moves at these links alone;
+//               tracks without any need no chain
 //   cells       by spatial cells (§4.2 of the report), which are shifted by half in every other
 //               frame so that the borders move
 //   clusters    joined if they are closer than some distance (ibid.)
@@ -10,6 +11,7 @@
 // A track belongs to the group or cell of its last detection, so no track is divided.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -21,6 +23,7 @@
 #include "math/union_find.hpp"
 #include "mcmc/chain/ambiguous_links.hpp"
 #include "mcmc/model/partition.hpp"
+#include "mcmc/moves/involutive_moves.hpp"
 
 namespace asterism {
 
@@ -33,14 +36,19 @@ struct SplitOptions {
   double distance = 0;   // edge of a cell, or distance within a cluster
 };
 
+// A move at an ambiguous link, and an estimate of its gain of the log posterior.
+struct HotMove {
+  Toggle toggle;
+  double gain = 0;
+};
+
 struct Group {
   std::vector<std::int32_t> tracks, free;
   std::vector<AmbiguousLinks::Link> ambiguous;
+  std::vector<HotMove> moves;  // the plausible moves at the ambiguous links
+  bool is_listed = false;      // whether `moves` are those of the present partition
   std::int64_t n_new = 0;   // tracks and free detections with a detection in the newest frame
   std::int64_t n_open = 0;  // detections that are not settled
-
-  std::int32_t first() const { return tracks.empty() ? -1 - free.front() : tracks.front(); }
-  bool operator==(const Group&) const = default;
 };
 
 struct Split {
@@ -69,7 +77,48 @@ class Splitter {
       case SplitBy::cells: join_cells(sets); break;
       case SplitBy::clusters: join_clusters(sets); break;
     }
-    return collect(sets, ambiguous);
+    std::vector<char> is_open(items_.size(), opt_.by != SplitBy::likelihood);
+    ambiguous.each([&](std::int32_t, std::int32_t j) {
+      if (item(j) >= 0) is_open[sets.find(item(j))] = true;
+    });
+    Split out = collect(sets, is_open);
+    ambiguous.each([&](std::int32_t i, std::int32_t j) {
+      const std::int32_t a = item(i), b = item(j);
+      if (a < 0 || b < 0) return;
+      if (sets.find(a) == sets.find(b))
+        out.groups[group_of_[a]].ambiguous.push_back({i, j});
+      else
+        ++out.n_cut;
+    });
+    return out;
+  }
+
+  // Divides the groups of a split by likelihood further if their moves are listed. Many links are
+  // ambiguous by the likelihood of the link alone, but have no plausible move, because the tracks
+  // and detections concerned have much better links. They need no chain and join no groups.
+  Split divide(Split wide) {
+    const auto is_listed = [](const Group& group) { return group.is_listed; };
+    if (opt_.by != SplitBy::likelihood || !std::ranges::all_of(wide.groups, is_listed)) return wide;
+    UnionFind sets(items_.size());
+    for (const Group& group : wide.groups)
+      for (const auto& [toggle, gain] : group.moves) {
+        join(sets, toggle.y, toggle.a);
+        if (toggle.c >= 0) join(sets, toggle.y, toggle.c);
+      }
+    std::vector<char> is_open(items_.size(), false);
+    for (const Group& group : wide.groups)
+      for (const HotMove& move : group.moves) is_open[sets.find(item(move.toggle.y))] = true;
+    Split out = collect(sets, is_open);
+    for (Group& group : out.groups) group.is_listed = true;
+    for (const Group& group : wide.groups) {
+      for (const auto& [i, j] : group.ambiguous) {
+        const std::int32_t n = group_of_[item(i)];
+        if (n >= 0 && n == group_of_[item(j)]) out.groups[n].ambiguous.push_back({i, j});
+      }
+      for (const HotMove& move : group.moves)
+        out.groups[group_of_[item(move.toggle.y)]].moves.push_back(move);
+    }
+    return out;
   }
 
  private:
@@ -123,22 +172,20 @@ class Splitter {
       grid.within(places[n], opt_.distance, [&](std::int32_t other, double) { sets.join(n, other); });
   }
 
-  Split collect(UnionFind& sets, const AmbiguousLinks& ambiguous) const {
+  // Makes groups of the sets whose root is open, and stores the group of each item, -1 for none.
+  Split collect(UnionFind& sets, const std::vector<char>& is_open) {
     Split out;
-    std::vector<char> is_open(items_.size(), opt_.by != SplitBy::likelihood);
-    ambiguous.each([&](std::int32_t, std::int32_t j) {
-      if (item(j) >= 0) is_open[sets.find(item(j))] = true;
-    });
-    std::vector<std::int32_t> group_of(items_.size(), -1);
+    group_of_.assign(items_.size(), -1);
     for (std::int32_t n = 0; n < static_cast<std::int32_t>(items_.size()); ++n) {
       const std::int32_t root = sets.find(n);
       out.n_all += root == n;
       if (!is_open[root]) continue;
-      if (group_of[root] < 0) {
-        group_of[root] = static_cast<std::int32_t>(out.groups.size());
+      if (group_of_[root] < 0) {
+        group_of_[root] = static_cast<std::int32_t>(out.groups.size());
         out.groups.emplace_back();
       }
-      Group& group = out.groups[group_of[root]];
+      group_of_[n] = group_of_[root];
+      Group& group = out.groups[group_of_[root]];
       const Item& item = items_[n];
       if (item.track >= 0) {
         group.tracks.push_back(item.track);
@@ -149,21 +196,13 @@ class Splitter {
       }
       group.n_new += p_.window()[item.detection].frame == p_.window().now();
     }
-    ambiguous.each([&](std::int32_t i, std::int32_t j) {
-      const std::int32_t a = item(i), b = item(j);
-      if (a < 0 || b < 0) return;
-      if (sets.find(a) == sets.find(b))
-        out.groups[group_of[sets.find(a)]].ambiguous.push_back({i, j});
-      else
-        ++out.n_cut;
-    });
     return out;
   }
 
   const Partition<Filter>& p_;
   SplitOptions opt_;
   std::vector<Item> items_;
-  std::vector<std::int32_t> item_of_, item_of_track_;
+  std::vector<std::int32_t> item_of_, item_of_track_, group_of_;
 };
 
 }  // namespace asterism

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "mcmc/model/partition.hpp"
@@ -89,15 +90,21 @@ double max_gain(const Partition<Filter>& p, const Edit<Filter>& edit, std::size_
   return p.gap_score(gap) + (is_second ? steps.log_peak : steps.log_later_peak) + later;
 }
 
-// An upper bound of the score of an edit, of which some detections may be planned.
+// An upper bound of the score of an edit, of which some detections may be planned. Detections after
+// the first `n_filtered` of the tail add what they add at present; they must follow each other in
+// the present partition as well.
 template <typename Filter>
-double max_score_of(const Partition<Filter>& p, const Edit<Filter>& edit) {
+double max_score_of(const Partition<Filter>& p, const Edit<Filter>& edit,
+                    std::size_t n_filtered = std::numeric_limits<std::size_t>::max()) {
   const Tail<Filter>& tail = edit.tail;
   const std::size_t n = tail.states.size();
   if (n == tail.nodes.size()) return p.score_of(edit);
+  const std::size_t n_last = std::min(n_filtered, tail.nodes.size());
   double score = n > 0 ? tail.scores.back() : edit.keep > 0 ? p.score(before(p, edit, 0)) : 0;
-  for (std::size_t k = n; k < tail.nodes.size(); ++k) score += max_gain(p, edit, k);
-  return score + p.end_score(tail.nodes.back());
+  for (std::size_t k = n; k < n_last; ++k) score += max_gain(p, edit, k);
+  const std::int32_t last = tail.nodes.back();
+  if (n_last < tail.nodes.size()) score += p.score(last) - p.score(tail.nodes[n_last - 1]);
+  return score + p.end_score(last);
 }
 
 // Whether every continuation is in a track after the edits.

@@ -202,8 +202,9 @@ class Partition {
   // Number of a detection in the whole partition; the number itself if this is not a part.
   std::int32_t origin(std::int32_t i) const { return origin_.empty() ? i : origin_[i]; }
 
-  // Replaces these tracks by the result of a part that was taken of them.
-  void take_over(const Partition& part, std::span<const std::int32_t> tracks) {
+  // The edits that replace these tracks by the result of a part that was taken of them.
+  std::vector<Edit<Filter>> edits_to(const Partition& part,
+                                     std::span<const std::int32_t> tracks) const {
     std::unordered_map<std::int32_t, std::int32_t> by_first;
     for (const std::int32_t k : tracks)
       by_first[tracks_[k].nodes[tracks_[k].first_open()]] = k;
@@ -233,7 +234,7 @@ class Partition {
     }
     for (const std::int32_t k : tracks)
       if (by_first.contains(tracks_[k].nodes[tracks_[k].first_open()])) edits.emplace_back().track = k;
-    apply(edits);
+    return edits;
   }
 
   // Ends a block of a longer capture at this frame. `n_after` frames of the capture follow the last
@@ -304,10 +305,7 @@ class Partition {
     reserve_up_to(n);
     std::fill_n(track_of_.begin(), n, kFree);
     unused_.clear();
-    for (std::int32_t k = static_cast<std::int32_t>(tracks_.size()) - 1; k >= 0; --k) {
-      tracks_[k].nodes.clear();
-      unused_.push_back(k);
-    }
+    n_used_ = 0;
   }
 
   // Adds a detection at the end of a track.
@@ -344,17 +342,18 @@ class Partition {
     free_.add(i);
   }
   std::int32_t new_track() {
-    std::int32_t k = static_cast<std::int32_t>(tracks_.size());
-    if (unused_.empty()) {
+    std::int32_t k = n_used_;
+    if (!unused_.empty()) {
+      k = unused_.back();
+      unused_.pop_back();
+    } else if (++n_used_ > static_cast<std::int32_t>(tracks_.size())) {
       tracks_.emplace_back();
       begins_.emplace_back();
       ends_.emplace_back();
       all_.reserve_up_to(k + 1);
       young_.reserve_up_to(k + 1);
-    } else {
-      k = unused_.back();
-      unused_.pop_back();
     }
+    tracks_[k].nodes.clear();
     tracks_[k].n_frozen = tracks_[k].n_gone = 0;
     tracks_[k].id = -1;
     tracks_[k].stamp = ++clock_;
@@ -382,7 +381,8 @@ class Partition {
     std::int64_t frame = 0;
   };
   std::vector<End> begins_, ends_;
-  std::vector<std::int32_t> unused_;
+  std::int32_t n_used_ = 0;           // numbers of tracks that have been used
+  std::vector<std::int32_t> unused_;  // those of them that no track has any more
   IndexSet free_, taken_, linked_, leapt_, all_, young_;
   std::vector<std::int32_t> track_of_, place_;
   std::vector<State> state_;

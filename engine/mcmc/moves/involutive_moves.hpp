@@ -40,6 +40,8 @@ class Toggles {
   }
   // Computes the gain of the proposed move. Returns false if it does not exceed out.min_gain.
   bool weigh(Change<Filter>& out) const { return edits_.weigh(out); }
+  // The same with an estimate of the gain (mcmc/moves/track_edits.hpp).
+  bool estimate(Change<Filter>& out) const { return edits_.estimate(out); }
 
  private:
   bool draw(const Toggle& t, Change<Filter>& out) const {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "mcmc/model/edit_filter.hpp"
@@ -19,29 +20,10 @@ class TrackEdits {
 
   // Computes the gain of a proposed change, whose edits may be planned. Returns false as soon as the
   // gain cannot exceed `min_gain`, even if each of the remaining detections had its largest gain.
-  bool weigh(Change<Filter>& q) const {
-    double most = 0;  // an upper bound of the gain
-    std::size_t n_last = 0;
-    for (const Edit<Filter>& e : q.all()) {
-      most += max_score_of(p_, e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
-      n_last = std::max(n_last, e.tail.nodes.size());
-    }
-    if (!(most > q.min_gain - kRounding)) return false;
-    for (std::size_t n = 0; n < n_last; ++n)
-      for (Edit<Filter>& e : q.all()) {
-        if (n < e.tail.states.size() || n >= e.tail.nodes.size()) continue;
-        const double highest = max_gain(p_, e, n);
-        const auto goes_on = [&](double gain) {
-          most += gain - highest;
-          return most > q.min_gain - kRounding;
-        };
-        if (!filter_next(p_, e, goes_on)) return false;
-      }
-    q.gain = 0;
-    for (const Edit<Filter>& e : q.all())
-      q.gain += p_.score_of(e) - (e.track >= 0 ? p_.score_of(e.track) : 0);
-    return q.gain > q.min_gain;
-  }
+  bool weigh(Change<Filter>& q) const { return weigh_first(q, kAll); }
+  // Estimates the gain from the first detections of each tail. The others count as if they added to
+  // the score what they add at present.
+  bool estimate(Change<Filter>& q) const { return weigh_first(q, kEstimated); }
   // Plans the detections of a track from an index on.
   void append(Edit<Filter>& edit, std::int32_t track, std::int32_t from) const {
     const auto& nodes = p_.track(track).nodes;
@@ -80,6 +62,33 @@ class TrackEdits {
   }
 
  private:
+  static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+  // In every involutive move, the detections of a tail from the second on are consecutive already.
+  static constexpr std::size_t kEstimated = 2;
+
+  bool weigh_first(Change<Filter>& q, std::size_t n_filtered) const {
+    double most = 0;  // an upper bound of the gain
+    std::size_t n_last = 0;
+    for (const Edit<Filter>& e : q.all()) {
+      most += max_score_of(p_, e, n_filtered) - (e.track >= 0 ? p_.score_of(e.track) : 0);
+      n_last = std::max(n_last, std::min(e.tail.nodes.size(), n_filtered));
+    }
+    if (!(most > q.min_gain - kRounding)) return false;
+    for (std::size_t n = 0; n < n_last; ++n)
+      for (Edit<Filter>& e : q.all()) {
+        if (n < e.tail.states.size() || n >= e.tail.nodes.size()) continue;
+        const double highest = max_gain(p_, e, n);
+        const auto goes_on = [&](double gain) {
+          most += gain - highest;
+          return most > q.min_gain - kRounding;
+        };
+        if (!filter_next(p_, e, goes_on)) return false;
+      }
+    q.gain = 0;
+    for (const Edit<Filter>& e : q.all())
+      q.gain += max_score_of(p_, e, n_filtered) - (e.track >= 0 ? p_.score_of(e.track) : 0);
+    return q.gain > q.min_gain;
+  }
   bool fits_in_place_of(std::int32_t y, std::int32_t x) const {
     const DetectionWindow& window = p_.window();
     const std::int32_t i = p_.before(x), j = p_.after(x);

@@ -95,7 +95,7 @@ class McmcTracker {
         const auto go_on = [&](double share) { return goes_on((n_done + share) / n_all); };
         auto part = sweep_.take(partition_, blocks[b]);
         const double moves = (s == 0 ? opt_.moves : opt_.confidence) / overlap;
-        const Split split = split_up(part.partition, part.ambiguous, {}, stats);
+        Split split = split_up(part.partition, part.ambiguous, {}, stats);
         const auto weights = weights_of(split.groups, [](const Group& g) { return g.n_open; });
         double all = 0;
         for (const double weight : weights) all += weight;
@@ -107,7 +107,7 @@ class McmcTracker {
           sweep_.put_back(blocks[b], part);
         } else {
           const auto shares =
-              chains_.sample(part.partition, split.groups, {}, budgets, seed, stats.chain);
+              chains_.sample(part.partition, split.groups, budgets, seed, stats.chain);
           sweep_.keep_states(blocks[b], part);
           take_shares(blocks[b], part, shares, sure);
         }
@@ -188,16 +188,13 @@ class McmcTracker {
   template <typename Allowed, typename WantsConfidence>
   void run_chains(const std::vector<char>& is_sure, Allowed&& allowed, std::uint64_t phase,
             SampledStats& stats, WantsConfidence&& wants_confidence) {
-    const Split split = split_up(partition_, ambiguous_, is_sure, stats);
-    const auto unchanged = chains_.search(
-        partition_, split.groups, allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1),
-        seed_of(phase), stats.chain);
+    Split split = split_up(partition_, ambiguous_, is_sure, stats);
+    chains_.search(partition_, split.groups,
+                   allowed(split.groups, opt_.moves, has_confidence() ? 0.5 : 1), seed_of(phase),
+                   stats.chain);
     if (!wants_confidence()) return;
-    // The search may have changed the tracks.
-    const Split now = Splitter<Filter>(partition_, opt_.split).split(ambiguous_, is_sure);
-    keep_shares(chains_.sample(partition_, now.groups, unchanged,
-                               allowed(now.groups, opt_.confidence, 1), seed_of(phase + 1),
-                               stats.chain));
+    keep_shares(chains_.sample(partition_, split.groups, allowed(split.groups, opt_.confidence, 1),
+                               seed_of(phase + 1), stats.chain));
   }
 
   // Stores the confidences of a block for the frames that are at least as far inside it as in any
@@ -215,8 +212,11 @@ class McmcTracker {
   }
 
   Split split_up(const Partition<Filter>& p, const AmbiguousLinks& ambiguous,
-                 const std::vector<char>& is_sure, SampledStats& stats) const {
-    Split split = Splitter<Filter>(p, opt_.split).split(ambiguous, is_sure);
+                 const std::vector<char>& is_sure, SampledStats& stats) {
+    Splitter<Filter> splitter(p, opt_.split);
+    Split wide = splitter.split(ambiguous, is_sure);
+    chains_.list(p, wide.groups);
+    const Split split = splitter.divide(std::move(wide));
     stats.n_groups += split.n_all;
     for (const Group& group : split.groups)
       stats.largest_group = std::max<std::int64_t>(

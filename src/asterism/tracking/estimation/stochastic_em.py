@@ -31,7 +31,7 @@ N_KEPT = 3
 """Number of last rounds; their differences measure the uncertainty of the partition."""
 DRAWN_POINTS = 15_000
 """Number of detections in the pieces whose partitions are drawn."""
-_WALK = MCMCDA(keep="draw", confidence=0.0, end_odds=1.0)
+_WALK = MCMCDA(moves=25.0, keep="draw", confidence=0.0, end_odds=1.0)
 
 
 @record(eq=False)

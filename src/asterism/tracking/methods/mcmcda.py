@@ -105,7 +105,7 @@ class MCMCDA(EngineMethod):
     """
 
     window: int | None = 10
-    moves: float | None = 25.0
+    moves: float | None = 100.0
     deadline: float | None = None
     confidence: float = 25.0
     end_odds: float = 1000.0
