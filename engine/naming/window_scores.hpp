@@ -29,14 +29,15 @@ inline constexpr int kTried = 4;            // neighbours after which a hopeless
 inline constexpr double kHopelessSum = -8;  // sum of their log odds below which it is
 inline constexpr double kNoScore = -50;
 
-// points: (F, A, 3), NaN without a detection; holder: track of each marker, -1 for none. Writes
-// (A, M).
+// points: (F, A, 3), NaN without a detection; rows: the tracks that are scored; holder: track of
+// each marker, -1 for none. Writes (rows, M).
 inline void window_scores(std::span<const double> points, std::int32_t F, std::int32_t A,
-                          std::span<const std::int32_t> holder, const NeighbourTables& tables,
-                          std::span<double> out) {
-  std::vector<double> distance(static_cast<std::size_t>(A) * A, NAN);
-  for (std::int32_t a = 0; a < A; ++a)
-    for (std::int32_t b = 0; b < a; ++b) {
+                          std::span<const std::int32_t> rows, std::span<const std::int32_t> holder,
+                          const NeighbourTables& tables, std::span<double> out) {
+  std::vector<double> distance(A);
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    const std::int32_t a = rows[row];
+    for (std::int32_t b = 0; b < A; ++b) {
       double sum = 0;
       int n = 0;
       for (std::int32_t f = 0; f < F; ++f) {
@@ -48,11 +49,8 @@ inline void window_scores(std::span<const double> points, std::int32_t F, std::i
         sum += d;
         ++n;
       }
-      if (n > 0)
-        distance[static_cast<std::size_t>(a) * A + b] =
-            distance[static_cast<std::size_t>(b) * A + a] = sum / n;
+      distance[b] = n > 0 ? sum / n : NAN;
     }
-  for (std::int32_t k = 0; k < A; ++k)
     for (std::int32_t m = 0; m < tables.M; ++m) {
       double sum = 0;
       int n = 0;
@@ -60,8 +58,8 @@ inline void window_scores(std::span<const double> points, std::int32_t F, std::i
         const std::size_t at = static_cast<std::size_t>(m) * tables.R + r;
         const std::int32_t other = holder[tables.neighbour[at]];
         const double v = tables.variance[at];
-        if (other < 0 || other == k || !std::isfinite(v)) continue;
-        const double d = distance[static_cast<std::size_t>(k) * A + other];
+        if (other < 0 || other == a || !std::isfinite(v)) continue;
+        const double d = distance[other];
         if (std::isnan(d)) continue;
         const double off = d - tables.distance[at], y = 1 + off * off / (4 * v);
         const double density = 0.375 * kExpected / (std::sqrt(v * y) * y * y);
@@ -71,8 +69,9 @@ inline void window_scores(std::span<const double> points, std::int32_t F, std::i
           break;
         }
       }
-      out[static_cast<std::size_t>(k) * tables.M + m] = sum;
+      out[row * tables.M + m] = sum;
     }
+  }
 }
 
 }  // namespace asterism

@@ -114,7 +114,8 @@ nb::tuple searched(NameSearch& search, const In<std::int64_t>& names, Run&& run)
   return nb::make_tuple(array_of<std::int64_t>(state.names), state.score);
 }
 
-Out<double> scores_in_window(const In<double>& points, const In<std::int64_t>& holder,
+Out<double> scores_in_window(const In<double>& points, const In<std::int64_t>& rows,
+                   const In<std::int64_t>& holder,
                    const In<std::int64_t>& neighbours, const In<double>& distances,
                    const In<double>& variances, const In<double>& weights) {
   require(points.ndim() == 3 && points.shape(2) == 3, "points: (F, A, 3)");
@@ -134,13 +135,15 @@ Out<double> scores_in_window(const In<double>& points, const In<std::int64_t>& h
   const std::vector<std::int32_t> own = values_as<std::int32_t>(holder);
   require(own.size() == static_cast<std::size_t>(tables.M), "holder: (M,)");
   require_within(own, -1, A, "holder: tracks, or -1");
-  Owned<double> out(static_cast<std::size_t>(A) * tables.M);
+  const std::vector<std::int32_t> scored = values_as<std::int32_t>(rows);
+  require_within(scored, 0, A, "rows: tracks");
+  Owned<double> out(scored.size() * tables.M);
   {
     nb::gil_scoped_release release;
-    window_scores(flat(points), static_cast<std::int32_t>(points.shape(0)), A, own, tables,
-                  {out.data.get(), static_cast<std::size_t>(A) * tables.M});
+    window_scores(flat(points), static_cast<std::int32_t>(points.shape(0)), A, scored, own,
+                  tables, {out.data.get(), scored.size() * tables.M});
   }
-  return out.give({static_cast<std::size_t>(A), static_cast<std::size_t>(tables.M)});
+  return out.give({scored.size(), static_cast<std::size_t>(tables.M)});
 }
 
 }  // namespace
@@ -167,7 +170,7 @@ void bind_naming(nb::module_& module) {
              return self.total(names_given(names, self));
            },
            "names"_a);
-  module.def("window_scores", &scores_in_window, "points"_a, nb::kw_only(), "holder"_a, "neighbours"_a,
+  module.def("window_scores", &scores_in_window, "points"_a, nb::kw_only(), "rows"_a, "holder"_a, "neighbours"_a,
              "distances"_a, "variances"_a, "weights"_a);
   nb::class_<NameSearch>(module, "NameSearch")
       .def("__init__", &make_name_search, nb::keep_alive<1, 2>(), "evidence"_a, nb::kw_only(),

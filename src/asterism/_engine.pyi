@@ -557,6 +557,7 @@ class NameSearch:
 def window_scores(
     points: Floats,
     *,
+    rows: Ints,
     holder: Ints,
     neighbours: Ints,
     distances: Floats,

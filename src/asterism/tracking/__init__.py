@@ -17,6 +17,8 @@ from asterism.tracking.methods import (
 from asterism.tracking.naming import (
     NameChange,
     NameConflict,
+    Named,
+    NamedState,
     Naming,
     check_names,
     learn_marker_set,
@@ -51,6 +53,8 @@ __all__ = [
     "ModelEstimate",
     "NameChange",
     "NameConflict",
+    "Named",
+    "NamedState",
     "Naming",
     "Plan",
     "Rigidity",

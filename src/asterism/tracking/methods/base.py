@@ -76,6 +76,8 @@ class Update:
         Probability that each revised label is right.
     info : mapping
         Counts of the step, such as tracks, groups and candidates.
+    names : tuple of (str or None), or None
+        Name of the marker of each point, if the method names tracks (`Named`).
 
     Examples
     --------
@@ -97,6 +99,7 @@ class Update:
     confidence: NDArray[np.float64] | None = None
     revised_confidence: NDArray[np.float64] | None = None
     info: Mapping[str, float] = field(default_factory=dict[str, float])
+    names: tuple[str | None, ...] | None = None
 
     def __repr__(self) -> str:
         sure = "" if self.confidence is None else ", with confidence"

@@ -3,11 +3,14 @@
 from asterism.tracking.naming.check import NameConflict, check_names
 from asterism.tracking.naming.learn import learn_marker_set, merge_marker_sets
 from asterism.tracking.naming.name import Naming, name_tracks
+from asterism.tracking.naming.stream import Named, NamedState
 from asterism.tracking.naming.stretches import NameChange
 
 __all__ = [
     "NameChange",
     "NameConflict",
+    "Named",
+    "NamedState",
     "Naming",
     "check_names",
     "learn_marker_set",

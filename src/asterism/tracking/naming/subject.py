@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.tracking.rigidity.distances import distances_between
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism.model import MarkerSet
+    from asterism.tracking.rigidity.distances import Distances
 
 __all__ = ["Subject"]
 
@@ -44,7 +43,13 @@ class Subject:
 
     @classmethod
     def of(
-        cls, made: MarkerSet, size: float, positions: NDArray[np.float64], *, is_kept: bool
+        cls,
+        made: MarkerSet,
+        size: float,
+        found: Distances,
+        *,
+        is_kept: bool,
+        markers: NDArray[np.int64] | None = None,
     ) -> Subject:
         """Measure a subject.
 
@@ -54,31 +59,35 @@ class Subject:
             What is known beforehand; it fills in where the capture has too few frames.
         size : float
             Size of the subject relative to the set.
-        positions : ndarray of shape (F, M, 3)
-            Positions of the markers as named so far, metres, NaN where unknown.
+        found : Distances
+            Distances from `markers` to all markers as named so far, of shape (n, M).
         is_kept : bool
             Whether the markers are where they were when the set was learnt.
+        markers : ndarray of int, shape (n,), optional
+            Markers whose rows are wanted; all by default.
         """
-        found = distances_between(positions)
-        before = size * made.distances
+        own = np.arange(len(made)) if markers is None else markers
+        before = size * made.distances[own]
         fixed, share = UNKNOWN_MOVEMENT
-        movement = np.where(np.isfinite(made.movements), made.movements, fixed + share * before)
+        movement = made.movements[own]
+        movement = np.where(np.isfinite(movement), movement, fixed + share * before)
         fixed, share = KEPT if is_kept and made.knows_movement else ATTACHED
-        error2 = (fixed + share * before) ** 2 + np.nan_to_num(made.variations) ** 2
+        error2 = (fixed + share * before) ** 2 + np.nan_to_num(made.variations[own]) ** 2
         is_known = (found.n_frames >= MIN_FRAMES) & np.isfinite(found.middle)
         n = np.minimum(found.n_frames, 60)
         pooled2 = (n * found.spread**2 + PRIOR_FRAMES * movement**2) / (n + PRIOR_FRAMES)
         variance = np.where(is_known, pooled2, movement**2 + error2)
         distance = np.where(is_known, found.middle, before)
-        unused = np.eye(len(made), dtype=bool) | ~np.isfinite(distance) | ~np.isfinite(variance)
+        unused = own[:, None] == np.arange(len(made))
+        unused |= ~np.isfinite(distance) | ~np.isfinite(variance)
         cost = np.where(unused, np.inf, np.sqrt(variance) + 0.02 * np.nan_to_num(distance))
         order = np.argsort(cost, axis=1, kind="stable")[:, :NEIGHBOURS]
         variance = np.where(unused, np.inf, variance)
-        own = np.take_along_axis(variance, order, axis=1)
-        weight = MIN_WEIGHT + (1 - MIN_WEIGHT) / (1 + own / LOOSE**2)
+        variance = np.take_along_axis(variance, order, axis=1)
+        weight = MIN_WEIGHT + (1 - MIN_WEIGHT) / (1 + variance / LOOSE**2)
         return cls(
             neighbours=np.ascontiguousarray(order.astype(np.int64)),
             distances=np.nan_to_num(np.take_along_axis(distance, order, axis=1)),
-            variances=own + NOISE**2,
+            variances=variance + NOISE**2,
             weights=weight,
         )

@@ -15,6 +15,7 @@ import numpy as np
 from asterism import _engine
 from asterism.tracking.naming.evidence import prior_of
 from asterism.tracking.naming.subject import Subject
+from asterism.tracking.rigidity.distances import distances_between
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -146,7 +147,7 @@ class WindowNames:
         K, M = len(self.track_markers), len(self.made)
         for n in range(SWEEPS):
             before = self.markers.copy()
-            measured = self.positions(SUBJECT_FRAMES)
+            measured = distances_between(self.positions(SUBJECT_FRAMES))
             subject = Subject.of(self.made, self.size, measured, is_kept=self.is_kept)
             self.evidence, self.exchanges = np.zeros((K, M)), np.zeros((K, M))
             self.without, self.counts = np.zeros(K), np.zeros(K, dtype=np.int64)
@@ -199,6 +200,7 @@ class WindowNames:
         for _ in range(ROUNDS):
             scores = _engine.window_scores(
                 np.ascontiguousarray(sampled),
+                rows=np.arange(len(alive)),
                 holder=_holders(names, lengths, len(self.made)),
                 neighbours=subject.neighbours,
                 distances=subject.distances,

@@ -1,0 +1,291 @@
+"""Names of the tracks of a stream, examined a track at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from asterism import _engine
+from asterism.tracking.naming.probabilities import TEMPERATURE
+from asterism.tracking.naming.subject import Subject
+from asterism.tracking.naming.windows import MIN_LOG_ODDS, scattered
+from asterism.tracking.rigidity.distances import Distances
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from asterism.model import MarkerSet
+
+    Frames = Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]]  # points, and their labels
+    Changes = dict[int, tuple[str, float] | None]  # label -> name and its probability
+
+__all__ = ["LiveNames"]
+
+MARGIN = 4.0
+"""Log odds by which the best name of a new track must exceed the next."""
+MIN_CHANGE = 16.0
+"""Sum of log odds by which examinations of a track must favour another name."""
+MAX_EACH = 8.0
+"""Largest log odds of one examination, so that a single one never changes a name."""
+EVERY = 5
+"""Number of frames between two poses that are measured, and between two measured markers."""
+RIGID = 0.006
+"""Spread of distances, metres, by which the size of the subject is measured."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LiveNames:
+    """Names of tracks, and the subjects as measured so far.
+
+    Parameters
+    ----------
+    sets : tuple of MarkerSet
+        Marker set of each subject.
+    marker_of : mapping of int to int
+        Marker of each named track, by its label; the markers of all sets are numbered together.
+    sizes : tuple of float
+        Size of each subject relative to its set.
+    sums : ndarray of shape (3, M, M)
+        Number, sum and sum of squares of the distances between markers.
+    subject : Subject
+        Tables of all markers.
+    doubts : mapping of int to (int, float)
+        Better marker of a named track, -1 for none, and its log odds over several examinations.
+    turn : int
+        Number of frames so far.
+    """
+
+    LENGTH: ClassVar[int] = 5
+    """Number of frames by which a track is examined."""
+
+    sets: tuple[MarkerSet, ...]
+    marker_of: Mapping[int, int]
+    sizes: tuple[float, ...]
+    sums: NDArray[np.float64]
+    subject: Subject
+    doubts: Mapping[int, tuple[int, float]]
+    turn: int = 0
+
+    @classmethod
+    def of(cls, sets: tuple[MarkerSet, ...], names: Mapping[int, str], recent: Frames) -> LiveNames:
+        """Measure the subjects in the frames by which they were named."""
+        number = {name: m for m, name in enumerate(n for made in sets for n in made.full_names)}
+        marker_of = {label: number[name] for label, name in names.items()}
+        M = len(number)
+        sums = np.zeros((3, M, M))
+        for points, labels in recent:
+            sums = sums + _distance_sums(marker_of, points, labels, M)
+        sizes: list[float] = []
+        tables: list[Subject] = []
+        for at, made in zip(_starts(sets), sets, strict=True):
+            found = _distances(sums, at + np.arange(len(made)), at, len(made))
+            rigid = (found.n_frames > 0) & (found.spread < RIGID) & (made.distances > 0)
+            ratios = found.middle[rigid] / made.distances[rigid]
+            sizes.append(float(np.median(ratios)) if len(ratios) else 1.0)
+            own = Subject.of(made, sizes[-1], found, is_kept=False)
+            tables.append(replace(own, neighbours=own.neighbours + at))
+        subject = Subject(
+            neighbours=np.concatenate([own.neighbours for own in tables]),
+            distances=np.concatenate([own.distances for own in tables]),
+            variances=np.concatenate([own.variances for own in tables]),
+            weights=np.concatenate([own.weights for own in tables]),
+        )
+        return cls(
+            sets=sets,
+            marker_of=marker_of,
+            sizes=tuple(sizes),
+            sums=sums,
+            subject=subject,
+            doubts={},
+        )
+
+    def followed(self, recent: Frames) -> tuple[LiveNames, Changes]:
+        """Examine a named track and one without a name, and measure one marker again.
+
+        Parameters
+        ----------
+        recent : sequence of (points, labels)
+            The last frames.
+
+        Returns
+        -------
+        live, changes
+            Names after these frames, and what has changed: name and probability by label, or None
+            for a track that has lost its name.
+        """
+        after = replace(self, turn=self.turn + 1)
+        points, labels = recent[-1]
+        if after.turn % EVERY == 0:
+            sums = self.sums + _distance_sums(self.marker_of, points, labels, self.sums.shape[1])
+            after = replace(after, sums=sums)
+        alive = np.unique(labels[labels >= 0])
+        if len(recent) < self.LENGTH or len(alive) < 2:
+            return after, {}
+        return after._examined(alive, recent)
+
+    def _examined(self, alive: NDArray[np.int64], recent: Frames) -> tuple[LiveNames, Changes]:
+        window = _Window(self, alive, _dense(alive, recent))
+        of = self.marker_of
+        marker = np.array([of.get(label, -1) for label in alive.tolist()], dtype=np.int64)
+        named, unnamed = np.flatnonzero(marker >= 0), np.flatnonzero(marker < 0)
+        unnamed = unnamed[window.is_whole[unnamed]]
+        marker_of, doubts = dict(self.marker_of), dict(self.doubts)
+        changes: Changes = {}
+        subject = self.subject
+        if len(unnamed):
+            k = int(unnamed[self.turn % len(unnamed)])
+            found = window.name_of_new(k)
+            if found is not None:
+                before = [label for label, m in marker_of.items() if m == found[0]]
+                for label in before:
+                    del marker_of[label]
+                    changes[label] = None
+                marker_of[int(alive[k])] = found[0]
+                changes[int(alive[k])] = self._name(found[0]), found[1]
+        if len(named):
+            k = int(named[self.turn % len(named)])
+            label, own = int(alive[k]), int(marker[k])
+            other, gain = window.better(k, own)
+            before, sum_before = doubts.pop(label, (own, 0.0))
+            total = min(gain, MAX_EACH) + (sum_before if before == other else 0.0)
+            if other != own and total > MIN_CHANGE:
+                holder = window.holder[other] if other >= 0 else -1
+                for who, m in ((label, other), (int(alive[holder]), own))[: 1 + (holder >= 0)]:
+                    changes[who] = (
+                        None if m < 0 else (self._name(m), 1 / (1 + np.exp(-total / TEMPERATURE)))
+                    )
+                    marker_of.pop(who, None)
+                    if m >= 0:
+                        marker_of[who] = m
+            elif other != own and total > 0:
+                doubts[label] = other, total
+            if self.turn % EVERY == EVERY // 2:
+                subject = self._with_row(own)
+        return replace(self, marker_of=marker_of, doubts=doubts, subject=subject), changes
+
+    def _with_row(self, marker: int) -> Subject:
+        """Return the tables with one marker measured again."""
+        starts = _starts(self.sets)
+        s = int(np.searchsorted(starts, marker, side="right")) - 1
+        at = starts[s]
+        made = self.sets[s]
+        found = _distances(self.sums, np.array([marker]), at, len(made))
+        row = Subject.of(made, self.sizes[s], found, is_kept=False, markers=np.array([marker - at]))
+        own = self.subject
+        return Subject(
+            neighbours=_with(own.neighbours, marker, row.neighbours + at),
+            distances=_with(own.distances, marker, row.distances),
+            variances=_with(own.variances, marker, row.variances),
+            weights=_with(own.weights, marker, row.weights),
+        )
+
+    def _name(self, marker: int) -> str:
+        return [name for made in self.sets for name in made.full_names][marker]
+
+
+class _Window:
+    """Tracks in a few frames, and the scores of their names."""
+
+    def __init__(
+        self, names: LiveNames, alive: NDArray[np.int64], dense: NDArray[np.float64]
+    ) -> None:
+        self.dense = dense
+        self.is_whole = np.isfinite(dense[..., 0]).all(axis=0)
+        self.tables = names.subject
+        self.holder = np.full(names.sums.shape[1], -1)
+        for k, label in enumerate(alive.tolist()):
+            m = names.marker_of.get(label)
+            if m is not None:
+                self.holder[m] = k
+
+    def scores(self, k: int) -> NDArray[np.float64]:
+        """Return the log odds of all markers for a track, (M,)."""
+        return _engine.window_scores(
+            self.dense,
+            rows=np.array([k]),
+            holder=self.holder,
+            neighbours=self.tables.neighbours,
+            distances=self.tables.distances,
+            variances=self.tables.variances,
+            weights=self.tables.weights,
+        )[0]
+
+    def name_of_new(self, k: int) -> tuple[int, float] | None:
+        """Return the marker of a track without a name, with its probability; None if unsure."""
+        scores = np.where(self.holder < 0, self.scores(k), -np.inf)
+        m = int(np.argmax(scores))
+        rivals = np.append(np.delete(scores, m), MIN_LOG_ODDS)
+        if scores[m] < rivals.max() + MARGIN:
+            return None
+        return m, float(1 / (1 + np.exp((rivals - scores[m]) / TEMPERATURE).sum()))
+
+    def better(self, k: int, own: int) -> tuple[int, float]:
+        """Return the marker that a track should have, -1 for none, and what that would gain.
+
+        A holder of that marker would get the name of the track.
+        """
+        scores = self.scores(k)
+        m = int(np.argmax(scores))
+        if scores[m] < MIN_LOG_ODDS:
+            return -1, float(MIN_LOG_ODDS - scores[own])
+        gain = float(scores[m] - scores[own])
+        if m != own and self.holder[m] >= 0:
+            back = self.scores(int(self.holder[m]))
+            gain += float(back[own] - back[m])
+        return m, gain
+
+
+def _dense(alive: NDArray[np.int64], recent: Frames) -> NDArray[np.float64]:
+    """Return the positions of the tracks `alive`, ordered, in some frames, (F, A, 3)."""
+    points = np.concatenate([p for p, _ in recent])
+    labels = np.concatenate([own for _, own in recent])
+    frame = np.repeat(np.arange(len(recent)), [len(own) for _, own in recent])
+    column = np.minimum(np.searchsorted(alive, labels), len(alive) - 1)
+    used = alive[column] == labels
+    return scattered(points[used], frame[used], column[used], len(recent), len(alive))
+
+
+def _distance_sums(
+    marker_of: Mapping[int, int], points: NDArray[np.float64], labels: NDArray[np.int64], M: int
+) -> NDArray[np.float64]:
+    """Return whether markers have a distance in a frame, the distance and its square, (3, M, M)."""
+    markers = np.array([marker_of.get(label, -1) for label in labels.tolist()], dtype=np.int64)
+    pose = scattered(
+        points[markers >= 0],
+        np.zeros(int((markers >= 0).sum()), np.int64),
+        markers[markers >= 0],
+        1,
+        M,
+    )[0]
+    distance = np.sqrt(((pose[:, None] - pose) ** 2).sum(axis=2))
+    known = np.isfinite(distance)
+    distance[~known] = 0
+    return np.stack([known, distance, distance**2])
+
+
+def _starts(sets: tuple[MarkerSet, ...]) -> list[int]:
+    """Return the number of the first marker of each set."""
+    return [sum(len(made) for made in sets[:s]) for s in range(len(sets))]
+
+
+def _distances(
+    sums: NDArray[np.float64], markers: NDArray[np.int64], first: int, n_markers: int
+) -> Distances:
+    """Return the distances from markers to those of one set, by their sums."""
+    own = sums[:, markers, first : first + n_markers]
+    count, total, squares = own[0], own[1], own[2]
+    n = np.maximum(count, 1)
+    middle = np.where(count > 0, total / n, np.nan)
+    spread = np.sqrt(np.maximum(squares / n - (total / n) ** 2, 0))
+    return Distances(middle=middle, spread=spread, n_frames=count)
+
+
+def _with(table: NDArray[Any], row: int, values: NDArray[Any]) -> NDArray[Any]:
+    """Return a table with another row."""
+    out = table.copy()
+    out[row] = values
+    return out
