@@ -127,8 +127,9 @@ class HypothesisMatrix {
   // Whether means and standard deviations differ by at most `merged_within` standard deviations of
   // the first.
   bool is_near(const Branch& a, const Branch& b) const {
-    const AxisState one = collapse(open_.live.m, a.state), other = collapse(open_.live.m, b.state);
-    const int n = open_.live.m.axis.n;
+    const MotionModel& m = open_.live.m;
+    const AxisState one = collapse(m, a.state.updated(m)), other = collapse(m, b.state.updated(m));
+    const int n = m.axis.n;
     for (int s = 0; s < n; ++s) {
       const double sigma = std::sqrt(one.P[s * n + s]);
       const double bound = opt_.merged_within * sigma;

@@ -116,15 +116,19 @@ class CandidateChoice {
     for (const std::int32_t p : resources) number.emplace(p, static_cast<std::int32_t>(number.size()));
     std::unordered_map<std::int32_t, bool> is_placed;
     std::vector<std::vector<PackingOption>> trees;
+    Numbers numbered;  // resources of all options
+    std::size_t n_uses = 0;
+    for (const std::int32_t c : part) n_uses += uses_[c].size();
+    numbered.reserve(n_uses);  // so that the spans stay valid
     std::vector<Numbers> members;
     for (const std::int32_t p : resources) {
       std::vector<PackingOption> tree;
       Numbers own;
       for (const std::int32_t c : holders[p]) {
         if (!is_placed.emplace(c, true).second) continue;
-        PackingOption option{scores_[c], {}};
-        for (const std::int32_t q : uses_[c]) option.uses.push_back(number[q]);
-        tree.push_back(std::move(option));
+        const std::size_t begin = numbered.size();
+        for (const std::int32_t q : uses_[c]) numbered.push_back(number[q]);
+        tree.push_back({scores_[c], std::span<const std::int32_t>(numbered).subspan(begin)});
         own.push_back(c);
       }
       if (tree.empty()) continue;

@@ -177,7 +177,7 @@ std::vector<std::vector<PackingOption>> packing_trees(const In<std::int64_t>& fi
     for (std::int64_t o = first_option.data()[i]; o < first_option.data()[i + 1]; ++o) {
       const std::int64_t a = first_use.data()[o], b = first_use.data()[o + 1];
       for (std::int64_t u = a; u < b; ++u) require(uses.data()[u] >= 0, "resources from 0");
-      trees[i].push_back({weights.data()[o], {uses.data() + a, uses.data() + b}});
+      trees[i].push_back({weights.data()[o], flat(uses).subspan(a, b - a)});
       has_free = has_free || a == b;
     }
     require(has_free, "an option that uses nothing in every tree");

@@ -78,18 +78,20 @@ class BestPermutations {
   }
 
   bool visit(std::size_t r, std::uint64_t tracks, std::uint64_t columns, double gain) {
-    if (gain + max_gain_[r] < best_ - kNegligible) return true;
     if (++n_visits_ > 4 * kMaxEvents || events_.size() > kMaxEvents) return false;
     if (r == chosen_.size()) {
       events_.push_back({tracks, columns, gain, choices_.size()});
       choices_.insert(choices_.end(), chosen_.begin(), chosen_.end());
       return true;
     }
+    const auto is_negligible = [&](double next_gain) {
+      return next_gain + max_gain_[r + 1] < best_ - kNegligible;
+    };
     chosen_[r] = -1;
-    if (!visit(r + 1, tracks, columns, gain)) return false;
+    if (!is_negligible(gain) && !visit(r + 1, tracks, columns, gain)) return false;
     for (std::int32_t e = by_.first[r]; e < by_.first[r + 1]; ++e) {
       const std::uint64_t bit = std::uint64_t{1} << by_.column_of[e];
-      if (columns & bit) continue;
+      if (columns & bit || is_negligible(gain + group_[e].gain)) continue;
       chosen_[r] = e;
       if (!visit(r + 1, tracks | std::uint64_t{1} << r, columns | bit, gain + group_[e].gain))
         return false;

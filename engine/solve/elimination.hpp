@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <vector>
 
 namespace asterism {
@@ -22,129 +23,149 @@ struct Link {
 };
 
 struct MatchingGraph {
-  std::vector<std::vector<Link>> links;  // of each vertex
-  std::vector<double> weight;            // of each edge
-  std::vector<double> alone;             // of each vertex
+  std::vector<Link> links;          // by vertex
+  std::vector<std::int32_t> first;  // the links of vertex v are first[v] to first[v + 1]
+  std::vector<double> weight;       // of each edge
+  std::vector<double> alone;        // of each vertex
 
-  std::int32_t size() const { return static_cast<std::int32_t>(links.size()); }
+  std::int32_t size() const { return static_cast<std::int32_t>(first.size()) - 1; }
+  std::int32_t degree(std::int32_t v) const { return first[v + 1] - first[v]; }
+  std::span<const Link> links_of(std::int32_t v) const {
+    return std::span(links).subspan(first[v], degree(v));
+  }
 };
 
 struct EliminationStep {
   std::int32_t vertex = 0;
-  bool is_active = false;              // in the frontier before the step
-  std::vector<Link> links;             // to the remaining vertices, whose bits the step may set
-  std::vector<std::int32_t> entering;  // vertices that the step adds to the frontier
+  bool is_active = false;           // in the frontier before the step
+  std::span<const Link> links;      // to the remaining vertices, whose bits the step may set
+  std::span<const Link> entering;   // of these, to vertices that the step adds to the frontier
 };
 
 struct Elimination {
-  std::vector<EliminationStep> steps;
-  std::int32_t peak = 0;  // size of the largest frontier
-  double work = 0;        // multiplications of one pass
+  std::vector<std::int32_t> order;  // of the vertices; empty if none was found
+  std::int32_t peak = 0;            // size of the largest frontier
+  double work = 0;                  // multiplications of one pass
+
+  // The steps in that order. They refer to `links`, which receives the links of all steps.
+  std::vector<EliminationStep> steps(const MatchingGraph& graph, std::vector<Link>& links) const {
+    std::vector<char> is_gone(graph.size(), 0), is_active(graph.size(), 0);
+    std::vector<EliminationStep> out;
+    out.reserve(order.size());
+    links.clear();
+    links.reserve(graph.links.size());  // so that the spans stay valid
+    for (const std::int32_t v : order) {
+      EliminationStep step{v, is_active[v] != 0, {}, {}};
+      is_gone[v] = 1;
+      const auto collect = [&](auto&& is_included) {
+        const std::size_t begin = links.size();
+        for (const Link& l : graph.links_of(v))
+          if (!is_gone[l.to] && is_included(l.to)) links.push_back(l);
+        return std::span<const Link>(links).subspan(begin);
+      };
+      step.links = collect([](std::int32_t) { return true; });
+      step.entering = collect([&](std::int32_t u) { return !is_active[u]; });
+      for (const Link& l : step.entering) is_active[l.to] = 1;
+      out.push_back(step);
+    }
+    return out;
+  }
 };
 
+// Its working memory serves many graphs.
 class EliminationOrder {
  public:
-  explicit EliminationOrder(const MatchingGraph& graph) : graph_(graph) {}
-
-  // Whether the frontier of one of these orders always has at most so many vertices. The trials are
-  // short where it grows further.
-  bool may_fit(std::int32_t max_frontier) {
-    for (const std::int32_t start : starts())
-      if (greedy(start, max_frontier).peak <= max_frontier) return true;
-    return false;
-  }
-  // The cheapest of several greedy orders, each from another promising first vertex.
-  Elimination best() {
-    Elimination best;
-    for (const std::int32_t start : starts()) {
-      Elimination e = greedy(start);
-      if (best.steps.empty() || e.work < best.work) best = std::move(e);
-      if (best.peak <= kSmallFrontier) break;  // more trials would cost more than they save
-    }
-    return best;
+  // The cheapest of several greedy orders, each from another promising first vertex, whose frontier
+  // always has at most so many vertices. A trial stops where it is no longer the cheapest.
+  const Elimination& best(const MatchingGraph& graph, std::int32_t max_frontier) {
+    graph_ = &graph;
+    best_.order.clear();
+    best_.work = std::numeric_limits<double>::infinity();
+    try_from(farthest(farthest(0)), max_frontier);
+    // With a small frontier, more trials would cost more than they save.
+    if (best_.order.empty() || best_.peak > kSmallFrontier) try_others(max_frontier);
+    return best_;
   }
 
  private:
-  static constexpr std::int32_t kSmallFrontier = 6, kManyStarts = 16;
+  static constexpr std::int32_t kSmallFrontier = 6, kManyStarts = 15;
 
-  // First vertices to try: an end of the graph, vertices of low degree, and one of high degree.
-  std::vector<std::int32_t> starts() const {
-    std::vector<std::int32_t> all(graph_.size());
-    std::iota(all.begin(), all.end(), 0);
-    std::stable_sort(all.begin(), all.end(), [&](std::int32_t a, std::int32_t b) {
-      return graph_.links[a].size() < graph_.links[b].size();
+  // Further first vertices: those of low degree, and one of high degree.
+  void try_others(std::int32_t max_frontier) {
+    starts_.resize(graph_->size());
+    std::iota(starts_.begin(), starts_.end(), 0);
+    std::stable_sort(starts_.begin(), starts_.end(), [&](std::int32_t a, std::int32_t b) {
+      return graph_->degree(a) < graph_->degree(b);
     });
-    all.insert(all.begin(), farthest(farthest(0)));
-    const std::int32_t last = all.back();
-    if (static_cast<std::int32_t>(all.size()) > kManyStarts) {
-      all.resize(kManyStarts);
-      all.push_back(last);
+    if (static_cast<std::int32_t>(starts_.size()) > kManyStarts) {
+      starts_[kManyStarts] = starts_.back();
+      starts_.resize(kManyStarts + 1);
     }
-    return all;
+    for (const std::int32_t start : starts_) {
+      try_from(start, max_frontier);
+      if (!best_.order.empty() && best_.peak <= kSmallFrontier) return;
+    }
+  }
+  void try_from(std::int32_t start, std::int32_t max_frontier) {
+    if (greedy(start, max_frontier)) std::swap(best_, trial_);
   }
 
   // The last vertex that a breadth-first search reaches.
-  std::int32_t farthest(std::int32_t from) const {
-    std::vector<std::int32_t> queue{from};
-    std::vector<char> is_visited(graph_.size(), 0);
-    is_visited[from] = 1;
-    for (std::size_t k = 0; k < queue.size(); ++k)
-      for (const Link& l : graph_.links[queue[k]])
-        if (!is_visited[l.to]) {
-          is_visited[l.to] = 1;
-          queue.push_back(l.to);
-        }
-    return queue.back();
+  std::int32_t farthest(std::int32_t from) {
+    near_.assign(1, from);
+    is_near_.assign(graph_->size(), 0);
+    is_near_[from] = 1;
+    for (std::size_t k = 0; k < near_.size(); ++k)
+      for (const Link& l : graph_->links_of(near_[k])) add_near(l.to);
+    return near_.back();
   }
 
   // Always eliminates the vertex that leaves the smallest frontier. Ties go to the vertex that was
-  // met first. Stops where the frontier has more than `max_frontier` vertices.
-  Elimination greedy(std::int32_t start,
-                     std::int32_t max_frontier = std::numeric_limits<std::int32_t>::max()) {
-    const std::int32_t n = graph_.size();
+  // met first. Returns false if the frontier becomes too large or the order is not cheaper than the
+  // best.
+  bool greedy(std::int32_t start, std::int32_t max_frontier) {
+    const std::int32_t n = graph_->size();
     is_gone_.assign(n, 0);
     is_active_.assign(n, 0);
     is_near_.assign(n, 0);
     n_outside_.resize(n);
-    for (std::int32_t v = 0; v < n; ++v)
-      n_outside_[v] = static_cast<std::int32_t>(graph_.links[v].size());
+    for (std::int32_t v = 0; v < n; ++v) n_outside_[v] = graph_->degree(v);
     near_.clear();
-    Elimination e;
-    std::int32_t frontier = 0, v = start;
-    for (;;) {
-      EliminationStep step;
-      step.vertex = v;
-      step.is_active = is_active_[v];
-      for (const Link& l : graph_.links[v]) {
-        if (is_gone_[l.to]) continue;
-        step.links.push_back(l);
-        if (!is_active_[l.to]) step.entering.push_back(l.to);
-      }
+    trial_.order.clear();
+    trial_.peak = 0;
+    trial_.work = 0;
+    for (std::int32_t v = start, frontier = 0;; v = next()) {
+      const bool was_active = is_active_[v];
       is_gone_[v] = 1;
-      if (!is_active_[v]) enter(v);  // only to update the counts of its neighbours
-      for (const std::int32_t u : step.entering) enter(u);
-      frontier += static_cast<std::int32_t>(step.entering.size()) - step.is_active;
-      e.peak = std::max(e.peak, frontier);
-      if (frontier > max_frontier) return e;
-      e.work += std::ldexp(static_cast<double>(step.links.size() + 1), std::min(frontier, 900));
-      e.steps.push_back(std::move(step));
-      if (static_cast<std::int32_t>(e.steps.size()) == n) return e;
-      v = next();
+      if (!was_active) enter(v);  // only to update the counts of its neighbours
+      std::int32_t n_links = 0, n_entering = 0;
+      for (const Link& l : graph_->links_of(v)) {
+        if (is_gone_[l.to]) continue;
+        ++n_links;
+        if (is_active_[l.to]) continue;
+        ++n_entering;
+        enter(l.to);
+      }
+      frontier += n_entering - was_active;
+      trial_.peak = std::max(trial_.peak, frontier);
+      trial_.work += std::ldexp(static_cast<double>(n_links + 1), std::min(frontier, 900));
+      if (frontier > max_frontier || !(trial_.work < best_.work)) return false;
+      trial_.order.push_back(v);
+      if (static_cast<std::int32_t>(trial_.order.size()) == n) return true;
     }
   }
 
+  void add_near(std::int32_t u) {
+    if (is_near_[u]) return;
+    is_near_[u] = 1;
+    near_.push_back(u);
+  }
   void enter(std::int32_t u) {
     is_active_[u] = 1;
-    if (!is_near_[u]) {
-      is_near_[u] = 1;
-      near_.push_back(u);
-    }
-    for (const Link& l : graph_.links[u]) {
+    add_near(u);
+    for (const Link& l : graph_->links_of(u)) {
       --n_outside_[l.to];
-      if (!is_near_[l.to]) {
-        is_near_[l.to] = 1;
-        near_.push_back(l.to);
-      }
+      add_near(l.to);
     }
   }
 
@@ -165,7 +186,9 @@ class EliminationOrder {
     return best;
   }
 
-  const MatchingGraph& graph_;
+  const MatchingGraph* graph_ = nullptr;
+  Elimination best_, trial_;
+  std::vector<std::int32_t> starts_;
   std::vector<char> is_gone_, is_active_, is_near_;
   // Number of neighbours that are neither in the frontier nor eliminated.
   std::vector<std::int32_t> n_outside_;

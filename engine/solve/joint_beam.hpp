@@ -35,7 +35,7 @@ class JointBeam {
   // tracks.
   JointBeam(const MatchingGraph& graph, const Elimination& elimination, std::int32_t n_tracks,
             std::span<const std::int32_t> partner, std::int64_t max_states)
-      : graph_(graph), steps_(elimination.steps), partner_(partner), max_states_(max_states) {
+      : graph_(graph), steps_(elimination.steps(graph_, links_)), partner_(partner), max_states_(max_states) {
     log_scale_ = balance(n_tracks);
     choose_slots();
     choose_followed();
@@ -104,7 +104,7 @@ class JointBeam {
     std::vector<double> x(n, 1.0);
     const auto wanted = [&](std::int32_t v) {
       double sum = 0;
-      for (const Link& l : graph_.links[v]) sum += graph_.weight[l.edge] * x[l.to];
+      for (const Link& l : graph_.links_of(v)) sum += graph_.weight[l.edge] * x[l.to];
       return sum;
     };
     for (std::int32_t round = 0; round <= kBalanceRounds; ++round) {
@@ -117,7 +117,7 @@ class JointBeam {
       graph_.alone[v] *= x[v];
       log_scale -= std::log(x[v]);
       if (v < n_tracks)
-        for (const Link& l : graph_.links[v]) graph_.weight[l.edge] *= x[v] * x[l.to];
+        for (const Link& l : graph_.links_of(v)) graph_.weight[l.edge] *= x[v] * x[l.to];
     }
     return log_scale;
   }
@@ -136,7 +136,7 @@ class JointBeam {
       const std::int32_t v = steps_[t].vertex;
       leaves_[v] = static_cast<std::int32_t>(t);
       if (slot_[v] >= 0) spare.push_back(slot_[v]);
-      for (const std::int32_t u : steps_[t].entering) {
+      for (const auto& [u, edge] : steps_[t].entering) {
         if (spare.empty()) spare.push_back(n_slots++);
         slot_[u] = spare.back();
         spare.pop_back();
@@ -153,7 +153,7 @@ class JointBeam {
     std::vector<double> conflict(n, 0);
     for (std::int32_t v = 0; v < n; ++v) {
       double sum = 0, squares = 0;
-      for (const Link& l : graph_.links[v]) {
+      for (const Link& l : graph_.links_of(v)) {
         sum += graph_.weight[l.edge];
         squares += graph_.weight[l.edge] * graph_.weight[l.edge];
       }
@@ -312,7 +312,7 @@ class JointBeam {
       const Layer& in = layers_[t];
       index_.reset(layers_[t + 1].sets);
       before.assign(in.sets.size(), 0);
-      sums.assign(graph_.links[steps_[t].vertex].size() + 2, 0);
+      sums.assign(graph_.degree(steps_[t].vertex) + 2, 0);
       each_choice(t, [&](std::size_t i, const Set& next, double weight, std::int32_t option) {
         const std::int32_t k = index_.find(next);
         if (k < 0) return;  // dropped
@@ -367,7 +367,8 @@ class JointBeam {
   }
 
   MatchingGraph graph_;
-  const std::vector<EliminationStep>& steps_;
+  std::vector<Link> links_;  // of the steps
+  std::vector<EliminationStep> steps_;
   std::span<const std::int32_t> partner_;
   std::int64_t max_states_ = 1;
   double log_scale_ = 0;

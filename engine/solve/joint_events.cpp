@@ -6,11 +6,10 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <vector>
 
-#include "solve/elimination.hpp"
 #include "solve/joint_beam.hpp"
-#include "solve/joint_exact.hpp"
 
 namespace asterism {
 
@@ -40,7 +39,7 @@ MatchingMarginals only_best(const MatchingGraph& graph, std::int32_t n,
   for (std::int32_t v = 0; v < graph.size(); ++v) {
     out.alone[v] = partner[v] < 0;
     if (v < n)
-      for (const Link& l : graph.links[v]) out.edge[l.edge] = l.to == partner[v];
+      for (const Link& l : graph.links_of(v)) out.edge[l.edge] = l.to == partner[v];
   }
   out.bound = 1;
   return out;
@@ -74,17 +73,21 @@ void find_prices(std::span<const Candidate> group, const GroupNumbering& by,
   }
 }
 
-// The links of a group, without weights.
-MatchingGraph graph_of(std::span<const Candidate> group, const GroupNumbering& by) {
-  const std::int32_t n = by.n_rows();
-  MatchingGraph graph;
-  graph.links.resize(n + by.n_columns());
+// The links of a group, without weights. Those of a vertex are in the order of the candidates.
+void list_links(std::span<const Candidate> group, const GroupNumbering& by, MatchingGraph& graph) {
+  const std::int32_t n = by.n_rows(), n_vertices = n + by.n_columns();
+  graph.first.assign(n_vertices + 1, 0);
   for (std::size_t e = 0; e < group.size(); ++e) {
-    const std::int32_t i = by.row_of[e], j = n + by.column_of[e];
-    graph.links[i].push_back({j, static_cast<std::int32_t>(e)});
-    graph.links[j].push_back({i, static_cast<std::int32_t>(e)});
+    ++graph.first[by.row_of[e]];
+    ++graph.first[n + by.column_of[e]];
   }
-  return graph;
+  std::partial_sum(graph.first.begin(), graph.first.end(), graph.first.begin());
+  graph.links.resize(2 * group.size());
+  for (auto e = static_cast<std::int32_t>(group.size()); e-- > 0;) {
+    const std::int32_t i = by.row_of[e], j = n + by.column_of[e];
+    graph.links[--graph.first[i]] = {j, e};
+    graph.links[--graph.first[j]] = {i, e};
+  }
 }
 
 }  // namespace
@@ -99,21 +102,39 @@ JointSummary JointEvents::solve(std::span<double> marginals, std::span<double> m
   std::fill(best.begin(), best.end(), -1);
   for (std::size_t g = 0; g < groups_.size(); ++g) assignment_.solve(groups_[g], best_);
   double log_exact = 0;  // log of the fraction of the events that was summed
-  if (negligible_ > 0) log_exact += std::log1p(-cut());
-  std::vector<char> has_any(n_, 0);
+  std::vector<char> is_solved(n_, 0), has_any(n_, 0);  // by first row of a group; by row
+  std::vector<char> is_cut(groups_.order.size(), 0);
+  double omitted = 0;
+  const auto solve_one = [&](std::size_t g, bool may_cut) {
+    double bound = 0;
+    if (is_single(g)) {
+      solve_single(g);
+    } else {
+      price(g);
+      const Elimination& elimination = order_.best(graph_, may_cut ? max_frontier() : kUnlimited);
+      if (elimination.order.empty()) {
+        omitted += cut(g, is_cut);
+        return;
+      }
+      bound = solve_group(g, elimination);
+    }
+    is_solved[groups_[g].front().row] = 1;
+    summary_.n_beams += bound > 0;
+    log_exact += std::log1p(-bound);
+  };
+  for (std::size_t g = 0; g < groups_.size(); ++g) solve_one(g, negligible_ > 0);
+  if (summary_.n_cut > 0) groups_ = groups_without(groups_, is_cut, n_, n_columns_);
+  log_exact += std::log1p(-std::min(omitted, 1.0));
   for (const Candidate& c : groups_.order) has_any[c.row] = 1;
   for (std::int32_t i = 0; i < n_; ++i)
     if (!has_any[i]) summary_.log_total += log_miss_[i];
-  for (std::size_t g = 0; g < groups_.size(); ++g) {
-    const double bound = is_single(g) ? solve_single(g) : solve_group(g);
-    summary_.n_beams += bound > 0;
-    log_exact += std::log1p(-bound);
-  }
+  for (std::size_t g = 0; g < groups_.size(); ++g)
+    if (!is_solved[groups_[g].front().row]) solve_one(g, false);
   if (log_exact < 0) summary_.bound = -std::expm1(log_exact);
   return summary_;
 }
 
-double JointEvents::solve_single(std::size_t g) {
+void JointEvents::solve_single(std::size_t g) {
   const std::int32_t i = groups_[g].front().row;
   const std::size_t n = groups_[g].size();
   double max_log = log_miss_[i], total = 0;
@@ -124,24 +145,22 @@ double JointEvents::solve_single(std::size_t g) {
   for (std::size_t e = 0; e < n; ++e) marginal(g, e) /= total;
   missed_[i] /= total;
   summary_.log_total += max_log + std::log(total);
-  return 0;
 }
 
-JointEvents::Priced JointEvents::price(std::size_t g) const {
+void JointEvents::price(std::size_t g) {
   const std::span<const Candidate> group = groups_[g];
-  Priced out;
-  out.by.number(group);
-  const std::int32_t n = out.by.n_rows(), m = out.by.n_columns();
-  out.partner.assign(n + m, -1);
+  by_.number(group);
+  const std::int32_t n = by_.n_rows(), m = by_.n_columns();
+  partner_.assign(n + m, -1);
   for (std::size_t e = 0; e < group.size(); ++e)
     if (best_[group[e].row] == group[e].column) {
-      out.partner[out.by.row_of[e]] = n + out.by.column_of[e];
-      out.partner[n + out.by.column_of[e]] = out.by.row_of[e];
+      partner_[by_.row_of[e]] = n + by_.column_of[e];
+      partner_[n + by_.column_of[e]] = by_.row_of[e];
     }
-  out.left.resize(n);
-  out.price.resize(m);
-  find_prices(group, out.by, out.partner, out.left, out.price);
-  return out;
+  left_.assign(n, 0);
+  price_.assign(m, 0);
+  find_prices(group, by_, partner_, left_, price_);
+  list_links(group, by_, graph_);
 }
 
 std::vector<double> JointEvents::marginal_bounds() {
@@ -151,68 +170,56 @@ std::vector<double> JointEvents::marginal_bounds() {
   best_ = best;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     assignment_.solve(groups_[g], best_);
-    const Priced priced = price(g);
+    price(g);
     const std::span<const double> bounds =
-        negligible.bounds(groups_[g], priced.by, priced.partner, priced.left, priced.price);
+        negligible.bounds(groups_[g], by_, partner_, left_, price_);
     for (std::size_t e = 0; e < bounds.size(); ++e)
       out[groups_.sources[groups_.starts[g] + e]] = bounds[e];
   }
   return out;
 }
 
-double JointEvents::cut() {
+double JointEvents::cut(std::size_t g, std::span<char> is_cut) {
   NegligibleLinks negligible;
-  std::vector<char> is_cut(groups_.order.size(), 0);
   double omitted = 0;
-  for (std::size_t g = 0; g < groups_.size(); ++g) {
-    const std::span<const Candidate> group = groups_[g];
-    if (is_single(g)) continue;
-    const Priced priced = price(g);
-    const MatchingGraph graph = graph_of(group, priced.by);
-    EliminationOrder order(graph);
-    if (order.may_fit(max_frontier()) && order.best().peak <= max_frontier()) continue;
-    const std::span<const double> bounds =
-        negligible.bounds(group, priced.by, priced.partner, priced.left, priced.price);
-    const std::int64_t n_before = summary_.n_cut;
-    for (std::size_t e = 0; e < group.size(); ++e) {
-      if (!(bounds[e] <= negligible_)) continue;
-      is_cut[groups_.starts[g] + e] = 1;
-      omitted += bounds[e];
-      ++summary_.n_cut;
-    }
-    summary_.n_beams += summary_.n_cut > n_before;
+  const std::span<const double> bounds =
+      negligible.bounds(groups_[g], by_, partner_, left_, price_);
+  const std::int64_t n_before = summary_.n_cut;
+  for (std::size_t e = 0; e < bounds.size(); ++e) {
+    if (!(bounds[e] <= negligible_)) continue;
+    is_cut[groups_.starts[g] + e] = 1;
+    omitted += bounds[e];
+    ++summary_.n_cut;
   }
-  if (summary_.n_cut > 0) groups_ = groups_without(groups_, is_cut, n_, n_columns_);
-  return std::min(omitted, 1.0);
+  summary_.n_beams += summary_.n_cut > n_before;
+  return omitted;
 }
 
-double JointEvents::solve_group(std::size_t g) {
+double JointEvents::solve_group(std::size_t g, const Elimination& elimination) {
   const std::span<const Candidate> group = groups_[g];
-  auto [by, partner, u, p] = price(g);
-  const std::int32_t n = by.n_rows(), m = by.n_columns();
-  MatchingGraph graph = graph_of(group, by);
-  graph.alone.resize(n + m);
-  graph.weight.resize(group.size());
+  const std::int32_t n = by_.n_rows(), m = by_.n_columns();
+  graph_.alone.resize(n + m);
+  graph_.weight.resize(group.size());
   double log_scale = 0;
   for (std::int32_t i = 0; i < n; ++i) {
-    u[i] = snap(log_miss_[by.rows[i]] + u[i]);
-    graph.alone[i] = std::exp(log_miss_[by.rows[i]] - u[i]);
-    log_scale += u[i];
+    left_[i] = snap(log_miss_[by_.rows[i]] + left_[i]);
+    graph_.alone[i] = std::exp(log_miss_[by_.rows[i]] - left_[i]);
+    log_scale += left_[i];
   }
   for (std::int32_t j = 0; j < m; ++j) {
-    p[j] = snap(p[j]);
-    graph.alone[n + j] = std::exp(-p[j]);
-    log_scale += p[j];
+    price_[j] = snap(price_[j]);
+    graph_.alone[n + j] = std::exp(-price_[j]);
+    log_scale += price_[j];
   }
   for (std::size_t e = 0; e < group.size(); ++e) {
-    const std::int32_t i = by.row_of[e], j = by.column_of[e];
-    graph.weight[e] = std::exp(log_weight(g, e) - (u[i] + p[j]));
+    const std::int32_t i = by_.row_of[e], j = by_.column_of[e];
+    graph_.weight[e] = std::exp(log_weight(g, e) - (left_[i] + price_[j]));
   }
 
-  MatchingMarginals result = sum(graph, n, partner);
-  if (!is_finite(result)) result = only_best(graph, n, partner);
+  MatchingMarginals result = sum(elimination, n);
+  if (!is_finite(result)) result = only_best(graph_, n, partner_);
   for (std::size_t e = 0; e < group.size(); ++e) marginal(g, e) = result.edge[e];
-  for (std::int32_t i = 0; i < n; ++i) missed_[by.rows[i]] = result.alone[i];
+  for (std::int32_t i = 0; i < n; ++i) missed_[by_.rows[i]] = result.alone[i];
   summary_.log_total += result.log_total + log_scale;
   summary_.n_states = std::max(summary_.n_states, result.n_states);
   return result.bound;
@@ -223,15 +230,12 @@ std::int32_t JointEvents::max_frontier() const {
   return static_cast<std::int32_t>(std::bit_width(static_cast<std::uint64_t>(max_states_))) - 1;
 }
 
-MatchingMarginals JointEvents::sum(const MatchingGraph& graph, std::int32_t n,
-                                   std::span<const std::int32_t> partner) const {
-  const Elimination elimination = EliminationOrder(graph).best();
-  if (elimination.peak <= max_frontier())
-    return JointExact(graph, elimination).solve();
+MatchingMarginals JointEvents::sum(const Elimination& elimination, std::int32_t n) {
+  if (elimination.peak <= max_frontier()) return exact_.solve(graph_, elimination);
   if (elimination.peak <= 64)
-    return JointBeam<1>(graph, elimination, n, partner, max_states_).solve();
+    return JointBeam<1>(graph_, elimination, n, partner_, max_states_).solve();
   if (elimination.peak <= 1024)
-    return JointBeam<16>(graph, elimination, n, partner, max_states_).solve();
+    return JointBeam<16>(graph_, elimination, n, partner_, max_states_).solve();
   throw FrontierLimit("more than 1024 tracks or detections compete at once");
 }
 

@@ -13,18 +13,17 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <vector>
 
 #include "solve/assignment.hpp"
 #include "solve/connected_components.hpp"
+#include "solve/joint_exact.hpp"
 #include "solve/negligible_links.hpp"
 
 namespace asterism {
-
-struct MatchingGraph;
-struct MatchingMarginals;
 
 struct FrontierLimit : std::runtime_error {
   using std::runtime_error::runtime_error;
@@ -64,16 +63,13 @@ class JointEvents {
   const Groups& groups() const { return groups_; }
 
  private:
-  // The best event of a group with its prices.
-  struct Priced {
-    GroupNumbering by;
-    std::vector<std::int32_t> partner;  // of the rows, then of the columns; -1 for none
-    std::vector<double> left, price;
-  };
-  Priced price(std::size_t g) const;
+  static constexpr std::int32_t kUnlimited = std::numeric_limits<std::int32_t>::max();
+
+  // Finds the prices of the best event of a group, and its links.
+  void price(std::size_t g);
   std::int32_t max_frontier() const;
-  // Cuts negligible links and divides the groups anew. Returns the bound of the omitted mass.
-  double cut();
+  // Marks the negligible links of the priced group. Returns the bound of the omitted mass.
+  double cut(std::size_t g, std::span<char> is_cut);
 
   double log_weight(std::size_t g, std::size_t e) const {
     return log_weights_[groups_.sources[groups_.starts[g] + e]];
@@ -85,10 +81,10 @@ class JointEvents {
   bool is_single(std::size_t g) const { return groups_[g].front().row == groups_[g].back().row; }
 
   // A track that competes with no other has one of its detections or none.
-  double solve_single(std::size_t g);
-  double solve_group(std::size_t g);
-  MatchingMarginals sum(const MatchingGraph& graph, std::int32_t n,
-                        std::span<const std::int32_t> partner) const;
+  void solve_single(std::size_t g);
+  // The priced group.
+  double solve_group(std::size_t g, const Elimination& elimination);
+  MatchingMarginals sum(const Elimination& elimination, std::int32_t n);
 
   std::span<const double> log_weights_, log_miss_;
   std::int64_t max_states_;
@@ -99,6 +95,13 @@ class JointEvents {
   std::span<double> marginals_, missed_;
   std::span<std::int32_t> best_;
   JointSummary summary_;
+  // The priced group.
+  GroupNumbering by_;
+  std::vector<std::int32_t> partner_;  // of the rows, then of the columns; -1 for none
+  std::vector<double> left_, price_;
+  MatchingGraph graph_;
+  EliminationOrder order_;
+  JointExact exact_;
 };
 
 }  // namespace asterism

@@ -15,6 +15,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -30,35 +31,15 @@ struct MatchingMarginals {
   std::int64_t n_states = 1;
 };
 
+// Its working memory serves many graphs.
 class JointExact {
  public:
-  JointExact(const MatchingGraph& graph, const Elimination& elimination) : graph_(graph) {
-    std::vector<std::int32_t> frontier;
-    steps_.reserve(elimination.steps.size());
-    for (const EliminationStep& from : elimination.steps) {
-      Step step;
-      step.vertex = from.vertex;
-      if (from.is_active) {
-        const auto at = std::find(frontier.begin(), frontier.end(), from.vertex);
-        step.bit = static_cast<std::int32_t>(at - frontier.begin());
-        frontier.erase(at);
-      }
-      step.n_base = static_cast<std::int32_t>(frontier.size());
-      frontier.insert(frontier.end(), from.entering.begin(), from.entering.end());
-      step.n_out = static_cast<std::int32_t>(frontier.size());
-      for (const Link& l : from.links) {
-        const auto at = std::find(frontier.begin(), frontier.end(), l.to);
-        step.options.push_back({static_cast<std::int32_t>(at - frontier.begin()), l.edge});
-      }
-      steps_.push_back(std::move(step));
-    }
-    layers_.resize(steps_.size() + 1);
-  }
-
-  MatchingMarginals solve() {
+  MatchingMarginals solve(const MatchingGraph& graph, const Elimination& elimination) {
+    graph_ = &graph;
+    list_steps(elimination);
     MatchingMarginals out;
-    out.edge.assign(graph_.weight.size(), 0);
-    out.alone.assign(graph_.alone.size(), 0);
+    out.edge.assign(graph_->weight.size(), 0);
+    out.alone.assign(graph_->alone.size(), 0);
     choose_kept();
     const auto n = static_cast<std::int32_t>(steps_.size());
     layers_[0] = take(1);
@@ -96,7 +77,7 @@ class JointExact {
   // that bit the layer before has n_base bits; the bits of the entering vertices follow above them.
   struct Step {
     std::int32_t vertex = 0, bit = -1, n_base = 0, n_out = 0;
-    std::vector<Option> options;
+    std::span<const Option> options;
   };
 
   static constexpr std::int32_t kTileBits = 11;  // tiles that stay in the first-level cache
@@ -104,6 +85,33 @@ class JointExact {
   static constexpr double kNothing = 1e-17;  // an error far below rounding
 
   std::int32_t n_in(std::int32_t t) const { return steps_[t].n_base + (steps_[t].bit >= 0); }
+
+  void list_steps(const Elimination& elimination) {
+    frontier_.clear();
+    steps_.clear();
+    options_.clear();
+    options_.reserve(graph_->weight.size());  // so that the spans stay valid
+    for (const EliminationStep& from : elimination.steps(*graph_, links_)) {
+      Step step;
+      step.vertex = from.vertex;
+      if (from.is_active) {
+        const auto at = std::ranges::find(frontier_, from.vertex);
+        step.bit = static_cast<std::int32_t>(at - frontier_.begin());
+        frontier_.erase(at);
+      }
+      step.n_base = static_cast<std::int32_t>(frontier_.size());
+      for (const Link& l : from.entering) frontier_.push_back(l.to);
+      step.n_out = static_cast<std::int32_t>(frontier_.size());
+      const std::size_t begin = options_.size();
+      for (const Link& l : from.links) {
+        const auto at = std::ranges::find(frontier_, l.to);
+        options_.push_back({static_cast<std::int32_t>(at - frontier_.begin()), l.edge});
+      }
+      step.options = std::span<const Option>(options_).subspan(begin);
+      steps_.push_back(step);
+    }
+    layers_.resize(steps_.size() + 1);
+  }
 
   void choose_kept() {
     double all = 0, largest = 0, run = 0;
@@ -165,7 +173,7 @@ class JointExact {
     const double* free = is_active ? free_.data() : layers_[t].data();
     const std::size_t size = std::size_t{1} << step.n_base;
     const std::size_t tile = std::min(size, std::size_t{1} << kTileBits);
-    const double alone = graph_.alone[step.vertex];
+    const double alone = graph_->alone[step.vertex];
     layers_[t + 1] = take(std::size_t{1} << step.n_out);
     double* out = layers_[t + 1].data();
     std::fill(out + size, out + (std::size_t{1} << step.n_out), 0.0);
@@ -179,7 +187,7 @@ class JointExact {
         for (std::size_t s = at; s < at + tile; ++s) out[s] += used_[s];
       for (const Option& option : step.options) {
         const std::size_t bit = std::size_t{1} << option.bit;
-        const double w = graph_.weight[option.edge];
+        const double w = graph_->weight[option.edge];
         if (bit >= size)
           add(out + bit + at, free + at, w, tile);
         else if (bit >= tile) {
@@ -202,7 +210,7 @@ class JointExact {
     const double* free = is_active ? free_.data() : layers_[t].data();
     const std::size_t size = std::size_t{1} << step.n_base;
     const std::size_t tile = std::min(size, std::size_t{1} << kTileBits);
-    const double alone = graph_.alone[step.vertex];
+    const double alone = graph_->alone[step.vertex];
     rest_.resize(is_active ? size : 0);
     double* rest = is_active ? rest_.data() : before.data();
     sums_.assign(step.options.size(), 0);
@@ -214,7 +222,7 @@ class JointExact {
       if (is_active) sum_used += dot(used_.data() + at, after.data() + at, tile);
       for (std::size_t k = 0; k < step.options.size(); ++k) {
         const std::size_t bit = std::size_t{1} << step.options[k].bit;
-        const double w = graph_.weight[step.options[k].edge];
+        const double w = graph_->weight[step.options[k].edge];
         if (bit >= tile) {
           if (!(at & bit))
             sums_[k] += add(rest + at, after.data() + (at | bit), w, free + at, tile);
@@ -225,7 +233,7 @@ class JointExact {
     }
     double total = alone * sum_alone + sum_used;
     for (std::size_t k = 0; k < sums_.size(); ++k)
-      total += sums_[k] *= graph_.weight[step.options[k].edge];
+      total += sums_[k] *= graph_->weight[step.options[k].edge];
     if (is_active) {
       const std::size_t run = std::size_t{1} << step.bit;
       double* in = before.data();
@@ -286,8 +294,11 @@ class JointExact {
     return exponent;
   }
 
-  const MatchingGraph& graph_;
+  const MatchingGraph* graph_ = nullptr;
   std::vector<Step> steps_;
+  std::vector<Link> links_;           // of the elimination
+  std::vector<std::int32_t> frontier_;
+  std::vector<Option> options_;       // by step
   std::vector<std::vector<double>> layers_, spare_;
   std::vector<char> is_kept_;
   std::vector<double> free_, used_, rest_, sums_;

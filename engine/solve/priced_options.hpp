@@ -16,10 +16,10 @@
 
 namespace asterism {
 
-// An option of a tree: its log weight and the resources that it uses.
+// An option of a tree: its log weight and the resources that it uses, which the caller keeps.
 struct PackingOption {
   double log_weight = 0;
-  std::vector<std::int32_t> uses;
+  std::span<const std::int32_t> uses;
 };
 
 class PricedOptions {

@@ -182,6 +182,11 @@ class SetPacking : PricedOptions {
         split_by_owner(node, contested);
         continue;
       }
+      if (k == 1 && weight(node.chosen) >= node.bound) {  // nothing left is better
+        packings_.push_back(packing(node.chosen));
+        keep_if_better(node.chosen);
+        break;
+      }
       split_rest(node);
       node.is_packing = true;
       push(std::move(node));
@@ -190,10 +195,15 @@ class SetPacking : PricedOptions {
     return summary;
   }
 
+  double weight(const std::vector<std::int32_t>& chosen) const {
+    double sum = 0;
+    for (const std::int32_t o : chosen) sum += log_weight(o);
+    return sum;
+  }
+
   void push(Node node) {
-    node.bound = 0;
     if (node.is_packing) {
-      for (const std::int32_t o : node.chosen) node.bound += log_weight(o);
+      node.bound = weight(node.chosen);
     } else {
       node.bound = sum_of_prices_;
       for (const std::int32_t o : node.chosen) node.bound += reduced_[o];

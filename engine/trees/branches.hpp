@@ -119,8 +119,38 @@ struct WindowFrame {
   }
 };
 
+// The state of a branch after its last frame. Most branches are pruned before the next frame, so the
+// update with the detection is computed on demand. The predicted state is shared by the branches of
+// one parent.
+class BranchState {
+ public:
+  BranchState() = default;
+  explicit BranchState(MotionState state)
+      : predicted_(std::make_shared<const MotionState>(std::move(state))) {}
+
+  MotionState updated(const MotionModel& m) const {
+    MotionState state = *predicted_;
+    if (is_detected_) update(m, each_, log_likelihood_, y_, state);
+    return state;
+  }
+  // Updates the predicted state with a detection. `each` and its likelihood are from the prediction.
+  void detect(const Point& y, const std::array<double, kMaxModes>& each, double log_likelihood) {
+    y_ = y;
+    each_ = each;
+    log_likelihood_ = log_likelihood;
+    is_detected_ = true;
+  }
+
+ private:
+  std::shared_ptr<const MotionState> predicted_;
+  Point y_{};
+  std::array<double, kMaxModes> each_{};
+  double log_likelihood_ = 0;
+  bool is_detected_ = false;
+};
+
 struct Branch {
-  MotionState state;
+  BranchState state;
   double score = 0;  // as in LiveTrack
   double lambda = 0;
   std::int64_t n_updates = 0;
@@ -173,7 +203,7 @@ class BranchGrower {
   // A branch for the decided part of a track.
   Branch root(const LiveTrack<Tree>& track) const {
     Branch b;
-    b.state = track.state;
+    b.state = BranchState(track.state);
     b.score = track.score;
     b.lambda = track.more.lambda;
     b.n_updates = track.more.n_updates;
@@ -194,7 +224,7 @@ class BranchGrower {
       split(frame, track, parent, grown_, stats);
     prune(frame.number, n_open, max_branches, stats);
     track.more.branches.clear();
-    for (const std::int32_t b : kept_) track.more.branches.push_back(grown_[b]);
+    for (const std::int32_t b : kept_) track.more.branches.push_back(std::move(grown_[b]));
   }
 
   // Prediction for a track missed in the last `gap` frames. Its state must be predicted to the
@@ -224,9 +254,11 @@ class BranchGrower {
       out.push_back(parent);
       return;
     }
-    predict(live_.m, frame.step, parent.state);
+    MotionState predicted = parent.state.updated(live_.m);
+    predict(live_.m, frame.step, predicted);
+    parent.state = BranchState(predicted);
     const NeighbourAdvice* advice = frame.advice_to(track.more.key);
-    const Expected all = expected(parent.state, parent.gap, advice);
+    const Expected all = expected(predicted, parent.gap, advice);
     const double hit = live_.hit_gain(parent.gap), miss = live_.miss_gain(parent.gap);
     const double min_log_likelihood =
         track.is_confirmed() ? miss + live_.leftover_gain() - hit - opt_.prune_drop
@@ -240,10 +272,17 @@ class BranchGrower {
         ++stats.n_cut;
         return;
       }
+      std::array<double, kMaxModes> each{};
+      const double log_likelihood = prediction.log_likelihood(y, each);
+      const double hit_gain = hit + log_likelihood;
+      if (!std::isfinite(hit_gain)) return;
       Branch& child = out.emplace_back(parent);  // branches are large, so it is not copied again
-      all.choose(y, child.state);
-      const double hit_gain = hit + update(live_.m, prediction, y, child.state);
-      if (!std::isfinite(hit_gain)) return out.pop_back();
+      if (all.is_carried()) {
+        MotionState chosen = predicted;
+        all.choose(y, chosen);
+        child.state = BranchState(chosen);
+      }
+      child.state.detect(y, each, log_likelihood);
       child.score += opt_.is_joint ? hit_gain : hit_gain - frame.crowding(track.more.key, j);
       if (advice != nullptr) child.score += advice->of(j);
       child.lambda = lambda;
@@ -282,7 +321,7 @@ class BranchGrower {
     if (best.has_ended) return;
     const NeighbourAdvice* advice = frame.advice_to(track.more.key);
     if (advice != nullptr && advice->is_reappearance) return;
-    MotionState state = best.state;
+    MotionState state = best.state.updated(live_.m);
     predict(live_.m, frame.step, state);
     const Expected all = expected(state, best.gap, advice);
     const Prediction& prediction = all.prediction();

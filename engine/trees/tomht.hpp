@@ -106,6 +106,10 @@ class HypothesisForest {
     const BranchGrower grower(open_.live, open_.branches);
     s_.trees.assign(open_.n_all(), {});
     s_.decisions.assign(open_.n_all(), {});
+    std::size_t n_branches = 0;
+    for (std::size_t i = 0; i < open_.n_all(); ++i) n_branches += branches(i).size();
+    s_.uses.clear();
+    s_.uses.reserve(n_branches * open_.frames.size());  // so that the spans stay valid
     for (std::size_t i = 0; i < s_.trees.size(); ++i) {
       const bool is_seed = open_.is_seed(i);
       const LiveTrack<Tree>& track = open_.tree(i);
@@ -117,12 +121,13 @@ class HypothesisForest {
           continue;
         if (!is_seed && !track.is_confirmed() && track.best_score - b.score > opt_.delete_drop)
           continue;
-        PackingOption option{grower.log_ratio(b), {}};
-        option.uses.reserve(open_.frames.size());
-        open_.each_detection(i, b, [&](std::int32_t r) { option.uses.push_back(r); });
+        const std::size_t begin = s_.uses.size();
+        open_.each_detection(i, b, [&](std::int32_t r) { s_.uses.push_back(r); });
+        const PackingOption option{grower.log_ratio(b),
+                                   std::span<const std::int32_t>(s_.uses).subspan(begin)};
         has_free = has_free || option.uses.empty();
         const std::int32_t column = open_.taken(i, b, *open_.frames.front());
-        tree.options.push_back(std::move(option));
+        tree.options.push_back(option);
         tree.choices.push_back({static_cast<std::int32_t>(k), column, 0});
       }
       if (!track.is_confirmed()) {
@@ -208,7 +213,7 @@ class HypothesisForest {
       }
       if (n != o) {
         tree.choices[n] = tree.choices[o];
-        tree.options[n] = std::move(tree.options[o]);
+        tree.options[n] = tree.options[o];
       }
       ++n;
     }
@@ -373,6 +378,7 @@ class HypothesisForest {
   // Data of one decision: live tracks first, then seeds.
   struct Memory {
     std::vector<TreeOptions> trees;
+    std::vector<std::int32_t> uses;  // of all options
     std::vector<Ranked> ranked;
     std::vector<TreeDecision> decisions;
     std::vector<double> free, taken;
