@@ -38,11 +38,17 @@ LONG = 60
 """Number of detections above which a longer track is no better."""
 FIRST_FRAMES = 100
 """Number of frames in which the first tracks are compared."""
-MIN_MEAN, MIN_FIT = 0.7, 0.6
-"""Mean log odds of a distance, and share of the score that exact distances would have, below which
-a marker set does not fit the capture at all. On real captures of whole bodies, sets of another
-protocol reach 0.6 and 0.65, hardly ever both; labelling templates 0.8 and 0.65, and sets of other
-subjects 1.6 and 0.85 and more."""
+MIN_MEAN = 0.7
+"""Smallest mean log odds of the distances between named tracks, for a marker set to fit."""
+MIN_FIT, MIN_ROUGH_FIT, ROUGH = 0.75, 0.65, 0.015
+"""Smallest score for a marker set to fit, as a share of the score of tracks at exactly its
+distances; and that for a rough set, whose near distances vary more than `ROUGH`, metres, between
+subjects. On real captures of whole bodies, sets of other protocols reach 0.6 to 0.75; sets of other
+subjects 0.88, subject templates 0.76, and labelling templates, which are rough, 0.66 and more."""
+NEAR = 0.3
+"""Largest of these near distances, metres."""
+SIZES = (0.6, 1.6)
+"""Smallest and largest size of a subject relative to the set."""
 MIN_SHARE, MIN_FOUND = 0.5, 0.4
 """Smallest share of the tracks, or of the markers if these are fewer, that a set must name, and
 smallest share of its markers that must be there."""
@@ -206,7 +212,7 @@ def _first(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list
     def try_set(s: int, b: int) -> None:
         if len(subsets[b]) >= MIN_FOUND * len(marker_sets[s]):
             own = search(marker_sets[s], positions[:, subsets[b]], up)
-            if own is not None and _fits(own):
+            if own is not None and _fits(own, marker_sets[s]):
                 results[s, b] = own
 
     if len(marker_sets) == 1:
@@ -230,11 +236,14 @@ def _first(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list
     ]
 
 
-def _fits(found: Found) -> bool:
+def _fits(found: Found, made: MarkerSet) -> bool:
     n_named, n_markers = int((found.names >= 0).sum()), found.evidence.n_markers
     expected = max(MIN_SHARE * min(len(found.names), n_markers), MIN_FOUND * n_markers)
-    is_close = found.mean_log_odds >= MIN_MEAN and found.fit >= MIN_FIT
-    return n_named >= max(expected, 1) and is_close
+    variation = made.variations[(made.distances > 0) & (made.distances < NEAR)]
+    is_rough = np.median(np.nan_to_num(variation)) > ROUGH if len(variation) else False
+    is_close = found.mean_log_odds >= MIN_MEAN
+    is_close &= found.fit >= (MIN_ROUGH_FIT if is_rough else MIN_FIT)
+    return n_named >= max(expected, 1) and is_close and SIZES[0] < found.size < SIZES[1]
 
 
 def _without(tracks: Tracks, others: list[_First | None]) -> Tracks:
