@@ -1,12 +1,12 @@
 // Evidence for the names of tracks: distances between tracks, and heights of tracks over the planes
 // of three others, against those of a marker set.
 //
-//   score of an assignment = Σ_pairs T[p, m_i, m_j] + Σ_quads H(height) + Σ_named (prior_m - none)
+//   score of an assignment = Σ_pairs T[p, m_i, m_j] + Σ_quads H(height) + Σ_named (prior_km - none)
 //
 //   T      log odds of a distance for all pairs of markers (`distance_evidence.hpp`)
 //   quad   a marker and three reference markers; the sign of its height over their plane tells a
 //          body from its mirror image
-//   prior  log odds of a marker that is often missing; none: those of a track without a name
+//   prior  log odds of a marker for a track, by its presence and place; none: those of no name
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,6 @@ using Names = std::vector<std::int32_t>;  // marker of each track, -1 for none
 struct MarkerTables {
   std::int32_t M = 0;
   std::vector<double> distance, movement, variation;  // (M, M), NaN where unknown
-  std::vector<double> prior;                          // (M,)
 };
 
 struct Quad {
@@ -50,8 +49,8 @@ struct TrackPoses {
 class NameEvidence {
  public:
   NameEvidence(const MarkerTables& markers, std::vector<Quad> quads, TrackPairs pairs,
-               TrackPoses poses, double size, const FitWeights& weights, double none)
-      : M_(markers.M), K_(pairs.K), size_(size), none_(none), prior_(markers.prior), quads_(std::move(quads)),
+               TrackPoses poses, std::vector<double> prior, double size, const FitWeights& weights, double none)
+      : M_(markers.M), K_(pairs.K), size_(size), none_(none), prior_(std::move(prior)), quads_(std::move(quads)),
         pairs_(std::move(pairs)), poses_(std::move(poses)) {
     const std::size_t P = pairs_.first.size();
     table_.resize(P * M_ * M_);
@@ -76,7 +75,7 @@ class NameEvidence {
     out.resize(static_cast<std::size_t>(K_) * M_);
     for (const std::int32_t k : rows) {
       double* row = out.data() + static_cast<std::size_t>(k) * M_;
-      std::copy(prior_.begin(), prior_.end(), row);
+      std::copy_n(prior_.begin() + static_cast<std::ptrdiff_t>(k) * M_, M_, row);
       for (const std::int32_t p : own_pairs_[k]) {
         const std::int32_t other = names[pairs_.first[p] == k ? pairs_.second[p] : pairs_.first[p]];
         if (other < 0) continue;
@@ -102,7 +101,8 @@ class NameEvidence {
       const std::int32_t a = names[pairs_.first[p]], b = names[pairs_.second[p]];
       if (a >= 0 && b >= 0) sum += table_[(p * M_ + a) * M_ + b];
     }
-    for (const std::int32_t m : names) sum += m >= 0 ? prior_[m] - none_ : 0;
+    for (std::int32_t k = 0; k < K_; ++k)
+      if (names[k] >= 0) sum += prior_[static_cast<std::size_t>(k) * M_ + names[k]] - none_;
     track_of(names);
     for (std::size_t q = 0; q < quads_.size(); ++q) {
       const std::int32_t k = track_[quads_[q].marker];
@@ -217,7 +217,7 @@ class NameEvidence {
 
   std::int32_t M_, K_;
   double size_, none_;
-  std::vector<double> prior_;
+  std::vector<double> prior_;  // (K, M)
   std::vector<Quad> quads_;
   TrackPairs pairs_;
   TrackPoses poses_;

@@ -45,9 +45,8 @@ void make_evidence(NameEvidence* self, const In<double>& distances, const In<dou
   markers.distance = values_as<double>(distances);
   markers.movement = values_as<double>(movements);
   markers.variation = values_as<double>(variations);
-  markers.prior = values_as<double>(prior);
-  require(markers.prior.size() == distances.shape(0), "prior: (M,)");
   require(spreads.ndim() == 2 && spreads.shape(0) == spreads.shape(1), "spreads: (K, K)");
+  require(prior.size() == spreads.shape(0) * distances.shape(0), "prior: (K, M)");
   TrackPairs tracks;
   tracks.K = static_cast<std::int32_t>(spreads.shape(0));
   const std::size_t P = pair_distances.size();
@@ -85,7 +84,8 @@ void make_evidence(NameEvidence* self, const In<double>& distances, const In<dou
   FitWeights w;
   std::copy_n(weights.data(), kFits, w.begin());
   nb::gil_scoped_release release;
-  new (self) NameEvidence(markers, std::move(own), std::move(tracks), std::move(poses), size, w,
+  new (self) NameEvidence(markers, std::move(own), std::move(tracks), std::move(poses),
+                          values_as<double>(prior), size, w,
                           none);
 }
 

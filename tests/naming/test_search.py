@@ -38,7 +38,7 @@ def made_up(seed, n_tracks=7, n_markers=8):
         "distances": distances,
         "movements": movements,
         "variations": np.full(distances.shape, 0.006),
-        "prior": np.where(np.arange(n_markers) == 2, -3.0, 0.0),
+        "prior": rng.uniform(-3.0, 0.0, (n_tracks, n_markers)),
         "quads": quads,
         "heights": heights,
         "pairs": stats.pairs,

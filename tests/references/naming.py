@@ -60,8 +60,8 @@ def total(given, names):
                 d, s, given["distances"][a, b], given["movements"][a, b],
                 given["variations"][a, b], given["size"], given["weights"],
             )  # fmt: skip
-    for m in names:
-        score += given["prior"][m] - given["none"] if m >= 0 else 0.0
+    for k, m in enumerate(names):
+        score += given["prior"][k, m] - given["none"] if m >= 0 else 0.0
     track = {m: k for k, m in enumerate(names) if m >= 0}
     for quad, (mean, variance, weight) in zip(given["quads"], given["heights"], strict=True):
         if all(m in track for m in quad):

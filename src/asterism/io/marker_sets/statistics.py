@@ -31,6 +31,8 @@ PRIOR = 0.005, 0.06
 """The same between subjects, where a size is that of the template."""
 WIDE = 2.0
 """Factor on the joint angles of the postures in which sides are measured."""
+MAX_SEGMENTS = 2
+"""Largest number of segments of a marker and its references, for their side to have a spread."""
 STEADY = 0.1
 """Share of a distance that is added to its movement where neighbours are ordered."""
 
@@ -84,11 +86,12 @@ def marker_set(
         variations=variations,
         segments=tuple(segments[s].name if s >= 0 else None for s in owner),
         presences=np.array(presences),
-        **_sides(places, wide, distances, movements, error=(fixed, share)),
+        **_sides(owner, places, wide, distances, movements, error=(fixed, share)),
     )
 
 
 def _sides(
+    owner: NDArray[np.int64],
     places: NDArray[np.float64],
     wide: NDArray[np.float64],
     distances: NDArray[np.float64],
@@ -98,12 +101,15 @@ def _sides(
 ) -> dict[str, Any]:
     """Return sides that hold in all postures, with their spread, and those of the neutral one.
 
+    Sides across several joints are left out: real postures differ more than sampled ones.
+
     The sides of the neutral posture have no known spread, so that they weigh less. They contain
     what no other side does, as which wrist marker is in front.
     """
     cost = movements + STEADY * distances
     cost[np.isnan(cost) | np.eye(len(cost), dtype=bool)] = np.inf
     quads = candidate_quads(cost)
+    quads = quads[(np.diff(np.sort(owner[quads], axis=1), axis=1) > 0).sum(axis=1) < MAX_SEGMENTS]
     sampled = heights(wide, quads)
     middle = sampled.mean(axis=0)
     spread = np.hypot(sampled.std(axis=0), error[0] + error[1] * np.abs(middle))

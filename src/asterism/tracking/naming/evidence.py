@@ -63,6 +63,9 @@ HEIGHT_ERROR = 0.006, 0.15
 """Standard deviation that is added to every known height: metres, and share."""
 NEAR = 0.3
 """Size of a quad, metres, from which on its height tells little if its spread is unknown."""
+ACROSS = 0.1
+"""Weight of a height across segments, relative to that within a segment, if its spread is unknown:
+the other posture may have it on the other side."""
 FITS = ((0.004, 0.01, False), (0.008, 0.05, True))
 """Fixed and relative error of the first two kinds, and whether they scale with the subject."""
 
@@ -101,7 +104,12 @@ class TrackStats:
 
 
 def evidence_of(
-    made: MarkerSet, stats: TrackStats, *, size: float, weights: tuple[float, ...]
+    made: MarkerSet,
+    stats: TrackStats,
+    *,
+    size: float,
+    weights: tuple[float, ...],
+    posture: NDArray[np.float64] | None = None,
 ) -> _engine.NameEvidence:
     """Return the evidence for the names of tracks.
 
@@ -115,6 +123,8 @@ def evidence_of(
         Size of the subject relative to the marker set.
     weights : tuple of float
         Weights of the four kinds of fit of a distance.
+    posture : ndarray of shape (n, M), optional
+        Log odds of each marker for each track by their places.
     """
     assert made.quads is not None
     known = np.isfinite(made.height_spreads)
@@ -122,14 +132,17 @@ def evidence_of(
     variance = error[:, 0] ** 2 + (error[:, 1] * made.heights) ** 2
     variance += np.where(known, made.height_spreads, 0) ** 2
     weight = np.exp(-((quad_sizes(made.quads, made.distances) / NEAR) ** 2))
+    segments = np.unique(np.array(made.segments, dtype=str), return_inverse=True)[1]
+    weight[np.ptp(segments[made.quads], axis=1) > 0] *= ACROSS
     weight = np.where(known, 1.0, np.nan_to_num(weight))
     usable = np.isfinite(made.heights)
     i, j = stats.pairs.T
+    n = len(stats.distances.middle)
     return _engine.NameEvidence(
         distances=made.distances,
         movements=made.movements,
         variations=np.nan_to_num(made.variations),
-        prior=prior_of(made),
+        prior=np.tile(prior_of(made), (n, 1)) + (0.0 if posture is None else posture),
         quads=np.ascontiguousarray(made.quads[usable]),
         heights=np.ascontiguousarray(np.stack([made.heights, variance, weight], axis=1)[usable]),
         pairs=stats.pairs,

@@ -16,6 +16,7 @@ from asterism.tracking.naming.evidence import (
     evidence_of,
     refit,
 )
+from asterism.tracking.naming.posture import posture_log_odds
 from asterism.tracking.naming.starts import starts
 
 if TYPE_CHECKING:
@@ -92,16 +93,18 @@ def search(
         first = [n for _, n in sorted(settled.values(), key=lambda item: -item[0])[:REFINED]]
         first = [rough.improved(first[0])[0], *first]
     size, weights = refit(made, stats, first[0]) or (1.0, FIRST_WEIGHTS)
-    evidence = evidence_of(made, stats, size=size, weights=weights)
+    posture = posture_log_odds(made, stats.positions, first[0], up, size)
+    evidence = evidence_of(made, stats, size=size, weights=weights, posture=posture)
     fine = searching(evidence)
     names, _ = max((fine.settled(names) for names in first), key=lambda item: item[1])
     again = refit(made, stats, names)
     if again is not None and _differs(again, (size, weights)):
         size, weights = again
-        evidence = evidence_of(made, stats, size=size, weights=weights)
+        evidence = evidence_of(made, stats, size=size, weights=weights, posture=posture)
         fine = searching(evidence)
     names, score = fine.improved(names)
-    exact = evidence_of(made, _at_the_set(made, stats, names, size), size=size, weights=weights)
+    at_the_set = _at_the_set(made, stats, names, size)
+    exact = evidence_of(made, at_the_set, size=size, weights=weights, posture=posture)
     n_named = int((names >= 0).sum())
     n_pairs = int((names >= 0)[stats.pairs].all(axis=1).sum())
     best = exact.total(names) + NONE * n_named

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from asterism.model import MarkerSet
     from asterism.model.upwards import Axis
 
-__all__ = ["starts"]
+__all__ = ["starts", "z_up"]
 
 HEADINGS = 16
 """Number of directions that an upright subject may face."""
@@ -46,7 +46,7 @@ def starts(made: MarkerSet, positions: NDArray[np.float64], up: Axis) -> list[ND
     to `HEADINGS` directions. Otherwise: its principal axes are laid over those of the points, four
     ways round. Each track takes the marker of one exact assignment of all.
     """
-    place = _z_up(made.places, made.up)
+    place = z_up(made.places, made.up)
     known = np.flatnonzero(np.isfinite(place[:, 0]))
     if not len(known) or not positions.size:
         return []
@@ -57,7 +57,7 @@ def starts(made: MarkerSet, positions: NDArray[np.float64], up: Axis) -> list[ND
     upright: list[tuple[float, NDArray[np.int64]]] = []
     others: list[tuple[float, NDArray[np.int64]]] = []
     for frame in chosen:
-        point = _z_up(positions[frame], up)
+        point = z_up(positions[frame], up)
         is_seen = np.flatnonzero(np.isfinite(point[:, 0]))
         for laid, sigma, found in (
             *((own, UPRIGHT, upright) for own in _upright(place, point[is_seen])),
@@ -74,7 +74,7 @@ def starts(made: MarkerSet, positions: NDArray[np.float64], up: Axis) -> list[ND
     ]
 
 
-def _z_up(points: NDArray[np.float64], up: Axis) -> NDArray[np.float64]:
+def z_up(points: NDArray[np.float64], up: Axis) -> NDArray[np.float64]:
     """Return points with the axis that points up as the last, turned without reflection."""
     return np.roll(points, 2 - "xyz".index(up), axis=1)
 
