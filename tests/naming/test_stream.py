@@ -141,7 +141,7 @@ def test_every_subject_is_named_by_its_own_set():
                 am.Tracks(detections=own.detections, labels=own.labels, names=tuple(short))
             ).of_subject(subject)
         )
-    states, names = named(truth, *sets)
+    _, names = named(truth, *sets)
     is_named = [n is not None for n in names[-1]]
     own = truth.labels[d.offsets[-2] :]
     wrong = [n for n, m in zip(names[-1], own, strict=True) if n and n != truth.names[m]]

@@ -11,7 +11,7 @@ from asterism.tracking.rigidity.distances import distances_between
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["bodies_of", "bodies_of_sets"]
+__all__ = ["bodies_of", "bodies_of_sets", "parted_bodies"]
 
 LINKS = ((0.06, 0.6), (0.03, 0.4), (0.02, 0.3), (0.01, 0.25))
 """Largest spread and largest distance of two tracks that are linked, metres. Across a joint both
@@ -20,6 +20,10 @@ MIN_FRAMES = 3
 """Smallest number of common frames of two tracks that are linked."""
 MIN_TRACKS = 4
 """Smallest number of tracks of a body."""
+STEADINESS, LOOSEST = 10.0, 100.0
+"""Weight of a distance's spread beside the distance itself, and the cost of an unknown one."""
+MIN_SHARE = 0.7
+"""Smallest body, as a share of one of equal bodies."""
 TEMPERATURE = 12.0
 """Factor by which the difference of the scores of two subjects is too large: all distances of a
 subject vary together."""
@@ -41,6 +45,45 @@ def bodies_of(positions: NDArray[np.float64], n_subjects: int) -> list[NDArray[n
         if len(bodies) >= n_subjects:
             break
     return bodies
+
+
+def parted_bodies(positions: NDArray[np.float64], n_subjects: int) -> list[NDArray[np.int64]]:
+    """Return bodies that move close to each other in step, parted at their weakest links.
+
+    Parameters
+    ----------
+    positions : ndarray of shape (F, n, 3)
+        Positions of n tracks, metres, NaN without a detection.
+    n_subjects : int
+        Number of bodies.
+
+    Returns
+    -------
+    list of ndarray
+        Tracks of each body: those on one side of a link of the tree of steadiest, shortest
+        distances. The weakest link is cut that leaves both sides large enough.
+    """
+    from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
+
+    found = distances_between(positions)
+    cost = np.nan_to_num(found.middle, nan=LOOSEST) + STEADINESS * np.nan_to_num(
+        found.spread, nan=LOOSEST
+    )
+    cost[found.n_frames < MIN_FRAMES] = LOOSEST
+    np.fill_diagonal(cost, 0.0)
+    tree = minimum_spanning_tree(cost).tolil()
+    smallest = MIN_SHARE * len(cost) / n_subjects
+    edges = sorted(zip(*tree.nonzero(), strict=True), key=lambda edge: -tree[edge])
+    for edge in edges:
+        kept = tree[edge]
+        tree[edge] = 0
+        n, body = connected_components(tree, directed=False)
+        sizes = np.bincount(body)
+        if sizes[body[list(edge)]].min() < smallest:
+            tree[edge] = kept
+        elif n == n_subjects:
+            return [np.flatnonzero(body == b) for b in range(n)]
+    return []
 
 
 def _linked(

@@ -12,17 +12,16 @@ from asterism.errors import ParameterError
 from asterism.model import MarkerSet, Tracks
 from asterism.model.upwards import up_axis
 from asterism.records import record
-from asterism.tracking.naming.bodies import bodies_of, bodies_of_sets
 from asterism.tracking.naming.exchanges import without_exchanges
+from asterism.tracking.naming.first_names import FIRST_FRAMES, MIN_LENGTH, First, first_names
 from asterism.tracking.naming.joining import joined
 from asterism.tracking.naming.probabilities import marker_odds, probabilities_of, track_odds
-from asterism.tracking.naming.search import Found, search
+from asterism.tracking.naming.search import search
 from asterism.tracking.naming.stretches import NameChange, changes_of
 from asterism.tracking.naming.windows import (
     WindowNames,
     Windows,
     most_of_each,
-    scattered,
 )
 
 if TYPE_CHECKING:
@@ -32,26 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Naming", "name_tracks"]
 
-MIN_LENGTH = 5
-"""Smallest number of detections of a track that is named first."""
-LONG = 60
-"""Number of detections above which a longer track is no better."""
-FIRST_FRAMES = 100
-"""Number of frames in which the first tracks are compared."""
-MIN_MEAN = 0.7
-"""Smallest mean log odds of the distances between named tracks, for a marker set to fit."""
-MIN_FIT, MIN_ROUGH_FIT, ROUGH = 0.75, 0.65, 0.015
-"""Smallest score for a marker set to fit, as a share of the score of tracks at exactly its
-distances; and that for a rough set, whose near distances vary more than `ROUGH`, metres, between
-subjects. On real captures of whole bodies, sets of other protocols reach 0.6 to 0.75; sets of other
-subjects 0.88, subject templates 0.76, and labelling templates, which are rough, 0.66 and more."""
-NEAR = 0.3
-"""Largest of these near distances, metres."""
-SIZES = (0.6, 1.6)
-"""Smallest and largest size of a subject relative to the set."""
-MIN_SHARE, MIN_FOUND = 0.5, 0.4
-"""Smallest share of the tracks, or of the markers if these are fewer, that a set must name, and
-smallest share of its markers that must be there."""
 MIN_DETECTIONS = 10
 """Smallest number of detections of a name in a capture."""
 MIN_SUBJECT = 0.75
@@ -172,107 +151,25 @@ def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
         raise ParameterError("marker_sets", "names that differ", f"{twice[0]} in two sets", hint)
     up, _ = up_axis(tracks.detections)
     whole = without_exchanges(joined(tracks))
-    found = _first(whole, marker_sets, up)
+    found = first_names(whole, marker_sets, up)
     named = [
-        None if own is None else _all(_without(whole, [*found[:s], *found[s + 1 :]]), made, own, up)
-        for s, (made, own) in enumerate(zip(marker_sets, found, strict=True))
+        None if own is None else _all(_without(whole, own, found), made, own, up)
+        for made, own in zip(marker_sets, found, strict=True)
     ]
     return _result(tracks, whole, marker_sets, named)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _First:
-    """First names: those of the tracks of one moment."""
-
-    frame: int
-    tracks: NDArray[np.int64]
-    found: Found
-    probability: float  # that the body is this subject's, not another's of the given sets
-
-
-def _first(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list[_First | None]:
-    """Name the tracks of the frame with the most long tracks; each set names a body of its own."""
-    d = tracks.detections
-    used = np.flatnonzero(tracks.labels >= 0)
-    if not len(used):
-        return [None] * len(marker_sets)
-    worth = np.where(tracks.lengths >= MIN_LENGTH, np.minimum(tracks.lengths, LONG), 0)
-    by_frame = np.bincount(
-        d.frame_of[used], weights=worth[tracks.labels[used]], minlength=d.n_frames
-    )
-    frame = int(np.argmax(by_frame))
-    alive = tracks.labels[slice(*d.offsets[[frame, frame + 1]])]
-    alive = np.unique(alive[(alive >= 0) & (tracks.lengths[alive] >= MIN_LENGTH)])
-    if len(alive) < 2:
-        return [None] * len(marker_sets)
-    positions = _positions(tracks, alive)
-    subsets = [np.arange(len(alive))]
-    results: dict[tuple[int, int], Found] = {}
-
-    def try_set(s: int, b: int) -> None:
-        if len(subsets[b]) >= MIN_FOUND * len(marker_sets[s]):
-            own = search(marker_sets[s], positions[:, subsets[b]], up)
-            if own is not None and _fits(own, marker_sets[s]):
-                results[s, b] = own
-
-    if len(marker_sets) == 1:
-        try_set(0, 0)
-    if not results:  # several subjects, each with a body of its own; or others without a set
-        subsets += bodies_of(positions, len(marker_sets))
-        is_apart = len(marker_sets) == 1 or len(subsets) > len(marker_sets)
-        for s in range(len(marker_sets)):
-            for b in range(is_apart, len(subsets)):
-                try_set(s, b)
-    body_of, probability = bodies_of_sets(
-        {key: own.score for key, own in results.items()}, len(marker_sets), len(subsets)
-    )
-    return [
-        None
-        if b < 0
-        else _First(
-            frame=frame, tracks=alive[subsets[b]], found=results[s, b], probability=probability[s]
-        )
-        for s, b in enumerate(body_of)
-    ]
-
-
-def _fits(found: Found, made: MarkerSet) -> bool:
-    n_named, n_markers = int((found.names >= 0).sum()), found.evidence.n_markers
-    expected = max(MIN_SHARE * min(len(found.names), n_markers), MIN_FOUND * n_markers)
-    variation = made.variations[(made.distances > 0) & (made.distances < NEAR)]
-    is_rough = np.median(np.nan_to_num(variation)) > ROUGH if len(variation) else False
-    is_close = found.mean_log_odds >= MIN_MEAN
-    is_close &= found.fit >= (MIN_ROUGH_FIT if is_rough else MIN_FIT)
-    return n_named >= max(expected, 1) and is_close and SIZES[0] < found.size < SIZES[1]
-
-
-def _without(tracks: Tracks, others: list[_First | None]) -> Tracks:
+def _without(tracks: Tracks, own: First, others: list[First | None]) -> Tracks:
     """Return the tracks with those of other bodies as clutter."""
     is_other = np.zeros(tracks.n_tracks + 1, dtype=bool)  # the last element is for clutter
     for other in others:
         if other is not None:
             is_other[other.tracks] = True
+    is_other[own.tracks] = False
     return replace(tracks, labels=np.where(is_other[tracks.labels], -1, tracks.labels))
 
 
-def _positions(tracks: Tracks, alive: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return positions of some tracks in frames in which most of them exist, (F, n, 3)."""
-    d = tracks.detections
-    column = np.full(tracks.n_tracks + 1, -1)  # the last element is for clutter
-    column[alive] = np.arange(len(alive))
-    used = np.flatnonzero(column[tracks.labels] >= 0)
-    counts = np.bincount(d.frame_of[used], minlength=d.n_frames)
-    frames = np.flatnonzero(counts >= 0.5 * counts.max())
-    frames = frames[np.unique(np.linspace(0, len(frames) - 1, FIRST_FRAMES).astype(np.int64))]
-    row = np.full(d.n_frames, -1)
-    row[frames] = np.arange(len(frames))
-    used = used[row[d.frame_of[used]] >= 0]
-    return scattered(
-        d.points[used], row[d.frame_of[used]], column[tracks.labels[used]], len(frames), len(alive)
-    )
-
-
-def _all(tracks: Tracks, made: MarkerSet, first: _First, up: Axis) -> _Named:
+def _all(tracks: Tracks, made: MarkerSet, first: First, up: Axis) -> _Named:
     """Name all tracks from the first names; the names of the whole capture are searched again."""
     of_track = np.full(tracks.n_tracks, -1)
     of_track[first.tracks] = first.found.names

@@ -12,8 +12,9 @@ from asterism.errors import ParameterError
 from asterism.model import Detections, MarkerSet, Tracks
 from asterism.records import record
 from asterism.tracking.methods import Method, Update
+from asterism.tracking.naming.first_names import MIN_FOUND, MIN_LENGTH
 from asterism.tracking.naming.live_names import LiveNames
-from asterism.tracking.naming.name import MIN_FOUND, MIN_LENGTH, name_tracks
+from asterism.tracking.naming.name import name_tracks
 from asterism.tracking.stitching import Stitched
 
 if TYPE_CHECKING:

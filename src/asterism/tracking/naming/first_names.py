@@ -1,0 +1,149 @@
+"""First names: those of the tracks of one moment, for the subjects in a capture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.tracking.naming.bodies import bodies_of, bodies_of_sets, parted_bodies
+from asterism.tracking.naming.search import Found, search
+from asterism.tracking.naming.windows import scattered
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import MarkerSet, Tracks
+    from asterism.model.upwards import Axis
+
+__all__ = ["First", "first_names"]
+
+MIN_LENGTH = 5
+"""Smallest number of detections of a track that is named first."""
+LONG = 60
+"""Number of detections above which a longer track is no better."""
+FIRST_FRAMES = 100
+"""Number of frames in which the first tracks are compared."""
+MIN_MEAN = 0.7
+"""Smallest mean log odds of the distances between named tracks, for a marker set to fit."""
+MIN_FIT, MIN_ROUGH_FIT, ROUGH = 0.75, 0.65, 0.015
+"""Smallest score for a marker set to fit, as a share of the score of tracks at exactly its
+distances; and that for a rough set, whose near distances vary more than `ROUGH`, metres, between
+subjects. On real captures of whole bodies, sets of other protocols reach 0.6 to 0.75; sets of other
+subjects 0.88, subject templates 0.76, and labelling templates, which are rough, 0.66 and more."""
+NEAR = 0.3
+"""Largest of these near distances, metres."""
+SIZES = (0.6, 1.6)
+"""Smallest and largest size of a subject relative to the set."""
+MIN_SHARE, MIN_FOUND = 0.5, 0.4
+"""Smallest share of the tracks, or of the markers if these are fewer, that a set must name, and
+smallest share of its markers that must be there."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class First:
+    """First names of one subject."""
+
+    frame: int
+    tracks: NDArray[np.int64]  # of the body, shape (n,)
+    found: Found
+    probability: float  # that the body is this subject's, not another's of the given sets
+
+
+def first_names(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) -> list[First | None]:
+    """Name the tracks of the frame with the most long tracks; each set names a body of its own.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture.
+    marker_sets : tuple of MarkerSet
+        Set of each subject.
+    up : {"x", "y", "z"}
+        Axis of the capture that points up.
+
+    Returns
+    -------
+    list of First or None
+        Names by each set; None where it does not fit.
+    """
+    none = [None] * len(marker_sets)
+    d = tracks.detections
+    used = np.flatnonzero(tracks.labels >= 0)
+    if not len(used):
+        return none
+    worth = np.where(tracks.lengths >= MIN_LENGTH, np.minimum(tracks.lengths, LONG), 0)
+    by_frame = np.bincount(
+        d.frame_of[used], weights=worth[tracks.labels[used]], minlength=d.n_frames
+    )
+    frame = int(np.argmax(by_frame))
+    alive = tracks.labels[slice(*d.offsets[[frame, frame + 1]])]
+    alive = np.unique(alive[(alive >= 0) & (tracks.lengths[alive] >= MIN_LENGTH)])
+    if len(alive) < 2:
+        return none
+    positions = _positions(tracks, alive)
+    n = len(marker_sets)
+    bodies = [np.arange(len(alive))]
+    results = _results(marker_sets, positions, bodies, up) if n == 1 else {}
+    if not results:
+        bodies = bodies_of(positions, n)
+        results = _results(marker_sets, positions, bodies, up)
+    if len({b for _, b in results}) < n:
+        bodies = parted_bodies(positions, n)
+        results = _results(marker_sets, positions, bodies, up)
+    body_of, probability = bodies_of_sets(
+        {key: own.score for key, own in results.items()}, n, len(bodies)
+    )
+    return [
+        None
+        if b < 0
+        else First(
+            frame=frame, tracks=alive[bodies[b]], found=results[s, b], probability=probability[s]
+        )
+        for s, b in enumerate(body_of)
+    ]
+
+
+def _results(
+    marker_sets: tuple[MarkerSet, ...],
+    positions: NDArray[np.float64],
+    bodies: list[NDArray[np.int64]],
+    up: Axis,
+) -> dict[tuple[int, int], Found]:
+    """Return the names of bodies by the sets that fit, by the numbers of set and body."""
+    results: dict[tuple[int, int], Found] = {}
+    for s, made in enumerate(marker_sets):
+        for b, body in enumerate(bodies):
+            if len(body) >= MIN_FOUND * len(made):
+                own = search(made, positions[:, body], up)
+                if own is not None and _fits(own, made):
+                    results[s, b] = own
+    return results
+
+
+def _fits(found: Found, made: MarkerSet) -> bool:
+    n_named, n_markers = int((found.names >= 0).sum()), found.evidence.n_markers
+    expected = max(MIN_SHARE * min(len(found.names), n_markers), MIN_FOUND * n_markers)
+    variation = made.variations[(made.distances > 0) & (made.distances < NEAR)]
+    is_rough = np.median(np.nan_to_num(variation)) > ROUGH if len(variation) else False
+    is_close = found.mean_log_odds >= MIN_MEAN
+    is_close &= found.fit >= (MIN_ROUGH_FIT if is_rough else MIN_FIT)
+    return n_named >= max(expected, 1) and is_close and SIZES[0] < found.size < SIZES[1]
+
+
+def _positions(tracks: Tracks, alive: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return positions of some tracks in frames in which most of them exist, (F, n, 3)."""
+    d = tracks.detections
+    column = np.full(tracks.n_tracks + 1, -1)  # the last element is for clutter
+    column[alive] = np.arange(len(alive))
+    used = np.flatnonzero(column[tracks.labels] >= 0)
+    counts = np.bincount(d.frame_of[used], minlength=d.n_frames)
+    frames = np.flatnonzero(counts >= 0.5 * counts.max())
+    frames = frames[np.unique(np.linspace(0, len(frames) - 1, FIRST_FRAMES).astype(np.int64))]
+    row = np.full(d.n_frames, -1)
+    row[frames] = np.arange(len(frames))
+    used = used[row[d.frame_of[used]] >= 0]
+    return scattered(
+        d.points[used], row[d.frame_of[used]], column[tracks.labels[used]], len(frames), len(alive)
+    )
