@@ -11,11 +11,11 @@ from asterism.tracking.rigidity.distances import distances_between
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["bodies_of", "bodies_of_sets", "parted_bodies"]
+__all__ = ["bodies_of_sets", "linked_bodies", "parted_bodies"]
 
-LINKS = ((0.06, 0.6), (0.03, 0.4), (0.02, 0.3), (0.01, 0.25))
+MAX_SPREAD, MAX_DISTANCE = 0.06, 0.6
 """Largest spread and largest distance of two tracks that are linked, metres. Across a joint both
-are smaller than the first; the others separate subjects who move close to each other in step."""
+are smaller."""
 MIN_FRAMES = 3
 """Smallest number of common frames of two tracks that are linked."""
 MIN_TRACKS = 4
@@ -27,24 +27,6 @@ MIN_SHARE = 0.7
 TEMPERATURE = 12.0
 """Factor by which the difference of the scores of two subjects is too large: all distances of a
 subject vary together."""
-
-
-def bodies_of(positions: NDArray[np.float64], n_subjects: int) -> list[NDArray[np.int64]]:
-    """Return the tracks of each body, the largest first; nothing if there is only one body.
-
-    Parameters
-    ----------
-    positions : ndarray of shape (F, n, 3)
-        Positions of n tracks, metres, NaN without a detection.
-    n_subjects : int
-        Number of subjects. Links are made stricter until there are as many bodies.
-    """
-    bodies: list[NDArray[np.int64]] = []
-    for max_spread, max_distance in LINKS:
-        bodies = _linked(positions, max_spread, max_distance)
-        if len(bodies) >= n_subjects:
-            break
-    return bodies
 
 
 def parted_bodies(positions: NDArray[np.float64], n_subjects: int) -> list[NDArray[np.int64]]:
@@ -86,21 +68,23 @@ def parted_bodies(positions: NDArray[np.float64], n_subjects: int) -> list[NDArr
     return []
 
 
-def _linked(
-    positions: NDArray[np.float64], max_spread: float, max_distance: float
-) -> list[NDArray[np.int64]]:
-    """Return the groups of tracks that links connect."""
+def linked_bodies(positions: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+    """Return groups of tracks that are linked by distances that hardly vary, the largest first.
+
+    Parameters
+    ----------
+    positions : ndarray of shape (F, n, 3)
+        Positions of n tracks, metres, NaN without a detection.
+    """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 
     found = distances_between(positions)
-    linked = (found.n_frames >= MIN_FRAMES) & (found.spread < max_spread)
-    linked &= np.nan_to_num(found.middle, nan=np.inf) < max_distance
+    linked = (found.n_frames >= MIN_FRAMES) & (found.spread < MAX_SPREAD)
+    linked &= np.nan_to_num(found.middle, nan=np.inf) < MAX_DISTANCE
     n, component = connected_components(csr_matrix(linked), directed=False)
     bodies = [np.flatnonzero(component == c) for c in range(n)]
     bodies = [body for body in bodies if len(body) >= MIN_TRACKS]
-    if len(bodies) == 1 and len(bodies[0]) == positions.shape[1]:
-        return []
     return sorted(bodies, key=lambda body: (-len(body), int(body[0])))
 
 

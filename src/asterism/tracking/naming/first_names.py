@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.tracking.naming.bodies import bodies_of, bodies_of_sets, parted_bodies
+from asterism.tracking.naming.bodies import bodies_of_sets, linked_bodies, parted_bodies
 from asterism.tracking.naming.search import Found, search
 from asterism.tracking.naming.windows import scattered
 
@@ -84,13 +84,10 @@ def first_names(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) ->
         return none
     positions = _positions(tracks, alive)
     n = len(marker_sets)
-    bodies = [np.arange(len(alive))]
-    results = _results(marker_sets, positions, bodies, up) if n == 1 else {}
-    if not results:
-        bodies = bodies_of(positions, n)
-        results = _results(marker_sets, positions, bodies, up)
-    if len({b for _, b in results}) < n:
-        bodies = parted_bodies(positions, n)
+    bodies = [np.arange(len(alive))] if n == 1 else parted_bodies(positions, n)
+    results = _results(marker_sets, positions, bodies, up)
+    if not results:  # others without a set may be there too
+        bodies = linked_bodies(positions)
         results = _results(marker_sets, positions, bodies, up)
     body_of, probability = bodies_of_sets(
         {key: own.score for key, own in results.items()}, n, len(bodies)
