@@ -176,6 +176,25 @@ def test_a_track_after_a_marker_has_gone_is_not_yet_that_marker():
     assert found.markers == (*"ABCDEF", None)
 
 
+def test_a_set_whose_subject_is_absent_names_nothing():
+    one, other = am.simulate.person(seed=1), am.simulate.person(seed=2)
+    sets = [am.learn_marker_set(t).of_subject(name) for t, name in ((one, "A"), (other, "B"))]
+    found = am.name_tracks(am.Tracks(detections=one.detections, labels=one.labels), *sets)
+    assert set(found.markers) == {f"A:{name}" for name in one.names}
+
+
+@pytest.mark.parametrize("apart", [0.4, 1.5])
+def test_two_bodies_that_move_in_step_have_their_own_names(apart):
+    one, other = am.simulate.person(seed=1), am.simulate.person(seed=2)
+    sets = [am.learn_marker_set(t).of_subject(name) for t, name in ((one, "A"), (other, "B"))]
+    places = np.concatenate([one.positions(), other.positions() + np.array([0, apart, 0])], axis=1)
+    found = am.name_tracks(am.Tracks.from_dense(one.detections.times, places), *sets)
+    right = [f"A:{name}" for name in one.names] + [f"B:{name}" for name in other.names]
+    given = [(a, b) for a, b in zip(found.markers, right, strict=True) if a is not None]
+    assert all(a == b for a, b in given)
+    assert len(given) > 0.9 * len(right)
+
+
 def test_subjects_that_cannot_be_told_apart_are_refused():
     truth = am.simulate.person(frames=80, seed=4)
     made = am.learn_marker_set(truth)

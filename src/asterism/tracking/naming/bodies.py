@@ -55,8 +55,9 @@ def parted_bodies(positions: NDArray[np.float64], n_subjects: int) -> list[NDArr
     np.fill_diagonal(cost, 0.0)
     tree = minimum_spanning_tree(cost).tolil()
     smallest = MIN_SHARE * len(cost) / n_subjects
-    edges = sorted(zip(*tree.nonzero(), strict=True), key=lambda edge: -tree[edge])
-    for edge in edges:
+    rows, columns = tree.nonzero()
+    for k in np.argsort(-cost[rows, columns], kind="stable"):
+        edge = int(rows[k]), int(columns[k])
         kept = tree[edge]
         tree[edge] = 0
         n, body = connected_components(tree, directed=False)

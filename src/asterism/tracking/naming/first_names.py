@@ -27,11 +27,11 @@ FIRST_FRAMES = 100
 """Number of frames in which the first tracks are compared."""
 MIN_MEAN = 0.7
 """Smallest mean log odds of the distances between named tracks, for a marker set to fit."""
-MIN_FIT, MIN_ROUGH_FIT, ROUGH = 0.75, 0.65, 0.015
+MIN_FIT, MIN_ROUGH_FIT, ROUGH = 0.75, 0.6, 0.015
 """Smallest score for a marker set to fit, as a share of the score of tracks at exactly its
 distances; and that for a rough set, whose near distances vary more than `ROUGH`, metres, between
 subjects. On real captures of whole bodies, sets of other protocols reach 0.6 to 0.75; sets of other
-subjects 0.88, subject templates 0.76, and labelling templates, which are rough, 0.66 and more."""
+subjects 0.88, subject templates 0.76, and labelling templates, which are rough, 0.64 and more."""
 NEAR = 0.3
 """Largest of these near distances, metres."""
 SIZES = (0.6, 1.6)
@@ -68,7 +68,7 @@ def first_names(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) ->
     list of First or None
         Names by each set; None where it does not fit.
     """
-    none = [None] * len(marker_sets)
+    none: list[First | None] = [None] * len(marker_sets)
     d = tracks.detections
     used = np.flatnonzero(tracks.labels >= 0)
     if not len(used):
@@ -84,31 +84,40 @@ def first_names(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) ->
         return none
     positions = _positions(tracks, alive)
     n = len(marker_sets)
-    bodies = [np.arange(len(alive))] if n == 1 else parted_bodies(positions, n)
-    results = _results(marker_sets, positions, bodies, up)
-    if not results:  # others without a set may be there too
-        bodies = linked_bodies(positions)
-        results = _results(marker_sets, positions, bodies, up)
-    body_of, probability = bodies_of_sets(
-        {key: own.score for key, own in results.items()}, n, len(bodies)
-    )
+    if n == 1:
+        one = _named_bodies(marker_sets, positions, [np.arange(len(alive))], up)
+    else:
+        one = _named_bodies(marker_sets, positions, parted_bodies(positions, n), up)
+    if n == 1 and one.score > 0:
+        best = one
+    else:  # a subject may be absent, and others without a set may be there
+        other = _named_bodies(marker_sets, positions, linked_bodies(positions), up)
+        best = max(one, other, key=lambda named: named.score)
     return [
         None
-        if b < 0
-        else First(
-            frame=frame, tracks=alive[bodies[b]], found=results[s, b], probability=probability[s]
-        )
-        for s, b in enumerate(body_of)
+        if found is None
+        else First(frame=frame, tracks=alive[body], found=found, probability=p)
+        for body, found, p in zip(best.bodies, best.found, best.probabilities, strict=True)
     ]
 
 
-def _results(
+@dataclass(frozen=True, eq=False)
+class _Named:
+    """Body of each subject with its names, None for none, and the sum of their scores."""
+
+    bodies: list[NDArray[np.int64]]
+    found: list[Found | None]
+    probabilities: list[float]
+    score: float
+
+
+def _named_bodies(
     marker_sets: tuple[MarkerSet, ...],
     positions: NDArray[np.float64],
     bodies: list[NDArray[np.int64]],
     up: Axis,
-) -> dict[tuple[int, int], Found]:
-    """Return the names of bodies by the sets that fit, by the numbers of set and body."""
+) -> _Named:
+    """Name bodies by the sets that fit; each set has the body with which all fit best."""
     results: dict[tuple[int, int], Found] = {}
     for s, made in enumerate(marker_sets):
         for b, body in enumerate(bodies):
@@ -116,7 +125,16 @@ def _results(
                 own = search(made, positions[:, body], up)
                 if own is not None and _fits(own, made):
                     results[s, b] = own
-    return results
+    scores = {key: own.score for key, own in results.items()}
+    chosen, probabilities = bodies_of_sets(scores, len(marker_sets), len(bodies))
+    found = [results.get((s, b)) for s, b in enumerate(chosen)]
+    empty = np.empty(0, dtype=np.int64)
+    return _Named(
+        [bodies[b] if b >= 0 else empty for b in chosen],
+        found,
+        probabilities,
+        sum(own.score for own in found if own is not None),
+    )
 
 
 def _fits(found: Found, made: MarkerSet) -> bool:

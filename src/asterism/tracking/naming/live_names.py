@@ -131,8 +131,8 @@ class LiveNames:
         window = _Window(self, alive, _dense(alive, recent))
         of = self.marker_of
         marker = np.array([of.get(label, -1) for label in alive.tolist()], dtype=np.int64)
-        named, unnamed = np.flatnonzero(marker >= 0), np.flatnonzero(marker < 0)
-        unnamed = unnamed[window.is_whole[unnamed]]
+        named = np.flatnonzero(marker >= 0)
+        unnamed = np.flatnonzero((marker < 0) & window.is_whole)
         marker_of, doubts = dict(self.marker_of), dict(self.doubts)
         changes: Changes = {}
         subject = self.subject
