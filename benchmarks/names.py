@@ -251,15 +251,16 @@ def streams(trials: list[Trial], sets: Sets) -> list[list[str]]:
     """Name the gait trials frame by frame: shares of the detections after the first names."""
     rows: list[list[str]] = []
     for which in (SETS[0], SETS[3]):
-        for condition, extra in (
-            (CONDITIONS[0], {}),
-            ("bursts", {"burst": Burst(), "ghosts": Ghosts()}),
-        ):
+        for condition in (CONDITIONS[0], "bursts"):
+            is_clean = condition == CONDITIONS[0]
+            burst, ghosts = (None, None) if is_clean else (Burst(), Ghosts())
             right = wrong = none = 0
             first: list[float] = []
             taken: list[float] = []
             for trial in trials:
-                truth = am.simulate.corrupt(trial.tracks, noise=3e-4, seed=1, **extra)
+                truth = am.simulate.corrupt(
+                    trial.tracks, burst=burst, ghosts=ghosts, noise=3e-4, seed=1
+                )
                 d, own = truth.detections, sets.of(which, trial.subject, trial.kind)
                 inner = am.tracking.Stitched()
                 method = am.tracking.Named(marker_sets=own, method=inner)
@@ -362,9 +363,9 @@ def main() -> None:
         "",
         *table(("template, captures", *HEAD), templates(options.sets, gait)),
         "",
-        "Streams: the gait trials with 0.3 mm of noise, frame by frame, tracked by `Stitched`. Time "
-        "of the last first name, seconds; shares of the detections after it, %; and milliseconds "
-        "of a frame beyond those of `Stitched`, mean and 99th percentile.",
+        "Streams: the gait trials with 0.3 mm of noise, frame by frame, tracked by `Stitched`. "
+        "Time of the last first name, seconds; shares of the detections after it, %; and "
+        "milliseconds of a frame beyond those of `Stitched`, mean and 99th percentile.",
         "",
         *table(
             ("set, condition", "named from", "right", "wrong", "no name", "mean", "99 %"),

@@ -4,17 +4,48 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from asterism.errors import ParameterError
 from asterism.model import Capture
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import asterism as am
 
-__all__ = ["naming_figures", "naming_rows"]
+__all__ = ["labelled_tracks", "naming_figures", "naming_rows", "read_markers"]
 
 UNCERTAIN = 0.9
 """Probability of a name below which it is listed."""
 MOST = 8
 """Number of rows of a list."""
+
+
+def read_markers(path: Path) -> am.MarkerSet:
+    """Read a marker set, or learn that of a labelled capture."""
+    import asterism as am
+
+    endings = [e for f in am.io.CAPTURE_FORMATS.values() for e in f.extensions]
+    if path.name.lower().endswith(tuple(endings)):
+        return am.learn_marker_set(labelled_tracks(path, None))
+    return am.read_marker_set(path)
+
+
+def labelled_tracks(path: Path, subject: str | None) -> am.Tracks:
+    """Read the tracks of a labelled capture, of one subject if it is given."""
+    import asterism as am
+    from asterism.io.captures.marker_names import is_unlabelled
+
+    capture = am.read(path)
+    tracks = capture.tracks.measured()
+    named = [k for k, name in enumerate(tracks.names) if name and not is_unlabelled(name)]
+    if subject is not None:
+        named = [k for k in named if str(tracks.names[k]).startswith(f"{subject}:")]
+    if not named:
+        of = f" of {subject}" if subject is not None else ""
+        n = tracks.n_tracks
+        got = f"{n} tracks in {path}, none with a name{of}" if n else f"no tracks in {path}"
+        raise ParameterError("IN", f"a capture with named markers{of}", got)
+    return tracks if subject is None else tracks.select(named)
 
 
 def naming_rows(found: am.tracking.Naming) -> list[tuple[str, str]]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import asterism as am
 from asterism.checks import check_fields
 from asterism.cli.console import progress, to_json
+from asterism.cli.naming import read_markers
 from asterism.cli.run_folder import CONFIG, SUMMARY, writing_log
 from asterism.cli.summary import Summary, summarize
 from asterism.errors import ParameterError
@@ -126,7 +127,7 @@ def _carry_out(run: Run, capture: am.Capture, out: Path) -> tuple[am.tracking.Tr
         result = am.tracking.carry_out(
             recipe, capture, progress=advance,
             start=capture.tracks if recipe.has_start else None,
-            marker_sets=[am.read_marker_set(path) for path in run.markers],
+            marker_sets=[read_markers(path) for path in run.markers],
         )  # fmt: skip
         tracks = result.tracks
     seconds = time.perf_counter() - start

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table
-from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     import asterism as am
@@ -57,11 +56,12 @@ def learn(
         asterism markerset learn static.c3d walk.c3d -o ann.toml
     """
     import asterism as am
+    from asterism.cli.naming import labelled_tracks
     from asterism.cli.outputs import check_ending, check_outputs
 
     check_ending("--out", out, ".toml")
     check_outputs({"--out": out}, captures, overwrite=overwrite)
-    made = am.learn_marker_set(*[_named(path, subject) for path in captures])
+    made = am.learn_marker_set(*[labelled_tracks(path, subject) for path in captures])
     made.to_toml(out)
     _print(made, {"inputs": [str(path) for path in captures], "output": str(out)}, quiet, json)
 
@@ -114,12 +114,13 @@ def check(path: _Set, captures: _Checked, quiet: Quiet = False, json: Json = Fal
         asterism markerset check protocol.toml walk.c3d turn.c3d
     """
     import asterism as am
+    from asterism.cli.naming import labelled_tracks
 
     made = am.read_marker_set(path)
     rows: list[tuple[str, ...]] = []
     plain: list[dict[str, Any]] = []
     for source in captures:
-        tracks = _named(source, None)
+        tracks = labelled_tracks(source, None)
         capture = tracks.detections
         at = capture.first_frame if isinstance(capture, am.Capture) else 0
         for conflict in am.tracking.check_names(tracks, made):
@@ -145,24 +146,6 @@ def check(path: _Set, captures: _Checked, quiet: Quiet = False, json: Json = Fal
         print_table([("names that contradict the marker set", "none")])
     if rows:
         raise typer.Exit(1)
-
-
-def _named(path: Path, subject: str | None) -> am.Tracks:
-    """Read the tracks of a labelled capture, of one subject if it is given."""
-    import asterism as am
-    from asterism.io.captures.marker_names import is_unlabelled
-
-    capture = am.read(path)
-    tracks = capture.tracks.measured()
-    named = [k for k, name in enumerate(tracks.names) if name and not is_unlabelled(name)]
-    if subject is not None:
-        named = [k for k in named if str(tracks.names[k]).startswith(f"{subject}:")]
-    if not named:
-        of = f" of {subject}" if subject is not None else ""
-        n = tracks.n_tracks
-        got = f"{n} tracks in {path}, none with a name{of}" if n else f"no tracks in {path}"
-        raise ParameterError("IN", f"a capture with named markers{of}", got)
-    return tracks if subject is None else tracks.select(named)
 
 
 def _print(made: am.MarkerSet, files: dict[str, Any], quiet: bool, json: bool) -> None:

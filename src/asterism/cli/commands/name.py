@@ -16,7 +16,9 @@ _In = Annotated[Path, typer.Argument(metavar="IN", help="Capture with tracks.")]
 _Markers = Annotated[
     list[Path],
     typer.Option(
-        "--markers", metavar="SET", help="Marker set, TOML, VSK or VST; one for each subject."
+        "--markers",
+        metavar="SET",
+        help="Marker set (TOML, VSK, VST), or a labelled capture; one for each subject.",
     ),
 ]
 _Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
@@ -32,8 +34,8 @@ def name(
 ) -> None:
     """Name tracks by the marker set of the subject.
 
-    Names in IN are ignored. Tracklets of one marker become one track; a track that changed marker
-    is cut. A track without a probable name keeps none.
+    Names in IN are ignored, unless IN itself is given as marker set. Tracklets of one marker become
+    one track; a track that changed marker is cut. A track without a probable name keeps none.
 
     For example:
 
@@ -44,13 +46,13 @@ def name(
         asterism name tracked.c3d --markers ann.toml -o named.c3d
     """
     import asterism as am
-    from asterism.cli.naming import naming_figures, naming_rows
+    from asterism.cli.naming import naming_figures, naming_rows, read_markers
     from asterism.cli.outputs import check_outputs
     from asterism.cli.tracking import output_format
 
     format = output_format(out, None)
     check_outputs({"--out": out}, [source, *markers], overwrite=overwrite)
-    sets = [am.read_marker_set(path) for path in markers]
+    sets = [read_markers(path) for path in markers]
     capture = am.read(source)
     if not (capture.labels >= 0).any():
         hint = "run asterism track first"

@@ -67,7 +67,8 @@ _Markers = Annotated[
     typer.Option(
         "--markers",
         metavar="SET",
-        help="Marker set that names the tracks, TOML, VSK or VST; one for each subject.",
+        help="Marker set that names the tracks (TOML, VSK, VST), or a labelled capture; "
+        "one for each subject.",
     ),
 ]
 _Fill = Annotated[bool, typer.Option("--fill", help="Fill the gaps of the tracks.")]
@@ -111,8 +112,9 @@ def track(
 ) -> None:
     """Track the detections of a capture, and write the tracks.
 
-    Model and method are estimated from the capture unless they are given. Names in the capture are
-    ignored. The same input, options and seed give the same bytes.
+    Model and method are estimated from the capture unless they are given. Names in the capture
+    are ignored, unless the capture itself is given as marker set. The same input, options and
+    seed give the same bytes.
 
     For example:
 
@@ -132,11 +134,14 @@ def track(
 
         asterism track trial.c3d --markers subject.toml --fill
 
+        asterism track trial.c3d --markers trial.c3d
+
         asterism track trial.c3d --run runs/first
 
         asterism track --from runs/first/run.toml -o again.c3d
     """
     import asterism as am
+    from asterism.cli.naming import read_markers
     from asterism.cli.outputs import check_ending, check_outputs, read_model
     from asterism.cli.run_folder import Run
     from asterism.cli.tracking import carry_out, default_output, output_format
@@ -159,7 +164,7 @@ def track(
         out = out if run is None else run / out.name
     outputs = _outputs(out, run) | {"--report": report}
     check_outputs(outputs, [source, model, repeat, *(markers or [])], overwrite=overwrite)
-    sets = [am.read_marker_set(path) for path in markers or []]
+    sets = [read_markers(path) for path in markers or []]
     chosen_method = made_method(method, option or [])
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
     given = None if model is None else read_model(model)
