@@ -40,6 +40,7 @@ bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/stream.py --markdown docs/tables/stream.md
 	$(BIN)/python benchmarks/joint.py --markdown docs/tables/joint.md
 	$(BIN)/python benchmarks/k_best.py --markdown docs/tables/k_best.md
+	$(BIN)/python benchmarks/threads.py --markdown docs/tables/threads.md
 
 # The tables of scenes and of captures in the docs; the second needs the real captures beside the
 # project.

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -26,13 +27,20 @@ inline constexpr std::size_t kSteadiest = 6;    // number of bonds used for a ma
 // Deviation in √V above which a distance is evidence against a bond.
 inline constexpr double kFar = 2;
 
+// 1/n for the first kMemory numbers, because a division for each bond and frame takes long.
+inline constexpr auto kShares = [] {
+  std::array<double, kMemory + 1> shares{};
+  for (std::size_t n = 1; n < shares.size(); ++n) shares[n] = 1 / static_cast<double>(n);
+  return shares;
+}();
+
 struct Bond {
   std::int32_t other = 0;
   std::int64_t n = 0;
   double mean = 0, variance = 0;
 
   void add(double distance) {
-    const double share = 1 / static_cast<double>(std::min(++n, kMemory));
+    const double share = kShares[static_cast<std::size_t>(std::min(++n, kMemory))];
     const double off = distance - mean;
     mean += share * off;
     variance += share * (off * (distance - mean) - variance);

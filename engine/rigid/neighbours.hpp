@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -44,8 +45,12 @@ class Places {
     std::fill(slots_.begin(), slots_.end(), MarkerPoint{kEmpty, {}});
     n_ = 0;
   }
+  // Makes room for so many markers at once.
+  void reserve(std::size_t n) {
+    if (2 * n > slots_.size()) grow(2 * n);
+  }
   void set(std::int32_t marker, const Point& at) {
-    if (2 * (n_ + 1) > slots_.size()) grow();
+    if (2 * (n_ + 1) > slots_.size()) grow(2 * (n_ + 1));
     MarkerPoint& slot = slots_[place(marker)];
     n_ += slot.marker == kEmpty;
     slot = {marker, at};
@@ -68,9 +73,9 @@ class Places {
     while (slots_[at].marker != kEmpty && slots_[at].marker != marker) at = (at + 1) & last;
     return at;
   }
-  void grow() {
+  void grow(std::size_t n_slots) {
     const std::vector<MarkerPoint> old = std::move(slots_);
-    slots_.assign(std::max<std::size_t>(2 * old.size(), 32), MarkerPoint{kEmpty, {}});
+    slots_.assign(std::bit_ceil(std::max<std::size_t>(n_slots, 32)), MarkerPoint{kEmpty, {}});
     for (const MarkerPoint& one : old)
       if (one.marker != kEmpty) slots_[place(one.marker)] = one;
   }
@@ -101,6 +106,7 @@ class Neighbours {
   void add(std::span<const MarkerPoint> seen) {
     ++n_frames_;
     places_.clear();
+    places_.reserve(seen.size());
     for (const MarkerPoint& one : seen) places_.set(one.marker, one.at);
     for (const MarkerPoint& one : seen) {
       SharedCopy<Bonds>& shared = bonds_[one.marker];

@@ -37,12 +37,29 @@ class RigidNeighbours {
     w_.n_common = 0;
     forget_places();
   }
-  // Removes the positions of markers, because a tracklet has a marker now, or a detection another
-  // tracklet.
+  // Removes the positions of markers, because a detection has another tracklet now.
   void forget_places() {
     w_.n_known = 0;
     w_.looked_at = -1;
     w_.peaks.clear();
+  }
+  // Adds the positions of a tracklet that has a marker now. Predictions stay known unless they are
+  // of that marker or may use it.
+  void add_places(const StitchMemory& s, std::int32_t tracklet, std::int32_t k,
+                  const Markers& markers) {
+    const auto uses = [&](const Anchor& anchor) {
+      return std::ranges::find(anchor.around, k, &MarkerPoint::marker) != anchor.around.end();
+    };
+    for (std::size_t i = 0; i < w_.n_known; ++i) {
+      Known& known = w_.known[i];
+      const Point* at = s.frames.find(known.frame)->find(tracklet);
+      if (at != nullptr) known.places.set(k, *at);
+      known.ways.erase_if([&](const auto& way) {
+        const Marker* marker = markers.find(way.first);
+        if (way.first == k || marker == nullptr || !marker->is_prepared()) return true;
+        return at != nullptr && std::ranges::any_of(*marker->anchors, uses);
+      });
+    }
   }
   // Log-likelihood ratio of a tracklet's link into the newest frame, predicted by its neighbours,
   // against the background density. The most stable neighbours are used first, and the nearest ones
@@ -191,8 +208,10 @@ class RigidNeighbours {
     Known& known = w_.known[w_.n_known++];
     known.frame = t;
     known.ways.clear();
+    const std::vector<Frame::One>& seen = s.frames.find(t)->seen;
     known.places.clear();
-    for_each_known(s.frames.find(t)->seen, &Frame::One::tracklet, s.tracklets,
+    known.places.reserve(seen.size());
+    for_each_known(seen, &Frame::One::tracklet, s.tracklets,
                    [&](const Frame::One& one, const Tracklet& f) {
       if (f.marker >= 0) known.places.set(f.marker, one.at);
     });

@@ -304,7 +304,6 @@ class Stitcher {
     f.marker = out.marker;
     f.open = {};
     if (out.marker < 0) return out;
-    neighbours_.forget_places();
     Marker& marker = markers_[out.marker];
     out.after = marker.tracklet;
     marker.tracklet = id;
@@ -312,6 +311,7 @@ class Stitcher {
     marker.last = f.last;
     marker.is_occluded = f.last < now();
     marker.release();
+    neighbours_.add_places(so_far_, id, out.marker, markers_);
     return out;
   }
 

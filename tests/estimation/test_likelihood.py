@@ -21,6 +21,15 @@ FITS = {
 }
 
 
+def log_likelihoods(likelihood, *fits):
+    return likelihood.sums(
+        [fit.noise for fit in fits],
+        [fit.levels for fit in fits],
+        [fit.stay for fit in fits],
+        fits[0].kind,
+    )
+
+
 @pytest.mark.parametrize("fit", FITS.values(), ids=FITS)
 @pytest.mark.parametrize("n_axes", [2, 3])
 @pytest.mark.parametrize("own_noise", [False, True])
@@ -33,7 +42,7 @@ def test_the_likelihood_is_that_of_the_filter(fit, n_axes, own_noise):
         truth = replace(truth, detections=replace(truth.detections, covariances=spread))
     model = small_model(motion=fit.motion(0.8), noise_sigma=fit.noise)
     densities = am.filter.filter_states(truth, model).log_densities
-    found = TrackLikelihood(truth, 0.8, 10**6).sums([fit, fit])
+    found = log_likelihoods(TrackLikelihood(truth, 0.8, 10**6), fit, fit)
     assert found == pytest.approx([densities.sum()] * 2, rel=1e-9)
 
 
@@ -45,7 +54,7 @@ def test_a_capture_too_large_is_sampled_in_pieces():
     whole = am.filter.filter_states(
         truth, small_model(motion=FITS["one motion"].motion(0.8), noise_sigma=0.004)
     ).log_densities
-    mean = likelihood.sums([FITS["one motion"]])[0] / likelihood.n_points
+    mean = log_likelihoods(likelihood, FITS["one motion"])[0] / likelihood.n_points
     assert mean == pytest.approx(whole[whole != 0].mean(), rel=0.05)
 
 
@@ -53,7 +62,7 @@ def test_a_numerical_failure_is_not_a_number():
     truth = wanderers(np.random.default_rng(5))
     likelihood = TrackLikelihood(truth, 0.8, 10**6)
     for fit in FITS.values():
-        assert np.isnan(likelihood.sums([replace(fit, noise=np.nan)])[0])
+        assert np.isnan(log_likelihoods(likelihood, replace(fit, noise=np.nan))[0])
 
 
 @pytest.mark.parametrize("seed", range(5))

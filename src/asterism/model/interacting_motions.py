@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["InteractingMotions"]
 
+MAX_OFF = 1e-5
+"""Largest difference of a sum of probabilities from 1."""
+
 
 @record(eq=False)
 class InteractingMotions(Motion):
@@ -73,7 +76,8 @@ class InteractingMotions(Motion):
         if not (observations == observations[0]).all():
             raise ParameterError("models", "motions with the same H", observations.tolist())
         transitions = keep_array("transitions", self.transitions, (M, M))
-        if (transitions <= 0).any() or not np.allclose(transitions.sum(axis=1), 1, atol=1e-9):
+        off = np.abs(transitions.sum(axis=1) - 1)
+        if (transitions <= 0).any() or (off > MAX_OFF).any():
             raise ParameterError("transitions", "positive rows that sum to 1", transitions.tolist())
         object.__setattr__(self, "models", models)
         object.__setattr__(self, "transitions", transitions)

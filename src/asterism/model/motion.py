@@ -184,8 +184,10 @@ class DWNA(SingleMotion):
                [0. , 1. ]])
         """
         d = _steps(dt)
-        one, zero = np.ones_like(d), np.zeros_like(d)
-        return _stack([[one, d], [zero, one]])
+        F = np.zeros((*d.shape, 2, 2))
+        F[..., 0, 0] = F[..., 1, 1] = 1.0
+        F[..., 0, 1] = d
+        return F
 
     def process_noise(self, dt: ArrayLike) -> NDArray[np.float64]:
         """Return Q for each Δ of `dt` (M,), shape (M, 2, 2).
@@ -198,7 +200,11 @@ class DWNA(SingleMotion):
                [2., 4.]])
         """
         d = _steps(dt)
-        return self.acceleration_sigma**2 * _stack([[d**4 / 4, d**3 / 2], [d**3 / 2, d**2]])
+        Q = np.empty((*d.shape, 2, 2))
+        Q[..., 0, 0] = d**4 / 4
+        Q[..., 0, 1] = Q[..., 1, 0] = d**3 / 2
+        Q[..., 1, 1] = d**2
+        return self.acceleration_sigma**2 * Q
 
     def initial_covariance(self, noise_sigma: float, velocity_sigma: float) -> NDArray[np.float64]:
         """Return ``diag(σ², σ_v²)``, shape (2, 2).

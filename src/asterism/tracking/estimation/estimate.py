@@ -321,8 +321,11 @@ def _log_evidence(evidence: Evidence, model: TrackingModel, region: Region) -> f
     log_clutter = math.log(sensor.clutter_density)
     events = (sensor.clutter_density + population.birth_density) * region.volume
     total = -events * evidence.n_frames
-    for piece, labels in zip(evidence.runs.pieces, evidence.labels, strict=True):
-        scores = track_scores(Tracks(detections=piece, labels=labels), model)
+    pieces = evidence.runs.pieces
+    for piece, labels in zip(pieces, evidence.labels, strict=True):
+        is_whole = len(pieces) == 1
+        tracks = evidence.tracks if is_whole else Tracks(detections=piece, labels=labels)
+        scores = track_scores(tracks, model)
         # The model forbids a track of one detection, so it counts as clutter.
         total += float(scores[np.isfinite(scores)].sum()) + log_clutter * len(labels)
     return total

@@ -10,7 +10,7 @@ import numpy as np
 from asterism.errors import ParameterError
 from asterism.records import record
 from asterism.tracking.estimation.occlusions import Sightings, count_sightings
-from asterism.tracking.estimation.scales import extents
+from asterism.tracking.estimation.scales import extents, quantile
 from asterism.tracking.methods.gnn import GNN
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ class Evidence:
             tracks=tracks,
             n_misses=int((np.diff(frame)[is_link] - 1).sum()),
             sightings=count_sightings(tracks, reach),
-            top_speed=math.sqrt(float(np.quantile(squares, 0.9999))),
+            top_speed=math.sqrt(quantile(squares, 0.9999)),
             velocity_rms=math.sqrt(float(squares.mean()) / d.n_axes),
             n_links=n_links,
         )

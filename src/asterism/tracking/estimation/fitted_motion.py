@@ -12,7 +12,7 @@ from asterism.records import record
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Kind", "MotionFit"]
+__all__ = ["Kind", "MotionFit", "transition_matrices"]
 
 Kind = Literal["dwna", "random_walk"]
 JOLT = 0.1
@@ -44,16 +44,7 @@ class MotionFit:
     @property
     def transitions(self) -> NDArray[np.float64]:
         """Probability of switching from mode (row) to mode (column) in a step."""
-        if len(self.levels) == 1:
-            return np.ones((1, 1))
-        leave = 1 - self.stay
-        return np.array(
-            [
-                [self.stay, (1 - JOLT) * leave, JOLT * leave],
-                [(1 - JOLT) * leave, self.stay, JOLT * leave],
-                [0.25, 0.25, 0.5],
-            ]
-        )
+        return transition_matrices(len(self.levels), np.array([self.stay]))[0]
 
     def motion(self, velocity_sigma: float) -> Motion:
         """Return the motion model.
@@ -75,3 +66,28 @@ class MotionFit:
         if len(models) == 1:
             return models[0]
         return InteractingMotions(models=models, transitions=self.transitions)
+
+
+def transition_matrices(n_modes: int, stays: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the transition probabilities of several motions at once.
+
+    Parameters
+    ----------
+    n_modes : int
+        Number of modes, 1 or 3.
+    stays : ndarray of shape (n,)
+        `MotionFit.stay` of each motion.
+
+    Returns
+    -------
+    ndarray of shape (n, modes, modes)
+    """
+    if n_modes == 1:
+        return np.ones((len(stays), 1, 1))
+    leave = 1 - stays
+    matrices = np.empty((len(stays), 3, 3))
+    matrices[:, 0, 0] = matrices[:, 1, 1] = stays
+    matrices[:, 0, 1] = matrices[:, 1, 0] = (1 - JOLT) * leave
+    matrices[:, 0, 2] = matrices[:, 1, 2] = JOLT * leave
+    matrices[:, 2] = 0.25, 0.25, 0.5
+    return matrices

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism import _engine
-from asterism.model import DWNA, RandomWalk, Tracks
+from asterism.model import DWNA, RandomWalk
 from asterism.model.compiled import steps_of, with_noise
+from asterism.tracking.estimation.fitted_motion import transition_matrices
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from numpy.typing import ArrayLike, NDArray
 
-    from numpy.typing import NDArray
-
-    from asterism.tracking.estimation.fitted_motion import MotionFit
+    from asterism.model import Tracks
+    from asterism.tracking.estimation.fitted_motion import Kind
 
 __all__ = ["TrackLikelihood"]
 
@@ -41,17 +41,17 @@ class TrackLikelihood:
     """
 
     def __init__(self, tracks: Tracks, velocity_sigma: float, n_points: int) -> None:
-        self._sample = _sample(tracks, n_points)
-        self.n_points = self._sample.detections.n_points
-        self.n_links = self.n_points - self._sample.n_tracks
+        self._tracks = tracks
+        self._order, self._offsets = _sample(tracks, n_points)
+        self.n_points = len(self._order)
+        self.n_links = self.n_points - (len(self._offsets) - 1)
         self._velocity_variance = velocity_sigma**2
         self._engines: dict[str, _engine.MotionLikelihood] = {}
 
     def _engine_of(self, kind: str) -> _engine.MotionLikelihood:
         """Return the engine of a class of motion."""
         if kind not in self._engines:
-            d = self._sample.detections
-            order, offsets = self._sample.by_track
+            d = self._tracks.detections
             steps_kind, F, Q = steps_of(UNITS[kind], d.times)
             steps = np.zeros((len(F), 4))  # a random walk has no velocity
             if kind == "dwna":
@@ -59,40 +59,61 @@ class TrackLikelihood:
             else:
                 steps[:, 1] = Q[:, 0, 0, 0]
             self._engines[kind] = _engine.MotionLikelihood(
-                n_axes=d.n_axes, points=with_noise(d.points, d.covariances)[order],
-                frames=d.frame_of[order], offsets=offsets, kind=steps_kind, steps=steps,
+                n_axes=d.n_axes, points=with_noise(d.points, d.covariances)[self._order],
+                frames=d.frame_of[self._order], offsets=self._offsets, kind=steps_kind,
+                steps=steps,
             )  # fmt: skip
         return self._engines[kind]
 
-    def sums(self, fits: Sequence[MotionFit]) -> NDArray[np.float64]:
-        """Return the log likelihood of several motions and noises.
+    def sums(
+        self,
+        noises: ArrayLike,
+        levels: ArrayLike,
+        stays: ArrayLike,
+        kind: Kind,
+    ) -> NDArray[np.float64]:
+        """Return the log likelihood of several motions and noises of one class.
 
         Parameters
         ----------
-        fits : sequence of MotionFit
-            Motions of one class, with their noise.
+        noises : array_like of shape (fits,)
+            `MotionFit.noise` of each.
+        levels : array_like of shape (fits, modes)
+            `MotionFit.levels` of each.
+        stays : array_like of shape (fits,)
+            `MotionFit.stay` of each.
+        kind : {"dwna", "random_walk"}
+            Class of the motions.
 
         Returns
         -------
         ndarray of shape (fits,)
             Sum over the sampled detections, nats.
         """
-        return self._engine_of(fits[0].kind).sums(
-            squares=np.square([fit.levels for fit in fits]),
-            transitions=np.array([fit.transitions for fit in fits]),
-            variances=np.square([fit.noise for fit in fits]),
+        squares = np.square(levels)
+        return self._engine_of(kind).sums(
+            squares=squares,
+            transitions=transition_matrices(squares.shape[1], np.asarray(stays)),
+            variances=np.square(noises),
             velocity_variance=self._velocity_variance,
         )
 
 
-def _sample(tracks: Tracks, n_points: int) -> Tracks:
-    """Cut the tracks into pieces of `PIECE_POINTS` and return evenly spread ones."""
-    d = tracks.detections
+def _sample(tracks: Tracks, n_points: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Cut the tracks into pieces of `PIECE_POINTS` and return evenly spread ones.
+
+    Returns
+    -------
+    order : ndarray of int, shape (M,)
+        Detections of the pieces, one piece after the other.
+    offsets : ndarray of int, shape (pieces + 1,)
+        First detection of each piece in `order`.
+    """
     order, offsets = tracks.by_track
     stride = max(1, round(len(order) / n_points))
     rank = np.arange(len(order)) - np.repeat(offsets[:-1], tracks.lengths)
-    piece = np.cumsum(rank % PIECE_POINTS == 0) - 1
-    labels = np.full(d.n_points, -1, dtype=np.int64)
-    labels[order] = np.where(piece % stride == 0, piece // stride, -1)
-    is_kept = labels >= 0
-    return Tracks(detections=d.keep(is_kept), labels=labels[is_kept])
+    is_first = rank % PIECE_POINTS == 0
+    if stride > 1:
+        is_kept = (np.cumsum(is_first) - 1) % stride == 0
+        order, is_first = order[is_kept], is_first[is_kept]
+    return order, np.append(np.flatnonzero(is_first), len(order))

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
     from asterism.model import TrackingModel, Tracks
 
+    _Values = tuple[float, tuple[float, ...], float]
+    """Noise, levels and `MotionFit.stay`."""
+
 __all__ = ["MIN_GAIN", "FitBounds", "fit_motion", "fit_one_motion", "polish"]
 
 KINDS: tuple[Kind, ...] = ("dwna", "random_walk")
@@ -110,11 +113,10 @@ def fit_motion(
     MotionFit
     """
 
-    def unpack(x: NDArray[np.float64]) -> MotionFit:
-        noise, jolt, busy, quiet, odds = map(float, x)
-        levels = (jolt - busy - quiet, jolt - busy, jolt)
-        stay = 1 / (1 + math.exp(-odds))
-        return MotionFit(noise=math.exp(noise), levels=tuple(map(math.exp, levels)), stay=stay)
+    def unpack(x: list[float]) -> _Values:
+        noise, jolt, busy, quiet, odds = x
+        levels = math.exp(jolt - busy - quiet), math.exp(jolt - busy), math.exp(jolt)
+        return math.exp(noise), levels, 1 / (1 + math.exp(-odds))
 
     quiet, busy, jolt = map(math.log, start.levels)
     odds = math.log(start.stay / (1 - start.stay))
@@ -127,7 +129,7 @@ def fit_motion(
         STAY,
     ]
     likelihood = _likelihood(tracks, model, FIT_POINTS if refine else SEARCH_POINTS)
-    return bounds.clip(_search(likelihood, unpack, first, limits)[0])
+    return bounds.clip(_search(likelihood, unpack, "dwna", first, limits)[0])
 
 
 def fit_one_motion(
@@ -151,18 +153,19 @@ def fit_one_motion(
     likelihood = _likelihood(tracks, model, FIT_POINTS)
     middle = math.log(start.levels[len(start.levels) // 2])
     best, best_gain = start, -math.inf
+
+    def unpack(x: list[float]) -> _Values:
+        noise, level = x
+        return math.exp(noise), (math.exp(level),), 1.0
+
     for kind in KINDS:
-
-        def unpack(x: NDArray[np.float64], kind: Kind = kind) -> MotionFit:
-            return MotionFit(noise=math.exp(x[0]), levels=(math.exp(x[1]),), kind=kind)
-
         level = middle
         if kind == "random_walk":
             level = math.log(velocity) + math.log(tracks.detections.step or 1.0) / 2
         first = [math.log(start.noise), level]
         top = math.inf if kind == "random_walk" else math.log(bounds.max_acceleration)
         limits = [(math.log(bounds.min_noise), math.inf), (-math.inf, top)]
-        plain, gain = _search(likelihood, unpack, first, limits)
+        plain, gain = _search(likelihood, unpack, kind, first, limits)
         if gain > best_gain + MIN_GAIN:
             best, best_gain = bounds.clip(plain), gain
     return best
@@ -196,7 +199,9 @@ def polish(
         return replace(fit, noise=noise, levels=tuple(levels))
 
     def costs(points: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-        return -likelihood.sums([at(x) for x in points])
+        values = np.exp(points)
+        stays = np.full(len(values), fit.stay)
+        return -likelihood.sums(values[:, 0], values[:, 1:], stays, fit.kind)
 
     # The step is about one standard deviation. With several motions the likelihood is rough at
     # that scale, because links that no mode predicts change from mode to mode.
@@ -261,15 +266,19 @@ def _likelihood(tracks: Tracks, model: TrackingModel, n_points: int) -> TrackLik
 
 def _search(
     likelihood: TrackLikelihood,
-    unpack: Callable[[NDArray[np.float64]], MotionFit],
+    unpack: Callable[[list[float]], _Values],
+    kind: Kind,
     first: list[float],
     limits: list[tuple[float, float]],
 ) -> tuple[MotionFit, float]:
     """Return the most likely motion, and its log likelihood in nats per detection."""
 
     def likelihoods(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        return likelihood.sums([unpack(x) for x in points])
+        noises, levels, stays = zip(*map(unpack, points.tolist()), strict=True)
+        return likelihood.sums(noises, levels, stays, kind)
 
     low, high = np.array(limits).T
     x, value = maximise(likelihoods, np.array(first), low, high)
-    return unpack(x), value / likelihood.n_points
+    noise, levels, stay = unpack(x.tolist())
+    best = MotionFit(noise=noise, levels=levels, stay=stay, kind=kind)
+    return best, value / likelihood.n_points

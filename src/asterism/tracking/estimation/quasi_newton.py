@@ -68,9 +68,9 @@ def maximise(
 
     def at(x: NDArray[np.float64]) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
         """Return the value, the gradient, and the curvature along each parameter."""
-        middle, *around = log_likelihoods(x + nearby)
-        up, down = np.split(np.array(around), 2)
-        return float(middle), (up - down) / (2 * NEAR), (2 * middle - up - down) / NEAR**2
+        found = np.asarray(log_likelihoods(x + nearby))
+        middle, up, down = float(found[0]), found[1 : n + 1], found[n + 1 :]
+        return middle, (up - down) / (2 * NEAR), (2 * middle - up - down) / NEAR**2
 
     x = np.clip(start, low, high)
     value, gradient, along = at(x)
@@ -78,12 +78,15 @@ def maximise(
     for _ in range(MAX_STEPS):
         is_free = ~((x <= low) & (gradient < 0) | (x >= high) & (gradient > 0))
         step = np.zeros(n)
-        step[is_free] = np.linalg.solve(curvature[np.ix_(is_free, is_free)], gradient[is_free])
+        if is_free.all():
+            step = np.linalg.solve(curvature, gradient)
+        else:
+            step[is_free] = np.linalg.solve(curvature[is_free][:, is_free], gradient[is_free])
         if not 0.5 * gradient @ step > ENOUGH:
             break
         step *= min(1.0, MAX_STEP / float(np.abs(step).max()))
         for _ in range(MAX_HALVINGS):
-            following = np.clip(x + step, low, high)
+            following = np.minimum(np.maximum(x + step, low), high)
             reached, slope, _ = at(following)
             if reached > value:
                 break
@@ -110,4 +113,4 @@ def _update(
     bent = curvature @ change
     expected = float(bent @ change)
     if (found := float(fall @ change)) > 0.01 * expected:
-        curvature += np.outer(fall, fall) / found - np.outer(bent, bent) / expected
+        curvature += fall[:, None] * fall / found - bent[:, None] * bent / expected

@@ -62,6 +62,8 @@ class Runs:
         -------
         Tracks
         """
+        if len(labels) == 1:
+            return Tracks(detections=self.joined, labels=labels[0])
         counts = [int(own.max(initial=-1)) + 1 for own in labels]
         shifts = np.cumsum([0, *counts])
         shifted = [np.where(own < 0, -1, own + n) for own, n in zip(labels, shifts, strict=False)]
