@@ -128,6 +128,15 @@ def test_one_command_tracks_names_and_fills(person, capsys):
     assert "--markers: expected those of" in err
 
 
+def test_a_labelled_capture_serves_as_marker_set(person, capsys):
+    run("name pt.c3d --markers pt.c3d -o own.c3d", capsys)
+    truth, named = (am.io.read_tracks(f) for f in ("pt.c3d", "own.c3d"))
+    assert am.evaluate(named, truth).names.f1 > 0.99
+    run("track p.c3d --markers pt.c3d --run kept", capsys)
+    run("track --from kept/run.toml -o again.c3d", capsys)
+    assert Path("again.c3d").read_bytes() == Path("kept/p.tracked.c3d").read_bytes()
+
+
 def test_sets_are_merged_and_names_checked(person, capsys):
     run("markerset learn person.csv -o one.toml", capsys)
     run("markerset learn person.csv -o two.toml", capsys)
@@ -158,7 +167,7 @@ def test_sets_are_merged_and_names_checked(person, capsys):
         ("markerset merge set.toml none.toml -o x.toml", "none.toml"),
         ("name in.csv --markers set.toml -o out.csv", "asterism track"),
         ("name truth.csv --markers none.toml -o out.csv", "none.toml"),
-        ("name truth.csv --markers truth.csv -o out.csv", "TOML"),
+        ("name truth.csv --markers in.csv -o out.csv", "a capture with named markers"),
         ("name truth.csv --markers set.toml -o set.toml", "a name ending in .c3d"),
         ("name truth.csv -o out.csv", "--markers"),
     ],

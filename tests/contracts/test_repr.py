@@ -91,8 +91,8 @@ def instances():
         *methods, changed["gate"], changed["lifecycle"], changed["rigid"],
         am.tracking.ChainOptions(groups="cells", distance=1 / 3),
         am.tracking.Stitched(), am.tracking.Stitched().init(plain), state, update,
-        am.tracking.Named(marker_sets=am.learn_marker_set(truth)),
-        am.tracking.Named(marker_sets=am.learn_marker_set(truth)).init(plain),
+        am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN()),
+        am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN()).init(plain),
         am.MCMCDA(window=50, moves=12.345, deadline=1 / 3, confidence=12.345, end_odds=123.4,
                   chains=4, threads=2, chain=am.tracking.ChainOptions(
                       ambiguous_within=3.21, bonds=3, ambiguous_share=0.25,

@@ -167,4 +167,4 @@ def test_states_are_values(person, made):
 @pytest.mark.parametrize("wrong", [(), ("set",)])
 def test_sets_that_are_none_are_refused(wrong):
     with pytest.raises(ParameterError, match="marker_sets: expected"):
-        Named(marker_sets=wrong)
+        Named(marker_sets=wrong, method=am.GNN())

@@ -25,7 +25,7 @@ def read_markers(path: Path) -> am.MarkerSet:
     import asterism as am
 
     endings = [e for f in am.io.CAPTURE_FORMATS.values() for e in f.extensions]
-    if path.name.lower().endswith(tuple(endings)):
+    if path.name.lower().endswith(tuple(e for e in endings if e)):
         return am.learn_marker_set(labelled_tracks(path, None))
     return am.read_marker_set(path)
 

@@ -53,7 +53,7 @@ class LiveNames:
         Number, sum and sum of squares of the distances between markers.
     subject : Subject
         Tables of all markers.
-    doubts : mapping of int to (int, float)
+    rivals : mapping of int to (int, float)
         Better marker of a named track, -1 for none, and its log odds over several examinations.
     turn : int
         Number of frames so far.
@@ -67,7 +67,7 @@ class LiveNames:
     sizes: tuple[float, ...]
     sums: NDArray[np.float64]
     subject: Subject
-    doubts: Mapping[int, tuple[int, float]]
+    rivals: Mapping[int, tuple[int, float]]
     turn: int = 0
 
     @classmethod
@@ -100,7 +100,7 @@ class LiveNames:
             sizes=tuple(sizes),
             sums=sums,
             subject=subject,
-            doubts={},
+            rivals={},
         )
 
     def followed(self, recent: Frames) -> tuple[LiveNames, Changes]:
@@ -133,7 +133,7 @@ class LiveNames:
         marker = np.array([of.get(label, -1) for label in alive.tolist()], dtype=np.int64)
         named = np.flatnonzero(marker >= 0)
         unnamed = np.flatnonzero((marker < 0) & window.is_whole)
-        marker_of, doubts = dict(self.marker_of), dict(self.doubts)
+        marker_of, rivals = dict(self.marker_of), dict(self.rivals)
         changes: Changes = {}
         subject = self.subject
         if len(unnamed):
@@ -150,7 +150,7 @@ class LiveNames:
             k = int(named[self.turn % len(named)])
             label, own = int(alive[k]), int(marker[k])
             other, gain = window.better(k, own)
-            before, sum_before = doubts.pop(label, (own, 0.0))
+            before, sum_before = rivals.pop(label, (own, 0.0))
             total = min(gain, MAX_EACH) + (sum_before if before == other else 0.0)
             if other != own and total > MIN_CHANGE:
                 holder = window.holder[other] if other >= 0 else -1
@@ -162,10 +162,10 @@ class LiveNames:
                     if m >= 0:
                         marker_of[who] = m
             elif other != own and total > 0:
-                doubts[label] = other, total
+                rivals[label] = other, total
             if self.turn % EVERY == EVERY // 2:
                 subject = self._with_row(own)
-        return replace(self, marker_of=marker_of, doubts=doubts, subject=subject), changes
+        return replace(self, marker_of=marker_of, rivals=rivals, subject=subject), changes
 
     def _with_row(self, marker: int) -> Subject:
         """Return the tables with one marker measured again."""

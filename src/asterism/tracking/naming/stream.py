@@ -15,7 +15,6 @@ from asterism.tracking.methods import Method, Update
 from asterism.tracking.naming.first_names import MIN_FOUND, MIN_LENGTH
 from asterism.tracking.naming.live_names import LiveNames
 from asterism.tracking.naming.name import name_tracks
-from asterism.tracking.stitching import Stitched
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -104,7 +103,7 @@ class Named(Method[NamedState]):
     marker_sets : MarkerSet or tuple of MarkerSet
         Marker set of the subject, or of each subject; their names must differ.
     method : Method
-        Method that tracks; `Stitched` by default.
+        Method that tracks, for example `Stitched`.
 
     Raises
     ------
@@ -114,14 +113,15 @@ class Named(Method[NamedState]):
     Examples
     --------
     >>> import asterism as am
-    >>> am.tracking.Named(marker_sets=am.learn_marker_set(am.simulate.fingers(seed=1))).name
+    >>> made = am.learn_marker_set(am.simulate.fingers(seed=1))
+    >>> am.tracking.Named(marker_sets=made, method=am.tracking.Stitched()).name
     'named'
     """
 
     name: ClassVar[str] = "named"
 
     marker_sets: MarkerSet | tuple[MarkerSet, ...]
-    method: Method[Any] = field(default_factory=Stitched)
+    method: Method[Any]
 
     def __post_init__(self) -> None:
         check_kind("method", self.method, Method, "am.tracking.Stitched()")
