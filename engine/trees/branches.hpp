@@ -160,10 +160,12 @@ struct Branch {
   std::int32_t n_taken = 0;           // detections within the window
   bool has_ended = false;
   bool is_chosen = false;  // in the last joint choice
-  // The detection in each frame of the window (-1 for a missed detection) and its squared distance
-  // from the prediction. The index is the frame number modulo the longest window.
+  // The detection in each frame of the window, -1 for a missed detection. The index is the frame
+  // number modulo the longest window.
   std::array<std::int32_t, kMaxWindow> path{};
-  std::array<double, kMaxWindow> distance2{};
+  // Its squared distance from the prediction, by the same index. Joint evaluation does not read the
+  // distances. They are then left out, because branches are copied often.
+  std::vector<double> distance2;
 
   std::int32_t taken(std::int64_t frame) const { return path[frame % kMaxWindow]; }
   std::int32_t unpredicted() const { return gap - carried; }
@@ -211,6 +213,7 @@ class BranchGrower {
     b.last = track.last;
     b.gap = track.gap;
     b.carried = track.carried;
+    if (!opt_.is_joint) b.distance2.assign(kMaxWindow, 0);
     return b;
   }
 
@@ -224,6 +227,7 @@ class BranchGrower {
       split(frame, track, parent, grown_, stats);
     prune(frame.number, n_open, max_branches, stats);
     track.more.branches.clear();
+    track.more.branches.reserve(kept_.size());
     for (const std::int32_t b : kept_) track.more.branches.push_back(std::move(grown_[b]));
   }
 
@@ -240,18 +244,18 @@ class BranchGrower {
   }
 
   // Adds the continuations of a branch in a further frame: one for each detection in its gate, then
-  // the missed detection, into which the branch itself turns.
+  // the missed detection, into which the branch itself turns. The branch is moved from.
   void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch& parent,
              std::vector<Branch>& out, TreeStats& stats) const {
     const std::int64_t slot = frame.number % kMaxWindow;
     parent.path[slot] = -1;
-    parent.distance2[slot] = 0;
+    if (!opt_.is_joint) parent.distance2[slot] = 0;
     if (parent.has_ended) {
       if (opt_.is_joint) {  // one more missed frame
         parent.score += live_.miss_gain(parent.unpredicted());
         ++parent.gap;
       }
-      out.push_back(parent);
+      out.push_back(std::move(parent));
       return;
     }
     MotionState predicted = parent.state.updated(live_.m);
@@ -292,7 +296,7 @@ class BranchGrower {
       child.last_time = frame.time;
       child.gap = child.carried = 0;
       child.path[slot] = j;
-      child.distance2[slot] = d2;
+      if (!opt_.is_joint) child.distance2[slot] = d2;
     };
     const bool is_reappearance = advice != nullptr && advice->is_reappearance;
     if (all.is_carried()) {
@@ -312,7 +316,7 @@ class BranchGrower {
       parent.score += miss;
     ++parent.gap;
     parent.has_ended = is_reappearance || parent.unpredicted() >= live_.sm.max_gap;
-    out.push_back(parent);
+    out.push_back(std::move(parent));
   }
 
   // Adds the claims of a track's best branch on the detections of the next frame.
