@@ -2,6 +2,8 @@
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/tuple.h>
 
+#include <optional>
+
 #include "mcmc/tracker/mcmc_tracker.hpp"
 #include "python/bindings.hpp"
 #include "python/motion_arrays.hpp"

@@ -26,6 +26,11 @@ class PricedOptions {
  protected:
   static constexpr double kBetter = 1e-9;
 
+  struct Option {
+    double log_weight = 0;
+    std::int32_t begin = 0, end = 0;  // of its resources in `uses_`
+    std::int32_t number = 0;
+  };
   struct Packing {
     std::vector<std::int32_t> own;  // option of each tree, in the caller's numbering
     double log_weight = 0;
@@ -35,12 +40,19 @@ class PricedOptions {
   explicit PricedOptions(std::span<const std::vector<PackingOption>> trees) {
     thread_local std::vector<std::int32_t> new_number;  // by resource, -1 between the calls
     std::vector<std::int32_t> resources;
+    std::size_t n_all = 0, n_uses = 0;
     for (const auto& options : trees)
-      for (const PackingOption& option : options)
+      for (const PackingOption& option : options) {
+        ++n_all;
+        n_uses += option.uses.size();
         for (const std::int32_t r : option.uses) {
           if (r >= static_cast<std::int32_t>(new_number.size())) new_number.resize(r + 1, -1);
           if (std::exchange(new_number[r], 0) < 0) resources.push_back(r);
         }
+      }
+    options_.reserve(n_all);
+    reduced_.reserve(n_all);
+    uses_.reserve(n_uses);
     std::ranges::sort(resources);
     for (std::size_t k = 0; k < resources.size(); ++k)
       new_number[resources[k]] = static_cast<std::int32_t>(k);
@@ -57,7 +69,7 @@ class PricedOptions {
     first_.push_back(n_options());
     for (const std::int32_t r : resources) new_number[r] = -1;
     price_.assign(resources.size(), 0);
-    sort();
+    describe();
   }
 
   double max_reduced(std::int32_t tree) const {
@@ -74,9 +86,11 @@ class PricedOptions {
   double log_weight(std::int32_t option) const { return options_[option].log_weight; }
   // Number of an option within its tree, in the caller's numbering.
   std::int32_t number(std::int32_t option) const { return options_[option].number; }
+  std::span<const std::int32_t> uses_of(const Option& option) const {
+    return std::span(uses_).subspan(option.begin, option.end - option.begin);
+  }
   std::span<const std::int32_t> uses_of(std::int32_t option) const {
-    return std::span(uses_).subspan(options_[option].begin,
-                                    options_[option].end - options_[option].begin);
+    return uses_of(options_[option]);
   }
   std::int32_t n_trees() const { return static_cast<std::int32_t>(first_.size()) - 1; }
 
@@ -99,6 +113,10 @@ class PricedOptions {
     options_ = std::move(options);
     reduced_ = std::move(reduced);
     list_users();
+    describe();
+  }
+  // Computes the tree of each option, and the largest weight of each tree.
+  void describe() {
     tree_of_.resize(options_.size());
     max_log_weight_.assign(n_trees(), -std::numeric_limits<double>::infinity());
     for (std::int32_t i = 0; i < n_trees(); ++i)
@@ -109,10 +127,11 @@ class PricedOptions {
   }
   void list_users() {
     first_user_.assign(price_.size() + 1, 0);
-    for (const std::int32_t r : uses_) ++first_user_[r + 1];
+    for (std::int32_t o = 0; o < n_options(); ++o)
+      for (const std::int32_t r : uses_of(o)) ++first_user_[r + 1];
     std::partial_sum(first_user_.begin(), first_user_.end(), first_user_.begin());
     std::vector<std::int32_t> next(first_user_.begin(), first_user_.end() - 1);
-    users_.resize(uses_.size());
+    users_.resize(first_user_.back());
     for (std::int32_t o = 0; o < n_options(); ++o)
       for (const std::int32_t r : uses_of(o)) users_[next[r]++] = o;
   }
@@ -177,6 +196,40 @@ class PricedOptions {
         price[r] = std::max(price[r] - step * (dual - known_.log_weight) / size * way[r], 0.0);
     }
     reprice(price_);
+  }
+  // The lists that `keep_core` shortens.
+  struct OptionLists {
+    std::vector<Option> options;
+    std::vector<double> reduced;
+    std::vector<std::int32_t> first;
+  };
+  // Leaves only the options that a packing better than the known one may contain, and those without
+  // resources, so that a packing exists. The loss of an option at the prices must not exceed the
+  // duality gap. Returns all options.
+  OptionLists keep_core() {
+    OptionLists all{options_, reduced_, first_};
+    const double gap = bound() - known_.log_weight;
+    std::int32_t n = 0;
+    for (std::int32_t i = 0; i < n_trees(); ++i) {
+      const double min_reduced = max_reduced(i) - gap - kBetter;
+      first_[i] = n;
+      for (std::int32_t o = all.first[i]; o < all.first[i + 1]; ++o) {
+        if (all.reduced[o] < min_reduced && !uses_of(all.options[o]).empty()) continue;
+        options_[n] = all.options[o];
+        reduced_[n++] = all.reduced[o];
+      }
+    }
+    first_.back() = n;
+    options_.resize(n);
+    reduced_.resize(n);
+    sort();
+    return all;
+  }
+  void restore(OptionLists all) {
+    options_ = std::move(all.options);
+    reduced_ = std::move(all.reduced);
+    first_ = std::move(all.first);
+    describe();
   }
   void reprice(const std::vector<double>& price) {
     for (std::int32_t o = 0; o < n_options(); ++o) {
@@ -247,11 +300,6 @@ class PricedOptions {
     if (known_.own.empty() || one.log_weight > known_.log_weight) known_ = std::move(one);
   }
 
-  struct Option {
-    double log_weight = 0;
-    std::int32_t begin = 0, end = 0;  // of its resources in `uses_`
-    std::int32_t number = 0;
-  };
   std::vector<Option> options_;  // by tree, the best first
   std::vector<std::int32_t> uses_;
   std::vector<double> reduced_, price_;  // reduced weight of each option; price of each resource

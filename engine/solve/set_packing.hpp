@@ -42,12 +42,18 @@ class SetPacking : PricedOptions {
     std::vector<std::int32_t> best;  // option of each tree in the best known packing
   };
   Losses losses() {
-    const bool is_best = search(1, 0, kUnpriced).is_exact;
-    if (bound() > known_.log_weight + kBetter) {
+    // Without prices, a few nodes do not solve a large cluster.
+    bool is_best = false;
+    if (n_trees() <= kManyTrees) {
+      sort();
+      is_best = search(1, 0, kUnpriced).is_exact;
+    }
+    if (!is_best || bound() > known_.log_weight + kBetter) {
       set_prices(is_best);
       if (!is_best) {
-        sort();
+        OptionLists all = keep_core();
         search(1, 0, kUnpriced);
+        restore(std::move(all));
       }
     }
     std::vector<double> loss(options_.size());
@@ -76,6 +82,7 @@ class SetPacking : PricedOptions {
   // returned.
   template <typename Found>
   PackingSummary solve(std::int64_t k, double drop, std::int64_t max_nodes, Found&& found) {
+    sort();
     PackingSummary summary = search(k, drop, std::min(max_nodes, kUnpriced));
     if (!summary.is_exact && max_nodes > kUnpriced) {
       set_prices(false);
@@ -92,6 +99,7 @@ class SetPacking : PricedOptions {
  private:
   static constexpr std::int64_t kUnpriced = 32;  // number of nodes before prices are used
   static constexpr int kDives = 32;
+  static constexpr std::int32_t kManyTrees = 64;
 
   struct Node {
     double bound = 0;

@@ -17,46 +17,11 @@
 #include "filter/nis.hpp"
 #include "rigid/carried_state.hpp"
 #include "tracks/live_tracks.hpp"
+#include "trees/tree_stats.hpp"
 
 namespace asterism {
 
 inline constexpr int kMaxWindow = 16;
-
-// Statistics of the trackers whose tracks are trees of branches.
-struct TreeStats : FrameStats {
-  // Branches at the end; largest number in a tree; cut by the χ² test; dropped by the limit on
-  // their number.
-  std::int64_t n_branches = 0, peak_branches = 0, n_cut = 0, n_limited = 0;
-  std::int64_t n_shared = 0;  // detections that are the best choice of several trees
-  std::int64_t n_beams = 0;   // groups that were not solved exactly
-  double bound = 0, gap = 0;  // bounds of the error of their marginals and of their log posterior
-  // Joint hypotheses: largest number of a cluster, merged into a similar one, nodes of the search.
-  std::int64_t n_hypotheses = 0, n_merged = 0, n_nodes = 0;
-
-  void add(const TreeStats& next) {
-    FrameStats::add(next);
-    add_tree_work(next);
-    n_branches = next.n_branches;
-  }
-  void add_work(const TreeStats& next) {
-    FrameStats::add_work(next);
-    add_tree_work(next);
-  }
-
- private:
-  void add_tree_work(const TreeStats& next) {
-    peak_branches = std::max(peak_branches, next.peak_branches);
-    n_cut += next.n_cut;
-    n_limited += next.n_limited;
-    n_shared += next.n_shared;
-    n_beams += next.n_beams;
-    bound = std::max(bound, next.bound);
-    gap = std::max(gap, next.gap);
-    n_hypotheses = std::max(n_hypotheses, next.n_hypotheses);
-    n_merged += next.n_merged;
-    n_nodes += next.n_nodes;
-  }
-};
 
 struct BranchOptions {
   std::int32_t window = 1;        // frames until one is decided
@@ -130,9 +95,19 @@ class BranchState {
 
   MotionState updated(const MotionModel& m) const {
     MotionState state = *predicted_;
-    if (is_detected_) update(m, each_, log_likelihood_, y_, state);
+    update_if_detected(m, state);
     return state;
   }
+  // The prediction from the updated state. It is made in place, because states are large.
+  BranchState next(const MotionModel& m, const MotionStep& step) const {
+    const auto state = std::make_shared<MotionState>(*predicted_);
+    update_if_detected(m, *state);
+    predict(m, step, *state);
+    BranchState out;
+    out.predicted_ = state;
+    return out;
+  }
+  const MotionState& predicted() const { return *predicted_; }
   // Updates the predicted state with a detection. `each` and its likelihood are from the prediction.
   void detect(const Point& y, const std::array<double, kMaxModes>& each, double log_likelihood) {
     y_ = y;
@@ -142,6 +117,10 @@ class BranchState {
   }
 
  private:
+  void update_if_detected(const MotionModel& m, MotionState& state) const {
+    if (is_detected_) update(m, each_, log_likelihood_, y_, state);
+  }
+
   std::shared_ptr<const MotionState> predicted_;
   Point y_{};
   std::array<double, kMaxModes> each_{};
@@ -160,10 +139,12 @@ struct Branch {
   std::int32_t n_taken = 0;           // detections within the window
   bool has_ended = false;
   bool is_chosen = false;  // in the last joint choice
-  // The detection in each frame of the window (-1 for a missed detection) and its squared distance
-  // from the prediction. The index is the frame number modulo the longest window.
+  // The detection in each frame of the window, -1 for a missed detection. The index is the frame
+  // number modulo the longest window.
   std::array<std::int32_t, kMaxWindow> path{};
-  std::array<double, kMaxWindow> distance2{};
+  // Its squared distance from the prediction, by the same index. Joint evaluation does not read the
+  // distances. They are then left out, because branches are copied often.
+  std::vector<double> distance2;
 
   std::int32_t taken(std::int64_t frame) const { return path[frame % kMaxWindow]; }
   std::int32_t unpredicted() const { return gap - carried; }
@@ -211,6 +192,7 @@ class BranchGrower {
     b.last = track.last;
     b.gap = track.gap;
     b.carried = track.carried;
+    if (!opt_.is_joint) b.distance2.assign(kMaxWindow, 0);
     return b;
   }
 
@@ -224,6 +206,7 @@ class BranchGrower {
       split(frame, track, parent, grown_, stats);
     prune(frame.number, n_open, max_branches, stats);
     track.more.branches.clear();
+    track.more.branches.reserve(kept_.size());
     for (const std::int32_t b : kept_) track.more.branches.push_back(std::move(grown_[b]));
   }
 
@@ -240,23 +223,22 @@ class BranchGrower {
   }
 
   // Adds the continuations of a branch in a further frame: one for each detection in its gate, then
-  // the missed detection, into which the branch itself turns.
+  // the missed detection, into which the branch itself turns. The branch is moved from.
   void split(const WindowFrame& frame, const LiveTrack<Tree>& track, Branch& parent,
              std::vector<Branch>& out, TreeStats& stats) const {
     const std::int64_t slot = frame.number % kMaxWindow;
     parent.path[slot] = -1;
-    parent.distance2[slot] = 0;
+    if (!opt_.is_joint) parent.distance2[slot] = 0;
     if (parent.has_ended) {
       if (opt_.is_joint) {  // one more missed frame
         parent.score += live_.miss_gain(parent.unpredicted());
         ++parent.gap;
       }
-      out.push_back(parent);
+      out.push_back(std::move(parent));
       return;
     }
-    MotionState predicted = parent.state.updated(live_.m);
-    predict(live_.m, frame.step, predicted);
-    parent.state = BranchState(predicted);
+    parent.state = parent.state.next(live_.m, frame.step);
+    const MotionState& predicted = parent.state.predicted();
     const NeighbourAdvice* advice = frame.advice_to(track.more.key);
     const Expected all = expected(predicted, parent.gap, advice);
     const double hit = live_.hit_gain(parent.gap), miss = live_.miss_gain(parent.gap);
@@ -292,7 +274,7 @@ class BranchGrower {
       child.last_time = frame.time;
       child.gap = child.carried = 0;
       child.path[slot] = j;
-      child.distance2[slot] = d2;
+      if (!opt_.is_joint) child.distance2[slot] = d2;
     };
     const bool is_reappearance = advice != nullptr && advice->is_reappearance;
     if (all.is_carried()) {
@@ -312,7 +294,7 @@ class BranchGrower {
       parent.score += miss;
     ++parent.gap;
     parent.has_ended = is_reappearance || parent.unpredicted() >= live_.sm.max_gap;
-    out.push_back(parent);
+    out.push_back(std::move(parent));
   }
 
   // Adds the claims of a track's best branch on the detections of the next frame.

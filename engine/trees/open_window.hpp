@@ -122,8 +122,10 @@ struct OpenWindow {
   void settle(const WindowFrame& frame, std::int32_t own, LiveTrack<Tree>& track) const {
     for (Branch& b : track.more.branches) {
       --b.n_taken;
-      b.distance2[frame.number % kMaxWindow] = 0;
-      if (!branches.is_joint) b.score += frame.crowding(track.more.key, own);
+      if (!branches.is_joint) {
+        b.distance2[frame.number % kMaxWindow] = 0;
+        b.score += frame.crowding(track.more.key, own);
+      }
       b.score -= frame.bond_gains(track.more.key, own);
     }
   }

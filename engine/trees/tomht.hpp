@@ -90,6 +90,12 @@ class HypothesisForest {
     std::vector<PackingOption> options;
     std::vector<Choice> choices;
     std::vector<Choice> improbable;  // pruned options
+
+    void clear() {
+      options.clear();
+      choices.clear();
+      improbable.clear();
+    }
   };
 
   // Decides the oldest frame, with the options and losses that `limit` has computed.
@@ -104,7 +110,8 @@ class HypothesisForest {
   // resources.
   void list_options() {
     const BranchGrower grower(open_.live, open_.branches);
-    s_.trees.assign(open_.n_all(), {});
+    s_.trees.resize(open_.n_all());
+    for (TreeOptions& tree : s_.trees) tree.clear();
     s_.decisions.assign(open_.n_all(), {});
     std::size_t n_branches = 0;
     for (std::size_t i = 0; i < open_.n_all(); ++i) n_branches += branches(i).size();
@@ -178,8 +185,8 @@ class HypothesisForest {
     if (s_.ranked.size() == n_ranked) return;
     auto next = s_.ranked.begin();
     for (const std::int32_t i : cluster) {
-      // Number of a branch that is kept.
-      std::vector<std::int32_t> now(branches(i).size(), kNothing);
+      std::vector<std::int32_t>& now = s_.now;
+      now.assign(branches(i).size(), kNothing);
       std::int32_t n_kept = 0;
       for (; next != s_.ranked.end() && next->tree == i; ++next) {
         now[next->branch] = n_kept;
@@ -380,6 +387,7 @@ class HypothesisForest {
     std::vector<TreeOptions> trees;
     std::vector<std::int32_t> uses;  // of all options
     std::vector<Ranked> ranked;
+    std::vector<std::int32_t> now;  // of each branch of a tree: its number among those kept
     std::vector<TreeDecision> decisions;
     std::vector<double> free, taken;
   };
