@@ -131,7 +131,7 @@ def test_one_command_tracks_names_and_fills(person, capsys):
 def test_a_labelled_capture_serves_as_marker_set(person, capsys):
     run("name pt.c3d --markers pt.c3d -o own.c3d", capsys)
     truth, named = (am.io.read_tracks(f) for f in ("pt.c3d", "own.c3d"))
-    assert am.evaluate(named, truth).names.f1 > 0.99
+    assert set(filter(None, named.names)) == set(truth.names)
     run("track p.c3d --markers pt.c3d --run kept", capsys)
     run("track --from kept/run.toml -o again.c3d", capsys)
     assert Path("again.c3d").read_bytes() == Path("kept/p.tracked.c3d").read_bytes()
