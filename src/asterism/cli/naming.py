@@ -24,8 +24,8 @@ def read_markers(path: Path) -> am.MarkerSet:
     """Read a marker set, or learn that of a labelled capture."""
     import asterism as am
 
-    endings = [e for f in am.io.CAPTURE_FORMATS.values() for e in f.extensions]
-    if path.name.lower().endswith(tuple(e for e in endings if e)):
+    suffixes = [e for f in am.io.CAPTURE_FORMATS.values() for e in f.extensions]
+    if path.name.lower().endswith(tuple(e for e in suffixes if e)):
         return am.learn_marker_set(labelled_tracks(path, None))
     return am.read_marker_set(path)
 
