@@ -2,18 +2,24 @@
 
 A person of 53 markers at 100 Hz in bursts (up to 5 markers occluded at a time for 5 to 60 frames,
 up to 3 ghosts, 0.3 mm of noise), frame by frame from Python. The stream goes forward and backward
-through the recorded frames. Each frame is processed by a method alone. Where stitching is measured,
-it is also processed by the same method, stitched; the third row is the difference, frame by frame.
-Times are of the processor in the thread, because others share the machine. Memory is that of the
-process after a third of the stream and after all of it.
+through the recorded frames. Each method has a process of its own, which takes `--frames` frames, or
+fewer where they last longer than `--seconds`, but at least `--min-frames`. Each frame is processed
+by a method alone. Where stitching is measured, it is also processed by the same method, stitched;
+the third row is the difference, frame by frame. Times are of the processor in the thread, because
+others share the machine. Memory is that of the process after a third of `--min-frames`, when the
+method has seen all recorded frames, and at the end of the stream.
 
-    python benchmarks/stream.py [--frames N] [--recorded N] [--methods NAME …] [--markdown FILE]
+    python benchmarks/stream.py [--frames N] [--min-frames N] [--seconds S] [--recorded N]
+                                [--methods NAME …] [--jobs N] [--markdown FILE]
 """
 
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import time
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,53 +56,78 @@ def back_and_forth(d: am.Detections, n_frames: int) -> Iterator[tuple[float, NDA
 
 
 def measured(
-    both: list[am.tracking.Method[Any]], model: am.TrackingModel, d: am.Detections, n_frames: int
-) -> tuple[NDArray[np.float64], float]:
-    """Milliseconds of each frame for each method, (N, n); megabytes more at the end."""
+    both: list[am.tracking.Method[Any]],
+    model: am.TrackingModel,
+    d: am.Detections,
+    options: argparse.Namespace,
+) -> tuple[NDArray[np.float64], float, float]:
+    """Milliseconds of each frame for each method, (N, n); megabytes early on, and at the end."""
     states = [each.init(am.tracking.tracklet_model(model)) for each in both]
-    taken = np.zeros((n_frames, len(both)))
-    third = 0.0
-    for t, (now, points) in enumerate(back_and_forth(d, n_frames)):
+    # The times themselves must not add to the memory, so that their pages are written here.
+    taken = np.full((options.frames, len(both)), np.nan)
+    end = time.monotonic() + options.seconds
+    early, n = resident(), 0
+    for t, (now, points) in enumerate(back_and_forth(d, options.frames)):
+        if t >= options.min_frames and time.monotonic() > end:
+            break
         for k, each in enumerate(both):
             start = time.thread_time()
             states[k], _ = each.step(states[k], now, points)
             taken[t, k] = 1e3 * (time.thread_time() - start)
-        if t == n_frames // 3:
-            third = resident()
-    return taken, resident() - third
+        n = t + 1
+        if n == options.min_frames // 3:
+            early = resident()
+    return taken[:n], early, resident()
 
 
-def row(name: str, taken: NDArray[np.float64], more: str) -> list[str]:
+def rows_of(options: argparse.Namespace, name: str) -> list[list[str]]:
+    """Measure a method in a stream: a row of its own, and two of its stitching if that is asked."""
+    person = am.simulate.person(seed=1, frames=min(options.recorded, options.frames))
+    capture = am.simulate.corrupt(person, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
+    model = am.estimate_model(capture.detections).model
+    both: list[am.tracking.Method[Any]] = [METHODS[name]]
+    both += [am.tracking.Stitched(method=METHODS[name])] if name in STITCHED else []
+    taken, *memory = measured(both, model, capture.detections, options)
+    rows = [row(name, taken[:, 0], [f"{x:.1f}" for x in memory])]
+    if name in STITCHED:
+        rows.append(row(f"{name}, stitched", taken[:, 1], ["", ""]))
+        rows.append(row("stitching alone", taken[:, 1] - taken[:, 0], ["", ""]))
+    return rows
+
+
+def row(name: str, taken: NDArray[np.float64], memory: list[str]) -> list[str]:
     tenth = max(len(taken) // 10, 1)
     ms = [float(np.percentile(taken, q)) for q in (50, 99, 99.9, 100)]
     figures = [taken.mean(), *ms, taken[:tenth].mean(), taken[-tenth:].mean()]
-    return [name, *(f"{x:.3f}" for x in figures), more]
+    return [name, f"{len(taken):,}", *(f"{x:.3f}" for x in figures), *memory]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=6000, help="of the stream")
+    parser.add_argument("--frames", type=int, default=1_000_000, help="of the stream, at most")
+    parser.add_argument("--min-frames", type=int, default=100_000, help="of the stream, at least")
+    parser.add_argument("--seconds", type=float, default=480.0, help="of a method's stream")
     parser.add_argument("--recorded", type=int, default=6000, help="frames through which it goes")
     parser.add_argument("--methods", nargs="+", choices=list(METHODS), default=list(METHODS))
+    parser.add_argument("--jobs", type=int, default=1, help="methods measured at a time")
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
-    person = am.simulate.person(seed=1, frames=min(options.recorded, options.frames))
-    capture = am.simulate.corrupt(person, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
-    model = am.estimate_model(capture.detections).model
+    options.min_frames = min(options.min_frames, options.frames)
     rows: list[list[str]] = []
-    for name in options.methods:
-        both: list[am.tracking.Method[Any]] = [METHODS[name]]
-        both += [am.tracking.Stitched(method=METHODS[name])] if name in STITCHED else []
-        taken, more = measured(both, model, capture.detections, options.frames)
-        rows.append(row(name, taken[:, 0], f"{more:+.1f}"))
-        if name in STITCHED:
-            rows.append(row(f"{name}, stitched", taken[:, 1], ""))
-            rows.append(row("stitching alone", taken[:, 1] - taken[:, 0], ""))
-        print(*rows[-1], flush=True)
-    head = ["ms a frame", "mean", "median", "99 %", "99.9 %", "most", "mean of the first tenth",
-            "of the last", "MB more at the end"]  # fmt: skip
-    lines = [*table(head, rows), "", f"{options.frames} frames, processor time. {conditions()}."]
-    publish(lines, options.markdown)
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(options.jobs, mp_context=spawn, max_tasks_per_child=1) as pool:
+        for its_rows in pool.map(partial(rows_of, options), options.methods):
+            print(*its_rows, sep="\n", flush=True)
+            rows += its_rows
+    head = ["ms a frame", "frames", "mean", "median", "99 %", "99.9 %", "most",
+            "mean of the first tenth", "of the last", "MB early on", "MB at the end"]  # fmt: skip
+    about = (
+        f"Each stream has {options.frames:,} frames, or as many as {options.seconds:,.0f} s allow, "
+        f"but at least {options.min_frames:,}. Memory is of the method's process, both stitched "
+        f"and not, after {options.min_frames // 3:,} frames and at the end. Processor time. "
+        f"{conditions()}."
+    )
+    publish([*table(head, rows), "", about], options.markdown)
 
 
 if __name__ == "__main__":
