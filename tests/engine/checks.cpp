@@ -235,7 +235,8 @@ void no_gain_exceeds_its_bound(int n_modes) {
     const std::size_t n_filtered = 1 + random.below(static_cast<std::int32_t>(same.tail.nodes.size()));
     for (std::size_t n = 0; n < n_filtered; ++n) filter_next(p, same, [](double) { return true; });
     CHECK(std::abs(max_score_of(p, same, n_filtered) - p.score_of(edit.track)) < 1e-9);
-    Edit<Filter> none{edit.track};
+    Edit<Filter> none;
+    none.track = edit.track;
     p.apply(std::span(&none, 1));
   }
   CHECK(smallest < 0.5);
