@@ -169,4 +169,5 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     for line in header:
         file.write(("\t".join(line) + "\n").encode())
     for t, (time, row) in enumerate(zip(d.times.tolist(), rows, strict=True)):
-        file.write(("\t".join([str(first + t), repr(time), *row]) + "\n").encode())
+        end = "\n" if row and row[-1] else "\t\n"  # OpenSim does not count a blank field at the end
+        file.write(("\t".join([str(first + t), repr(time), *row]) + end).encode())

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["Naming", "name_tracks"]
 
 MIN_DETECTIONS = 10
-"""Smallest number of detections of a name in a capture."""
+"""Smallest number of detections of a name in a capture, in tracks of `MIN_LENGTH` and more."""
 MIN_SUBJECT = 0.75
 """Probability of a subject below which no name is given, because all of them could be another's."""
 
@@ -234,7 +234,9 @@ def _result(
             markers[rows] = at + own.markers[rows]
         at += len(made)
     n_given = np.bincount(markers[markers >= 0], minlength=len(all_names))
-    rare = n_given < MIN_DETECTIONS  # false alarms at the place of a marker that is not there
+    is_long = np.append(whole.lengths >= MIN_LENGTH, False)[whole.labels] & (markers >= 0)
+    n_long = np.bincount(markers[is_long], minlength=len(all_names))
+    rare = n_long < MIN_DETECTIONS  # false alarms at the place of a marker that is not there
     markers[np.append(rare, False)[markers]] = -1
     of_whole[np.append(rare, False)[of_whole]] = -1
     n_given[rare] = 0
