@@ -230,7 +230,9 @@ void no_gain_exceeds_its_bound(int n_modes) {
     // Detections that are not filtered count with their present gain.
     p.apply(std::span(&edit, 1));
     const auto& nodes = p.track(edit.track).nodes;
-    Edit<Filter> same{edit.track, random.below(p.track(edit.track).size() - 1)};
+    Edit<Filter> same;
+    same.track = edit.track;
+    same.keep = random.below(p.track(edit.track).size() - 1);
     same.tail.nodes.assign(nodes.begin() + same.keep, nodes.end());
     const std::size_t n_filtered = 1 + random.below(static_cast<std::int32_t>(same.tail.nodes.size()));
     for (std::size_t n = 0; n < n_filtered; ++n) filter_next(p, same, [](double) { return true; });
