@@ -93,16 +93,17 @@ def search(
         first = [n for _, n in sorted(settled.values(), key=lambda item: -item[0])[:REFINED]]
         first = [rough.improved(first[0])[0], *first]
     size, weights = refit(made, stats, first[0]) or (1.0, FIRST_WEIGHTS)
-    posture = posture_log_odds(made, stats.positions, first[0], up, size)
-    evidence = evidence_of(made, stats, size=size, weights=weights, posture=posture)
-    fine = searching(evidence)
+    fine = searching(evidence_of(made, stats, size=size, weights=weights))
     names, _ = max((fine.settled(names) for names in first), key=lambda item: item[1])
     again = refit(made, stats, names)
     if again is not None and _differs(again, (size, weights)):
         size, weights = again
-        evidence = evidence_of(made, stats, size=size, weights=weights, posture=posture)
-        fine = searching(evidence)
-    names, score = fine.improved(names)
+        fine = searching(evidence_of(made, stats, size=size, weights=weights))
+    names, _ = fine.improved(names)
+    # Last, because a posture that wrong names have laid would keep them.
+    posture = posture_log_odds(made, stats.positions, names, up, size)
+    evidence = evidence_of(made, stats, size=size, weights=weights, posture=posture)
+    names, score = searching(evidence).improved(names)
     at_the_set = _at_the_set(made, stats, names, size)
     exact = evidence_of(made, at_the_set, size=size, weights=weights, posture=posture)
     n_named = int((names >= 0).sum())
