@@ -19,4 +19,5 @@ NB_MODULE(_engine, module) {
   bind_stitcher(module);
   bind_reconstruct(module);
   bind_naming(module);
+  bind_confidence(module);
 }

@@ -451,6 +451,33 @@ def judge_distances(
 # (R, from, to, rms): b = R (a - from) + to, in three axes.
 def fit_rigid(a: Floats, b: Floats, weights: Floats) -> tuple[Floats, Floats, Floats, float]: ...
 
+# (frames, tracks a, tracks b, log-likelihood ratios, whether both tracks continue)
+def exchanges(
+    motion: MotionModel,
+    times: Floats,
+    kind: Shorts,
+    F: Floats,
+    Q: Floats,
+    points: Floats,
+    frames: Ints,
+    offsets: Ints,
+    *,
+    p_detection: float,
+) -> tuple[Ints, Shorts, Shorts, Floats, NDArray[np.bool_]]: ...
+
+# (whether distances are known, log densities of an unknown marker, other tracks, their densities)
+def compare_parts(
+    points: Floats,
+    labels: Ints,
+    offsets: Ints,
+    n_tracks: int,
+    noise: float,
+    tracks: Ints,
+    frames: Ints,
+    ranges: Ints,
+    partners: Ints,
+) -> tuple[NDArray[np.bool_], Floats, Ints, Floats]: ...
+
 # (predicted position of what was at `then`, its variance beyond `r`, log densities of points)
 def carried(
     a: Floats, b: Floats, weights: Floats, then: Floats, r: float, points: Floats

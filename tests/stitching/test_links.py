@@ -133,7 +133,7 @@ def test_a_pass_advises_whom_its_joins_come_from():
     found = Pass(
         tracklets=np.zeros(0, np.int32), markers=np.array([0, 1, 0, 0, -2, 1], np.int32),
         after=np.array([-1, -1, 0, 2, -1, 1], np.int32),
-        probabilities=np.array([1, 1, 1 / (1 + np.exp(-0.5)), 1, 0.9, 0.1]), n_cuts=0,
+        probabilities=np.array([1, 1, 1 / (1 + np.exp(-0.5)), 1, 0.9, 0.1]),
     )  # fmt: skip
     found.advise(Listener())  # pyright: ignore[reportArgumentType]
     # 2 went on with 0: in the other direction 0 goes on with 2.

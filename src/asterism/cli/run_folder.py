@@ -1,7 +1,8 @@
 """Folder of a run, with everything that repeats it bit for bit.
 
-``run.toml`` holds the recipe and the path of the input, ``log.txt`` the log messages and
-``summary.json`` the figures; the result is beside them. ``summary.json`` is written last, so its
+``run.toml`` holds the recipe and the path of the input, ``log.txt`` the log messages,
+``decisions.csv`` and ``decisions.json`` the decisions, and ``summary.json`` the figures; the result
+is beside them. ``summary.json`` is written last, so its
 presence shows that the run is complete.
 """
 
@@ -23,9 +24,11 @@ from asterism.model.toml_file import read_toml, write_toml
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-__all__ = ["CONFIG", "FILES", "LOG", "SUMMARY", "Run", "writing_log"]
+__all__ = ["CONFIG", "DECISIONS", "FILES", "LOG", "SUMMARY", "Run", "writing_log"]
 
-FILES = CONFIG, LOG, SUMMARY = "run.toml", "log.txt", "summary.json"
+CONFIG, LOG, SUMMARY = "run.toml", "log.txt", "summary.json"
+DECISIONS = "decisions.csv", "decisions.json"
+FILES = CONFIG, LOG, *DECISIONS, SUMMARY
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import asterism as am
 from asterism.cli.naming import naming_figures, naming_rows
+from asterism.reporting.places import places_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
 __all__ = ["Summary", "stitching_rows", "summarize"]
-
-UNCERTAIN = 0.9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +41,10 @@ class Summary:
     log_posterior : float or None
         Log posterior of the tracks, in nats above that of “everything is clutter”. Larger is
         better under the same model. None if the model gives a track probability zero.
-    n_uncertain : int or None
-        Number of detections with a confidence below `UNCERTAIN`; None without a confidence.
+    places : int
+        Number of places to check, as on the report page.
+    expected_wrong : float
+        Expected number of detections with a wrong identity at these places.
     info : dict
         Figures of the method, such as the error of approximations.
     naming : dict or None
@@ -69,7 +70,8 @@ class Summary:
     seconds: float
     frames_per_second: float
     log_posterior: float | None
-    n_uncertain: int | None
+    places: int
+    expected_wrong: float
     info: dict[str, float]
     naming: dict[str, Any] | None = None
     filled: dict[str, int] | None = None
@@ -111,8 +113,8 @@ class Summary:
 
     def _certainty(self) -> list[tuple[str, str]]:
         rows: list[tuple[str, str]] = []
-        if self.n_uncertain is not None:
-            rows.append((f"confidence below {UNCERTAIN:.0%}", f"{self.n_uncertain} labels"))
+        wrong = f", {self.expected_wrong:.0f} wrong labels expected" if self.places else ""
+        rows.append(("places to check", f"{self.places}{wrong}"))
         if self.info.get("bound", 0) > 0:
             groups = f"{self.info['approximate_groups']:.0f} groups too large for the exact sum"
             text = f"{groups}; error of their probabilities at most {self.info['bound']:.2g}"
@@ -160,10 +162,10 @@ def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: f
     tracks, naming, filling = result.tracks.measured(), result.naming, result.filling
     d = tracks.detections
     assert isinstance(d, am.Capture)
-    order, _ = tracks.by_track
+    places = places_of(tracks)
     gaps = tracks.gaps()
     longest = sorted(gaps, key=lambda gap: -gap.length)[:3]
-    n_labelled = len(order)
+    n_labelled = int(tracks.lengths.sum())
     info = dict(tracks.info)
     log_posterior = info.pop("log_posterior", -math.inf)
     return Summary(
@@ -183,9 +185,8 @@ def summarize(result: am.tracking.Tracked, *, out: Path, method: str, seconds: f
         seconds=seconds,
         frames_per_second=d.n_frames / seconds if seconds else 0.0,
         log_posterior=log_posterior if math.isfinite(log_posterior) else None,
-        n_uncertain=None
-        if tracks.confidence is None
-        else int((tracks.confidence[order] < UNCERTAIN).sum()),
+        places=len(places),
+        expected_wrong=sum(place.expected_wrong for place in places),
         info=info,
         naming=None if naming is None else naming_figures(naming),
         filled=None

@@ -10,10 +10,11 @@ import asterism as am
 from asterism.checks import check_fields
 from asterism.cli.console import progress, to_json
 from asterism.cli.naming import read_markers
-from asterism.cli.run_folder import CONFIG, SUMMARY, writing_log
+from asterism.cli.run_folder import CONFIG, DECISIONS, SUMMARY, writing_log
 from asterism.cli.summary import Summary, summarize
 from asterism.errors import ParameterError
 from asterism.io.atomic import write_text
+from asterism.io.decisions import write_decisions
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -95,7 +96,7 @@ def carry_out(
     out : Path
         File of the result.
     folder : Path or None
-        Existing folder for ``run.toml``, ``log.txt`` and ``summary.json``; None for no such files.
+        Existing folder for the files of the run; None for no such files.
 
     Returns
     -------
@@ -106,6 +107,8 @@ def carry_out(
     with writing_log(folder):
         run.write(folder / CONFIG)
         result, summary = _carry_out(run, capture, out)
+        for name in DECISIONS:
+            write_decisions(result.tracks, folder / name)
         write_text(folder / SUMMARY, to_json(summary.to_dict()) + "\n")
         return result, summary
 

@@ -1,6 +1,7 @@
 """Data types: detections, tracks, captures and the generative model that every method searches."""
 
 from asterism.model.capture import Capture
+from asterism.model.decision import Alternative, Decision
 from asterism.model.detections import Detections
 from asterism.model.gap import Gap
 from asterism.model.interacting_motions import InteractingMotions
@@ -18,8 +19,10 @@ from asterism.model.tracks import Tracks
 __all__ = [
     "DWNA",
     "DWPA",
+    "Alternative",
     "Analog",
     "Capture",
+    "Decision",
     "Detections",
     "Event",
     "ForcePlate",

@@ -12,7 +12,7 @@ import numpy as np
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -63,7 +63,7 @@ def data_frame(
     d: Detections,
     labels: NDArray[np.int64],
     names: Sequence[str],
-    confidence: NDArray[np.float64] | None,
+    confidences: Mapping[str, NDArray[np.float64] | None],
 ) -> Any:
     """Return a pandas ``DataFrame`` with one row a detection; see `Tracks.to_pandas`."""
     columns = {
@@ -73,8 +73,7 @@ def data_frame(
         "name": np.array([*names, ""], dtype=object)[labels],
         **{f"{axis}_m": d.points[:, k] for k, axis in enumerate("xyz"[: d.n_axes])},
     }
-    if confidence is not None:
-        columns["confidence"] = confidence
+    columns |= {name: values for name, values in confidences.items() if values is not None}
     return _library("pandas").DataFrame(columns)
 
 

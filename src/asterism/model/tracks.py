@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from asterism.model.decision import Decision
     from asterism.model.recipe import Recipe
 
 __all__ = ["Tracks"]
@@ -45,7 +46,12 @@ class Tracks:
         Marker name of each of the K tracks, None if it is unknown. Without names K is the largest
         label + 1.
     confidence : array_like of shape (N,), optional
-        Probability in [0, 1] that each label is right, if the method estimates it.
+        Probability in [0, 1] that the link which leads to each detection is right, 0 for clutter.
+    identity_confidence : array_like of shape (N,), optional
+        Probability in [0, 1] that each detection is of the marker that holds most of its track, 0
+        for clutter.
+    decisions : tuple of Decision
+        What the tracking decided, with probabilities and alternatives.
     info : mapping, optional
         Numbers reported by the method: sizes of approximations, counts and running time.
     recipe : Recipe, optional
@@ -71,6 +77,8 @@ class Tracks:
     labels: NDArray[np.int64]
     names: tuple[str | None, ...] = ()
     confidence: NDArray[np.float64] | None = None
+    identity_confidence: NDArray[np.float64] | None = None
+    decisions: tuple[Decision, ...] = ()
     info: Mapping[str, float] = field(default_factory=dict[str, float])
     recipe: Recipe | None = None
 
@@ -87,16 +95,8 @@ class Tracks:
         names += (None,) * (n_tracks - len(names))
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "labels", labels)
-        object.__setattr__(self, "confidence", self._checked_confidence(n))
-
-    def _checked_confidence(self, n: int) -> NDArray[np.float64] | None:
-        if self.confidence is None:
-            return None
-        confidence = keep_array("confidence", self.confidence, (n,))
-        if confidence.size and (confidence.min() < 0 or confidence.max() > 1):
-            worst = confidence[np.argmax(np.abs(confidence - 0.5))]
-            raise ParameterError("confidence", "probabilities in [0, 1]", worst)
-        return confidence
+        for name in ("confidence", "identity_confidence"):
+            object.__setattr__(self, name, _probabilities(name, getattr(self, name), n))
 
     @classmethod
     def from_dense(
@@ -198,7 +198,7 @@ class Tracks:
         """Return a pandas ``DataFrame`` with one row a detection (extra ``asterism[tables]``).
 
         Columns are ``frame``, ``time_s``, ``track`` (-1 for clutter), ``name``, ``x_m``, ``y_m``,
-        ``z_m`` and, if the method estimates it, ``confidence``.
+        ``z_m`` and, where they are known, ``confidence`` and ``identity_confidence``.
 
         Raises
         ------
@@ -212,7 +212,8 @@ class Tracks:
         >>> list(tracks.to_pandas().columns)
         ['frame', 'time_s', 'track', 'name', 'x_m', 'y_m', 'z_m']
         """
-        return data_frame(self.detections, self.labels, self.display_names, self.confidence)
+        everything = self._confidences(slice(None))
+        return data_frame(self.detections, self.labels, self.display_names, everything)
 
     def to_xarray(self) -> Any:
         """Return an xarray ``DataArray`` of time, marker and axis (extra ``asterism[tables]``).
@@ -247,8 +248,16 @@ class Tracks:
         if d is self.detections or self.detections.filled is None:
             return self
         kept = ~self.detections.filled
-        confidence = None if self.confidence is None else self.confidence[kept]
-        return replace(self, detections=d, labels=self.labels[kept], confidence=confidence)
+        return replace(self, detections=d, labels=self.labels[kept], **self._confidences(kept))
+
+    def _confidences(self, which: Any) -> dict[str, Any]:
+        """Return both confidences of some detections, by the name of the field."""
+        return {
+            "confidence": None if self.confidence is None else self.confidence[which],
+            "identity_confidence": (
+                None if self.identity_confidence is None else self.identity_confidence[which]
+            ),
+        }
 
     def part(self, first: int, end: int) -> Tracks:
         """Return the tracks in the frames from `first` up to but without `end`.
@@ -261,7 +270,7 @@ class Tracks:
         Returns
         -------
         Tracks
-            All tracks keep their numbers and names; report and recipe are left out.
+            All tracks keep their numbers and names; decisions, info and recipe are left out.
 
         Examples
         --------
@@ -271,9 +280,8 @@ class Tracks:
         """
         d = self.detections
         own = slice(d.offsets[first], d.offsets[end])
-        confidence = None if self.confidence is None else self.confidence[own]
         labels, part = self.labels[own], d.part(first, end)
-        return Tracks(detections=part, labels=labels, names=self.names, confidence=confidence)
+        return Tracks(detections=part, labels=labels, names=self.names, **self._confidences(own))
 
     def select(self, tracks: Sequence[int | str]) -> Tracks:
         """Return some of the tracks, in the order given, without other tracks and clutter.
@@ -286,7 +294,7 @@ class Tracks:
         Returns
         -------
         Tracks
-            Report and recipe, which are of the whole, are left out.
+            Decisions, info and recipe, which are of the whole, are left out.
 
         Raises
         ------
@@ -305,10 +313,9 @@ class Tracks:
         label_of[chosen] = np.arange(len(chosen))
         labels = label_of[self.labels]
         kept = labels >= 0
-        confidence = None if self.confidence is None else self.confidence[kept]
         names = tuple(self.names[k] for k in chosen)
         d = self.detections.keep(kept)
-        return Tracks(detections=d, labels=labels[kept], names=names, confidence=confidence)
+        return Tracks(detections=d, labels=labels[kept], names=names, **self._confidences(kept))
 
     @property
     def n_tracks(self) -> int:
@@ -365,3 +372,13 @@ class Tracks:
             f"{type(self).__name__}({self.n_tracks} tracks, {len(self.labels) - n_clutter} "
             f"detections in them, {n_clutter} clutter, {self.detections.n_frames} frames)"
         )
+
+
+def _probabilities(name: str, values: ArrayLike | None, n: int) -> NDArray[np.float64] | None:
+    if values is None:
+        return None
+    array = keep_array(name, values, (n,))
+    if array.size and (array.min() < 0 or array.max() > 1):
+        worst = array[np.argmax(np.abs(array - 0.5))]
+        raise ParameterError(name, "probabilities in [0, 1]", worst)
+    return array

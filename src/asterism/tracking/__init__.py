@@ -1,6 +1,7 @@
 """Tracking: from detections to tracks of named markers, one package for each step."""
 
 from asterism.tracking.choose import AUTO, Choice, choose_method
+from asterism.tracking.confidence import assess
 from asterism.tracking.estimation import ModelEstimate, estimate_model
 from asterism.tracking.filling import FilledGap, Filling, fill_gaps
 from asterism.tracking.methods import (
@@ -63,6 +64,7 @@ __all__ = [
     "Stitching",
     "Tracked",
     "Update",
+    "assess",
     "carry_out",
     "check_names",
     "choose_method",

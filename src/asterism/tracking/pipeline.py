@@ -1,4 +1,4 @@
-"""Tracking pipeline: model, method, association, stitching, names, gaps."""
+"""Tracking pipeline: model, method, association, stitching, names, confidence, gaps."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from asterism.errors import ParameterError
 from asterism.model import Detections, MarkerSet, Recipe, TrackingModel, Tracks
 from asterism.model.recipe import sha256_of, versions
 from asterism.records import record
+from asterism.tracking.confidence import assess
+from asterism.tracking.decisions import of_filling, of_naming, of_stitching
 from asterism.tracking.filling import fill_gaps
 from asterism.tracking.methods import METHODS, method_by_name
 from asterism.tracking.methods.associate import associate
@@ -157,7 +159,7 @@ def carry_out(
     marker_sets: Sequence[MarkerSet] = (),
     progress: Callable[[int], Any] | None = None,
 ) -> Tracked:
-    """Carry out a recipe: associate, stitch, name and fill, with a report of each last step.
+    """Carry out a recipe: associate, stitch, name, assess and fill, and report the last steps.
 
     Parameters
     ----------
@@ -194,12 +196,22 @@ def carry_out(
         made, detections, model, seed=recipe.seed, start=start, recipe=carried,
         score=not recipe.stitch, progress=progress,
     )  # fmt: skip
-    if recipe.stitch:
-        tracks = dataclasses.replace(stitch_tracklets(tracks, model).tracks, recipe=carried)
+    stitching = stitch_tracklets(tracks, model) if recipe.stitch else None
+    if stitching is not None:
+        tracks = dataclasses.replace(stitching.tracks, recipe=carried)
     naming = name_tracks(tracks, *marker_sets) if recipe.markers else None
     tracks = tracks if naming is None else naming.tracks
+    tracks = assess(tracks, model, stitching)
+    decisions = tracks.decisions
+    if stitching is not None:
+        decisions += of_stitching(stitching, tracks)
+    if naming is not None:
+        decisions += of_naming(naming)
     filling = fill_gaps(tracks, model=recipe.model) if recipe.fill else None
-    tracks = tracks if filling is None else filling.tracks
+    if filling is not None:
+        tracks = filling.tracks
+        decisions += of_filling(filling)
+    tracks = dataclasses.replace(tracks, decisions=decisions)
     return Tracked(tracks=tracks, naming=naming, filling=filling)
 
 

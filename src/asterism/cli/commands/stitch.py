@@ -86,8 +86,8 @@ def stitch(
         "n_tracks_before": int((capture.tracks.lengths > 0).sum()),
         "n_tracks": found.tracks.n_tracks,
         "n_joins": len(found.joins),
-        "n_cuts": found.n_cuts,
-        "n_ghosts": found.n_ghosts,
+        "n_cuts": len(found.cuts),
+        "n_ghosts": len(found.ghosts),
     }
     if json:
         joins = [
@@ -99,8 +99,8 @@ def stitch(
         rows = [
             ("tracks", f"{figures['n_tracks']}, from {figures['n_tracks_before']}"),
             ("joins", str(len(found.joins))),
-            ("links cut", str(found.n_cuts)),
-            ("ghosts", str(found.n_ghosts)),
+            ("links cut", str(len(found.cuts))),
+            ("ghosts", str(len(found.ghosts))),
             *bond_rows(found.bonds),
             *_least_certain(found, capture),
             ("written", str(out)),

@@ -23,6 +23,7 @@ from asterism.io.captures.c3d_layout import C3DFile, read_c3d
 from asterism.io.captures.c3d_parameters import BLOCK, Group, Parameter, build
 from asterism.io.captures.channels import to_channels, to_dense
 from asterism.io.captures.rates import fixed_rate
+from asterism.io.decisions import as_line, by_expected_wrong, decision_rows
 from asterism.io.units import PER_METRE, to_float32
 from asterism.model import Capture
 
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 
 __all__ = ["write"]
 
+DECISIONS = "DECISIONS"
+"""Group of what the tracking decided; other programs ignore it."""
+_MOST_DECISIONS, _LONGEST_LINE = 255, 120  # of which a parameter block has room for
 _CHUNK = 2048  # frames converted at a time, so that a long capture is not in memory twice
 # Some programs read 0, 0, 0 as a gap whatever the residual is. This distance from the origin is
 # below any precision of measurement.
@@ -65,7 +69,9 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     points. A missed detection is written as 0, 0, 0 with residual -1, as other programs expect.
     C3D holds the first seven cameras of a point. A filled point has residual 0, as the format
     prescribes, and every measured point at least one step; the parameter ASTERISM:FILLED marks such
-    a file. ASTERISM:TRUNCATED keeps the place at which the capture was cut off.
+    a file. ASTERISM:TRUNCATED keeps the place at which the capture was cut off. DECISIONS:LINES
+    lists at most 255 decisions, those with the most expected wrong detections first, and
+    DECISIONS:NUMBER the number of all.
 
     Examples
     --------
@@ -104,6 +110,7 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     filled = d.filled if d.filled is not None and d.filled.any() else None
     truncated = d.truncated if isinstance(d, Capture) else ""
     _set_ours(groups, filled is not None, d.residuals is not None, truncated)
+    _set_decisions(groups, tracks)
     n_blocks = len(build(groups)) // BLOCK
     point = groups["POINT"].parameters  # the number of blocks is final from here on
     point["DATA_START"] = Parameter.of_integers([2 + n_blocks], point["DATA_START"])
@@ -232,6 +239,18 @@ def _set_ours(
         old.parameters["TRUNCATED"] = Parameter.of_strings([MADE_FROM + about])
     if old.parameters:
         groups[OURS] = old
+
+
+def _set_decisions(groups: dict[str, Group], tracks: Tracks) -> None:
+    """Set the decisions that cost most if they are wrong, as lines of text."""
+    groups.pop(DECISIONS, None)
+    if not tracks.decisions:
+        return
+    rows = decision_rows(tracks)
+    lines = [as_line(rows[i]) for i in by_expected_wrong(tracks.decisions)[:_MOST_DECISIONS]]
+    lines = [line.encode()[:_LONGEST_LINE].decode(errors="ignore") for line in lines]
+    number = Parameter.of_reals([float(len(rows))])
+    groups[DECISIONS] = Group({"LINES": Parameter.of_strings(lines), "NUMBER": number})
 
 
 def _mark_filled(

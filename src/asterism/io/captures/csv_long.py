@@ -1,13 +1,13 @@
 """Asterism's own CSV: one row per detection, without loss.
 
-Columns ``frame, time_s, x_m, y_m, z_m, track, name, confidence, filled, std, source_unit``; ``z_m``
-is absent in 2-D, and each of the last four if it has no values. Coordinates are metres. Clutter is
-track -1; ``filled`` is 1 for a point that was not measured; ``std`` is the standard deviation of a
-coordinate in metres, 0 if it is not known. ``source_unit`` is the unit of the source file if that
-is not metres; formats with a unit are written in it again. It is the same in all rows. A row
-without coordinates is a frame without points; a row without frame and time declares a track
-without a detection. Floats have enough digits to restore the same bits. Tabs and line ends in a
-name become blanks.
+Columns ``frame, time_s, x_m, y_m, z_m, track, name, confidence, identity_confidence, filled, std,
+source_unit``; ``z_m`` is absent in 2-D, and each of the last five if it has no values. Coordinates
+are metres. Clutter is track -1; ``filled`` is 1 for a point that was not measured; ``std`` is the
+standard deviation of a coordinate in metres, 0 if it is not known. ``source_unit`` is the unit of
+the source file if that is not metres; formats with a unit are written in it again. It is the same
+in all rows. A row without coordinates is a frame without points; a row without frame and time
+declares a track without a detection. Floats have enough digits to restore the same bits. Tabs and
+line ends in a name become blanks.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["read", "read_tracks", "sniff", "write"]
 
-_COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "track", "name", "confidence", "filled", "std",
-            SOURCE_UNIT)  # fmt: skip
+_COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "track", "name", "confidence",
+            "identity_confidence", "filled", "std", SOURCE_UNIT)  # fmt: skip
 _TEXTS = ("name", SOURCE_UNIT)
 _REQUIRED = ("frame", "time_s", "x_m", "y_m")
 _CHUNK = 4096  # lines or frames at a time
@@ -55,7 +55,7 @@ def read(path: Path) -> Capture:
     Returns
     -------
     Capture
-        Detections, labels and names. `read_tracks` returns the confidence too.
+        Detections, labels and names. `read_tracks` returns the confidences too.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def read(path: Path) -> Capture:
 
 
 def read_tracks(path: Path) -> Tracks:
-    r"""Read the tracks of Asterism's CSV, with their labels, names and confidence.
+    r"""Read the tracks of Asterism's CSV, with their labels, names and confidences.
 
     Parameters
     ----------
@@ -173,9 +173,16 @@ def _load(path: Path) -> tuple[Capture, Tracks]:
         names=track_names,
         warnings=check_size(points[kept], unit),
     )
-    confidence = numbers["confidence"][kept] if "confidence" in header else None
+
+    def sure(name: str) -> NDArray[np.float64] | None:
+        return numbers[name][kept] if name in header else None
+
     tracks = Tracks(
-        detections=capture, labels=track[kept], names=track_names, confidence=confidence
+        detections=capture,
+        labels=track[kept],
+        names=track_names,
+        confidence=sure("confidence"),
+        identity_confidence=sure("identity_confidence"),
     )
     return capture, tracks
 
@@ -205,7 +212,7 @@ def _names(path: Path, track: NDArray[np.int64], names: list[str]) -> tuple[str 
 def write(tracks: Tracks, file: IO[bytes]) -> None:
     """Write tracks as Asterism's CSV, from which `read_tracks` returns the same tracks.
 
-    Labels, names, confidence, points, flags of filled points and standard deviations are kept bit
+    Labels, names, confidences, points, flags of filled points and standard deviations are kept bit
     for bit.
 
     Parameters
@@ -225,7 +232,12 @@ def write(tracks: Tracks, file: IO[bytes]) -> None:
     """
     d = tracks.detections
     filled = None if d.filled is None else d.filled.astype(np.int64)
-    more = {"confidence": tracks.confidence, "filled": filled, "std": d.stds}
+    more = {
+        "confidence": tracks.confidence,
+        "identity_confidence": tracks.identity_confidence,
+        "filled": filled,
+        "std": d.stds,
+    }
     last = {name: values for name, values in more.items() if values is not None}
     unit = d.units if isinstance(d, Capture) and d.units != "m" else ""
     absent = {*more, SOURCE_UNIT} | ({"z_m"} if d.n_axes == 2 else set[str]())

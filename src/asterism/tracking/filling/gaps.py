@@ -278,15 +278,19 @@ def _with(tracks: Tracks, fills: Sequence[tuple[Span, Fill]]) -> Tracks:
         offsets=np.concatenate([[0], np.cumsum(counts)]),
         **{name: np.concatenate([values, new[name]])[order] for name, values in old.items()},
     )
-    confidence = tracks.confidence
-    if confidence is not None:
+
+    def of_both_ends(confidence: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+        if confidence is None:
+            return None
         of_ends = np.minimum(confidence[before], confidence[after])
-        confidence = np.concatenate([confidence, of_ends])[order]
+        return np.concatenate([confidence, of_ends])[order]
+
     return replace(
         tracks,
         detections=detections,
         labels=np.concatenate([tracks.labels, labels])[order],
-        confidence=confidence,
+        confidence=of_both_ends(tracks.confidence),
+        identity_confidence=of_both_ends(tracks.identity_confidence),
     )
 
 

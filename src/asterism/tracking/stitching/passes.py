@@ -38,15 +38,12 @@ class Pass:
         marker.
     probabilities : ndarray of shape (F,)
         Probability of the decision about each tracklet.
-    n_cuts : int
-        Number of links that were cut because the neighbours contradict them.
     """
 
     tracklets: NDArray[np.int32]
     markers: NDArray[np.int32]
     after: NDArray[np.int32]
     probabilities: NDArray[np.float64]
-    n_cuts: int
 
     def advise(self, stitcher: _engine.Stitcher) -> None:
         """Pass the joins of these tracklets as prior log odds to a pass in the other direction.
@@ -111,7 +108,4 @@ def go_through(
             np.ascontiguousarray(labels[own][::way], dtype=np.int64),
         )  # fmt: skip
     markers, after, probabilities = stitcher.finish()
-    return Pass(
-        tracklets=tracklets, markers=markers, after=after, probabilities=probabilities,
-        n_cuts=stitcher.n_cuts,
-    )  # fmt: skip
+    return Pass(tracklets=tracklets, markers=markers, after=after, probabilities=probabilities)

@@ -74,9 +74,9 @@ class Stitching:
         Preceding tracklet of each tracklet, -1 for the first of a marker.
     probabilities : ndarray of shape (F,)
         Probability of the decision about each tracklet.
-    n_cuts : int
-        Number of links of the input tracks that were cut because the neighbours contradict
-        them.
+    cuts : ndarray of int, shape (C, 2)
+        Detections before and after each link of the input tracks that was cut because the
+        neighbours contradict it.
 
     Examples
     --------
@@ -86,7 +86,7 @@ class Stitching:
     >>> corrupted = am.simulate.corrupt(truth, burst=burst, seed=1)
     >>> model = am.tracking.tracklet_model(am.estimate_model(corrupted.detections).model)
     >>> stitching = am.stitch(am.track(corrupted.detections, am.GNN(), model=model), model)
-    >>> stitching.tracks.n_tracks, len(stitching.joins), stitching.n_ghosts
+    >>> stitching.tracks.n_tracks, len(stitching.joins), len(stitching.ghosts)
     (8, 2, 0)
     >>> stitching.bonds
     Bonds(8 markers, 28 pairs, 28 rigid, 1 clusters)
@@ -97,23 +97,28 @@ class Stitching:
     markers: NDArray[np.int32]
     after: NDArray[np.int32]
     probabilities: NDArray[np.float64]
-    n_cuts: int
+    cuts: NDArray[np.int64]
 
     @property
-    def n_ghosts(self) -> int:
-        """Number of tracklets that are ghosts."""
-        return int((self.markers == GHOST).sum())
+    def ghosts(self) -> NDArray[np.int64]:
+        """Tracklets that are ghosts."""
+        return np.flatnonzero(self.markers == GHOST)
+
+    @cached_property
+    def extents(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """First and last detection of each tracklet, and their number, each of shape (F,)."""
+        inside = np.flatnonzero(self.tracklets >= 0)
+        own = self.tracklets[inside]
+        first, last = np.zeros((2, len(self.markers)), dtype=np.int64)
+        first[own[::-1]] = inside[::-1]  # the last assignment is of the first detection
+        last[own] = inside
+        return first, last, np.bincount(own, minlength=len(self.markers))
 
     @cached_property
     def joins(self) -> tuple[Join, ...]:
         """All joins, in order of time."""
         frame = self.tracks.detections.frame_of
-        inside = self.tracklets >= 0
-        n = len(self.markers)
-        first = np.full(n, np.iinfo(np.int64).max)
-        last = np.full(n, -1)
-        np.minimum.at(first, self.tracklets[inside], frame[inside])
-        np.maximum.at(last, self.tracklets[inside], frame[inside])
+        first, last = (frame[each] for each in self.extents[:2])
         found = np.flatnonzero((self.after >= 0) & (self.markers >= 0))
         order = found[np.lexsort((found, first[found]))]
         return tuple(
@@ -134,7 +139,7 @@ class Stitching:
     def __repr__(self) -> str:
         return (
             f"Stitching({self.tracks.n_tracks} tracks, {len(self.joins)} joins, "
-            f"{self.n_cuts} cuts, {self.n_ghosts} ghosts)"
+            f"{len(self.cuts)} cuts, {len(self.ghosts)} ghosts)"
         )
 
 
@@ -221,9 +226,7 @@ def stitch(
     limits = (model, confirm, ghost_radius, max_occlusion)
     options = stitch_options(*limits)
     found = go_through(d, tracks.labels, model, options)
-    n_cuts = found.n_cuts
     found = go_through(d, found.tracklets, model, options, before=found, backward=True)
-    n_cuts += found.n_cuts
     options = stitch_options(*limits, may_cut=False)
     found = go_through(d, found.tracklets, model, options, before=found)
     tracklets, markers, after = found.tracklets, found.markers, found.after
@@ -231,6 +234,7 @@ def stitch(
     labels = np.append(np.maximum(markers, -1), -1).astype(np.int64)[tracklets]
     labels.flags.writeable = False  # no other object refers to it: no need to copy
     n_markers = int(markers.max(initial=-1)) + 1
+    cuts = _cuts(tracks, tracklets)
     n_joins = int(((after >= 0) & (markers >= 0)).sum())
     result = Tracks(
         detections=d,
@@ -242,13 +246,13 @@ def stitch(
             # the markers.
             **{name: value for name, value in tracks.info.items() if name != "log_posterior"},
             "joins": n_joins,
-            "cuts": n_cuts,
+            "cuts": len(cuts),
             "ghosts": int((markers == GHOST).sum()),
         },
     )
     return Stitching(
         tracks=result, tracklets=tracklets, markers=markers, after=after,
-        probabilities=found.probabilities, n_cuts=n_cuts,
+        probabilities=found.probabilities, cuts=cuts,
     )  # fmt: skip
 
 
@@ -324,6 +328,18 @@ def _names(
             if names[marker] is None and name not in names:
                 names[marker] = name
     return tuple(names)
+
+
+def _cuts(tracks: Tracks, tracklets: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Return the detections before and after each link that was cut, in order of time."""
+    order, _ = tracks.by_track
+    order = order[tracklets[order] >= 0]
+    before, after = order[:-1], order[1:]
+    is_cut = (tracks.labels[before] == tracks.labels[after]) & (
+        tracklets[before] != tracklets[after]
+    )
+    cuts = np.stack([before[is_cut], after[is_cut]], axis=1)
+    return cuts[np.argsort(cuts[:, 1], kind="stable")]
 
 
 def _confidence(

@@ -1,0 +1,242 @@
+"""Fit the constants of the confidence on simulated people, and check them on real captures.
+
+People walk, run, turn and jump, two walk through each other, and fingers move; for every second
+seed markers wobble and slip; corrupted in five ways. Each part of a track between uncertain links
+is right if most of its detections are of the marker that holds most of the track; each exchange is
+right if the later part of one track belongs to the other. The logistic functions of
+``tracking/confidence/calibration.py`` are fitted by maximum likelihood. The check is of the
+captures of ``../shared/data`` (or ``--data``) in four conditions.
+
+    python benchmarks/calibration.py [--seeds N] [--data FOLDER] [--markdown FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+import asterism as am
+from asterism.simulate import Burst, Ghosts
+from asterism.tracking.confidence import calibration
+from asterism.tracking.confidence.identity import Examined, examine
+from asterism.tracking.methods.associate import associate
+from captures import captures
+from identity import CONDITIONS
+from report import conditions, publish, table
+
+Array = NDArray[np.float64]
+Corrupt = Callable[[am.Tracks, int], am.Tracks]
+
+FIRST_SEED = 11
+SCENES: dict[str, Callable[[int], am.Tracks]] = {
+    **{
+        activity: lambda seed, activity=activity: am.simulate.person(
+            activity=activity, frames=600, seed=seed
+        )
+        for activity in ("walk", "run", "turn", "jump")
+    },
+    "two people": lambda seed: am.simulate.two_people(frames=400, seed=seed),
+    "fingers": lambda seed: am.simulate.fingers(seed=seed),
+}
+
+
+def loosened(truth: am.Tracks, seed: int) -> am.Tracks:
+    """Let markers wobble on soft tissue by millimetres to centimetres, and a fifth of them slip."""
+    rng = np.random.default_rng(seed)
+    positions, t = truth.positions(), truth.detections.times
+    for k in range(truth.n_tracks):
+        wobble = rng.exponential(0.005) * np.sin(
+            2 * np.pi * (rng.uniform(0.5, 3) * t + rng.uniform())
+        )
+        positions[:, k] += wobble[:, None] * rng.standard_normal(3) / np.sqrt(3)
+        if rng.uniform() < 0.2:
+            when = rng.uniform(t[0], t[-1])
+            slip = 1 / (1 + np.exp(-(t - when) / 0.1))
+            positions[:, k] += slip[:, None] * rng.normal(0, 0.03, 3)
+    return am.Tracks.from_dense(t, positions, truth.names)
+
+
+def missing(truth: am.Tracks, seed: int, stride: int) -> am.Tracks:
+    return am.simulate.corrupt(
+        truth, missing=0.1, clutter=0.1, noise=3e-4, stride=stride, seed=seed
+    )
+
+
+def bursts(truth: am.Tracks, seed: int, stride: int) -> am.Tracks:
+    return am.simulate.corrupt(
+        truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, stride=stride, seed=seed
+    )
+
+
+CORRUPTED: dict[str, Corrupt] = {
+    "10 %/10 %": lambda truth, seed: missing(truth, seed, 1),
+    "10 %/10 %, half rate": lambda truth, seed: missing(truth, seed, 2),
+    "10 %/10 %, third of the rate": lambda truth, seed: missing(truth, seed, 3),
+    "bursts": lambda truth, seed: bursts(truth, seed, 1),
+    "bursts, half rate": lambda truth, seed: bursts(truth, seed, 2),
+}
+
+
+def tracked(
+    truth: am.Tracks,
+) -> tuple[am.Tracks, am.TrackingModel, am.tracking.Stitching | None]:
+    """Track by the default path, up to the confidence."""
+    plan = am.tracking.plan_tracking(truth.detections)
+    model = plan.recipe.model
+    model = am.tracking.tracklet_model(model) if plan.recipe.stitch else model
+    tracks = associate(plan.method, truth.detections, model, score=False)
+    if not plan.recipe.stitch:
+        return tracks, model, None
+    stitching = am.stitch(tracks, model)
+    return stitching.tracks, model, stitching
+
+
+def is_wrong(tracks: am.Tracks, truth: am.Tracks) -> NDArray[np.bool_]:
+    """Return for each detection whether it is not of the marker that holds most of its track."""
+    inside = (tracks.labels >= 0) & (truth.labels >= 0)
+    counts = np.zeros((tracks.n_tracks, truth.n_tracks), dtype=np.int64)
+    np.add.at(counts, (tracks.labels[inside], truth.labels[inside]), 1)
+    most = np.where(counts.any(axis=1), counts.argmax(axis=1), -2)
+    return (tracks.labels >= 0) & (truth.labels != most[tracks.labels])
+
+
+def most_frequent(labels: NDArray[np.int64]) -> int:
+    labels = labels[labels >= 0]
+    return int(np.bincount(labels).argmax()) if len(labels) else -1
+
+
+def parts_of(found: Examined, tracks: am.Tracks, truth: am.Tracks) -> tuple[Array, Array]:
+    """Return features of the parts that are not whole tracks, and whether each is right."""
+    parts, evidence = found.parts, found.evidence
+    used = evidence.is_known & ~parts.is_whole(tracks.n_tracks)
+    wrong = is_wrong(tracks, truth)[tracks.by_track[0]]
+    right = 1 - np.add.reduceat(wrong, parts.offsets[:-1]) / parts.n_detections
+    features = calibration.part_features(evidence, parts.weakest, parts.n_detections)
+    return features[used], (right > 0.5)[used].astype(float)
+
+
+def exchanges_of(found: Examined, tracks: am.Tracks, truth: am.Tracks) -> tuple[Array, Array]:
+    """Return features of the exchanges between tracks, and whether each is right."""
+    d, ex = tracks.detections, found.exchanges
+    by_tracklet = np.lexsort((d.frame_of, found.tracklets))
+    keys = found.tracklets[by_tracklet] * d.n_frames + d.frame_of[by_tracklet]
+    rows: list[list[float]] = []
+    right: list[float] = []
+    for frame, pair, ratio, mutual in zip(
+        ex.frames, ex.pairs, ex.ratios, ex.is_mutual, strict=True
+    ):
+        ends: list[int] = []
+        for own in pair:
+            at = int(np.searchsorted(keys, own * d.n_frames + frame))
+            near = by_tracklet[max(at - 6, 0) : at + 6]
+            near = near[found.tracklets[near] == own]
+            before = d.frame_of[near] < frame
+            ends += [most_frequent(truth.labels[near[half]]) for half in (before, ~before)]
+        if tracks.labels[by_tracklet[np.searchsorted(keys, pair * d.n_frames)]].std() == 0:
+            continue  # both are of one track
+        crossed = (ends[0] == ends[3] >= 0) or (ends[2] == ends[1] >= 0)
+        rows.append([1.0, float(np.clip(ratio, -10, 10)), float(mutual)])
+        right.append(float(crossed and (ends[0] != ends[1] or ends[2] != ends[3])))
+    return np.array(rows).reshape(-1, 3), np.array(right)
+
+
+def fit(features: Array, right: Array) -> Array:
+    """Return the maximum-likelihood weights of a logistic function."""
+
+    def loss(weights: Array) -> tuple[float, Array]:
+        z = features @ weights
+        error = 1 / (1 + np.exp(-z)) - right
+        return float(np.mean(np.logaddexp(0, z) - right * z)), features.T @ error / len(right)
+
+    return minimize(loss, np.zeros(features.shape[1]), jac=True, method="BFGS").x
+
+
+def simulated(seeds: int) -> Iterator[tuple[str, am.Tracks]]:
+    for seed, (scene, make) in itertools.product(
+        range(FIRST_SEED, FIRST_SEED + seeds), SCENES.items()
+    ):
+        truth = make(seed) if seed % 2 else loosened(make(seed), seed)
+        for name, corrupt in CORRUPTED.items():
+            yield f"{scene}, seed {seed}, {name}", corrupt(truth, seed)
+
+
+class Reliability:
+    """Confidence of identities, and whether they are right, over several captures."""
+
+    def __init__(self) -> None:
+        self.parts: list[tuple[Array, NDArray[np.bool_]]] = []
+
+    def add(self, tracks: am.Tracks, truth: am.Tracks) -> None:
+        """Count the detections of one result."""
+        assert tracks.identity_confidence is not None
+        inside = tracks.labels >= 0
+        self.parts.append((tracks.identity_confidence[inside], ~is_wrong(tracks, truth)[inside]))
+
+    def row(self, name: str) -> list[str]:
+        """Return the row of a table."""
+        sure, right = (np.concatenate(each) for each in zip(*self.parts, strict=True))
+        c = am.metrics.calibration_curve(sure, right)
+        return [
+            name, f"{len(right):,}", f"{int((~right).sum()):,}", f"{sure.mean():.4f}",
+            f"{right.mean():.4f}", f"{c.ece:.4f}", f"{c.auc:.3f}", f"{(sure >= 0.99).mean():.3f}",
+        ]  # fmt: skip
+
+
+HEAD = (
+    "detections", "in tracks", "wrong", "mean confidence", "right", "ECE",
+    "AUC for wrong identities", "confidence ≥ 0.99",
+)  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--data", type=Path, default=beside)
+    parser.add_argument("--markdown", type=Path)
+    options = parser.parse_args()
+    parts: list[tuple[Array, Array]] = []
+    exchanges: list[tuple[Array, Array]] = []
+    reliability: dict[str, Reliability] = {}
+    for name, truth in simulated(options.seeds):
+        tracks, model, stitching = tracked(truth)
+        found = examine(tracks, model, stitching)
+        parts.append(parts_of(found, tracks, truth))
+        exchanges.append(exchanges_of(found, tracks, truth))
+        own = reliability.setdefault("simulated people", Reliability())
+        own.add(am.tracking.assess(tracks, model, stitching), truth)
+        print(name, flush=True)
+    weights = {
+        name: fit(*(np.concatenate(each) for each in zip(*all_of, strict=True)))
+        for name, all_of in (("EXCHANGE", exchanges), ("PART", parts))
+    }
+    for name, values in weights.items():
+        print(name, "=", tuple(round(float(w), 2) for w in values), flush=True)
+    each: list[list[str]] = []
+    for path in captures(options.data):
+        capture = am.read(path)
+        if not any(capture.names):
+            continue
+        for condition, corrupt in CONDITIONS.items():
+            truth = corrupt(capture.tracks)
+            tracks = am.tracking.assess(*tracked(truth))
+            reliability.setdefault(f"captures, {condition}", Reliability()).add(tracks, truth)
+            own = Reliability()
+            own.add(tracks, truth)
+            each.append(own.row(f"{path.name}, {condition}"))
+            print(*each[-1], sep=" | ", flush=True)
+    lines = [*table(HEAD, [r.row(name) for name, r in reliability.items()]), ""]
+    fitted = (f"{name} {tuple(round(float(w), 2) for w in v)}" for name, v in weights.items())
+    lines += [f"Fitted on simulated people: {', '.join(fitted)}.", ""]
+    lines += ["Each capture:", "", *table(HEAD, each), "", f"{conditions()}."]
+    publish(lines, options.markdown)
+
+
+if __name__ == "__main__":
+    main()

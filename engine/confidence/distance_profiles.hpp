@@ -1,0 +1,279 @@
+// Evidence of the distances to other tracks for the identity of a part of a track.
+//
+// A track that stays on one marker keeps its distances to the other markers of the segment. The
+// profile of a track holds the median and the spread of its distances to the longest tracks, over
+// frames spread through the capture. A part of a track is compared with the profile of its own
+// track, with those of tracks that are absent meanwhile, and with an unknown marker.
+//
+//   d    distance of the part to another track, the median of a few frames
+//   m, s median and spread of that distance in a profile
+//   log density: Student's t of (d - m) / s, in the mean over the steadiest distances
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "math/point.hpp"
+
+namespace asterism {
+
+// Detections by frame, with the track of each, -1 for none.
+struct LabelledFrames {
+  std::span<const Point> points;
+  std::span<const std::int64_t> labels, offsets;
+  std::int64_t n_tracks = 0;
+  int D = 3;
+
+  std::int64_t n_frames() const { return static_cast<std::int64_t>(offsets.size()) - 1; }
+};
+
+// Frames of a part of a track, and tracks that may have exchanged their later parts with it.
+struct TrackPart {
+  std::int32_t track = 0;
+  std::span<const std::int64_t> frames;  // of its detections
+  std::array<std::int32_t, 2> partners{-1, -1};
+};
+
+// Log densities of the distances of a part, relative to its own track.
+struct PartEvidence {
+  static constexpr std::size_t kMost = 3;
+  // Of the tracks that fit best, by falling density; unused ones have the density -inf.
+  std::array<std::int32_t, kMost> track{-1, -1, -1};
+  std::array<double, kMost> density{-kInfinite, -kInfinite, -kInfinite};
+  double unknown = 0;     // density of an unknown marker
+  bool is_known = false;  // whether the part has enough steady distances
+
+ private:
+  static constexpr double kInfinite = std::numeric_limits<double>::infinity();
+};
+
+class DistanceProfiles {
+ public:
+  // `noise` is the standard deviation of a coordinate.
+  DistanceProfiles(const LabelledFrames& all, double noise)
+      : all_(all), floor2_(2 * std::max(noise * noise, kMinNoise * kMinNoise)) {
+    choose_references();
+    sample();
+  }
+
+  PartEvidence compare(const TrackPart& part) {
+    PartEvidence found;
+    measure(part);
+    const std::vector<Distance>& profile_of_own = profile(part.track);
+    steady_.clear();
+    for (std::size_t r = 0; r < references_.size(); ++r) {
+      const Distance& own = profile_of_own[r];
+      if (references_[r] != part.track && own.is_known() && distances_[r] >= 0 &&
+          own.spread < kSteady)
+        steady_.push_back({own.spread, r});
+    }
+    if (steady_.size() < kMinNeighbours) return found;
+    const std::size_t n = std::min(steady_.size(), kNeighbours);
+    std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n),
+                      steady_.end());
+    steady_.resize(n);
+    found.is_known = true;
+    double own = 0, unknown = 0;
+    for (const auto& [spread, r] : steady_) {
+      const double off = distances_[r] - profile_of_own[r].median;
+      own += log_t(off, spread);
+      unknown += log_t(off, std::hypot(spread, kUnknownSpread));
+    }
+    found.unknown = (unknown - own) / static_cast<double>(n);
+    for (std::int32_t k = 0; k < static_cast<std::int32_t>(all_.n_tracks); ++k) {
+      if (k == part.track) continue;
+      const bool is_partner = std::ranges::find(part.partners, k) != part.partners.end();
+      if (!is_partner && kMaxPresent * static_cast<double>(n_measured_) < n_present_[k]) continue;
+      if (may_be_same(part.track, k)) continue;
+      const std::vector<Distance>& profile_of_other = profile(k);
+      double sum = 0;
+      std::size_t n_common = 0;
+      for (const auto& [spread, r] : steady_) {
+        const Distance& other = profile_of_other[r];
+        if (!other.is_known() || references_[r] == k) continue;
+        ++n_common;
+        sum += log_t(distances_[r] - other.median, other.spread) -
+               log_t(distances_[r] - profile_of_own[r].median, spread);
+      }
+      if (n_common >= kMinNeighbours) offer(found, k, sum / static_cast<double>(n_common));
+    }
+    return found;
+  }
+
+ private:
+  static constexpr std::size_t kSamples = 160;     // frames of the profiles
+  static constexpr std::size_t kReferences = 128;  // longest tracks, to which distances are taken
+  static constexpr std::size_t kPartFrames = 8;    // frames of a part
+  static constexpr std::size_t kNeighbours = 6, kMinNeighbours = 2;
+  static constexpr std::size_t kMinFrames = 6;  // of a distance in a profile
+  static constexpr double kMinNoise = 1e-3;     // metres
+  static constexpr double kBend = 0.02;         // spread of a distance as a share of it
+  static constexpr double kSteady = 0.1, kUnknownSpread = 0.1;  // metres
+  static constexpr double kSame = -0.5;  // log density of the difference of equal profiles
+  static constexpr double kMaxPresent = 0.2;  // share of a part in which an alternative is present
+
+  struct Distance {
+    double median = -1, spread = 0;
+    bool is_known() const { return median >= 0; }
+  };
+
+  // Student's t with three degrees of freedom, without its constant.
+  static double log_t(double off, double spread) {
+    return -2 * std::log1p(off * off / (3 * spread * spread)) - std::log(spread);
+  }
+  // Whether two tracks may be of one marker: they are never present together, and their profiles
+  // agree in the steady distances.
+  bool may_be_same(std::int32_t own, std::int32_t other) {
+    if (has_both(own, other)) return false;
+    double sum = 0;
+    std::size_t n = 0;
+    for (const auto& [spread, r] : steady_) {
+      const Distance &a = profile(own)[r], &b = profile(other)[r];
+      if (!b.is_known() || references_[r] == other) continue;
+      const double both = std::hypot(a.spread, b.spread);
+      sum += log_t(a.median - b.median, both) - log_t(0, both);
+      ++n;
+    }
+    return n >= kMinNeighbours && sum > kSame * static_cast<double>(n);
+  }
+  bool has_both(std::int32_t a, std::int32_t b) const {
+    const auto &of_a = samples_[a], &of_b = samples_[b];
+    for (std::size_t i = 0, j = 0; i < of_a.size() && j < of_b.size();) {
+      if (of_a[i].first == of_b[j].first) return true;
+      of_a[i].first < of_b[j].first ? ++i : ++j;
+    }
+    return false;
+  }
+  static void offer(PartEvidence& found, std::int32_t track, double density) {
+    for (std::size_t i = 0; i < PartEvidence::kMost; ++i)
+      if (density > found.density[i]) {
+        std::swap(density, found.density[i]);
+        std::swap(track, found.track[i]);
+      }
+  }
+  static double median_of(std::vector<double>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::ranges::nth_element(values, middle);
+    return *middle;
+  }
+
+  void choose_references() {
+    std::vector<std::int64_t> length(all_.n_tracks, 0);
+    for (const std::int64_t k : all_.labels)
+      if (k >= 0) ++length[k];
+    references_.resize(all_.n_tracks);
+    std::iota(references_.begin(), references_.end(), 0);
+    std::ranges::stable_sort(references_, std::greater<>(),
+                             [&](std::int32_t k) { return length[k]; });
+    references_.resize(std::min(references_.size(), kReferences));
+    reference_of_.assign(all_.n_tracks, -1);
+    for (std::size_t r = 0; r < references_.size(); ++r)
+      reference_of_[references_[r]] = static_cast<std::int32_t>(r);
+    distances_.resize(references_.size());
+    n_present_.resize(all_.n_tracks);
+  }
+
+  // Calls take(track, reference or -1, point) for the detections of a frame that are in tracks.
+  template <typename Take>
+  void each_in(std::int64_t frame, Take&& take) const {
+    for (std::int64_t i = all_.offsets[frame]; i < all_.offsets[frame + 1]; ++i)
+      if (const std::int64_t k = all_.labels[i]; k >= 0)
+        take(static_cast<std::int32_t>(k), reference_of_[k], all_.points[i]);
+  }
+
+  // Collects the detections of the sampled frames.
+  void sample() {
+    const std::size_t R = references_.size();
+    const auto n_samples = std::min<std::int64_t>(kSamples, all_.n_frames());
+    samples_.resize(all_.n_tracks);
+    at_.assign(static_cast<std::size_t>(n_samples) * R, {});
+    has_.assign(at_.size(), 0);
+    profiles_.resize(all_.n_tracks);
+    for (std::int64_t s = 0; s < n_samples; ++s)
+      each_in(frame_of(s), [&](std::int32_t k, std::int32_t r, const Point& y) {
+        samples_[k].push_back({s, y});
+        if (r < 0) return;
+        at_[s * R + r] = y;
+        has_[s * R + r] = 1;
+      });
+  }
+
+  // The profile of a track, which is computed when it is first needed.
+  const std::vector<Distance>& profile(std::int32_t track) {
+    std::vector<Distance>& profile = profiles_[track];
+    if (!profile.empty()) return profile;
+    const std::size_t R = references_.size();
+    profile.resize(R);
+    std::vector<double>& values = of_samples_;
+    for (std::size_t r = 0; r < R; ++r) {
+      if (references_[r] == track) continue;
+      values.clear();
+      for (const auto& [s, y] : samples_[track])
+        if (has_[s * R + r]) values.push_back(std::sqrt(squared_distance(y, at_[s * R + r], all_.D)));
+      if (values.size() < kMinFrames) continue;
+      Distance& distance = profile[r];
+      distance.median = median_of(values);
+      for (double& value : values) value = std::abs(value - distance.median);
+      const double spread = kOfNormal * median_of(values), bend = kBend * distance.median;
+      distance.spread = std::sqrt(spread * spread + floor2_ + bend * bend);
+    }
+    return profile;
+  }
+  std::int64_t frame_of(std::int64_t sample) const {
+    return sample * all_.n_frames() / std::min<std::int64_t>(kSamples, all_.n_frames());
+  }
+
+  // The median distances of a part to the references, -1 where there is none.
+  void measure(const TrackPart& part) {
+    const std::size_t R = references_.size(), n = part.frames.size();
+    n_measured_ = std::min(n, kPartFrames);
+    std::ranges::fill(n_present_, 0);
+    values_.resize(R * kPartFrames);
+    counts_.assign(R, 0);
+    for (std::size_t i = 0; i < n_measured_; ++i) {
+      const std::int64_t frame = part.frames[n_measured_ < 2 ? 0 : i * (n - 1) / (n_measured_ - 1)];
+      Point own;
+      each_in(frame, [&](std::int32_t k, std::int32_t, const Point& y) {
+        n_present_[k] += 1;
+        if (k == part.track) own = y;
+      });
+      each_in(frame, [&](std::int32_t, std::int32_t r, const Point& y) {
+        if (r >= 0)
+          values_[r * kPartFrames + counts_[r]++] = std::sqrt(squared_distance(own, y, all_.D));
+      });
+    }
+    for (std::size_t r = 0; r < R; ++r) {
+      distances_[r] = -1;
+      if (counts_[r] == 0) continue;
+      const auto begin = values_.begin() + static_cast<std::ptrdiff_t>(r * kPartFrames);
+      std::nth_element(begin, begin + counts_[r] / 2, begin + counts_[r]);
+      distances_[r] = *(begin + counts_[r] / 2);
+    }
+  }
+
+  static constexpr double kOfNormal = 1.4826;  // standard deviation per median deviation
+
+  LabelledFrames all_;
+  double floor2_;
+  std::vector<std::int32_t> references_, reference_of_;
+  std::vector<std::vector<std::pair<std::int64_t, Point>>> samples_;  // of each track
+  std::vector<Point> at_;  // of the references in the sampled frames
+  std::vector<char> has_;  // whether a reference is present
+  std::vector<std::vector<Distance>> profiles_;  // of each track, empty until it is needed
+  std::vector<double> of_samples_;
+  // Of the part that is compared.
+  std::size_t n_measured_ = 0;
+  std::vector<double> values_, distances_, n_present_;
+  std::vector<std::ptrdiff_t> counts_;
+  std::vector<std::pair<double, std::size_t>> steady_;
+};
+
+}  // namespace asterism

@@ -1,0 +1,96 @@
+"""Constants of the confidence, fitted on simulated people by ``benchmarks/calibration.py``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.tracking.confidence.parts import Evidence
+
+__all__ = [
+    "EXCHANGE",
+    "PART",
+    "WHOLE",
+    "exchange_probability",
+    "part_features",
+    "part_probability",
+]
+
+EXCHANGE = (-1.15, 0.15, 0.86)
+"""Log odds of an exchange: constant, factor of its log-likelihood ratio, and of both links."""
+PART = (-1.29, 0.86, 0.67, 0.15, 0.17)
+"""Log odds that a part is on the marker of its track: constant, and the factors of the margins of
+its distances over an unknown marker and over the best other track, of the log odds of the less
+certain link or join at its ends, and of the logarithm of its number of detections."""
+WHOLE = 0.9999
+"""Probability of a part without an uncertain link or join."""
+MARGINS = (-2.0, 4.0)
+"""Bounds of the margins."""
+EVEN = 1e-4
+"""Smallest probability whose log odds are used, and its complement."""
+
+
+def log_odds(probability: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return log(p / (1 - p)), bounded."""
+    p = np.clip(probability, EVEN, 1 - EVEN)
+    return np.log(p / (1 - p))
+
+
+def exchange_probability(
+    ratio: NDArray[np.float64], is_mutual: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the probability that two tracks have exchanged their later parts.
+
+    Parameters
+    ----------
+    ratio : ndarray of shape (n,)
+        Log-likelihood ratio of the exchange by the motion model.
+    is_mutual : ndarray of bool, shape (n,)
+        Whether both tracks continue after the exchange.
+    """
+    constant, factor, mutual = EXCHANGE
+    return _probability(constant + factor * np.clip(ratio, -10, 10) + mutual * is_mutual)
+
+
+def part_features(
+    evidence: Evidence, weakest: NDArray[np.float64], n_detections: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return what the probability of each part is computed from, shape (P, 5).
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Comparison of the distances of the parts.
+    weakest : ndarray of shape (P,)
+        Probability of the less certain link or join at the ends of each part.
+    n_detections : ndarray of int, shape (P,)
+        Number of detections of each part.
+    """
+    return np.column_stack(
+        [
+            np.ones(len(weakest)),
+            np.clip(-evidence.unknown, *MARGINS),
+            np.clip(-evidence.densities[:, 0], *MARGINS),
+            log_odds(weakest),
+            np.log(np.maximum(n_detections, 1)),
+        ]
+    )
+
+
+def part_probability(features: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the probability that parts of tracks are on the marker of their track.
+
+    Parameters
+    ----------
+    features : ndarray of shape (P, 5)
+        Result of `part_features`.
+    """
+    return _probability(features @ np.array(PART))
+
+
+def _probability(log_odds: NDArray[np.float64]) -> NDArray[np.float64]:
+    return 1 / (1 + np.exp(-log_odds))

@@ -1,0 +1,138 @@
+"""Parts of tracks between uncertain links."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism import _engine
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import Tracks
+
+__all__ = ["Evidence", "Parts", "compare", "part_tracks"]
+
+
+@record(eq=False)
+class Parts:
+    """Parts of tracks, in the order of `Tracks.by_track`.
+
+    Parameters
+    ----------
+    track : ndarray of int, shape (P,)
+        Track of each part.
+    offsets : ndarray of int, shape (P + 1,)
+        Part ``p`` holds ``order[offsets[p]:offsets[p + 1]]``, with the order of `Tracks.by_track`.
+    before : ndarray of shape (P,)
+        Probability of the link that leads to each part, 1 for the first part of a track.
+    """
+
+    track: NDArray[np.int64]
+    offsets: NDArray[np.int64]
+    before: NDArray[np.float64]
+
+    @property
+    def n_detections(self) -> NDArray[np.int64]:
+        """Number of detections of each part, shape (P,)."""
+        return np.diff(self.offsets)
+
+    @property
+    def weakest(self) -> NDArray[np.float64]:
+        """Probability of the less certain link at the ends of each part, shape (P,)."""
+        return np.minimum(self.before, self.after)
+
+    def is_whole(self, n_tracks: int) -> NDArray[np.bool_]:
+        """Return whether each part is a whole track, shape (P,)."""
+        return np.bincount(self.track, minlength=n_tracks)[self.track] == 1
+
+    @property
+    def after(self) -> NDArray[np.float64]:
+        """Probability of the link that leaves each part, 1 for the last part of a track."""
+        return np.append(self.before[1:], 1.0)
+
+
+@record(eq=False, kw_only=False)
+class Evidence:
+    """Comparison of parts with the distances that tracks keep.
+
+    Parameters
+    ----------
+    is_known : ndarray of bool, shape (P,)
+        Whether a part has enough steady distances; False for whole tracks, which are not compared.
+    unknown : ndarray of shape (P,)
+        Log density of an unknown marker relative to the own track.
+    alternatives : ndarray of int, shape (P, 3)
+        Other tracks whose distances fit best, -1 for none.
+    densities : ndarray of shape (P, 3)
+        Their log densities relative to the own track, falling; -inf for none.
+    """
+
+    is_known: NDArray[np.bool_]
+    unknown: NDArray[np.float64]
+    alternatives: NDArray[np.int64]
+    densities: NDArray[np.float64]
+
+
+def part_tracks(tracks: Tracks, link: NDArray[np.float64], max_probability: float) -> Parts:
+    """Cut tracks at uncertain links.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture.
+    link : ndarray of shape (N,)
+        Probability of the link that leads to each detection.
+    max_probability : float
+        Tracks are cut at links of at most that probability.
+    """
+    order, offsets = tracks.by_track
+    probability = link[order]
+    is_first = np.zeros(len(order), dtype=bool)
+    is_first[offsets[:-1][np.diff(offsets) > 0]] = True
+    starts = np.flatnonzero(is_first | (probability <= max_probability))
+    before = np.where(is_first[starts], 1.0, probability[starts])
+    return Parts(
+        track=tracks.labels[order[starts]],
+        offsets=np.append(starts, len(order)).astype(np.int64),
+        before=before,
+    )
+
+
+def compare(
+    tracks: Tracks, parts: Parts, partners: NDArray[np.int64], noise_sigma: float
+) -> Evidence:
+    """Compare the distances of parts to other tracks with those that tracks keep.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture.
+    parts : Parts
+        Parts of the tracks.
+    partners : ndarray of int, shape (P, 2)
+        Tracks that may have exchanged a part with the own track at its start and at its end, -1
+        for none.
+    noise_sigma : float
+        Standard deviation of a coordinate, metres.
+    """
+    d = tracks.detections
+    order, _ = tracks.by_track
+    n = len(parts.track)
+    evidence = Evidence(
+        np.zeros(n, bool), np.zeros(n), np.full((n, 3), -1), np.full((n, 3), -np.inf)
+    )
+    used = np.flatnonzero(~parts.is_whole(tracks.n_tracks))
+    if len(used):
+        found = _engine.compare_parts(
+            np.ascontiguousarray(d.points), tracks.labels, d.offsets, tracks.n_tracks, noise_sigma,
+            parts.track[used], d.frame_of[order].astype(np.int64),
+            np.stack([parts.offsets[used], parts.offsets[used + 1]], axis=1), partners[used],
+        )  # fmt: skip
+        arrays = evidence.is_known, evidence.unknown, evidence.alternatives, evidence.densities
+        for values, own in zip(arrays, found, strict=True):
+            values[used] = own
+    return evidence
