@@ -117,7 +117,14 @@ nb::tuple carried(const In<double>& a, const In<double>& b, const In<double>& we
   const auto D = static_cast<int>(a.shape(1));
   const std::vector<Point> was = to_points(then, D), at = to_points(points, D);
   require(was.size() == 1, "then: shape (1, D)");
-  const Carried found = RigidPrediction(pairs, was[0], D, r).place(r, 1);
+  Carried found;
+  RigidPredictions().each(
+      D, r, was,
+      [&](const Point& one, Point& at_then) {
+        at_then = one;
+        return std::span<const RigidPair>(pairs);
+      },
+      [&](const Point&, const RigidPrediction& prediction) { found = prediction.place(r, 1); });
   const auto density = [&](const Point& y) { return found.log_density(y, D); };
   return nb::make_tuple(array_of<double>(found.at), found.variance, array_of<double>(at, density));
 }

@@ -61,30 +61,46 @@ class RigidNeighbours {
       });
     }
   }
-  // Log-likelihood ratio of a tracklet's link into the newest frame, predicted by its neighbours,
-  // against the background density. The most stable neighbours are used first, and the nearest ones
-  // also if the result is below `enough`. Returns false if there are too few neighbours.
-  bool link(const StitchMemory& s, const Frame::One& own, const Tracklet& f, double enough,
-            double& gain) {
-    const Common& common = common_with(s, f.last);
-    if (common.pairs.size() < min_for_rotation(D_) + 2) return false;
-    const Point then = *s.frames.find(f.last)->find(own.tracklet);
-    const double background = not_carried_now(s, own);
+  // Link of a tracklet into the newest frame.
+  struct Link {
+    Frame::One* own = nullptr;
+    Tracklet* tracklet = nullptr;
+    double enough = 0;  // a log-likelihood ratio that need not be known better
+    double gain = -std::numeric_limits<double>::infinity();
+  };
+  // Computes the log-likelihood ratios of links, predicted by the tracklets' neighbours, against the
+  // background density. The most stable neighbours are used first, and the nearest ones also if the
+  // result is below `enough`. Links with too few neighbours are removed.
+  void rate(const StitchMemory& s, std::vector<Link>& links) {
+    std::erase_if(links, [&](const Link& link) {
+      return common_with(s, link.tracklet->last).pairs.size() < min_for_rotation(D_) + 2;
+    });
     // Segments hardly deform between two frames, so the residual of the fit alone gives the
     // variance.
-    const auto say = [&](std::span<const RigidPair> pairs) {
-      const RigidPrediction found(pairs, then, D_, square(noise_));
-      return found.place(kNoise * square(noise_), 0).log_density(own.at, D_) - background;
+    const auto say = [&](Link& link, const RigidPrediction& found) {
+      const double gain = found.place(kNoise * square(noise_), 0).log_density(link.own->at, D_) -
+                          not_carried_now(s, *link.own);
+      link.gain = std::max(link.gain, gain);
     };
-    gain = -std::numeric_limits<double>::infinity();
-    if (f.marker >= 0)
-      if (const auto pairs = carrier_.pair(f.marker, places(s, f.last), places(s, s.frames.now()));
-          pairs.size() == kSteadiest)
-        gain = say(pairs);
-    if (gain >= enough) return true;
-    pair_nearest(common, own.tracklet, then);
-    gain = std::max(gain, say(w_.pairs));
-    return true;
+    const auto then = [&](const Link& link) {
+      return *s.frames.find(link.tracklet->last)->find(link.own->tracklet);
+    };
+    const auto steadiest = [&](const Link& link, Point& was) -> std::span<const RigidPair> {
+      if (link.tracklet->marker < 0) return {};
+      const auto pairs = carrier_.pair(link.tracklet->marker, places(s, link.tracklet->last),
+                                       places(s, s.frames.now()));
+      if (pairs.size() < kSteadiest) return {};
+      was = then(link);
+      return pairs;
+    };
+    const auto nearest = [&](const Link& link, Point& was) -> std::span<const RigidPair> {
+      if (link.gain >= link.enough) return {};
+      was = then(link);
+      pair_nearest(common_with(s, link.tracklet->last), link.own->tracklet, was);
+      return w_.pairs;
+    };
+    w_.predictions.each(D_, square(noise_), links, steadiest, say);
+    w_.predictions.each(D_, square(noise_), links, nearest, say);
   }
 
   // Stores the positions of the neighbours of an occluded marker. The last detections may already
@@ -236,11 +252,13 @@ class RigidNeighbours {
     Known& then = known(s, t);
     if (const Ways* ways = then.ways.find(k); ways != nullptr) return *ways;
     Ways& ways = then.ways[k];
-    Carriage way;
     // Over long gaps a segment returns to its shape, so the variance does not grow with the gap.
-    for (std::size_t a = 0; a < anchors.size(); ++a)
-      if (carrier_.carry(k, anchors[a], then.places, Carrier::kLag, kNoise * square(noise_), way))
-        ways[a] = way.place;
+    carrier_.carry(
+        k, anchors, then.places, kNoise * square(noise_),
+        [](const Anchor&) { return Carrier::kLag; },
+        [&](const Anchor& anchor, const Carriage& way) {
+          ways[static_cast<std::size_t>(&anchor - anchors.data())] = way.place;
+        });
     return ways;
   }
   // Background density of a detection of the newest frame.
@@ -270,6 +288,7 @@ class RigidNeighbours {
     std::vector<std::pair<double, std::int32_t>> nearest;
     std::vector<Looks> looks;
     std::vector<RigidPair> pairs;
+    RigidPredictions predictions;
     std::deque<Known> known;  // references stay valid
     std::size_t n_known = 0;
     std::vector<double> peaks;  // of the newest frame
