@@ -15,6 +15,7 @@
 
 #include "base/flat_map.hpp"
 #include "base/scratch.hpp"
+#include "base/shared_copy.hpp"
 #include "rigid/carrier.hpp"
 #include "rigid/tracklets.hpp"
 #include "stitch/background_density.hpp"
@@ -31,11 +32,17 @@ class RigidNeighbours {
     assess(s, seen, markers);
   }
   void forget(std::int32_t marker) { carrier_.forget(marker); }
+  // Removes the predictions of a marker that is detected again.
+  void forget_predictions(std::int32_t k) {
+    for (auto& [t, ways] : ways_)
+      if (ways->find(k) != nullptr) ways.own().erase(k);
+  }
 
-  // Removes what belongs to the frame before.
-  void begin_frame() {
+  // Removes what belongs to the frame before, and to frames that are no longer kept.
+  void begin_frame(const StitchMemory& s) {
     w_.n_common = 0;
     forget_places();
+    ways_.erase_if([&](const auto& of_frame) { return s.frames.find(of_frame.first) == nullptr; });
   }
   // Removes the positions of markers, because a detection has another tracklet now.
   void forget_places() {
@@ -47,19 +54,21 @@ class RigidNeighbours {
   // of that marker or may use it.
   void add_places(const StitchMemory& s, std::int32_t tracklet, std::int32_t k,
                   const Markers& markers) {
+    for (std::size_t i = 0; i < w_.n_known; ++i)
+      if (const Point* at = s.frames.find(w_.known[i].frame)->find(tracklet); at != nullptr)
+        w_.known[i].places.set(k, *at);
+    forget_predictions(k);
     const auto uses = [&](const Anchor& anchor) {
       return std::ranges::find(anchor.around, k, &MarkerPoint::marker) != anchor.around.end();
     };
-    for (std::size_t i = 0; i < w_.n_known; ++i) {
-      Known& known = w_.known[i];
-      const Point* at = s.frames.find(known.frame)->find(tracklet);
-      if (at != nullptr) known.places.set(k, *at);
-      known.ways.erase_if([&](const auto& way) {
-        const Marker* marker = markers.find(way.first);
-        if (way.first == k || marker == nullptr || !marker->is_prepared()) return true;
-        return at != nullptr && std::ranges::any_of(*marker->anchors, uses);
-      });
-    }
+    w_.using_it.clear();
+    for (const auto& [other, marker] : markers)
+      if (marker.is_prepared() && std::ranges::any_of(*marker.anchors, uses))
+        w_.using_it.push_back(other);
+    for (auto& [t, ways] : ways_)
+      if (s.frames.find(t)->find(tracklet) != nullptr)
+        for (const std::int32_t other : w_.using_it)
+          if (ways->find(other) != nullptr) ways.own().erase(other);
   }
   // Link of a tracklet into the newest frame.
   struct Link {
@@ -112,6 +121,14 @@ class RigidNeighbours {
         carrier_.remember(k, places(s, then), then, anchors);
     marker.anchors = SharedCopy<std::vector<Anchor>>(std::move(anchors));
   }
+  // Predicts the occluded marker k in the newest frame if a tracklet of so many detections, the last
+  // of them there, will be compared with it by this one when it is decided after `confirm` frames.
+  // This spreads the work of a decision over the frames before.
+  void prepare(const StitchMemory& s, std::int32_t n, std::int64_t confirm, std::int32_t k,
+               const Marker& marker) {
+    if ((n - 1) % interval(static_cast<std::size_t>(confirm)) == 0)
+      carry(s, k, *marker.anchors, s.frames.now());
+  }
   // Log-likelihood ratio for a tracklet to be the occluded marker k, predicted by the neighbours of
   // k. For each anchor, it is averaged over some detections of the tracklet, without the worst,
   // which may be a ghost. The anchors are alternatives, so their likelihoods are averaged.
@@ -151,15 +168,16 @@ class RigidNeighbours {
   struct Known {
     std::int64_t frame = 0;
     Places places;
-    FlatMap<std::int32_t, Ways> ways;  // by occluded marker
   };
 
+  // Interval of the detections of a tracklet in which it is compared.
+  static std::size_t interval(std::size_t n) { return std::max<std::size_t>(n / kLooks, 1); }
   // Selects the moments of a tracklet. They are the same for all occluded markers.
   void look(const StitchMemory& s, const Tracklet& f, std::int32_t id) {
     w_.looked_at = id;
     w_.moments.clear();
     const std::vector<TrackletPoint>& detections = f.open->detections;
-    const std::size_t every = std::max<std::size_t>(detections.size() / kLooks, 1);
+    const std::size_t every = interval(detections.size());
     for (std::size_t i = 0; i < detections.size(); i += every)
       if (const Frame* at = s.frames.find(detections[i].frame); at != nullptr)
         w_.moments.push_back({detections[i].frame, detections[i].at,
@@ -223,7 +241,6 @@ class RigidNeighbours {
     if (w_.n_known == w_.known.size()) w_.known.emplace_back();
     Known& known = w_.known[w_.n_known++];
     known.frame = t;
-    known.ways.clear();
     const std::vector<Frame::One>& seen = s.frames.find(t)->seen;
     known.places.clear();
     known.places.reserve(seen.size());
@@ -249,12 +266,13 @@ class RigidNeighbours {
   // Where an occluded marker was in a frame, by its anchors. It is the same for all tracklets.
   const Ways& carry(const StitchMemory& s, std::int32_t k, std::span<const Anchor> anchors,
                     std::int64_t t) {
-    Known& then = known(s, t);
-    if (const Ways* ways = then.ways.find(k); ways != nullptr) return *ways;
-    Ways& ways = then.ways[k];
+    SharedCopy<FlatMap<std::int32_t, Ways>>& then = ways_[t];
+    if (!then.has_value()) then = SharedCopy(FlatMap<std::int32_t, Ways>{});
+    if (const Ways* ways = then->find(k); ways != nullptr) return *ways;
+    Ways& ways = then.own()[k];
     // Over long gaps a segment returns to its shape, so the variance does not grow with the gap.
     carrier_.carry(
-        k, anchors, then.places, kNoise * square(noise_),
+        k, anchors, places(s, t), kNoise * square(noise_),
         [](const Anchor&) { return Carrier::kLag; },
         [&](const Anchor& anchor, const Carriage& way) {
           ways[static_cast<std::size_t>(&anchor - anchors.data())] = way.place;
@@ -289,6 +307,7 @@ class RigidNeighbours {
     std::vector<Looks> looks;
     std::vector<RigidPair> pairs;
     RigidPredictions predictions;
+    std::vector<std::int32_t> using_it;  // occluded markers with a certain neighbour
     std::deque<Known> known;  // references stay valid
     std::size_t n_known = 0;
     std::vector<double> peaks;  // of the newest frame
@@ -299,6 +318,8 @@ class RigidNeighbours {
   int D_;
   double noise_;
   Carrier carrier_;
+  // Predictions in the frames that are kept, by frame and by occluded marker.
+  FlatMap<std::int64_t, SharedCopy<FlatMap<std::int32_t, Ways>>> ways_;
   Scratch<Memory> w_;  // scratch of one frame
 };
 

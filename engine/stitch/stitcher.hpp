@@ -64,7 +64,7 @@ class Stitcher {
             std::span<const std::int64_t> labels, std::span<std::int32_t> tracklet_of,
             Decide&& decide) {
     so_far_.frames.add(step, static_cast<std::size_t>(opt_.confirm + opt_.max_gap + 2));
-    neighbours_.begin_frame();
+    neighbours_.begin_frame(so_far_);
     predict_markers(step);
     add_points(points, labels, tracklet_of);
     cut_links(labels, tracklet_of);
@@ -104,7 +104,7 @@ class Stitcher {
         prepare_all();
         break;
       }
-    assignment_.guess(so_far_, markers_, neighbours_,
+    assignment_.guess(so_far_, markers_, neighbours_, opt_.confirm,
                       [this](const Tracklet& f) { return is_short(f); });
   }
   // Decides the remaining tracklets after the last frame.
@@ -219,6 +219,7 @@ class Stitcher {
     if (f.marker >= 0) {
       Marker& marker = markers_.at(f.marker);
       marker.is_occluded = false;
+      if (marker.is_prepared()) neighbours_.forget_predictions(f.marker);
       marker.release();
       marker.last = f.last = now();
       ++f.n;
