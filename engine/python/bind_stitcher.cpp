@@ -140,9 +140,9 @@ Out<double> background_densities(const In<double>& before, const In<double>& poi
   Frame frame;
   for (const Point& y : to_points(points, D))
     frame.seen.push_back({static_cast<std::int32_t>(frame.seen.size()), y});
-  return array_of<double>(frame.seen, [&](const Frame::One& one) {
-    return background.log_density(one.at, frame, one.tracklet);
-  });
+  std::vector<double> peaks;
+  background.sum_peaks(frame, peaks);
+  return array_of<double>(peaks, [&](double sum) { return background.log_density(sum, frame); });
 }
 
 // The markers of a frame, by increasing number.

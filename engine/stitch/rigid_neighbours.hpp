@@ -70,6 +70,13 @@ class RigidNeighbours {
         for (const std::int32_t other : w_.using_it)
           if (ways->find(other) != nullptr) ways.own().erase(other);
   }
+  // Sum of the peaks of the background density beside all others at a detection of the newest frame.
+  double peaks(const StitchMemory& s, const Frame::One& one) {
+    const Frame& now = s.frames.newest();
+    if (w_.peaks.empty()) s.background.sum_peaks(now, w_.peaks);
+    return w_.peaks[static_cast<std::size_t>(&one - now.seen.data())];
+  }
+
   // Link of a tracklet into the newest frame.
   struct Link {
     Frame::One* own = nullptr;
@@ -181,7 +188,7 @@ class RigidNeighbours {
     for (std::size_t i = 0; i < detections.size(); i += every)
       if (const Frame* at = s.frames.find(detections[i].frame); at != nullptr)
         w_.moments.push_back({detections[i].frame, detections[i].at,
-                              s.background.log_density(detections[i].at, *at, id)});
+                              s.background.log_density(detections[i].peaks, *at)});
   }
 
   // The tracklets detected in an earlier frame and in the newest one.
@@ -281,9 +288,7 @@ class RigidNeighbours {
   }
   // Background density of a detection of the newest frame.
   double not_carried_now(const StitchMemory& s, const Frame::One& one) {
-    const Frame& now = s.frames.newest();
-    if (w_.peaks.empty()) s.background.sum_peaks(now, w_.peaks);
-    return s.background.log_density(w_.peaks[static_cast<std::size_t>(&one - now.seen.data())], now);
+    return s.background.log_density(peaks(s, one), s.frames.newest());
   }
 
   struct Looks {

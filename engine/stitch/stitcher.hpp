@@ -225,13 +225,13 @@ class Stitcher {
       ++f.n;
       return;
     }
-    if (f.marker == Decision::kOpen) compare(f, y);
+    if (f.marker == Decision::kOpen) compare(id, f, y);
     ++f.n;
     f.last = now();
   }
   // Updates the motions under which an undecided tracklet may have reached a detection. They are
   // predicted only now, because most false alarms have no second detection.
-  void compare(Tracklet& f, const Point& y) {
+  void compare(std::int32_t id, Tracklet& f, const Point& y) {
     Comparison& open = f.open.own();
     if (f.n == 0) open.state = begin_state(m_, y);
     if (f.n > 0 && f.n < kMotionDetections) {
@@ -244,7 +244,8 @@ class Stitcher {
       for (Continuation& c : open.continuations) c.log_likelihood += next(c.state);
     }
     if (static_cast<std::int64_t>(open.detections.size()) < opt_.confirm)
-      open.detections.push_back({now(), y});
+      open.detections.push_back(
+          {now(), y, neighbours_.peaks(so_far_, *so_far_.frames.newest().one(id))});
   }
   void mark_occluded() {
     for (auto& [k, marker] : markers_) {

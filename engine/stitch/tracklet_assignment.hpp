@@ -131,19 +131,18 @@ class TrackletAssignment {
   double score(const StitchMemory& s, RigidNeighbours& neighbours, std::int32_t id,
                const Tracklet& f, std::int32_t k, const Marker& marker, bool is_short) const {
     if (!may_be(f, marker)) return kNever;
-    const double body = neighbours.log_odds(s, f, id, k, marker), motion = by_motion(s, f, id, k);
+    const double body = neighbours.log_odds(s, f, id, k, marker), motion = by_motion(s, f, k);
     const double at_rest = std::clamp(1 / (1 + std::exp(marker.mean_gain)), kMinMotion, 0.5);
     const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
     const double both = log_sum(a, b);
     return both == kNever ? kNever : both + (is_short ? kShort : kLong) + advised(f, marker);
   }
-  static double by_motion(const StitchMemory& s, const Tracklet& f, std::int32_t id,
-                          std::int32_t k) {
+  static double by_motion(const StitchMemory& s, const Tracklet& f, std::int32_t k) {
     for (const Continuation& c : f.open->continuations)
       if (c.marker == k)
         if (const Frame* at = s.frames.find(f.first); at != nullptr)
           return c.log_likelihood - f.open->alone -
-                 s.background.log_density(f.open->detections.front().at, *at, id);
+                 s.background.log_density(f.open->detections.front().peaks, *at);
     return kNever;
   }
   double advised(const Tracklet& f, const Marker& marker) const {
