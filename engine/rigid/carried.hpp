@@ -38,6 +38,8 @@ struct Carried {
   Point at{};
   double variance = std::numeric_limits<double>::infinity();  // per coordinate
 
+  bool operator==(const Carried&) const = default;
+
   // Student's t distribution with 3 degrees of freedom, whose squared scale is the variance. The
   // heavy tails allow for occasional large deformation and for correlated errors of the neighbours.
   double log_density(const Point& y, int D) const {

@@ -32,12 +32,6 @@ class RigidNeighbours {
     assess(s, seen, markers);
   }
   void forget(std::int32_t marker) { carrier_.forget(marker); }
-  // Removes the predictions of a marker that is detected again.
-  void forget_predictions(std::int32_t k) {
-    for (auto& [t, ways] : ways_)
-      if (ways->find(k) != nullptr) ways.own().erase(k);
-  }
-
   // Removes what belongs to the frame before, and to frames that are no longer kept.
   void begin_frame(const StitchMemory& s) {
     w_.n_common = 0;
@@ -57,7 +51,6 @@ class RigidNeighbours {
     for (std::size_t i = 0; i < w_.n_known; ++i)
       if (const Point* at = s.frames.find(w_.known[i].frame)->find(tracklet); at != nullptr)
         w_.known[i].places.set(k, *at);
-    forget_predictions(k);
     const auto uses = [&](const Anchor& anchor) {
       return std::ranges::find(anchor.around, k, &MarkerPoint::marker) != anchor.around.end();
     };
@@ -65,10 +58,12 @@ class RigidNeighbours {
     for (const auto& [other, marker] : markers)
       if (marker.is_prepared() && std::ranges::any_of(*marker.anchors, uses))
         w_.using_it.push_back(other);
-    for (auto& [t, ways] : ways_)
-      if (s.frames.find(t)->find(tracklet) != nullptr)
-        for (const std::int32_t other : w_.using_it)
-          if (ways->find(other) != nullptr) ways.own().erase(other);
+    for (auto& [t, ways] : ways_) {
+      if (ways->find(k) != nullptr) ways.own().erase(k);
+      if (s.frames.find(t)->find(tracklet) == nullptr) continue;
+      for (const std::int32_t other : w_.using_it)
+        if (ways->find(other) != nullptr) ways.own().erase(other);
+    }
   }
   // Sum of the peaks of the background density beside all others at a detection of the newest frame.
   double peaks(const StitchMemory& s, const Frame::One& one) {
@@ -275,8 +270,15 @@ class RigidNeighbours {
                     std::int64_t t) {
     SharedCopy<FlatMap<std::int32_t, Ways>>& then = ways_[t];
     if (!then.has_value()) then = SharedCopy(FlatMap<std::int32_t, Ways>{});
-    if (const Ways* ways = then->find(k); ways != nullptr) return *ways;
-    Ways& ways = then.own()[k];
+    if (const Ways* ways = then->find(k); ways != nullptr) {
+      assert(*ways == predict(s, k, anchors, t));
+      return *ways;
+    }
+    return then.own()[k] = predict(s, k, anchors, t);
+  }
+  Ways predict(const StitchMemory& s, std::int32_t k, std::span<const Anchor> anchors,
+               std::int64_t t) {
+    Ways ways;
     // Over long gaps a segment returns to its shape, so the variance does not grow with the gap.
     carrier_.carry(
         k, anchors, places(s, t), kNoise * square(noise_),
@@ -323,7 +325,8 @@ class RigidNeighbours {
   int D_;
   double noise_;
   Carrier carrier_;
-  // Predictions in the frames that are kept, by frame and by occluded marker.
+  // Predictions in the frames that are kept, by frame and by occluded marker. Those from before a
+  // marker was last detected are not used any more, because later tracklets alone can continue it.
   FlatMap<std::int64_t, SharedCopy<FlatMap<std::int32_t, Ways>>> ways_;
   Scratch<Memory> w_;  // scratch of one frame
 };

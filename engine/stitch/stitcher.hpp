@@ -219,7 +219,6 @@ class Stitcher {
     if (f.marker >= 0) {
       Marker& marker = markers_.at(f.marker);
       marker.is_occluded = false;
-      if (marker.is_prepared()) neighbours_.forget_predictions(f.marker);
       marker.release();
       marker.last = f.last = now();
       ++f.n;
