@@ -117,6 +117,9 @@ Lanes with_bits(const Lanes& a, Change&& change) {
 
 #endif
 
+ASTERISM_INLINED Lanes& operator+=(Lanes& a, const Lanes& b) { return a = a + b; }
+ASTERISM_INLINED Lanes operator-(const Lanes& a) { return Lanes(0.0) - a; }
+ASTERISM_INLINED Lanes absolute(const Lanes& a) { return maximum(a, -a); }
 ASTERISM_INLINED Lanes square_root(const Lanes& a) {
   Lanes result;
   for (int i = 0; i < kLanes; ++i) result.at[i] = std::sqrt(a.at[i]);

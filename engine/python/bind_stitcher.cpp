@@ -117,7 +117,14 @@ nb::tuple carried(const In<double>& a, const In<double>& b, const In<double>& we
   const auto D = static_cast<int>(a.shape(1));
   const std::vector<Point> was = to_points(then, D), at = to_points(points, D);
   require(was.size() == 1, "then: shape (1, D)");
-  const Carried found = RigidPrediction(pairs, was[0], D, r).place(r, 1);
+  Carried found;
+  RigidPredictions().each(
+      D, r, was,
+      [&](const Point& one, Point& at_then) {
+        at_then = one;
+        return std::span<const RigidPair>(pairs);
+      },
+      [&](const Point&, const RigidPrediction& prediction) { found = prediction.place(r, 1); });
   const auto density = [&](const Point& y) { return found.log_density(y, D); };
   return nb::make_tuple(array_of<double>(found.at), found.variance, array_of<double>(at, density));
 }
@@ -133,9 +140,9 @@ Out<double> background_densities(const In<double>& before, const In<double>& poi
   Frame frame;
   for (const Point& y : to_points(points, D))
     frame.seen.push_back({static_cast<std::int32_t>(frame.seen.size()), y});
-  return array_of<double>(frame.seen, [&](const Frame::One& one) {
-    return background.log_density(one.at, frame, one.tracklet);
-  });
+  std::vector<double> peaks;
+  background.sum_peaks(frame, peaks);
+  return array_of<double>(peaks, [&](double sum) { return background.log_density(sum, frame); });
 }
 
 // The markers of a frame, by increasing number.

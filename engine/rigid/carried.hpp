@@ -24,7 +24,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <iterator>
 #include <numbers>
 #include <span>
 
@@ -35,6 +37,8 @@ namespace asterism {
 struct Carried {
   Point at{};
   double variance = std::numeric_limits<double>::infinity();  // per coordinate
+
+  bool operator==(const Carried&) const = default;
 
   // Student's t distribution with 3 degrees of freedom, whose squared scale is the variance. The
   // heavy tails allow for occasional large deformation and for correlated errors of the neighbours.
@@ -57,34 +61,9 @@ struct Carried {
   }
 };
 
-// The position of a marker that was at `then`, predicted from its neighbours. `pairs` have the
-// weights 1/v_k; `noise` is the variance of a measured coordinate.
+// The position of a marker that was at some point, predicted from its neighbours.
 class RigidPrediction {
  public:
-  RigidPrediction(std::span<const RigidPair> pairs, const Point& then, int D, double noise) {
-    const RigidFit fit = fit_rigid(pairs, D);
-    const auto n = static_cast<double>(pairs.size());
-    turned_ = fit(then);
-    moved_ = then;
-    moved_.r = 0;
-    Point arm{};
-    for (int d = 0; d < D; ++d) {
-      arm[d] = turned_[d] - fit.to[d];
-      moved_[d] += fit.to[d] - fit.from[d];
-    }
-    double all = 0;
-    for (const RigidPair& p : pairs) {
-      all += p.weight;
-      nearest2_ = std::min(nearest2_, squared_distance(p.a, then, D));
-    }
-    offset2_ = kOffset * kOffset * squared_distance(then, fit.from, D);
-    left_ = std::max(fit.rms * fit.rms - 2 * noise, 0.0) / 3;
-    expected_ = n / all;
-    if (D > 1 && pairs.size() >= min_for_rotation(D))
-      turn_ = all / n * turning_variance(pairs, fit.to, arm, D) / D;
-    mean_ = 1 + 1 / n;
-  }
-
   bool may_turn() const { return std::isfinite(turn_); }
   const Point& turned() const { return turned_; }
   double turned_variance(double r, double kappa) const {
@@ -92,6 +71,7 @@ class RigidPrediction {
     return r + u * mean_ + std::max(u, r) * turn_;
   }
   double nearest2() const { return nearest2_; }  // squared distance of the nearest neighbour
+  std::int32_t n_neighbours() const { return n_; }
   // Returns the prediction with the smaller variance: rotated, or translated only.
   Carried place(double r, double kappa) const {
     const double V = turned_variance(r, kappa);
@@ -99,11 +79,54 @@ class RigidPrediction {
   }
 
  private:
-  static constexpr double kOffset = 0.3;  // error of a kept offset as a fraction of its length
+  friend class RigidPredictions;
 
   Point turned_{}, moved_{};
-  double nearest2_ = std::numeric_limits<double>::infinity(), offset2_ = 0;
-  double left_ = 0, expected_ = 0, mean_ = 1, turn_ = std::numeric_limits<double>::infinity();
+  double nearest2_ = 0, offset2_ = 0, left_ = 0, expected_ = 0, mean_ = 1, turn_ = 0;
+  std::int32_t n_ = 0;
 };
+
+// Computes predictions four at a time.
+class RigidPredictions {
+ public:
+  // Calls use(item, prediction) for each of some items. `pairs_of(item, then)` returns the pairs of
+  // an item, with the weights 1/v_k, and sets the point where its marker was. Items without pairs
+  // are left out. `noise` is the variance of a measured coordinate.
+  template <typename Items, typename PairsOf, typename Use>
+  void each(int D, double noise, Items&& items, PairsOf&& pairs_of, Use&& use) {
+    std::array<decltype(&*std::begin(items)), kLanes> waiting{};
+    Point then;
+    const auto use_waiting = [&] {
+      if (pairs_.n_lanes() > 0) solve(D, noise);
+      for (std::size_t lane = 0; lane < pairs_.n_lanes(); ++lane) use(*waiting[lane], found_[lane]);
+      pairs_.clear();
+    };
+    for (auto& item : items) {
+      const std::span<const RigidPair> pairs = pairs_of(item, then);
+      if (pairs.empty()) continue;
+      waiting[pairs_.n_lanes()] = &item;
+      add(pairs, then);
+      if (pairs_.n_lanes() == kLanes) use_waiting();
+    }
+    use_waiting();
+  }
+
+ private:
+  void add(std::span<const RigidPair> pairs, const Point& then);
+  // Predicts in all lanes.
+  void solve(int D, double noise);
+
+  rigid::LanePairs pairs_;
+  rigid::LanePoint then_{};
+  std::array<RigidPrediction, kLanes> found_;
+};
+
+// The rigid motion between two point sets.
+struct RigidFit {
+  std::array<double, 9> R{};
+  Point from{}, to{};
+  double rms = 0;
+};
+RigidFit fit_rigid(std::span<const RigidPair> pairs, int D);
 
 }  // namespace asterism

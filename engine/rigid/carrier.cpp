@@ -33,21 +33,6 @@ Carried Carrier::place(const RigidPrediction& found, const Accuracy& accuracy, s
   return found.place(r, std::max(bent * accuracy.kappa(r_), Accuracy::kMinKappa));
 }
 
-bool Carrier::carry(std::int32_t marker, const Anchor& from, const Places& now, std::int64_t frames,
-                    double r, Carriage& out) {
-  s_.pairs.clear();
-  for (std::size_t k = 0; k < from.around.size() && s_.pairs.size() < kSteadiest; ++k)
-    if (const Point* at = now.find(from.around[k].marker); at != nullptr)
-      s_.pairs.push_back({from.around[k].at, *at, from.weight[k]});
-  if (s_.pairs.empty()) return false;
-  const RigidPrediction found(s_.pairs, from.at, D_, r_);
-  const Accuracy* accuracy = accuracy_.find(marker);
-  out.place = place(found, accuracy == nullptr ? Accuracy{} : *accuracy, frames, r);
-  out.n_neighbours = static_cast<std::int32_t>(s_.pairs.size());
-  out.nearest = std::sqrt(found.nearest2());
-  return true;
-}
-
 void RigidCarrier::see(std::span<const MarkerPoint> seen) {
   frames_.push_back({{seen.begin(), seen.end()}});
   if (static_cast<std::int64_t>(frames_.size()) > Carrier::kLag + 1) frames_.pop_front();
@@ -76,10 +61,10 @@ bool RigidCarrier::carry(std::int32_t marker, const Places& now, Carriage& out,
     if (n_open > 0) remember(marker, 0, s_.anchors);
   }
   s_.ways.clear();
-  Carriage way;
-  for (const Anchor& anchor : occlusion == occluded_.end() ? s_.anchors : occlusion->second.anchors)
-    if (carrier_.carry(marker, anchor, now, n_frames_ + n_open + 1 - anchor.frame, noise(), way))
-      s_.ways.push_back(way);
+  carrier_.carry(
+      marker, occlusion == occluded_.end() ? s_.anchors : occlusion->second.anchors, now, noise(),
+      [&](const Anchor& anchor) { return n_frames_ + n_open + 1 - anchor.frame; },
+      [&](const Anchor&, const Carriage& way) { s_.ways.push_back(way); });
   if (s_.ways.empty()) return false;
   out = middle(s_.ways, n_axes());
   return true;

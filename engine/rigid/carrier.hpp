@@ -102,21 +102,22 @@ class Carrier {
   // earlier. Calls tell(marker, prediction, accuracy before this frame).
   template <typename Then, typename Now, typename Visit>
   void assess(std::span<const MarkerPoint> seen, const Then& then, const Now& now, Visit&& visit) {
-    for (const MarkerPoint& one : seen) {
-      if ((n_frames_ + one.marker) % kAssessEvery != 0) continue;
+    const auto pairs_of = [&](const MarkerPoint& one, Point& was) -> std::span<const RigidPair> {
+      if ((n_frames_ + one.marker) % kAssessEvery != 0) return {};
       const Point* before = then.find(one.marker);
-      if (before == nullptr) continue;
-      const std::span<const RigidPair> pairs = pair(one.marker, then, now);
-      if (pairs.empty()) continue;
-      const RigidPrediction found(pairs, *before, D_, r_);
+      if (before == nullptr) return {};
+      was = *before;
+      return pair(one.marker, then, now);
+    };
+    s_.predictions.each(D_, r_, seen, pairs_of, [&](const MarkerPoint& one, const RigidPrediction& found) {
       Accuracy& accuracy = accuracy_[one.marker];
       visit(one, found, std::as_const(accuracy));
       ++accuracy.n_assessed;
-      if (!found.may_turn()) continue;
+      if (!found.may_turn()) return;
       // An error beyond the nearest neighbour is due to a wrong association, so it is clipped.
       const double error2 = std::min(squared_distance(one.at, found.turned(), D_), found.nearest2());
       accuracy.add(error2 / D_, found.turned_variance(0, 1));
-    }
+    });
   }
   // Whether the accuracy was assessed often enough for predictions to be used.
   bool is_assessed(std::int32_t marker) const {
@@ -145,10 +146,27 @@ class Carrier {
   // The position of a marker carried over `frames` frames. `r` is the additional variance.
   Carried place(const RigidPrediction& found, const Accuracy& accuracy, std::int64_t frames,
                 double r) const;
-  // Predicts the position of a marker from an anchor. Returns false if none of its neighbours is
-  // detected.
-  bool carry(std::int32_t marker, const Anchor& from, const Places& now, std::int64_t frames, double r,
-             Carriage& out);
+  // Predicts the position of a marker from each of its anchors some of whose neighbours are
+  // detected now, and calls use(anchor, carriage). `frames_since(anchor)` is the number of frames
+  // over which the marker is carried. `r` is the additional variance.
+  template <typename FramesSince, typename Use>
+  void carry(std::int32_t marker, std::span<const Anchor> anchors, const Places& now, double r,
+             FramesSince&& frames_since, Use&& use) {
+    const Accuracy* assessed = accuracy_.find(marker);
+    const Accuracy accuracy = assessed == nullptr ? Accuracy{} : *assessed;
+    const auto pairs_of = [&](const Anchor& anchor, Point& was) -> std::span<const RigidPair> {
+      was = anchor.at;
+      s_.pairs.clear();
+      for (std::size_t k = 0; k < anchor.around.size() && s_.pairs.size() < kSteadiest; ++k)
+        if (const Point* at = now.find(anchor.around[k].marker); at != nullptr)
+          s_.pairs.push_back({anchor.around[k].at, *at, anchor.weight[k]});
+      return s_.pairs;
+    };
+    s_.predictions.each(D_, r_, anchors, pairs_of, [&](const Anchor& anchor, const RigidPrediction& found) {
+      use(anchor, Carriage{place(found, accuracy, frames_since(anchor), r),
+                           std::sqrt(found.nearest2()), found.n_neighbours()});
+    });
+  }
 
  private:
   static constexpr std::size_t kRemembered = 16;  // neighbours of an anchor
@@ -156,6 +174,7 @@ class Carrier {
 
   struct Memory {
     std::vector<RigidPair> pairs;
+    RigidPredictions predictions;
   };
 
   int D_;

@@ -27,6 +27,7 @@ struct Decision {
 struct TrackletPoint {
   std::int64_t frame = 0;
   Point at{};
+  double peaks = 0;  // sum of the peaks of the background density beside all others of the frame
 };
 // Hypothesis that a tracklet continues an occluded marker, with the filter state under it.
 struct Continuation {

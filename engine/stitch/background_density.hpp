@@ -31,12 +31,6 @@ class BackgroundDensity {
       volume_ *= std::max(high_[d] - low_[d], 100 * noise_);
     }
   }
-  double log_density(const Point& y, const Frame& at, std::int32_t own) const {
-    double ghosts = 0;
-    for (const auto& one : at.seen)
-      if (one.tracklet != own) ghosts += peak_at(squared_distance(one.at, y, D_));
-    return log_density(ghosts, at);
-  }
   // The sum of the peaks of all others at each detection of a frame. Each pair is computed once.
   void sum_peaks(const Frame& at, std::vector<double>& sums) const {
     sums.assign(at.seen.size(), 0);

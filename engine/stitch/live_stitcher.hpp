@@ -114,16 +114,15 @@ class LiveStitcher {
   // If several detections of a frame have the same marker, those of undecided tracklets lose it.
   template <typename Report>
   void report_waiting(Recent& frame, Report&& report) {
-    tracklets_.clear();
     markers_.clear();
+    is_open_.clear();
     for (const std::int64_t label : frame.labels) {
-      const std::int32_t f = label < 0 ? -1 : stitcher_.tracklet_with(label);
-      tracklets_.push_back(f);
-      markers_.push_back(f < 0 ? -1 : stitcher_.marker_of(f));
+      const Stitcher::Continued found = stitcher_.continued_by(label);
+      markers_.push_back(found.marker);
+      is_open_.push_back(found.is_open);
     }
     for (std::size_t i = 0; i < markers_.size(); ++i)
-      if (tracklets_[i] >= 0 && stitcher_.is_open(tracklets_[i]) &&
-          std::count(markers_.begin(), markers_.end(), markers_[i]) > 1)
+      if (is_open_[i] && std::count(markers_.begin(), markers_.end(), markers_[i]) > 1)
         markers_[i] = -1;
     for (std::size_t i = 0; i < markers_.size(); ++i) report_one(frame, i, markers_[i], report);
   }
@@ -138,7 +137,9 @@ class LiveStitcher {
   std::size_t n_waiting_, n_kept_;
   std::int64_t n_seen_ = 0, n_joins_ = 0, n_ghosts_ = 0;
   std::deque<SharedCopy<Recent>> recent_;
-  std::vector<std::int32_t> tracklets_, markers_;  // scratch of one frame
+  // Scratch of one frame.
+  std::vector<std::int32_t> tracklets_, markers_;
+  std::vector<char> is_open_;
 };
 
 }  // namespace asterism

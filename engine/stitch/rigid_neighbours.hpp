@@ -15,6 +15,7 @@
 
 #include "base/flat_map.hpp"
 #include "base/scratch.hpp"
+#include "base/shared_copy.hpp"
 #include "rigid/carrier.hpp"
 #include "rigid/tracklets.hpp"
 #include "stitch/background_density.hpp"
@@ -31,11 +32,11 @@ class RigidNeighbours {
     assess(s, seen, markers);
   }
   void forget(std::int32_t marker) { carrier_.forget(marker); }
-
-  // Removes what belongs to the frame before.
-  void begin_frame() {
+  // Removes what belongs to the frame before, and to frames that are no longer kept.
+  void begin_frame(const StitchMemory& s) {
     w_.n_common = 0;
     forget_places();
+    ways_.erase_if([&](const auto& of_frame) { return s.frames.find(of_frame.first) == nullptr; });
   }
   // Removes the positions of markers, because a detection has another tracklet now.
   void forget_places() {
@@ -47,44 +48,70 @@ class RigidNeighbours {
   // of that marker or may use it.
   void add_places(const StitchMemory& s, std::int32_t tracklet, std::int32_t k,
                   const Markers& markers) {
+    for (std::size_t i = 0; i < w_.n_known; ++i)
+      if (const Point* at = s.frames.find(w_.known[i].frame)->find(tracklet); at != nullptr)
+        w_.known[i].places.set(k, *at);
     const auto uses = [&](const Anchor& anchor) {
       return std::ranges::find(anchor.around, k, &MarkerPoint::marker) != anchor.around.end();
     };
-    for (std::size_t i = 0; i < w_.n_known; ++i) {
-      Known& known = w_.known[i];
-      const Point* at = s.frames.find(known.frame)->find(tracklet);
-      if (at != nullptr) known.places.set(k, *at);
-      known.ways.erase_if([&](const auto& way) {
-        const Marker* marker = markers.find(way.first);
-        if (way.first == k || marker == nullptr || !marker->is_prepared()) return true;
-        return at != nullptr && std::ranges::any_of(*marker->anchors, uses);
-      });
+    w_.using_it.clear();
+    for (const auto& [other, marker] : markers)
+      if (marker.is_prepared() && std::ranges::any_of(*marker.anchors, uses))
+        w_.using_it.push_back(other);
+    for (auto& [t, ways] : ways_) {
+      if (ways->find(k) != nullptr) ways.own().erase(k);
+      if (s.frames.find(t)->find(tracklet) == nullptr) continue;
+      for (const std::int32_t other : w_.using_it)
+        if (ways->find(other) != nullptr) ways.own().erase(other);
     }
   }
-  // Log-likelihood ratio of a tracklet's link into the newest frame, predicted by its neighbours,
-  // against the background density. The most stable neighbours are used first, and the nearest ones
-  // also if the result is below `enough`. Returns false if there are too few neighbours.
-  bool link(const StitchMemory& s, const Frame::One& own, const Tracklet& f, double enough,
-            double& gain) {
-    const Common& common = common_with(s, f.last);
-    if (common.pairs.size() < min_for_rotation(D_) + 2) return false;
-    const Point then = *s.frames.find(f.last)->find(own.tracklet);
-    const double background = not_carried_now(s, own);
+  // Sum of the peaks of the background density beside all others at a detection of the newest frame.
+  double peaks(const StitchMemory& s, const Frame::One& one) {
+    const Frame& now = s.frames.newest();
+    if (w_.peaks.empty()) s.background.sum_peaks(now, w_.peaks);
+    return w_.peaks[static_cast<std::size_t>(&one - now.seen.data())];
+  }
+
+  // Link of a tracklet into the newest frame.
+  struct Link {
+    Frame::One* own = nullptr;
+    Tracklet* tracklet = nullptr;
+    double enough = 0;  // a log-likelihood ratio that need not be known better
+    double gain = -std::numeric_limits<double>::infinity();
+  };
+  // Computes the log-likelihood ratios of links, predicted by the tracklets' neighbours, against the
+  // background density. The most stable neighbours are used first, and the nearest ones also if the
+  // result is below `enough`. Links with too few neighbours are removed.
+  void rate(const StitchMemory& s, std::vector<Link>& links) {
+    std::erase_if(links, [&](const Link& link) {
+      return common_with(s, link.tracklet->last).pairs.size() < min_for_rotation(D_) + 2;
+    });
     // Segments hardly deform between two frames, so the residual of the fit alone gives the
     // variance.
-    const auto say = [&](std::span<const RigidPair> pairs) {
-      const RigidPrediction found(pairs, then, D_, square(noise_));
-      return found.place(kNoise * square(noise_), 0).log_density(own.at, D_) - background;
+    const auto say = [&](Link& link, const RigidPrediction& found) {
+      const double gain = found.place(kNoise * square(noise_), 0).log_density(link.own->at, D_) -
+                          not_carried_now(s, *link.own);
+      link.gain = std::max(link.gain, gain);
     };
-    gain = -std::numeric_limits<double>::infinity();
-    if (f.marker >= 0)
-      if (const auto pairs = carrier_.pair(f.marker, places(s, f.last), places(s, s.frames.now()));
-          pairs.size() == kSteadiest)
-        gain = say(pairs);
-    if (gain >= enough) return true;
-    pair_nearest(common, own.tracklet, then);
-    gain = std::max(gain, say(w_.pairs));
-    return true;
+    const auto then = [&](const Link& link) {
+      return *s.frames.find(link.tracklet->last)->find(link.own->tracklet);
+    };
+    const auto steadiest = [&](const Link& link, Point& was) -> std::span<const RigidPair> {
+      if (link.tracklet->marker < 0) return {};
+      const auto pairs = carrier_.pair(link.tracklet->marker, places(s, link.tracklet->last),
+                                       places(s, s.frames.now()));
+      if (pairs.size() < kSteadiest) return {};
+      was = then(link);
+      return pairs;
+    };
+    const auto nearest = [&](const Link& link, Point& was) -> std::span<const RigidPair> {
+      if (link.gain >= link.enough) return {};
+      was = then(link);
+      pair_nearest(common_with(s, link.tracklet->last), link.own->tracklet, was);
+      return w_.pairs;
+    };
+    w_.predictions.each(D_, square(noise_), links, steadiest, say);
+    w_.predictions.each(D_, square(noise_), links, nearest, say);
   }
 
   // Stores the positions of the neighbours of an occluded marker. The last detections may already
@@ -95,6 +122,14 @@ class RigidNeighbours {
       if (const std::int64_t then = marker.last - back; s.frames.find(then) != nullptr)
         carrier_.remember(k, places(s, then), then, anchors);
     marker.anchors = SharedCopy<std::vector<Anchor>>(std::move(anchors));
+  }
+  // Predicts the occluded marker k in the newest frame if a tracklet of so many detections, the last
+  // of them there, will be compared with it by this one when it is decided after `confirm` frames.
+  // This spreads the work of a decision over the frames before.
+  void prepare(const StitchMemory& s, std::int32_t n, std::int64_t confirm, std::int32_t k,
+               const Marker& marker) {
+    if ((n - 1) % interval(static_cast<std::size_t>(confirm)) == 0)
+      carry(s, k, *marker.anchors, s.frames.now());
   }
   // Log-likelihood ratio for a tracklet to be the occluded marker k, predicted by the neighbours of
   // k. For each anchor, it is averaged over some detections of the tracklet, without the worst,
@@ -135,19 +170,20 @@ class RigidNeighbours {
   struct Known {
     std::int64_t frame = 0;
     Places places;
-    FlatMap<std::int32_t, Ways> ways;  // by occluded marker
   };
 
+  // Interval of the detections of a tracklet in which it is compared.
+  static std::size_t interval(std::size_t n) { return std::max<std::size_t>(n / kLooks, 1); }
   // Selects the moments of a tracklet. They are the same for all occluded markers.
   void look(const StitchMemory& s, const Tracklet& f, std::int32_t id) {
     w_.looked_at = id;
     w_.moments.clear();
     const std::vector<TrackletPoint>& detections = f.open->detections;
-    const std::size_t every = std::max<std::size_t>(detections.size() / kLooks, 1);
+    const std::size_t every = interval(detections.size());
     for (std::size_t i = 0; i < detections.size(); i += every)
       if (const Frame* at = s.frames.find(detections[i].frame); at != nullptr)
         w_.moments.push_back({detections[i].frame, detections[i].at,
-                              s.background.log_density(detections[i].at, *at, id)});
+                              s.background.log_density(detections[i].peaks, *at)});
   }
 
   // The tracklets detected in an earlier frame and in the newest one.
@@ -207,7 +243,6 @@ class RigidNeighbours {
     if (w_.n_known == w_.known.size()) w_.known.emplace_back();
     Known& known = w_.known[w_.n_known++];
     known.frame = t;
-    known.ways.clear();
     const std::vector<Frame::One>& seen = s.frames.find(t)->seen;
     known.places.clear();
     known.places.reserve(seen.size());
@@ -233,21 +268,29 @@ class RigidNeighbours {
   // Where an occluded marker was in a frame, by its anchors. It is the same for all tracklets.
   const Ways& carry(const StitchMemory& s, std::int32_t k, std::span<const Anchor> anchors,
                     std::int64_t t) {
-    Known& then = known(s, t);
-    if (const Ways* ways = then.ways.find(k); ways != nullptr) return *ways;
-    Ways& ways = then.ways[k];
-    Carriage way;
+    SharedCopy<FlatMap<std::int32_t, Ways>>& then = ways_[t];
+    if (!then.has_value()) then = SharedCopy(FlatMap<std::int32_t, Ways>{});
+    if (const Ways* ways = then->find(k); ways != nullptr) {
+      assert(*ways == predict(s, k, anchors, t));
+      return *ways;
+    }
+    return then.own()[k] = predict(s, k, anchors, t);
+  }
+  Ways predict(const StitchMemory& s, std::int32_t k, std::span<const Anchor> anchors,
+               std::int64_t t) {
+    Ways ways;
     // Over long gaps a segment returns to its shape, so the variance does not grow with the gap.
-    for (std::size_t a = 0; a < anchors.size(); ++a)
-      if (carrier_.carry(k, anchors[a], then.places, Carrier::kLag, kNoise * square(noise_), way))
-        ways[a] = way.place;
+    carrier_.carry(
+        k, anchors, places(s, t), kNoise * square(noise_),
+        [](const Anchor&) { return Carrier::kLag; },
+        [&](const Anchor& anchor, const Carriage& way) {
+          ways[static_cast<std::size_t>(&anchor - anchors.data())] = way.place;
+        });
     return ways;
   }
   // Background density of a detection of the newest frame.
   double not_carried_now(const StitchMemory& s, const Frame::One& one) {
-    const Frame& now = s.frames.newest();
-    if (w_.peaks.empty()) s.background.sum_peaks(now, w_.peaks);
-    return s.background.log_density(w_.peaks[static_cast<std::size_t>(&one - now.seen.data())], now);
+    return s.background.log_density(peaks(s, one), s.frames.newest());
   }
 
   struct Looks {
@@ -270,6 +313,8 @@ class RigidNeighbours {
     std::vector<std::pair<double, std::int32_t>> nearest;
     std::vector<Looks> looks;
     std::vector<RigidPair> pairs;
+    RigidPredictions predictions;
+    std::vector<std::int32_t> using_it;  // occluded markers with a certain neighbour
     std::deque<Known> known;  // references stay valid
     std::size_t n_known = 0;
     std::vector<double> peaks;  // of the newest frame
@@ -280,6 +325,9 @@ class RigidNeighbours {
   int D_;
   double noise_;
   Carrier carrier_;
+  // Predictions in the frames that are kept, by frame and by occluded marker. Those from before a
+  // marker was last detected are not used any more, because later tracklets alone can continue it.
+  FlatMap<std::int64_t, SharedCopy<FlatMap<std::int32_t, Ways>>> ways_;
   Scratch<Memory> w_;  // scratch of one frame
 };
 

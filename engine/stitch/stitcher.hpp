@@ -64,7 +64,7 @@ class Stitcher {
             std::span<const std::int64_t> labels, std::span<std::int32_t> tracklet_of,
             Decide&& decide) {
     so_far_.frames.add(step, static_cast<std::size_t>(opt_.confirm + opt_.max_gap + 2));
-    neighbours_.begin_frame();
+    neighbours_.begin_frame(so_far_);
     predict_markers(step);
     add_points(points, labels, tracklet_of);
     cut_links(labels, tracklet_of);
@@ -84,10 +84,18 @@ class Stitcher {
   bool is_open(std::int32_t tracklet) const {
     return so_far_.tracklets.at(tracklet).marker == Decision::kOpen;
   }
-  // The tracklet that a detection with this label would continue, -1 if it would begin one.
-  std::int32_t tracklet_with(std::int64_t label) const {
+  // The tracklet that a detection with this label would continue, -1 if it would begin one, its
+  // marker as above, and whether it is undecided.
+  struct Continued {
+    std::int32_t tracklet = -1, marker = -1;
+    bool is_open = false;
+  };
+  Continued continued_by(std::int64_t label) const {
     const std::int32_t* id = of_label_.find(label);
-    return id != nullptr && can_continue(*id) ? *id : -1;
+    const Tracklet* f = id == nullptr ? nullptr : so_far_.tracklets.find(*id);
+    if (f == nullptr || !can_continue(*id, *f)) return {};
+    const bool is_undecided = f->marker == Decision::kOpen;
+    return {*id, is_undecided ? f->guess : f->marker, is_undecided};
   }
   // Computes the best candidates of all undecided tracklets, as if no further frame came.
   void guess() {
@@ -96,7 +104,7 @@ class Stitcher {
         prepare_all();
         break;
       }
-    assignment_.guess(so_far_, markers_, neighbours_,
+    assignment_.guess(so_far_, markers_, neighbours_, opt_.confirm,
                       [this](const Tracklet& f) { return is_short(f); });
   }
   // Decides the remaining tracklets after the last frame.
@@ -128,7 +136,7 @@ class Stitcher {
   void add_points(std::span<const Point> points, std::span<const std::int64_t> labels,
                std::span<std::int32_t> tracklet_of) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      tracklet_of[i] = labels[i] < 0 ? -1 : tracklet_with(labels[i]);
+      tracklet_of[i] = labels[i] < 0 ? -1 : continued_by(labels[i]).tracklet;
       if (labels[i] >= 0 && tracklet_of[i] < 0) tracklet_of[i] = begin(labels[i]);
     }
     for (std::size_t i = 0; i < points.size(); ++i)
@@ -138,11 +146,10 @@ class Stitcher {
     so_far_.frames.newest().sort();
   }
   // A tracklet cannot continue if it is over, or if its marker was found in another tracklet.
-  bool can_continue(std::int32_t id) const {
-    const Tracklet* f = so_far_.tracklets.find(id);
-    if (f == nullptr || is_over(*f)) return false;
-    if (f->marker < 0) return f->marker == Decision::kOpen;
-    const Marker* marker = markers_.find(f->marker);
+  bool can_continue(std::int32_t id, const Tracklet& f) const {
+    if (is_over(f)) return false;
+    if (f.marker < 0) return f.marker == Decision::kOpen;
+    const Marker* marker = markers_.find(f.marker);
     return marker != nullptr && marker->tracklet == id;
   }
   std::int32_t begin(std::int64_t label) {
@@ -182,19 +189,20 @@ class Stitcher {
   void cut_links(std::span<const std::int64_t> labels, std::span<std::int32_t> tracklet_of) {
     Frame& now = so_far_.frames.newest();
     w_.cut.clear();
+    w_.links.clear();
     for_each_known(now.seen, &Frame::One::tracklet, so_far_.tracklets,
                    [&](Frame::One& one, Tracklet& f) {
-      if (f.n == 0 || so_far_.frames.find(f.last) == nullptr) return;
-      const double min_gain = std::min(kContradicted, f.link_gain - kFall);
-      double gain = 0;
-      if (!neighbours_.link(so_far_, one, f, min_gain, gain)) return;
+      if (f.n > 0 && so_far_.frames.find(f.last) != nullptr)
+        w_.links.push_back({&one, &f, std::min(kContradicted, f.link_gain - kFall)});
+    });
+    neighbours_.rate(so_far_, w_.links);
+    for (const auto& [one, f, min_gain, gain] : w_.links)
       if (opt_.may_cut && gain < min_gain) {
-        w_.cut.push_back(&one);
+        w_.cut.push_back(one);
       } else {
-        f.link_gain += 0.2 * (gain - f.link_gain);
+        f->link_gain += 0.2 * (gain - f->link_gain);
         usual_gain_ += 0.01 * (gain - usual_gain_);
       }
-    });
     if (w_.cut.empty()) return;
     n_cuts_ += static_cast<std::int64_t>(w_.cut.size());
     for (Frame::One* one : w_.cut) {
@@ -216,13 +224,13 @@ class Stitcher {
       ++f.n;
       return;
     }
-    if (f.marker == Decision::kOpen) compare(f, y);
+    if (f.marker == Decision::kOpen) compare(id, f, y);
     ++f.n;
     f.last = now();
   }
   // Updates the motions under which an undecided tracklet may have reached a detection. They are
   // predicted only now, because most false alarms have no second detection.
-  void compare(Tracklet& f, const Point& y) {
+  void compare(std::int32_t id, Tracklet& f, const Point& y) {
     Comparison& open = f.open.own();
     if (f.n == 0) open.state = begin_state(m_, y);
     if (f.n > 0 && f.n < kMotionDetections) {
@@ -235,7 +243,8 @@ class Stitcher {
       for (Continuation& c : open.continuations) c.log_likelihood += next(c.state);
     }
     if (static_cast<std::int64_t>(open.detections.size()) < opt_.confirm)
-      open.detections.push_back({now(), y});
+      open.detections.push_back(
+          {now(), y, neighbours_.peaks(so_far_, *so_far_.frames.newest().one(id))});
   }
   void mark_occluded() {
     for (auto& [k, marker] : markers_) {
@@ -335,6 +344,7 @@ class Stitcher {
   }
 
   struct Memory {
+    std::vector<RigidNeighbours::Link> links;
     std::vector<Frame::One*> cut;
     std::vector<MarkerPoint> seen;
     std::vector<std::int32_t> due;

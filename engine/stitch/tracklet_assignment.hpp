@@ -83,7 +83,7 @@ class TrackletAssignment {
   // its number of detections has doubled.
   template <typename IsShort>
   void guess(StitchMemory& s, const Markers& markers, RigidNeighbours& neighbours,
-             IsShort&& is_short) {
+             std::int64_t confirm, IsShort&& is_short) {
     w_.open.clear();
     w_.candidates.clear();
     for (auto& [id, f] : s.tracklets) {
@@ -95,6 +95,9 @@ class TrackletAssignment {
         for (const auto& [k, marker] : markers)
           if (const double gain = score(s, neighbours, id, f, k, marker, is_short(f)); gain > 0)
             guesses.emplace_back(k, gain);
+      } else if (f.last == s.frames.now()) {
+        for (const auto& [k, marker] : markers)
+          if (may_be(f, marker)) neighbours.prepare(s, f.n, confirm, k, marker);
       }
       const auto row = static_cast<std::int32_t>(w_.open.size());
       w_.open.push_back(id);
@@ -121,23 +124,25 @@ class TrackletAssignment {
   // known truth.
   static double odds(double gain) { return std::exp(std::min(kOddsFactor * gain, 500.0)); }
 
+  static bool may_be(const Tracklet& f, const Marker& marker) {
+    return marker.is_occluded && marker.last < f.first;
+  }
   // Log odds that a tracklet is the reappearing marker k.
   double score(const StitchMemory& s, RigidNeighbours& neighbours, std::int32_t id,
                const Tracklet& f, std::int32_t k, const Marker& marker, bool is_short) const {
-    if (!marker.is_occluded || marker.last >= f.first) return kNever;
-    const double body = neighbours.log_odds(s, f, id, k, marker), motion = by_motion(s, f, id, k);
+    if (!may_be(f, marker)) return kNever;
+    const double body = neighbours.log_odds(s, f, id, k, marker), motion = by_motion(s, f, k);
     const double at_rest = std::clamp(1 / (1 + std::exp(marker.mean_gain)), kMinMotion, 0.5);
     const double a = body + std::log1p(-at_rest), b = motion + std::log(at_rest);
     const double both = log_sum(a, b);
     return both == kNever ? kNever : both + (is_short ? kShort : kLong) + advised(f, marker);
   }
-  static double by_motion(const StitchMemory& s, const Tracklet& f, std::int32_t id,
-                          std::int32_t k) {
+  static double by_motion(const StitchMemory& s, const Tracklet& f, std::int32_t k) {
     for (const Continuation& c : f.open->continuations)
       if (c.marker == k)
         if (const Frame* at = s.frames.find(f.first); at != nullptr)
           return c.log_likelihood - f.open->alone -
-                 s.background.log_density(f.open->detections.front().at, *at, id);
+                 s.background.log_density(f.open->detections.front().peaks, *at);
     return kNever;
   }
   double advised(const Tracklet& f, const Marker& marker) const {

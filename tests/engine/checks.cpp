@@ -11,6 +11,7 @@
 #include "mcmc/chain/budgets.hpp"
 #include "mcmc/tracker/capture_sweep.hpp"
 #include "mcmc/chain/chain_stats.hpp"
+#include "rigid/carried.hpp"
 #include "rigid/neighbours.hpp"
 #include "base/flat_map.hpp"
 #include "base/parallel.hpp"
@@ -345,7 +346,56 @@ void products_of_many_numbers() {
     CHECK(std::abs(exp_of_negative(x).at[1] / std::exp(x) - 1) < 1e-15);
 }
 
+// Predictions do not depend on those that are computed beside them, to the last bit: sets of unlike
+// sizes, points in one place and on a line, in lanes that are full and in those left over.
+void predictions_side_by_side_are_those_alone() {
+  struct Problem {
+    std::vector<RigidPair> pairs;
+    Point then;
+    std::vector<double> expected, found;
+  };
+  const auto predict = [](int D, auto&& problems, std::vector<double> Problem::* out) {
+    RigidPredictions().each(
+        D, 1e-6, problems,
+        [](const Problem& one, Point& then) {
+          then = one.then;
+          return std::span(one.pairs);
+        },
+        [&](Problem& one, const RigidPrediction& p) {
+          const Carried place = p.place(1e-6, 1);
+          one.*out = {place.at[0], place.at[1], place.at[2], place.variance, p.turned()[0],
+                      p.turned()[1], p.turned()[2], p.turned_variance(1e-6, 0.5), p.nearest2(),
+                      static_cast<double>(p.n_neighbours())};
+        });
+  };
+  Random random(7);
+  for (int repeat = 0; repeat < 600; ++repeat) {
+    const int D = 1 + repeat % 3;
+    std::vector<Problem> problems(static_cast<std::size_t>(repeat % 11));
+    for (Problem& one : problems) {
+      const int n = static_cast<int>(9 * random.uniform()), shape = static_cast<int>(4 * random.uniform());
+      one.pairs.resize(static_cast<std::size_t>(n));
+      for (int d = 0; d < D; ++d) one.then[d] = random.uniform();
+      for (RigidPair& p : one.pairs) {
+        const double along = random.uniform();
+        p.weight = 0.1 + random.uniform();
+        for (int d = 0; d < D; ++d) {
+          p.a[d] = shape == 0 ? 1 : shape == 1 ? along * d : random.uniform();
+          p.b[d] = p.a[d] + 0.1 * random.uniform();
+        }
+      }
+    }
+    predict(D, problems, &Problem::found);
+    for (Problem& one : problems) {
+      predict(D, std::span(&one, 1), &Problem::expected);
+      CHECK(one.expected.empty() == one.pairs.empty());
+      CHECK(one.found == one.expected);
+    }
+  }
+}
+
 int main() {
+  predictions_side_by_side_are_those_alone();
   choices_of_candidates_are_the_best_or_tell_by_how_much_not();
   a_block_gains_what_the_capture_gains();
   no_gain_exceeds_its_bound<OneMotion>(1);

@@ -87,10 +87,10 @@ class FrameStart {
   void list_ends(const Partition<Filter>& p) {
     const DetectionWindow& window = p.window();
     s_.rows.clear();
-    s_.row_of.clear();
     for (const std::int32_t k : p.tracks().items()) {
       const std::int64_t gap = window.now() - window[p.last(k)].frame;
       if (gap < 1 || gap > window.max_gap()) continue;
+      if (static_cast<std::int32_t>(s_.row_of.size()) <= k) s_.row_of.resize(k + 1);
       s_.row_of[k] = static_cast<std::int32_t>(s_.rows.size());
       s_.rows.push_back(k);
     }
@@ -113,7 +113,7 @@ class FrameStart {
       // The number may have been reused for another detection.
       const bool is_here = !is_new && window[i].number == at->second.number && window.is_linkable(i, j);
       if (is_here && p.track_of(i) >= 0 && p.last(p.track_of(i)) == i) {
-        s_.row_given[c] = s_.row_of.at(p.track_of(i));
+        s_.row_given[c] = s_.row_of[p.track_of(i)];
       } else if (is_here && p.is_free(i)) {
         s_.row_given[c] = kNewTrack;
         Edit<Filter>& edit = s_.edits.emplace_back();
@@ -204,7 +204,7 @@ class FrameStart {
 
   struct Memory {
     std::vector<std::int32_t> rows, row_given, match, missed;
-    std::unordered_map<std::int32_t, std::int32_t> row_of;
+    std::vector<std::int32_t> row_of;  // by track, only for those listed in `rows`
     std::vector<char> is_given;
     std::vector<Candidate> candidates, others;
     std::vector<Edit<Filter>> edits;
