@@ -15,6 +15,7 @@ from asterism.tracking.methods import (
     method_by_name,
 )
 from asterism.tracking.naming import (
+    KeptNames,
     NameChange,
     NameConflict,
     Named,
@@ -48,6 +49,7 @@ __all__ = [
     "Gate",
     "HypothesisCluster",
     "Join",
+    "KeptNames",
     "Lifecycle",
     "Method",
     "ModelEstimate",

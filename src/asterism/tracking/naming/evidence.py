@@ -109,7 +109,7 @@ def evidence_of(
     *,
     size: float,
     weights: tuple[float, ...],
-    posture: NDArray[np.float64] | None = None,
+    more: NDArray[np.float64] | None = None,
 ) -> _engine.NameEvidence:
     """Return the evidence for the names of tracks.
 
@@ -123,8 +123,8 @@ def evidence_of(
         Size of the subject relative to the marker set.
     weights : tuple of float
         Weights of the four kinds of fit of a distance.
-    posture : ndarray of shape (n, M), optional
-        Log odds of each marker for each track by their places.
+    more : ndarray of shape (n, M), optional
+        Log odds of each marker for each track by its place, or by the names of the capture.
     """
     assert made.quads is not None
     known = np.isfinite(made.height_spreads)
@@ -142,7 +142,7 @@ def evidence_of(
         distances=made.distances,
         movements=made.movements,
         variations=np.nan_to_num(made.variations),
-        prior=np.tile(prior_of(made), (n, 1)) + (0.0 if posture is None else posture),
+        prior=np.tile(prior_of(made), (n, 1)) + (0.0 if more is None else more),
         quads=np.ascontiguousarray(made.quads[usable]),
         heights=np.ascontiguousarray(np.stack([made.heights, variance, weight], axis=1)[usable]),
         pairs=stats.pairs,

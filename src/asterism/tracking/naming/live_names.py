@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from asterism import _engine
+from asterism.tracking.naming.positions import scattered
 from asterism.tracking.naming.probabilities import TEMPERATURE
 from asterism.tracking.naming.subject import Subject
-from asterism.tracking.naming.windows import MIN_LOG_ODDS, scattered
+from asterism.tracking.naming.windows import MIN_LOG_ODDS
 from asterism.tracking.rigidity.distances import Distances
 
 if TYPE_CHECKING:

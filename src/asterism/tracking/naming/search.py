@@ -53,6 +53,7 @@ def search(
     positions: NDArray[np.float64],
     up: Axis,
     start: NDArray[np.int64] | None = None,
+    labelled: NDArray[np.float64] | None = None,
 ) -> Found | None:
     """Search for the names of tracks that exist at the same time; None where nothing can start.
 
@@ -66,6 +67,8 @@ def search(
         Axis of the capture that points up.
     start : ndarray of int, shape (n,), optional
         Names from which the search starts instead, nearly right.
+    labelled : ndarray of shape (n, M), optional
+        Log odds of each marker for each track by the names that the capture has itself.
 
     Notes
     -----
@@ -93,19 +96,20 @@ def search(
         first = [n for _, n in sorted(settled.values(), key=lambda item: -item[0])[:REFINED]]
         first = [rough.improved(first[0])[0], *first]
     size, weights = refit(made, stats, first[0]) or (1.0, FIRST_WEIGHTS)
-    fine = searching(evidence_of(made, stats, size=size, weights=weights))
+    fine = searching(evidence_of(made, stats, size=size, weights=weights, more=labelled))
     names, _ = max((fine.settled(names) for names in first), key=lambda item: item[1])
     again = refit(made, stats, names)
     if again is not None and _differs(again, (size, weights)):
         size, weights = again
-        fine = searching(evidence_of(made, stats, size=size, weights=weights))
+        fine = searching(evidence_of(made, stats, size=size, weights=weights, more=labelled))
     names, _ = fine.improved(names)
     # Last, because a posture that wrong names have laid would keep them.
-    posture = posture_log_odds(made, stats.positions, names, up, size)
-    evidence = evidence_of(made, stats, size=size, weights=weights, posture=posture)
+    more = posture_log_odds(made, stats.positions, names, up, size)
+    more = more if labelled is None else more + labelled
+    evidence = evidence_of(made, stats, size=size, weights=weights, more=more)
     names, score = searching(evidence).improved(names)
     at_the_set = _at_the_set(made, stats, names, size)
-    exact = evidence_of(made, at_the_set, size=size, weights=weights, posture=posture)
+    exact = evidence_of(made, at_the_set, size=size, weights=weights, more=more)
     n_named = int((names >= 0).sum())
     n_pairs = int((names >= 0)[stats.pairs].all(axis=1).sum())
     best = exact.total(names) + NONE * n_named
