@@ -216,6 +216,8 @@ def _all(
     given = np.full(len(tracks.labels), -1) if given is None else given
     of_track = np.full(tracks.n_tracks, -1)
     of_track[first.tracks] = first.found.names
+    refused = np.zeros((tracks.n_tracks, len(made)), dtype=bool)
+    refused[first.tracks] = first.found.refused
     windows = Windows(tracks.detections, tracks.labels)
     names = WindowNames(
         windows=windows,
@@ -223,6 +225,7 @@ def _all(
         size=first.found.size,
         is_kept=first.found.weights[0] > first.found.weights[1],
         track_markers=of_track,
+        refused=refused,
         given=given,
     )
     start = windows.holding(first.frame)
@@ -233,9 +236,9 @@ def _all(
     found = search(made, positions[:, seen], up, start=seen, labelled=labelled)
     assert found is not None
     if not np.array_equal(found.names, seen):
-        marker_of = np.arange(len(made))
-        marker_of[seen] = found.names
-        names.renamed(marker_of)
+        marker_of, refused = np.arange(len(made)), np.zeros((len(made), len(made)), dtype=bool)
+        marker_of[seen], refused[seen] = found.names, found.refused
+        names.renamed(marker_of, refused)
         names.sweep(start)
     odds = marker_odds(found, len(made))
     own = names.usual()

@@ -15,6 +15,7 @@ from asterism.tracking.naming.evidence import (
     TrackStats,
     evidence_of,
     refit,
+    rigid_fit,
 )
 from asterism.tracking.naming.posture import posture_log_odds
 from asterism.tracking.naming.starts import starts
@@ -31,6 +32,15 @@ REFINED = 3
 """Number of results of the rough search that are refined."""
 SAME_SIZE, SAME_WEIGHT = 0.002, 0.05
 """Differences of the size and of a weight up to which the evidence is not computed again."""
+MIN_FIT = -0.95
+"""Smallest fit of a track's rigid distances to its name (`rigid_fit`). Other points of a body that
+are near a marker which is not worn have -1.0 and less, right names -0.85 and more."""
+REFUSED = -99.0
+"""Log odds of a name that a track cannot have."""
+ROUNDS = 5
+"""Number of times that names are searched without those that do not fit."""
+ONE_SIDE = -2
+"""Partner of a marker with a side whose partner is not in the set."""
 IN_TURN = 5
 """Number of nearest tracks with which a track may exchange names in turn."""
 
@@ -45,6 +55,7 @@ class Found:
     weights: tuple[float, ...]  # of the four kinds of fit of a distance
     evidence: _engine.NameEvidence
     mean_log_odds: float  # of a distance between two named tracks
+    refused: NDArray[np.bool_]  # (n, M), names that a track's rigid distances contradict
     fit: float  # score relative to that of tracks at exactly the distances of the set
 
 
@@ -82,7 +93,9 @@ def search(
         return None
     stats = TrackStats.of(positions)
     groups, near = _groups(made), stats.near(IN_TURN)
+    has_side = np.array([side is not None for side in made.sides])
     partner = np.array(made.partners, dtype=np.int64)
+    partner[has_side & (partner < 0)] = ONE_SIDE
 
     def searching(evidence: _engine.NameEvidence) -> _engine.NameSearch:
         return _engine.NameSearch(evidence, groups=groups, partner=partner, near=near)
@@ -103,11 +116,20 @@ def search(
         size, weights = again
         fine = searching(evidence_of(made, stats, size=size, weights=weights, more=labelled))
     names, _ = fine.improved(names)
-    # Last, because a posture that wrong names have laid would keep them.
-    more = posture_log_odds(made, stats.positions, names, up, size)
-    more = more if labelled is None else more + labelled
-    evidence = evidence_of(made, stats, size=size, weights=weights, more=more)
-    names, score = searching(evidence).improved(names)
+    refused = np.zeros((len(names), len(made)), dtype=bool)
+    for _ in range(ROUNDS):
+        # After the names, because a posture that wrong names have laid would keep them.
+        more = posture_log_odds(made, stats.positions, names, up, size)
+        more = np.where(refused, REFUSED, more if labelled is None else more + labelled)
+        evidence = evidence_of(made, stats, size=size, weights=weights, more=more)
+        names, score = searching(evidence).improved(names)
+        fit = rigid_fit(made, stats, names, size, weights)
+        wrong = np.flatnonzero((names >= 0) & (fit < MIN_FIT))
+        if not len(wrong):
+            break
+        refused[wrong, names[wrong]] = True
+        names = names.copy()
+        names[wrong] = -1
     at_the_set = _at_the_set(made, stats, names, size)
     exact = evidence_of(made, at_the_set, size=size, weights=weights, more=more)
     n_named = int((names >= 0).sum())
@@ -121,6 +143,7 @@ def search(
         evidence=evidence,
         mean_log_odds=(score + NONE * n_named) / max(n_pairs, 1),
         fit=(score + NONE * n_named) / best if best > 0 else 0.0,
+        refused=refused,
     )
 
 

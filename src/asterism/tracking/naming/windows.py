@@ -111,6 +111,8 @@ class WindowNames:
         Whether the markers are where they were when the set was learnt.
     track_markers : ndarray of int, shape (K,)
         Marker of each track in the capture as a whole, -1 for none so far.
+    refused : ndarray of bool, shape (K, M)
+        Names that a track cannot have.
     given : ndarray of int, shape (N,)
         Marker of each detection by the names that the capture has itself, -1 for none.
     """
@@ -120,6 +122,7 @@ class WindowNames:
     size: float
     is_kept: bool
     track_markers: NDArray[np.int64]
+    refused: NDArray[np.bool_]
     given: NDArray[np.int64]
     markers: NDArray[np.int64] = field(init=False)  # (N,), of each detection
     evidence: NDArray[np.float64] = field(init=False)  # (K, M), sum over the windows
@@ -158,9 +161,14 @@ class WindowNames:
         frames = np.unique(np.linspace(0, d.n_frames - 1, n_frames).astype(np.int64))
         return positions_in(d, frames, self.markers, len(self.made))
 
-    def renamed(self, marker_of: NDArray[np.int64]) -> None:
-        """Replace each marker by another, -1 for none: the result of a search over markers."""
+    def renamed(self, marker_of: NDArray[np.int64], refused: NDArray[np.bool_]) -> None:
+        """Replace each marker by another, -1 for none: the result of a search over markers.
+
+        The tracks of a marker are refused other ones by the rows of `refused`, (M, M).
+        """
         of = np.append(marker_of, -1)
+        has = np.flatnonzero(self.track_markers >= 0)
+        self.refused[has] |= refused[self.track_markers[has]]
         self.track_markers = of[self.track_markers]
         self.markers = of[self.markers]
 
@@ -181,6 +189,7 @@ class WindowNames:
         bonus = np.tile(prior_of(self.made), (len(alive), 1))
         has = np.flatnonzero(known >= 0)
         bonus[has, known[has]] += BONUS * np.minimum(lengths[has] / FULL_BONUS, 1)
+        bonus[self.refused[alive]] = TAKEN
         labelled = own_log_odds(column, len(alive), self.given[rows], len(self.made))
         scores = np.zeros(bonus.shape)
         for _ in range(ROUNDS):
