@@ -117,12 +117,24 @@ def search(
         fine = searching(evidence_of(made, stats, size=size, weights=weights, more=labelled))
     names, _ = fine.improved(names)
     refused = np.zeros((len(names), len(made)), dtype=bool)
-    for _ in range(ROUNDS):
+
+    def with_posture(
+        names: NDArray[np.int64],
+    ) -> tuple[NDArray[np.int64], float, _engine.NameEvidence, NDArray[np.float64]]:
         # After the names, because a posture that wrong names have laid would keep them.
         more = posture_log_odds(made, stats.positions, names, up, size)
         more = np.where(refused, REFUSED, more if labelled is None else more + labelled)
         evidence = evidence_of(made, stats, size=size, weights=weights, more=more)
-        names, score = searching(evidence).improved(names)
+        return *searching(evidence).improved(names), evidence, more
+
+    names, score, evidence, more = with_posture(names)
+    # How well the set fits is judged with the names that are refused below.
+    at_the_set = _at_the_set(made, stats, names, size)
+    exact = evidence_of(made, at_the_set, size=size, weights=weights, more=more)
+    n_named = int((names >= 0).sum())
+    n_pairs = int((names >= 0)[stats.pairs].all(axis=1).sum())
+    of_named, best = score + NONE * n_named, exact.total(names) + NONE * n_named
+    for n in range(ROUNDS):
         fit = rigid_fit(made, stats, names, size, weights)
         wrong = np.flatnonzero((names >= 0) & (fit < MIN_FIT))
         if not len(wrong):
@@ -130,19 +142,18 @@ def search(
         refused[wrong, names[wrong]] = True
         names = names.copy()
         names[wrong] = -1
-    at_the_set = _at_the_set(made, stats, names, size)
-    exact = evidence_of(made, at_the_set, size=size, weights=weights, more=more)
-    n_named = int((names >= 0).sum())
-    n_pairs = int((names >= 0)[stats.pairs].all(axis=1).sum())
-    best = exact.total(names) + NONE * n_named
+        if n < ROUNDS - 1:
+            names, score, evidence, _ = with_posture(names)
+        else:  # what still does not fit has no name
+            score = evidence.total(names)
     return Found(
         names=names,
         score=score,
         size=size,
         weights=weights,
         evidence=evidence,
-        mean_log_odds=(score + NONE * n_named) / max(n_pairs, 1),
-        fit=(score + NONE * n_named) / best if best > 0 else 0.0,
+        mean_log_odds=of_named / max(n_pairs, 1),
+        fit=of_named / best if best > 0 else 0.0,
         refused=refused,
     )
 
