@@ -36,7 +36,7 @@ def test_the_posture_is_laid_over_names_that_are_found_without_it(seed):
     """
     rng = np.random.default_rng(seed)
     left = rng.uniform([0.1, -0.3, 0], [0.3, 0.3, 0.6], (5, 3))
-    right = left * [-1, -1, 1] + rng.normal(scale=0.012, size=(5, 3))
+    right = left * [-1, -1, 1] + rng.normal(scale=0.004, size=(5, 3))
     places = np.concatenate([left, right])
     names = [f"{side}{n}" for side in "LR" for n in "ABCDE"]
     made = am.MarkerSet(names=names, places=places)
