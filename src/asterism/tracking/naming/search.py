@@ -35,6 +35,9 @@ SAME_SIZE, SAME_WEIGHT = 0.002, 0.05
 MIN_FIT = -0.95
 """Smallest fit of a track's rigid distances to its name (`rigid_fit`). Other points of a body that
 are near a marker which is not worn have -1.0 and less, right names -0.85 and more."""
+MAX_REFUSED = 0.15
+"""Largest share of the tracks whose names are refused at a time: where more do not fit, the set is
+another subject's."""
 REFUSED = -99.0
 """Log odds of a name that a track cannot have."""
 ROUNDS = 5
@@ -137,7 +140,7 @@ def search(
     for n in range(ROUNDS):
         fit = rigid_fit(made, stats, names, size, weights)
         wrong = np.flatnonzero((names >= 0) & (fit < MIN_FIT))
-        if not len(wrong):
+        if not 0 < len(wrong) <= MAX_REFUSED * len(names):
             break
         refused[wrong, names[wrong]] = True
         names = names.copy()
