@@ -359,7 +359,10 @@ def main() -> None:
         "Templates of Vicon: three subjects' templates on their static trials, and the labelling "
         f"template `{LABELLING_TEMPLATE}` on those of its markers that the gait trials hold. The "
         f"left wrist of {EXCHANGED_WRIST[0]} is left out: its LWRA is 62 mm behind LWRB, the right "
-        "one 70 mm in front, and in the template both are in front.",
+        "one 70 mm in front, and in the template both are in front. The template of Sample_SM has "
+        "LWRA in front and RWRA behind, whereas the subject holds both inwards. In the template "
+        "elbow and finger are equally far from RWRA and RWRB (266 and 101 mm), so that distances "
+        "do not tell them apart; each of the two names has a probability of 0.6.",
         "",
         *table(("template, captures", *HEAD), templates(options.sets, gait)),
         "",

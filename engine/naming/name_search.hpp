@@ -3,8 +3,8 @@
 // that the symmetry of bodies asks for.
 //
 //   settle    all tracks at once, each by the names of the others: one exact assignment a round
-//   swaps     two tracks exchange their names
-//   cycles    three near tracks exchange theirs in turn
+//   swaps     two tracks exchange their names, or one takes the other's, which then has none
+//   cycles    three near tracks exchange theirs in turn, or the last name is left free
 //   regroup   a group of markers and of their partners on the other side: the sides are exchanged,
 //             or the group is left without names and named anew from its surroundings outwards
 #pragma once
@@ -31,8 +31,8 @@ struct NamedState {
 
 class NameSearch {
  public:
-  // Groups of markers, largest first; partner[m] is the marker of the other side, or -1. `near`
-  // holds for each track the tracks with which it may exchange names in turn.
+  // Groups of markers, largest first; partner[m] is the marker of the other side, -1 for a marker
+  // without a side, or `kOneSide` for one whose partner is not in the set. `near` holds for each track the tracks with which it may exchange names in turn.
   NameSearch(const NameEvidence& evidence, std::vector<std::vector<std::int32_t>> groups,
              std::vector<std::int32_t> partner, std::vector<std::vector<std::int32_t>> near)
       : evidence_(evidence), groups_(std::move(groups)), partner_(std::move(partner)),
@@ -75,9 +75,13 @@ class NameSearch {
       std::vector<Change> changes;
       const auto gain = [&](std::int32_t k, std::int32_t m) { return at(k, m) - at(k, names[k]); };
       for (std::int32_t i = 0; i < n(); ++i)
-        for (std::int32_t j = i + 1; j < n() && names[i] >= 0; ++j)
-          if (names[j] >= 0)
-            changes.push_back({gain(i, names[j]) + gain(j, names[i]), {i, j, -1}});
+        for (std::int32_t j = i + 1; j < n(); ++j) {
+          if (names[i] < 0 && names[j] < 0) continue;
+          changes.push_back({gain(i, names[j]) + gain(j, names[i]), {i, j, -1}});
+          if (names[i] < 0 || names[j] < 0) continue;
+          changes.push_back({gain(i, -1) + gain(j, names[i]), {i, j, -1}, true});
+          changes.push_back({gain(j, -1) + gain(i, names[j]), {j, i, -1}, true});
+        }
       return changes;
     });
   }
@@ -88,10 +92,12 @@ class NameSearch {
       for (std::int32_t x = 0; x < n(); ++x)
         for (const std::int32_t y : near_[x])
           for (const std::int32_t z : near_[x])
-            if (y != z && names[x] >= 0 && names[y] >= 0 && names[z] >= 0)
-              changes.push_back({at(x, names[y]) + at(y, names[z]) + at(z, names[x]) -
-                                     at(x, names[x]) - at(y, names[y]) - at(z, names[z]),
-                                 {x, y, z}});
+            if (y != z && (names[x] >= 0) + (names[y] >= 0) + (names[z] >= 0) >= 2) {
+              const double gain = at(y, names[z]) + at(z, names[x]) - at(x, names[x]) -
+                                  at(y, names[y]) - at(z, names[z]);
+              changes.push_back({gain + at(x, names[y]), {x, y, z}});
+              if (names[y] >= 0) changes.push_back({gain + at(x, -1), {x, y, z}, true});
+            }
       return changes;
     });
   }
@@ -108,7 +114,7 @@ class NameSearch {
         for (const std::int32_t m : group)
           for (const auto& [own, other] : {std::pair{m, partner_[m]}, std::pair{partner_[m], m}})
             if (own >= 0 && track[own] >= 0) {
-              exchanged[track[own]] = other >= 0 ? other : own;
+              exchanged[track[own]] = other >= 0 ? other : other == kOneSide ? -1 : own;
               open[track[own]] = -1;
               rows.push_back(track[own]);
             }
@@ -139,11 +145,12 @@ class NameSearch {
   struct Change {
     double gain = 0;  // to first order: as if the others were not exchanged
     std::int32_t tracks[3] = {-1, -1, -1};
+    bool frees = false;  // the first track has no name afterwards
   };
 
   std::int32_t n() const { return evidence_.n_tracks(); }
   double at(std::int32_t k, std::int32_t m) const {
-    return scores_[static_cast<std::size_t>(k) * evidence_.n_markers() + m];
+    return m < 0 ? evidence_.none() : scores_[static_cast<std::size_t>(k) * evidence_.n_markers() + m];
   }
 
   static void keep_better(NamedState& best, NamedState other) {
@@ -176,7 +183,8 @@ class NameSearch {
       std::vector<Change> changes = propose(state.names);
       const auto kept = changes.begin() + static_cast<std::ptrdiff_t>(std::min(most, changes.size()));
       std::partial_sort(changes.begin(), kept, changes.end(), [](const Change& a, const Change& b) {
-        return a.gain != b.gain ? a.gain > b.gain : std::ranges::lexicographical_compare(a.tracks, b.tracks);
+        if (a.gain != b.gain) return a.gain > b.gain;
+        return std::ranges::lexicographical_compare(a.tracks, b.tracks);
       });
       NamedState best = state;
       for (auto change = changes.begin(); change != kept; ++change) {
@@ -185,6 +193,7 @@ class NameSearch {
         next.names[x] = state.names[y];
         next.names[y] = state.names[z < 0 ? x : z];
         if (z >= 0) next.names[z] = state.names[x];
+        if (change->frees) next.names[x] = -1;
         next.score = evidence_.total(next.names);
         keep_better(best, std::move(next));
       }
@@ -193,6 +202,7 @@ class NameSearch {
     }
   }
 
+  static constexpr std::int32_t kOneSide = -2;
   static constexpr int kRounds = 30;
   static constexpr int kRegroups = 4;
   static constexpr int kGrown = 8;  // rounds with one smallest score

@@ -95,7 +95,7 @@ void make_name_search(NameSearch* self, const NameEvidence& evidence,
                  const std::vector<std::vector<std::int32_t>>& near) {
   std::vector<std::int32_t> partners = values_as<std::int32_t>(partner);
   require(partners.size() == static_cast<std::size_t>(evidence.n_markers()), "partner: (M,)");
-  require_within(partners, -1, evidence.n_markers(), "partner: markers, or -1");
+  require_within(partners, -2, evidence.n_markers(), "partner: markers, -1 or -2");
   for (const auto& group : groups) require_within(group, 0, evidence.n_markers(), "groups: markers");
   require(near.size() == static_cast<std::size_t>(evidence.n_tracks()), "near: one list a track");
   for (const auto& list : near) require_within(list, 0, evidence.n_tracks(), "near: tracks");

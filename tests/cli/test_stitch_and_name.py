@@ -137,6 +137,32 @@ def test_a_labelled_capture_serves_as_marker_set(person, capsys):
     assert Path("again.c3d").read_bytes() == Path("kept/p.tracked.c3d").read_bytes()
 
 
+def test_a_capture_keeps_its_own_names(person, capsys):
+    out = run("track pt.c3d -o kept.c3d --run kept", capsys)
+    assert "53 kept, 0 moved, 0 left out" in out
+    run("track --from kept/run.toml -o again.c3d", capsys)
+    assert Path("again.c3d").read_bytes() == Path("kept.c3d").read_bytes()
+    truth = am.io.read_tracks("person.csv")
+    names = list(truth.names)
+    a, b = names.index("LTOE"), names.index("LHEE")
+    late = truth.detections.frame_of >= truth.detections.n_frames - 60
+    labels = truth.labels.copy()
+    labels[late & (truth.labels == a)], labels[late & (truth.labels == b)] = b, a
+    am.write(am.Tracks(detections=truth.detections, labels=labels, names=truth.names), "w.csv")
+    own = json.loads(run("name w.csv -o n.csv --json", capsys))["own"]
+    assert len(own["kept"]) == 53
+    assert {(c["name"], c["found"]) for c in own["conflicts"]} == {
+        ("LTOE", "LHEE"),
+        ("LHEE", "LTOE"),
+    }
+    assert "contradicted" in run("name w.csv -o m.csv", capsys)
+    assert main(["markerset", "check", "person.csv", "w.csv", "--json"]) == 1
+    checked = json.loads(capsys.readouterr().out)["conflicts"]
+    assert [c | {"probability": 1} for c in checked] == [
+        {"capture": "w.csv"} | c | {"probability": 1} for c in own["conflicts"]
+    ]
+
+
 def test_sets_are_merged_and_names_checked(person, capsys):
     run("markerset learn person.csv -o one.toml", capsys)
     run("markerset learn person.csv -o two.toml", capsys)
@@ -167,11 +193,13 @@ def test_sets_are_merged_and_names_checked(person, capsys):
         ("markerset merge set.toml none.toml -o x.toml", "none.toml"),
         ("name in.csv --markers set.toml -o out.csv", "asterism track"),
         ("name truth.csv --markers none.toml -o out.csv", "none.toml"),
-        ("name truth.csv --markers in.csv -o out.csv", "a capture with named markers"),
+        ("name truth.csv --markers in.csv -o out.csv", "--markers: expected a capture with named"),
         ("name truth.csv --markers set.toml -o set.toml", "a name ending in .c3d"),
-        ("name truth.csv -o out.csv", "--markers"),
+        ("name bare.csv -o out.csv", "--markers: expected a marker set"),
     ],
 )
 def test_what_marker_sets_and_naming_refuse(scene, capsys, line, says):
-    am.learn_marker_set(am.io.read_tracks("truth.csv")).to_toml("set.toml")
+    truth = am.io.read_tracks("truth.csv")
+    am.learn_marker_set(truth).to_toml("set.toml")
+    am.write(am.Tracks(detections=truth.detections, labels=truth.labels), "bare.csv")
     assert says in refused(line, capsys)

@@ -73,6 +73,26 @@ def test_other_subjects_name_the_gait_trial(subject):
     assert exchanged == 0
 
 
+def test_arms_are_on_their_sides_although_the_set_lacks_markers_of_one():
+    trial = sets().trials["HC032A", "Turn"]
+    made = sets().static("HC032A")
+    gone = ("RELB", "RWRA", "LTOE")
+    made = made.select([m for m, name in enumerate(made.names) if name not in gone])
+    _, exchanged = scores(clean(trial.tracks), made)
+    assert exchanged == 0
+
+
+def test_a_name_goes_to_the_track_that_has_none():
+    gone = ("LFHD", "LASI", "RASI")
+    made = sets().static("HC030A")
+    made = made.select([m for m, name in enumerate(made.names) if name not in gone])
+    take = clean(straight("HC030A"))
+    found = am.name_tracks(take.tracks, made)
+    given = np.array([*found.tracks.names, None], dtype=object)[found.tracks.labels]
+    true = np.array(take.names, dtype=object)[take.truth]
+    assert (given == true)[~np.isin(true, gone)].all()
+
+
 @pytest.mark.parametrize("which", ["static", "others"])
 def test_an_exchange_inside_the_tracks_of_a_file_is_found(which):
     trial = sets().trials["HC032A", "Turn"]

@@ -8,6 +8,7 @@ import pytest
 import asterism as am
 from asterism import _engine
 from asterism.tracking.naming.evidence import TrackStats
+from asterism.tracking.naming.search import search
 from tests.references import naming
 from tests.scenes import moving
 
@@ -108,3 +109,30 @@ def test_every_move_keeps_each_name_once():
     found = am.name_tracks(truth, made)
     given = [name for name in found.tracks.names if name]
     assert len(given) == len(set(given)) == 53
+
+
+def test_a_point_beside_a_marker_that_is_not_worn_is_not_that_marker():
+    truth = am.simulate.person(frames=120, seed=2)
+    made = am.learn_marker_set(truth.part(0, 1))
+    places = truth.positions()
+    k = truth.names.index("RTHI")
+    places[:, k] += 0.2 * (places[:, truth.names.index("RKNE")] - places[:, k])  # 4 cm
+    found = am.name_tracks(am.Tracks.from_dense(truth.detections.times, places), made)
+    assert found.markers[k] is None
+    assert found.missing == ("RTHI",)
+    assert found.n_named == truth.n_tracks - 1
+
+
+def test_a_name_goes_to_a_track_without_one():
+    """No start gives it, and the track that has it fits nearly as well."""
+    truth = am.simulate.person(frames=60, seed=2)
+    made = am.learn_marker_set(truth.part(0, 1))
+    names = np.arange(truth.n_tracks)
+    a, b = made.names.index("LWRA"), made.names.index("LWRB")
+    made = made.select([m for m in names if m != b])
+    number = {name: m for m, name in enumerate(made.names)}
+    right = np.array([number.get(name, -1) for name in truth.names])
+    start = right.copy()
+    start[b], start[a] = right[a], -1
+    found = search(made, truth.positions(), "z", start=start)
+    assert (found.names == right).all()

@@ -8,11 +8,12 @@ from asterism.errors import ParameterError
 from asterism.model import Capture
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
 
     import asterism as am
 
-__all__ = ["labelled_tracks", "naming_figures", "naming_rows", "read_markers"]
+__all__ = ["conflict_figures", "labelled_tracks", "naming_figures", "naming_rows", "read_markers"]
 
 UNCERTAIN = 0.9
 """Probability of a name below which it is listed."""
@@ -20,18 +21,21 @@ MOST = 8
 """Number of rows of a list."""
 
 
-def read_markers(path: Path) -> am.MarkerSet:
-    """Read a marker set, or learn that of a labelled capture."""
+def read_markers(path: Path, *, option: str = "--markers") -> am.MarkerSet:
+    """Read a marker set, or learn that of a labelled capture; errors name the `option`."""
     import asterism as am
 
     suffixes = [e for f in am.io.CAPTURE_FORMATS.values() for e in f.extensions]
     if path.name.lower().endswith(tuple(e for e in suffixes if e)):
-        return am.learn_marker_set(labelled_tracks(path, None))
+        return am.learn_marker_set(labelled_tracks(path, None, option=option))
     return am.read_marker_set(path)
 
 
-def labelled_tracks(path: Path, subject: str | None) -> am.Tracks:
-    """Read the tracks of a labelled capture, of one subject if it is given."""
+def labelled_tracks(path: Path, subject: str | None, *, option: str = "IN") -> am.Tracks:
+    """Read the tracks of a labelled capture, of one subject if it is given.
+
+    Errors name the `option` that gives the capture.
+    """
     import asterism as am
     from asterism.io.captures.marker_names import is_unlabelled
 
@@ -44,7 +48,7 @@ def labelled_tracks(path: Path, subject: str | None) -> am.Tracks:
         of = f" of {subject}" if subject is not None else ""
         n = tracks.n_tracks
         got = f"{n} tracks in {path}, none with a name{of}" if n else f"no tracks in {path}"
-        raise ParameterError("IN", f"a capture with named markers{of}", got)
+        raise ParameterError(option, f"a capture with named markers{of}", got)
     return tracks if subject is None else tracks.select(named)
 
 
@@ -55,6 +59,7 @@ def naming_rows(found: am.tracking.Naming) -> list[tuple[str, str]]:
         ("names given", f"{len(names)}, to {found.n_named} of {len(found.markers)} tracks"),
         ("names not found", ", ".join(found.missing) or "none"),
     ]
+    rows += [] if found.own is None else _own_rows(found, found.own)
     uncertain = sorted(
         (float(p), str(name), other)
         for p, name, other in zip(
@@ -76,9 +81,41 @@ def naming_rows(found: am.tracking.Naming) -> list[tuple[str, str]]:
     return rows
 
 
+def _own_rows(found: am.tracking.Naming, own: am.tracking.KeptNames) -> list[tuple[str, str]]:
+    """Return the result for the names in the file as rows."""
+    kept, moved, left_out = len(own.kept), len(own.moved), len(own.left_out)
+    rows = [("names in the file", f"{kept} kept, {moved} moved, {left_out} left out")]
+    if own.moved:
+        rows.append(("moved", ", ".join(own.moved)))
+    at = _first_frame(found)
+    longest = sorted(own.conflicts, key=lambda one: one.first - one.last)[:MOST]
+    for n, one in enumerate(longest):
+        text = f"{one.name}, frames {at + one.first} to {at + one.last}: {one.found or 'no name'}"
+        rows.append(("" if n else "contradicted", text))
+    if len(own.conflicts) > MOST:
+        rows.append(("", f"and {len(own.conflicts) - MOST} more"))
+    return rows
+
+
+def conflict_figures(
+    conflicts: Iterable[am.tracking.NameConflict], at: int
+) -> list[dict[str, Any]]:
+    """Return names that are contradicted as plain values; `at` is the number of the first frame."""
+    return [
+        {
+            "name": one.name,
+            "first": at + one.first,
+            "last": at + one.last,
+            "found": one.found,
+            "probability": one.probability,
+        }
+        for one in conflicts
+    ]
+
+
 def naming_figures(found: am.tracking.Naming) -> dict[str, Any]:
     """Return the result of `name_tracks` as plain values, with the frame numbers of the file."""
-    at = _first_frame(found)
+    at, own = _first_frame(found), found.own
     rows = zip(
         found.markers,
         found.probabilities.tolist(),
@@ -111,6 +148,14 @@ def naming_figures(found: am.tracking.Naming) -> dict[str, Any]:
             for change in found.changes
         ],
         "not_found": list(found.missing),
+        "own": None
+        if own is None
+        else {
+            "kept": list(own.kept),
+            "moved": list(own.moved),
+            "left_out": list(own.left_out),
+            "conflicts": conflict_figures(own.conflicts, at),
+        },
     }
 
 

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["candidate_quads", "choose_quads", "heights", "pose_distances", "quad_sizes"]
+__all__ = [
+    "candidate_quads",
+    "choose_quads",
+    "heights",
+    "pose_distances",
+    "quad_sizes",
+    "sides_of",
+    "steady_quads",
+]
 
 NEIGHBOURS = 6
 """Number of neighbours of a marker whose triples may span its reference plane."""
+STEADY = 0.1
+"""Share of a distance that is added to its movement where neighbours are ordered."""
 MAX_QUADS = 8
 """Number of reference planes of a marker."""
 MIN_RATIO = 0.8
@@ -69,6 +79,21 @@ def candidate_quads(cost: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.array(quads, dtype=np.int64).reshape(-1, 4)
 
 
+def steady_quads(
+    distances: NDArray[np.float64], movements: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Return each marker with all triples of its steadiest neighbours, shape (Q, 4).
+
+    Parameters
+    ----------
+    distances, movements : ndarray of shape (M, M)
+        Distances and their variation by movement, metres, NaN where unknown.
+    """
+    cost = np.nan_to_num(movements) + STEADY * distances
+    cost[np.isnan(distances) | np.eye(len(distances), dtype=bool)] = np.inf
+    return candidate_quads(cost)
+
+
 def quad_sizes(quads: NDArray[np.int64], distances: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the largest distance within each quad, metres, shape (Q,)."""
     if not len(quads):
@@ -107,3 +132,24 @@ def choose_quads(
         best = own[np.argsort(-rank[own], kind="stable")[:MAX_QUADS]]
         chosen += [int(q) for q in best if certainty[q] > MIN_RATIO]
     return np.array(chosen, dtype=np.int64)
+
+
+def sides_of(
+    quads: NDArray[np.int64],
+    middle: NDArray[np.float64],
+    spread: NDArray[np.float64],
+    distances: NDArray[np.float64],
+) -> dict[str, Any]:
+    """Return the chosen quads with their heights and spreads, as fields of a `MarkerSet`.
+
+    Parameters
+    ----------
+    quads, middle, spread, distances
+        As for `choose_quads`; an unknown spread may be NaN.
+    """
+    chosen = choose_quads(quads, middle, np.nan_to_num(spread), distances)
+    return {
+        "quads": quads[chosen],
+        "heights": middle[chosen],
+        "height_spreads": spread[chosen],
+    }

@@ -11,12 +11,7 @@ import numpy as np
 
 from asterism.checks import check_kind, check_number, check_path, keep_array
 from asterism.errors import FormatError, ParameterError
-from asterism.model.marker_geometry import (
-    candidate_quads,
-    choose_quads,
-    heights,
-    pose_distances,
-)
+from asterism.model.marker_geometry import candidate_quads, heights, pose_distances, sides_of
 from asterism.records import record
 
 if TYPE_CHECKING:
@@ -286,12 +281,7 @@ def _quads_of(places: NDArray[np.float64], distances: NDArray[np.float64]) -> di
     cost = np.where(np.eye(len(places), dtype=bool) | ~np.isfinite(distances), np.inf, distances)
     quads = candidate_quads(cost)
     middle = heights(places, quads)
-    chosen = choose_quads(quads, middle, np.zeros(len(quads)), distances)
-    return {
-        "quads": quads[chosen],
-        "heights": middle[chosen],
-        "height_spreads": np.full(len(chosen), np.nan),
-    }
+    return sides_of(quads, middle, np.full(len(quads), np.nan), distances)
 
 
 def side_of(name: str) -> str | None:

@@ -89,8 +89,8 @@ class Recipe:
     reason : str
         Reason why this method was selected; empty if the caller named the method.
     markers : str
-        SHA-256 of the marker sets by which the tracks are named, which are then needed to repeat
-        the recipe; empty for none.
+        SHA-256 of the marker sets by which the tracks are named, or of the own names of the
+        capture; either is then needed to repeat the recipe. Empty if no track is named.
     fill : bool
         Whether gaps are filled.
     input_hash : InputHash

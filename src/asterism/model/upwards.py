@@ -11,9 +11,11 @@ from asterism.model.capture import Capture
 if TYPE_CHECKING:
     from asterism.model.detections import Detections
 
-__all__ = ["Axis", "up_axis"]
+__all__ = ["Axis", "UpReason", "up_axis"]
 
 Axis = Literal["x", "y", "z"]
+UpReason = Literal["format", "ground", "assumed"]
+"""Whether the axis follows from the format of the file, from the ground, or from nothing."""
 
 _Y_UP = ("motive", "trc")
 """Formats whose files have the y axis up."""
@@ -21,8 +23,8 @@ _BY_THE_GROUND, _OFF_THE_GROUND = 0.1, 0.3  # metres
 _FRAMES = 500
 
 
-def up_axis(detections: Detections) -> tuple[Axis, str]:
-    """Return the axis that points up, and a sentence with the reason.
+def up_axis(detections: Detections) -> tuple[Axis, UpReason]:
+    """Return the axis that points up, and the reason.
 
     Parameters
     ----------
@@ -32,16 +34,15 @@ def up_axis(detections: Detections) -> tuple[Axis, str]:
     Examples
     --------
     >>> import asterism as am
-    >>> up_axis(am.simulate.person(frames=20, seed=1).detections)[0]
-    'z'
+    >>> up_axis(am.simulate.person(frames=20, seed=1).detections)
+    ('z', 'assumed')
     """
     d = detections
     if isinstance(d, Capture) and d.format in _Y_UP:
-        return "y", "The y axis points up, as in most files of this format."
+        return "y", "format"
     if d.n_axes == 3 and _stands_on_y(d):
-        text = "The y axis is taken to point up: the lowest points stay near y = 0, far from z = 0."
-        return "y", f"{text} Change it below the player if this is wrong."
-    return "z", "The z axis is taken to point up. Change it below the player if this is wrong."
+        return "y", "ground"
+    return "z", "assumed"
 
 
 def _stands_on_y(d: Detections) -> bool:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from asterism.model.upwards import Axis
+    from asterism.model.upwards import Axis, UpReason
     from asterism.tracking import Naming
 
 __all__ = ["report"]
@@ -118,6 +118,14 @@ def report(
         file.write(text)
 
 
+_UP: dict[UpReason, str] = {
+    "format": "The y axis points up, as in most files of this format.",
+    "ground": "The y axis is taken to point up: the lowest points stay near y = 0, far from z = 0. "
+    "Change it below the player if this is wrong.",
+    "assumed": "The z axis is taken to point up. Change it below the player if this is wrong.",
+}
+
+
 def _up(tracks: Tracks, rig: Rig | None, asked: Axis | None) -> tuple[Axis, str]:
     """Return the axis that points up, and a sentence with the reason."""
     if asked is not None:
@@ -128,7 +136,8 @@ def _up(tracks: Tracks, rig: Rig | None, asked: Axis | None) -> tuple[Axis, str]
         axes: tuple[Axis, ...] = ("x", "y", "z")
         axis = axes[int(np.argmax(np.abs(mean)))]
         return axis, f"The {axis} axis points up, as in the images of the cameras."
-    return up_axis(tracks.detections)
+    axis, reason = up_axis(tracks.detections)
+    return axis, _UP[reason]
 
 
 def _oddities(tracks: Tracks) -> list[str]:

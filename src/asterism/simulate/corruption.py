@@ -119,9 +119,9 @@ def corrupt(
         Truth of the result. `detections` holds the points in random order within each frame,
         `labels` the marker of each, -1 for false points. `names` lists every marker, detected or
         not, and `record` the options that were set. With a rig, detections have their cameras. The
-        detections of a `Capture` are a `Capture` with the same file and units, no channels, and
-        rate and first frame according to the stride. Its format is empty if frames were left out
-        or shifted, because the rest of the file no longer matches.
+        detections of a `Capture` are a `Capture` with the same file and units, no channels, labels
+        or names, and rate and first frame according to the stride. Its format is empty if frames
+        were left out or shifted, because the rest of the file no longer matches.
 
     Raises
     ------
@@ -191,7 +191,7 @@ def corrupt(
     lines = truth.connections[np.ix_(origin, origin)] if isinstance(truth, Truth) else ()
     return Truth(
         detections=replace(
-            _detections(truth.detections, chosen, times, mixed, names, stride, switches),
+            _detections(truth.detections, chosen, times, mixed, stride, switches),
             **_views(rng_views, mixed, clean, by_cameras, noise * factor),
         ),
         labels=mixed.markers,
@@ -357,7 +357,6 @@ def _detections(
     chosen: NDArray[np.int64],
     times: NDArray[np.float64],
     mixed: Points,
-    names: tuple[str | None, ...],
     stride: int,
     switches: dict[str, Any],
 ) -> Detections:
@@ -383,6 +382,6 @@ def _detections(
         # Frame n of a file has the time (n - 1) / rate.
         first_frame=(source.first_frame - 1) // stride + 1,
         channels=np.full(len(mixed.markers), -1),
-        labels=mixed.markers,
-        names=names,
+        labels=np.full(len(mixed.markers), -1),
+        names=(),
     )

@@ -16,6 +16,7 @@ from asterism.tracking.methods import (
     method_by_name,
 )
 from asterism.tracking.naming import (
+    KeptNames,
     NameChange,
     NameConflict,
     Named,
@@ -49,6 +50,7 @@ __all__ = [
     "Gate",
     "HypothesisCluster",
     "Join",
+    "KeptNames",
     "Lifecycle",
     "Method",
     "ModelEstimate",

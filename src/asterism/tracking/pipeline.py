@@ -17,7 +17,7 @@ from asterism.tracking.filling import fill_gaps
 from asterism.tracking.methods import METHODS, method_by_name
 from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import name_tracks
-from asterism.tracking.plan import hash_of_sets, plan_tracking
+from asterism.tracking.plan import hash_of_names, plan_tracking
 from asterism.tracking.stitching import stitch as stitch_tracklets
 from asterism.tracking.stitching import tracklet_model
 
@@ -42,7 +42,7 @@ class Tracked:
     tracks : Tracks
         Result of the last step.
     naming : Naming, optional
-        Names with their probabilities; None without marker sets.
+        Names with their probabilities; None without marker sets and own names.
     filling : Filling, optional
         Every gap; None if gaps are not filled.
 
@@ -70,7 +70,7 @@ def track(
     stitch: bool | Literal["auto"] = "auto",
     seed: int | None = None,
     start: Tracks | None = None,
-    marker_set: MarkerSet | Sequence[MarkerSet] = (),
+    marker_set: MarkerSet | Sequence[MarkerSet] | None = None,
     fill: bool = False,
     recipe: Recipe | None = None,
     progress: Callable[[int], Any] | None = None,
@@ -80,7 +80,7 @@ def track(
     Parameters
     ----------
     detections : Detections
-        Unnamed points; names that a `Capture` carries are not used.
+        Points. The labels that a `Capture` carries have no influence on the association.
     method : Method or str, optional
         Method of association, or its name for the default options. By default `choose_method`
         selects one from measured properties of the capture.
@@ -96,7 +96,8 @@ def track(
         Initial tracks of the same detections, for example those of a file. `MCMCDA` repairs them
         by merging, splitting and switching.
     marker_set : MarkerSet or sequence of MarkerSet, optional
-        Marker set of the subject, or of each subject, by which `name_tracks` names the tracks.
+        Marker set of the subject, or of each subject, by which `name_tracks` names the tracks. By
+        default they are named by the names that a `Capture` has itself, if any; ``()`` gives none.
     fill : bool
         Whether `fill_gaps` fills the gaps of the tracks.
     recipe : Recipe, optional
@@ -133,7 +134,7 @@ def track(
     >>> bool((again.labels == tracks.labels).all())
     True
     """
-    sets = (marker_set,) if isinstance(marker_set, MarkerSet) else tuple(marker_set)
+    sets = (marker_set,) if isinstance(marker_set, MarkerSet) else marker_set
     made = None
     if recipe is None:
         plan = plan_tracking(
@@ -156,7 +157,7 @@ def carry_out(
     method: Method[Any] | None = None,
     *,
     start: Tracks | None = None,
-    marker_sets: Sequence[MarkerSet] = (),
+    marker_sets: Sequence[MarkerSet] | None = None,
     progress: Callable[[int], Any] | None = None,
 ) -> Tracked:
     """Carry out a recipe: associate, stitch, name, assess and fill, and report the last steps.
@@ -171,8 +172,8 @@ def carry_out(
         Method of the recipe; needed only if it is not in `METHODS`.
     start : Tracks, optional
         Initial tracks of a recipe that has some.
-    marker_sets : sequence of MarkerSet
-        Marker sets of a recipe that names tracks.
+    marker_sets : sequence of MarkerSet, optional
+        Marker sets of a recipe that names tracks; by default the own names of the capture.
     progress : callable, optional
         Called from time to time with the number of finished frames of the association.
 
@@ -199,7 +200,7 @@ def carry_out(
     stitching = stitch_tracklets(tracks, model) if recipe.stitch else None
     if stitching is not None:
         tracks = dataclasses.replace(stitching.tracks, recipe=carried)
-    naming = name_tracks(tracks, *marker_sets) if recipe.markers else None
+    naming = name_tracks(tracks, *(marker_sets or ())) if recipe.markers else None
     tracks = tracks if naming is None else naming.tracks
     tracks = assess(tracks, model, stitching)
     decisions = tracks.decisions
@@ -220,7 +221,7 @@ def _check_recipe(
     given: dict[str, Any],
     detections: Detections,
     start: Tracks | None,
-    marker_sets: Sequence[MarkerSet],
+    marker_sets: Sequence[MarkerSet] | None,
 ) -> None:
     """Raise `ParameterError` unless the recipe is the only setting and has the same input."""
     check_kind("recipe", recipe, Recipe, "tracks.recipe")
@@ -231,8 +232,8 @@ def _check_recipe(
     if recipe.has_start != (start is not None):
         expected = "the initial tracks of that run" if recipe.has_start else "none"
         raise ParameterError("start", expected, "none" if start is None else "tracks")
-    if (found := hash_of_sets(marker_sets)) != recipe.markers:
-        expected = f"the marker sets of that run, SHA-256 {recipe.markers}"
+    if (found := hash_of_names(detections, marker_sets)) != recipe.markers:
+        expected = f"the marker sets of that run, or its own names, SHA-256 {recipe.markers}"
         raise ParameterError("marker_set", expected if recipe.markers else "none", found or "none")
     found = sha256_of(detections, None if start is None else start.labels)
     if found != recipe.sha256:

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from asterism.checks import check_kind, check_number
 from asterism.errors import ParameterError
-from asterism.model import Detections, MarkerSet, Recipe, TrackingModel
+from asterism.model import Capture, Detections, MarkerSet, Recipe, TrackingModel
 from asterism.model.recipe import InputHash, versions
 from asterism.records import record
 from asterism.tracking.choose import choose_method
 from asterism.tracking.estimation import estimate_model
 from asterism.tracking.methods import SMP, Method, method_by_name, options_of
+from asterism.tracking.naming.own_names import has_own_names
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from asterism.model import Tracks
     from asterism.tracking.estimation import ModelEstimate
 
-__all__ = ["Plan", "hash_of_sets", "plan_tracking"]
+__all__ = ["Plan", "hash_of_names", "plan_tracking"]
 
 
 @record
@@ -58,7 +59,7 @@ def plan_tracking(
     stitch: bool | Literal["auto"] = "auto",
     seed: int | None = None,
     start: Tracks | None = None,
-    marker_sets: Sequence[MarkerSet] = (),
+    marker_sets: Sequence[MarkerSet] | None = None,
     fill: bool = False,
 ) -> Plan:
     """Decide the model, the method and the stitching of a tracking, without running it.
@@ -77,8 +78,9 @@ def plan_tracking(
         Seed of the methods that draw random numbers; 0 by default.
     start : Tracks, optional
         Initial tracks, which `MCMCDA` repairs.
-    marker_sets : sequence of MarkerSet
-        Marker sets by which the tracks are named, as for `track`.
+    marker_sets : sequence of MarkerSet, optional
+        Marker sets by which the tracks are named, as for `track`; by default the own names of a
+        `Capture`, if it has any.
     fill : bool
         Whether gaps are filled.
 
@@ -126,7 +128,7 @@ def plan_tracking(
         seed=seed,
         has_start=start is not None,
         reason=reason,
-        markers=hash_of_sets(marker_sets),
+        markers=hash_of_names(detections, marker_sets),
         fill=fill,
         input_hash=InputHash((detections, None if start is None else start.labels)),
         versions=versions(),
@@ -134,8 +136,19 @@ def plan_tracking(
     return Plan(recipe=recipe, method=method, estimate=estimate)
 
 
-def hash_of_sets(marker_sets: Sequence[MarkerSet]) -> str:
-    """Return the SHA-256 of marker sets, in hexadecimal; empty for none."""
+def hash_of_names(detections: Detections, marker_sets: Sequence[MarkerSet] | None) -> str:
+    """Return the SHA-256 of what names the tracks, in hexadecimal; empty for nothing.
+
+    Parameters
+    ----------
+    detections : Detections
+        Points; their own names count if no sets are given.
+    marker_sets : sequence of MarkerSet, optional
+        Marker sets; none of them, and no own names, if the sequence is empty.
+    """
+    if marker_sets is None and isinstance(detections, Capture) and has_own_names(detections):
+        own = "\n".join(name or "" for name in detections.names).encode()
+        return hashlib.sha256(own + b"\n" + detections.labels.tobytes()).hexdigest()
     if not marker_sets:
         return ""
     for made in marker_sets:

@@ -29,6 +29,10 @@ _Subject = Annotated[
     typer.Option(help="Use only this subject's markers, those named SUBJECT:NAME."),
 ]
 _Set = Annotated[Path, typer.Argument(metavar="SET", help="Marker set, TOML, VSK or VST.")]
+_SetOrCapture = Annotated[
+    Path,
+    typer.Argument(metavar="SET", help="Marker set, TOML, VSK or VST, or a labelled capture."),
+]
 _Sets = Annotated[
     list[Path], typer.Argument(metavar="SET...", help="Marker sets of different subjects.")
 ]
@@ -104,39 +108,36 @@ def merge(
 
 
 @app.command()
-def check(path: _Set, captures: _Checked, quiet: Quiet = False, json: Json = False) -> None:
+def check(
+    path: _SetOrCapture, captures: _Checked, quiet: Quiet = False, json: Json = False
+) -> None:
     """List the stretches in which names of captures contradict a marker set; exit code 1 if any do.
 
-    The set should be learnt from other captures.
+    SET may be a labelled capture. It should not be IN itself, where labels that are wrong in most
+    frames count as right.
 
     For example:
 
         asterism markerset check protocol.toml walk.c3d turn.c3d
+
+        asterism markerset check static.c3d walk.c3d
     """
     import asterism as am
-    from asterism.cli.naming import labelled_tracks
+    from asterism.cli.naming import conflict_figures, labelled_tracks, read_markers
 
-    made = am.read_marker_set(path)
+    made = read_markers(path, option="SET")
     rows: list[tuple[str, ...]] = []
     plain: list[dict[str, Any]] = []
     for source in captures:
         tracks = labelled_tracks(source, None)
         capture = tracks.detections
         at = capture.first_frame if isinstance(capture, am.Capture) else 0
-        for conflict in am.tracking.check_names(tracks, made):
+        conflicts = am.tracking.check_names(tracks, made)
+        plain += [{"capture": str(source)} | own for own in conflict_figures(conflicts, at)]
+        for conflict in conflicts:
             frames = f"{at + conflict.first} to {at + conflict.last}"
             found = conflict.found or "none"
             rows.append((source.name, conflict.name, frames, found, f"{conflict.probability:.0%}"))
-            plain.append(
-                {
-                    "capture": str(source),
-                    "name": conflict.name,
-                    "first": at + conflict.first,
-                    "last": at + conflict.last,
-                    "found": conflict.found,
-                    "probability": conflict.probability,
-                }
-            )
     if json:
         print_json({"marker_set": str(path), "conflicts": plain})
     elif rows and not quiet:

@@ -14,11 +14,12 @@ __all__ = ["name"]
 
 _In = Annotated[Path, typer.Argument(metavar="IN", help="Capture with tracks.")]
 _Markers = Annotated[
-    list[Path],
+    list[Path] | None,
     typer.Option(
         "--markers",
         metavar="SET",
         help="Marker set (TOML, VSK, VST), or a labelled capture; one for each subject.",
+        show_default="the names in IN",
     ),
 ]
 _Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
@@ -26,16 +27,17 @@ _Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.")]
 
 def name(
     source: _In,
-    markers: _Markers,
     out: _Out,
+    markers: _Markers = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Name tracks by the marker set of the subject.
+    """Name tracks by the marker set of the subject, or by the names in IN.
 
-    Names in IN are ignored, unless IN itself is given as marker set. Tracklets of one marker become
-    one track; a track that changed marker is cut. A track without a probable name keeps none.
+    With a marker set names in IN are ignored. Without one they are kept where the distances in IN
+    do not contradict them. Tracklets of one marker become one track; a track that changed marker is
+    cut. A track without a probable name keeps none.
 
     For example:
 
@@ -44,20 +46,26 @@ def name(
         asterism track next.c3d -o tracked.c3d
 
         asterism name tracked.c3d --markers ann.toml -o named.c3d
+
+        asterism name labelled.c3d -o named.c3d
     """
     import asterism as am
     from asterism.cli.naming import naming_figures, naming_rows, read_markers
     from asterism.cli.outputs import check_outputs
     from asterism.cli.tracking import output_format
+    from asterism.tracking.naming.own_names import has_own_names
 
     format = output_format(out, None)
-    check_outputs({"--out": out}, [source, *markers], overwrite=overwrite)
-    sets = [read_markers(path) for path in markers]
+    check_outputs({"--out": out}, [source, *(markers or [])], overwrite=overwrite)
+    sets = [read_markers(path) for path in markers or []]
     capture = am.read(source)
     if not (capture.labels >= 0).any():
         hint = "run asterism track first"
         raise ParameterError("IN", "a capture with tracks", f"none in {source}", hint)
-    found = am.name_tracks(capture.tracks.measured(), *sets)
+    tracks = capture.tracks.measured()
+    if not sets and not has_own_names(capture):
+        raise ParameterError("--markers", "a marker set", f"none, and no names in {source}")
+    found = am.name_tracks(tracks, *sets)
     am.write(found.tracks, out, format=format)
     if json:
         print_json({"input": str(source), "output": str(out)} | naming_figures(found))

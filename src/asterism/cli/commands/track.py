@@ -112,9 +112,9 @@ def track(
 ) -> None:
     """Track the detections of a capture, and write the tracks.
 
-    Model and method are estimated from the capture unless they are given. Names in the capture
-    are ignored, unless the capture itself is given as marker set. The same input, options and
-    seed give the same bytes.
+    Model and method are estimated from the capture unless they are given. Without marker sets,
+    tracks take the names that the capture has itself, where its distances do not contradict them.
+    The same input, options and seed give the same bytes.
 
     For example:
 
@@ -133,8 +133,6 @@ def track(
         asterism track trial.c3d --report trial.html
 
         asterism track trial.c3d --markers subject.toml --fill
-
-        asterism track trial.c3d --markers trial.c3d
 
         asterism track trial.c3d --run runs/first
 
@@ -164,7 +162,7 @@ def track(
         out = out if run is None else run / out.name
     outputs = _outputs(out, run) | {"--report": report}
     check_outputs(outputs, [source, model, repeat, *(markers or [])], overwrite=overwrite)
-    sets = [read_markers(path) for path in markers or []]
+    sets = [read_markers(path) for path in markers] if markers else None
     chosen_method = made_method(method, option or [])
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
     given = None if model is None else read_model(model)
@@ -269,13 +267,13 @@ def _run_of(path: Path, source: Path | None, settings: list[str]) -> Run:
     return job
 
 
-def _checked(job: Run, capture: am.Capture, sets: list[am.MarkerSet], path: Path) -> Recipe:
+def _checked(job: Run, capture: am.Capture, sets: list[am.MarkerSet] | None, path: Path) -> Recipe:
     """Return the recipe of a run, if the capture and the marker sets are its input."""
     from asterism.model.recipe import sha256_of
-    from asterism.tracking.plan import hash_of_sets
+    from asterism.tracking.plan import hash_of_names
 
     recipe = job.recipe
-    if (found := hash_of_sets(sets)) != recipe.markers:
+    if (found := hash_of_names(capture, sets)) != recipe.markers:
         expected = f"those of {path}, SHA-256 {recipe.markers}" if recipe.markers else "none"
         raise ParameterError("--markers", expected, found or "none")
     found = sha256_of(capture, capture.labels if recipe.has_start else None)

@@ -8,12 +8,7 @@ import numpy as np
 
 from asterism.io.marker_sets.postures import neutral, place_markers, postures, relaxed
 from asterism.model import MarkerSet
-from asterism.model.marker_geometry import (
-    candidate_quads,
-    choose_quads,
-    heights,
-    pose_distances,
-)
+from asterism.model.marker_geometry import heights, pose_distances, sides_of, steady_quads
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,8 +28,6 @@ WIDE = 2.0
 """Factor on the joint angles of the postures in which sides are measured."""
 MAX_SEGMENTS = 2
 """Largest number of segments of a marker and its references, for their side to have a spread."""
-STEADY = 0.1
-"""Share of a distance that is added to its movement where neighbours are ordered."""
 
 
 def marker_set(
@@ -106,21 +99,14 @@ def _sides(
     The sides of the neutral posture have no known spread, so that they weigh less. They contain
     what no other side does, as which wrist marker is in front.
     """
-    cost = movements + STEADY * distances
-    cost[np.isnan(cost) | np.eye(len(cost), dtype=bool)] = np.inf
-    quads = candidate_quads(cost)
+    quads = steady_quads(distances, movements)
     quads = quads[(np.diff(np.sort(owner[quads], axis=1), axis=1) > 0).sum(axis=1) < MAX_SEGMENTS]
     sampled = heights(wide, quads)
     middle = sampled.mean(axis=0)
     spread = np.hypot(sampled.std(axis=0), error[0] + error[1] * np.abs(middle))
-    chosen = choose_quads(quads, middle, np.nan_to_num(spread), distances)
+    own = sides_of(quads, middle, spread, distances)
     simple = MarkerSet(names=tuple(map(str, range(len(places)))), places=places)
-    assert simple.quads is not None
-    return {
-        "quads": np.concatenate([quads[chosen], simple.quads]),
-        "heights": np.concatenate([middle[chosen], simple.heights]),
-        "height_spreads": np.concatenate([spread[chosen], simple.height_spreads]),
-    }
+    return {name: np.concatenate([own[name], getattr(simple, name)]) for name in own}
 
 
 def _distances(poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -6,45 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.records import record
+from asterism.tracking.naming.conflicts import codes_of, conflicts_of
 from asterism.tracking.naming.name import name_tracks
 
 if TYPE_CHECKING:
     from asterism.model import MarkerSet, Tracks
+    from asterism.tracking.naming.conflicts import NameConflict
 
-__all__ = ["NameConflict", "check_names"]
-
-MIN_FRAMES = 3
-"""Shortest stretch that is listed, frames."""
-
-
-@record
-class NameConflict:
-    """Stretch of frames in which a track's own name contradicts the marker sets.
-
-    Parameters
-    ----------
-    name : str
-        Name of the track in the capture.
-    first, last : int
-        First and last frame.
-    found : str or None
-        Name by the marker sets, None for none.
-    probability : float
-        Probability of the name that was found, for the track as a whole.
-
-    Examples
-    --------
-    >>> conflict = NameConflict(name="RNAV", first=0, last=167, found="RHLX", probability=0.98)
-    >>> conflict.found
-    'RHLX'
-    """
-
-    name: str
-    first: int
-    last: int
-    found: str | None
-    probability: float
+__all__ = ["check_names"]
 
 
 def check_names(tracks: Tracks, *marker_sets: MarkerSet) -> tuple[NameConflict, ...]:
@@ -77,31 +46,17 @@ def check_names(tracks: Tracks, *marker_sets: MarkerSet) -> tuple[NameConflict, 
     """
     tracks = tracks.measured()
     naming = name_tracks(tracks, *marker_sets)
-    own = [None if name is None else name.rpartition(":")[2] for name in tracks.names]
-    known = {name for made in marker_sets for name in made.names}
-    found = [None if name is None else name.rpartition(":")[2] for name in naming.tracks.names]
-    code = {name: n for n, name in enumerate(sorted(known))}
-    given = np.array([code.get(name or "", -1) for name in [*own, None]])[tracks.labels]
-    by_sets = np.array([code.get(name or "", -1) for name in [*found, None]])[naming.tracks.labels]
-    order, _ = tracks.by_track
-    track, is_conflict = tracks.labels[order], (given != by_sets)[order] & (given[order] >= 0)
-    frame = tracks.detections.frame_of[order]
-    other = by_sets[order]
-    starts = np.flatnonzero(
-        np.diff(track, prepend=-1)
-        | np.diff(is_conflict, prepend=False)
-        | np.diff(other, prepend=-2)
+    if naming.own is not None:
+        return naming.own.conflicts
+    known = sorted({name for made in marker_sets for name in made.names})
+    own, found = (
+        [None if name is None else name.rpartition(":")[2] for name in names]
+        for names in (tracks.names, naming.tracks.names)
     )
-    ends = np.append(starts, len(order))[1:] - 1
-    names = sorted(known)
-    return tuple(
-        NameConflict(
-            name=str(tracks.names[track[a]]),
-            first=int(frame[a]),
-            last=int(frame[b]),
-            found=names[int(other[a])] if other[a] >= 0 else None,
-            probability=float(naming.probabilities[track[a]]),
-        )
-        for a, b in zip(starts.tolist(), ends.tolist(), strict=True)
-        if is_conflict[a] and frame[b] - frame[a] + 1 >= MIN_FRAMES
+    return conflicts_of(
+        tracks,
+        codes_of(tracks, own, known),
+        codes_of(naming.tracks, found, known),
+        np.append(naming.probabilities, 1.0)[tracks.labels],
+        known,
     )

@@ -29,6 +29,7 @@ __all__ = [
     "evidence_of",
     "prior_of",
     "refit",
+    "rigid_fit",
 ]
 
 NEIGHBOURS = 16
@@ -66,8 +67,12 @@ NEAR = 0.3
 ACROSS = 0.1
 """Weight of a height across segments, relative to that within a segment, if its spread is unknown:
 the other posture may have it on the other side."""
-FITS = ((0.004, 0.01, False), (0.008, 0.05, True))
-"""Fixed and relative error of the first two kinds, and whether they scale with the subject."""
+FITS = ((0.004, 0.01, False), (0.008, 0.05, True), (0.03, 0.15, True))
+"""Fixed and relative error of the first three kinds, and whether they scale with the subject."""
+STEADIEST = 0.004
+"""Spread of a distance, metres, at which it counts a quarter in the fit of a name."""
+MIN_RIGID_WEIGHT = 0.5
+"""Smallest sum of these weights by which a name is judged."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -109,7 +114,7 @@ def evidence_of(
     *,
     size: float,
     weights: tuple[float, ...],
-    posture: NDArray[np.float64] | None = None,
+    more: NDArray[np.float64] | None = None,
 ) -> _engine.NameEvidence:
     """Return the evidence for the names of tracks.
 
@@ -123,8 +128,8 @@ def evidence_of(
         Size of the subject relative to the marker set.
     weights : tuple of float
         Weights of the four kinds of fit of a distance.
-    posture : ndarray of shape (n, M), optional
-        Log odds of each marker for each track by their places.
+    more : ndarray of shape (n, M), optional
+        Log odds of each marker for each track by its place, or by the names of the capture.
     """
     assert made.quads is not None
     known = np.isfinite(made.height_spreads)
@@ -142,7 +147,7 @@ def evidence_of(
         distances=made.distances,
         movements=made.movements,
         variations=np.nan_to_num(made.variations),
-        prior=np.tile(prior_of(made), (n, 1)) + (0.0 if posture is None else posture),
+        prior=np.tile(prior_of(made), (n, 1)) + (0.0 if more is None else more),
         quads=np.ascontiguousarray(made.quads[usable]),
         heights=np.ascontiguousarray(np.stack([made.heights, variance, weight], axis=1)[usable]),
         pairs=stats.pairs,
@@ -182,20 +187,62 @@ def refit(
     if used.sum() < MIN_RIGID:
         return None
     d, s, a, b = d[used], s[used], a[used], b[used]
-    D, W, B = made.distances[a, b], np.nan_to_num(made.movements[a, b]), made.variations[a, b]
-    size = float(np.median(d / D))
+    size = float(np.median(d / made.distances[a, b]))
     w = np.array([0.5, 0.5])
+    density = _densities(made, d, s, a, b, size)[:2]
     for _ in range(10):
-        density: list[NDArray[np.float64]] = []
-        for weight, (fixed, share, scales) in zip(w, FITS, strict=True):
-            v = fixed**2 + (share * D) ** 2 + scales * np.nan_to_num(B) ** 2 + s**2 + W**2 / 2
-            y = 1 + (d - (size if scales else 1) * D) ** 2 / (4 * v)
-            density.append(weight / (np.sqrt(v * y) * y**2))
-        share_of = np.stack(density)
+        share_of = w[:, None] * density
         share_of /= share_of.sum(axis=0)
         w = (share_of.sum(axis=1) + 1) / (len(d) + 2)
     rest = (1 - RIGID_SHARE) / 2
     return size, (RIGID_SHARE * float(w[0]), RIGID_SHARE * float(w[1]), rest, rest)
+
+
+def rigid_fit(
+    made: MarkerSet,
+    stats: TrackStats,
+    names: NDArray[np.int64],
+    size: float,
+    weights: tuple[float, ...],
+) -> NDArray[np.float64]:
+    """Return how well the rigid distances of each named track fit its marker, (n,).
+
+    It is the mean log-likelihood ratio of a distance to another named track: of this marker against
+    another point nearby, whose distances are off by `FITS[2]`. It is 0 for a track without a name
+    or without rigid distances.
+    """
+    i, j = stats.pairs.T
+    used = (names[i] >= 0) & (names[j] >= 0)
+    used &= made.distances[names[i], names[j]] > 0
+    i, j = i[used], j[used]
+    d, s = stats.distances.middle[i, j], stats.distances.spread[i, j]
+    density = _densities(made, d, s, names[i], names[j], size)
+    ratio = np.log(np.array(weights[:3]) @ density / density[2])
+    weight = 1 / (1 + (s / STEADIEST) ** 2) ** 2
+    total, sums = np.zeros((2, len(names)))
+    for own in (i, j):
+        np.add.at(total, own, weight * ratio)
+        np.add.at(sums, own, weight)
+    return np.where(sums >= MIN_RIGID_WEIGHT, total / np.maximum(sums, MIN_RIGID_WEIGHT), 0.0)
+
+
+def _densities(
+    made: MarkerSet,
+    d: NDArray[np.float64],
+    s: NDArray[np.float64],
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    size: float,
+) -> NDArray[np.float64]:
+    """Return the densities of distances d of spread s for markers a and b, by kind, (3, P)."""
+    D, W, B = made.distances[a, b], made.movements[a, b], np.nan_to_num(made.variations[a, b])
+    moved2 = np.where(np.isfinite(W), s**2 / 4 + np.nan_to_num(W) ** 2 / 2, s**2)
+    density: list[NDArray[np.float64]] = []
+    for fixed, share, scales in FITS:
+        v = fixed**2 + (share * D) ** 2 + scales * B**2 + moved2
+        y = 1 + (d - (size if scales else 1) * D) ** 2 / (4 * v)
+        density.append(0.375 / (np.sqrt(v * y) * y**2))
+    return np.stack(density)
 
 
 def _sampled(positions: NDArray[np.float64], n: int) -> NDArray[np.float64]:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asterism.tracking.naming.bodies import bodies_of_sets, linked_bodies, parted_bodies
+from asterism.tracking.naming.positions import positions_in
 from asterism.tracking.naming.search import Found, search
-from asterism.tracking.naming.windows import scattered
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from asterism.model import MarkerSet, Tracks
     from asterism.model.upwards import Axis
 
-__all__ = ["First", "first_names"]
+__all__ = ["First", "first_names", "first_own_names"]
 
 MIN_LENGTH = 5
 """Smallest number of detections of a track that is named first."""
@@ -69,17 +69,7 @@ def first_names(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) ->
         Names by each set; None where it does not fit.
     """
     none: list[First | None] = [None] * len(marker_sets)
-    d = tracks.detections
-    used = np.flatnonzero(tracks.labels >= 0)
-    if not len(used):
-        return none
-    worth = np.where(tracks.lengths >= MIN_LENGTH, np.minimum(tracks.lengths, LONG), 0)
-    by_frame = np.bincount(
-        d.frame_of[used], weights=worth[tracks.labels[used]], minlength=d.n_frames
-    )
-    frame = int(np.argmax(by_frame))
-    alive = tracks.labels[slice(*d.offsets[[frame, frame + 1]])]
-    alive = np.unique(alive[(alive >= 0) & (tracks.lengths[alive] >= MIN_LENGTH)])
+    frame, alive = _fullest(tracks, tracks.lengths >= MIN_LENGTH)
     if len(alive) < 2:
         return none
     positions = _positions(tracks, alive)
@@ -99,6 +89,53 @@ def first_names(tracks: Tracks, marker_sets: tuple[MarkerSet, ...], up: Axis) ->
         else First(frame=frame, tracks=alive[body], found=found, probability=p)
         for body, found, p in zip(best.bodies, best.found, best.probabilities, strict=True)
     ]
+
+
+def first_own_names(
+    tracks: Tracks, made: MarkerSet, up: Axis, labelled: NDArray[np.float64]
+) -> First | None:
+    """Name the tracks of the frame with the most long tracks that the capture itself names.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture.
+    made : MarkerSet
+        Set that was learnt from the names of the capture; it fits.
+    up : {"x", "y", "z"}
+        Axis of the capture that points up.
+    labelled : ndarray of shape (K, M)
+        Log odds of each marker for each track by these names.
+    """
+    is_long = tracks.lengths >= MIN_LENGTH
+    frame, alive = _fullest(tracks, is_long & labelled.any(axis=1), is_long)
+    if not len(alive):
+        return None
+    own = labelled[alive]
+    start, best = own.argmax(axis=1), own.max(axis=1)
+    start[best == 0] = -1
+    for m in np.unique(start[start >= 0]):  # one track a marker, the one that has most of its name
+        rivals = np.flatnonzero(start == m)
+        start[np.delete(rivals, best[rivals].argmax())] = -1
+    found = search(made, _positions(tracks, alive), up, start=start, labelled=own)
+    assert found is not None
+    return First(frame=frame, tracks=alive, found=found, probability=1.0)
+
+
+def _fullest(
+    tracks: Tracks, counts: NDArray[np.bool_], is_used: NDArray[np.bool_] | None = None
+) -> tuple[int, NDArray[np.int64]]:
+    """Return the frame with the most long tracks of those that count, and its used tracks."""
+    d = tracks.detections
+    used = np.flatnonzero(tracks.labels >= 0)
+    worth = np.where(counts, np.minimum(tracks.lengths, LONG), 0)
+    by_frame = np.bincount(
+        d.frame_of[used], weights=worth[tracks.labels[used]], minlength=d.n_frames
+    )
+    frame = int(np.argmax(by_frame)) if len(by_frame) else 0
+    alive = tracks.labels[slice(*d.offsets[[frame, frame + 1]])] if len(used) else used
+    alive = np.unique(alive[alive >= 0])
+    return frame, alive[(counts if is_used is None else is_used)[alive]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,13 +189,8 @@ def _positions(tracks: Tracks, alive: NDArray[np.int64]) -> NDArray[np.float64]:
     d = tracks.detections
     column = np.full(tracks.n_tracks + 1, -1)  # the last element is for clutter
     column[alive] = np.arange(len(alive))
-    used = np.flatnonzero(column[tracks.labels] >= 0)
-    counts = np.bincount(d.frame_of[used], minlength=d.n_frames)
+    columns = column[tracks.labels]
+    counts = np.bincount(d.frame_of[columns >= 0], minlength=d.n_frames)
     frames = np.flatnonzero(counts >= 0.5 * counts.max())
     frames = frames[np.unique(np.linspace(0, len(frames) - 1, FIRST_FRAMES).astype(np.int64))]
-    row = np.full(d.n_frames, -1)
-    row[frames] = np.arange(len(frames))
-    used = used[row[d.frame_of[used]] >= 0]
-    return scattered(
-        d.points[used], row[d.frame_of[used]], column[tracks.labels[used]], len(frames), len(alive)
-    )
+    return positions_in(d, frames, columns, len(alive))

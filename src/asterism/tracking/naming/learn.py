@@ -10,7 +10,7 @@ from asterism.checks import check_kind
 from asterism.errors import ParameterError
 from asterism.io.captures.marker_names import is_unlabelled
 from asterism.model import MarkerSet, Tracks
-from asterism.model.marker_geometry import candidate_quads, choose_quads, heights
+from asterism.model.marker_geometry import heights, sides_of, steady_quads
 from asterism.model.upwards import up_axis
 from asterism.tracking.rigidity.cliques import disjoint_cliques
 from asterism.tracking.rigidity.distances import distances_between
@@ -33,8 +33,6 @@ MOVED = 0.03
 """Spread of a distance, metres, from which on a body has moved. In a static trial it sways less."""
 RIGID = 0.06
 """Largest movement of a distance on a rigid segment, as a share of the distance."""
-STEADY = 0.1
-"""Share of a distance that is added to its movement where neighbours are ordered."""
 
 
 def learn_marker_set(*captures: Tracks) -> MarkerSet:
@@ -227,18 +225,11 @@ def _sides(
     moved: bool,
 ) -> dict[str, Any]:
     """Choose reference planes for each marker, with its heights over them."""
-    cost = np.nan_to_num(movements) + STEADY * distances
-    cost[np.isnan(distances) | np.eye(len(distances), dtype=bool)] = np.inf
-    quads = candidate_quads(cost)
+    quads = steady_quads(distances, movements)
     all_heights = [heights(_spread_over(pose, HEIGHT_FRAMES), quads) for pose in poses]
     stacked = np.concatenate(all_heights) if all_heights else np.zeros((0, len(quads)))
-    middle, spread = _mean(stacked), np.sqrt(_variance(stacked))
-    chosen = choose_quads(quads, middle, np.nan_to_num(spread), distances)
-    return {
-        "quads": quads[chosen],
-        "heights": middle[chosen],
-        "height_spreads": spread[chosen] if moved else np.full(len(chosen), np.nan),
-    }
+    sides = sides_of(quads, _mean(stacked), np.sqrt(_variance(stacked)), distances)
+    return sides if moved else sides | {"height_spreads": np.full(len(sides["quads"]), np.nan)}
 
 
 def _merged_sides(
@@ -263,12 +254,7 @@ def _merged_sides(
         table /= size
     middle = _center(values[:, 0])
     spread = np.sqrt(np.nan_to_num(_mean(values[:, 1] ** 2)) + _variance(values[:, 0]))
-    chosen = choose_quads(quads, middle, np.nan_to_num(spread), distances)
-    return {
-        "quads": quads[chosen],
-        "heights": middle[chosen],
-        "height_spreads": spread[chosen],
-    }
+    return sides_of(quads, middle, spread, distances)
 
 
 def _presences(poses: list[NDArray[np.float64]], has_moved: list[bool]) -> NDArray[np.float64]:

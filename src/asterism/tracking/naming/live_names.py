@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from asterism import _engine
+from asterism.tracking.naming.positions import scattered
 from asterism.tracking.naming.probabilities import TEMPERATURE
 from asterism.tracking.naming.subject import Subject
-from asterism.tracking.naming.windows import MIN_LOG_ODDS, scattered
+from asterism.tracking.naming.windows import MIN_LOG_ODDS, TAKEN
 from asterism.tracking.rigidity.distances import Distances
 
 if TYPE_CHECKING:
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = ["LiveNames"]
 
-MARGIN = 4.0
-"""Log odds by which the best name of a new track must exceed the next."""
+MARGIN, MIN_SUM = 4.0, 8.0
+"""Log odds by which the best name of a new track must exceed the next: in one examination, or in
+the sum of several that favour the same name."""
 MIN_CHANGE = 16.0
 """Sum of log odds by which examinations of a track must favour another name."""
 MAX_EACH = 8.0
@@ -54,7 +56,7 @@ class LiveNames:
     subject : Subject
         Tables of all markers.
     rivals : mapping of int to (int, float)
-        Better marker of a named track, -1 for none, and its log odds over several examinations.
+        Better marker of a track, -1 for none, and its log odds over several examinations.
     turn : int
         Number of frames so far.
     """
@@ -129,43 +131,56 @@ class LiveNames:
 
     def _examined(self, alive: NDArray[np.int64], recent: Frames) -> tuple[LiveNames, Changes]:
         window = _Window(self, alive, _dense(alive, recent))
-        of = self.marker_of
-        marker = np.array([of.get(label, -1) for label in alive.tolist()], dtype=np.int64)
-        named = np.flatnonzero(marker >= 0)
-        unnamed = np.flatnonzero((marker < 0) & window.is_whole)
-        marker_of, rivals = dict(self.marker_of), dict(self.rivals)
-        changes: Changes = {}
+        after = _Changed(dict(self.marker_of), dict(self.rivals), {})
+        new = np.flatnonzero((window.marker < 0) & window.is_whole)
+        named = np.flatnonzero(window.marker >= 0)
         subject = self.subject
-        if len(unnamed):
-            k = int(unnamed[self.turn % len(unnamed)])
-            found = window.name_of_new(k)
-            if found is not None:
-                before = [label for label, m in marker_of.items() if m == found[0]]
-                for label in before:
-                    del marker_of[label]
-                    changes[label] = None
-                marker_of[int(alive[k])] = found[0]
-                changes[int(alive[k])] = self._name(found[0]), found[1]
+        if len(new):
+            self._name_new(after, window, int(new[self.turn % len(new)]))
         if len(named):
             k = int(named[self.turn % len(named)])
-            label, own = int(alive[k]), int(marker[k])
-            other, gain = window.better(k, own)
-            before, sum_before = rivals.pop(label, (own, 0.0))
-            total = min(gain, MAX_EACH) + (sum_before if before == other else 0.0)
-            if other != own and total > MIN_CHANGE:
-                holder = window.holder[other] if other >= 0 else -1
-                for who, m in ((label, other), (int(alive[holder]), own))[: 1 + (holder >= 0)]:
-                    changes[who] = (
-                        None if m < 0 else (self._name(m), 1 / (1 + np.exp(-total / TEMPERATURE)))
-                    )
-                    marker_of.pop(who, None)
-                    if m >= 0:
-                        marker_of[who] = m
-            elif other != own and total > 0:
-                rivals[label] = other, total
+            self._rename(after, window, k)
             if self.turn % EVERY == EVERY // 2:
-                subject = self._with_row(own)
-        return replace(self, marker_of=marker_of, rivals=rivals, subject=subject), changes
+                subject = self._with_row(int(window.marker[k]))
+        return (
+            replace(self, marker_of=after.marker_of, rivals=after.rivals, subject=subject),
+            after.changes,
+        )
+
+    def _name_new(self, after: _Changed, window: _Window, k: int) -> None:
+        """Name a track without a name, if its best free marker leads clearly, or repeatedly."""
+        m, lead, probability = window.best_free(k)
+        label = int(window.alive[k])
+        before, sum_before = after.rivals.pop(label, (m, 0.0))
+        total = max(lead, 0.0) + (sum_before if before == m else 0.0)
+        if lead <= 0:
+            return
+        if lead < MARGIN and total < MIN_SUM:
+            after.rivals[label] = m, total
+            return
+        for holder in [own for own, marker in after.marker_of.items() if marker == m]:
+            after.set(holder, None)  # it has ended
+        after.set(label, m, self._name(m), probability)
+
+    def _rename(self, after: _Changed, window: _Window, k: int) -> None:
+        """Examine a named track; its examinations together may favour another name."""
+        label, own = int(window.alive[k]), int(window.marker[k])
+        other, gain = window.better(k, own)
+        before, sum_before = after.rivals.pop(label, (own, 0.0))
+        total = min(gain, MAX_EACH) + (sum_before if before == other else 0.0)
+        if other == own or total <= 0:
+            return
+        if total <= MIN_CHANGE:
+            after.rivals[label] = other, total
+            return
+        probability = float(1 / (1 + np.exp(-total / TEMPERATURE)))
+        if other < 0:
+            after.set(label, None)
+            return
+        holder = window.holder[other]
+        after.set(label, other, self._name(other), probability)
+        if holder >= 0:
+            after.set(int(window.alive[holder]), own, self._name(own), probability)
 
     def _with_row(self, marker: int) -> Subject:
         """Return the tables with one marker measured again."""
@@ -187,20 +202,36 @@ class LiveNames:
         return [name for made in self.sets for name in made.full_names][marker]
 
 
+@dataclass(eq=False)
+class _Changed:
+    """Names while a frame is examined: `marker_of` and `rivals` of `LiveNames`, and changes."""
+
+    marker_of: dict[int, int]
+    rivals: dict[int, tuple[int, float]]
+    changes: Changes
+
+    def set(self, label: int, marker: int | None, name: str = "", probability: float = 0.0) -> None:
+        """Set the marker of a track, None for none."""
+        self.marker_of.pop(label, None)
+        if marker is not None:
+            self.marker_of[label] = marker
+        self.changes[label] = None if marker is None else (name, probability)
+
+
 class _Window:
     """Tracks in a few frames, and the scores of their names."""
 
     def __init__(
         self, names: LiveNames, alive: NDArray[np.int64], dense: NDArray[np.float64]
     ) -> None:
-        self.dense = dense
+        self.alive, self.dense = alive, dense
         self.is_whole = np.isfinite(dense[..., 0]).all(axis=0)
         self.tables = names.subject
+        of = names.marker_of
+        self.marker = np.array([of.get(label, -1) for label in alive.tolist()], dtype=np.int64)
         self.holder = np.full(names.sums.shape[1], -1)
-        for k, label in enumerate(alive.tolist()):
-            m = names.marker_of.get(label)
-            if m is not None:
-                self.holder[m] = k
+        has = np.flatnonzero(self.marker >= 0)
+        self.holder[self.marker[has]] = has
 
     def scores(self, k: int) -> NDArray[np.float64]:
         """Return the log odds of all markers for a track, (M,)."""
@@ -214,14 +245,13 @@ class _Window:
             weights=self.tables.weights,
         )[0]
 
-    def name_of_new(self, k: int) -> tuple[int, float] | None:
-        """Return the marker of a track without a name, with its probability; None if unsure."""
-        scores = np.where(self.holder < 0, self.scores(k), -np.inf)
+    def best_free(self, k: int) -> tuple[int, float, float]:
+        """Return the best marker that no track has, its lead in log odds, and its probability."""
+        scores = np.where(self.holder < 0, self.scores(k), TAKEN)
         m = int(np.argmax(scores))
-        rivals = np.append(np.delete(scores, m), MIN_LOG_ODDS)
-        if scores[m] < rivals.max() + MARGIN:
-            return None
-        return m, float(1 / (1 + np.exp((rivals - scores[m]) / TEMPERATURE).sum()))
+        best, scores[m] = float(scores[m]), MIN_LOG_ODDS  # of no name
+        lead = best - float(scores.max())
+        return m, lead, float(1 / (1 + np.exp((scores - best) / TEMPERATURE).sum()))
 
     def better(self, k: int, own: int) -> tuple[int, float]:
         """Return the marker that a track should have, -1 for none, and what that would gain.

@@ -12,9 +12,17 @@ from asterism.errors import ParameterError
 from asterism.model import MarkerSet, Tracks
 from asterism.model.upwards import up_axis
 from asterism.records import record
+from asterism.tracking.naming.conflicts import KeptNames, codes_of, kept_names
 from asterism.tracking.naming.exchanges import without_exchanges
-from asterism.tracking.naming.first_names import FIRST_FRAMES, MIN_LENGTH, First, first_names
+from asterism.tracking.naming.first_names import (
+    FIRST_FRAMES,
+    MIN_LENGTH,
+    First,
+    first_names,
+    first_own_names,
+)
 from asterism.tracking.naming.joining import joined
+from asterism.tracking.naming.own_names import own_log_odds, own_marker_set, own_tracks
 from asterism.tracking.naming.probabilities import marker_odds, probabilities_of, track_odds
 from asterism.tracking.naming.search import search
 from asterism.tracking.naming.stretches import NameChange, changes_of
@@ -58,6 +66,9 @@ class Naming:
         Stretches of frames in which an input track is on another marker than in most of its frames.
     missing : tuple of str
         Names of the sets that no track has.
+    own : KeptNames, optional
+        Names of the capture itself that are kept, moved or left out, and where they are
+        contradicted; None with marker sets.
 
     Examples
     --------
@@ -75,6 +86,7 @@ class Naming:
     alternative_probabilities: NDArray[np.float64]
     changes: tuple[NameChange, ...]
     missing: tuple[str, ...]
+    own: KeptNames | None = None
 
     @property
     def n_named(self) -> int:
@@ -98,15 +110,17 @@ class _Named:
 
 
 def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
-    """Name tracks by the marker sets of the subjects in the capture.
+    """Name tracks by the marker sets of the subjects in the capture, or by its own names.
 
     The names that exist together most probably are searched for the tracks of one moment; all other
-    tracks and moments follow from these. Names of the input are not used.
+    tracks and moments follow from these. Names of the input are not used, unless there is no set.
+    Then a set is learnt from them, and each is also evidence for the tracks that have it.
 
     Parameters
     ----------
     tracks : Tracks
-        Tracks or tracklets, for example from `track`.
+        Tracks or tracklets, for example from `track`. Without a set the names are those of the
+        tracks or, if they have none, those of their `Capture`.
     *marker_sets : MarkerSet
         One set for each subject in the capture. Names of several sets must differ, for example by
         the subject before a colon (`MarkerSet.of_subject`).
@@ -120,7 +134,8 @@ def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
     Raises
     ------
     ParameterError
-        If no set is given, an argument has the wrong type, or two sets have the same name.
+        If there is neither a set nor a name, an argument has the wrong type, or two sets have the
+        same name.
 
     Notes
     -----
@@ -140,7 +155,7 @@ def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
     """
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     if not marker_sets:
-        raise ParameterError("marker_sets", "at least one marker set", "none")
+        return _by_own_names(tracks)
     all_names: list[str] = []
     for made in marker_sets:
         check_kind("marker_sets", made, MarkerSet, "am.learn_marker_set(tracks)")
@@ -159,6 +174,24 @@ def name_tracks(tracks: Tracks, *marker_sets: MarkerSet) -> Naming:
     return _result(tracks, whole, marker_sets, named)
 
 
+def _by_own_names(tracks: Tracks) -> Naming:
+    """Name tracks by a set that is learnt from the names of the capture, and by these names."""
+    own = own_tracks(tracks)
+    if own is None:
+        raise ParameterError("marker_sets", "a marker set, or a capture with names", "neither")
+    made = own_marker_set(own)
+    given = codes_of(own, own.names, made.names)
+    up, _ = up_axis(tracks.detections)
+    whole = without_exchanges(joined(tracks))
+    labelled = own_log_odds(whole.labels, whole.n_tracks, given, len(made))
+    first = first_own_names(whole, made, up, labelled)
+    named = None if first is None else _all(whole, made, first, up, given)
+    naming = _result(tracks, whole, (made,), [named])
+    found = codes_of(naming.tracks, naming.tracks.names, made.names)
+    probabilities = np.append(naming.probabilities, 1.0)[tracks.labels]
+    return replace(naming, own=kept_names(own, given, found, probabilities, made.names))
+
+
 def _without(tracks: Tracks, own: First, others: list[First | None]) -> Tracks:
     """Return the tracks with those of other bodies as clutter."""
     is_other = np.zeros(tracks.n_tracks + 1, dtype=bool)  # the last element is for clutter
@@ -169,10 +202,22 @@ def _without(tracks: Tracks, own: First, others: list[First | None]) -> Tracks:
     return replace(tracks, labels=np.where(is_other[tracks.labels], -1, tracks.labels))
 
 
-def _all(tracks: Tracks, made: MarkerSet, first: First, up: Axis) -> _Named:
-    """Name all tracks from the first names; the names of the whole capture are searched again."""
+def _all(
+    tracks: Tracks,
+    made: MarkerSet,
+    first: First,
+    up: Axis,
+    given: NDArray[np.int64] | None = None,
+) -> _Named:
+    """Name all tracks from the first names; the names of the whole capture are searched again.
+
+    `given` is the marker of each detection by the names of the capture, (N,).
+    """
+    given = np.full(len(tracks.labels), -1) if given is None else given
     of_track = np.full(tracks.n_tracks, -1)
     of_track[first.tracks] = first.found.names
+    refused = np.zeros((tracks.n_tracks, len(made)), dtype=bool)
+    refused[first.tracks] = first.found.refused
     windows = Windows(tracks.detections, tracks.labels)
     names = WindowNames(
         windows=windows,
@@ -180,17 +225,20 @@ def _all(tracks: Tracks, made: MarkerSet, first: First, up: Axis) -> _Named:
         size=first.found.size,
         is_kept=first.found.weights[0] > first.found.weights[1],
         track_markers=of_track,
+        refused=refused,
+        given=given,
     )
     start = windows.holding(first.frame)
     names.sweep(start)
     positions = names.positions(FIRST_FRAMES)
     seen = np.flatnonzero(np.isfinite(positions[..., 0]).sum(axis=0) >= MIN_LENGTH)
-    found = search(made, positions[:, seen], up, start=seen)
+    labelled = own_log_odds(names.markers, len(made), given, len(made))[seen]
+    found = search(made, positions[:, seen], up, start=seen, labelled=labelled)
     assert found is not None
     if not np.array_equal(found.names, seen):
-        marker_of = np.arange(len(made))
-        marker_of[seen] = found.names
-        names.renamed(marker_of)
+        marker_of, refused = np.arange(len(made)), np.zeros((len(made), len(made)), dtype=bool)
+        marker_of[seen], refused[seen] = found.names, found.refused
+        names.renamed(marker_of, refused)
         names.sweep(start)
     odds = marker_odds(found, len(made))
     own = names.usual()

@@ -1,8 +1,8 @@
-"""Stretches of frames in which a track is on another marker than in most of its frames."""
+"""Stretches of frames in which a track stays on one marker."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,38 @@ if TYPE_CHECKING:
 
     from asterism.model import Tracks
 
-__all__ = ["NameChange", "changes_of"]
+__all__ = ["NameChange", "Stretch", "changes_of", "stretches_of"]
+
+
+class Stretch(NamedTuple):
+    """Successive detections of a track that have one value."""
+
+    track: int
+    first: int  # frame
+    last: int  # frame
+    value: int
+    rows: NDArray[np.int64]  # the detections
+
+
+def stretches_of(tracks: Tracks, values: NDArray[np.int64]) -> list[Stretch]:
+    """Return the stretches of all tracks, by track and then by time.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of N detections.
+    values : ndarray of int, shape (N,)
+        Value of each detection, such as its marker; -1 or above.
+    """
+    order, _ = tracks.by_track
+    label, value = tracks.labels[order], values[order]
+    frame = tracks.detections.frame_of[order]
+    starts = np.flatnonzero(np.diff(label, prepend=-1) | np.diff(value, prepend=-2))
+    ends = np.append(starts, len(order))[1:] - 1
+    return [
+        Stretch(int(label[a]), int(frame[a]), int(frame[b]), int(value[a]), order[a : b + 1])
+        for a, b in zip(starts.tolist(), ends.tolist(), strict=True)
+    ]
 
 
 @record
@@ -70,19 +101,14 @@ def changes_of(
     def name_of(own: int) -> str | None:
         return names[own] if own >= 0 else None
 
-    order, _ = tracks.by_track
-    label, marker = tracks.labels[order], markers[order]
-    frame = tracks.detections.frame_of[order]
-    starts = np.flatnonzero(np.diff(label, prepend=-1) | np.diff(marker, prepend=-2))
-    ends = np.append(starts, len(order))[1:] - 1
     return tuple(
         NameChange(
-            track=int(label[a]),
-            first=int(frame[a]),
-            last=int(frame[b]),
-            usual=name_of(int(usual[label[a]])),
-            name=name_of(int(marker[a])),
+            track=own.track,
+            first=own.first,
+            last=own.last,
+            usual=name_of(int(usual[own.track])),
+            name=name_of(own.value),
         )
-        for a, b in zip(starts.tolist(), ends.tolist(), strict=True)
-        if marker[a] != usual[label[a]]
+        for own in stretches_of(tracks, markers)
+        if own.value != usual[own.track]
     )

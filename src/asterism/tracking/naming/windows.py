@@ -14,6 +14,8 @@ import numpy as np
 
 from asterism import _engine
 from asterism.tracking.naming.evidence import prior_of
+from asterism.tracking.naming.own_names import own_log_odds
+from asterism.tracking.naming.positions import positions_in, scattered
 from asterism.tracking.naming.subject import Subject
 from asterism.tracking.rigidity.distances import distances_between
 
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
     from asterism.model import Detections, MarkerSet
 
-__all__ = ["WindowNames", "Windows", "most_of_each", "scattered"]
+__all__ = ["WindowNames", "Windows", "most_of_each"]
 
 LENGTH = 15
 """Length of a window, frames."""
@@ -80,21 +82,6 @@ class Windows:
         )
 
 
-def scattered(
-    points: NDArray[np.float64],
-    frames: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    n_frames: int,
-    n_columns: int,
-) -> NDArray[np.float64]:
-    """Return points as positions of shape (frames, columns, 3), NaN elsewhere; 2-D has z = 0."""
-    dense = np.full((n_frames, n_columns, 3), np.nan)
-    dense[frames, columns, : points.shape[1]] = points
-    if points.shape[1] == 2:
-        dense[frames, columns, 2] = 0
-    return dense
-
-
 def most_of_each(
     tracks: NDArray[np.int64], values: NDArray[np.int64], n_tracks: int
 ) -> NDArray[np.int64]:
@@ -124,6 +111,10 @@ class WindowNames:
         Whether the markers are where they were when the set was learnt.
     track_markers : ndarray of int, shape (K,)
         Marker of each track in the capture as a whole, -1 for none so far.
+    refused : ndarray of bool, shape (K, M)
+        Names that a track cannot have.
+    given : ndarray of int, shape (N,)
+        Marker of each detection by the names that the capture has itself, -1 for none.
     """
 
     windows: Windows
@@ -131,6 +122,8 @@ class WindowNames:
     size: float
     is_kept: bool
     track_markers: NDArray[np.int64]
+    refused: NDArray[np.bool_]
+    given: NDArray[np.int64]
     markers: NDArray[np.int64] = field(init=False)  # (N,), of each detection
     evidence: NDArray[np.float64] = field(init=False)  # (K, M), sum over the windows
     exchanges: NDArray[np.float64] = field(init=False)  # (K, M), gain of another name, all windows
@@ -166,16 +159,16 @@ class WindowNames:
         """Return the positions of the markers in frames spread over the capture, (F, M, 3)."""
         d = self.windows.detections
         frames = np.unique(np.linspace(0, d.n_frames - 1, n_frames).astype(np.int64))
-        row = np.full(d.n_frames, -1)
-        row[frames] = np.arange(len(frames))
-        used = np.flatnonzero((self.markers >= 0) & (row[d.frame_of] >= 0))
-        return scattered(
-            d.points[used], row[d.frame_of[used]], self.markers[used], len(frames), len(self.made)
-        )
+        return positions_in(d, frames, self.markers, len(self.made))
 
-    def renamed(self, marker_of: NDArray[np.int64]) -> None:
-        """Replace each marker by another, -1 for none: the result of a search over markers."""
+    def renamed(self, marker_of: NDArray[np.int64], refused: NDArray[np.bool_]) -> None:
+        """Replace each marker by another, -1 for none: the result of a search over markers.
+
+        The tracks of a marker are refused other ones by the rows of `refused`, (M, M).
+        """
         of = np.append(marker_of, -1)
+        has = np.flatnonzero(self.track_markers >= 0)
+        self.refused[has] |= refused[self.track_markers[has]]
         self.track_markers = of[self.track_markers]
         self.markers = of[self.markers]
 
@@ -196,9 +189,11 @@ class WindowNames:
         bonus = np.tile(prior_of(self.made), (len(alive), 1))
         has = np.flatnonzero(known >= 0)
         bonus[has, known[has]] += BONUS * np.minimum(lengths[has] / FULL_BONUS, 1)
+        bonus[self.refused[alive]] = TAKEN
+        labelled = own_log_odds(column, len(alive), self.given[rows], len(self.made))
         scores = np.zeros(bonus.shape)
         for _ in range(ROUNDS):
-            scores = _engine.window_scores(
+            scores = labelled + _engine.window_scores(
                 np.ascontiguousarray(sampled),
                 rows=np.arange(len(alive)),
                 holder=_holders(names, lengths, len(self.made)),
