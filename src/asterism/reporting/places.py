@@ -16,8 +16,10 @@ __all__ = ["Place", "places_of"]
 
 UNCERTAIN = 0.8
 """Probability of an identity or a name from which no look is needed."""
-MIN_EXPECTED = 0.5
+MIN_EXPECTED = 1.0
 """Smallest expected number of wrong detections of a place."""
+MAX_SECONDS = 5.0
+"""Longest time from the first to the last frame of a place of several decisions."""
 NEAR_SECONDS = 0.5
 """Time within which uncertain parts of a track, or of two that may be exchanged, are one place."""
 
@@ -96,29 +98,19 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
         for each in tracks.decisions
         if each.probability is not None and each.probability < UNCERTAIN and each.track >= 0
     ]
-    group = list(range(len(uncertain)))
-
-    def root(i: int) -> int:
-        while group[i] != i:
-            i = group[i]
-        return i
-
     times = tracks.detections.times
-    order = sorted(range(len(uncertain)), key=lambda i: (uncertain[i].first, i))
-    for n, i in enumerate(order):
-        one = uncertain[i]
-        for j in order[n + 1 :]:
-            other = uncertain[j]
-            if times[other.first] - times[one.last] > NEAR_SECONDS and other.track != one.track:
-                continue
-            if _have_one_cause(one, other, times):
-                group[root(j)] = root(i)
-    members: dict[int, list[Decision]] = {}
-    for i, each in enumerate(uncertain):
-        members.setdefault(root(i), []).append(each)
+    groups: list[list[Decision]] = []
+    for each in sorted(uncertain, key=lambda one: (one.first, one.track)):
+        for group in reversed(groups):
+            span = times[each.last] - times[min(one.first for one in group)]
+            if span <= MAX_SECONDS and any(_have_one_cause(one, each, times) for one in group):
+                group.append(each)
+                break
+        else:
+            groups.append([each])
     places = [
         Place(decisions=tuple(sorted(own, key=lambda each: (-each.expected_wrong, each.track))))
-        for own in members.values()
+        for own in groups
     ]
     places = [each for each in places if each.expected_wrong >= MIN_EXPECTED]
     return tuple(sorted(places, key=lambda each: (-each.expected_wrong, each.first)))
