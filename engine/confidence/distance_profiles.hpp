@@ -64,6 +64,27 @@ class DistanceProfiles {
     sample();
   }
 
+  // Log density ratio of two tracks being of one marker against two, by the steadiest distances that
+  // both have; -inf without enough of them.
+  double agreement(std::int32_t a, std::int32_t b) {
+    const std::vector<Distance>&of_a = profile(a), &of_b = profile(b);
+    steady_.clear();
+    for (std::size_t r = 0; r < references_.size(); ++r)
+      if (references_[r] != a && references_[r] != b && of_a[r].is_known() && of_b[r].is_known())
+        steady_.push_back({std::hypot(of_a[r].spread, of_b[r].spread), r});
+    if (steady_.size() < kMinAgreeing) return -std::numeric_limits<double>::infinity();
+    const std::size_t n = std::min(steady_.size(), kNeighbours);
+    std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n),
+                      steady_.end());
+    double sum = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto& [spread, r] = steady_[i];
+      const double off = of_a[r].median - of_b[r].median;
+      sum += log_t(off, spread) - log_t(off, std::hypot(spread, kUnknownSpread));
+    }
+    return sum / static_cast<double>(n);
+  }
+
   PartEvidence compare(const TrackPart& part) {
     PartEvidence found;
     measure(part);
@@ -112,7 +133,7 @@ class DistanceProfiles {
   static constexpr std::size_t kSamples = 160;     // frames of the profiles
   static constexpr std::size_t kReferences = 128;  // longest tracks, to which distances are taken
   static constexpr std::size_t kPartFrames = 8;    // frames of a part
-  static constexpr std::size_t kNeighbours = 6, kMinNeighbours = 2;
+  static constexpr std::size_t kNeighbours = 6, kMinNeighbours = 2, kMinAgreeing = 3;
   static constexpr std::size_t kMinFrames = 6;  // of a distance in a profile
   static constexpr double kMinNoise = 1e-3;     // metres
   static constexpr double kBend = 0.02;         // spread of a distance as a share of it

@@ -32,6 +32,42 @@ nb::tuple exchanges(const MotionModel& m, const In<double>& times, const In<std:
                         array_of<bool>(found, &Exchange::is_mutual));
 }
 
+// Points by frame with the track of each.
+struct LabelledArrays {
+  std::vector<Point> at;
+  LabelledFrames all;
+
+  LabelledArrays(const In<double>& points, const In<std::int64_t>& labels,
+                 const In<std::int64_t>& offsets, std::int64_t n_tracks) {
+    require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
+            "points: shape (N, D)");
+    const auto D = static_cast<int>(points.shape(1));
+    at = to_points(points, D);
+    require(labels.size() == at.size(), "labels: one for each point");
+    for (const std::int64_t k : flat(labels)) require(k >= -1 && k < n_tracks, "labels: below K");
+    require_offsets(flat(offsets), at.size(), "offsets: rising, within the points");
+    all = {at, flat(labels), flat(offsets), n_tracks, D};
+  }
+};
+
+// Returns for pairs of tracks (n, 2) the log density ratio of one marker against two.
+Out<double> agreements(const In<double>& points, const In<std::int64_t>& labels,
+                       const In<std::int64_t>& offsets, std::int64_t n_tracks, double noise,
+                       const In<std::int64_t>& pairs) {
+  const LabelledArrays arrays(points, labels, offsets, n_tracks);
+  require(pairs.ndim() == 2 && pairs.shape(1) == 2, "pairs: shape (n, 2)");
+  for (const std::int64_t k : flat(pairs)) require(k >= 0 && k < n_tracks, "pairs: below K");
+  std::vector<double> found(pairs.shape(0));
+  {
+    nb::gil_scoped_release release;
+    DistanceProfiles profiles(arrays.all, noise);
+    for (std::size_t i = 0; i < found.size(); ++i)
+      found[i] = profiles.agreement(static_cast<std::int32_t>(pairs.data()[2 * i]),
+                                    static_cast<std::int32_t>(pairs.data()[2 * i + 1]));
+  }
+  return array_of<double>(found);
+}
+
 // Compares the parts of tracks with the distance profiles. The range of a part is that of the frames
 // of its detections in `frames`. Returns (whether the distances of a part are known, log density
 // of an unknown marker relative to the own track, other tracks by falling density (P, 3), their
@@ -40,14 +76,9 @@ nb::tuple compare_parts(const In<double>& points, const In<std::int64_t>& labels
                         const In<std::int64_t>& offsets, std::int64_t n_tracks, double noise,
                         const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
                         const In<std::int64_t>& ranges, const In<std::int64_t>& partners) {
-  require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
-          "points: shape (N, D)");
-  const auto D = static_cast<int>(points.shape(1));
-  const std::vector<Point> at = to_points(points, D);
+  const LabelledArrays arrays(points, labels, offsets, n_tracks);
+  const LabelledFrames& all = arrays.all;
   const std::size_t n_parts = tracks.size();
-  require(labels.size() == at.size(), "labels: one for each point");
-  for (const std::int64_t k : flat(labels)) require(k >= -1 && k < n_tracks, "labels: below K");
-  require_offsets(flat(offsets), at.size(), "offsets: rising, within the points");
   require(ranges.size() == 2 * n_parts && partners.size() == 2 * n_parts,
           "tracks, ranges and partners: of each part");
   const auto range = [&](std::size_t p) {
@@ -56,7 +87,6 @@ nb::tuple compare_parts(const In<double>& points, const In<std::int64_t>& labels
             "ranges: within the frames");
     return flat(frames).subspan(own[0], n);
   };
-  const LabelledFrames all{at, flat(labels), flat(offsets), n_tracks, D};
   for (const std::int64_t t : flat(frames)) require(t >= 0 && t < all.n_frames(), "frames: below T");
   for (const std::int64_t k : flat(tracks)) require(k >= 0 && k < n_tracks, "tracks: below K");
   std::vector<TrackPart> parts;
@@ -87,6 +117,8 @@ nb::tuple compare_parts(const In<double>& points, const In<std::int64_t>& labels
 void bind_confidence(nb::module_& module) {
   module.def("exchanges", &exchanges, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "points"_a,
              "frames"_a, "offsets"_a, nb::kw_only(), "p_detection"_a);
+  module.def("agreements", &agreements, "points"_a, "labels"_a, "offsets"_a, "n_tracks"_a, "noise"_a,
+             "pairs"_a);
   module.def("compare_parts", &compare_parts, "points"_a, "labels"_a, "offsets"_a, "n_tracks"_a,
              "noise"_a, "tracks"_a, "frames"_a, "ranges"_a, "partners"_a);
 }

@@ -465,6 +465,11 @@ def exchanges(
     p_detection: float,
 ) -> tuple[Ints, Shorts, Shorts, Floats, NDArray[np.bool_]]: ...
 
+# Log density ratio of one marker against two, of pairs of tracks.
+def agreements(
+    points: Floats, labels: Ints, offsets: Ints, n_tracks: int, noise: float, pairs: Ints
+) -> Floats: ...
+
 # (whether distances are known, log densities of an unknown marker, other tracks, their densities)
 def compare_parts(
     points: Floats,

@@ -6,6 +6,7 @@ stable distances do, because body segments move almost rigidly.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -16,14 +17,19 @@ from asterism.checks import check_kind, check_number
 from asterism.model import TrackingModel, Tracks
 from asterism.records import record
 from asterism.tracking.rigidity.bonds import Bonds, learn_bonds
-from asterism.tracking.stitching.passes import go_through
+from asterism.tracking.stitching.agreement import agreeing
+from asterism.tracking.stitching.passes import Pass, go_through
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from asterism.model import Detections
+
 __all__ = ["Join", "Stitching", "check_options", "stitch", "stitch_options"]
 
 GHOST = -2
+AGREEING = 0.95
+"""Probability of a join by equal distances, as measured on simulated people."""
 
 
 @record
@@ -162,7 +168,8 @@ def stitch(
     first.
 
     Three passes go through the capture, forward, backward and forward again; the joins of each
-    pass are prior information for the next.
+    pass are prior information for the next. At the end two tracks are joined if one ends before the
+    other begins and both keep the same distances to other tracks.
 
     Short pure tracklets give the best result: limit the model's gap by `tracklet_model`, as
     `track` does.
@@ -229,6 +236,7 @@ def stitch(
     found = go_through(d, found.tracklets, model, options, before=found, backward=True)
     options = stitch_options(*limits, may_cut=False)
     found = go_through(d, found.tracklets, model, options, before=found)
+    found = _joined_by_distances(d, found, model.sensor.noise_sigma, max_occlusion)
     tracklets, markers, after = found.tracklets, found.markers, found.after
     # The last element is the label of clutter.
     labels = np.append(np.maximum(markers, -1), -1).astype(np.int64)[tracklets]
@@ -254,6 +262,27 @@ def stitch(
         tracks=result, tracklets=tracklets, markers=markers, after=after,
         probabilities=found.probabilities, cuts=cuts,
     )  # fmt: skip
+
+
+def _joined_by_distances(
+    d: Detections, found: Pass, noise_sigma: float, max_occlusion: int | None
+) -> Pass:
+    """Join tracks that follow each other and keep the same distances to others."""
+    markers, after, probabilities = (
+        each.copy() for each in (found.markers, found.after, found.probabilities)
+    )
+    labels = np.append(np.maximum(markers, -1), -1).astype(np.int64)[found.tracklets]
+    tracks = Tracks(detections=d, labels=labels)
+    for earlier, later in agreeing(tracks, noise_sigma, max_occlusion):
+        markers[markers == later] = earlier
+        own = np.flatnonzero(markers == earlier)  # tracklets are numbered by their start
+        is_new = after[own[1:]] != own[:-1]
+        after[own[1:]] = own[:-1]
+        probabilities[own[1:][is_new]] = AGREEING
+    used, numbers = np.unique(markers[markers >= 0], return_inverse=True)
+    if len(used) <= markers.max(initial=-1):
+        markers[markers >= 0] = numbers
+    return replace(found, markers=markers, after=after, probabilities=probabilities)
 
 
 def check_options(confirm: int, ghost_radius: float, max_occlusion: int | None) -> None:
