@@ -43,6 +43,8 @@ MIN_DETECTIONS = 10
 """Smallest number of detections of a name in a capture, in tracks of `MIN_LENGTH` and more."""
 MIN_SUBJECT = 0.75
 """Probability of a subject below which no name is given, because all of them could be another's."""
+MIN_RIGHT = 0.55
+"""Expected share of right names below which none is given: the set is of another protocol."""
 
 
 @record(eq=False)
@@ -248,14 +250,34 @@ def _all(
         track_odds(names.exchanges, names.counts),
         track_odds(names.without, names.counts),
     )
+    is_given = (probability > none) & (first.probability >= MIN_SUBJECT)
     return _Named(
         markers=names.markers,
         of_track=own,
         probabilities=first.probability * probability,
         alternatives=other,
         alternative_probabilities=other_probability,
-        is_given=(probability > none) & (first.probability >= MIN_SUBJECT),
+        is_given=is_given & are_probable(probability[is_given], tracks.lengths[is_given]),
     )
+
+
+def are_probable(probabilities: NDArray[np.float64], lengths: NDArray[np.int64]) -> bool:
+    """Return whether names are worth giving: most of their detections are probably right.
+
+    Parameters
+    ----------
+    probabilities : ndarray of shape (n,)
+        Probability of the name of each named track.
+    lengths : ndarray of int, shape (n,)
+        Number of detections of each.
+
+    Examples
+    --------
+    >>> are_probable(np.array([0.4, 0.4, 0.9]), np.array([100, 100, 10]))
+    False
+    """
+    total = int(lengths.sum())
+    return total > 0 and float(probabilities @ lengths) >= MIN_RIGHT * total
 
 
 def _result(
