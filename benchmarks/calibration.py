@@ -106,11 +106,6 @@ def is_wrong(tracks: am.Tracks, truth: am.Tracks) -> NDArray[np.bool_]:
     return (tracks.labels >= 0) & (truth.labels != most[tracks.labels])
 
 
-def most_frequent(labels: NDArray[np.int64]) -> int:
-    labels = labels[labels >= 0]
-    return int(np.bincount(labels).argmax()) if len(labels) else -1
-
-
 def parts_of(found: Examined, tracks: am.Tracks, truth: am.Tracks) -> tuple[Array, Array]:
     """Return features of the parts that are not whole tracks, and whether each is right."""
     parts, evidence = found.parts, found.evidence
@@ -121,29 +116,14 @@ def parts_of(found: Examined, tracks: am.Tracks, truth: am.Tracks) -> tuple[Arra
     return features[used], (right > 0.5)[used].astype(float)
 
 
-def exchanges_of(found: Examined, tracks: am.Tracks, truth: am.Tracks) -> tuple[Array, Array]:
+def exchanges_of(found: Examined, truth: am.Tracks) -> tuple[Array, Array]:
     """Return features of the exchanges between tracks, and whether each is right."""
-    d, ex = tracks.detections, found.exchanges
-    by_tracklet = np.lexsort((d.frame_of, found.tracklets))
-    keys = found.tracklets[by_tracklet] * d.n_frames + d.frame_of[by_tracklet]
-    rows: list[list[float]] = []
-    right: list[float] = []
-    for frame, pair, ratio, mutual in zip(
-        ex.frames, ex.pairs, ex.ratios, ex.is_mutual, strict=True
-    ):
-        ends: list[int] = []
-        for own in pair:
-            at = int(np.searchsorted(keys, own * d.n_frames + frame))
-            near = by_tracklet[max(at - 6, 0) : at + 6]
-            near = near[found.tracklets[near] == own]
-            before = d.frame_of[near] < frame
-            ends += [most_frequent(truth.labels[near[half]]) for half in (before, ~before)]
-        if tracks.labels[by_tracklet[np.searchsorted(keys, pair * d.n_frames)]].std() == 0:
-            continue  # both are of one track
-        crossed = (ends[0] == ends[3] >= 0) or (ends[2] == ends[1] >= 0)
-        rows.append([1.0, float(np.clip(ratio, -10, 10)), float(mutual)])
-        right.append(float(crossed and (ends[0] != ends[1] or ends[2] != ends[3])))
-    return np.array(rows).reshape(-1, 3), np.array(right)
+    ex = found.exchanges
+    marker = np.append(truth.labels, -2)  # the last is of no detection
+    (a, b), (c, d) = marker[ex.before].T, marker[ex.after].T  # c follows a, and d follows b
+    crossed = ((a == d) & (a >= 0)) | ((b == c) & (b >= 0))
+    features = calibration.exchange_features(ex.ratios, ex.is_mutual)
+    return features, (crossed & ((a != c) | (b != d))).astype(float)
 
 
 def fit(features: Array, right: Array) -> Array:
@@ -208,7 +188,7 @@ def main() -> None:
         tracks, model, stitching = tracked(truth)
         found = examine(tracks, model, stitching)
         parts.append(parts_of(found, tracks, truth))
-        exchanges.append(exchanges_of(found, tracks, truth))
+        exchanges.append(exchanges_of(found, truth))
         own = reliability.setdefault("simulated people", Reliability())
         own.add(am.tracking.assess(tracks, model, stitching), truth)
         print(name, flush=True)

@@ -29,16 +29,15 @@ namespace asterism {
 struct LabelledFrames {
   std::span<const Point> points;
   std::span<const std::int64_t> labels, offsets;
+  std::span<const std::int64_t> samples;  // frames from which profiles are learnt, rising
   std::int64_t n_tracks = 0;
   int D = 3;
-
-  std::int64_t n_frames() const { return static_cast<std::int64_t>(offsets.size()) - 1; }
 };
 
 // Frames of a part of a track, and tracks that may have exchanged their later parts with it.
 struct TrackPart {
   std::int32_t track = 0;
-  std::span<const std::int64_t> frames;  // of its detections
+  std::span<const std::int64_t> frames;  // some of those of its detections
   std::array<std::int32_t, 2> partners{-1, -1};
 };
 
@@ -130,9 +129,7 @@ class DistanceProfiles {
   }
 
  private:
-  static constexpr std::size_t kSamples = 160;     // frames of the profiles
   static constexpr std::size_t kReferences = 128;  // longest tracks, to which distances are taken
-  static constexpr std::size_t kPartFrames = 8;    // frames of a part
   static constexpr std::size_t kNeighbours = 6, kMinNeighbours = 2, kMinAgreeing = 3;
   static constexpr std::size_t kMinFrames = 6;  // of a distance in a profile
   static constexpr double kMinNoise = 1e-3;     // metres
@@ -213,13 +210,13 @@ class DistanceProfiles {
   // Collects the detections of the sampled frames.
   void sample() {
     const std::size_t R = references_.size();
-    const auto n_samples = std::min<std::int64_t>(kSamples, all_.n_frames());
+    const auto n_samples = static_cast<std::int64_t>(all_.samples.size());
     samples_.resize(all_.n_tracks);
     at_.assign(static_cast<std::size_t>(n_samples) * R, {});
     has_.assign(at_.size(), 0);
     profiles_.resize(all_.n_tracks);
     for (std::int64_t s = 0; s < n_samples; ++s)
-      each_in(frame_of(s), [&](std::int32_t k, std::int32_t r, const Point& y) {
+      each_in(all_.samples[s], [&](std::int32_t k, std::int32_t r, const Point& y) {
         samples_[k].push_back({s, y});
         if (r < 0) return;
         at_[s * R + r] = y;
@@ -248,19 +245,14 @@ class DistanceProfiles {
     }
     return profile;
   }
-  std::int64_t frame_of(std::int64_t sample) const {
-    return sample * all_.n_frames() / std::min<std::int64_t>(kSamples, all_.n_frames());
-  }
-
   // The median distances of a part to the references, -1 where there is none.
   void measure(const TrackPart& part) {
-    const std::size_t R = references_.size(), n = part.frames.size();
-    n_measured_ = std::min(n, kPartFrames);
+    const std::size_t R = references_.size();
+    n_measured_ = part.frames.size();
     std::ranges::fill(n_present_, 0);
-    values_.resize(R * kPartFrames);
+    values_.resize(R * n_measured_);
     counts_.assign(R, 0);
-    for (std::size_t i = 0; i < n_measured_; ++i) {
-      const std::int64_t frame = part.frames[n_measured_ < 2 ? 0 : i * (n - 1) / (n_measured_ - 1)];
+    for (const std::int64_t frame : part.frames) {
       Point own;
       each_in(frame, [&](std::int32_t k, std::int32_t, const Point& y) {
         n_present_[k] += 1;
@@ -268,13 +260,13 @@ class DistanceProfiles {
       });
       each_in(frame, [&](std::int32_t, std::int32_t r, const Point& y) {
         if (r >= 0)
-          values_[r * kPartFrames + counts_[r]++] = std::sqrt(squared_distance(own, y, all_.D));
+          values_[r * n_measured_ + counts_[r]++] = std::sqrt(squared_distance(own, y, all_.D));
       });
     }
     for (std::size_t r = 0; r < R; ++r) {
       distances_[r] = -1;
       if (counts_[r] == 0) continue;
-      const auto begin = values_.begin() + static_cast<std::ptrdiff_t>(r * kPartFrames);
+      const auto begin = values_.begin() + static_cast<std::ptrdiff_t>(r * n_measured_);
       std::nth_element(begin, begin + counts_[r] / 2, begin + counts_[r]);
       distances_[r] = *(begin + counts_[r] / 2);
     }

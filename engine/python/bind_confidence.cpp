@@ -1,4 +1,10 @@
 // Bindings of the confidence of links and identities.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
 #include "confidence/distance_profiles.hpp"
 #include "confidence/exchanges.hpp"
 #include "python/arrays.hpp"
@@ -10,11 +16,18 @@ using namespace asterism;
 
 namespace {
 
+void require_finite(const In<double>& points) {
+  require(std::ranges::all_of(flat(points), [](double x) { return std::isfinite(x); }),
+          "points: finite");
+}
+
 // Returns (frames, tracks a, tracks b, log-likelihood ratios) of the possible exchanges.
 nb::tuple exchanges(const MotionModel& m, const In<double>& times, const In<std::int32_t>& kind,
                     const In<double>& F, const In<double>& Q, const In<double>& points,
                     const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
                     double p_detection) {
+  require(p_detection >= 0 && p_detection < 1, "p_detection: from 0 to below 1");
+  require_finite(points);
   const Timeline line = timeline(m, times, kind, F, Q);
   const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
   std::vector<Exchange> found;
@@ -32,93 +45,98 @@ nb::tuple exchanges(const MotionModel& m, const In<double>& times, const In<std:
                         array_of<bool>(found, &Exchange::is_mutual));
 }
 
-// Points by frame with the track of each.
-struct LabelledArrays {
-  std::vector<Point> at;
-  LabelledFrames all;
-
-  LabelledArrays(const In<double>& points, const In<std::int64_t>& labels,
-                 const In<std::int64_t>& offsets, std::int64_t n_tracks) {
+// Profiles with the arrays from which they are learnt.
+class Profiles {
+ public:
+  Profiles(const In<double>& points, const In<std::int64_t>& labels,
+           const In<std::int64_t>& offsets, const In<std::int64_t>& samples, std::int64_t n_tracks,
+           double noise)
+      : labels_(flat(labels).begin(), flat(labels).end()),
+        offsets_(flat(offsets).begin(), flat(offsets).end()),
+        samples_(flat(samples).begin(), flat(samples).end()) {
     require(points.ndim() == 2 && points.shape(1) >= 1 && points.shape(1) <= kMaxAxes,
             "points: shape (N, D)");
+    require_finite(points);
+    require(n_tracks >= 0, "n_tracks: at least 0");
+    require(noise >= 0, "noise: at least 0");
     const auto D = static_cast<int>(points.shape(1));
-    at = to_points(points, D);
-    require(labels.size() == at.size(), "labels: one for each point");
-    for (const std::int64_t k : flat(labels)) require(k >= -1 && k < n_tracks, "labels: below K");
-    require_offsets(flat(offsets), at.size(), "offsets: rising, within the points");
-    all = {at, flat(labels), flat(offsets), n_tracks, D};
+    points_ = to_points(points, D);
+    require(labels_.size() == points_.size(), "labels: one for each point");
+    for (const std::int64_t k : labels_) require(k >= -1 && k < n_tracks, "labels: below K");
+    require_offsets(offsets_, points_.size(), "offsets: rising, within the points");
+    for (const std::int64_t t : samples_) require_frame(t);
+    const LabelledFrames all{points_, labels_, offsets_, samples_, n_tracks, D};
+    profiles_ = std::make_unique<DistanceProfiles>(all, noise);
+    n_tracks_ = n_tracks;
   }
-};
 
-// Returns for pairs of tracks (n, 2) the log density ratio of one marker against two.
-Out<double> agreements(const In<double>& points, const In<std::int64_t>& labels,
-                       const In<std::int64_t>& offsets, std::int64_t n_tracks, double noise,
-                       const In<std::int64_t>& pairs) {
-  const LabelledArrays arrays(points, labels, offsets, n_tracks);
-  require(pairs.ndim() == 2 && pairs.shape(1) == 2, "pairs: shape (n, 2)");
-  for (const std::int64_t k : flat(pairs)) require(k >= 0 && k < n_tracks, "pairs: below K");
-  std::vector<double> found(pairs.shape(0));
-  {
-    nb::gil_scoped_release release;
-    DistanceProfiles profiles(arrays.all, noise);
+  // For pairs of tracks (n, 2), the log density ratio of one marker against two.
+  Out<double> agreements(const In<std::int64_t>& pairs) {
+    require(pairs.ndim() == 2 && pairs.shape(1) == 2, "pairs: shape (n, 2)");
+    for (const std::int64_t k : flat(pairs)) require_track(k);
+    std::vector<double> found(pairs.shape(0));
     for (std::size_t i = 0; i < found.size(); ++i)
-      found[i] = profiles.agreement(static_cast<std::int32_t>(pairs.data()[2 * i]),
-                                    static_cast<std::int32_t>(pairs.data()[2 * i + 1]));
+      found[i] = profiles_->agreement(static_cast<std::int32_t>(pairs.data()[2 * i]),
+                                      static_cast<std::int32_t>(pairs.data()[2 * i + 1]));
+    return array_of<double>(found);
   }
-  return array_of<double>(found);
-}
 
-// Compares the parts of tracks with the distance profiles. The range of a part is that of the frames
-// of its detections in `frames`. Returns (whether the distances of a part are known, log density
-// of an unknown marker relative to the own track, other tracks by falling density (P, 3), their
-// densities (P, 3)).
-nb::tuple compare_parts(const In<double>& points, const In<std::int64_t>& labels,
-                        const In<std::int64_t>& offsets, std::int64_t n_tracks, double noise,
-                        const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
-                        const In<std::int64_t>& ranges, const In<std::int64_t>& partners) {
-  const LabelledArrays arrays(points, labels, offsets, n_tracks);
-  const LabelledFrames& all = arrays.all;
-  const std::size_t n_parts = tracks.size();
-  require(ranges.size() == 2 * n_parts && partners.size() == 2 * n_parts,
-          "tracks, ranges and partners: of each part");
-  const auto range = [&](std::size_t p) {
-    const std::int64_t *own = ranges.data() + 2 * p, n = own[1] - own[0];
-    require(own[0] >= 0 && n > 0 && own[1] <= static_cast<std::int64_t>(frames.size()),
-            "ranges: within the frames");
-    return flat(frames).subspan(own[0], n);
-  };
-  for (const std::int64_t t : flat(frames)) require(t >= 0 && t < all.n_frames(), "frames: below T");
-  for (const std::int64_t k : flat(tracks)) require(k >= 0 && k < n_tracks, "tracks: below K");
-  std::vector<TrackPart> parts;
-  for (std::size_t p = 0; p < n_parts; ++p)
-    parts.push_back({static_cast<std::int32_t>(tracks.data()[p]), range(p),
-                     {static_cast<std::int32_t>(partners.data()[2 * p]),
-                      static_cast<std::int32_t>(partners.data()[2 * p + 1])}});
-  std::vector<PartEvidence> found;
-  {
-    nb::gil_scoped_release release;
-    DistanceProfiles profiles(all, noise);
-    for (const TrackPart& part : parts) found.push_back(profiles.compare(part));
+  // For parts of tracks, each in some frames: (whether their distances are known, log density of an
+  // unknown marker relative to the own track, other tracks by falling density (P, 3), their
+  // densities (P, 3)).
+  nb::tuple compare(const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
+                    const In<std::int64_t>& offsets, const In<std::int64_t>& partners) {
+    const std::size_t n_parts = tracks.size();
+    require(offsets.size() == n_parts + 1 && partners.size() == 2 * n_parts,
+            "tracks, offsets and partners: of each part");
+    require_offsets(flat(offsets), frames.size(), "offsets: rising, within the frames");
+    for (const std::int64_t t : flat(frames)) require_frame(t);
+    std::vector<PartEvidence> found;
+    for (std::size_t p = 0; p < n_parts; ++p) {
+      const std::int64_t k = tracks.data()[p], first = offsets.data()[p];
+      require_track(k);
+      const auto own = flat(frames).subspan(first, offsets.data()[p + 1] - first);
+      for (const std::int64_t t : own)
+        require(std::find(labels_.begin() + offsets_[t], labels_.begin() + offsets_[t + 1], k) !=
+                    labels_.begin() + offsets_[t + 1],
+                "frames: with a detection of the track");
+      found.push_back(profiles_->compare({static_cast<std::int32_t>(k), own,
+                                          {static_cast<std::int32_t>(partners.data()[2 * p]),
+                                           static_cast<std::int32_t>(partners.data()[2 * p + 1])}}));
+    }
+    constexpr std::size_t n_most = PartEvidence::kMost;
+    Owned<std::int64_t> others(n_parts * n_most);
+    Owned<double> densities(n_parts * n_most);
+    for (std::size_t p = 0; p < n_parts; ++p) {
+      std::copy_n(found[p].track.begin(), n_most, others.data.get() + p * n_most);
+      std::copy_n(found[p].density.begin(), n_most, densities.data.get() + p * n_most);
+    }
+    return nb::make_tuple(array_of<bool>(found, &PartEvidence::is_known),
+                          array_of<double>(found, &PartEvidence::unknown),
+                          others.give({n_parts, n_most}), densities.give({n_parts, n_most}));
   }
-  constexpr std::size_t n_most = PartEvidence::kMost;
-  Owned<std::int64_t> others(n_parts * n_most);
-  Owned<double> densities(n_parts * n_most);
-  for (std::size_t p = 0; p < n_parts; ++p) {
-    std::copy_n(found[p].track.begin(), n_most, others.data.get() + p * n_most);
-    std::copy_n(found[p].density.begin(), n_most, densities.data.get() + p * n_most);
+
+ private:
+  void require_track(std::int64_t k) const { require(k >= 0 && k < n_tracks_, "tracks: below K"); }
+  void require_frame(std::int64_t t) const {
+    require(t >= 0 && t + 1 < static_cast<std::int64_t>(offsets_.size()), "frames: below T");
   }
-  return nb::make_tuple(array_of<bool>(found, &PartEvidence::is_known),
-                        array_of<double>(found, &PartEvidence::unknown),
-                        others.give({n_parts, n_most}), densities.give({n_parts, n_most}));
-}
+
+  std::vector<Point> points_;
+  std::vector<std::int64_t> labels_, offsets_, samples_;
+  std::int64_t n_tracks_ = 0;
+  std::unique_ptr<DistanceProfiles> profiles_;
+};
 
 }  // namespace
 
 void bind_confidence(nb::module_& module) {
   module.def("exchanges", &exchanges, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "points"_a,
              "frames"_a, "offsets"_a, nb::kw_only(), "p_detection"_a);
-  module.def("agreements", &agreements, "points"_a, "labels"_a, "offsets"_a, "n_tracks"_a, "noise"_a,
-             "pairs"_a);
-  module.def("compare_parts", &compare_parts, "points"_a, "labels"_a, "offsets"_a, "n_tracks"_a,
-             "noise"_a, "tracks"_a, "frames"_a, "ranges"_a, "partners"_a);
+  nb::class_<Profiles>(module, "DistanceProfiles")
+      .def(nb::init<const In<double>&, const In<std::int64_t>&, const In<std::int64_t>&,
+                    const In<std::int64_t>&, std::int64_t, double>(),
+           "points"_a, "labels"_a, "offsets"_a, "samples"_a, nb::kw_only(), "n_tracks"_a, "noise"_a)
+      .def("agreements", &Profiles::agreements, "pairs"_a)
+      .def("compare", &Profiles::compare, "tracks"_a, "frames"_a, "offsets"_a, "partners"_a);
 }

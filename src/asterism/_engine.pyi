@@ -465,23 +465,24 @@ def exchanges(
     p_detection: float,
 ) -> tuple[Ints, Shorts, Shorts, Floats, NDArray[np.bool_]]: ...
 
-# Log density ratio of one marker against two, of pairs of tracks.
-def agreements(
-    points: Floats, labels: Ints, offsets: Ints, n_tracks: int, noise: float, pairs: Ints
-) -> Floats: ...
-
-# (whether distances are known, log densities of an unknown marker, other tracks, their densities)
-def compare_parts(
-    points: Floats,
-    labels: Ints,
-    offsets: Ints,
-    n_tracks: int,
-    noise: float,
-    tracks: Ints,
-    frames: Ints,
-    ranges: Ints,
-    partners: Ints,
-) -> tuple[NDArray[np.bool_], Floats, Ints, Floats]: ...
+# `samples` are the frames from which the distances that each track keeps are learnt.
+class DistanceProfiles:
+    def __init__(
+        self,
+        points: Floats,
+        labels: Ints,
+        offsets: Ints,
+        samples: Ints,
+        *,
+        n_tracks: int,
+        noise: float,
+    ) -> None: ...
+    # Log density ratio of one marker against two, of pairs of tracks.
+    def agreements(self, pairs: Ints) -> Floats: ...
+    # (whether distances are known, log densities of an unknown marker, other tracks, theirs)
+    def compare(
+        self, tracks: Ints, frames: Ints, offsets: Ints, partners: Ints
+    ) -> tuple[NDArray[np.bool_], Floats, Ints, Floats]: ...
 
 # (predicted position of what was at `then`, its variance beyond `r`, log densities of points)
 def carried(

@@ -15,6 +15,7 @@ __all__ = [
     "EXCHANGE",
     "PART",
     "WHOLE",
+    "exchange_features",
     "exchange_probability",
     "part_features",
     "part_probability",
@@ -28,6 +29,8 @@ its distances over an unknown marker and over the best other track, of the log o
 certain link or join at its ends, and of the logarithm of its number of detections."""
 WHOLE = 0.9999
 """Probability of a part without an uncertain link or join."""
+RATIOS = (-10.0, 10.0)
+"""Bounds of the log-likelihood ratio of an exchange."""
 MARGINS = (-2.0, 4.0)
 """Bounds of the margins."""
 EVEN = 1e-4
@@ -40,10 +43,10 @@ def log_odds(probability: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.log(p / (1 - p))
 
 
-def exchange_probability(
+def exchange_features(
     ratio: NDArray[np.float64], is_mutual: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Return the probability that two tracks have exchanged their later parts.
+    """Return what the probability of each exchange is computed from, shape (n, 3).
 
     Parameters
     ----------
@@ -52,8 +55,20 @@ def exchange_probability(
     is_mutual : ndarray of bool, shape (n,)
         Whether both tracks continue after the exchange.
     """
-    constant, factor, mutual = EXCHANGE
-    return _probability(constant + factor * np.clip(ratio, -10, 10) + mutual * is_mutual)
+    return np.column_stack([np.ones(len(ratio)), np.clip(ratio, *RATIOS), is_mutual])
+
+
+def exchange_probability(
+    ratio: NDArray[np.float64], is_mutual: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the probability that two tracks have exchanged their later parts.
+
+    Parameters
+    ----------
+    ratio, is_mutual
+        As for `exchange_features`.
+    """
+    return _probability(exchange_features(ratio, is_mutual) @ np.array(EXCHANGE))
 
 
 def part_features(

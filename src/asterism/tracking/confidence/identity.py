@@ -72,14 +72,21 @@ def assess(tracks: Tracks, model: TrackingModel, stitching: Stitching | None = N
     (True, ())
     """
     found = examine(tracks, model, stitching)
-    parts = found.parts
+    parts, order = found.parts, tracks.by_track[0]
     probability = _probability(parts, found.evidence, tracks.n_tracks)
-    confidence = np.zeros(tracks.detections.n_points)
-    confidence[tracks.by_track[0]] = np.repeat(probability, parts.n_detections)
+    identity = np.where(tracks.labels >= 0, WHOLE, 0.0)
+    for p in np.flatnonzero(~parts.is_whole(tracks.n_tracks)):
+        identity[order[parts.offsets[p] : parts.offsets[p + 1]]] = probability[p]
+    identity.flags.writeable = False  # no other object refers to it: no need to copy
+    confidence = tracks.confidence
+    if confidence is None:
+        confidence = np.where(tracks.labels >= 0, 1.0, 0.0)
+        confidence[found.uncertain] = found.link
+        confidence.flags.writeable = False
     return replace(
         tracks,
-        confidence=found.confidence,
-        identity_confidence=confidence,
+        confidence=confidence,
+        identity_confidence=identity,
         decisions=(*tracks.decisions, *_decisions(tracks, found, probability)),
     )
 
@@ -90,12 +97,12 @@ class Examined:
 
     Parameters
     ----------
-    confidence : ndarray of shape (N,)
-        Confidence of the links.
     exchanges : Exchanges
-        Exchanges that the motion model allows, of `tracklets`.
-    tracklets : ndarray of int, shape (N,)
-        Tracklet of each detection, -1 for none.
+        Exchanges of tracks that the motion model allows.
+    uncertain : ndarray of int, shape (n,)
+        Detections whose link another track could have, rising.
+    link : ndarray of shape (n,)
+        Probability of their links.
     parts : Parts
         Parts of the tracks.
     partners : ndarray of int, shape (P, 2)
@@ -104,9 +111,9 @@ class Examined:
         Comparison of the distances of the parts.
     """
 
-    confidence: NDArray[np.float64]
     exchanges: Exchanges
-    tracklets: NDArray[np.int64]
+    uncertain: NDArray[np.int64]
+    link: NDArray[np.float64]
     parts: Parts
     partners: NDArray[np.int64]
     evidence: Evidence
@@ -120,71 +127,71 @@ def examine(tracks: Tracks, model: TrackingModel, stitching: Stitching | None = 
     tracks, model, stitching
         As for `assess`.
     """
-    d = tracks.detections
-    tracklets = _tracklets(tracks, stitching)
-    exchanges = find_exchanges(d, tracklets, model)
-    link, partner = _after_exchanges(exchanges, tracks, tracklets)
-    own = tracks.confidence
-    confidence = np.where(tracks.labels < 0, 0.0, link) if own is None else own
-    link = link if own is None else np.minimum(link, own)
+    tracklets = tracks.labels if stitching is None else stitching.tracklets
+    exchanges = find_exchanges(tracks, tracklets, model)
+    uncertain, link, partner = _after_exchanges(exchanges, tracks.labels)
+    cuts = [(uncertain, link)]
+    if tracks.confidence is not None:
+        own = np.flatnonzero((tracks.confidence <= CERTAIN) & (tracks.labels >= 0))
+        cuts.append((own, tracks.confidence[own]))
     if stitching is not None:
-        _limit_by_joins(link, tracks, tracklets, stitching)
-    parts = part_tracks(tracks, link, CERTAIN)
-    starts = partner[tracks.by_track[0][parts.offsets[:-1]]]
-    partners = np.stack([starts, np.append(starts[1:], -1)], axis=1)
+        cuts.append(_joins(tracks, stitching))
+    parts = part_tracks(
+        tracks, *_least(*(np.concatenate(each) for each in zip(*cuts, strict=True)))
+    )
+    starts = tracks.by_track[0][parts.offsets[:-1]]
+    at = np.searchsorted(uncertain, starts)
+    has = at < len(uncertain)
+    has[has] = uncertain[at[has]] == starts[has]
+    other = np.full(len(starts) + 1, -1)
+    other[:-1][has] = partner[at[has]]
+    partners = np.stack([other[:-1], other[1:]], axis=1)
     evidence = compare(tracks, parts, partners, model.sensor.noise_sigma)
     return Examined(
-        confidence=confidence, exchanges=exchanges, tracklets=tracklets, parts=parts,
-        partners=partners, evidence=evidence,
+        exchanges=exchanges, uncertain=uncertain, link=link, parts=parts, partners=partners,
+        evidence=evidence,
     )  # fmt: skip
 
 
-def _tracklets(tracks: Tracks, stitching: Stitching | None) -> NDArray[np.int64]:
-    """Return the pieces of tracks that no join made, one number each, -1 for no tracklet."""
-    if stitching is None:
-        return tracks.labels
-    both = stitching.tracklets.astype(np.int64) * (tracks.n_tracks + 1) + tracks.labels + 1
-    both[stitching.tracklets < 0] = -1
-    numbers, found = np.unique(both, return_inverse=True)
-    return found - int(len(numbers) > 0 and numbers[0] == -1)
+def _least(
+    detections: NDArray[np.int64], probabilities: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the detections once, rising, with the smallest probability of each."""
+    order = np.lexsort((probabilities, detections))
+    detections, probabilities = detections[order], probabilities[order]
+    is_first = np.ones(len(detections), dtype=bool)
+    is_first[1:] = detections[1:] != detections[:-1]
+    return detections[is_first], probabilities[is_first]
 
 
 def _after_exchanges(
-    exchanges: Exchanges, tracks: Tracks, tracklets: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return for each detection the probability of no exchange before it, and the other track."""
-    d = tracks.detections
-    link, partner = np.ones(d.n_points), np.full(d.n_points, -1)
-    track_of = np.full(int(tracklets.max(initial=-1)) + 1, -1)
-    inside = tracklets >= 0
-    track_of[tracklets[inside]] = tracks.labels[inside]
-    pairs = track_of[exchanges.pairs]
-    differ = pairs[:, 0] != pairs[:, 1]
-    order = np.lexsort((d.frame_of, tracklets))
-    keys = tracklets[order] * d.n_frames + d.frame_of[order]
-    for side in (0, 1):
-        own = exchanges.pairs[:, side]
-        at = np.searchsorted(keys, own * d.n_frames + exchanges.frames)
-        has = differ & (at < len(keys))
-        has[has] = tracklets[order[at[has]]] == own[has]
-        detection = order[at[has]]
-        np.multiply.at(link, detection, 1 - exchanges.probabilities[has])
-        partner[detection] = pairs[has, 1 - side]
-    return link, partner
+    exchanges: Exchanges, labels: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    """Return the detections after exchanges, the probability of none, and one other track."""
+    sides = exchanges.tracks(labels)
+    has = exchanges.after >= 0
+    detections, index = np.unique(exchanges.after[has], return_inverse=True)
+    link, partner = np.ones(len(detections)), np.full(len(detections), -1)
+    np.multiply.at(link, index, 1 - np.stack([exchanges.probabilities] * 2, axis=1)[has])
+    partner[index] = sides[:, ::-1][has]
+    is_link = (exchanges.before[has] >= 0) & (partner[index] >= -1)
+    linked = np.zeros(len(detections), dtype=bool)
+    linked[index[is_link]] = True
+    return detections[linked], link[linked], partner[linked]
 
 
-def _limit_by_joins(
-    link: NDArray[np.float64], tracks: Tracks, tracklets: NDArray[np.int64], stitching: Stitching
-) -> None:
-    """Limit the probability of the first detection after each join to that of the join."""
-    order, _ = tracks.by_track
-    labels = tracks.labels[order]
-    joined = (labels[1:] == labels[:-1]) & (tracklets[order[1:]] != tracklets[order[:-1]])
-    after, before = order[1:][joined], order[:-1][joined]
+def _joins(tracks: Tracks, stitching: Stitching) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the first detection after each join, and the probability of the join."""
+    order, offsets = tracks.by_track
     of = stitching.tracklets
-    is_own = (of[after] != of[before]) & (stitching.after[of[after]] >= 0)
-    p = np.where(is_own, np.minimum(stitching.probabilities[of[after]], CERTAIN), OTHER_JOIN)
-    link[after] = np.minimum(link[after], p)
+    after: list[NDArray[np.int64]] = [np.empty(0, dtype=np.int64)]
+    for k in range(tracks.n_tracks):
+        own = order[offsets[k] : offsets[k + 1]]
+        after.append(own[np.flatnonzero(np.diff(of[own])) + 1])
+    then = np.concatenate(after)
+    is_own = stitching.after[of[then]] >= 0
+    p = np.where(is_own, np.minimum(stitching.probabilities[of[then]], CERTAIN), OTHER_JOIN)
+    return then, p
 
 
 def _probability(parts: Parts, evidence: Evidence, n_tracks: int) -> NDArray[np.float64]:

@@ -14,65 +14,116 @@ from asterism.tracking.confidence.calibration import exchange_probability
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.model import Detections, TrackingModel
+    from asterism.model import TrackingModel, Tracks
 
 __all__ = ["Exchanges", "find_exchanges"]
 
 
+CHUNK, MARGIN = 4000, 64
+"""Number of frames that are searched at a time, and of those around that are looked at. They bound
+the memory, and do not depend on the length of the capture."""
+
+
 @record(eq=False)
 class Exchanges:
-    """Pairs of tracklets that may have exchanged their later parts.
+    """Places where two tracks may have exchanged their later parts.
 
     Parameters
     ----------
-    frames : ndarray of int, shape (n,)
-        First frame of the later parts.
-    pairs : ndarray of int, shape (n, 2)
-        Tracklets.
+    before, after : ndarray of int, shape (n, 2)
+        Last detection of the earlier part, and first detection of the later part, of both tracks;
+        -1 for a track that begins or ends there.
     ratios : ndarray of shape (n,)
         Log-likelihood ratio of each exchange by the motion model.
-    is_mutual : ndarray of bool, shape (n,)
-        Whether both tracklets continue after the exchange.
     """
 
-    frames: NDArray[np.int64]
-    pairs: NDArray[np.int64]
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
     ratios: NDArray[np.float64]
-    is_mutual: NDArray[np.bool_]
+
+    @property
+    def is_mutual(self) -> NDArray[np.bool_]:
+        """Whether both tracks continue, shape (n,)."""
+        return np.minimum(self.before, self.after).min(axis=1) >= 0
 
     @property
     def probabilities(self) -> NDArray[np.float64]:
         """Probability of each exchange, shape (n,)."""
         return exchange_probability(self.ratios, self.is_mutual)
 
+    def tracks(self, labels: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the tracks of both sides by the label of each detection, shape (n, 2)."""
+        return labels[np.where(self.after >= 0, self.after, self.before)]
+
 
 def find_exchanges(
-    detections: Detections, tracklets: NDArray[np.int64], model: TrackingModel
+    tracks: Tracks, tracklets: NDArray[np.int32] | NDArray[np.int64], model: TrackingModel
 ) -> Exchanges:
-    """Find pairs of tracklets that may have exchanged their later parts.
+    """Find places where two tracks may have exchanged their later parts.
 
-    Two tracklets are compared where links of both are as probable if exchanged, by the motion
-    model and the detections before and after. A tracklet that has ended shortly before may go on
-    with the later part of another, and one that begins may continue another.
+    Two tracklets are compared where their links are as probable if exchanged, by the motion model
+    and the detections before and after. A tracklet that has ended shortly before may go on with the
+    later part of another, and one that begins may continue another.
 
     Parameters
     ----------
-    detections : Detections
-        Detections of the capture.
+    tracks : Tracks
+        Tracks of the capture.
     tracklets : ndarray of int, shape (N,)
-        Tracklet of each detection, -1 for none.
+        Tracklet of each detection, -1 for none; the labels of the tracks, if no join made them.
     model : TrackingModel
         Model of motion and noise.
+
+    Returns
+    -------
+    Exchanges
+        Exchanges between different tracks.
     """
-    d = detections
-    inside = np.flatnonzero(tracklets >= 0)
-    order = inside[np.argsort(tracklets[inside], kind="stable")]
-    offsets = np.concatenate([[0], np.cumsum(np.bincount(tracklets[inside]))]).astype(np.int64)
-    kind, F, Q = steps_of(model.motion, d.times)
-    frames, a, b, ratios, is_mutual = _engine.exchanges(
-        motion_model(model, d.n_axes), d.times, kind, F, Q,
-        np.ascontiguousarray(d.points[order]), d.frame_of[order].astype(np.int64), offsets,
+    d = tracks.detections
+    steps = steps_of(model.motion, d.times)
+    found: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]] = []
+    for begin in range(0, d.n_frames, CHUNK):
+        low, high = max(begin - MARGIN, 0), min(begin + CHUNK + MARGIN, d.n_frames)
+        found.append(_in_frames(tracks, tracklets, model, steps, (low, high), begin))
+    both = [np.concatenate(each) for each in zip(*found, strict=True)] if found else []
+    if not both:
+        none = np.empty((0, 2), dtype=np.int64)
+        return Exchanges(before=none, after=none, ratios=np.empty(0))
+    exchanges = Exchanges(before=both[0], after=both[1], ratios=both[2])
+    sides = exchanges.tracks(tracks.labels)
+    kept = sides[:, 0] != sides[:, 1]
+    return Exchanges(before=both[0][kept], after=both[1][kept], ratios=both[2][kept])
+
+
+def _in_frames(
+    tracks: Tracks,
+    tracklets: NDArray[np.int32] | NDArray[np.int64],
+    model: TrackingModel,
+    steps: tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]],
+    frames: tuple[int, int],
+    begin: int,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return (before, after, ratios) of the exchanges in `CHUNK` frames from `begin`."""
+    d, (low, high), (kind, F, Q) = tracks.detections, frames, steps
+    first = int(d.offsets[low])
+    rows = slice(first, int(d.offsets[high]))
+    # A tracklet that is in several tracks is one piece in each of them.
+    pieces = tracklets[rows].astype(np.int64) * (tracks.n_tracks + 1) + tracks.labels[rows] + 1
+    inside = np.flatnonzero(tracklets[rows] >= 0)
+    _, piece = np.unique(pieces[inside], return_inverse=True)
+    order = np.argsort(piece, kind="stable")
+    own, piece = inside[order] + first, piece[order]
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(piece))]).astype(np.int64)
+    frame = d.frame_of[own].astype(np.int64) - low
+    cut, *pair, ratios, _ = _engine.exchanges(
+        motion_model(model, d.n_axes), d.times[low:high], kind[low:high], F, Q,
+        np.ascontiguousarray(d.points[own]), frame, offsets,
         p_detection=min(model.sensor.p_detection, 0.999),
     )  # fmt: skip
-    pairs = np.stack([a, b], axis=1).astype(np.int64)
-    return Exchanges(frames=frames, pairs=pairs, ratios=ratios, is_mutual=is_mutual)
+    kept = (cut + low >= begin) & (cut + low < begin + CHUNK)
+    cut, sides = cut[kept], np.stack(pair, axis=1)[kept].astype(np.int64)
+    at = np.searchsorted(piece * (high - low) + frame, sides * (high - low) + cut[:, None])
+    own = np.append(own, -1)
+    before = np.where(at > offsets[sides], own[at - 1], -1)
+    after = np.where(at < offsets[sides + 1], own[np.minimum(at, len(own) - 1)], -1)
+    return before, after, ratios[kept]

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism import _engine
 from asterism.records import record
+from asterism.tracking.rigidity.profiles import learn_profiles
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from asterism.model import Tracks
 
 __all__ = ["Evidence", "Parts", "compare", "part_tracks"]
+
+PART_FRAMES = 8
+"""Number of frames of a part in which distances are measured."""
 
 
 @record(eq=False)
@@ -77,24 +80,33 @@ class Evidence:
     densities: NDArray[np.float64]
 
 
-def part_tracks(tracks: Tracks, link: NDArray[np.float64], max_probability: float) -> Parts:
+def part_tracks(
+    tracks: Tracks, cuts: NDArray[np.int64], probabilities: NDArray[np.float64]
+) -> Parts:
     """Cut tracks at uncertain links.
 
     Parameters
     ----------
     tracks : Tracks
         Tracks of a capture.
-    link : ndarray of shape (N,)
-        Probability of the link that leads to each detection.
-    max_probability : float
-        Tracks are cut at links of at most that probability.
+    cuts : ndarray of int, shape (n,)
+        Detections before which a track is cut, rising.
+    probabilities : ndarray of shape (n,)
+        Probability of the link that leads to each.
     """
     order, offsets = tracks.by_track
-    probability = link[order]
-    is_first = np.zeros(len(order), dtype=bool)
-    is_first[offsets[:-1][np.diff(offsets) > 0]] = True
-    starts = np.flatnonzero(is_first | (probability <= max_probability))
-    before = np.where(is_first[starts], 1.0, probability[starts])
+    is_start = np.zeros(len(tracks.labels), dtype=bool)
+    is_start[cuts] = True
+    is_start = is_start[order]
+    firsts = offsets[:-1][np.diff(offsets) > 0]
+    is_start[firsts] = True
+    starts = np.flatnonzero(is_start)
+    at = np.searchsorted(cuts, order[starts])
+    has = at < len(cuts)
+    has[has] = cuts[at[has]] == order[starts[has]]
+    before = np.ones(len(starts))
+    before[has] = probabilities[at[has]]
+    before[np.searchsorted(starts, firsts)] = 1.0
     return Parts(
         track=tracks.labels[order[starts]],
         offsets=np.append(starts, len(order)).astype(np.int64),
@@ -119,7 +131,7 @@ def compare(
     noise_sigma : float
         Standard deviation of a coordinate, metres.
     """
-    d = tracks.detections
+    frame = tracks.detections.frame_of
     order, _ = tracks.by_track
     n = len(parts.track)
     evidence = Evidence(
@@ -127,11 +139,20 @@ def compare(
     )
     used = np.flatnonzero(~parts.is_whole(tracks.n_tracks))
     if len(used):
-        found = _engine.compare_parts(
-            np.ascontiguousarray(d.points), tracks.labels, d.offsets, tracks.n_tracks, noise_sigma,
-            parts.track[used], d.frame_of[order].astype(np.int64),
-            np.stack([parts.offsets[used], parts.offsets[used + 1]], axis=1), partners[used],
-        )  # fmt: skip
+        begins, lengths = parts.offsets[used], parts.n_detections[used]
+        counts = np.minimum(lengths, PART_FRAMES)
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        rank = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
+        spacing = (lengths - 1) / np.maximum(counts - 1, 1)
+        chosen = np.repeat(begins, counts) + (rank * np.repeat(spacing, counts)).astype(np.int64)
+        frames = frame[order[chosen]].astype(np.int64)
+        profiles = learn_profiles(tracks, noise_sigma, frames)
+        found = profiles.engine.compare(
+            parts.track[used],
+            np.searchsorted(profiles.frames, frames).astype(np.int64),
+            offsets,
+            np.ascontiguousarray(partners[used]),
+        )
         arrays = evidence.is_known, evidence.unknown, evidence.alternatives, evidence.densities
         for values, own in zip(arrays, found, strict=True):
             values[used] = own

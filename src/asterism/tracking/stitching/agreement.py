@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism import _engine
+from asterism.tracking.rigidity.profiles import learn_profiles
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,18 +45,10 @@ def agreeing(
     list of (int, int)
         The earlier and the later track of each pair, each track at most once.
     """
-    d = tracks.detections
     pairs = _in_turn(tracks, max_occlusion)
     if not len(pairs):
         return []
-    ratio = _engine.agreements(
-        np.ascontiguousarray(d.points),
-        tracks.labels,
-        d.offsets,
-        tracks.n_tracks,
-        noise_sigma,
-        pairs,
-    )
+    ratio = learn_profiles(tracks, noise_sigma).engine.agreements(pairs)
     found: list[tuple[int, int]] = []
     for i in np.argsort(-ratio, kind="stable"):
         if ratio[i] < AGREEMENT:
