@@ -55,7 +55,9 @@ def exchange_features(
     is_mutual : ndarray of bool, shape (n,)
         Whether both tracks continue after the exchange.
     """
-    return np.column_stack([np.ones(len(ratio)), np.clip(ratio, *RATIOS), is_mutual])
+    return np.column_stack(
+        [np.ones(len(ratio)), np.clip(ratio, *RATIOS), is_mutual.astype(np.float64)]
+    )
 
 
 def exchange_probability(
