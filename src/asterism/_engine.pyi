@@ -473,7 +473,7 @@ def compare_parts(
     n_tracks: int,
     noise: float,
     tracks: Ints,
-    frames: Ints,
+    detections: Ints,
     ranges: Ints,
     partners: Ints,
 ) -> tuple[NDArray[np.bool_], Floats, Ints, Floats]: ...

@@ -131,7 +131,7 @@ def examine(tracks: Tracks, model: TrackingModel, stitching: Stitching | None = 
         _limit_by_joins(link, tracks, tracklets, stitching)
     parts = part_tracks(tracks, link, CERTAIN)
     starts = partner[tracks.by_track[0][parts.offsets[:-1]]]
-    partners = np.stack([starts, np.append(starts[1:], -1)], axis=1)
+    partners = np.stack([starts, np.append(starts, -1)[1:]], axis=1)
     evidence = compare(tracks, parts, partners, model.sensor.noise_sigma)
     return Examined(
         confidence=confidence, exchanges=exchanges, tracklets=tracklets, parts=parts,
@@ -238,7 +238,7 @@ def _alternatives(
         weights = np.ones(len(others))
     weights *= share / weights.sum()
     return tuple(
-        Alternative(track=None if k < 0 else int(k), probability=float(w))
-        for k, w in zip(others, weights, strict=True)
-        if w >= MIN_ALTERNATIVE
+        Alternative(track=None if others[i] < 0 else int(others[i]), probability=float(weights[i]))
+        for i in np.argsort(-weights, kind="stable")
+        if weights[i] >= MIN_ALTERNATIVE
     )

@@ -52,7 +52,7 @@ class Parts:
     @property
     def after(self) -> NDArray[np.float64]:
         """Probability of the link that leaves each part, 1 for the last part of a track."""
-        return np.append(self.before[1:], 1.0)
+        return np.append(self.before, 1.0)[1:]
 
 
 @record(eq=False, kw_only=False)
@@ -129,7 +129,7 @@ def compare(
     if len(used):
         found = _engine.compare_parts(
             np.ascontiguousarray(d.points), tracks.labels, d.offsets, tracks.n_tracks, noise_sigma,
-            parts.track[used], d.frame_of[order].astype(np.int64),
+            parts.track[used], order,
             np.stack([parts.offsets[used], parts.offsets[used + 1]], axis=1), partners[used],
         )  # fmt: skip
         arrays = evidence.is_known, evidence.unknown, evidence.alternatives, evidence.densities
