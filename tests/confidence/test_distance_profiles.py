@@ -115,7 +115,8 @@ def arguments(**changes):
     values = {
         "points": np.arange(12.0).reshape(4, 3), "labels": np.array([0, 1, 0, 1]),
         "offsets": np.array([0, 2, 4]), "n_tracks": 2, "noise": 0.001, "tracks": np.array([0]),
-        "detections": np.array([0, 2]), "ranges": np.array([[0, 2]]), "partners": np.array([[1, -1]]),
+        "detections": np.array([0, 2]), "ranges": np.array([[0, 2]]),
+        "partners": np.array([[1, -1]]),
     }  # fmt: skip
     return values | changes
 

@@ -102,7 +102,6 @@ def test_a_method_keeps_its_own_confidence(name):
     truth = wanderers(np.random.default_rng(12), clutter=1.5)
     model = small_model()
     method = am.tracking.method_by_name(name)
-    _, update = method.run(method.init(model), truth.detections)[:2]
     tracks = am.track(truth.detections, method, model=model, stitch=False)
     bare = replace(tracks, confidence=None, identity_confidence=None, decisions=())
     by_motion = assess(bare, model)

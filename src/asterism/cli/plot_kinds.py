@@ -279,7 +279,7 @@ KINDS: dict[str, Kind] = {
     ),
     "errors": Kind(about="wrong labels of each track, over time", draw=_errors, needs=_TRUTH),
     "reliability": Kind(
-        about="share of right links, and of right identities, by confidence, of one or more results",
+        about="share of right links and identities by confidence, of one or more results",
         draw=_reliability, many=True, needs=_TRUTH,
     ),
     "compare": Kind(

@@ -169,7 +169,7 @@ def right_links(
 def right_identities(
     labels: ArrayLike, truth_labels: ArrayLike
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Find the detections in tracks, and whether each is of the marker that holds most of its track.
+    """Find the detections in tracks, and whether each is of the marker of most in its track.
 
     Parameters
     ----------
