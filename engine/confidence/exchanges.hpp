@@ -39,7 +39,7 @@ class ExchangeSearch {
 
   // The tracks are given as points and rising frames of each, and must not change.
   void add(std::span<const Point> points, std::span<const std::int64_t> frames) {
-    tracks_.push_back({points, frames, 0, -1, {}});
+    tracks_.push_back({points, frames, 0, 0, {}});
   }
 
   std::vector<Exchange> find() {
@@ -74,9 +74,9 @@ class ExchangeSearch {
   struct Track {
     std::span<const Point> points;
     std::span<const std::int64_t> frames;
-    std::size_t next = 0;         // index of the first detection of the tail
-    std::int64_t stated_at = -1;  // value of `next` to which `head` belongs
-    MotionState head;             // after the detection before `next`
+    std::size_t next = 0;    // index of the first detection of the tail
+    std::size_t stated = 0;  // value of `next` to which `head` belongs
+    MotionState head;        // after the detection before `next`
 
     bool has_head() const { return next > 0; }
     bool has_tail() const { return next < frames.size(); }
@@ -88,6 +88,11 @@ class ExchangeSearch {
     Point at{}, velocity{};  // of the head, per frame
     std::int64_t frame = 0;
     double reach2 = 0;  // largest squared deviation at which another tail is compared
+    double x = 0;       // of the head in the frame of the cut
+    double tail_x = 0;  // of the tail
+
+    // Whether the search along x compares this head with the tail of another track.
+    bool reaches(const Open& other) const { return std::abs(other.tail_x - x) <= std::sqrt(reach2); }
   };
 
   void compare(std::int64_t t, std::span<const std::int32_t> open, std::vector<Exchange>& found) {
@@ -107,10 +112,11 @@ class ExchangeSearch {
             o.velocity[d] = (o.at[d] - own.points[own.next - 2][d]) / n;
         }
         o.reach2 = std::max(kFar * typical, own.has_tail() ? kTimes * deviation(o, own) : 0);
+        o.x = o.at[0] + static_cast<double>(t - o.frame) * o.velocity[0];
       }
       const auto i = static_cast<std::int32_t>(open_.size()) - 1;
       if (own.has_tail() && (o.arrives || own.has_head()))
-        by_x_.emplace_back(place_along_x(o, own, t), i);
+        by_x_.emplace_back(o.tail_x = place_along_x(o, own, t), i);
       else if (own.has_tail())
         late_.push_back(i);
     }
@@ -118,11 +124,10 @@ class ExchangeSearch {
     for (std::int32_t i = 0; i < static_cast<std::int32_t>(open_.size()); ++i) {
       const Open& one = open_[i];
       if (!tracks_[one.track].has_head()) continue;
-      const double x = one.at[0] + static_cast<double>(t - one.frame) * one.velocity[0];
       const double reach = std::sqrt(one.reach2);
-      for (auto at = std::ranges::lower_bound(by_x_, std::pair(x - reach, std::int32_t{0}));
-           at != by_x_.end() && at->first <= x + reach; ++at)
-        if (at->second != i) compare(t, i, at->second, found);
+      for (auto at = std::ranges::lower_bound(by_x_, std::pair(one.x - reach, std::int32_t{0}));
+           at != by_x_.end() && at->first <= one.x + reach; ++at)
+        if (at->second != i && one.reaches(open_[at->second])) compare(t, i, at->second, found);
       for (const std::int32_t j : late_)
         if (j != i) compare(t, i, j, found);
     }
@@ -132,7 +137,7 @@ class ExchangeSearch {
     const Open &one = open_[i], &other = open_[j];
     Track &a = tracks_[one.track], &b = tracks_[other.track];
     const bool is_mutual = a.has_tail() && b.has_head();
-    if (is_mutual && j < i && deviation(other, a) <= other.reach2) return;  // compared already
+    if (is_mutual && j < i && other.reaches(one)) return;  // compared already
     if (!a.has_tail() && !b.has_head()) return;  // no link is cut
     // A link is cut where its later detection is, or where another track begins.
     if (!other.arrives && !(one.arrives && (is_mutual || a.has_tail()))) return;
@@ -170,17 +175,12 @@ class ExchangeSearch {
   }
 
   const MotionState& head(Track& own) {
-    const auto next = static_cast<std::int64_t>(own.next);
-    if (own.stated_at == next) return own.head;
-    std::int64_t from = own.stated_at;
-    if (from < 0 || next - from > static_cast<std::int64_t>(kHead)) {
-      const std::int64_t first = std::max<std::int64_t>(0, next - static_cast<std::int64_t>(kHead));
-      own.head = begin_state(m_, own.points[first]);
-      from = first + 1;
-    }
-    for (; from < next; ++from)
-      advance(own.head, own.frames[from - 1], own, static_cast<std::size_t>(from));
-    own.stated_at = next;
+    if (own.stated == own.next) return own.head;
+    const std::size_t first = own.next - std::min(own.next, kHead);
+    own.head = begin_state(m_, own.points[first]);
+    for (std::size_t j = first + 1; j < own.next; ++j)
+      advance(own.head, own.frames[j - 1], own, j);
+    own.stated = own.next;
     return own.head;
   }
   // Predicts from frame `last` to a detection and takes it. Returns its log likelihood.

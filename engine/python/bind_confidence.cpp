@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "confidence/distance_profiles.hpp"
@@ -65,6 +66,11 @@ class Profiles {
     for (const std::int64_t k : labels_) require(k >= -1 && k < n_tracks, "labels: below K");
     require_offsets(offsets_, points_.size(), "offsets: rising, within the points");
     for (const std::int64_t t : samples_) require_frame(t);
+    std::vector<std::int64_t> last(n_tracks, -1);
+    for (std::int64_t t = 0; t + 1 < static_cast<std::int64_t>(offsets_.size()); ++t)
+      for (std::int64_t i = offsets_[t]; i < offsets_[t + 1]; ++i)
+        if (labels_[i] >= 0)
+          require(std::exchange(last[labels_[i]], t) < t, "labels: a track once in a frame");
     const LabelledFrames all{points_, labels_, offsets_, samples_, n_tracks, D};
     profiles_ = std::make_unique<DistanceProfiles>(all, noise);
     n_tracks_ = n_tracks;

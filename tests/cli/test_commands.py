@@ -89,12 +89,15 @@ def test_summary_as_json(scene, capsys):
 def test_a_run_is_repeated_bit_for_bit(scene, capsys):
     run("track in.csv --run first --method smp --option lifecycle.delete_odds=100 --seed 5", capsys)
     names = sorted(path.name for path in (scene / "first").iterdir())
-    assert names == ["in.tracked.csv", "log.txt", "run.toml", "summary.json"]
+    decisions = ["decisions.csv", "decisions.json"]
+    assert names == [*decisions, "in.tracked.csv", "log.txt", "run.toml", "summary.json"]
     run("track --from first/run.toml -o again.csv", capsys)
     result = (scene / "first/in.tracked.csv").read_bytes()
     assert (scene / "again.csv").read_bytes() == result
     run("track --from first/run.toml --run second", capsys)
     assert (scene / "second/in.tracked.csv").read_bytes() == result
+    for name in decisions:
+        assert (scene / "second" / name).read_bytes() == (scene / "first" / name).read_bytes()
     first, second = (
         tomllib.loads((scene / name / "run.toml").read_text()) for name in ("first", "second")
     )

@@ -102,7 +102,10 @@ MISTAKES = {
     "a number for a marker set": (
         lambda: am.MarkerSet.from_toml(3), "path: expected the name of a file",
     ),
-    "no marker set": (lambda: am.name_tracks(TRUTH), "marker_sets: expected at least one"),
+    "no marker set": (
+        lambda: am.name_tracks(am.Tracks(detections=D, labels=TRUTH.labels)),
+        "marker_sets: expected a marker set, or a capture with names",
+    ),
     "tracks for a marker set": (
         lambda: am.name_tracks(TRUTH, TRUTH), "marker_sets: expected a MarkerSet",
     ),

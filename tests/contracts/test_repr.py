@@ -127,6 +127,11 @@ def instances():
         am.tracking.learn_bonds(truth), am.learn_marker_set(truth),
         am.name_tracks(tracks, am.learn_marker_set(truth)),
         am.tracking.Tracked(tracks=tracks),
+        am.model.Alternative(track=3, probability=1 / 3, name=LONG),
+        am.model.Decision(
+            kind="identity", track=3, first=5, last=17, n_detections=9, probability=1 / 3
+        ),
+        am.tracking.KeptNames(kept=(LONG,) * 9, moved=(), left_out=(LONG,), conflicts=()),
         am.tracking.NameChange(track=3, first=5, last=17, usual=LONG, name=None),
         am.tracking.NameConflict(name=LONG, first=5, last=17, found=LONG, probability=1 / 3),
         am.tracking.Join(marker=3, last=5, first=17, probability=1 / 3),

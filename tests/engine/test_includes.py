@@ -9,7 +9,7 @@ from tests.paths import ROOT
 ENGINE = ROOT / "engine"
 ROOMS = (
     "math", "base", "filter", "solve", "rigid", "tracks", "frame", "trees", "mht",
-    "mcmc/model", "mcmc/moves", "mcmc/chain", "mcmc/tracker", "stitch", "naming",
+    "mcmc/model", "mcmc/moves", "mcmc/chain", "mcmc/tracker", "confidence", "stitch", "naming",
     "camera", "multiview",
     "python",
 )  # fmt: skip

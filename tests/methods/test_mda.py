@@ -47,7 +47,6 @@ def test_the_same_as_multiple_hypotheses_where_both_are_exact(solver):
     tomht = am.track(truth.detections, am.TOMHT(), model=model)
     mda = am.track(truth.detections, am.MDA(solver=solver), model=model)
     assert (mda.labels == tomht.labels).all()
-    assert mda.confidence is None
     assert mda.info["gap"] == tomht.info["gap"] == 0
 
 

@@ -80,8 +80,10 @@ def test_confidence_shades_each_label_where_it_is():
 
 def test_confidence_must_be_there():
     truth = am.simulate.cube(seed=1)
-    with pytest.raises(am.ParameterError, match=r"tracks with a confidence.*mcmcda"):
+    with pytest.raises(am.ParameterError, match=r"tracks with a confidence of links"):
         am.plot.plot_confidence(truth)
+    with pytest.raises(am.ParameterError, match=r"tracks with a confidence of identities"):
+        am.plot.plot_identity(truth)
 
 
 def test_reliability_shows_the_bins_and_how_few_labels_tell():
@@ -330,8 +332,12 @@ def test_no_global_state():
 def test_confidence_says_of_what_it_is():
     truth = am.simulate.cube(seed=1, frames=20)
     sure = np.full(truth.detections.n_points, 0.875)
-    axes = am.plot.plot_confidence(dataclasses.replace(truth, confidence=sure))
-    (above,) = axes.child_axes
-    assert above.get_xlabel() == "confidence of links, mean 0.875"
-    bars = [a.get_ylabel() for a in axes.figure.axes if a is not axes]
-    assert "confidence of a link" in bars
+    tracks = dataclasses.replace(truth, confidence=sure, identity_confidence=sure / 2)
+    for axes, title, of in (
+        (am.plot.plot_confidence(tracks), "confidence of links, mean 0.875", "a link"),
+        (am.plot.plot_identity(tracks), "confidence of identities, mean 0.438", "an identity"),
+    ):
+        (above,) = axes.child_axes
+        assert above.get_xlabel() == title
+        bars = [a.get_ylabel() for a in axes.figure.axes if a is not axes]
+        assert f"confidence of {of}" in bars

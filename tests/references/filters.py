@@ -91,16 +91,16 @@ def imm_log_densities(model: TrackingModel, times, frames, points):
         x, P, w = new_x, new_P, prior
         if frames[i] != t:
             continue
-        likelihood = np.empty(M)
+        logs = np.empty(M)
         for b in range(M):
             S = h @ P[b] @ h + r
             e = points[i] - x[b] @ h
-            likelihood[b] = np.exp(-0.5 * e @ e / S) / (2 * np.pi * S) ** (D / 2)
+            logs[b] = -0.5 * e @ e / S - (D / 2) * np.log(2 * np.pi * S)
             K = P[b] @ h / S
             x[b] = x[b] + np.outer(e, K)
             P[b] = P[b] - np.outer(K, K) * S
-        w = w * likelihood
-        out.append(math.log(w.sum()))
+        w = w * np.exp(logs - logs.max())  # far detections have no likelihood in double precision
+        out.append(math.log(w.sum()) + logs.max())
         w /= w.sum()
         i += 1
     return np.array(out)

@@ -82,11 +82,11 @@ def segments_of(tracks: am.Tracks) -> NDArray[np.int64] | None:
     return am.tracking.learn_bonds(renamed).segments(names)
 
 
-def confident_tracks(path: Path) -> am.Tracks:
-    """Read tracks that have a confidence."""
+def confident_tracks(path: Path, field: str = "confidence") -> am.Tracks:
+    """Read tracks that have a confidence, of links or in `field`."""
     tracks = tracks_of(path)
-    if tracks.confidence is None:
-        hint = "run asterism track --method mcmcda -o FILE.csv; only CSV holds a confidence"
+    if getattr(tracks, field) is None:
+        hint = "run asterism track -o FILE.csv; only CSV holds a confidence"
         raise ParameterError("FILES", "tracks with a confidence", f"{path}, which has none", hint)
     return tracks
 

@@ -104,6 +104,13 @@ def _confidence(asked: Request) -> Any:
     return am.plot.plot_confidence(tracks)
 
 
+def _identity(asked: Request) -> Any:
+    import asterism as am
+
+    tracks = confident_tracks(asked.file, "identity_confidence")
+    return am.plot.plot_identity(selected(tracks, asked.markers, asked.time))
+
+
 def _errors(asked: Request) -> Any:
     import asterism as am
     from asterism.cli.outputs import truth_of_each
@@ -115,19 +122,30 @@ def _errors(asked: Request) -> Any:
 def _reliability(asked: Request) -> Any:
     import asterism as am
     from asterism.cli.outputs import truth_of_each
-    from asterism.metrics import CalibrationCurve, right_links
+    from asterism.metrics import CalibrationCurve, calibration_curve, right_identities, right_links
+    from asterism.plot.style import new_panels
 
     truth = _truth(asked)
-    parts: dict[str, CalibrationCurve] = {}
+    links: dict[str, CalibrationCurve] = {}
+    identities: dict[str, CalibrationCurve] = {}
     for name, file in named(asked.files).items():
         tracks = confident_tracks(file)
-        assert tracks.confidence is not None
-        links, is_right = right_links(tracks.labels, truth_of_each(tracks, truth).labels)
-        parts[name] = am.metrics.calibration_curve(tracks.confidence[links], is_right)
-    axes: Any = am.plot.plot_reliability(parts)
-    # The confidence of a label is that of the link that leads to it.
-    axes.set_xlabel("confidence of a link")
-    return axes
+        markers = truth_of_each(tracks, truth).labels
+        of_each = (
+            (links, tracks.confidence, right_links),
+            (identities, tracks.identity_confidence, right_identities),
+        )
+        for parts, confidence, right_of in of_each:
+            if confidence is not None:
+                which, is_right = right_of(tracks.labels, markers)
+                parts[name] = calibration_curve(confidence[which], is_right)
+    drawn = {"confidence of a link": links, "confidence of an identity": identities}
+    drawn = {title: parts for title, parts in drawn.items() if parts}
+    panels: list[Any] = new_panels(1, len(drawn), width=6.0 * len(drawn), height=6.0)
+    for axes, (title, parts) in zip(panels, drawn.items(), strict=True):
+        am.plot.plot_reliability(parts, axes)
+        axes.set_xlabel(title)
+    return panels
 
 
 def _compare(asked: Request) -> Any:
@@ -255,9 +273,13 @@ KINDS: dict[str, Kind] = {
     "confidence": Kind(
         about="as presence, shaded by the confidence of each link", draw=_confidence, takes=_PART
     ),
+    "identity": Kind(
+        about="as presence, shaded by the confidence of each identity",
+        draw=_identity, takes=_PART,
+    ),
     "errors": Kind(about="wrong labels of each track, over time", draw=_errors, needs=_TRUTH),
     "reliability": Kind(
-        about="share of correct labels by confidence, of one or more results",
+        about="share of right links and identities by confidence, of one or more results",
         draw=_reliability, many=True, needs=_TRUTH,
     ),
     "compare": Kind(

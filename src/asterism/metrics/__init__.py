@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from asterism.metrics.alignment import Alignment, align
-from asterism.metrics.association import AssociationScores, association_scores, right_links
+from asterism.metrics.association import (
+    AssociationScores,
+    association_scores,
+    right_identities,
+    right_links,
+)
 from asterism.metrics.clear import ClearScores, clear_scores
 from asterism.metrics.evaluation import Evaluation, evaluate
 from asterism.metrics.gospa import GospaScores, gospa_scores
@@ -36,5 +41,6 @@ __all__ = [
     "name_scores",
     "oracle_tracks",
     "point_scores",
+    "right_identities",
     "right_links",
 ]

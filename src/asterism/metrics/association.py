@@ -12,7 +12,7 @@ from asterism.records import record
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["AssociationScores", "association_scores", "right_links"]
+__all__ = ["AssociationScores", "association_scores", "right_identities", "right_links"]
 
 
 @record(eq=False)
@@ -105,20 +105,14 @@ def association_scores(
     frame_of, n_frames = check_frames(frame_of, len(labels), n_frames)
     is_true, is_labelled = truth_labels >= 0, labels >= 0
     pairs = overlap(labels, truth_labels)
-    n_tracks = len(pairs.track_sizes)
-
-    commonest = np.full(n_tracks, -1)
-    rising = np.lexsort((-pairs.markers, pairs.counts))  # the last one is kept
-    commonest[pairs.tracks[rising]] = pairs.markers[rising]
-    first = np.full(n_tracks, -1)
-    members = np.flatnonzero(is_labelled)
+    members, is_right = right_identities(labels, truth_labels)
+    first = np.full(len(pairs.track_sizes), -1)
     first[labels[members[::-1]]] = truth_labels[members[::-1]]
-
-    by_frame: list[NDArray[np.int64]] = []
-    for marker_of in (commonest, first):
-        is_right = (marker_of[labels[members]] == truth_labels[members]) & is_true[members]
-        by_frame.append(np.bincount(frame_of[members[~is_right]], minlength=n_frames))
-    wrong, wrong_first = by_frame
+    is_as_first = (first[labels[members]] == truth_labels[members]) & is_true[members]
+    wrong, wrong_first = (
+        np.bincount(frame_of[members[~right]], minlength=n_frames)
+        for right in (is_right, is_as_first)
+    )
 
     _, is_right = right_links(labels, truth_labels)
     before_in_truth, before_in_track = np.full((2, len(labels)), -1)
@@ -170,3 +164,36 @@ def right_links(
     before, after = successions(labels)
     marker = truth_labels[after]
     return after, (marker == truth_labels[before]) & (marker >= 0)
+
+
+def right_identities(
+    labels: ArrayLike, truth_labels: ArrayLike
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Find the detections in tracks, and whether each is of the marker of most in its track.
+
+    Parameters
+    ----------
+    labels, truth_labels : array_like of int, shape (N,)
+        Track and marker of each detection, -1 for none.
+
+    Returns
+    -------
+    inside : ndarray of int, shape (M,)
+        Indices of the detections in tracks.
+    is_right : ndarray of bool, shape (M,)
+        Whether each is of that marker, the lowest if several are equally frequent. Clutter is
+        wrong.
+
+    Examples
+    --------
+    >>> right_identities([0, 0, -1, 0], [2, 2, 1, 1])
+    (array([0, 1, 3]), array([ True,  True, False]))
+    """
+    labels, truth_labels = check_labels(labels, truth_labels)
+    pairs = overlap(labels, truth_labels)
+    most = np.full(len(pairs.track_sizes), -1)
+    rising = np.lexsort((-pairs.markers, pairs.counts))  # the last one is kept
+    most[pairs.tracks[rising]] = pairs.markers[rising]
+    inside = np.flatnonzero(labels >= 0)
+    marker = truth_labels[inside]
+    return inside, (marker == most[labels[inside]]) & (marker >= 0)

@@ -27,7 +27,7 @@ class Alternative:
     Examples
     --------
     >>> Alternative(track=3, probability=0.2)
-    Alternative(track=3, probability=0.2, name='')
+    Alternative(track=3, probability=0.2)
     """
 
     track: int | None

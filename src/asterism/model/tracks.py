@@ -46,7 +46,8 @@ class Tracks:
         Marker name of each of the K tracks, None if it is unknown. Without names K is the largest
         label + 1.
     confidence : array_like of shape (N,), optional
-        Probability in [0, 1] that the link which leads to each detection is right, 0 for clutter.
+        Probability in [0, 1] that the link which leads to each detection is right. For clutter, the
+        probability that it is clutter if the method states one, otherwise 0.
     identity_confidence : array_like of shape (N,), optional
         Probability in [0, 1] that each detection is of the marker that holds most of its track, 0
         for clutter.

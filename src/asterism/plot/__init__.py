@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from asterism.plot.compare import plot_compare
-from asterism.plot.confidence import plot_confidence, plot_reliability
+from asterism.plot.confidence import plot_confidence, plot_identity, plot_reliability
 from asterism.plot.coverage import plot_coverage
 from asterism.plot.export import figure_bytes
 from asterism.plot.groups import plot_groups
@@ -30,6 +30,7 @@ __all__ = [
     "plot_depth",
     "plot_errors",
     "plot_groups",
+    "plot_identity",
     "plot_image",
     "plot_lens",
     "plot_posterior",

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from asterism.metrics import CalibrationCurve
 
-__all__ = ["plot_confidence", "plot_reliability"]
+__all__ = ["plot_confidence", "plot_identity", "plot_reliability"]
 
 _MANY = 20_000  # cells beyond which a vector file holds them as one image
 
@@ -56,16 +56,55 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
     >>> am.plot.plot_confidence(tracks).get_xlabel()
     'time [s]'
     """
+    return _bars(tracks, "confidence", "a link", "links", ax)
+
+
+def plot_identity(tracks: Tracks, ax: Axes | None = None) -> Axes:
+    """Draw each track as a bar over time, shaded by the confidence of its identity.
+
+    The confidence of an identity is the probability that a detection is of the marker that holds
+    most of its track. Light shades stand for a low confidence.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks with a confidence of identity. Bars are in the order of `plot_presence`, interrupted
+        by gaps.
+    ax : Axes, optional
+        Axes to draw on. By default a new figure.
+
+    Returns
+    -------
+    Axes
+        As of `plot_confidence`, with the mean and the lowest confidence of each frame above.
+
+    Raises
+    ------
+    ParameterError
+        If the tracks have no confidence of identity.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> tracks = am.track(am.simulate.cube(frames=10, seed=1).detections)
+    >>> am.plot.plot_identity(tracks).get_xlabel()
+    'time [s]'
+    """
+    return _bars(tracks, "identity_confidence", "an identity", "identities", ax)
+
+
+def _bars(tracks: Tracks, field: str, one: str, many: str, ax: Axes | None) -> Axes:
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
-    if tracks.confidence is None:
-        hint = "track with jpda, mht or mcmcda; of the files a CSV keeps the confidence"
-        raise ParameterError("tracks", "tracks with a confidence", "none", hint)
+    confidence: NDArray[np.float64] | None = getattr(tracks, field)
+    if confidence is None:
+        hint = "am.track returns it; of the files a CSV keeps it"
+        raise ParameterError("tracks", f"tracks with a confidence of {many}", "none", hint)
     d = tracks.detections
     rows = rows_of(tracks)
     axes: Any = ax if ax is not None else axes_for(rows)
     order, _ = tracks.by_track
     row, frame = rows[tracks.labels[order]], d.frame_of[order]
-    sure = tracks.confidence[order]
+    sure = confidence[order]
     if len(order):
         cells = np.full((int(row.max()) + 1, d.n_frames), np.nan)
         cells[row, frame] = sure
@@ -73,13 +112,13 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
             _edges(d.times), np.arange(len(cells) + 1) - 0.5, np.ma.masked_invalid(cells),
             cmap=f"{GRADIENT}_r", vmin=0, vmax=1, rasterized=cells.size > _MANY,
         )  # fmt: skip
-        draw_bar(axes, drawn, "confidence of a link", ticks=np.linspace(0, 1, 6))
+        draw_bar(axes, drawn, f"confidence of {one}", ticks=np.linspace(0, 1, 6))
         # White between the rows, so that neighbours do not run into each other.
         for edge in np.arange(1, len(cells)) - 0.5:
             axes.axhline(edge, color="white", linewidth=2.0)
     frame_rows(axes, tracks, rows)
     axes.grid(visible=False)
-    title = f"confidence of links, mean {sure.mean():.3f}" if len(sure) else "no links"
+    title = f"confidence of {many}, mean {sure.mean():.3f}" if len(sure) else f"no {many}"
     above = strip_above(axes, title)
     n = np.bincount(frame, minlength=d.n_frames)
     total = np.bincount(frame, weights=sure, minlength=d.n_frames)
@@ -87,7 +126,7 @@ def plot_confidence(tracks: Tracks, ax: Axes | None = None) -> Axes:
     least = np.full(d.n_frames, np.inf)
     np.minimum.at(least, frame, sure)
     least[n == 0] = np.nan
-    above.plot(d.times, least, color=CYCLE[1], linewidth=0.8, label="least")
+    above.plot(d.times, least, color=CYCLE[1], linewidth=0.8, label="lowest")
     above.plot(d.times, mean, color=CYCLE[0], linewidth=1.2, label="mean")
     above.set_ylim(-0.03, 1.05)
     legend_above(above)

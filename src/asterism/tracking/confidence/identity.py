@@ -245,7 +245,7 @@ def _alternatives(
         weights = np.ones(len(others))
     weights *= share / weights.sum()
     return tuple(
-        Alternative(track=None if k < 0 else int(k), probability=float(w))
-        for k, w in zip(others, weights, strict=True)
-        if w >= MIN_ALTERNATIVE
+        Alternative(track=None if others[i] < 0 else int(others[i]), probability=float(weights[i]))
+        for i in np.argsort(-weights, kind="stable")
+        if weights[i] >= MIN_ALTERNATIVE
     )

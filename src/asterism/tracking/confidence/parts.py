@@ -55,7 +55,7 @@ class Parts:
     @property
     def after(self) -> NDArray[np.float64]:
         """Probability of the link that leaves each part, 1 for the last part of a track."""
-        return np.append(self.before[1:], 1.0)
+        return np.append(self.before, 1.0)[1:]
 
 
 @record(eq=False, kw_only=False)

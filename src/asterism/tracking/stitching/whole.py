@@ -242,7 +242,7 @@ def stitch(
     labels = np.append(np.maximum(markers, -1), -1).astype(np.int64)[tracklets]
     labels.flags.writeable = False  # no other object refers to it: no need to copy
     n_markers = int(markers.max(initial=-1)) + 1
-    cuts = _cuts(tracks, tracklets)
+    cuts = _cuts(tracks, tracklets, model.population.max_gap)
     n_joins = int(((after >= 0) & (markers >= 0)).sum())
     result = Tracks(
         detections=d,
@@ -359,13 +359,19 @@ def _names(
     return tuple(names)
 
 
-def _cuts(tracks: Tracks, tracklets: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the detections before and after each link that was cut, in order of time."""
+def _cuts(tracks: Tracks, tracklets: NDArray[np.int32], max_gap: int) -> NDArray[np.int64]:
+    """Return the detections before and after each link that was cut, in order of time.
+
+    Longer gaps end a tracklet without a contradiction.
+    """
     order, _ = tracks.by_track
     order = order[tracklets[order] >= 0]
     before, after = order[:-1], order[1:]
-    is_cut = (tracks.labels[before] == tracks.labels[after]) & (
-        tracklets[before] != tracklets[after]
+    frame = tracks.detections.frame_of
+    is_cut = (
+        (tracks.labels[before] == tracks.labels[after])
+        & (tracklets[before] != tracklets[after])
+        & (frame[after] - frame[before] <= max_gap + 1)
     )
     cuts = np.stack([before[is_cut], after[is_cut]], axis=1)
     return cuts[np.argsort(cuts[:, 1], kind="stable")]
