@@ -40,7 +40,8 @@ export class Writing {
       this.write(pen, text, p, colour, paper, 10);
     };
     const dots = [...markers.tracks.subarray(0, markers.count).keys()];
-    const isMarked = (k) => k >= 0 && (k === state.chosen || k === state.hovered);
+    const isMarked = (k) =>
+      k >= 0 && (k === state.chosen || k === state.hovered || state.involved.includes(k));
     for (const n of dots) if (isMarked(markers.tracks[n])) name(n, `600 ${FONT}`, ink, true);
     if (!state.show.names) return;
     const others = dots.filter((n) => markers.tracks[n] >= 0 && !isMarked(markers.tracks[n]));

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from asterism.model import Decision
 from asterism.records import record
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
-    from asterism.model import Decision, Tracks
+    from asterism.model import Tracks
 
 __all__ = ["Place", "places_of"]
 
@@ -77,7 +81,8 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     Parameters
     ----------
     tracks : Tracks
-        Tracks with decisions, as of `track`.
+        Tracks with decisions, as of `track`. Without decisions about identities, as of a file, the
+        identity confidence is used, and the places have no alternatives.
 
     Returns
     -------
@@ -91,9 +96,12 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     >>> places_of(am.track(am.simulate.cube(frames=60, seed=1).detections))
     ()
     """
+    decisions = tracks.decisions
+    if all(each.kind != "identity" for each in decisions):
+        decisions += tuple(_of_confidence(tracks))
     uncertain = [
         each
-        for each in tracks.decisions
+        for each in decisions
         if each.probability is not None and each.probability < UNCERTAIN and each.track >= 0
     ]
     group = list(range(len(uncertain)))
@@ -122,6 +130,22 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     ]
     places = [each for each in places if each.expected_wrong >= MIN_EXPECTED]
     return tuple(sorted(places, key=lambda each: (-each.expected_wrong, each.first)))
+
+
+def _of_confidence(tracks: Tracks) -> Iterator[Decision]:
+    """Return the runs of detections with an uncertain identity, as decisions."""
+    if tracks.identity_confidence is None:
+        return
+    order, _ = tracks.by_track
+    c, frame = tracks.identity_confidence[order], tracks.detections.frame_of[order]
+    is_uncertain, label = c < UNCERTAIN, tracks.labels[order]
+    cuts = np.flatnonzero((np.diff(is_uncertain) != 0) | (np.diff(label) != 0)) + 1
+    for run in np.split(np.arange(len(order)), cuts):
+        if len(run) and is_uncertain[run[0]]:
+            yield Decision(
+                kind="identity", track=int(label[run[0]]), first=int(frame[run[0]]),
+                last=int(frame[run[-1]]), n_detections=len(run), probability=float(c[run].mean()),
+            )  # fmt: skip
 
 
 def _have_one_cause(one: Decision, other: Decision, times: NDArray[np.float64]) -> bool:
