@@ -61,7 +61,7 @@ def main(captures: Path) -> None:
             width=1240, height=960,
         )  # fmt: skip
         draw(
-            browser, "person", "document.querySelector('#findings button').click()",
+            browser, "person", "document.querySelector('.list button').click()",
             width=1240, height=860,
         )  # fmt: skip
         draw(browser, "crossing", "asterism.seek(20)", width=375, height=860, dark=True, scale=1.5)

@@ -65,7 +65,7 @@ def facts_of(tracks: Tracks) -> Facts:
 
 
 def in_words(facts: Facts, n_axes: int) -> str:
-    """Return the counts as one or two sentences."""
+    """Return the counts as a sentence."""
     if not facts.n_frames:
         return "An empty capture: no frame, no point, no track."
     span = _count(facts.n_frames, "frame") + ("" if n_axes == 3 else " of a 2-D capture")
@@ -78,12 +78,7 @@ def in_words(facts: Facts, n_axes: int) -> str:
     named = "" if not facts.n_named else ", all named," if facts.n_named == facts.n_tracks else ""
     if facts.n_named and not named:
         named = f", {facts.n_named:,} of them named,"
-    share = 100 * facts.n_labelled / facts.n_points
-    text = f"{_count(facts.n_tracks, 'track')}{named} over {span}. "
-    text += f"{_percent(share)} of {_count(facts.n_points, 'point')} have a label"
-    if facts.n_clutter:
-        text += f"; {facts.n_clutter:,} are clutter"
-    return text + "."
+    return f"{_count(facts.n_tracks, 'track')}{named} over {span}."
 
 
 def cards(facts: Facts) -> list[tuple[str, str, str]]:

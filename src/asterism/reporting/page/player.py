@@ -129,7 +129,7 @@ def _settings(contents: Contents, solid: bool) -> Markup:
         _check("show-names", "Names", on=False),
         element("label", "Trails ", element("select", *tails, id="trails")),
         element("label", "Colours ", element("select", *colours, id="colours")),
-        _check("show-lines", "Connections"),
+        _check("show-lines", "Bonds"),
         _check("show-clutter", "Clutter"),
     ]
     if contents.judgement is not None:
@@ -139,7 +139,7 @@ def _settings(contents: Contents, solid: bool) -> Markup:
     if solid:
         parts.append(element("label", "Up ", element("select", *up, id="up")))
     parts.append(_check("track-subject", "Follow subject"))
-    parts.append(element("button", "Whole scene", type="button", id="fit"))
+    parts.append(element("button", "Show all", type="button", id="fit"))
     return element("div", *parts, class_="settings")
 
 
