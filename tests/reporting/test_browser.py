@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 
 import numpy as np
@@ -113,7 +114,12 @@ def test_keys_play_step_and_seek(opened, person):
 
 
 def test_list_leads_to_the_place(opened, person):
-    opened.run("asterism.choose(-1); asterism.seek(0)")
+    opened.run("asterism.choose(-1)")
+    opened.run(f"asterism.seek({person[1].decisions[0].first})")
+    opened.key("m")
+    opened.settle()
+    apart = np.hypot(*np.subtract(*(opened.run(f"asterism.where({k})") for k in (0, 1))))
+    opened.run("asterism.seek(0)")
     opened.run("document.querySelector('#places button').click()")
     opened.settle()
     state = opened.run("asterism.state()")
@@ -128,7 +134,9 @@ def test_list_leads_to_the_place(opened, person):
     assert opened.run(confidence) == "40 %"
     # The involved markers are framed: amid the view, and apart.
     _, _, width, height = box(opened, "#scene")
-    spots = np.array([opened.run(f"asterism.where({k})") for k in (0, 1)]) / [width, height]
+    spots = np.array([opened.run(f"asterism.where({k})") for k in (0, 1)])
+    assert np.hypot(*np.subtract(*spots)) > 1.5 * apart
+    spots /= [width, height]
     assert (np.abs(spots - 0.5) < 0.45).all()
     assert np.abs(spots.mean(axis=0) - 0.5).max() < 0.2
     before = opened.run("asterism.where(0)")
@@ -152,14 +160,21 @@ def strips(page):
     return np.asarray(png)[int(y) : int(y + h), int(x) : int(x + w)].astype(float)
 
 
-def test_marks_of_the_truth_are_switched(browser, person):
-    page = browser.page(person[0])
-    n_wrong = page.run("asterism.capture.verdict.filter(v => v > 0).length")
-    assert n_wrong > 0
+def test_marks_of_the_truth_are_switched(browser, tmp_path):
+    truth = am.simulate.cube(seed=1, frames=60)
+    labels = truth.labels.copy()
+    late = truth.detections.frame_of >= 40
+    labels[late & (truth.labels == 2)], labels[late & (truth.labels == 5)] = 5, 2
+    am.report(dataclasses.replace(truth, labels=labels), tmp_path / "swapped.html", truth=truth)
+    page = browser.page(tmp_path / "swapped.html")
+    assert page.run("asterism.capture.verdict.filter(v => v === 1).length") == 40
+    page.run("asterism.seek(50)")
     with_truth, scene = strips(page), image_of(page)
-    page.run("document.getElementById('show-truth').click()")
+    switch = "document.getElementById('show-truth').click()"
+    page.run(switch)
     assert np.abs(strips(page) - with_truth).max() > 50
-    page.run("document.getElementById('show-truth').click()")
+    assert np.abs(image_of(page) - scene).max() > 50
+    page.run(switch)
     assert np.abs(strips(page) - with_truth).max() == 0
     assert np.abs(image_of(page) - scene).max() == 0
     page.close()

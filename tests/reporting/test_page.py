@@ -298,6 +298,36 @@ def test_places_are_in_words_the_worst_first(tmp_path):
     assert cards.index('data-fact="places"') < cards.index('data-fact="tracks"')
 
 
+def test_a_subject_that_walks_out_and_in_is_one_place_each_time():
+    from asterism.reporting.places import places_of
+
+    parts = [
+        (k, first + 3 * k, first + length - 2 * k, 0.6, [(None, 0.4)])
+        for first, length in ((100, 100), (300, 150))
+        for k in range(4)
+    ]
+    tracks = uncertain(*parts, n_frames=600)
+    # A gap of a second between them does not make both one place.
+    joins = tuple(
+        am.model.Decision(
+            kind="join", track=k, first=200 - 2 * k, last=300 + 3 * k, n_detections=0,
+            probability=0.6,
+        )
+        for k in range(4)
+    )  # fmt: skip
+    tracks = dataclasses.replace(tracks, decisions=tracks.decisions + joins)
+    second, first = places_of(tracks)
+    assert (first.first, first.last) == (100, 200)
+    assert (second.first, second.last) == (194, 450)  # with the joins that lead to it
+    assert sorted(first.tracks) == sorted(second.tracks) == [0, 1, 2, 3]
+    apart = [(0, 100, 200, 0.6, []), (1, 190, 290, 0.6, []), (2, 100, 130, 0.6, [])]
+    assert len(places_of(uncertain(*apart, n_frames=600))) == 3  # not long, or not at one time
+    names = uncertain(*parts[:4], n_frames=600)
+    of_names = tuple(dataclasses.replace(each, kind="name") for each in names.decisions)
+    names = dataclasses.replace(names, decisions=of_names, identity_confidence=None)
+    assert len(places_of(names)) == 4
+
+
 def test_severity_is_a_word_and_a_sign(tmp_path):
     few = written(tmp_path, uncertain((0, 20, 24, 0.5, [(1, 0.5)]))).decode()
     assert 'data-severity="some"><dt>place to check, about 2 wrong points</dt>' in few

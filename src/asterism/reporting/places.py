@@ -24,6 +24,8 @@ MIN_EXPECTED = 0.5
 """Smallest expected number of wrong detections of a place."""
 NEAR_SECONDS = 0.5
 """Time within which uncertain parts of a track, or of two that may be exchanged, are one place."""
+SHARED = 0.5
+"""Smallest shared time of two long parts of one place, relative to the time of both together."""
 
 
 @record(eq=False)
@@ -87,8 +89,9 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     Returns
     -------
     tuple of Place
-        Identities and names of a probability below `UNCERTAIN`. Parts of one track that follow
-        each other, and parts of two tracks that may be exchanged, are one place.
+        Identities and names of a probability below `UNCERTAIN`. One place are parts of one track
+        that follow each other, parts of two tracks that may be exchanged, and long parts of several
+        tracks at one time, as of a subject that walks out and in again.
 
     Examples
     --------
@@ -112,13 +115,11 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
         return i
 
     times = tracks.detections.times
-    order = sorted(range(len(uncertain)), key=lambda i: (uncertain[i].first, i))
+    order = sorted(range(len(uncertain)), key=lambda i: (_begin(uncertain[i]), i))
     for n, i in enumerate(order):
         one = uncertain[i]
         for j in order[n + 1 :]:
             other = uncertain[j]
-            if times[other.first] - times[one.last] > NEAR_SECONDS and other.track != one.track:
-                continue
             if _have_one_cause(one, other, times):
                 group[root(j)] = root(i)
     members: dict[int, list[Decision]] = {}
@@ -149,11 +150,27 @@ def _of_confidence(tracks: Tracks) -> Iterator[Decision]:
 
 
 def _have_one_cause(one: Decision, other: Decision, times: NDArray[np.float64]) -> bool:
-    if times[other.first] - times[one.last] > NEAR_SECONDS:
+    if times[_begin(other)] - times[one.last] > NEAR_SECONDS:
         return False
     if one.track == other.track:
         return True
-    return _may_be(one, other.track) or _may_be(other, one.track)
+    if _may_be(one, other.track) or _may_be(other, one.track):
+        return True
+    return one.kind == other.kind == "identity" and _are_together(one, other, times)
+
+
+def _begin(decision: Decision) -> int:
+    """Return the first frame, for a join that after its gap."""
+    return decision.last if decision.kind == "join" else decision.first
+
+
+def _are_together(one: Decision, other: Decision, times: NDArray[np.float64]) -> bool:
+    """Return whether two parts are long and share most of their time."""
+    first, last = times[[one.first, other.first]], times[[one.last, other.last]]
+    shared = last.min() - first.max()
+    return bool(
+        (last - first).min() >= NEAR_SECONDS and shared >= SHARED * (last.max() - first.min())
+    )
 
 
 def _may_be(one: Decision, track: int) -> bool:
