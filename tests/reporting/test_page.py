@@ -281,7 +281,7 @@ def places_on(page):
 def test_places_are_in_words_the_worst_first(tmp_path):
     tracks = uncertain(
         (2, 20, 29, 0.5, [(3, 0.5)]),
-        (0, 54, 181, 0.62, [(None, 0.07), (1, 0.31), (3, 0.001)]),
+        (0, 54, 181, 0.62, [(None, 0.07), (1, 0.31), (3, 0.01)]),
         (2, 190, 191, 0.79, [(3, 0.2)]),  # less than half a wrong point
     )
     page = written(tmp_path, tracks).decode()

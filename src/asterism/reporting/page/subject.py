@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Subject", "subject_of"]
 
-MOST_KNOTS = 2000
+MAX_KNOTS = 2000
 """Largest number of points of the course."""
 SMOOTH = 1.0
 """Length of the moving average of the course, seconds."""
@@ -21,7 +21,7 @@ LONG = 0.25
 """Shortest track of the subject, relative to the longest."""
 ROOM = 0.4
 """Distance from the middle nine tenths of the points, relative to their extent, of a stray."""
-MOST_POINTS = 200
+MAX_OUTERMOST = 200
 """Number of points that stand for the size of the subject."""
 
 
@@ -68,19 +68,19 @@ def subject_of(tracks: Tracks) -> Subject:
         sums = np.concatenate([[0.0], np.cumsum(np.interp(every, seen, mean))])
         low, high = np.maximum(every - half, 0), np.minimum(every + half + 1, d.n_frames)
         course[:, axis] = (sums[high] - sums[low]) / (high - low)
-    few = np.linspace(0, len(used) - 1, min(len(used), 100 * MOST_POINTS)).astype(int)
+    few = np.linspace(0, len(used) - 1, min(len(used), 100 * MAX_OUTERMOST)).astype(int)
     around = points[few] - course[frame[few]]
     low, high = np.quantile(around, [0.05, 0.95], axis=0)
     room = ROOM * max(float((high - low).max()), 0.01)
     around = around[((around >= low - room) & (around <= high + room)).all(axis=1)]
-    knots = np.linspace(0, d.n_frames - 1, min(d.n_frames, MOST_KNOTS)).astype(int)
+    knots = np.linspace(0, d.n_frames - 1, min(d.n_frames, MAX_KNOTS)).astype(int)
     return Subject(course[knots], _outermost(around))
 
 
 def _outermost(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the farthest points in evenly spread directions."""
-    k = np.arange(MOST_POINTS) + 0.5
-    z = 1 - 2 * k / MOST_POINTS
+    k = np.arange(MAX_OUTERMOST) + 0.5
+    z = 1 - 2 * k / MAX_OUTERMOST
     turn, r = np.pi * (1 + 5**0.5) * k, np.sqrt(1 - z**2)
     ways = np.stack([r * np.cos(turn), r * np.sin(turn), z])
     return points[np.unique(np.argmax(points @ ways, axis=0))]

@@ -21,7 +21,7 @@ MOST_POINTS = 3_000_000
 """Number of points from which frames are left out; a page of them has 10 to 20 MB."""
 AROUND = 0.5
 """Time about the worst part of a place within which every frame is kept, seconds."""
-MOST_AROUND = 0.25
+MAX_AROUND = 0.25
 """Largest share of `MOST_POINTS` that is kept about places, those of the worst places first."""
 
 
@@ -49,7 +49,7 @@ def frames_to_show(tracks: Tracks, places: Sequence[Place]) -> NDArray[np.int64]
     stride = stride_for(d.n_points)
     is_shown = np.zeros(d.n_frames, dtype=bool)
     is_shown[::stride] = True
-    room = MOST_AROUND * MOST_POINTS
+    room = MAX_AROUND * MOST_POINTS
     for place in places if stride > 1 else ():
         worst = place.decisions[0]
         about = d.times[[worst.first, worst.last]] + [-AROUND, AROUND]

@@ -22,8 +22,10 @@ __all__ = ["entries", "in_words", "tile"]
 
 MANY = 0.01
 """Share of wrong points among the labelled ones from which the severity is the highest."""
-MOST_ALTERNATIVES = 3
-INVOLVED = 0.05
+MAX_ALTERNATIVES = 3
+MIN_LISTED = 0.015
+"""Smallest probability of an alternative that is listed."""
+MIN_INVOLVED = 0.05
 """Smallest probability of an alternative whose marker the player frames."""
 
 
@@ -48,7 +50,7 @@ def tile(contents: Contents) -> Markup:
     )
 
 
-def entries(contents: Contents, shown: NDArray[np.int64], most: int) -> list[Markup]:
+def entries(contents: Contents, shown: NDArray[np.int64], max_entries: int) -> list[Markup]:
     """Return the entries of the list.
 
     Parameters
@@ -57,7 +59,7 @@ def entries(contents: Contents, shown: NDArray[np.int64], most: int) -> list[Mar
         Contents of the page.
     shown : ndarray of int
         Frames of the capture that the player has, increasing.
-    most : int
+    max_entries : int
         Largest number of entries.
     """
     tracks = contents.tracks
@@ -67,7 +69,9 @@ def entries(contents: Contents, shown: NDArray[np.int64], most: int) -> list[Mar
         worst = place.decisions[0]
         first, last = (int(np.searchsorted(shown, t)) for t in (worst.first, worst.last))
         others = [
-            a.track for a in worst.alternatives if a.track is not None and a.probability >= INVOLVED
+            a.track
+            for a in worst.alternatives
+            if a.track is not None and a.probability >= MIN_INVOLVED
         ]
         return element(
             "li",
@@ -90,7 +94,7 @@ def entries(contents: Contents, shown: NDArray[np.int64], most: int) -> list[Mar
             ),
         )
 
-    return [of(place) for place in (contents.places or ())[:most]]
+    return [of(place) for place in (contents.places or ())[:max_entries]]
 
 
 def in_words(place: Place, tracks: Tracks) -> str:
@@ -125,8 +129,8 @@ def _alternatives(decision: Decision, names: Sequence[str]) -> list[str]:
     unknown = "no name" if decision.kind == "name" else "unknown marker"
     return [
         f"{a.name or (unknown if a.track is None else names[a.track])} {_percent(a.probability)}"
-        for a in likely[:MOST_ALTERNATIVES]
-        if a.probability >= 0.005
+        for a in likely[:MAX_ALTERNATIVES]
+        if a.probability >= MIN_LISTED
     ]
 
 
