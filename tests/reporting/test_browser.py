@@ -209,7 +209,10 @@ def test_a_click_chooses_the_marker_under_it(opened, person):
     x, y, _, _ = box(opened, "#scene")
     there = tracks.labels[tracks.detections.frame_of == 60]
     places = {k: opened.run(f"asterism.where({k})") for k in there[there >= 0].tolist()}
-    gap = lambda k: min(np.hypot(*np.subtract(places[k], places[j])) for j in places if j != k)  # noqa: E731
+
+    def gap(k):
+        return min(np.hypot(*np.subtract(places[k], places[j])) for j in places if j != k)
+
     alone = max(places, key=gap)
     opened.click(x + places[alone][0] + 2, y + places[alone][1] - 1)
     assert opened.run("asterism.state().chosen") == alone
