@@ -56,12 +56,9 @@ def main(captures: Path) -> None:
             browser, "walking", f"asterism.seek(800); asterism.choose(12); {away}", width=1240,
             height=860, dark=True,
         )  # fmt: skip
+        draw(browser, "rat", "asterism.seek(900)", width=1240, height=860)
         draw(
-            browser, "rat", "asterism.seek(900); document.querySelector('.left').scrollIntoView()",
-            width=1240, height=960,
-        )  # fmt: skip
-        draw(
-            browser, "person", "document.querySelector('#findings button').click()",
+            browser, "person", "dispatchEvent(new KeyboardEvent('keydown', {key: 'n'}))",
             width=1240, height=860,
         )  # fmt: skip
         draw(browser, "crossing", "asterism.seek(20)", width=375, height=860, dark=True, scale=1.5)

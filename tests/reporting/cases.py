@@ -71,11 +71,27 @@ def full_page(path):
     names = [*HOSTILE, *(f"M{k}" for k in range(tracks.n_tracks - len(HOSTILE)))]
     tracks = dataclasses.replace(tracks, names=tuple(names))
     order, starts = tracks.by_track
-    confidence = tracks.confidence.copy()
-    confidence[order[starts[0] + 20 : starts[0] + 30]] = 0.4  # that the first is to be looked at
+    uncertain = order[starts[0] + 20 : starts[0] + 30]  # that the first is a place to check
+    identity = np.ones(len(tracks.labels))
+    identity[uncertain] = 0.4
+    frames = tracks.detections.frame_of[uncertain]
+    decision = am.model.Decision(
+        kind="identity",
+        track=0,
+        first=int(frames[0]),
+        last=int(frames[-1]),
+        n_detections=10,
+        probability=0.4,
+        alternatives=(
+            am.model.Alternative(track=1, probability=0.5),
+            am.model.Alternative(track=None, probability=0.1),
+        ),
+    )
     labels = tracks.labels.copy()
     labels[order[starts[7] + 40 : starts[7] + 49]] = -1  # that there is a long gap
-    tracks = dataclasses.replace(tracks, confidence=confidence, labels=labels)
+    tracks = dataclasses.replace(
+        tracks, identity_confidence=identity, labels=labels, decisions=(decision,)
+    )
     ring = am.Rig.ring(8, radius=4, height=2.5).cameras
     lens = am.camera.BrownConrady(k1=-0.2)
     ring = tuple(dataclasses.replace(c, K=K, lens=lens) for c in ring)

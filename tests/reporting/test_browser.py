@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 
 import numpy as np
@@ -73,7 +74,7 @@ def test_names_from_files_do_nothing(opened):
     assert opened.run("document.querySelectorAll('script').length") == 1  # the data is taken out
     assert opened.run("document.querySelectorAll('img').length") == 0
     assert opened.run("document.querySelector('h1').textContent") == HOSTILE[0]
-    shown = opened.run("[...document.querySelectorAll('#findings bdi')].map(b => b.textContent)")
+    shown = opened.run("[...document.querySelectorAll('#places bdi')].map(b => b.textContent)")
     assert HOSTILE[0] in shown
     for k, name in enumerate(HOSTILE):
         opened.run(f"asterism.choose({k})")
@@ -113,16 +114,92 @@ def test_keys_play_step_and_seek(opened, person):
 
 
 def test_list_leads_to_the_place(opened, person):
-    entry = "document.querySelector('#findings [data-kind=low-confidence]')"
-    opened.run(f"{entry}.click()")
+    opened.run("asterism.choose(-1)")
+    opened.run(f"asterism.seek({person[1].decisions[0].first})")
+    opened.key("m")
+    opened.settle()
+    apart = np.hypot(*np.subtract(*(opened.run(f"asterism.where({k})") for k in (0, 1))))
+    opened.run("asterism.seek(0)")
+    opened.run("document.querySelector('#places button').click()")
+    opened.settle()
     state = opened.run("asterism.state()")
-    assert state["chosen"] == 0
     tracks = person[1]
-    here = (tracks.labels == 0) & (tracks.detections.frame_of == state["frame"])
-    assert tracks.confidence[here] == 0.4
-    assert opened.run("document.querySelector('[data-about=confidence]').textContent") == "40 %"
+    assert state["chosen"] == 0
+    assert state["frame"] == tracks.decisions[0].first
+    assert state["involved"] == [0, 1]
+    assert state["follow"]
+    assert state["speed"] == 0.25
+    assert opened.run("document.getElementById('speed').value") == "0.25"
+    confidence = "document.querySelector('[data-about=\"identity confidence\"]').textContent"
+    assert opened.run(confidence) == "40 %"
+    # The involved markers are framed: amid the view, and apart.
+    _, _, width, height = box(opened, "#scene")
+    spots = np.array([opened.run(f"asterism.where({k})") for k in (0, 1)])
+    assert np.hypot(*np.subtract(*spots)) > 1.5 * apart
+    spots /= [width, height]
+    assert (np.abs(spots - 0.5) < 0.45).all()
+    assert np.abs(spots.mean(axis=0) - 0.5).max() < 0.2
+    before = opened.run("asterism.where(0)")
+    opened.key("ArrowRight", shift=True)
+    opened.settle()
+    assert np.allclose(opened.run("asterism.where(0)"), before, atol=1)  # it is followed
+    assert not opened.run("document.querySelector('.others').open")
     opened.key("n")
     assert opened.run("document.querySelectorAll('[aria-current]').length") == 1
+    assert opened.run("document.querySelector('.others').open")
+    opened.key("p")
+    assert opened.run("document.querySelector('#places [aria-current]') !== null")
+    opened.key("Escape")
+    assert opened.run("asterism.state()")["involved"] == []
+
+
+def strips(page):
+    """Content of the timeline as an array."""
+    png = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    x, y, w, h = box(page, "#strips")
+    return np.asarray(png)[int(y) : int(y + h), int(x) : int(x + w)].astype(float)
+
+
+def test_marks_of_the_truth_are_switched(browser, tmp_path):
+    truth = am.simulate.cube(seed=1, frames=60)
+    labels = truth.labels.copy()
+    late = truth.detections.frame_of >= 40
+    labels[late & (truth.labels == 2)], labels[late & (truth.labels == 5)] = 5, 2
+    am.report(dataclasses.replace(truth, labels=labels), tmp_path / "swapped.html", truth=truth)
+    page = browser.page(tmp_path / "swapped.html")
+    assert page.run("asterism.capture.verdict.filter(v => v === 1).length") == 40
+    page.run("asterism.seek(50)")
+    with_truth, scene = strips(page), image_of(page)
+    switch = "document.getElementById('show-truth').click()"
+    page.run(switch)
+    assert np.abs(strips(page) - with_truth).max() > 50
+    assert np.abs(image_of(page) - scene).max() > 50
+    page.run(switch)
+    assert np.abs(strips(page) - with_truth).max() == 0
+    assert np.abs(image_of(page) - scene).max() == 0
+    page.close()
+
+
+def test_colours_are_of_tracks_or_of_segments(browser, person):
+    page = browser.page(person[0])
+    n_tracks, n_segments = page.run("""(() => {
+      const { segments, header } = asterism.capture;
+      const n = header.colours.cycle.length;
+      const hues = () => [...segments.keys()].map(k => asterism.hue(k));
+      const tracks = hues().every((hue, k) => hue === k % n);
+      const select = document.getElementById("colours");
+      select.value = "segment";
+      select.dispatchEvent(new Event("change"));
+      const own = hues().every((hue, k) => hue === (segments[k] < 0 ? -1 : segments[k] % n));
+      return [tracks, own];
+    })()""")
+    assert n_tracks
+    assert n_segments
+    by_segment = image_of(page)
+    page.run("""(s => { s.value = "track"; s.dispatchEvent(new Event("change")); })
+      (document.getElementById("colours"))""")
+    assert np.abs(image_of(page) - by_segment).max() > 50
+    page.close()
 
 
 def test_a_click_chooses_the_marker_under_it(opened, person):
@@ -132,7 +209,10 @@ def test_a_click_chooses_the_marker_under_it(opened, person):
     x, y, _, _ = box(opened, "#scene")
     there = tracks.labels[tracks.detections.frame_of == 60]
     places = {k: opened.run(f"asterism.where({k})") for k in there[there >= 0].tolist()}
-    gap = lambda k: min(np.hypot(*np.subtract(places[k], places[j])) for j in places if j != k)  # noqa: E731
+
+    def gap(k):
+        return min(np.hypot(*np.subtract(places[k], places[j])) for j in places if j != k)
+
     alone = max(places, key=gap)
     opened.click(x + places[alone][0] + 2, y + places[alone][1] - 1)
     assert opened.run("asterism.state().chosen") == alone
@@ -219,7 +299,8 @@ def test_all_controls_are_reached_by_tab_in_their_order(browser, person):
         if outline.startswith("none") or outline.endswith(" 0px"):
             unmarked.append(name)
     controls = ["scene", "play", "back", "on", "frame", "speed", "camera", "show-names", "trails"]
-    controls += ["show-lines", "show-clutter", "show-cameras", "up", "fit", "order", "strips"]
+    controls += ["colours", "show-lines", "show-clutter", "show-truth", "show-cameras", "up"]
+    controls += ["track-subject", "fit", "order", "strips"]
     assert [name for name in ids if name in controls] == controls
     assert unmarked == []
     page.close()

@@ -81,6 +81,45 @@ def test_narrow_screens_need_no_scrolling_to_the_side(browser, person, width):
     page.close()
 
 
+@pytest.mark.parametrize(("width", "height"), [(1400, 900), (1024, 768)])
+def test_player_lists_and_timeline_fit_the_screen(browser, person, width, height):
+    page = browser.page(person[0], width=width, height=height)
+    for selector in (".cards", "#scene", "#places button", "#frame", "#strips"):
+        top, bottom, right = page.run(
+            f"(b => [b.top, b.bottom, b.right])(document.querySelector({selector!r})"
+            ".getBoundingClientRect())"
+        )
+        assert 0 <= top < bottom <= height
+        assert right <= width
+    assert place(page)[3] >= 0.25 * height
+    page.close()
+
+
+def test_the_subject_fills_the_view_beside_strays(browser, tmp_path):
+    truth = am.simulate.person(activity="walk", frames=200, seed=1)
+    body = truth.positions()
+    stray = np.full((200, 2, 3), 30.0) * [1, -1, 0]
+    stray[:, 1] += 5
+    tracks = am.Tracks.from_dense(
+        truth.detections.times, np.concatenate([body, stray], axis=1), [*truth.names, "a", "b"]
+    )
+    am.report(tracks, tmp_path / "page.html")
+    page = browser.page(tmp_path / "page.html", width=1400)
+    _, _, width, height = place(page)
+    for frame in (0, 100, 199):
+        page.run(f"asterism.seek({frame})")
+        page.settle()
+        spots = np.array([page.run(f"asterism.where({k})") for k in range(len(truth.names))])
+        assert (spots > 0).all()
+        assert (spots < [width, height]).all()
+        assert np.ptp(spots[:, 1]) > 0.6 * height
+    page.run("document.getElementById('fit').click()")
+    page.settle()
+    spots = np.array([page.run(f"asterism.where({k})") for k in range(len(truth.names))])
+    assert np.ptp(spots[:, 1]) < 0.3 * height  # the whole scene has the strays
+    page.close()
+
+
 def empty(n_frames, n_axes=3):
     d = am.Detections(
         times=np.arange(n_frames) / 100,

@@ -52,7 +52,11 @@ def test_positions_come_back_within_half_a_cell(tmp_path, person):
     assert (off <= 0.5001 * np.array(header["grid"][1])).all()
     assert max(header["grid"][1]) < 0.0005
     assert np.array_equal(arrays["times"], tracks.detections.times)
-    assert np.abs(arrays["confidence"][: len(order)] / 255 - tracks.confidence[order]).max() < 0.002
+    for name, sure in (("Identity", tracks.identity_confidence), ("Link", tracks.confidence)):
+        header, arrays = unpacked(written(tmp_path, tracks))
+        assert header["confidence"] == f"{name} confidence"
+        assert np.abs(arrays["confidence"][: len(order)] / 255 - sure[order]).max() < 0.002
+        tracks = dataclasses.replace(tracks, identity_confidence=None)
 
 
 def test_runs_and_clutter_are_those_of_the_tracks(tmp_path, person):
@@ -108,7 +112,8 @@ def test_policy_allows_the_page_itself_and_nothing_else(tmp_path, person):
 def test_names_from_files_stay_text(tmp_path):
     names = HOSTILE
     places = straight(n_markers=len(names))
-    places[60:100, :, :] = np.nan  # so that each is in the list of what to look at
+    for k in range(len(names)):
+        places[20 + 25 * k : 40 + 25 * k, k] = np.nan  # so that each is in a list
     tracks = tracks_of(places, names)
     page = written(
         tmp_path, tracks, truth=tracks, title=HOSTILE[0], summary=[(HOSTILE[1], HOSTILE[2])]
@@ -132,7 +137,7 @@ def test_figures_are_those_of_the_tracks(tmp_path, person):
     assert facts["tracks"] == str(np.count_nonzero(tracks.lengths))
     assert facts["labelled"] == f"{100 * labelled.mean():.1f} %"
     assert facts["clutter"] == f"{(~labelled).sum():,}"
-    assert facts["doubtful"] == f"{(tracks.confidence[labelled] < 0.9).sum():,}"
+    assert facts["places"] == "✓ 0"
     seen = [np.flatnonzero(np.isfinite(c)) for c in tracks.positions()[:, :, 0].T]
     assert facts["gaps"] == f"{sum((np.diff(f) > 1).sum() for f in seen):,}"
     scores = {html.unescape(k): v for k, v in re.findall('data-score="([^"]+)">([^<]*)<', page)}
@@ -158,8 +163,9 @@ def test_judgement_counts_as_the_evaluation_does(person):
     assert (judged.verdicts == 2).sum() == e.missed
     assert e.wrong_percent > 0
     found = [f for f in find_troubles(swapped, judged) if f.kind == "wrong marker"]
-    assert {3, 8} <= {f.track for f in found}
-    n_switches = sum(f.kind == "switch" for f in find_troubles(swapped, judged))
+    assert (found[0].frame, found[0].count) == (40, 2)
+    assert found[0].reason.startswith("2 tracks change to another marker at 0.40 s; ")
+    n_switches = sum(f.count for f in find_troubles(swapped, judged) if f.kind == "switch")
     assert n_switches == e.switches >= 4
 
 
@@ -175,6 +181,19 @@ def test_detections_that_only_the_truth_has_are_told(tmp_path, person):
     )
     page = written(tmp_path, am.Tracks(detections=fewer, labels=tracks.labels[kept]), truth=truth)
     assert "7 points of markers are in the truth only" in text_of(page)
+
+
+def test_another_result_is_not_called_the_truth(tmp_path, person):
+    truth, tracks = person
+    text = text_of(written(tmp_path, tracks, truth=truth))
+    assert "Comparison with the truth" in text
+    other = dataclasses.replace(truth, confidence=(truth.labels >= 0).astype(float))
+    page = written(tmp_path, tracks, truth=other)
+    assert unpacked(page)[0]["against"] == "other result"
+    text = text_of(re.sub(rb"(?s)<(script|style).*?</\1>", b"", page))
+    assert "Comparison with the other result" in text
+    assert "differs from the other result" in text
+    assert "truth" not in text
 
 
 def test_two_tracks_that_change_places_are_found():
@@ -202,25 +221,168 @@ def test_a_jump_is_found_once_and_nothing_else():
     assert find_troubles(tracks_of(straight())) == []
 
 
-def test_gaps_ends_and_ambiguous_links_are_found_with_their_reasons():
+def test_gaps_and_ends_are_found_with_their_reasons():
     places = straight()
     places[50:80, 0] = np.nan
     places[:120, 1] = np.nan
     places[150:, 2] = np.nan
     places[90:93, 3] = np.nan  # too short for a finding
-    tracks = tracks_of(places)
-    confidence = np.ones(tracks.detections.n_points)
-    doubtful = (tracks.labels == 3) & np.isin(tracks.detections.frame_of, [10, 12])
-    confidence[doubtful] = [0.6, 0.5]
-    found = find_troubles(dataclasses.replace(tracks, confidence=confidence))
+    found = find_troubles(tracks_of(places))
     by_place = {(f.kind, f.track): f for f in found}
-    assert len(by_place) == len(found) == 4
+    assert len(by_place) == len(found) == 3
     assert by_place["long gap", 0].frame == 80
     assert "0.31 s (30 frames)" in by_place["long gap", 0].reason
     assert by_place["begun midway", 1].frame == 120
     assert by_place["ends early", 2].frame == 149
-    assert by_place["low confidence", 3].frame == 12
-    assert "50 %" in by_place["low confidence", 3].reason
+
+
+def test_tracks_that_begin_together_are_one_entry():
+    places = straight(n_markers=40)
+    for k in range(2, 40):
+        places[: 120 + k % 6, k] = np.nan
+    places[100:120, :2] = np.nan
+    found = {f.kind: f for f in find_troubles(tracks_of(places))}
+    assert set(found) == {"begun midway", "long gap"}
+    begun = found["begun midway"]
+    assert (begun.count, begun.frame, begun.weight) == (38, 120, 38 * 3.0)
+    assert begun.reason.startswith("38 tracks begin at 1.20 s; ")
+    assert found["long gap"].reason.startswith("2 tracks continue after a gap at 1.20 s; ")
+
+
+def uncertain(*parts, n_markers=4, n_frames=200):
+    """Tracks with some decisions, (track, first, last, probability, alternatives) each."""
+    decisions = tuple(
+        am.model.Decision(
+            kind="identity", track=track, first=first, last=last, n_detections=last - first + 1,
+            probability=p, alternatives=tuple(
+                am.model.Alternative(track=k, probability=q) for k, q in others
+            ),
+        )
+        for track, first, last, p, others in parts
+    )  # fmt: skip
+    tracks = tracks_of(straight(n_frames, n_markers), ["RTOE", "RMT1", "LTOE", "LMT1"])
+    sure = np.ones(len(tracks.labels))
+    for each in decisions:
+        frame = tracks.detections.frame_of
+        own = (tracks.labels == each.track) & (frame >= each.first) & (frame <= each.last)
+        sure[own] = each.probability
+    return dataclasses.replace(tracks, identity_confidence=sure, decisions=decisions)
+
+
+def places_on(page):
+    """Attributes and words of the entries of the first list."""
+    listed = re.search('<ol id="places".*?</ol>', page, re.S)[0]
+    return [
+        (dict(re.findall('data-([a-z]+)="([^"]*)"', button)), text_of(button.encode()))
+        for button in re.findall("<button.*?</button>", listed, re.S)
+    ]
+
+
+def test_places_are_in_words_the_worst_first(tmp_path):
+    tracks = uncertain(
+        (2, 20, 29, 0.5, [(3, 0.5)]),
+        (0, 54, 181, 0.62, [(None, 0.07), (1, 0.31), (3, 0.01)]),
+        (2, 190, 191, 0.79, [(3, 0.2)]),  # less than half a wrong point
+    )
+    page = written(tmp_path, tracks).decode()
+    (first, words), (second, _) = places_on(page)
+    sentence = " ".join(words.split("0.54\xa0s")[1].replace("\xa0", " ").split())
+    assert sentence == (
+        "RTOE , frames 54 to 181: 62 %, or RMT1 31 %, unknown marker 7 %; about 49 wrong points"
+    )
+    assert (first["track"], first["frame"], first["last"]) == ("0", "54", "181")
+    assert first["tracks"] == "0 1"
+    assert second["tracks"] == "2 3"
+    assert 'data-severity="many"><dt>places to check, about 54 wrong points</dt>' in page
+    assert 'data-fact="places">▲ 2<' in page
+    cards = page.split('class="cards"')[1]
+    assert cards.index('data-fact="places"') < cards.index('data-fact="tracks"')
+
+
+def test_a_subject_that_walks_out_and_in_is_one_place_each_time():
+    from asterism.reporting.places import places_of
+
+    parts = [
+        (k, first + 3 * k, first + length - 2 * k, 0.6, [(None, 0.4)])
+        for first, length in ((100, 100), (300, 150))
+        for k in range(4)
+    ]
+    tracks = uncertain(*parts, n_frames=600)
+    # A gap of a second between them does not make both one place.
+    joins = tuple(
+        am.model.Decision(
+            kind="join", track=k, first=200 - 2 * k, last=300 + 3 * k, n_detections=0,
+            probability=0.6,
+        )
+        for k in range(4)
+    )  # fmt: skip
+    tracks = dataclasses.replace(tracks, decisions=tracks.decisions + joins)
+    second, first = places_of(tracks)
+    assert (first.first, first.last) == (100, 200)
+    assert (second.first, second.last) == (194, 450)  # with the joins that lead to it
+    assert sorted(first.tracks) == sorted(second.tracks) == [0, 1, 2, 3]
+    apart = [(0, 100, 200, 0.6, []), (1, 190, 290, 0.6, []), (2, 100, 130, 0.6, [])]
+    assert len(places_of(uncertain(*apart, n_frames=600))) == 3  # not long, or not at one time
+    names = uncertain(*parts[:4], n_frames=600)
+    of_names = tuple(dataclasses.replace(each, kind="name") for each in names.decisions)
+    names = dataclasses.replace(names, decisions=of_names, identity_confidence=None)
+    assert len(places_of(names)) == 4
+
+
+def test_severity_is_a_word_and_a_sign(tmp_path):
+    few = written(tmp_path, uncertain((0, 20, 24, 0.5, [(1, 0.5)]))).decode()
+    assert 'data-severity="some"><dt>place to check, about 2 wrong points</dt>' in few
+    assert 'data-fact="places">△ 1<' in few
+    assert (
+        'data-severity="clear"><dt>places to check</dt>' in written(tmp_path, uncertain()).decode()
+    )
+    unknown = written(tmp_path, tracks_of(straight())).decode()
+    assert 'data-severity="none"' in unknown
+    assert 'data-fact="places">–<' in unknown
+    assert "Not known: the tracks have no probabilities of identity." in text_of(unknown.encode())
+
+
+def test_places_of_a_file_follow_from_its_identity_confidence(tmp_path):
+    tracks = uncertain((0, 20, 29, 0.5, [(1, 0.5)]), (3, 100, 139, 0.7, []))
+    of_file = dataclasses.replace(tracks, decisions=())
+    found = [place for place, _ in places_on(written(tmp_path, of_file).decode())]
+    assert [(p["track"], p["frame"], p["last"]) for p in found] == [
+        ("3", "100", "139"), ("0", "20", "29"),
+    ]  # fmt: skip
+
+
+def test_method_and_figures_are_folded(tmp_path, person):
+    _, tracks = person
+    page = written(tmp_path, tracks, made="Made so.", summary=[("method", "of mine")]).decode()
+    folded = re.search("<details[^>]*><summary>How it was made</summary>(.*?)</details>", page)[1]
+    for text in ("Made so.", "of mine", "Figures reported by the method", *list(tracks.info)[-1:]):
+        assert text in folded
+        assert text not in page.replace(folded, "").split("<script")[0]
+
+
+def test_segments_are_the_rigid_clusters(tmp_path):
+    truth = am.simulate.person(frames=60, seed=1)
+    clusters = am.tracking.learn_bonds(truth).clusters
+    segments = unpacked(written(tmp_path, truth))[1]["segments"]
+    for n, cluster in enumerate(clusters):
+        assert np.flatnonzero(segments == n).tolist() == sorted(cluster)
+
+
+def test_strays_do_not_enlarge_the_subject():
+    from asterism.reporting.page.subject import subject_of
+
+    rng = np.random.default_rng(4)
+    way = np.cumsum(rng.normal(0, 0.01, (300, 1, 3)), axis=0)
+    body = rng.uniform(-1, 1, (40, 3)) * [0.3, 0.3, 0.9] + way
+    alone = subject_of(tracks_of(body))
+    stray = np.full((300, 2, 3), 30.0)
+    stray[:, 1] = -20.0
+    brief = np.full((300, 1, 3), 8.0)
+    brief[40:] = np.nan
+    found = subject_of(tracks_of(np.concatenate([body, stray, brief], axis=1)))
+    assert np.ptp(alone.points, axis=0).max() > 1.7
+    assert np.allclose(np.ptp(found.points, axis=0), np.ptp(alone.points, axis=0), atol=0.05)
+    assert np.allclose(np.ptp(found.course, axis=0), np.ptp(alone.course, axis=0), atol=0.05)
 
 
 def test_connections_are_those_that_keep_their_distance():
@@ -305,11 +467,24 @@ def test_long_captures_are_thinned_and_say_so(tmp_path, monkeypatch):
     assert stride_for(301) == 2
     tracks = tracks_of(straight(200))
     page = written(tmp_path, tracks, truth=tracks)
-    header, arrays = unpacked(page)
-    assert header["frame"] == [0, 3]
+    _, arrays = unpacked(page)
+    assert np.array_equal(arrays["frames"], np.arange(0, 200, 3))
     assert np.allclose(arrays["times"], tracks.detections.times[::3])
     assert "Every third frame is shown (67 of 200)" in text_of(page)
     assert 'data-fact="tracks">4<' in page.decode()
+
+
+def test_all_frames_about_the_worst_places_are_shown(tmp_path, monkeypatch):
+    monkeypatch.setattr("asterism.reporting.page.thinning.MOST_POINTS", 2000)
+    tracks = uncertain((0, 400, 405, 0.3, []), (1, 900, 901, 0.4, []), n_frames=1500)
+    page = written(tmp_path, tracks)
+    _, arrays = unpacked(page)
+    around = set(range(350, 455))  # half a second; the share of a page has no room for the second
+    assert set(arrays["frames"].tolist()) == set(range(0, 1500, 3)) | around
+    first, second = (place for place, _ in places_on(page.decode()))
+    assert arrays["frames"][int(first["frame"])] == 400
+    assert arrays["frames"][int(second["frame"])] == 900
+    assert "Every third frame and all about the worst places" in text_of(page)
 
 
 def test_far_clutter_is_counted_not_drawn(tmp_path):
@@ -371,18 +546,24 @@ def test_the_page_opens_where_the_capture_does(tmp_path):
     assert unpacked(written(tmp_path, empty))[0]["opens"] == 0
 
 
-def test_uncertain_names_and_changes_of_marker_are_listed():
+def test_uncertain_names_and_changes_of_marker_are_listed(tmp_path):
     truth = am.simulate.person(frames=60, seed=1)
     naming = am.name_tracks(truth, am.learn_marker_set(truth))
-    assert [f for f in find_troubles(naming.tracks, None, naming) if "name" in f.kind] == []
     p, other = naming.probabilities.copy(), list(naming.alternatives)
-    p[3], other[3] = 0.6, "LKNE"
+    q = naming.alternative_probabilities.copy()
+    p[3], q[3], other[3] = 0.6, 0.4, "LKNE"
     change = am.tracking.NameChange(track=5, first=20, last=40, usual="C7", name=truth.names[5])
     unsure = dataclasses.replace(
-        naming, probabilities=p, alternatives=tuple(other), changes=(change,)
+        naming,
+        probabilities=p,
+        alternatives=tuple(other),
+        alternative_probabilities=q,
+        changes=(change,),
     )
     found = {f.kind: f for f in find_troubles(naming.tracks, None, unsure)}
-    assert found["uncertain name"].track == naming.tracks.names.index(truth.names[3])
-    assert "probability 60%; LKNE has" in found["uncertain name"].reason
+    ((place, words),) = places_on(written(tmp_path, naming.tracks, naming=unsure).decode())
+    assert place["kind"] == "name"
+    assert int(place["track"]) == naming.tracks.names.index(truth.names[3])
+    assert f"{truth.names[3]} , frames 0 to 59: 60 %, or LKNE 40 %" in words.replace("\xa0", " ")
     assert (found["changed marker"].track, found["changed marker"].frame) == (5, 20)
     assert "frames 20 to 40: the track was on C7" in found["changed marker"].reason

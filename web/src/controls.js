@@ -1,5 +1,7 @@
 /** Buttons, boxes and keys. */
 
+const SLOW = 0.25; // speed at a place to check
+
 const byId = (id) => document.getElementById(id);
 
 export function connect({ capture, state, stage, timeline }) {
@@ -19,17 +21,29 @@ export function connect({ capture, state, stage, timeline }) {
     timeline.sort(event.target.value);
     timeline.draw();
   });
+  const moves = byId("track-subject");
+  moves.addEventListener("change", () => {
+    if (moves.checked) stage?.fitSubject();
+    else state.set({ moves: false });
+  });
+  state.addEventListener("change", () => {
+    moves.checked = state.moves;
+  });
   byId("fit").addEventListener("click", () => stage?.fit());
   byId("up")?.addEventListener("change", (event) => {
     stage?.setUp(event.target.value);
-    stage?.fit();
+    stage?.fitSubject();
   });
   byId("trails").addEventListener("change", (event) => show({ trails: Number(event.target.value) }));
-  for (const name of ["names", "lines", "clutter", "cameras"]) {
-    byId(`show-${name}`)?.addEventListener("change", (event) => show({ [name]: event.target.checked }));
+  byId("colours").addEventListener("change", (event) => show({ colours: event.target.value }));
+  for (const name of ["names", "lines", "clutter", "cameras", "truth"]) {
+    byId(`show-${name}`)?.addEventListener("change", (event) => {
+      show({ [name]: event.target.checked });
+      if (name === "truth") timeline.resize();
+    });
   }
 
-  const found = [...document.querySelectorAll("#findings button")];
+  const found = [...document.querySelectorAll(".list button")];
   let at = -1;
   found.forEach((button, i) =>
     button.addEventListener("click", () => {
@@ -44,15 +58,24 @@ export function connect({ capture, state, stage, timeline }) {
       else other.removeAttribute("aria-current");
     }
     state.play(false);
-    const track = Number(button.dataset.track);
+    const [track, frame] = [Number(button.dataset.track), Number(button.dataset.frame)];
+    const involved = (button.dataset.tracks ?? "").split(" ").filter(Boolean).map(Number);
+    state.involved = involved;
     state.choose(track);
-    state.seek(Number(button.dataset.frame));
+    if (involved.length) {
+      byId("speed").value = SLOW;
+      state.set({ speed: SLOW, follow: true });
+    }
+    state.seek(frame);
+    if (involved.length) stage?.focus(involved, frame, Number(button.dataset.last));
     timeline.reveal(timeline.rowOf.get(track));
   }
 
   function visit(by) {
     if (!found.length) return;
     at = (at + by + found.length) % found.length;
+    const folded = found[at].closest("details");
+    if (folded) folded.open = true;
     found[at].scrollIntoView({ block: "nearest" });
     go(found[at]);
   }
@@ -88,6 +111,7 @@ export function connect({ capture, state, stage, timeline }) {
     "=": () => stage?.zoom(0.87),
     "-": () => stage?.zoom(1.15),
     0: () => stage?.fit(),
+    m: () => stage?.fitSubject(),
   };
 
   addEventListener("keydown", (event) => {

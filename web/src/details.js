@@ -7,6 +7,7 @@ export class Details {
     Object.assign(this, { capture, state, box, list, follow });
     this.places = new Places(capture);
     this.rows = new Map();
+    this.against = capture.header.against === "truth" ? "True marker" : "Other result";
   }
 
   draw() {
@@ -23,8 +24,10 @@ export class Details {
     this.row("State", this.seen(there, point));
     const shown = place.slice(0, capture.axes).map((x) => (1000 * x).toFixed(1));
     this.row("Position, mm", there === ABSENT ? "–" : shown.join(", "));
-    if (capture.confidence) this.row("Confidence", point < 0 ? "–" : percent(capture.confidence[point]));
-    if (capture.marker) this.row("True marker", this.trueMarker(point));
+    if (capture.confidence) {
+      this.row(capture.header.confidence, point < 0 ? "–" : percent(capture.confidence[point]));
+    }
+    if (capture.marker) this.row(this.against, this.trueMarker(point));
   }
 
   seen(there, point) {
@@ -39,7 +42,7 @@ export class Details {
     if (point < 0) return "–";
     const m = marker[point];
     const name = m < 0 ? "no marker" : header.markers[m] ?? `marker ${m}`;
-    return verdict[point] === 1 ? `${name}: wrong` : name;
+    return verdict[point] === 1 ? `${name}: ${header.against === "truth" ? "wrong" : "differs"}` : name;
   }
 
   row(name, text) {

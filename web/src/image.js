@@ -1,5 +1,6 @@
 /** Image of a camera: markers projected through its lens. */
 
+import { hueOf } from "./colours.js";
 import { cleared } from "./flat.js";
 import { ABSENT, GAP, Places } from "./places.js";
 import { css } from "./theme.js";
@@ -87,7 +88,7 @@ export class CameraImage {
     };
     const t = state.frame;
     for (let i = capture.clutterStart[t]; capture.T && i < capture.clutterStart[t + 1]; i++) {
-      const isMissed = capture.verdict?.[i] === 2;
+      const isMissed = state.show.truth && capture.verdict?.[i] === 2;
       if (!state.show.clutter && !isMissed) continue;
       const [x, y, z] = capture.positions.subarray(3 * i, 3 * i + 3);
       if (lens.project(x, y, z, pixel)) dot(1.5, isMissed ? missed : clutter, false);
@@ -97,7 +98,7 @@ export class CameraImage {
       const there = this.places.find(k, t, place, 0);
       if (there === ABSENT || !lens.project(...place, pixel)) continue;
       n += there !== GAP;
-      dot(2.5, cycle[k % cycle.length], there === GAP);
+      dot(2.5, cycle[hueOf(capture, state.show, k)] ?? clutter, there === GAP);
       if (k === state.chosen) {
         pen.lineWidth = 1.5;
         dot(6, css("--ink"), true);

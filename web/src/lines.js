@@ -4,6 +4,7 @@ import {
   BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, LineBasicMaterial, LineSegments,
 } from "three";
 
+import { hueOf } from "./colours.js";
 import { frameAt, SEEN } from "./places.js";
 
 const MAX_SAMPLES = 80; // of a trail
@@ -59,6 +60,7 @@ export class Trails extends Lines {
     this.capture = capture;
     this.places = places;
     this.cycle = capture.header.colours.cycle.map((c) => new Color(c));
+    this.clutter = new Color(capture.header.colours.clutter);
     this.buffer = [new Float32Array(3), new Float32Array(3)];
   }
 
@@ -80,7 +82,7 @@ export class Trails extends Lines {
           if (is && was) {
             const dim = is === SEEN && was === SEEN ? 0.8 : 0.25;
             const share = (x) => dim * (1 - (t - x) / (t - first + 1));
-            const colour = this.cycle[k % this.cycle.length];
+            const colour = this.cycle[hueOf(capture, state.show, k)] ?? this.clutter;
             this.add(before, 0, now, 0, colour, share(s + step), share(s));
           }
           was = is;

@@ -2,6 +2,7 @@
 
 import "./style.css";
 
+import { hueOf } from "./colours.js";
 import { connect, connectPointer } from "./controls.js";
 import { Details } from "./details.js";
 import { CameraImage } from "./image.js";
@@ -61,7 +62,7 @@ async function start() {
     draw();
   });
   resize();
-  stage?.fit();
+  stage?.fitSubject();
   if (stage) byId("scale").textContent = `squares of ${size(stage.floor.cell)}`;
   if (stage && capture.T && capture.positions.length) message.hidden = true;
   else if (stage) message.textContent = capture.T ? "The capture has no points." : "The capture has no frames.";
@@ -82,11 +83,10 @@ function staged(capture, state, message) {
 
 /** Show frame and time. */
 function tell(capture, state) {
-  const [first, stride] = capture.header.frame;
   const slider = byId("frame");
   slider.value = state.frame;
   const time = capture.T ? capture.times[state.frame].toFixed(3) : "";
-  const number = first + state.frame * stride;
+  const number = capture.frames[state.frame];
   byId("clock").textContent = capture.T ? `${time} s · frame ${number}` : "no frame";
   slider.setAttribute("aria-valuetext", `frame ${number}, ${time} seconds`);
   const play = byId("play");
@@ -103,9 +103,14 @@ function size(metres) {
 function script(capture, state, stage, image) {
   return {
     capture,
-    state: () => ({ frame: state.frame, chosen: state.chosen, playing: state.playing }),
+    state: () => ({
+      frame: state.frame, chosen: state.chosen, playing: state.playing, speed: state.speed,
+      follow: state.follow, moves: state.moves, involved: state.involved,
+    }),
     seek: (frame) => state.seek(frame),
     choose: (track) => state.choose(track),
+    /** Index of the colour of a track, -1 for none of the cycle. */
+    hue: (track) => hueOf(capture, state.show, track),
     /** Position of a track on the canvas in CSS pixels, null without one. */
     where: (track) => {
       const n = stage ? stage.dotOf(track) : -1;

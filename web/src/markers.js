@@ -4,6 +4,7 @@ import {
   BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, Points, ShaderMaterial,
 } from "three";
 
+import { hueOf } from "./colours.js";
 import { ABSENT, GAP } from "./places.js";
 
 const VERTEX = `
@@ -107,16 +108,16 @@ export class Markers {
       if (there === ABSENT) continue;
       const point = places.point;
       const isHollow = there === GAP || capture.filled?.[point];
-      paint(look, n, this.cycle[k % this.cycle.length], isHollow ? 1 : 0);
-      const isWrong = point >= 0 && capture.verdict?.[point] === 1;
+      paint(look, n, this.cycle[hueOf(capture, state.show, k)] ?? this.clutter, isHollow ? 1 : 0);
+      const isWrong = state.show.truth && point >= 0 && capture.verdict?.[point] === 1;
       const isMarked = k === state.chosen || k === state.hovered;
       if (isWrong) paint(ring, n, this.wrong, 2.5);
-      else paint(ring, n, ink, isMarked ? 1.8 : 0);
+      else paint(ring, n, ink, isMarked ? 1.8 : state.involved.includes(k) ? 1 : 0);
       this.tracks[n++] = k;
     }
     const last = capture.T ? capture.clutterStart[t + 1] : 0;
     for (let i = capture.T ? capture.clutterStart[t] : 0; i < last; i++) {
-      const isMissed = capture.verdict?.[i] === 2;
+      const isMissed = state.show.truth && capture.verdict?.[i] === 2;
       if (!state.show.clutter && !isMissed) continue;
       for (let a = 0; a < 3; a++) position.array[3 * n + a] = capture.positions[3 * i + a];
       paint(look, n, isMissed ? this.missed : this.clutter, 2);

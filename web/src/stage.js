@@ -8,7 +8,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { Connections, Trails } from "./lines.js";
 import { Markers } from "./markers.js";
-import { Places } from "./places.js";
+import { frameAt, Places, SEEN } from "./places.js";
 import { Floor, Frustums } from "./surroundings.js";
 import { ink, accent } from "./theme.js";
 
@@ -17,6 +17,10 @@ ColorManagement.enabled = false;
 
 const UP = { x: new Vector3(1, 0, 0), y: new Vector3(0, 1, 0), z: new Vector3(0, 0, 1) };
 const SEEN_FROM = new Vector3(0.6, 0.33, 0.9).normalize();
+const AROUND = 0.25; // seconds about a place that are framed
+const CONTEXT = 24; // smallest half size of a frame, in radii of a marker
+// What the view follows, beside tracks by their number.
+const [NOTHING, SUBJECT] = [-1, -2];
 const NEAR_PX = 16; // largest distance of a click from the dot that it selects
 
 export class Stage {
@@ -37,6 +41,7 @@ export class Stage {
     this.scene.add(this.root);
     this.view = new PerspectiveCamera(capture.axes === 2 ? 20 : 38, 1, 0.01, 1000);
     const places = new Places(capture);
+    this.places = places;
     const [low, high] = capture.header.box;
     this.size = Math.max(0.05, Math.hypot(...high.map((h, i) => h - low[i])));
     this.floor = new Floor(capture);
@@ -59,9 +64,9 @@ export class Stage {
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => this.redraw());
     this.followed = new Vector3();
+    this.following = NOTHING;
     this.point = new Vector3();
     this.setUp(capture.header.up);
-    this.fit();
   }
 
   setUp(axis) {
@@ -78,18 +83,53 @@ export class Stage {
 
   /** Show the whole scene. */
   fit() {
-    const [low, high] = this.capture.header.box;
-    const middle = new Vector3(...low.map((l, i) => (l + high[i]) / 2));
-    this.root.localToWorld(middle);
-    const from = this.capture.axes === 2 ? new Vector3(0, 0, 1) : SEEN_FROM;
-    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((n) =>
-      this.root.localToWorld(new Vector3(...[0, 1, 2].map((i) => ((n >> i) & 1 ? high[i] : low[i])))),
-    );
+    this.state.set({ moves: false });
+    this.show(corners(...this.capture.header.box), this.front());
+  }
+
+  /** Show the subject where it is, and move with it. */
+  fitSubject() {
+    this.state.set({ moves: true });
+    const here = this.courseAt(this.state.frame);
+    this.show(this.capture.header.subject.map((p) => p.map((x, i) => x + here[i])), this.front());
+  }
+
+  front() {
+    return this.capture.axes === 2 ? UP.z : SEEN_FROM;
+  }
+
+  /** Place of the subject in a frame. */
+  courseAt(frame) {
+    const { course, T } = this.capture;
+    const n = course.length / 3;
+    const at = T > 1 ? (frame / (T - 1)) * (n - 1) : 0;
+    const before = Math.min(Math.floor(at), Math.max(0, n - 2));
+    const after = Math.min(before + 1, n - 1);
+    return [0, 1, 2].map((i) => {
+      const x = course[3 * before + i];
+      return x + (at - before) * (course[3 * after + i] - x);
+    });
+  }
+
+  /** Show points of the capture from a direction, in the middle of the view. */
+  show(points, from) {
+    const places = points.map((p) => this.root.localToWorld(new Vector3(...p)));
+    this.view.position.copy(from);
+    this.view.lookAt(0, 0, 0);
+    const middle = new Vector3();
+    let size = 0.05;
+    for (const axis of [UP.x, UP.y, UP.z]) {
+      const way = axis.clone().applyQuaternion(this.view.quaternion);
+      const along = places.map((p) => p.dot(way));
+      const [low, high] = [Math.min(...along), Math.max(...along)];
+      middle.addScaledVector(way, (low + high) / 2);
+      size = Math.max(size, high - low);
+    }
     this.controls.target.copy(middle);
-    let [near, away] = [0.3 * this.size, 20 * this.size];
+    let [near, away] = [0.3 * size, 20 * size];
     for (let n = 0; n < 20; n++) {
       const tried = (near + away) / 2;
-      if (this.holds(corners, middle, from, tried)) away = tried;
+      if (this.holds(places, middle, from, tried)) away = tried;
       else near = tried;
     }
     this.view.position.copy(middle).addScaledVector(from, away);
@@ -97,19 +137,62 @@ export class Stage {
     this.view.far = away * 100;
     this.view.updateProjectionMatrix();
     this.controls.update();
+    this.followed.set(...this.courseAt(this.state.frame));
+    this.root.localToWorld(this.followed);
+    this.following = this.state.moves && !this.state.follow ? SUBJECT : NOTHING;
     this.redraw();
   }
 
-  /** Return whether all corners are in view from a distance, with a margin. */
-  holds(corners, middle, from, away) {
+  /**
+   * Show some tracks about a time from the present direction.
+   * @param {number[]} tracks the first one is followed, so its own motion takes no room
+   * @param {number} first frame
+   * @param {number} last frame
+   */
+  focus(tracks, first, last) {
+    const { times, axes } = this.capture;
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    const place = [0, 0, 0];
+    const [home, lead] = [[0, 0, 0], [0, 0, 0]];
+    const isLed = this.places.find(tracks[0], first, home, 0);
+    const begin = frameAt(times, times[first] - AROUND);
+    const end = frameAt(times, Math.min(times[last], times[first] + AROUND) + AROUND);
+    for (let t = begin; t <= end; t++) {
+      const moves = isLed && this.places.find(tracks[0], t, lead, 0);
+      for (const k of tracks) {
+        if (this.places.find(k, t, place, 0) !== SEEN) continue;
+        place.forEach((x, i) => {
+          const at = moves ? x - lead[i] + home[i] : x;
+          low[i] = Math.min(low[i], at);
+          high[i] = Math.max(high[i], at);
+        });
+      }
+    }
+    if (low[0] > high[0]) return;
+    const room = CONTEXT * this.capture.header.radius;
+    low.forEach((l, i) => {
+      const more = axes === 2 && i === 2 ? 0 : Math.max(0, room - (high[i] - l) / 2);
+      low[i] -= more;
+      high[i] += more;
+    });
+    const from = this.view.position.clone().sub(this.controls.target).normalize();
+    this.show(corners(low, high), from);
+    const n = this.dotOf(tracks[0]);
+    this.following = n < 0 ? NOTHING : tracks[0];
+    if (n >= 0) this.followed.copy(this.place(n, this.point));
+  }
+
+  /** Return whether all points are in view from a distance, with a margin. */
+  holds(points, middle, from, away) {
     this.view.position.copy(middle).addScaledVector(from, away);
     this.view.lookAt(middle);
     this.view.near = away / 1000;
     this.view.updateProjectionMatrix();
     this.view.updateMatrixWorld();
-    return corners.every((corner) => {
-      const { x, y, z } = this.point.copy(corner).project(this.view);
-      return Math.abs(x) < 0.86 && Math.abs(y) < 0.8 && z < 1;
+    return points.every((point) => {
+      const { x, y, z } = this.point.copy(point).project(this.view);
+      return Math.abs(x) < 0.9 && Math.abs(y) < 0.86 && z < 1;
     });
   }
 
@@ -136,22 +219,31 @@ export class Stage {
     this.redraw();
   }
 
+  /** Move the view with the selected track, or else with the subject. */
   keepFollowing() {
     const { state, controls, view } = this;
     const n = state.follow ? this.dotOf(state.chosen) : -1;
-    if (n < 0) {
-      this.isFollowing = false;
+    let what = state.moves && !state.follow ? SUBJECT : NOTHING;
+    if (n >= 0) {
+      what = state.chosen;
+      this.place(n, this.point);
+    } else if (what === SUBJECT) {
+      this.root.localToWorld(this.point.set(...this.courseAt(state.frame)));
+    }
+    if (what === NOTHING) {
+      this.following = NOTHING;
       return;
     }
-    this.place(n, this.point);
-    if (this.isFollowing) {
-      view.position.add(this.point).sub(this.followed);
-    } else {
-      view.position.add(this.point).sub(controls.target);
+    // The view keeps its place relative to what it follows; a track that it takes up is centred.
+    const begins = this.following !== what;
+    const from = begins && n >= 0 ? controls.target : this.followed;
+    if (!begins || n >= 0) {
+      view.position.add(this.point).sub(from);
+      if (begins) controls.target.copy(this.point);
+      else controls.target.add(this.point).sub(from);
     }
-    controls.target.copy(this.point);
     this.followed.copy(this.point);
-    this.isFollowing = true;
+    this.following = what;
     controls.update();
   }
 
@@ -217,4 +309,9 @@ export class Stage {
     this.controls.update();
     this.redraw();
   }
+}
+
+/** Corners of a box. */
+function corners(low, high) {
+  return [0, 1, 2, 3, 4, 5, 6, 7].map((n) => low.map((l, i) => ((n >> i) & 1 ? high[i] : l)));
 }

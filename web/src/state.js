@@ -9,12 +9,15 @@ export class State extends EventTarget {
     this.capture = capture;
     this.frame = capture.header.opens;
     this.chosen = -1;
+    this.involved = []; // tracks of the place that is visited
     this.hovered = -1;
     this.follow = false;
+    this.moves = true; // with the subject
     this.playing = false;
     this.speed = 1;
     this.camera = 0;
-    this.show = { names: false, lines: true, clutter: true, cameras: true, trails: 0.5 };
+    this.show = { names: false, lines: true, clutter: true, cameras: true, trails: 0.5,
+      truth: true, colours: "track" };
     this.clock = capture.times[this.frame] ?? 0; // time of the player in seconds; it may lie between frames
     this.before = null;
   }
@@ -33,6 +36,7 @@ export class State extends EventTarget {
 
   choose(track) {
     this.chosen = track;
+    if (!this.involved.includes(track)) this.involved = [];
     if (track < 0) this.follow = false;
     this.changed();
   }

@@ -69,6 +69,7 @@ export class Timeline {
   /** Compute the worst frame of each track and cell. */
   gather() {
     const { capture, cells } = this;
+    const { truth } = this.state.show;
     this.strips = new Uint8Array(capture.K * cells);
     this.missed = new Uint8Array(cells);
     if (!capture.T) return;
@@ -85,7 +86,7 @@ export class Timeline {
         for (let t = first; t < end; t++) {
           const point = capture.runStart[r] + t - first;
           let value = SURE;
-          if (capture.verdict?.[point] === 1) value = WRONG;
+          if (truth && capture.verdict?.[point] === 1) value = WRONG;
           else if (capture.confidence) value = doubt(capture.confidence[point]);
           // A short capture has several cells a frame.
           const stop = t + 1 < end ? cell[t + 1] : cell[Math.min(t + 1, capture.T - 1)];
@@ -96,7 +97,7 @@ export class Timeline {
         }
       }
     }
-    for (let t = 0; t < capture.T && capture.verdict; t++) {
+    for (let t = 0; t < capture.T && truth && capture.verdict; t++) {
       for (let i = capture.clutterStart[t]; i < capture.clutterStart[t + 1]; i++) {
         if (capture.verdict[i] === 2) this.missed[cell[t]] = 1;
       }

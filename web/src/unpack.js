@@ -6,6 +6,7 @@
  * @property {number} K tracks
  * @property {number} axes 2 or 3
  * @property {Float64Array} times seconds, one a frame
+ * @property {Uint32Array} frames number of each frame in the file
  * @property {Uint32Array} starts K + 1: points of track k are starts[k] to starts[k + 1]
  * @property {Uint32Array} runsOf K + 1: runs of track k are runsOf[k] to runsOf[k + 1]
  * @property {Uint32Array} runFirst first frame of each run
@@ -17,8 +18,10 @@
  * @property {?Uint8Array} filled 1 where a point was filled in
  * @property {?Uint8Array} verdict of each point: 0 right, 1 wrong, 2 missed
  * @property {?Int32Array} marker true marker of each point, -1 for none
- * @property {Uint32Array} trouble tracks, ordered by the number of findings, most first
+ * @property {Uint32Array} trouble tracks, ordered by severity, the worst first
+ * @property {Float32Array} course x, y, z of the subject at evenly spaced frames
  * @property {Uint32Array} pairs tracks that are joined by lines, two by two
+ * @property {Int32Array} segments segment of each track, -1 for none
  * @property {object} header all other fields
  */
 
@@ -95,7 +98,8 @@ function capture(header, arrays) {
   });
   return {
     T, K, axes: header.axes, header, positions, runsOf, runStart, clutterStart,
-    times: arrays.times, starts: arrays.starts, trouble: arrays.trouble, pairs: arrays.pairs,
+    times: arrays.times, frames: arrays.frames, segments: arrays.segments, starts: arrays.starts, trouble: arrays.trouble, pairs: arrays.pairs,
+    course: arrays.course,
     runFirst: arrays.runFirst, runLength: arrays.runLength,
     confidence: arrays.confidence ?? null, filled: arrays.filled ?? null,
     verdict: arrays.verdict ?? null, marker: arrays.marker ?? null,

@@ -33,14 +33,17 @@ export class Writing {
       const p = stage.onCanvas(stage.place(n, this.point));
       const text = capture.header.names[markers.tracks[n]];
       pen.font = font;
-      const [x, y, width] = [p.x, p.y, pen.measureText(text).width + 10];
-      const covers = (o) => Math.abs(o.y - y) < 12 && o.x < x + width && x < o.x + o.width;
-      if (!mustBe && taken.some(covers)) return; // overlapping names are unreadable
-      taken.push({ x, y, width });
+      const [x, width] = [p.x, pen.measureText(text).width + 10];
+      const covers = (o) => Math.abs(o.y - p.y) < 12 && o.x < x + width && x < o.x + o.width;
+      // Overlapping names are unreadable.
+      if (!mustBe && taken.some(covers)) return;
+      for (let n = 0; n < 8 && taken.some(covers); n++) p.y += 13;
+      taken.push({ x, y: p.y, width });
       this.write(pen, text, p, colour, paper, 10);
     };
     const dots = [...markers.tracks.subarray(0, markers.count).keys()];
-    const isMarked = (k) => k >= 0 && (k === state.chosen || k === state.hovered);
+    const isMarked = (k) =>
+      k >= 0 && (k === state.chosen || k === state.hovered || state.involved.includes(k));
     for (const n of dots) if (isMarked(markers.tracks[n])) name(n, `600 ${FONT}`, ink, true);
     if (!state.show.names) return;
     const others = dots.filter((n) => markers.tracks[n] >= 0 && !isMarked(markers.tracks[n]));

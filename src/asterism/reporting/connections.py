@@ -1,4 +1,4 @@
-"""Lines between bonded markers, which make a body visible among the points."""
+"""Lines between bonded markers and their segments, which make a body visible."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NO_PAIRS = np.empty((0, 2), dtype=np.int64)
 
 
 def connections_of(tracks: Tracks) -> Connections:
-    """Estimate the bonds between markers, and select the lines to draw.
+    """Estimate the bonds between markers, and select the lines and the segments to draw.
 
     A body has more bonds than a reader can distinguish. The lines are a minimal spanning forest of
     the bonds, and the `EACH` shortest bonds of each marker.
@@ -40,18 +40,20 @@ def connections_of(tracks: Tracks) -> Connections:
     Returns
     -------
     Connections
-        Lines, and a sentence about them for the page.
+        Lines, segments, and a sentence about the lines for the page.
     """
     tracks = tracks.measured()
     longest = np.argsort(-tracks.lengths, kind="stable")[:MOST_MARKERS]
     longest = np.sort(longest[tracks.lengths[longest] > 0])
-    few = thinned(tracks, max(1, -(-tracks.detections.n_frames // MOST_FRAMES)))
+    T = tracks.detections.n_frames
+    few, _ = thinned(tracks, np.arange(0, T, max(1, -(-T // MOST_FRAMES))))
     number = np.full(tracks.n_tracks + 1, -1)
     number[longest] = np.arange(len(longest))
     # Without names, because two tracks of one name are allowed in a picture.
-    bonds = learn_bonds(
-        replace(few, labels=number[few.labels], names=(None,) * len(longest), confidence=None)
-    )
+    bonds = learn_bonds(replace(few, labels=number[few.labels], names=(None,) * len(longest)))
+    segments = np.full(tracks.n_tracks, -1)
+    for n, cluster in enumerate(bonds.clusters):
+        segments[longest[list(cluster)]] = n
     order = np.argsort(bonds.distances, kind="stable")
     steady = order[bonds.steady[order]]
     nearest = np.full(len(longest), np.inf)
@@ -69,11 +71,12 @@ def connections_of(tracks: Tracks) -> Connections:
             n_drawn[[i, j]] += 1
     if not chosen:
         text = "No lines are drawn: no bonds were found between markers."
-        return Connections(pairs=_NO_PAIRS, about=text)
+        return Connections(pairs=_NO_PAIRS, segments=segments, about=text)
     text = (
         f"Lines are bonds: pairs of markers with a stable distance in this capture. The shortest "
         f"{len(chosen)} of {len(steady)} that connect each body are drawn."
     )
     if np.count_nonzero(tracks.lengths) > MOST_MARKERS:
         text += f" Only the {MOST_MARKERS} longest tracks were searched for bonds."
-    return Connections(pairs=np.array(sorted(chosen), dtype=np.int64), about=text)
+    pairs = np.array(sorted(chosen), dtype=np.int64)
+    return Connections(pairs=pairs, segments=segments, about=text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,8 @@ from asterism.model.upwards import up_axis
 from asterism.reporting.connections import connections_of
 from asterism.reporting.judgement import judge
 from asterism.reporting.page import Contents, page
+from asterism.reporting.places import places_of
+from asterism.tracking.decisions import of_naming
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -51,11 +54,12 @@ def report(
     path : path
         File to write. An existing file is replaced, unless it is the input of the detections.
     truth : Tracks, optional
-        True tracks, as for `evaluate`. Wrong labels are marked, and scores are shown.
+        True tracks, as for `evaluate`. Wrong labels are marked, and scores are shown. Tracks with
+        confidence or a recipe are presented as another result.
     rig : Rig, optional
         The cameras, drawn in the scene; the player looks through each. Only with 3-D tracks.
     naming : Naming, optional
-        Result of `name_tracks` that gave the names; uncertain ones are listed as findings.
+        Result of `name_tracks` that gave the names; uncertain ones are places to check.
     made : str
         Sentence about the method and the model of the tracks.
     summary : iterable of (str, str)
@@ -96,6 +100,8 @@ def report(
         raise ParameterError("rig", "tracks in space to look at", f"{d.n_axes}-D tracks")
     if isinstance(d, Capture) and not overwrite_input and path.resolve() == d.path.resolve():
         raise ParameterError("path", "another file than the one that was read", str(path))
+    if naming is not None and all(each.kind != "name" for each in tracks.decisions):
+        tracks = replace(tracks, decisions=(*tracks.decisions, *of_naming(naming)))
     axis, about_up = _up(tracks, rig, up)
     if title is None:
         title = d.path.name if isinstance(d, Capture) else ""
@@ -112,6 +118,9 @@ def report(
         judgement=None if truth is None else judge(tracks, truth),
         rig=rig,
         naming=naming,
+        places=None
+        if tracks.identity_confidence is None and not tracks.decisions
+        else places_of(tracks),
     )
     text = page(contents)
     with replacing(path) as file:

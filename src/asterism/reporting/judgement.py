@@ -28,7 +28,8 @@ def judge(tracks: Tracks, truth: Tracks) -> Judgement:
     Parameters
     ----------
     tracks, truth : Tracks
-        Tracks of the page, and the ground truth.
+        Tracks of the page, and the ground truth. A truth with confidence or a recipe is taken for
+        another result.
 
     Returns
     -------
@@ -52,6 +53,7 @@ def judge(tracks: Tracks, truth: Tracks) -> Judgement:
         names=truth.names,
         scores=_scores(evaluate(tracks, truth)),
         n_elsewhere=int(np.count_nonzero(~here & (both.truth_labels >= 0))),
+        against="truth" if truth.recipe is None and truth.confidence is None else "other result",
     )
 
 

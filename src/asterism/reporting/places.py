@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from asterism.model import Decision
 from asterism.records import record
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
-    from asterism.model import Decision, Tracks
+    from asterism.model import Tracks
 
 __all__ = ["Place", "places_of"]
 
@@ -18,10 +22,12 @@ UNCERTAIN = 0.8
 """Probability of an identity or a name from which no look is needed."""
 MIN_EXPECTED = 1.0
 """Smallest expected number of wrong detections of a place."""
-MAX_SECONDS = 5.0
-"""Longest time from the first to the last frame of a place of several decisions."""
 NEAR_SECONDS = 0.5
 """Time within which uncertain parts of a track, or of two that may be exchanged, are one place."""
+MAX_SECONDS = 5.0
+"""Longest time from the first to the last frame of a place whose parts follow each other."""
+SHARED = 0.5
+"""Smallest shared time of two long parts of one place, relative to the time of both together."""
 
 
 @record(eq=False)
@@ -79,13 +85,15 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     Parameters
     ----------
     tracks : Tracks
-        Tracks with decisions, as of `track`.
+        Tracks with decisions, as of `track`. Without decisions about identities, as of a file, the
+        identity confidence is used, and the places have no alternatives.
 
     Returns
     -------
     tuple of Place
-        Identities and names of a probability below `UNCERTAIN`. Parts of one track that follow
-        each other, and parts of two tracks that may be exchanged, are one place.
+        Identities and names of a probability below `UNCERTAIN`. One place are parts of one track
+        that follow each other, parts of two tracks that may be exchanged, and long parts of several
+        tracks at one time, as of a subject that walks out and in again.
 
     Examples
     --------
@@ -93,21 +101,32 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     >>> places_of(am.track(am.simulate.cube(frames=60, seed=1).detections))
     ()
     """
+    decisions = tracks.decisions
+    if all(each.kind != "identity" for each in decisions):
+        decisions += tuple(_of_confidence(tracks))
     uncertain = [
         each
-        for each in tracks.decisions
+        for each in decisions
         if each.probability is not None and each.probability < UNCERTAIN and each.track >= 0
     ]
     times = tracks.detections.times
     groups: list[list[Decision]] = []
-    for each in sorted(uncertain, key=lambda one: (one.first, one.track)):
-        for group in reversed(groups):
-            span = times[each.last] - times[min(one.first for one in group)]
-            if span <= MAX_SECONDS and any(_have_one_cause(one, each, times) for one in group):
+    near: list[list[Decision]] = []
+    for each in sorted(uncertain, key=lambda one: (_begin(one), one.track)):
+        begin = times[_begin(each)]
+        near = [
+            group for group in near if begin - times[max(one.last for one in group)] <= NEAR_SECONDS
+        ]
+        for group in reversed(near):
+            span = times[each.last] - times[min(_begin(one) for one in group)]
+            if (span <= MAX_SECONDS or _are_together(group[0], each, times)) and any(
+                _have_one_cause(one, each, times) for one in group
+            ):
                 group.append(each)
                 break
         else:
             groups.append([each])
+            near.append(groups[-1])
     places = [
         Place(decisions=tuple(sorted(own, key=lambda each: (-each.expected_wrong, each.track))))
         for own in groups
@@ -116,12 +135,44 @@ def places_of(tracks: Tracks) -> tuple[Place, ...]:
     return tuple(sorted(places, key=lambda each: (-each.expected_wrong, each.first)))
 
 
+def _of_confidence(tracks: Tracks) -> Iterator[Decision]:
+    """Return the runs of detections with an uncertain identity, as decisions."""
+    if tracks.identity_confidence is None:
+        return
+    order, _ = tracks.by_track
+    c, frame = tracks.identity_confidence[order], tracks.detections.frame_of[order]
+    is_uncertain, label = c < UNCERTAIN, tracks.labels[order]
+    cuts = np.flatnonzero((np.diff(is_uncertain) != 0) | (np.diff(label) != 0)) + 1
+    for run in np.split(np.arange(len(order)), cuts):
+        if len(run) and is_uncertain[run[0]]:
+            yield Decision(
+                kind="identity", track=int(label[run[0]]), first=int(frame[run[0]]),
+                last=int(frame[run[-1]]), n_detections=len(run), probability=float(c[run].mean()),
+            )  # fmt: skip
+
+
 def _have_one_cause(one: Decision, other: Decision, times: NDArray[np.float64]) -> bool:
-    if times[other.first] - times[one.last] > NEAR_SECONDS:
+    if times[_begin(other)] - times[one.last] > NEAR_SECONDS:
         return False
     if one.track == other.track:
         return True
-    return _may_be(one, other.track) or _may_be(other, one.track)
+    if _may_be(one, other.track) or _may_be(other, one.track):
+        return True
+    return one.kind == other.kind == "identity" and _are_together(one, other, times)
+
+
+def _begin(decision: Decision) -> int:
+    """Return the first frame, for a join that after its gap."""
+    return decision.last if decision.kind == "join" else decision.first
+
+
+def _are_together(one: Decision, other: Decision, times: NDArray[np.float64]) -> bool:
+    """Return whether two parts are long and share most of their time."""
+    first, last = times[[one.first, other.first]], times[[one.last, other.last]]
+    shared = last.min() - first.max()
+    return bool(
+        (last - first).min() >= NEAR_SECONDS and shared >= SHARED * (last.max() - first.min())
+    )
 
 
 def _may_be(one: Decision, track: int) -> bool:

@@ -40,7 +40,7 @@ def report(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Write tracks as one HTML page with a player, a timeline and a list of findings.
+    """Write tracks as one HTML page that leads with the places to check.
 
     The page opens in any browser and loads nothing from the network.
 

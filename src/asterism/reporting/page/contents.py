@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from asterism.camera import Rig
     from asterism.model import Tracks
     from asterism.model.upwards import Axis
+    from asterism.reporting.places import Place
     from asterism.tracking import Naming
 
 __all__ = ["Connections", "Contents", "Judgement", "Score", "Verdict"]
@@ -62,6 +63,8 @@ class Judgement:
         Scores of the tracks.
     n_elsewhere : int
         Number of detections of markers that only the truth has, which cannot be drawn.
+    against : str
+        ``"truth"``, or ``"other result"`` if the tracks are compared with those of a method.
     """
 
     verdicts: NDArray[np.int64]
@@ -69,21 +72,25 @@ class Judgement:
     names: tuple[str | None, ...]
     scores: tuple[Score, ...]
     n_elsewhere: int
+    against: str = "truth"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Connections:
-    """Lines between markers.
+    """Lines between markers, and their segments.
 
     Parameters
     ----------
     pairs : ndarray of int, shape (M, 2)
         Pairs of tracks that a line connects.
+    segments : ndarray of int, shape (K,)
+        Rigid cluster of each track, the largest first, -1 for none.
     about : str
         Sentence about the origin of the lines, for the page.
     """
 
     pairs: NDArray[np.int64]
+    segments: NDArray[np.int64]
     about: str
 
 
@@ -115,6 +122,8 @@ class Contents:
         Cameras, None if they are not known.
     naming : Naming or None
         Result of the naming by which the tracks have their names, None without one.
+    places : tuple of Place or None
+        Places to check, the worst first; None if the identities have no probabilities.
     """
 
     title: str
@@ -128,3 +137,4 @@ class Contents:
     judgement: Judgement | None = None
     rig: Rig | None = None
     naming: Naming | None = None
+    places: tuple[Place, ...] | None = None

@@ -12,7 +12,8 @@ from asterism.reporting.page.lenses import SIDE, camera_header, lens_table
 from asterism.reporting.page.nearest import usual_distance
 from asterism.reporting.page.packing import grid_over, packed, residuals
 from asterism.reporting.page.runs import runs_of
-from asterism.reporting.page.thinning import every_nth, stride_for, thinned
+from asterism.reporting.page.subject import subject_of
+from asterism.reporting.page.thinning import thinned
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,8 +34,6 @@ class Played(NamedTuple):
     ----------
     text : str
         Data in Base64.
-    stride : int
-        Number of frames of the capture per frame of the player.
     resolution : float
         Largest spacing of the grid of positions, metres.
     n_outside : int
@@ -44,21 +43,22 @@ class Played(NamedTuple):
     """
 
     text: str
-    stride: int
     resolution: float
     n_outside: int
     lens_error: float
 
 
-def played(contents: Contents, order: NDArray[np.int64]) -> Played:
-    """Select the frames of the player, and pack its data.
+def played(contents: Contents, order: NDArray[np.int64], shown: NDArray[np.int64]) -> Played:
+    """Pack the data of the player.
 
     Parameters
     ----------
     contents : Contents
         Contents of the page.
     order : ndarray of int, shape (K,)
-        Tracks in the order of the weights of their findings, the largest first.
+        Tracks in the order of severity, the worst first.
+    shown : ndarray of int
+        Frames of the player, increasing.
 
     Returns
     -------
@@ -66,8 +66,7 @@ def played(contents: Contents, order: NDArray[np.int64]) -> Played:
         Packed data.
     """
     full = contents.tracks
-    stride = stride_for(full.detections.n_points)
-    tracks, kept = thinned(full, stride), every_nth(full, stride)
+    tracks, kept = thinned(full, shown)
     d = tracks.detections
     points = np.zeros((d.n_points, 3))
     points[:, : d.n_axes] = d.points
@@ -81,6 +80,7 @@ def played(contents: Contents, order: NDArray[np.int64]) -> Played:
     frame_clutter = np.bincount(d.frame_of[drawn_clutter], minlength=d.n_frames)
     arrays: dict[str, NDArray[Any]] = {
         "times": d.times,
+        "frames": (shown + _first_frame(full)).astype(np.uint32),
         "trouble": order.astype(np.uint32),
         "starts": starts.astype(np.uint32),
         "runTrack": runs.track.astype(np.uint32),
@@ -88,13 +88,15 @@ def played(contents: Contents, order: NDArray[np.int64]) -> Played:
         "runLength": runs.length.astype(np.uint32),
         "clutter": frame_clutter.astype(np.uint32),
         "pairs": contents.connections.pairs.astype(np.uint32),
+        "segments": contents.connections.segments.astype(np.int32),
     }
     begins = np.unique(np.append(starts[:-1], len(labelled)))
     begins = begins[begins < len(rows)]
     level, coded = _coded(cells[rows], begins)
     arrays |= dict(zip("xyz", coded, strict=True))
-    if tracks.confidence is not None:
-        arrays["confidence"] = np.rint(255 * tracks.confidence[rows]).astype(np.uint8)
+    sure = tracks.confidence if tracks.identity_confidence is None else tracks.identity_confidence
+    if sure is not None:
+        arrays["confidence"] = np.rint(255 * sure[rows]).astype(np.uint8)
     if d.filled is not None and d.filled.any():
         arrays["filled"] = d.filled[rows].astype(np.uint8)
     if (judged := contents.judgement) is not None:
@@ -102,23 +104,29 @@ def played(contents: Contents, order: NDArray[np.int64]) -> Played:
         arrays["marker"] = judged.markers[kept][rows].astype(np.int32)
     cameras, tables, lens_error = _cameras(contents)
     arrays |= tables
+    subject = subject_of(tracks)
+    arrays["course"] = subject.course.astype(np.float32).ravel()
     header: dict[str, Any] = {
         "axes": d.n_axes,
         "order": level,
         "grid": [grid.low.tolist(), grid.step.tolist()],
         "box": _box(points[labelled] if len(labelled) else points),
+        "subject": np.round(subject.points, 4).tolist(),
         "up": contents.up,
         "radius": min(_RADIUS, 0.25 * usual_distance(tracks)),
         "names": tracks.display_names,
+        "confidence": "Link confidence"
+        if tracks.identity_confidence is None
+        else "Identity confidence",
         "markers": [] if judged is None else list(judged.names),
-        "frame": [_first_frame(full), stride],
+        "against": "" if judged is None else judged.against,
         "opens": _opening_frame(d),
         "cameras": cameras,
         "lensSide": SIDE,
         "colours": {"cycle": CYCLE, "clutter": CLUTTER, "wrong": WRONG, "missed": MISSED},
     }
     n_outside = int(is_clutter.sum()) - len(drawn_clutter)
-    return Played(packed(header, arrays), stride, float(grid.step.max()), n_outside, lens_error)
+    return Played(packed(header, arrays), float(grid.step.max()), n_outside, lens_error)
 
 
 def _coded(

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections import Counter
 from importlib import resources
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asterism.reporting.page import uncertain
 from asterism.reporting.page.data import Played, played
 from asterism.reporting.page.facts import cards, facts_of, in_words
 from asterism.reporting.page.findings import find_troubles
 from asterism.reporting.page.markup import Markup, element, joined
 from asterism.reporting.page.player import HELP, player
-from asterism.reporting.page.thinning import MOST_POINTS
+from asterism.reporting.page.thinning import MOST_POINTS, frames_to_show, stride_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["MOST_LISTED", "page"]
 
 MOST_LISTED = 60
-"""Length of the list of findings; the page states the total number."""
+"""Length of each list; the page states the total number."""
 _ICON = (
     "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 16 16'%3E"
     "%3Cpath d='M3 12 8 3l5 6z' fill='none' stroke='%230072B2'/%3E%3Cg fill='%230072B2'%3E"
@@ -53,8 +53,8 @@ def page(contents: Contents) -> bytes:
     """
     script, style = _bundled("player.js"), _bundled("player.css")
     findings = find_troubles(contents.tracks, contents.judgement, contents.naming)
-    order = _by_trouble(contents, findings)
-    play = played(contents, order)
+    shown = frames_to_show(contents.tracks, contents.places or ())
+    play = played(contents, _by_trouble(contents, findings), shown)
     head = element(
         "head",
         element("meta", charset="utf-8"),
@@ -71,10 +71,17 @@ def page(contents: Contents) -> bytes:
         element("a", "Skip to the player", href="#player", class_="skip"),
         element(
             "main",
-            _top(contents),
-            player(contents, _list(findings, contents, play.stride)),
+            element(
+                "div",
+                _top(contents),
+                player(
+                    contents, joined(_places(contents, shown), _list(findings, contents, shown))
+                ),
+                class_="screen",
+            ),
             _scores(contents),
-            element("div", _made(contents), _drawn(contents, play), class_="columns"),
+            _made(contents),
+            _drawn(contents, play, shown),
             HELP,
         ),
         # A block of data, which no browser runs.
@@ -104,8 +111,11 @@ def _bundled(name: str) -> str:
 
 
 def _by_trouble(contents: Contents, findings: Sequence[Finding]) -> NDArray[np.int64]:
-    """Sort tracks by the weight of their findings, the largest first, and then by number."""
+    """Sort tracks by expected wrong points, then by the weight of their findings."""
     trouble = np.zeros(contents.tracks.n_tracks)
+    for place in contents.places or ():
+        for decision in place.decisions:
+            trouble[decision.track] += 1e6 * decision.expected_wrong
     for finding in findings:
         if finding.track >= 0:
             trouble[finding.track] += finding.weight
@@ -116,8 +126,11 @@ def _by_trouble(contents: Contents, findings: Sequence[Finding]) -> NDArray[np.i
 def _top(contents: Contents) -> Markup:
     facts = facts_of(contents.tracks)
     numbers = [
-        element("div", element("dt", what), element("dd", number, data_fact=key))
-        for key, number, what in cards(facts)
+        uncertain.tile(contents),
+        *(
+            element("div", element("dt", what), element("dd", number, data_fact=key))
+            for key, number, what in cards(facts)
+        ),
     ]
     if contents.judgement is not None:
         for score in contents.judgement.scores[:2]:
@@ -129,48 +142,68 @@ def _top(contents: Contents) -> Markup:
         element("p", "Asterism", class_="brand"),
         element("h1", element("bdi", contents.title)),
         element("p", in_words(facts, contents.tracks.detections.n_axes), class_="lead"),
-        element("p", contents.made, class_="made") if contents.made else "",
         element("dl", *numbers, class_="cards"),
         element("ul", *warnings, class_="warnings", aria_label="Warnings") if warnings else "",
     )
 
 
-def _list(findings: Sequence[Finding], contents: Contents, stride: int) -> Markup:
-    """Return the findings of the page, each with its reason."""
+def _places(contents: Contents, shown: NDArray[np.int64]) -> Markup:
+    """Return the list of places to check."""
+    if not (contents.tracks.labels >= 0).any():
+        text = "The result has no track."
+    elif contents.places is None:
+        text = "Not known: the tracks have no probabilities of identity."
+    elif not contents.places:
+        text = "None: no identity and no name is uncertain."
+    else:
+        text = "" if len(contents.places) <= MOST_LISTED else f"The worst {MOST_LISTED} are listed."
+    listed = uncertain.entries(contents, shown, MOST_LISTED)
+    return joined(
+        element("h3", "Places to check"),
+        element("p", text, class_="quiet", id="places-count") if text else "",
+        element("ol", *listed, id="places", class_="list") if listed else "",
+    )
+
+
+def _list(findings: Sequence[Finding], contents: Contents, shown: NDArray[np.int64]) -> Markup:
+    """Return the folded list of gaps, jumps, ends and errors, each with its reason."""
     if not findings:
-        sure = contents.tracks.confidence is not None
-        if not (contents.tracks.labels >= 0).any():
-            return element("p", "The result has no track.", class_="quiet", id="findings-count")
-        text = "No findings: no long gap, no improbable step, no track that starts or ends midway"
-        text += ", no label of low confidence." if sure else "."
-        return element("p", text, class_="quiet", id="findings-count")
+        return Markup()
     names, times = contents.tracks.display_names, contents.tracks.detections.times
-    shown = [
+    listed = [
         element(
             "li",
             element(
                 "button",
-                element("span", f.kind, class_="kind"),
-                element("bdi", names[f.track]) if f.track >= 0 else "",
+                element("span", _kind(f, contents), class_="kind"),
+                element("bdi", names[f.track]) if f.track >= 0 and f.count == 1 else "",
                 element("span", f"{times[f.frame]:.2f} s", class_="when"),
                 element("span", f.reason, class_="why"),
                 type="button",
-                data_frame=f.frame // stride,
+                data_frame=min(int(np.searchsorted(shown, f.frame)), len(shown) - 1),
                 data_track=f.track,
                 data_kind=f.kind.replace(" ", "-"),
             ),
         )
         for f in findings[:MOST_LISTED]
     ]
-    kinds = Counter(f.kind for f in findings)
-    parts = ", ".join(f"{kind} {n:,}" for kind, n in kinds.most_common())
-    n = len(findings)
-    count = f"{n:,} places" if n > 1 else "One place"
-    count += f", of which the {len(shown)} most severe are listed" if n > len(shown) else ""
-    return joined(
-        element("p", f"{count}: {parts}.", class_="quiet", id="findings-count"),
-        element("ol", *shown, id="findings"),
+    n, kinds = len(findings), list(dict.fromkeys(_kind(f, contents) for f in findings))
+    text = f"; the worst {len(listed)} are listed" if n > len(listed) else ""
+    return element(
+        "details",
+        element("summary", f"Gaps, jumps, missed markers: {n:,}"),
+        element("p", f"{', '.join(kinds)}{text}.".capitalize(), class_="quiet"),
+        element("ol", *listed, id="findings", class_="list"),
+        class_="others",
     )
+
+
+def _kind(finding: Finding, contents: Contents) -> str:
+    judged = contents.judgement
+    if judged is None or judged.against == "truth":
+        return finding.kind
+    other = {"wrong marker": "differs", "missed": "only in the other result"}
+    return other.get(finding.kind, finding.kind)
 
 
 def _scores(contents: Contents) -> Markup:
@@ -188,11 +221,11 @@ def _scores(contents: Contents) -> Markup:
     ]
     lost = ""
     if judged.n_elsewhere:
-        text = f"{judged.n_elsewhere:,} points of markers are in the truth only. They count as "
-        lost = element("p", text + "missed above and are not drawn.", class_="quiet")
+        text = f"{judged.n_elsewhere:,} points of markers are in the {judged.against} only. They "
+        lost = element("p", text + "count as missed above and are not drawn.", class_="quiet")
     return element(
         "section",
-        element("h2", "Comparison with the truth"),
+        element("h2", f"Comparison with the {judged.against}"),
         element("table", *rows),
         lost,
         class_="judged",
@@ -201,13 +234,17 @@ def _scores(contents: Contents) -> Markup:
 
 def _made(contents: Contents) -> Markup:
     info = [(name, f"{value:,.6g}") for name, value in contents.tracks.info.items()]
-    if not (contents.summary or info):
+    if not (contents.made or contents.summary or info):
         return Markup()
-    parts = [_table(contents.summary)] if contents.summary else []
-    if info:
-        heading = element("summary", "Figures reported by the method")
-        parts.append(element("details", heading, _table(info)))
-    return element("section", element("h2", "Method and model"), *parts)
+    return element(
+        "details",
+        element("summary", "How it was made"),
+        element("p", contents.made, class_="made") if contents.made else "",
+        _table(contents.summary) if contents.summary else "",
+        element("h3", "Figures reported by the method") if info else "",
+        _table(info) if info else "",
+        class_="folded",
+    )
 
 
 def _table(rows: Sequence[tuple[str, str]]) -> Markup:
@@ -215,7 +252,7 @@ def _table(rows: Sequence[tuple[str, str]]) -> Markup:
     return element("table", *lines)
 
 
-def _drawn(contents: Contents, play: Played) -> Markup:
+def _drawn(contents: Contents, play: Played, shown: NDArray[np.int64]) -> Markup:
     d = contents.tracks.detections
     notes = [
         f"Positions are drawn on a grid of {1e3 * play.resolution:.2g} mm; all figures are "
@@ -224,13 +261,15 @@ def _drawn(contents: Contents, play: Played) -> Markup:
     ]
     if d.n_axes == 3:
         notes.append(contents.about_up)
-    if contents.tracks.confidence is None:
-        notes.append("The tracks have no confidence: the timeline shows presence only.")
-    if play.stride > 1:
+    if contents.tracks.identity_confidence is None:
+        sure = "presence" if contents.tracks.confidence is None else "link confidence"
+        notes.append(f"The tracks have no identity confidence: the timeline shows {sure} only.")
+    if len(shown) < d.n_frames:
+        near = " and all about the worst places are" if contents.places else " is"
         notes.append(
-            f"Every {_ordinal(play.stride)} frame is shown ({-(-d.n_frames // play.stride):,} of "
-            f"{d.n_frames:,}), because a page holds {MOST_POINTS:,} points at most. Figures and "
-            "the list of findings are of all frames."
+            f"Every {_ordinal(stride_for(d.n_points))} frame{near} shown ({len(shown):,} of "
+            f"{d.n_frames:,}), because a page holds about {MOST_POINTS:,} points. Figures and "
+            "both lists are of all frames."
         )
     if play.n_outside:
         notes.append(
@@ -244,7 +283,10 @@ def _drawn(contents: Contents, play: Played) -> Markup:
         )
     items = [element("li", text) for text in notes]
     return element(
-        "section", element("h2", "Notes on the drawing"), element("ul", *items, id="notes")
+        "details",
+        element("summary", "Notes on the drawing"),
+        element("ul", *items, id="notes"),
+        class_="folded",
     )
 
 

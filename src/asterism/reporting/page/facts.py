@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from asterism.reporting.page.findings import DOUBTFUL
 from asterism.reporting.page.runs import gaps_of
 
 if TYPE_CHECKING:
@@ -29,8 +28,6 @@ class Facts(NamedTuple):
         Number of gaps within tracks.
     longest_gap : float
         Longest gap, seconds.
-    n_doubtful : int or None
-        Number of labels with a confidence below `DOUBTFUL`; None if labels have no confidence.
     """
 
     n_frames: int
@@ -44,7 +41,6 @@ class Facts(NamedTuple):
     rate: float
     n_gaps: int
     longest_gap: float
-    n_doubtful: int | None
 
 
 def facts_of(tracks: Tracks) -> Facts:
@@ -53,7 +49,6 @@ def facts_of(tracks: Tracks) -> Facts:
     is_labelled = tracks.labels >= 0
     gaps = gaps_of(tracks)
     names = np.array([name is not None for name in tracks.names], dtype=bool)
-    c = tracks.confidence
     return Facts(
         n_frames=d.n_frames,
         n_points=d.n_points,
@@ -66,12 +61,11 @@ def facts_of(tracks: Tracks) -> Facts:
         rate=1 / d.step if d.step else 0.0,
         n_gaps=len(gaps.track),
         longest_gap=float(gaps.seconds.max(initial=0.0)),
-        n_doubtful=None if c is None else int((c[is_labelled] < DOUBTFUL).sum()),
     )
 
 
 def in_words(facts: Facts, n_axes: int) -> str:
-    """Return the counts as one or two sentences."""
+    """Return the counts as a sentence."""
     if not facts.n_frames:
         return "An empty capture: no frame, no point, no track."
     span = _count(facts.n_frames, "frame") + ("" if n_axes == 3 else " of a 2-D capture")
@@ -84,32 +78,19 @@ def in_words(facts: Facts, n_axes: int) -> str:
     named = "" if not facts.n_named else ", all named," if facts.n_named == facts.n_tracks else ""
     if facts.n_named and not named:
         named = f", {facts.n_named:,} of them named,"
-    share = 100 * facts.n_labelled / facts.n_points
-    text = f"{_count(facts.n_tracks, 'track')}{named} over {span}. "
-    text += f"{_percent(share)} of {_count(facts.n_points, 'point')} have a label"
-    if facts.n_clutter:
-        text += f"; {facts.n_clutter:,} are clutter"
-    return text + "."
+    return f"{_count(facts.n_tracks, 'track')}{named} over {span}."
 
 
 def cards(facts: Facts) -> list[tuple[str, str, str]]:
     """Return the figures at the top of the page: key for scripts, number and label."""
     share = _percent(100 * facts.n_labelled / facts.n_points) if facts.n_points else "–"
-    gap = f", the longest {facts.longest_gap:.3g} s" if facts.n_gaps else ""
+    gap = f", longest {facts.longest_gap:.2g} s" if facts.n_gaps else ""
     found = [
         ("tracks", f"{facts.n_tracks:,}", _only("track", facts.n_tracks)),
         ("labelled", share, f"of {_count(facts.n_points, 'point')} labelled"),
-        ("gaps", f"{facts.n_gaps:,}", f"{_only('gap', facts.n_gaps)} within tracks{gap}"),
-        ("clutter", f"{facts.n_clutter:,}", "points without a label (clutter)"),
+        ("gaps", f"{facts.n_gaps:,}", f"{_only('gap', facts.n_gaps)}{gap}"),
+        ("clutter", f"{facts.n_clutter:,}", "points of clutter"),
     ]
-    if facts.n_doubtful is not None:
-        found.append(
-            (
-                "doubtful",
-                f"{facts.n_doubtful:,}",
-                f"labels below {100 * DOUBTFUL:.0f}\xa0% confidence",
-            )
-        )
     if facts.n_filled:
         found.append(("filled", f"{facts.n_filled:,}", "filled points, not measured"))
     return found

@@ -1,8 +1,8 @@
-"""Findings: places at which tracks are most likely wrong, with the reason."""
+"""Findings: gaps, jumps, ends and errors of tracks, one entry a cause."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,35 +20,42 @@ if TYPE_CHECKING:
     from asterism.reporting.page.contents import Judgement
     from asterism.tracking import Naming
 
-__all__ = ["DOUBTFUL", "Finding", "find_troubles"]
+__all__ = ["Finding", "find_troubles"]
 
-DOUBTFUL = 0.9
-"""Confidence below which a label is listed."""
 LONG = 0.1
 """Shortest long gap, seconds."""
 _WEIGHT = {  # what each kind counts beside the others
     "wrong marker": 100.0, "switch": 80.0, "likely swap": 50.0, "changed marker": 30.0,
-    "uncertain name": 20.0, "jump": 10.0, "low confidence": 4.0,
-    "begun midway": 3.0, "ends early": 2.0, "long gap": 1.0, "missed": 1.0,
+    "jump": 10.0, "begun midway": 3.0, "ends early": 2.0, "long gap": 1.0, "missed": 1.0,
+}  # fmt: skip
+TOGETHER = 0.1
+"""Time within which findings of one kind are one entry, seconds; 1.5 frames at lower rates."""
+_TOGETHER = {  # what several tracks do at a time
+    "wrong marker": "tracks change to another marker", "switch": "markers change their track",
+    "likely swap": "pairs of tracks swap", "changed marker": "tracks change their marker",
+    "jump": "tracks jump", "begun midway": "tracks begin", "ends early": "tracks end",
+    "long gap": "tracks continue after a gap", "missed": "markers lose their label",
 }  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """Place at which tracks are probably wrong.
+    """Place at which tracks may be wrong.
 
     Parameters
     ----------
     kind : str
         Kind, such as ``"likely swap"``.
     track : int
-        Track of the finding, -1 for none.
+        Track of the finding, the worst of several, -1 for none.
     frame : int
         Frame, counted from 0.
     weight : float
         Severity, by which findings are sorted.
     reason : str
         Reason in words.
+    count : int
+        Number of findings of this kind at this time that are this entry.
     """
 
     kind: str
@@ -56,12 +63,13 @@ class Finding:
     frame: int
     weight: float
     reason: str
+    count: int = 1
 
 
 def find_troubles(
     tracks: Tracks, judgement: Judgement | None = None, naming: Naming | None = None
 ) -> list[Finding]:
-    """Find the places at which tracks are most likely wrong.
+    """Find gaps, jumps, ends and errors of tracks.
 
     Parameters
     ----------
@@ -70,22 +78,46 @@ def find_troubles(
     judgement : Judgement, optional
         Comparison with the truth, whose errors are added.
     naming : Naming, optional
-        Result of the naming, whose uncertain names and changes of marker are added.
+        Result of the naming, whose changes of marker are added.
 
     Returns
     -------
     list of Finding
-        Findings in the order of their weights, the largest first.
+        Findings in the order of their weights, the largest first. Findings of one kind within
+        `TOGETHER` are one.
     """
-    found = [*_doubts(tracks), *_gaps(tracks), *_ends(tracks), *_steps(tracks)]
+    found = [*_gaps(tracks), *_ends(tracks), *_steps(tracks)]
     if judgement is not None:
         found += [
             _finding(kind, track, frame, size, reason)
             for kind, track, frame, size, reason in errors(tracks, judgement)
         ]
     if naming is not None:
-        found += _names(tracks, naming)
-    return sorted(found, key=lambda f: (-f.weight, f.frame, f.track))
+        found += _changes(tracks, naming)
+    return sorted(_merged(tracks, found), key=lambda f: (-f.weight, f.frame, f.track))
+
+
+def _merged(tracks: Tracks, found: list[Finding]) -> Iterator[Finding]:
+    """Merge the findings of one kind that begin at one time."""
+    times, names = tracks.detections.times, tracks.display_names
+    near = max(TOGETHER, 1.5 * tracks.detections.step)
+    groups: list[list[Finding]] = []
+    for f in sorted(found, key=lambda f: (f.kind, f.frame, f.track)):
+        last = groups[-1] if groups else []
+        if last and last[0].kind == f.kind and times[f.frame] - times[last[0].frame] <= near:
+            last.append(f)
+        else:
+            groups.append([f])
+    for group in groups:
+        worst = max(group, key=lambda f: f.weight)
+        n = len({f.track for f in group}) if worst.track >= 0 else len(group)
+        if n == 1:
+            yield from group
+            continue
+        reason = f"{n} {_TOGETHER[worst.kind]} at {times[group[0].frame]:.2f} s; "
+        reason += f"{names[worst.track]}: {worst.reason}" if worst.track >= 0 else worst.reason
+        weight = sum(f.weight for f in group)
+        yield replace(worst, frame=group[0].frame, weight=weight, reason=reason, count=len(group))
 
 
 def _finding(kind: str, track: Any, frame: Any, size: float, reason: str) -> Finding:
@@ -94,20 +126,8 @@ def _finding(kind: str, track: Any, frame: Any, size: float, reason: str) -> Fin
     )
 
 
-def _names(tracks: Tracks, naming: Naming) -> Iterator[Finding]:
-    order, starts = tracks.by_track
-    frame = tracks.detections.frame_of
+def _changes(tracks: Tracks, naming: Naming) -> Iterator[Finding]:
     number = {name: k for k, name in enumerate(tracks.names) if name is not None}
-    least: dict[str, int] = {}  # the input track whose name is the least certain
-    for i, name in enumerate(naming.markers):
-        if name in number and naming.probabilities[i] < DOUBTFUL:
-            other = least.get(name, i)
-            least[name] = min(other, i, key=lambda j: float(naming.probabilities[j]))
-    for name, i in least.items():
-        p, q = naming.probabilities[i], naming.alternative_probabilities[i]
-        reason = f"probability {p:.0%}; {naming.alternatives[i] or 'no name'} has {q:.0%}"
-        first = frame[order[starts[number[name]]]]
-        yield _finding("uncertain name", number[name], first, 1 - float(p), reason)
     d = tracks.detections
     at = d.first_frame if isinstance(d, Capture) else 0
     for change in naming.changes:
@@ -115,18 +135,6 @@ def _names(tracks: Tracks, naming: Naming) -> Iterator[Finding]:
             reason = f"frames {at + change.first} to {at + change.last}: the track was on "
             reason += f"{change.usual or 'no marker'} and was cut"
             yield _finding("changed marker", number[change.name], change.first, 1.0, reason)
-
-
-def _doubts(tracks: Tracks) -> Iterator[Finding]:
-    if tracks.confidence is None:
-        return
-    c, frame = tracks.confidence, tracks.detections.frame_of
-    for track, group in stretches(tracks, np.flatnonzero((tracks.labels >= 0) & (c < DOUBTFUL))):
-        least = group[np.argmin(c[group])]
-        reason = f"lowest confidence {100 * c[least]:.0f} %" + (
-            f"; {len(group)} points below {100 * DOUBTFUL:.0f} %" if len(group) > 1 else ""
-        )
-        yield _finding("low confidence", track, frame[least], float((1 - c[group]).sum()), reason)
 
 
 def _gaps(tracks: Tracks) -> Iterator[Finding]:

@@ -15,7 +15,7 @@ _KEYS = (
     ("Space", "play, pause"),
     ("← →", "one frame back or forward; ten with Shift"),
     ("Home, End", "first and last frame"),
-    ("N, P", "next and previous finding"),
+    ("N, P", "next and previous place"),
     ("[ ]", "previous and next track, in the order of the timeline"),
     ("F", "follow the selected track"),
     ("Esc", "clear the selection"),
@@ -23,11 +23,12 @@ _KEYS = (
     ("W A S D", "turn the view"),
     ("+ −", "zoom in and out"),
     ("0", "show the whole scene"),
+    ("M", "show the subject and follow it"),
 )
 
 
-def player(contents: Contents, findings: Markup) -> Markup:
-    """Build the player with its timeline and the list of findings."""
+def player(contents: Contents, lists: Markup) -> Markup:
+    """Build the player with its timeline and both lists of places."""
     solid = contents.tracks.detections.n_axes == 3
     does = "turn" if solid else "move"
     hint = f"Drag to {does}, scroll to zoom, click a marker to select it."
@@ -53,7 +54,9 @@ def player(contents: Contents, findings: Markup) -> Markup:
         element(
             "div",
             element("div", stage, _chosen(), _transport(), class_="left"),
-            element("div", _camera(contents), _places(findings), class_="right"),
+            element(
+                "div", _camera(contents), element("div", lists, class_="places"), class_="right"
+            ),
             class_="split",
         ),
         _settings(contents, solid),
@@ -115,27 +118,28 @@ def _camera(contents: Contents) -> Markup:
     )
 
 
-def _places(findings: Markup) -> Markup:
-    return element("div", element("h3", "Look at these first"), findings, class_="places")
-
-
 def _settings(contents: Contents, solid: bool) -> Markup:
     tails = [
         element("option", name, value=value, selected=value == "0.5")
         for name, value in (("none", "0"), ("0.5 s", "0.5"), ("2 s", "2"), ("10 s", "10"))
     ]
+    colours = [element("option", by, value=by) for by in ("track", "segment")]
     up = [element("option", axis, value=axis, selected=axis == contents.up) for axis in "xyz"]
     parts = [
         _check("show-names", "Names", on=False),
         element("label", "Trails ", element("select", *tails, id="trails")),
-        _check("show-lines", "Connections"),
+        element("label", "Colours ", element("select", *colours, id="colours")),
+        _check("show-lines", "Bonds"),
         _check("show-clutter", "Clutter"),
     ]
+    if contents.judgement is not None:
+        parts.append(_check("show-truth", contents.judgement.against.capitalize()))
     if contents.rig is not None:
         parts.append(_check("show-cameras", "Cameras"))
     if solid:
         parts.append(element("label", "Up ", element("select", *up, id="up")))
-    parts.append(element("button", "Whole scene", type="button", id="fit"))
+    parts.append(_check("track-subject", "Follow subject"))
+    parts.append(element("button", "Show all", type="button", id="fit"))
     return element("div", *parts, class_="settings")
 
 
@@ -146,14 +150,17 @@ def _check(name: str, text: str, *, on: bool = True) -> Markup:
 def _timeline(contents: Contents) -> Markup:
     orders = [
         element("option", text, value=value)
-        for value, text in (("trouble", "trouble"), ("first", "first frame"), ("name", "name"))
+        for value, text in (("trouble", "severity"), ("first", "first frame"), ("name", "name"))
     ]
     signs = [("seen", "seen")]
-    if contents.tracks.confidence is not None:
-        signs = [("fading", "confidence, 100 % to 50 %")]
+    if contents.tracks.identity_confidence is not None:
+        signs = [("fading", "identity confidence, 100 % to 50 %")]
+    elif contents.tracks.confidence is not None:
+        signs = [("fading", "link confidence, 100 % to 50 %")]
     if contents.judgement is not None:
-        signs.append(("wrong", "wrong marker"))
-        signs.append(("missed", "missed (in clutter)"))
+        is_truth = contents.judgement.against == "truth"
+        signs.append(("wrong", "wrong marker" if is_truth else "differs from the other result"))
+        signs.append(("missed", "missed (in clutter)" if is_truth else "only in the other result"))
     signs.append(("gap", "gap"))
     legend = [
         joined(element("i", class_=f"sign {name}", aria_hidden="true"), text)

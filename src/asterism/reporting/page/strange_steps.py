@@ -66,7 +66,8 @@ def strange_steps(tracks: Tracks) -> Iterator[StrangeStep]:
     usual = _medians(tracks, off)
     least = LEAST * usual_distance(tracks)
     ratio = off / np.maximum(usual, 1e-5)
-    strange = np.flatnonzero((ratio > USUAL) & (off > least))
+    is_strange = (ratio > USUAL) & (off > least)
+    strange = np.flatnonzero(is_strange)
     strange = strange[np.argsort(-off[strange], kind="stable")][:MOST]
     explained: set[int] = set()
     for i in strange:
@@ -78,7 +79,7 @@ def strange_steps(tracks: Tracks) -> Iterator[StrangeStep]:
             # The predictions of the next two steps include the swap, so they are improbable too.
             explained |= {int(i), j}
             other = int(tracks.labels[j])
-        elif _follows_a_strange_one(tracks, (ratio > USUAL) & (off > least), int(i)):
+        elif _follows_a_strange_one(tracks, is_strange, int(i)):
             continue
         yield StrangeStep(int(i), other, float(off[i]), float(ratio[i]))
 
