@@ -56,6 +56,8 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md
 	$(BIN)/python benchmarks/whole_call.py --markdown docs/tables/whole_call.md
 	$(BIN)/python benchmarks/identity.py --markdown docs/tables/identity.md
+	$(BIN)/python benchmarks/calibration.py --seeds 6 --markdown docs/tables/calibration.md
+	$(BIN)/python benchmarks/identity_methods.py --markdown docs/tables/identity_methods.md
 	$(BIN)/python benchmarks/field.py --markdown docs/tables --figure docs/images/field_growth.svg
 	$(BIN)/python benchmarks/fills.py --markdown docs/tables/fills.md
 	$(BIN)/python benchmarks/names.py --markdown docs/tables/names.md
