@@ -1,7 +1,8 @@
 """Calibration of the confidences of each method, alone and stitched, on simulated people.
 
-The scenes of ``calibration.py`` with seeds that the fit does not use, 10 % missing and 10 % clutter,
-and bursts. A row is marked where the calibration error of links or of identities exceeds 0.02.
+The scenes of ``calibration.py`` with seeds that the fit does not use, 10 % missing and 10 %
+clutter, and bursts. A row is marked where the calibration error of links or of identities exceeds
+0.02.
 
     python benchmarks/identity_methods.py [--seeds N …] [--methods NAME …] [--markdown FILE]
 """
