@@ -86,13 +86,18 @@ class ExchangeSearch {
     std::int32_t track = 0;
     bool arrives = false;  // whether the tail begins in this frame
     Point at{}, velocity{};  // of the head, per frame
-    std::int64_t frame = 0;
+    Point tail{};            // first detection of the tail
+    std::int64_t frame = 0, tail_frame = 0;
+    bool has_head = false, has_tail = false;
     double reach2 = 0;  // largest squared deviation at which another tail is compared
     double x = 0;       // of the head in the frame of the cut
-    double tail_x = 0;  // of the tail
+    double tail_x = 0;  // of the tail in that frame
 
     // Whether the search along x compares this head with the tail of another track.
-    bool reaches(const Open& other) const { return std::abs(other.tail_x - x) <= std::sqrt(reach2); }
+    bool reaches(const Open& other) const {
+      const double reach = std::sqrt(reach2);
+      return other.tail_x >= x - reach && other.tail_x <= x + reach;
+    }
   };
 
   void compare(std::int64_t t, std::span<const std::int32_t> open, std::vector<Exchange>& found) {
@@ -102,8 +107,16 @@ class ExchangeSearch {
     late_.clear();
     for (const std::int32_t k : open) {
       const Track& own = tracks_[k];
-      Open& o = open_.emplace_back(Open{k, own.has_tail() && own.frames[own.next] == t});
-      if (own.has_head()) {
+      Open& o = open_.emplace_back();
+      o.track = k;
+      o.has_head = own.has_head();
+      o.has_tail = own.has_tail();
+      if (o.has_tail) {
+        o.tail = own.points[own.next];
+        o.tail_frame = own.frames[own.next];
+        o.arrives = o.tail_frame == t;
+      }
+      if (o.has_head) {
         o.at = own.points[own.next - 1];
         o.frame = own.frames[own.next - 1];
         if (own.next > 1) {
@@ -111,23 +124,23 @@ class ExchangeSearch {
           for (int d = 0; d < m_.axis.D; ++d)
             o.velocity[d] = (o.at[d] - own.points[own.next - 2][d]) / n;
         }
-        o.reach2 = std::max(kFar * typical, own.has_tail() ? kTimes * deviation(o, own) : 0);
+        o.reach2 = std::max(kFar * typical, o.has_tail ? kTimes * deviation(o, o) : 0);
         o.x = o.at[0] + static_cast<double>(t - o.frame) * o.velocity[0];
       }
       const auto i = static_cast<std::int32_t>(open_.size()) - 1;
-      if (own.has_tail() && (o.arrives || own.has_head()))
-        by_x_.emplace_back(o.tail_x = place_along_x(o, own, t), i);
-      else if (own.has_tail())
+      if (o.has_tail && (o.arrives || o.has_head))
+        by_x_.emplace_back(o.tail_x = place_along_x(o, t), i);
+      else if (o.has_tail)
         late_.push_back(i);
     }
     std::ranges::sort(by_x_);
     for (std::int32_t i = 0; i < static_cast<std::int32_t>(open_.size()); ++i) {
       const Open& one = open_[i];
-      if (!tracks_[one.track].has_head()) continue;
+      if (!one.has_head) continue;
       const double reach = std::sqrt(one.reach2);
       for (auto at = std::ranges::lower_bound(by_x_, std::pair(one.x - reach, std::int32_t{0}));
            at != by_x_.end() && at->first <= one.x + reach; ++at)
-        if (at->second != i && one.reaches(open_[at->second])) compare(t, i, at->second, found);
+        if (at->second != i) compare(t, i, at->second, found);
       for (const std::int32_t j : late_)
         if (j != i) compare(t, i, j, found);
     }
@@ -135,18 +148,21 @@ class ExchangeSearch {
   // Compares two tracks, of which the first has a head and the second has a tail.
   void compare(std::int64_t t, std::int32_t i, std::int32_t j, std::vector<Exchange>& found) {
     const Open &one = open_[i], &other = open_[j];
-    Track &a = tracks_[one.track], &b = tracks_[other.track];
-    const bool is_mutual = a.has_tail() && b.has_head();
+    const bool is_mutual = one.has_tail && other.has_head;
+    const double reach2 = one.reach2 + (is_mutual ? other.reach2 : 0);
+    double exchanged = deviation(one, other);
+    if (exchanged > reach2) return;  // most pairs
     if (is_mutual && j < i && other.reaches(one)) return;  // compared already
-    if (!a.has_tail() && !b.has_head()) return;  // no link is cut
+    if (!one.has_tail && !other.has_head) return;  // no link is cut
     // A link is cut where its later detection is, or where another track begins.
-    if (!other.arrives && !(one.arrives && (is_mutual || a.has_tail()))) return;
-    const double exchanged = deviation(one, b) + (is_mutual ? deviation(other, a) : 0);
-    if (exchanged > (is_mutual ? one.reach2 + other.reach2 : one.reach2)) return;
+    if (!other.arrives && !(one.arrives && one.has_tail)) return;
+    if (is_mutual) exchanged += deviation(other, one);
+    if (exchanged > reach2) return;
+    Track &a = tracks_[one.track], &b = tracks_[other.track];
     double gain = tail(a, b);
     if (is_mutual) gain += tail(b, a);
-    if (a.has_tail()) gain -= tail(a, a);
-    if (b.has_head()) gain -= tail(b, b);
+    if (one.has_tail) gain -= tail(a, a);
+    if (other.has_head) gain -= tail(b, b);
     if (gain >= kMinGain)
       found.push_back({t, std::min(one.track, other.track), std::max(one.track, other.track), gain,
                        is_mutual});
@@ -156,19 +172,18 @@ class ExchangeSearch {
     return line_.steps[line_.kind[t]].mode[m_.M / 2].Q[0];
   }
   // Where a track with a tail is in frame t, between its last and its next detection.
-  double place_along_x(const Open& o, const Track& own, std::int64_t t) const {
-    const double next = own.points[own.next][0];
-    if (o.arrives) return next;
+  static double place_along_x(const Open& o, std::int64_t t) {
+    if (o.arrives) return o.tail[0];
     const auto before = static_cast<double>(t - o.frame);
-    const auto all = static_cast<double>(own.frames[own.next] - o.frame);
-    return o.at[0] + (next - o.at[0]) * before / all;
+    const auto all = static_cast<double>(o.tail_frame - o.frame);
+    return o.at[0] + (o.tail[0] - o.at[0]) * before / all;
   }
   // Squared distance of the first detection of a tail from the straight motion of a head.
-  double deviation(const Open& head, const Track& other) const {
-    const auto n = static_cast<double>(other.frames[other.next] - head.frame);
+  double deviation(const Open& head, const Open& tail) const {
+    const auto n = static_cast<double>(tail.tail_frame - head.frame);
     double sum = 0;
     for (int d = 0; d < m_.axis.D; ++d) {
-      const double off = other.points[other.next][d] - head.at[d] - n * head.velocity[d];
+      const double off = tail.tail[d] - head.at[d] - n * head.velocity[d];
       sum += off * off;
     }
     return sum;
