@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 __all__ = ["as_line", "by_expected_wrong", "decision_rows", "write_decisions"]
 
+DIGITS = 4
+"""Decimals of probabilities in the table; they are not known any better."""
+
 
 def decision_rows(tracks: Tracks) -> list[dict[str, Any]]:
     """Return the decisions of tracks as rows of plain values.
@@ -49,12 +52,12 @@ def decision_rows(tracks: Tracks) -> list[dict[str, Any]]:
             "start_s": float(d.times[each.first]),
             "end_s": float(d.times[each.last]),
             "detections": each.n_detections,
-            "probability": each.probability,
-            "expected_wrong": each.expected_wrong,
+            "probability": None if each.probability is None else round(each.probability, DIGITS),
+            "expected_wrong": round(each.expected_wrong, DIGITS),
             "alternatives": [
                 {
                     "name": other.name or ("" if other.track is None else names[other.track]),
-                    "probability": other.probability,
+                    "probability": round(other.probability, DIGITS),
                 }
                 for other in each.alternatives
             ],
