@@ -86,45 +86,28 @@ class DistanceProfiles {
 
   PartEvidence compare(const TrackPart& part) {
     PartEvidence found;
-    measure(part);
-    const std::vector<Distance>& profile_of_own = profile(part.track);
-    steady_.clear();
-    for (std::size_t r = 0; r < references_.size(); ++r) {
-      const Distance& own = profile_of_own[r];
-      if (references_[r] != part.track && own.is_known() && distances_[r] >= 0 &&
-          own.spread < kSteady)
-        steady_.push_back({own.spread, r});
-    }
-    if (steady_.size() < kMinNeighbours) return found;
-    const std::size_t n = std::min(steady_.size(), kNeighbours);
-    std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n),
-                      steady_.end());
-    steady_.resize(n);
+    if (!choose_steady(part)) return found;
     found.is_known = true;
-    double own = 0, unknown = 0;
-    for (const auto& [spread, r] : steady_) {
-      const double off = distances_[r] - profile_of_own[r].median;
-      own += log_t(off, spread);
-      unknown += log_t(off, std::hypot(spread, kUnknownSpread));
-    }
-    found.unknown = (unknown - own) / static_cast<double>(n);
+    found.unknown = unknown(part.track);
     for (std::int32_t k = 0; k < static_cast<std::int32_t>(all_.n_tracks); ++k) {
       if (k == part.track) continue;
       const bool is_partner = std::ranges::find(part.partners, k) != part.partners.end();
       if (!is_partner && kMaxPresent * static_cast<double>(n_measured_) < n_present_[k]) continue;
       if (may_be_same(part.track, k)) continue;
-      const std::vector<Distance>& profile_of_other = profile(k);
-      double sum = 0;
-      std::size_t n_common = 0;
-      for (const auto& [spread, r] : steady_) {
-        const Distance& other = profile_of_other[r];
-        if (!other.is_known() || references_[r] == k) continue;
-        ++n_common;
-        sum += log_t(distances_[r] - other.median, other.spread) -
-               log_t(distances_[r] - profile_of_own[r].median, spread);
-      }
-      if (n_common >= kMinNeighbours) offer(found, k, sum / static_cast<double>(n_common));
+      offer(found, k, density(part.track, k));
     }
+    return found;
+  }
+
+  // Log densities of the distances of a part by the profile of each track, relative to its own; 0
+  // where too few distances are known. The last is that of an unknown marker.
+  std::vector<double> densities(const TrackPart& part) {
+    std::vector<double> found(static_cast<std::size_t>(all_.n_tracks) + 1, 0);
+    if (!choose_steady(part)) return found;
+    for (std::int32_t k = 0; k < static_cast<std::int32_t>(all_.n_tracks); ++k)
+      if (const double own = density(part.track, k); k != part.track && std::isfinite(own))
+        found[k] = own;
+    found.back() = unknown(part.track);
     return found;
   }
 
@@ -143,6 +126,51 @@ class DistanceProfiles {
     bool is_known() const { return median >= 0; }
   };
 
+  // Measures the distances of a part, and chooses the steadiest ones of its own track. Returns
+  // whether there are enough.
+  bool choose_steady(const TrackPart& part) {
+    measure(part);
+    const std::vector<Distance>& profile_of_own = profile(part.track);
+    steady_.clear();
+    for (std::size_t r = 0; r < references_.size(); ++r) {
+      const Distance& own = profile_of_own[r];
+      if (references_[r] != part.track && own.is_known() && distances_[r] >= 0 &&
+          own.spread < kSteady)
+        steady_.push_back({own.spread, r});
+    }
+    if (steady_.size() < kMinNeighbours) return false;
+    const std::size_t n = std::min(steady_.size(), kNeighbours);
+    std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n),
+                      steady_.end());
+    steady_.resize(n);
+    return true;
+  }
+  // Log density of the chosen distances for an unknown marker, relative to the own track.
+  double unknown(std::int32_t own) {
+    const std::vector<Distance>& profile_of_own = profile(own);
+    double of_own = 0, of_unknown = 0;
+    for (const auto& [spread, r] : steady_) {
+      const double off = distances_[r] - profile_of_own[r].median;
+      of_own += log_t(off, spread);
+      of_unknown += log_t(off, std::hypot(spread, kUnknownSpread));
+    }
+    return (of_unknown - of_own) / static_cast<double>(steady_.size());
+  }
+  // Log density of the chosen distances by the profile of another track, relative to the own; -inf
+  // without enough of them.
+  double density(std::int32_t own, std::int32_t other) {
+    const std::vector<Distance>&of_own = profile(own), &of_other = profile(other);
+    double sum = 0;
+    std::size_t n_common = 0;
+    for (const auto& [spread, r] : steady_) {
+      if (!of_other[r].is_known() || references_[r] == other) continue;
+      ++n_common;
+      sum += log_t(distances_[r] - of_other[r].median, of_other[r].spread) -
+             log_t(distances_[r] - of_own[r].median, spread);
+    }
+    return n_common >= kMinNeighbours ? sum / static_cast<double>(n_common)
+                                      : -std::numeric_limits<double>::infinity();
+  }
   // Student's t with three degrees of freedom, without its constant.
   static double log_t(double off, double spread) {
     return -2 * std::log1p(off * off / (3 * spread * spread)) - std::log(spread);

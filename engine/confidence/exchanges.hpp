@@ -42,6 +42,17 @@ class ExchangeSearch {
     tracks_.push_back({points, frames, 0, 0, {}});
   }
 
+  // Log-likelihood ratio of an exchange of the first two tracks at a frame; both have a head and a
+  // tail there.
+  double ratio(std::int64_t t) {
+    for (Track& own : tracks_) {
+      const auto at = std::ranges::lower_bound(own.frames, t);
+      own.next = static_cast<std::size_t>(at - own.frames.begin());
+    }
+    Track &a = tracks_[0], &b = tracks_[1];
+    return tail(a, b) + tail(b, a) - tail(a, a) - tail(b, b);
+  }
+
   std::vector<Exchange> find() {
     const auto n_frames = static_cast<std::int64_t>(line_.times.size());
     std::vector<std::vector<std::int32_t>> opens(n_frames);

@@ -46,6 +46,30 @@ nb::tuple exchanges(const MotionModel& m, const In<double>& times, const In<std:
                         array_of<bool>(found, &Exchange::is_mutual));
 }
 
+// Returns the log-likelihood ratios of the exchanges of two tracks at some frames.
+Out<double> exchange_ratios(const MotionModel& m, const In<double>& times,
+                            const In<std::int32_t>& kind, const In<double>& F, const In<double>& Q,
+                            const In<double>& points, const In<std::int64_t>& frames,
+                            const In<std::int64_t>& offsets, const In<std::int64_t>& cuts,
+                            double p_detection) {
+  require(p_detection >= 0 && p_detection < 1, "p_detection: from 0 to below 1");
+  require_finite(points);
+  const Timeline line = timeline(m, times, kind, F, Q);
+  const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
+  require(tracks.n_tracks() == 2, "offsets: of two tracks");
+  ExchangeSearch search(m, line, p_detection);
+  for (std::size_t k = 0; k < 2; ++k) search.add(tracks.points_of(k), tracks.frames_of(k));
+  std::vector<double> found;
+  for (const std::int64_t t : flat(cuts)) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      const auto own = tracks.frames_of(k);
+      require(!own.empty() && own.front() < t && own.back() >= t, "cuts: inside both tracks");
+    }
+    found.push_back(search.ratio(t));
+  }
+  return array_of<double>(found);
+}
+
 // Profiles with the arrays from which they are learnt.
 class Profiles {
  public:
@@ -93,22 +117,13 @@ class Profiles {
   nb::tuple compare(const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
                     const In<std::int64_t>& offsets, const In<std::int64_t>& partners) {
     const std::size_t n_parts = tracks.size();
-    require(offsets.size() == n_parts + 1 && partners.size() == 2 * n_parts,
-            "tracks, offsets and partners: of each part");
-    require_offsets(flat(offsets), frames.size(), "offsets: rising, within the frames");
-    for (const std::int64_t t : flat(frames)) require_frame(t);
+    require(partners.size() == 2 * n_parts, "partners: two of each part");
     std::vector<PartEvidence> found;
-    for (std::size_t p = 0; p < n_parts; ++p) {
-      const std::int64_t k = tracks.data()[p], first = offsets.data()[p];
-      require_track(k);
-      const auto own = flat(frames).subspan(first, offsets.data()[p + 1] - first);
-      for (const std::int64_t t : own)
-        require(std::find(labels_.begin() + offsets_[t], labels_.begin() + offsets_[t + 1], k) !=
-                    labels_.begin() + offsets_[t + 1],
-                "frames: with a detection of the track");
-      found.push_back(profiles_->compare({static_cast<std::int32_t>(k), own,
-                                          {static_cast<std::int32_t>(partners.data()[2 * p]),
-                                           static_cast<std::int32_t>(partners.data()[2 * p + 1])}}));
+    for (TrackPart& part : parts_of(tracks, frames, offsets)) {
+      const std::size_t p = found.size();
+      part.partners = {static_cast<std::int32_t>(partners.data()[2 * p]),
+                       static_cast<std::int32_t>(partners.data()[2 * p + 1])};
+      found.push_back(profiles_->compare(part));
     }
     constexpr std::size_t n_most = PartEvidence::kMost;
     Owned<std::int64_t> others(n_parts * n_most);
@@ -122,7 +137,37 @@ class Profiles {
                           others.give({n_parts, n_most}), densities.give({n_parts, n_most}));
   }
 
+  // For parts of tracks, as for `compare`: log densities of each track, and of an unknown marker,
+  // relative to the own track (P, K + 1).
+  Out<double> densities(const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
+                        const In<std::int64_t>& offsets) {
+    const std::size_t n = static_cast<std::size_t>(n_tracks_) + 1;
+    Owned<double> found(tracks.size() * n);
+    double* to = found.data.get();
+    for (const TrackPart& part : parts_of(tracks, frames, offsets))
+      to = std::ranges::copy(profiles_->densities(part), to).out;
+    return found.give({tracks.size(), n});
+  }
+
  private:
+  std::vector<TrackPart> parts_of(const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
+                                  const In<std::int64_t>& offsets) const {
+    require(offsets.size() == tracks.size() + 1, "tracks and offsets: of each part");
+    require_offsets(flat(offsets), frames.size(), "offsets: rising, within the frames");
+    for (const std::int64_t t : flat(frames)) require_frame(t);
+    std::vector<TrackPart> parts;
+    for (std::size_t p = 0; p < tracks.size(); ++p) {
+      const std::int64_t k = tracks.data()[p], first = offsets.data()[p];
+      require_track(k);
+      const auto own = flat(frames).subspan(first, offsets.data()[p + 1] - first);
+      for (const std::int64_t t : own)
+        require(std::find(labels_.begin() + offsets_[t], labels_.begin() + offsets_[t + 1], k) !=
+                    labels_.begin() + offsets_[t + 1],
+                "frames: with a detection of the track");
+      parts.push_back({static_cast<std::int32_t>(k), own});
+    }
+    return parts;
+  }
   void require_track(std::int64_t k) const { require(k >= 0 && k < n_tracks_, "tracks: below K"); }
   void require_frame(std::int64_t t) const {
     require(t >= 0 && t + 1 < static_cast<std::int64_t>(offsets_.size()), "frames: below T");
@@ -139,10 +184,13 @@ class Profiles {
 void bind_confidence(nb::module_& module) {
   module.def("exchanges", &exchanges, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "points"_a,
              "frames"_a, "offsets"_a, nb::kw_only(), "p_detection"_a);
+  module.def("exchange_ratios", &exchange_ratios, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a,
+             "points"_a, "frames"_a, "offsets"_a, "cuts"_a, nb::kw_only(), "p_detection"_a);
   nb::class_<Profiles>(module, "DistanceProfiles")
       .def(nb::init<const In<double>&, const In<std::int64_t>&, const In<std::int64_t>&,
                     const In<std::int64_t>&, std::int64_t, double>(),
            "points"_a, "labels"_a, "offsets"_a, "samples"_a, nb::kw_only(), "n_tracks"_a, "noise"_a)
       .def("agreements", &Profiles::agreements, "pairs"_a)
-      .def("compare", &Profiles::compare, "tracks"_a, "frames"_a, "offsets"_a, "partners"_a);
+      .def("compare", &Profiles::compare, "tracks"_a, "frames"_a, "offsets"_a, "partners"_a)
+      .def("densities", &Profiles::densities, "tracks"_a, "frames"_a, "offsets"_a);
 }

@@ -1,5 +1,6 @@
 from . import (
     camera,
+    edit,
     filter,
     io,
     metrics,
@@ -70,6 +71,7 @@ __all__ = [
     "Tracks",
     "__version__",
     "camera",
+    "edit",
     "estimate_model",
     "evaluate",
     "fill_gaps",

@@ -465,6 +465,21 @@ def exchanges(
     p_detection: float,
 ) -> tuple[Ints, Shorts, Shorts, Floats, NDArray[np.bool_]]: ...
 
+# Log-likelihood ratios of the exchanges of two tracks at the frames `cuts`.
+def exchange_ratios(
+    motion: MotionModel,
+    times: Floats,
+    kind: Shorts,
+    F: Floats,
+    Q: Floats,
+    points: Floats,
+    frames: Ints,
+    offsets: Ints,
+    cuts: Ints,
+    *,
+    p_detection: float,
+) -> Floats: ...
+
 # `samples` are the frames from which the distances that each track keeps are learnt.
 class DistanceProfiles:
     def __init__(
@@ -483,6 +498,8 @@ class DistanceProfiles:
     def compare(
         self, tracks: Ints, frames: Ints, offsets: Ints, partners: Ints
     ) -> tuple[NDArray[np.bool_], Floats, Ints, Floats]: ...
+    # Log densities of each track and of an unknown marker, relative to the own track.
+    def densities(self, tracks: Ints, frames: Ints, offsets: Ints) -> Floats: ...
 
 # (predicted position of what was at `then`, its variance beyond `r`, log densities of points)
 def carried(

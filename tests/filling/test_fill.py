@@ -231,7 +231,7 @@ def test_little_or_nothing(frames):
 @pytest.mark.parametrize(
     ("wrong", "text"),
     [
-        ({"longest": 0}, "longest"),
+        ({"longest": -1}, "longest"),
         ({"longest": np.nan}, "longest"),
         ({"model": 3}, "estimate_model"),
     ],

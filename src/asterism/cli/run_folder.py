@@ -45,12 +45,15 @@ class Run:
         Format of the result, a key of `asterism.io.CAPTURE_FORMATS`.
     markers : tuple of Path
         Marker sets by which the tracks are named.
+    edits : tuple of Path
+        Files of the edits that the tracks respect.
     """
 
     recipe: Recipe
     source: Path
     format: str
     markers: tuple[Path, ...] = ()
+    edits: tuple[Path, ...] = ()
 
     def write(self, path: Path) -> None:
         """Write the run as ``run.toml``."""
@@ -58,6 +61,7 @@ class Run:
         values["input"] = {"path": str(self.source.resolve()), **values["input"]}
         values["names"] = {
             "paths": [str(path.resolve()) for path in self.markers],
+            "edit_paths": [str(path.resolve()) for path in self.edits],
             **values["names"],
         }
         write_text(path, write_toml({**values, "output": {"format": self.format}}, None))
@@ -82,16 +86,22 @@ class Run:
             for name, text in (("input.path", source), ("output.format", format)):
                 if not isinstance(text, str):
                     raise ParameterError(name, "a text", repr(text))
-            markers = values["names"].pop("paths", [])
-            if not isinstance(markers, list):
-                raise ParameterError("names.paths", "a list of files", repr(markers))
+            markers, edits = (values["names"].pop(key, []) for key in ("paths", "edit_paths"))
+            for name, paths in (("names.paths", markers), ("names.edit_paths", edits)):
+                if not isinstance(paths, list):
+                    raise ParameterError(name, "a list of files", repr(paths))
             check_fields("output.format", [format], am.io.CAPTURE_FORMATS)
             recipe = Recipe.from_dict(values)
             am.tracking.method_by_name(recipe.method, **recipe.options)
         except ParameterError as error:
             raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
-        paths = tuple(Path(str(path)) for path in cast("list[Any]", markers))
-        return cls(recipe=recipe, source=Path(source), format=format, markers=paths)
+        sets, edited = (
+            tuple(Path(str(path)) for path in cast("list[Any]", paths))
+            for paths in (markers, edits)
+        )
+        return cls(
+            recipe=recipe, source=Path(source), format=format, markers=sets, edits=edited
+        )  # fmt: skip
 
 
 @contextmanager

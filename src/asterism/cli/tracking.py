@@ -131,6 +131,7 @@ def _carry_out(run: Run, capture: am.Capture, out: Path) -> tuple[am.tracking.Tr
             recipe, capture, progress=advance,
             start=capture.tracks if recipe.has_start else None,
             marker_sets=[read_markers(path) for path in run.markers],
+            edits=[edit for path in run.edits for edit in am.io.read_edits(path, capture)],
         )  # fmt: skip
         tracks = result.tracks
     seconds = time.perf_counter() - start

@@ -15,6 +15,7 @@ from asterism.io.captures import (
     read_tracks,
     write,
 )
+from asterism.io.edits import read_edits, write_edits
 from asterism.io.marker_sets import read_marker_set
 from asterism.io.observations import read_observations, write_observations
 
@@ -26,11 +27,13 @@ __all__ = [
     "CaptureInfo",
     "describe",
     "read",
+    "read_edits",
     "read_marker_set",
     "read_observations",
     "read_rig",
     "read_tracks",
     "write",
+    "write_edits",
     "write_observations",
     "write_rig",
 ]

@@ -3,6 +3,7 @@
 from asterism.model.capture import Capture
 from asterism.model.decision import Alternative, Decision
 from asterism.model.detections import Detections
+from asterism.model.edit import Edit
 from asterism.model.gap import Gap
 from asterism.model.interacting_motions import InteractingMotions
 from asterism.model.linear_motion import LinearMotion
@@ -24,6 +25,7 @@ __all__ = [
     "Capture",
     "Decision",
     "Detections",
+    "Edit",
     "Event",
     "ForcePlate",
     "Gap",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism.model.detections import Detections
+    from asterism.model.edit import Edit
 
-__all__ = ["InputHash", "Recipe", "sha256_of", "versions"]
+__all__ = ["InputHash", "Recipe", "hash_of_edits", "sha256_of", "versions"]
 
 NONE = "none"
 """Text for an option that is None, here and on the command line."""
@@ -91,6 +92,8 @@ class Recipe:
     markers : str
         SHA-256 of the marker sets by which the tracks are named, or of the own names of the
         capture; either is then needed to repeat the recipe. Empty if no track is named.
+    edits : str
+        SHA-256 of the edits, which are then needed to repeat the recipe. Empty without edits.
     fill : bool
         Whether gaps are filled.
     input_hash : InputHash
@@ -119,6 +122,7 @@ class Recipe:
     has_start: bool
     reason: str
     markers: str
+    edits: str
     fill: bool
     input_hash: InputHash
     versions: dict[str, str]
@@ -157,7 +161,7 @@ class Recipe:
                 # TOML has no null value.
                 "options": _replaced(self.options, None, NONE),
             },
-            "names": {"markers": self.markers, "fill": self.fill},
+            "names": {"markers": self.markers, "edits": self.edits, "fill": self.fill},
             "model": self.model.to_dict(),
             "versions": self.versions,
         }
@@ -186,7 +190,7 @@ class Recipe:
         sections = ("input", "method", "names", "model", "versions")
         check_fields("recipe", map(str, values), sections)
         method, names = _table(values, "method"), _table(values, "names")
-        check_fields("names", map(str, names), ("markers", "fill"))
+        check_fields("names", map(str, names), ("markers", "edits", "fill"))
         keys = ("name", "seed", "start", "stitch", "reason", "options")
         check_fields("method", map(str, method), keys)
         if (seed := method.get("seed")) is not None:
@@ -200,6 +204,7 @@ class Recipe:
             has_start=_value(method, "method.start", bool),
             reason=_value({"reason": "", **method}, "method.reason", str),
             markers=_value(names, "names.markers", str),
+            edits=_value({"edits": "", **names}, "names.edits", str),
             fill=_value(names, "names.fill", bool),
             input_hash=InputHash(_value(_table(values, "input"), "input.sha256", str)),
             versions={str(k): str(v) for k, v in _table(values, "versions").items()},
@@ -223,6 +228,19 @@ def sha256_of(detections: Detections, start: NDArray[np.int64] | None = None) ->
         if array is not None:
             digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()
+
+
+def hash_of_edits(edits: Sequence[Edit]) -> str:
+    """Return the SHA-256 of what edits state, in hexadecimal; empty for none.
+
+    Examples
+    --------
+    >>> from asterism.model import Edit
+    >>> hash_of_edits([]), len(hash_of_edits([Edit(kind="clutter", at=((3, 0),))]))
+    ('', 64)
+    """
+    lines = "".join(f"{each.kind} {each.at} {each.name}\n" for each in edits)
+    return hashlib.sha256(lines.encode()).hexdigest() if lines else ""
 
 
 def versions() -> dict[str, str]:

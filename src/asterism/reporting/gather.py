@@ -101,7 +101,7 @@ def report(
     if isinstance(d, Capture) and not overwrite_input and path.resolve() == d.path.resolve():
         raise ParameterError("path", "another file than the one that was read", str(path))
     if naming is not None and all(each.kind != "name" for each in tracks.decisions):
-        tracks = replace(tracks, decisions=(*tracks.decisions, *of_naming(naming)))
+        tracks = replace(tracks, decisions=(*tracks.decisions, *of_naming(naming, tracks)))
     axis, about_up = _up(tracks, rig, up)
     if title is None:
         title = d.path.name if isinstance(d, Capture) else ""

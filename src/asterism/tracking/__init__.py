@@ -2,6 +2,7 @@
 
 from asterism.tracking.choose import AUTO, Choice, choose_method
 from asterism.tracking.confidence import assess
+from asterism.tracking.correction import Change, Correction, Stretch, correct, settled
 from asterism.tracking.estimation import ModelEstimate, estimate_model
 from asterism.tracking.filling import FilledGap, Filling, fill_gaps
 from asterism.tracking.methods import (
@@ -27,7 +28,14 @@ from asterism.tracking.naming import (
     merge_marker_sets,
     name_tracks,
 )
-from asterism.tracking.pipeline import Tracked, carry_out, track
+from asterism.tracking.pipeline import (
+    Tracked,
+    Uncorrected,
+    carry_out,
+    conclude,
+    track,
+    without_edits,
+)
 from asterism.tracking.plan import Plan, plan_tracking
 from asterism.tracking.rigidity import Bonds, learn_bonds
 from asterism.tracking.stitching import (
@@ -44,7 +52,9 @@ __all__ = [
     "METHODS",
     "Bonds",
     "ChainOptions",
+    "Change",
     "Choice",
+    "Correction",
     "FilledGap",
     "Filling",
     "Gate",
@@ -64,12 +74,16 @@ __all__ = [
     "Stitched",
     "StitchedState",
     "Stitching",
+    "Stretch",
     "Tracked",
+    "Uncorrected",
     "Update",
     "assess",
     "carry_out",
     "check_names",
     "choose_method",
+    "conclude",
+    "correct",
     "estimate_model",
     "fill_gaps",
     "learn_bonds",
@@ -78,7 +92,9 @@ __all__ = [
     "method_by_name",
     "name_tracks",
     "plan_tracking",
+    "settled",
     "stitch",
     "track",
     "tracklet_model",
+    "without_edits",
 ]

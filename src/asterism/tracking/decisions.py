@@ -33,6 +33,8 @@ def of_stitching(stitching: Stitching, tracks: Tracks) -> tuple[Decision, ...]:
     first, last, count = stitching.extents
     for tracklet in np.flatnonzero((stitching.after >= 0) & (stitching.markers >= 0)):
         before = stitching.after[tracklet]
+        if tracks.labels[last[before]] != tracks.labels[first[tracklet]]:
+            continue  # naming or an edit parted them
         found.append(
             Decision(
                 kind="join",
@@ -49,6 +51,7 @@ def of_stitching(stitching: Stitching, tracks: Tracks) -> tuple[Decision, ...]:
             last=int(frame[after]), n_detections=0,
         )
         for before, after in stitching.cuts
+        if tracks.labels[before] != tracks.labels[after]
     ]  # fmt: skip
     found += [
         Decision(
@@ -56,19 +59,21 @@ def of_stitching(stitching: Stitching, tracks: Tracks) -> tuple[Decision, ...]:
             n_detections=int(count[ghost]), probability=float(stitching.probabilities[ghost]),
         )
         for ghost in stitching.ghosts
+        if tracks.labels[first[ghost]] < 0
     ]  # fmt: skip
     return tuple(found)
 
 
-def of_naming(naming: Naming) -> tuple[Decision, ...]:
+def of_naming(naming: Naming, tracks: Tracks) -> tuple[Decision, ...]:
     """Return the names of tracks, each with its best alternative.
 
     Parameters
     ----------
     naming : Naming
-        Result of `name_tracks`, whose tracks the decisions are about.
+        Result of `name_tracks`.
+    tracks : Tracks
+        Its tracks, corrected or not, which the decisions are about.
     """
-    tracks = naming.tracks
     order, offsets = tracks.by_track
     frame = tracks.detections.frame_of
     found: list[Decision] = []
@@ -80,6 +85,8 @@ def of_naming(naming: Naming) -> tuple[Decision, ...]:
             continue
         k = tracks.names.index(marker)
         own = frame[order[offsets[k] : offsets[k + 1]]]
+        if not len(own):
+            continue  # an edit gave its detections to other tracks
         track = tracks.names.index(other) if other in tracks.names else None
         alternative = Alternative(track=track, probability=float(of_other), name=other or "")
         found.append(

@@ -1,4 +1,4 @@
-"""Tracking pipeline: model, method, association, stitching, names, confidence, gaps."""
+"""Tracking pipeline: model, method, association, stitching, names, edits, confidence, gaps."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from asterism.checks import check_kind
 from asterism.errors import ParameterError
-from asterism.model import Detections, MarkerSet, Recipe, TrackingModel, Tracks
-from asterism.model.recipe import sha256_of, versions
+from asterism.model import Detections, Edit, MarkerSet, Recipe, TrackingModel, Tracks
+from asterism.model.recipe import hash_of_edits, sha256_of, versions
 from asterism.records import record
 from asterism.tracking.confidence import assess
+from asterism.tracking.correction import correct, settled
 from asterism.tracking.decisions import of_filling, of_naming, of_stitching
-from asterism.tracking.filling import fill_gaps
+from asterism.tracking.filling import LONGEST, fill_gaps
 from asterism.tracking.methods import METHODS, method_by_name
 from asterism.tracking.methods.associate import associate
 from asterism.tracking.naming import name_tracks
@@ -27,8 +28,9 @@ if TYPE_CHECKING:
     from asterism.tracking.filling import Filling
     from asterism.tracking.methods import Method
     from asterism.tracking.naming import Naming
+    from asterism.tracking.stitching import Stitching
 
-__all__ = ["Tracked", "carry_out", "track"]
+__all__ = ["Tracked", "Uncorrected", "carry_out", "conclude", "track", "without_edits"]
 
 log = logging.getLogger(__name__)
 
@@ -71,6 +73,7 @@ def track(
     seed: int | None = None,
     start: Tracks | None = None,
     marker_set: MarkerSet | Sequence[MarkerSet] | None = None,
+    edits: Sequence[Edit] = (),
     fill: bool = False,
     recipe: Recipe | None = None,
     progress: Callable[[int], Any] | None = None,
@@ -98,11 +101,14 @@ def track(
     marker_set : MarkerSet or sequence of MarkerSet, optional
         Marker set of the subject, or of each subject, by which `name_tracks` names the tracks. By
         default they are named by the names that a `Capture` has itself, if any; ``()`` gives none.
+    edits : sequence of Edit
+        Statements of a person about detections, as of `asterism.io.read_edits`. The tracks are
+        the most probable ones that respect them (`asterism.tracking.correct`).
     fill : bool
         Whether `fill_gaps` fills the gaps of the tracks.
     recipe : Recipe, optional
         ``tracks.recipe`` of an earlier call, which is repeated bit for bit. It replaces `method`,
-        `model`, `stitch`, `seed` and `fill`; initial tracks and marker sets are given again.
+        `model`, `stitch`, `seed` and `fill`; initial tracks, marker sets and edits are given again.
     progress : callable, optional
         Called from time to time with the number of finished frames.
 
@@ -139,15 +145,15 @@ def track(
     if recipe is None:
         plan = plan_tracking(
             detections, method, model=model, stitch=stitch, seed=seed, start=start,
-            marker_sets=sets, fill=fill,
+            marker_sets=sets, edits=edits, fill=fill,
         )  # fmt: skip
         recipe, made = plan.recipe, plan.method
     else:
         given = {"method": method, "model": model, "seed": seed, "fill": fill or None}
         given["stitch"] = None if stitch == "auto" else stitch
-        _check_recipe(recipe, given, detections, start, sets)
+        _check_recipe(recipe, given, detections, start, sets, edits)
     return carry_out(
-        recipe, detections, made, start=start, marker_sets=sets, progress=progress
+        recipe, detections, made, start=start, marker_sets=sets, edits=edits, progress=progress
     ).tracks
 
 
@@ -158,9 +164,10 @@ def carry_out(
     *,
     start: Tracks | None = None,
     marker_sets: Sequence[MarkerSet] | None = None,
+    edits: Sequence[Edit] = (),
     progress: Callable[[int], Any] | None = None,
 ) -> Tracked:
-    """Carry out a recipe: associate, stitch, name, assess and fill, and report the last steps.
+    """Carry out a recipe: associate, stitch, name, correct, assess and fill.
 
     Parameters
     ----------
@@ -174,6 +181,8 @@ def carry_out(
         Initial tracks of a recipe that has some.
     marker_sets : sequence of MarkerSet, optional
         Marker sets of a recipe that names tracks; by default the own names of the capture.
+    edits : sequence of Edit
+        Edits of a recipe that has some.
     progress : callable, optional
         Called from time to time with the number of finished frames of the association.
 
@@ -187,6 +196,50 @@ def carry_out(
     >>> d = am.simulate.cube(frames=40, seed=1).detections
     >>> am.tracking.carry_out(am.tracking.plan_tracking(d, "gnn").recipe, d).naming is None
     True
+    """
+    begun = without_edits(
+        recipe, detections, method, start=start, marker_sets=marker_sets, progress=progress
+    )
+    return conclude(recipe, begun, edits)
+
+
+@record(eq=False)
+class Uncorrected:
+    """Tracks of a recipe before any edit, with what the later steps need.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Associated, stitched and named tracks.
+    model : TrackingModel
+        Model with which they were associated.
+    stitching : Stitching, optional
+        Stitching that made them.
+    naming : Naming, optional
+        Names with their probabilities.
+    """
+
+    tracks: Tracks
+    model: TrackingModel
+    stitching: Stitching | None
+    naming: Naming | None
+
+
+def without_edits(
+    recipe: Recipe,
+    detections: Detections,
+    method: Method[Any] | None = None,
+    *,
+    start: Tracks | None = None,
+    marker_sets: Sequence[MarkerSet] | None = None,
+    progress: Callable[[int], Any] | None = None,
+) -> Uncorrected:
+    """Carry out the steps of a recipe that come before edits: associate, stitch and name.
+
+    Parameters
+    ----------
+    recipe, detections, method, start, marker_sets, progress
+        As for `carry_out`.
     """
     _warn_of_versions(recipe)
     made = method_by_name(recipe.method, **recipe.options) if method is None else method
@@ -202,14 +255,34 @@ def carry_out(
         tracks = dataclasses.replace(stitching.tracks, recipe=carried)
     naming = name_tracks(tracks, *(marker_sets or ())) if recipe.markers else None
     tracks = tracks if naming is None else naming.tracks
-    tracks = assess(tracks, model, stitching)
+    return Uncorrected(tracks=tracks, model=model, stitching=stitching, naming=naming)
+
+
+def conclude(recipe: Recipe, begun: Uncorrected, edits: Sequence[Edit] = ()) -> Tracked:
+    """Carry out the other steps of a recipe: correct, assess and fill.
+
+    Parameters
+    ----------
+    recipe : Recipe
+        Settings.
+    begun : Uncorrected
+        Result of the steps before.
+    edits : sequence of Edit
+        Edits, in their order.
+    """
+    model, stitching, naming = begun.model, begun.stitching, begun.naming
+    tracks = correct(begun.tracks, edits, model, stitching) if edits else begun.tracks
+    tracks = settled(assess(tracks, model, stitching), edits)
     decisions = tracks.decisions
     if stitching is not None:
         decisions += of_stitching(stitching, tracks)
     if naming is not None:
-        decisions += of_naming(naming)
-    filling = fill_gaps(tracks, model=recipe.model) if recipe.fill else None
-    if filling is not None:
+        decisions += of_naming(naming, tracks)
+    is_filled = recipe.fill or any(each.kind == "fill" for each in edits)
+    filling = None
+    if is_filled:
+        longest = LONGEST if recipe.fill else 0.0  # only the gaps that edits state
+        filling = fill_gaps(tracks, model=recipe.model, edits=edits, longest=longest)
         tracks = filling.tracks
         decisions += of_filling(filling)
     tracks = dataclasses.replace(tracks, decisions=decisions)
@@ -222,6 +295,7 @@ def _check_recipe(
     detections: Detections,
     start: Tracks | None,
     marker_sets: Sequence[MarkerSet] | None,
+    edits: Sequence[Edit],
 ) -> None:
     """Raise `ParameterError` unless the recipe is the only setting and has the same input."""
     check_kind("recipe", recipe, Recipe, "tracks.recipe")
@@ -235,6 +309,9 @@ def _check_recipe(
     if (found := hash_of_names(detections, marker_sets)) != recipe.markers:
         expected = f"the marker sets of that run, or its own names, SHA-256 {recipe.markers}"
         raise ParameterError("marker_set", expected if recipe.markers else "none", found or "none")
+    if (found := hash_of_edits(edits)) != recipe.edits:
+        expected = f"those of that run, SHA-256 {recipe.edits}" if recipe.edits else "none"
+        raise ParameterError("edits", expected, found or "none")
     found = sha256_of(detections, None if start is None else start.labels)
     if found != recipe.sha256:
         hint = "track the same input, or plan a new run"

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from asterism.checks import check_kind, check_number
 from asterism.errors import ParameterError
-from asterism.model import Capture, Detections, MarkerSet, Recipe, TrackingModel
-from asterism.model.recipe import InputHash, versions
+from asterism.model import Capture, Detections, Edit, MarkerSet, Recipe, TrackingModel
+from asterism.model.recipe import InputHash, hash_of_edits, versions
 from asterism.records import record
 from asterism.tracking.choose import choose_method
 from asterism.tracking.estimation import estimate_model
@@ -60,6 +60,7 @@ def plan_tracking(
     seed: int | None = None,
     start: Tracks | None = None,
     marker_sets: Sequence[MarkerSet] | None = None,
+    edits: Sequence[Edit] = (),
     fill: bool = False,
 ) -> Plan:
     """Decide the model, the method and the stitching of a tracking, without running it.
@@ -81,6 +82,8 @@ def plan_tracking(
     marker_sets : sequence of MarkerSet, optional
         Marker sets by which the tracks are named, as for `track`; by default the own names of a
         `Capture`, if it has any.
+    edits : sequence of Edit
+        Edits that the tracks respect, as for `track`.
     fill : bool
         Whether gaps are filled.
 
@@ -108,6 +111,8 @@ def plan_tracking(
         check_number("seed", seed, above=0, closed=True, integer=True)
     if method is not None:  # checked before the slow estimation of the model
         method = _checked(method)
+    for each in edits:
+        check_kind("edits", each, Edit, "asterism.io.read_edits(path, detections)")
     estimate = None
     if model is None:
         estimate = estimate_model(detections)
@@ -129,6 +134,7 @@ def plan_tracking(
         has_start=start is not None,
         reason=reason,
         markers=hash_of_names(detections, marker_sets),
+        edits=hash_of_edits(edits),
         fill=fill,
         input_hash=InputHash((detections, None if start is None else start.labels)),
         versions=versions(),

@@ -71,6 +71,14 @@ _Markers = Annotated[
         "one for each subject.",
     ),
 ]
+_Edits = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--edits",
+        metavar="FILE",
+        help="Edits that the tracks respect, as `asterism edit` writes them; may be repeated.",
+    ),
+]
 _Fill = Annotated[bool, typer.Option("--fill", help="Fill the gaps of the tracks.")]
 _Run = Annotated[
     Path | None,
@@ -102,6 +110,7 @@ def track(
     start: _Start = False,
     stitch: _Stitch = False,
     markers: _Markers = None,
+    edits: _Edits = None,
     fill: _Fill = False,
     run: _Run = None,
     overwrite: Overwrite = False,
@@ -134,6 +143,8 @@ def track(
 
         asterism track trial.c3d --markers subject.toml --fill
 
+        asterism track trial.c3d --edits trial.edits.toml
+
         asterism track trial.c3d --run runs/first
 
         asterism track --from runs/first/run.toml -o again.c3d
@@ -154,6 +165,7 @@ def track(
         job = _run_of(repeat, source, [k for k, v in settings.items() if v not in (None, [])])
         source, format = job.source, format or job.format
         markers = markers or list(job.markers)
+        edits = edits or list(job.edits)
     if source is None:
         raise ParameterError("IN", "a capture to track", "nothing", "see asterism track --help")
     chosen_format = output_format(out, format, format_of(source).name)
@@ -161,15 +173,18 @@ def track(
         out = default_output(source, chosen_format)
         out = out if run is None else run / out.name
     outputs = _outputs(out, run) | {"--report": report}
-    check_outputs(outputs, [source, model, repeat, *(markers or [])], overwrite=overwrite)
+    check_outputs(
+        outputs, [source, model, repeat, *(markers or []), *(edits or [])], overwrite=overwrite
+    )
     sets = [read_markers(path) for path in markers] if markers else None
     chosen_method = made_method(method, option or [])
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
     given = None if model is None else read_model(model)
     capture = am.read(source)
+    stated = [edit for path in edits or [] for edit in am.io.read_edits(path, capture)]
     if job is not None:
         assert repeat is not None
-        recipe, estimate = _checked(job, capture, sets, repeat), None
+        recipe, estimate = _checked(job, capture, sets, stated, repeat), None
     else:
         if start:
             _check_start(method, capture, source)
@@ -177,7 +192,7 @@ def track(
             plan = am.tracking.plan_tracking(
                 capture, chosen_method, model=given, stitch=True if stitch else "auto",
                 seed=seed or 0, start=capture.tracks if start else None,
-                marker_sets=sets, fill=fill,
+                marker_sets=sets, edits=stated, fill=fill,
             )  # fmt: skip
         recipe, estimate = plan.recipe, plan.estimate
     if run is not None:
@@ -189,7 +204,10 @@ def track(
             print_table(estimate.reasons, ("parameter", "value", "why"), title="Model")
         if recipe.chosen:
             print_table([("method", recipe.chosen)])
-    job = Run(recipe=recipe, source=source, format=chosen_format, markers=tuple(markers or []))
+    job = Run(
+        recipe=recipe, source=source, format=chosen_format, markers=tuple(markers or []),
+        edits=tuple(edits or []),
+    )  # fmt: skip
     result, summary = carry_out(job, capture, out, run)
     if report is not None:
         _write_report(result, report, recipe, estimate, summary)
@@ -267,15 +285,24 @@ def _run_of(path: Path, source: Path | None, settings: list[str]) -> Run:
     return job
 
 
-def _checked(job: Run, capture: am.Capture, sets: list[am.MarkerSet] | None, path: Path) -> Recipe:
-    """Return the recipe of a run, if the capture and the marker sets are its input."""
-    from asterism.model.recipe import sha256_of
+def _checked(
+    job: Run,
+    capture: am.Capture,
+    sets: list[am.MarkerSet] | None,
+    edits: list[am.model.Edit],
+    path: Path,
+) -> Recipe:
+    """Return the recipe of a run, if the capture, the marker sets and the edits are its input."""
+    from asterism.model.recipe import hash_of_edits, sha256_of
     from asterism.tracking.plan import hash_of_names
 
     recipe = job.recipe
     if (found := hash_of_names(capture, sets)) != recipe.markers:
         expected = f"those of {path}, SHA-256 {recipe.markers}" if recipe.markers else "none"
         raise ParameterError("--markers", expected, found or "none")
+    if (found := hash_of_edits(edits)) != recipe.edits:
+        expected = f"those of {path}, SHA-256 {recipe.edits}" if recipe.edits else "none"
+        raise ParameterError("--edits", expected, found or "none")
     found = sha256_of(capture, capture.labels if recipe.has_start else None)
     if found != recipe.sha256:
         raise FormatError(

@@ -26,11 +26,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from asterism.model import Edit
     from asterism.tracking.filling.estimates import Estimates
 
-__all__ = ["ESTIMATORS", "FilledGap", "Filling", "fill_gaps"]
+__all__ = ["ESTIMATORS", "LONGEST", "FilledGap", "Filling", "fill_gaps"]
 
 ESTIMATORS = ("smoother", "body", "pattern")
+LONGEST = 1.0
+"""Default of the longest gap that is filled, seconds."""
 
 
 @record
@@ -137,7 +140,8 @@ def fill_gaps(
     tracks: Tracks,
     *,
     model: TrackingModel | None = None,
-    longest: float = 1.0,
+    longest: float = LONGEST,
+    edits: Sequence[Edit] = (),
     progress: Callable[[int], Any] | None = None,
 ) -> Filling:
     """Fill the gaps of tracks from their own motion, their rigid body and the other markers.
@@ -160,8 +164,10 @@ def fill_gaps(
     model : TrackingModel, optional
         Model whose motion and noise are used. By default it is estimated from the detections.
     longest : float
-        Longest gap that is filled, seconds between the detections before and after it, > 0.
+        Longest gap that is filled, seconds between the detections before and after it, ≥ 0.
         Larger values fill more gaps, with larger standard deviations.
+    edits : sequence of Edit
+        Edits that state of single gaps that they are filled, whatever their length, or left open.
     progress : callable, optional
         Called with the number of finished gaps.
 
@@ -196,22 +202,27 @@ def fill_gaps(
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     if model is not None:
         check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
-    check_number("longest", longest, above=0, below=1e9)
+    check_number("longest", longest, above=0, below=1e9, closed=True)
     tracks = tracks.measured()
     d = tracks.detections
     positions = tracks.positions()
     spans = find_gaps(np.isfinite(positions[..., 0]))
     # Rounded to nanoseconds, because times such as k / 120 differ in their last bits.
     seconds = [round(float(d.times[s.last + 1] - d.times[s.first - 1]), 9) for s in spans]
-    is_short = [value <= longest for value in seconds]
-    if model is None and any(is_short):
+    stated = _stated(tracks, edits)
+    reasons = [
+        "" if is_filled else "left open by an edit" if is_filled is False else
+        f"longer than {longest:g} s" if value > longest else ""
+        for value, is_filled in zip(seconds, map(stated.get, map(_key, spans)), strict=True)
+    ]  # fmt: skip
+    if model is None and not all(reasons):
         model = estimate_model(d).model
     dense = None if model is None else DenseTracks(times=d.times, positions=positions, model=model)
     gaps: list[FilledGap] = []
     fills: list[tuple[Span, Fill]] = []
-    for n, (span, length) in enumerate(zip(spans, seconds, strict=True), start=1):
-        if dense is None or length > longest:
-            gaps.append(_gap(span, length, None, f"longer than {longest:g} s"))
+    for n, (span, length, reason) in enumerate(zip(spans, seconds, reasons, strict=True), start=1):
+        if dense is None or reason:
+            gaps.append(_gap(span, length, None, reason))
         else:
             found = estimate(dense, span)
             fills.append((span, settle(found)))
@@ -219,6 +230,23 @@ def fill_gaps(
         if progress is not None:
             progress(n)
     return Filling(tracks=_with(tracks, fills), gaps=tuple(gaps))
+
+
+def _key(span: Span) -> tuple[int, int, int]:
+    return span.track, span.first, span.last
+
+
+def _stated(tracks: Tracks, edits: Sequence[Edit]) -> dict[tuple[int, int, int], bool]:
+    """Return the gaps of which an edit states that they are filled, or left open."""
+    stated: dict[tuple[int, int, int], bool] = {}
+    for edit in edits:
+        if edit.kind in ("fill", "no_fill"):
+            (first, i), (last, j) = sorted(edit.at)
+            offsets = tracks.detections.offsets
+            track, other = (int(tracks.labels[offsets[t] + n]) for t, n in ((first, i), (last, j)))
+            if track == other:  # otherwise it is a gap no longer
+                stated[track, first + 1, last - 1] = edit.kind == "fill"
+    return stated
 
 
 def _gap(span: Span, seconds: float, made: tuple[Estimates, Fill] | None, reason: str) -> FilledGap:

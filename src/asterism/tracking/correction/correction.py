@@ -1,0 +1,482 @@
+"""Correction of tracks by edits: the most probable tracks that respect what a person states."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.checks import check_kind
+from asterism.errors import ParameterError
+from asterism.model import Edit, TrackingModel, Tracks
+from asterism.records import record
+from asterism.tracking.confidence.calibration import WHOLE
+from asterism.tracking.correction.constraints import Constraints, detections_of
+from asterism.tracking.correction.evidence import Evidence
+from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from asterism.model import Decision
+    from asterism.tracking.stitching import Stitching
+
+__all__ = ["Change", "Correction", "Stretch", "correct", "settled"]
+
+CANDIDATES = 5
+"""Number of other tracks that are considered for a part that leaves its track."""
+
+
+@record
+class Stretch:
+    """Detections that changed from one track to another, in a stretch of time.
+
+    Parameters
+    ----------
+    first, last : int
+        First and last frame.
+    source, target : int
+        Track before and after the change, -1 for clutter.
+    n_detections : int
+        Number of detections.
+    is_asked : bool
+        Whether a detection of the edit is among them; other stretches follow from it.
+    """
+
+    first: int
+    last: int
+    source: int
+    target: int
+    n_detections: int
+    is_asked: bool
+
+
+@record(eq=False)
+class Change:
+    """What an edit changed.
+
+    Parameters
+    ----------
+    edit : Edit
+        The edit.
+    detections : ndarray of int, shape (n,)
+        Detections whose track changed, rising.
+    before, after : ndarray of int, shape (n,)
+        Their tracks before and after the edit, -1 for clutter.
+    stretches : tuple of Stretch
+        The same by stretches of time.
+    names : dict of int to tuple of (str or None)
+        Name before and after of each track whose name changed.
+    """
+
+    edit: Edit
+    detections: NDArray[np.int64]
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
+    stretches: tuple[Stretch, ...]
+    names: dict[int, tuple[str | None, str | None]]
+
+    def __repr__(self) -> str:
+        return f"Change({repr(self.edit)[5:-1]}: {len(self.detections)} detections)"
+
+
+def correct(
+    tracks: Tracks,
+    edits: Sequence[Edit],
+    model: TrackingModel,
+    stitching: Stitching | None = None,
+) -> Tracks:
+    """Change tracks so that they respect the edits of a person.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks of a capture, from any method, stitched and named or not.
+    edits : sequence of Edit
+        Edits, which are solved in their order.
+    model : TrackingModel
+        Model of motion and noise with which they were tracked.
+    stitching : Stitching, optional
+        Stitching that made the tracks.
+
+    Returns
+    -------
+    Tracks
+        Tracks with the same numbers; those that lost all their detections are left out.
+
+    Raises
+    ------
+    ParameterError
+        If edits contradict each other or do not belong to these detections.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> from asterism.model import Edit
+    >>> truth = am.simulate.cube(frames=40, seed=1)
+    >>> model = am.estimate_model(truth.detections).model
+    >>> d = truth.detections
+    >>> ghost = Edit(kind="clutter", at=((0, 0),))
+    >>> am.tracking.correct(truth, [ghost], model)
+    Tracks(7 tracks, 280 detections in them, 40 clutter, 40 frames)
+    """
+    correction = Correction(tracks, model, stitching)
+    for edit in edits:
+        correction.apply(edit)
+    found = correction.tracks
+    return found if found.lengths.all() or not edits else _without_empty(found, tracks.lengths)
+
+
+def settled(tracks: Tracks, edits: Sequence[Edit]) -> Tracks:
+    """Return tracks without the doubts that edits settle.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Corrected tracks with identity confidences and decisions.
+    edits : sequence of Edit
+        Edits that they respect. The identity of a part with one of their detections is certain.
+    """
+    pinned = sorted(Constraints.of(edits, tracks.detections).pinned)
+    if not pinned or tracks.identity_confidence is None:
+        return tracks
+    frames = tracks.detections.frame_of
+    stated: dict[int, list[int]] = {}
+    for i in pinned:
+        stated.setdefault(int(tracks.labels[i]), []).append(int(frames[i]))
+    identity = tracks.identity_confidence.copy()
+    kept: list[Decision] = []
+    for each in tracks.decisions:
+        own = stated.get(each.track, [])
+        if each.kind != "identity" or not any(each.first <= t <= each.last for t in own):
+            kept.append(each)
+            continue
+        part = np.flatnonzero(tracks.labels == each.track)
+        part = part[(frames[part] >= each.first) & (frames[part] <= each.last)]
+        identity[part] = WHOLE
+    return replace(tracks, identity_confidence=identity, decisions=tuple(kept))
+
+
+class Correction:
+    """Tracks under correction; each edit changes only what depends on it.
+
+    An edit states that a part of a track is of the marker of another track, or is not of its own.
+    Both tracks are exchanged in an interval around the part. Its ends are chosen so that the log
+    posterior is largest: the distances to other markers of what is exchanged, and the links that
+    are cut, as in the identity confidence (`assess`). Detections of earlier edits stay.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks before any edit.
+    model : TrackingModel
+        Model of motion and noise with which they were tracked.
+    stitching : Stitching, optional
+        Stitching that made the tracks.
+
+    Examples
+    --------
+    >>> import asterism as am
+    >>> from asterism.model import Edit
+    >>> truth = am.simulate.cube(frames=40, seed=1)
+    >>> model = am.estimate_model(truth.detections).model
+    >>> correction = am.tracking.Correction(truth, model)
+    >>> change = correction.apply(Edit(kind="clutter", at=((0, 0),)))
+    >>> change.stretches
+    (Stretch(first=0, last=39, source=0, target=-1, n_detections=40, is_asked=True),)
+    >>> correction.undo().edit == change.edit, correction.undo() is None
+    (True, True)
+    """
+
+    def __init__(
+        self, tracks: Tracks, model: TrackingModel, stitching: Stitching | None = None
+    ) -> None:
+        check_kind("tracks", tracks, Tracks, "am.track(detections)")
+        check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
+        self._tracks, self._d = tracks, tracks.detections
+        self._evidence = Evidence(tracks, model, stitching)
+        self._motion = Motion(self._d, model)
+        self._labels = tracks.labels.copy()
+        self._names = list(tracks.names)
+        self._constraints = Constraints(self._d)
+        self._done: list[tuple[Change, Constraints, int]] = []
+
+    @property
+    def edits(self) -> tuple[Edit, ...]:
+        """Edits that hold now, in their order."""
+        return self._constraints.edits
+
+    @property
+    def constraints(self) -> Constraints:
+        """Constraints of these edits."""
+        return self._constraints
+
+    @property
+    def tracks(self) -> Tracks:
+        """Tracks now, with the numbers from before; emptied tracks have no detection."""
+        if not self._done:
+            return self._tracks
+        return Tracks(
+            detections=self._d, labels=self._labels, names=tuple(self._names),
+            info=self._tracks.info, recipe=self._tracks.recipe,
+        )  # fmt: skip
+
+    def apply(self, edit: Edit) -> Change:
+        """Change the tracks so that they respect one more edit.
+
+        Parameters
+        ----------
+        edit : Edit
+            Next edit.
+
+        Returns
+        -------
+        Change
+            What changed.
+
+        Raises
+        ------
+        ParameterError
+            If it contradicts earlier edits or has no solution; nothing changes then.
+        """
+        check_kind("edit", edit, Edit, 'Edit(kind="same", at=((10, 3), (48, 0)))')
+        constraints = Constraints.of((*self.edits, edit), self._d)
+        labels, names = self._labels.copy(), list(self._names)
+        own = detections_of(edit, self._d)
+        try:
+            if edit.kind == "same":
+                self._join(own)
+            elif edit.kind in ("different", "cut"):
+                self._part(own, is_here=edit.kind == "cut")
+            elif edit.kind == "clutter":
+                self._drop(own[0])
+            elif edit.kind == "name":
+                self._call(own[0], edit.name)
+        except _NoSolution as error:
+            self._labels, self._names = labels, names
+            hint = "undo an edit in the way, or cut the track there first"
+            raise ParameterError(
+                "edits", "a solution that respects the earlier edits",
+                f"none for {repr(edit)[5:-1]}", hint,
+            ) from error  # fmt: skip
+        change = self._change(edit, own, labels, names)
+        self._done.append((change, self._constraints, len(names)))
+        self._constraints = constraints
+        return change
+
+    def undo(self) -> Change | None:
+        """Take back the last edit, and return what it had changed; None without one."""
+        if not self._done:
+            return None
+        change, self._constraints, n = self._done.pop()
+        self._labels[change.detections] = change.before
+        del self._names[n:]
+        for track, (before, _) in change.names.items():
+            if track < n:
+                self._names[track] = before
+        return change
+
+    def _join(self, own: Sequence[int]) -> None:
+        """Bring two detections to one track."""
+        a, b = (int(self._labels[i]) for i in own)
+        if a == b >= 0:
+            return
+        if a < 0 and b < 0:
+            a = self._new_track()
+            self._move(own[0], -1, a)
+        if a < 0 or b < 0:
+            detection, track = (own[0], b) if a < 0 else (own[1], a)
+            self._move(detection, -1, track)
+            return
+        self._carry_out(self._solve(own[1], b, a), self._solve(own[0], a, b))
+
+    def _part(self, own: Sequence[int], is_here: bool) -> None:
+        """Bring two detections of one track to different tracks."""
+        a, b = (int(self._labels[i]) for i in own)
+        if a != b or a < 0:
+            return
+        found: list[_Solution | None] = []
+        later = max(own, key=lambda i: self._d.frame_of[i])
+        cut = int(self._d.frame_of[later]) if is_here else None
+        for detection in own:
+            others = self._evidence.best(detection, self._labels, CANDIDATES)
+            found += [
+                self._solve(detection, a, other, cut)
+                for other in (*others, len(self._names))
+                if self._may_be(detection, other)
+            ]
+        self._carry_out(*found)
+
+    def _drop(self, detection: int) -> None:
+        """Make the part of a detection clutter."""
+        track = int(self._labels[detection])
+        if track < 0:
+            return
+        own = np.flatnonzero(
+            (self._evidence.part_of == self._evidence.part_of[detection]) & (self._labels == track)
+        )
+        pinned = np.isin(own, list(self._constraints.pinned))
+        frame = self._d.frame_of
+        low = frame[own[pinned & (own < detection)]].max(initial=-1)
+        high = frame[own[pinned & (own > detection)]].min(initial=self._d.n_frames)
+        self._labels[own[(frame[own] > low) & (frame[own] < high)]] = -1
+
+    def _call(self, detection: int, name: str) -> None:
+        """Bring a detection to the track of a name."""
+        track = int(self._labels[detection])
+        named = self._names.index(name) if name in self._names else -1
+        if track < 0:
+            track = named if named >= 0 else self._new_track()
+            self._move(detection, -1, track)
+        elif named >= 0 and named != track:
+            self._carry_out(self._solve(detection, track, named))
+        elif named < 0:
+            others = [i for i in self._constraints.pinned if self._labels[i] == track]
+            if any(self._constraints.name(i) not in ("", name) for i in others):
+                target = self._new_track()
+                self._carry_out(self._solve(detection, track, target))
+                track = target
+            self._names[track] = name
+            return
+        if named < 0:
+            self._names[track] = name
+
+    def _may_be(self, detection: int, track: int) -> bool:
+        """Return whether no edit states that a detection is not of the marker of a track."""
+        return not any(
+            self._constraints.are_different(detection, i)
+            for i in self._constraints.pinned
+            if self._labels[i] == track
+        )
+
+    def _new_track(self) -> int:
+        self._names.append(None)
+        return len(self._names) - 1
+
+    def _solve(
+        self, detection: int, source: int, target: int, cut: int | None = None
+    ) -> _Solution | None:
+        """Return the gain and the labels with a detection and its group on another track."""
+        group = self._constraints.group(detection)
+        fixed = np.array(sorted((self._constraints.pinned - group) | self._constraints.clutter))
+        labels, frame = self._labels.copy(), self._d.frame_of
+        gain = 0.0
+        for each in sorted(group, key=lambda i: (i != detection, i)):
+            if labels[each] != source:
+                continue
+            lanes = (
+                self._lane(source, target, labels, fixed),
+                self._lane(target, source, labels, fixed),
+            )
+            found = best_exchange(lanes, int(frame[each]), self._motion, cut)
+            if found is None:
+                return None
+            gain += found.gain
+            for lane, then in zip(lanes, (target, source), strict=True):
+                inside = (lane.frames >= found.first) & (lane.frames < found.end)
+                labels[lane.detections[inside]] = then
+            cut = None
+        return gain, labels
+
+    def _lane(
+        self, track: int, other: int, labels: NDArray[np.int64], fixed: NDArray[np.int64]
+    ) -> Lane:
+        evidence, own = self._evidence, np.flatnonzero(labels == track)
+        parts = evidence.part_of[own]
+        starts = np.ones(len(own), dtype=bool)
+        starts[1:] = parts[1:] != parts[:-1]
+        before = np.ones(len(own))
+        known = starts & (parts >= 0) & (parts < len(evidence.before))
+        before[known] = evidence.before[parts[known]]
+        return Lane(
+            detections=own,
+            frames=self._d.frame_of[own],
+            gains=evidence.gains(own, labels, other),
+            before=before,
+            pinned=np.isin(own, fixed),
+        )
+
+    def _carry_out(self, *solutions: _Solution | None) -> None:
+        """Take the labels with the largest gain."""
+        found = [each for each in solutions if each is not None]
+        if not found:
+            raise _NoSolution
+        self._labels = max(found, key=lambda each: each[0])[1]
+        while len(self._names) <= self._labels.max(initial=-1):
+            self._names.append(None)
+
+    def _move(self, detection: int, source: int, target: int) -> None:
+        """Bring clutter to a track: the tracklet of a ghost, or one detection."""
+        part, frame = self._evidence.part_of, self._d.frame_of
+        own = np.array([detection])
+        if part[detection] >= 0:
+            own = np.flatnonzero((part == part[detection]) & (self._labels == source))
+            own = own[~np.isin(own, list(self._constraints.clutter))]
+        there = np.flatnonzero(self._labels == target)
+        pinned = frame[there[np.isin(there, list(self._constraints.pinned))]]
+        if frame[detection] in pinned:
+            raise _NoSolution
+        # Only where the track has no detection, and at the detection itself.
+        taken = np.isin(frame[own], frame[there]) & (own != detection)
+        own = own[~taken]
+        self._labels[there[frame[there] == frame[detection]]] = -1
+        self._labels[own] = target
+
+    def _change(
+        self, edit: Edit, own: Sequence[int], labels: NDArray[np.int64], names: list[str | None]
+    ) -> Change:
+        changed = np.flatnonzero(self._labels != labels)
+        before, after = labels[changed], self._labels[changed]
+        frame = self._d.frame_of[changed]
+        stretches: list[Stretch] = []
+        for source, target in dict.fromkeys(zip(before.tolist(), after.tolist(), strict=True)):
+            which = np.flatnonzero((before == source) & (after == target))
+            stretches += [
+                Stretch(
+                    first=int(frame[run[0]]), last=int(frame[run[-1]]), source=source,
+                    target=target, n_detections=len(run),
+                    is_asked=bool(np.isin(changed[run], own).any()),
+                )
+                for run in np.split(which, self._breaks(changed[which], source, labels))
+            ]  # fmt: skip
+        stretches.sort(key=lambda each: (not each.is_asked, each.first, each.source))
+        both = [*names, *[None] * (len(self._names) - len(names))]
+        return Change(
+            edit=edit, detections=changed, before=before, after=after, stretches=tuple(stretches),
+            names={
+                k: (old, new)
+                for k, (old, new) in enumerate(zip(both, self._names, strict=True))
+                if old != new
+            },
+        )  # fmt: skip
+
+    def _breaks(
+        self, moved: NDArray[np.int64], source: int, labels: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Return where detections of a track that moved do not follow each other in it."""
+        if source < 0:
+            return np.empty(0, dtype=np.int64)
+        place = np.searchsorted(np.flatnonzero(labels == source), moved)
+        return np.flatnonzero(np.diff(place) > 1) + 1
+
+
+_Solution = tuple[float, "NDArray[np.int64]"]
+
+
+class _NoSolution(Exception):
+    """No exchange respects the earlier edits."""
+
+
+def _without_empty(tracks: Tracks, before: NDArray[np.int64]) -> Tracks:
+    """Leave out the tracks that edits emptied."""
+    old = np.zeros(tracks.n_tracks, dtype=bool)
+    old[: len(before)] = before == 0
+    kept = (tracks.lengths > 0) | old
+    numbers = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
+    return replace(
+        tracks, labels=numbers[tracks.labels],
+        names=tuple(name for name, keep in zip(tracks.names, kept, strict=True) if keep),
+    )  # fmt: skip

@@ -1,0 +1,121 @@
+"""Evidence for a correction: how well the distances of parts of tracks fit other tracks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.model import Tracks
+from asterism.tracking.confidence.calibration import MARGINS, PART
+from asterism.tracking.confidence.identity import examine
+from asterism.tracking.confidence.parts import PART_FRAMES
+from asterism.tracking.rigidity.profiles import learn_profiles
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import TrackingModel
+    from asterism.tracking.stitching import Stitching
+
+__all__ = ["Evidence"]
+
+
+class Evidence:
+    """Parts of the tracks before any edit, and how well each fits the other tracks.
+
+    Parameters
+    ----------
+    tracks : Tracks
+        Tracks before any edit.
+    model : TrackingModel
+        Model of motion and noise with which they were tracked.
+    stitching : Stitching, optional
+        Stitching that made the tracks.
+
+    Attributes
+    ----------
+    part_of : ndarray of int, shape (N,)
+        Part of each detection, -1 for clutter without a tracklet.
+    before : ndarray of shape (P,)
+        Probability of the link that leads to each part.
+    """
+
+    def __init__(
+        self, tracks: Tracks, model: TrackingModel, stitching: Stitching | None = None
+    ) -> None:
+        parts = examine(tracks, model, stitching).parts
+        self._tracks, self._noise = tracks, model.sensor.noise_sigma
+        self.before = parts.before
+        n = len(parts.track)
+        self.part_of = np.full(len(tracks.labels), -1)
+        self.part_of[tracks.by_track[0]] = np.repeat(np.arange(n), parts.n_detections)
+        if stitching is not None:  # ghosts are parts too, which a person can take back
+            is_ghost = (tracks.labels < 0) & (stitching.tracklets >= 0)
+            _, numbers = np.unique(stitching.tracklets[is_ghost], return_inverse=True)
+            self.part_of[is_ghost] = n + numbers
+
+    def gains(
+        self, detections: NDArray[np.int64], labels: NDArray[np.int64], then: int
+    ) -> NDArray[np.float64]:
+        """Return the log odds that each detection of a track gains in another track.
+
+        Those of a part are shared by its detections.
+
+        Parameters
+        ----------
+        detections : ndarray of int, shape (n,)
+            Detections of one track, in time order.
+        labels : ndarray of int, shape (N,)
+            Track of each detection now.
+        then : int
+            Other track; one without detections is an unknown marker.
+        """
+        if not len(detections):
+            return np.empty(0)
+        found, counts = self._densities(detections, labels)
+        is_new = then >= found.shape[1] - 1 or not (labels == then).any()
+        density, factor = (found[:, -1], PART[1]) if is_new else (found[:, then], PART[2])
+        gain = factor * np.clip(density, -MARGINS[1], -MARGINS[0])
+        return np.repeat(gain / counts, counts)
+
+    def best(self, detection: int, labels: NDArray[np.int64], n: int) -> list[int]:
+        """Return the `n` other tracks that the part of a detection fits best.
+
+        Parameters
+        ----------
+        detection : int
+            Detection of a track.
+        labels : ndarray of int, shape (N,)
+            Track of each detection now.
+        n : int
+            Largest number of tracks.
+        """
+        own = np.flatnonzero(
+            (self.part_of == self.part_of[detection]) & (labels == labels[detection])
+        )
+        found = self._densities(own, labels)[0][0, :-1]
+        order = np.argsort(-found, kind="stable")
+        return [int(k) for k in order if k != labels[detection] and found[k] != 0][:n]
+
+    def _densities(
+        self, detections: NDArray[np.int64], labels: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return the log densities of the parts of a track, and the lengths of the parts."""
+        d, parts = self._tracks.detections, self.part_of[detections]
+        starts = np.flatnonzero(np.concatenate([[True], parts[1:] != parts[:-1]]))
+        lengths = np.diff(np.append(starts, len(parts)))
+        counts = np.minimum(lengths, PART_FRAMES)
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        rank = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
+        spacing = (lengths - 1) / np.maximum(counts - 1, 1)
+        chosen = np.repeat(starts, counts) + (rank * np.repeat(spacing, counts)).astype(np.int64)
+        frames = d.frame_of[detections[chosen]].astype(np.int64)
+        tracks = Tracks(detections=d, labels=labels)
+        profiles = learn_profiles(tracks, self._noise, frames)
+        found = profiles.engine.densities(
+            np.full(len(starts), labels[detections[0]]),
+            np.searchsorted(profiles.frames, frames).astype(np.int64),
+            offsets,
+        )
+        return found, lengths

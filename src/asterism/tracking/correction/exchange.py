@@ -1,0 +1,248 @@
+"""Exchange of two tracks in an interval of time: the most probable one around a detection.
+
+Legend: lane 0 and 1 are the two tracks, with detections in time order. A cut at frame t parts each
+lane into a head, before t, and a tail, from t on. An exchange from s to e cuts at s and at e.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism import _engine
+from asterism.model.compiled import motion_model, steps_of
+from asterism.records import record
+from asterism.tracking.confidence.calibration import EXCHANGE, RATIOS, log_odds
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asterism.model import Detections, TrackingModel
+
+__all__ = ["Exchange", "Lane", "Motion", "best_exchange"]
+
+FARTHEST = 12.0
+"""Largest deviation of a link from straight motion that is counted, in log-likelihood units."""
+NEVER = np.iinfo(np.int64).max
+"""Frame after all others."""
+WINDOW = 64
+"""Number of frames around a cut in which the filter looks for detections."""
+BEGIN = -6.0
+"""Log likelihood of a detection that no short link leads to."""
+MIN_RATIO = -4.0
+"""Log-likelihood ratio below which the log odds of an exchange fall as the ratio does; exchanges
+of smaller ratios are not among those on which `EXCHANGE` was fitted."""
+
+
+@record(eq=False)
+class Lane:
+    """One of two tracks that may be exchanged.
+
+    Parameters
+    ----------
+    detections : ndarray of int, shape (n,)
+        Detections in time order.
+    frames : ndarray of int, shape (n,)
+        Their frames.
+    gains : ndarray of shape (n,)
+        Log odds that each gains in the other lane.
+    before : ndarray of shape (n,)
+        Probability of the link that leads to each.
+    pinned : ndarray of bool, shape (n,)
+        Whether each must stay.
+    """
+
+    detections: NDArray[np.int64]
+    frames: NDArray[np.int64]
+    gains: NDArray[np.float64]
+    before: NDArray[np.float64]
+    pinned: NDArray[np.bool_]
+
+
+@record
+class Exchange:
+    """Exchange of two lanes in the frames from `first` up to but without `end`.
+
+    Parameters
+    ----------
+    first, end : int
+        First frame, and the frame after the last.
+    gain : float
+        Change of the log posterior.
+    """
+
+    first: int
+    end: int
+    gain: float
+
+
+class Motion:
+    """Log likelihoods of links by straight motion.
+
+    Parameters
+    ----------
+    detections : Detections
+        Detections of the capture.
+    model : TrackingModel
+        Model of motion and noise.
+    """
+
+    def __init__(self, detections: Detections, model: TrackingModel) -> None:
+        self._d, self._frame = detections, detections.frame_of
+        self._steps = kind, _, Q = steps_of(model.motion, detections.times)
+        usual = np.bincount(kind[1:]).argmax() if len(kind) > 1 else 0
+        self._q = float(Q[usual, Q.shape[1] // 2, 0, 0])
+        self._r = 6 * model.sensor.noise_sigma**2
+        self._max_gap = model.population.max_gap + 1
+        self._model = model
+
+    def ratios(self, lanes: tuple[Lane, Lane], cuts: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the log-likelihood ratios of exchanges of both tails, by the filter of the model.
+
+        Parameters
+        ----------
+        lanes : tuple of two Lane
+            Tracks with detections before and after each cut.
+        cuts : ndarray of int
+            First frames of the tails, rising.
+        """
+        if not len(cuts):
+            return np.empty(0)
+        low = max(int(cuts[0]) - WINDOW, 0)
+        high = min(int(cuts[-1]) + WINDOW, len(self._d.times))
+        kind, F, Q = self._steps
+        rows = [
+            lane.detections[slice(*np.searchsorted(lane.frames, [low, high]))] for lane in lanes
+        ]
+        own = np.concatenate(rows)
+        return _engine.exchange_ratios(
+            motion_model(self._model, self._d.n_axes), self._d.times[low:high], kind[low:high], F,
+            Q, np.ascontiguousarray(self._d.points[own]), self._frame[own].astype(np.int64) - low,
+            np.cumsum([0, *map(len, rows)]).astype(np.int64), cuts - low,
+            p_detection=min(self._model.sensor.p_detection, 0.999),
+        )  # fmt: skip
+
+    def is_short(self, head: NDArray[np.int64], tail: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return whether a link is short enough for the motion to predict it.
+
+        Parameters
+        ----------
+        head, tail : ndarray of int, shape (n,)
+            Detections before and after, -1 for none.
+        """
+        n = self._frame[tail] - self._frame[head]
+        return (head >= 0) & (tail >= 0) & (n <= self._max_gap)
+
+    def log_likelihood(
+        self, before: NDArray[np.int64], head: NDArray[np.int64], tail: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Return the log likelihood of links, `BEGIN` for those that are not short.
+
+        Parameters
+        ----------
+        before, head, tail : ndarray of int, shape (n,)
+            The two detections before each link and the one after it, -1 for none.
+        """
+        y, frame = self._d.points, self._frame
+        n = (frame[tail] - frame[head])[:, None]
+        straight = self.is_short(before, head)
+        step = np.where(straight, frame[head] - frame[before], 1)[:, None]
+        velocity = np.where(straight[:, None], (y[head] - y[before]) / step, 0)
+        off = y[tail] - y[head] - n * velocity
+        variance = self._r + self._q * n[:, 0].clip(0, self._max_gap) ** 3
+        variance = np.where(straight, variance, 9 * variance)
+        deviation = np.minimum((off**2).sum(axis=1) / (2 * variance), FARTHEST)
+        return np.where(self.is_short(head, tail), -deviation, BEGIN)
+
+
+def best_exchange(
+    lanes: tuple[Lane, Lane], frame: int, motion: Motion, cut: int | None = None
+) -> Exchange | None:
+    """Return the most probable exchange of two tracks that contains a frame.
+
+    The score of an exchange is what its detections gain by their distances to other tracks, less
+    the log odds of the links that are cut at both ends.
+
+    Parameters
+    ----------
+    lanes : tuple of two Lane
+        The tracks.
+    frame : int
+        Frame that the exchange contains. No pinned detection is exchanged.
+    motion : Motion
+        Log likelihoods of links.
+    cut : int, optional
+        Frame at which the exchange begins or before which it ends.
+
+    Returns
+    -------
+    Exchange or None
+        None if a pinned detection is in the way.
+    """
+    pins = np.concatenate([lane.frames[lane.pinned] for lane in lanes])
+    if (pins == frame).any():
+        return None
+    lowest = int(pins[pins < frame].max(initial=-1)) + 1
+    highest = int(pins[pins > frame].min(initial=NEVER))
+    frames = np.concatenate([lane.frames for lane in lanes])
+    all_cuts = np.unique(np.concatenate([frames, [frames.max(initial=frame) + 1]]))
+    costs = _costs(lanes, all_cuts, motion)
+    total = np.zeros(len(all_cuts))
+    for lane in lanes:
+        total += np.concatenate([[0], np.cumsum(lane.gains)])[
+            np.searchsorted(lane.frames, all_cuts)
+        ]
+    begins = (all_cuts >= lowest) & (all_cuts <= frame)
+    ends = (all_cuts > frame) & (all_cuts <= highest)
+    if cut is not None and cut <= frame:
+        begins &= all_cuts == cut
+    elif cut is not None:
+        ends &= all_cuts == cut
+    if not begins.any() or not ends.any():
+        return None
+    from_begin = np.where(begins, -costs - total, -np.inf)
+    from_end = np.where(ends, total - costs, -np.inf)
+    # The latest begin and the earliest end of equal ones: as little as possible changes.
+    i = len(all_cuts) - 1 - int(np.argmax(from_begin[::-1]))
+    j = int(np.argmax(from_end))
+    return Exchange(
+        first=int(all_cuts[i]), end=int(all_cuts[j]), gain=float(from_begin[i] + from_end[j])
+    )
+
+
+def _costs(
+    lanes: tuple[Lane, Lane], cuts: NDArray[np.int64], motion: Motion
+) -> NDArray[np.float64]:
+    """Return the log odds that are lost by an exchange of the tails of two lanes at each cut."""
+    sides = [_around(lane, cuts) for lane in lanes]
+    ratio, links = np.zeros(len(cuts)), np.zeros(len(cuts))
+    has_short = np.zeros(len(cuts), dtype=bool)
+    for own, other, lane in ((0, 1, lanes[0]), (1, 0, lanes[1])):
+        (before, head, tail, at), (before_of_other, head_of_other, _, _) = sides[own], sides[other]
+        has_tail, is_kept = tail >= 0, motion.is_short(head, tail)
+        kept = motion.log_likelihood(before, head, tail)
+        exchanged = motion.log_likelihood(before_of_other, head_of_other, tail)
+        ratio += np.where(has_tail, exchanged - kept, 0)
+        has_short |= is_kept | motion.is_short(head_of_other, tail)
+        is_long = (head >= 0) & has_tail & ~is_kept
+        if len(lane.before):
+            probability = lane.before[np.minimum(at, len(lane.before) - 1)]
+            links += np.where(is_long, log_odds(np.minimum(probability, 0.98)), 0)
+    (_, h0, q0, _), (_, h1, q1, _) = sides
+    both_short = np.logical_and.reduce([motion.is_short(h, q) for h in (h0, h1) for q in (q0, q1)])
+    near = np.flatnonzero(both_short & (ratio > 2 * MIN_RATIO))
+    ratio[near] = motion.ratios(lanes, cuts[near])
+    is_mutual = np.minimum.reduce([side[i] for side in sides for i in (1, 2)]) >= 0
+    found = EXCHANGE[0] + EXCHANGE[1] * np.clip(ratio, MIN_RATIO, RATIOS[1])
+    found += EXCHANGE[2] * is_mutual + np.minimum(ratio - MIN_RATIO, 0)
+    return links - np.where(has_short, found, 0)
+
+
+def _around(
+    lane: Lane, cuts: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the two detections before each cut and the one after, and where that stands."""
+    padded = np.concatenate([[-1, -1], lane.detections, [-1]])
+    at = np.searchsorted(lane.frames, cuts)
+    return padded[at], padded[at + 1], padded[at + 2], at
