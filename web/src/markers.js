@@ -88,6 +88,8 @@ export class Markers {
     this.missed = new Color(missed);
     /** Track of each dot that is drawn, -1 for clutter. */
     this.tracks = new Int32Array(n);
+    /** Index of the point of each dot, -1 in a gap. */
+    this.points = new Int32Array(n);
     this.count = 0;
   }
 
@@ -113,6 +115,7 @@ export class Markers {
       const isMarked = k === state.chosen || k === state.hovered;
       if (isWrong) paint(ring, n, this.wrong, 2.5);
       else paint(ring, n, ink, isMarked ? 1.8 : state.involved.includes(k) ? 1 : 0);
+      this.points[n] = point;
       this.tracks[n++] = k;
     }
     const last = capture.T ? capture.clutterStart[t + 1] : 0;
@@ -122,6 +125,7 @@ export class Markers {
       for (let a = 0; a < 3; a++) position.array[3 * n + a] = capture.positions[3 * i + a];
       paint(look, n, isMissed ? this.missed : this.clutter, 2);
       paint(ring, n, this.missed, isMissed ? 1.5 : 0);
+      this.points[n] = i;
       this.tracks[n++] = -1;
     }
     this.count = n;
