@@ -7,6 +7,8 @@ import {
 import { hueOf } from "./colours.js";
 import { ABSENT, GAP } from "./places.js";
 
+const SPARE = 64; // dots for tracks that an editor adds
+
 const VERTEX = `
 attribute vec4 look; // colour, kind: 0 filled, 1 hollow, 2 clutter
 attribute vec4 ring; // colour, width in pixels (0 for none)
@@ -64,7 +66,7 @@ export class Markers {
     for (let t = 0; t < capture.T; t++) {
       most = Math.max(most, capture.clutterStart[t + 1] - capture.clutterStart[t]);
     }
-    const n = capture.K + most;
+    const n = capture.K + most + SPARE;
     const geometry = new BufferGeometry();
     for (const [name, size] of [["position", 3], ["look", 4], ["ring", 4]]) {
       const attribute = new BufferAttribute(new Float32Array(size * n), size);

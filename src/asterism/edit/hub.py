@@ -58,6 +58,7 @@ class Hub:
         self._changes: dict[int, Change] = {}
         self._readers: set[asyncio.Queue[_Event | None]] = set()
         self._n_undone = 0
+        self._names: Sequence[str] = session.tracks.display_names
         self._assessed = self._assess(session.tracks, session.edits)
         self._decisions: list[tuple[Decision, ...]] = [_uncertain(self._assessed)]
         self._assessment_of = 0
@@ -93,13 +94,12 @@ class Hub:
         if action == "save":
             return await self._save()
         async with self._lock:
-            before = self.session.tracks.display_names
             change = await asyncio.to_thread(self._change, action, message)
             if change is None:
                 raise ParameterError(action, f"an edit to {action}", "none")
             step = {"undo": 1, "redo": -1}.get(action, -self._n_undone)
             self._n_undone += step
-            event = self._entry(change, before, is_new=action != "undo")
+            event = self._entry(change, is_new=action != "undo")
         self._send("change", event)
         self._begin_assessment()
         return event
@@ -188,8 +188,10 @@ class Hub:
         self._send("saved", event)
         return event
 
-    def _entry(self, change: Change, before: Sequence[str], *, is_new: bool) -> dict[str, Any]:
-        event = self.view.change(change, before, self.session.tracks, is_new=is_new)
+    def _entry(self, change: Change, *, is_new: bool) -> dict[str, Any]:
+        tracks = self.session.tracks
+        event = self.view.change(change, self._names, tracks, is_new=is_new)
+        self._names = tracks.display_names
         event |= {"version": len(self._log) + 1, **self._state()}
         self._log.append(event)
         self._changes = {event["version"]: change} if is_new else {}

@@ -67,11 +67,9 @@ export class Decisions {
       (each) => each.track !== null && each.probability >= MIN_INVOLVED,
     );
     const tracks = [...new Set([decision.track, ...others.map((each) => each.track)])];
-    state.play(false);
-    state.involved = tracks;
-    state.choose(decision.track);
     byId("speed").value = SLOW;
-    state.set({ speed: SLOW, follow: true });
+    // At once, so that the scene is drawn once.
+    Object.assign(state, { playing: false, involved: tracks, chosen: decision.track, speed: SLOW, follow: true });
     state.seek(decision.at);
     stage?.focus(tracks, decision.at, decision.end);
     timeline.reveal(timeline.rowOf.get(decision.track));

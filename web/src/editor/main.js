@@ -140,7 +140,6 @@ class Editor {
   apply(event) {
     const { capture, numbering, stage, timeline } = this;
     const began = performance.now();
-    const before = capture.K;
     const touched = new Set(event.labels);
     for (const i of event.detections) touched.add(numbering.label[i]);
     event.detections.forEach((i, n) => {
@@ -154,18 +153,17 @@ class Editor {
     const { edits, n_undone } = event;
     Object.assign(this, { edits, n_undone });
     numbering.rebuild();
-    const most = Math.max(0, ...[...Array(capture.T).keys()].map((t) => capture.clutterStart[t + 1] - capture.clutterStart[t]));
-    if (stage && (capture.K > before || capture.K + most > stage.markers.tracks.length)) stage.grow();
+    if (stage && capture.K + numbering.mostClutter > stage.markers.tracks.length) stage.grow();
     timeline.sort(byId("order").value);
-    timeline.resize();
+    timeline.renew(touched);
     if (this.decisions.shown) touched.add(this.decidedBy(event));
     this.changes.show(event);
     this.changes.list(edits);
     this.preview(null);
     this.decisions.changed(touched);
-    if (!this.decisions.shown && this.decisions.list.length) this.decisions.step(1);
     this.naming.list();
-    this.draw();
+    if (!this.decisions.shown && this.decisions.list.length) this.decisions.step(1);
+    else this.draw();
     this.tell();
     document.body.dataset.applied = (performance.now() - began).toFixed(1);
   }
@@ -186,7 +184,8 @@ class Editor {
       for (let row = 0; row < numbering.numberOf.length; row++) {
         capture.confidence[row] = numbering.confidence[numbering.numberOf[row]];
       }
-      this.timeline.resize();
+      this.timeline.renew(new Set(event.detections.map((i) => numbering.label[i])));
+      this.timeline.draw();
     }
     this.decisions.take(event, event.assessment === this.server.version);
   }

@@ -45,7 +45,8 @@ export class Numbering {
     const K = capture.header.names.length;
     const starts = new Uint32Array(K + 1);
     let clutter = 0;
-    for (const k of label) {
+    for (let i = 0; i < label.length; i++) {
+      const k = label[i];
       if (k >= 0) starts[k + 1] += 1;
       else if (k > HIDDEN) clutter += 1;
     }
@@ -62,7 +63,9 @@ export class Numbering {
       const row = k < 0 ? at[K]++ : at[k]++;
       if (k < 0) clutterStart[frame[i] + 1] += 1;
       numberOf[row] = i;
-      for (let a = 0; a < 3; a++) positions[3 * row + a] = position[3 * i + a];
+      positions[3 * row] = position[3 * i];
+      positions[3 * row + 1] = position[3 * i + 1];
+      positions[3 * row + 2] = position[3 * i + 2];
       if (confidence) confidence[row] = this.confidence[i];
     }
     clutterStart[0] = starts[K];
@@ -76,26 +79,34 @@ export class Numbering {
     capture.trouble = Uint32Array.from([...capture.trouble, ...added].filter(hasPoints));
   }
 
+  /** Largest number of points of clutter in a frame. */
+  get mostClutter() {
+    const { clutterStart, T } = this.capture;
+    let most = 0;
+    for (let t = 0; t < T; t++) most = Math.max(most, clutterStart[t + 1] - clutterStart[t]);
+    return most;
+  }
+
   findRuns(K, starts) {
     const { frame, numberOf } = this;
-    const [first, length, start] = [[], [], []];
+    const most = starts[K];
+    const [first, length, start] = [0, 0, 0].map(() => new Uint32Array(most));
     const runsOf = new Uint32Array(K + 1);
+    let n = 0;
     for (let k = 0; k < K; k++) {
       for (let row = starts[k]; row < starts[k + 1]; row++) {
         const t = frame[numberOf[row]];
-        const last = first.length - 1;
-        if (row > starts[k] && t === first[last] + length[last]) length[last] += 1;
+        if (row > starts[k] && t === first[n - 1] + length[n - 1]) length[n - 1] += 1;
         else {
-          first.push(t);
-          length.push(1);
-          start.push(row);
+          first[n] = t;
+          length[n] = 1;
+          start[n++] = row;
         }
       }
-      runsOf[k + 1] = first.length;
+      runsOf[k + 1] = n;
     }
     Object.assign(this.capture, {
-      runsOf, runFirst: Uint32Array.from(first), runLength: Uint32Array.from(length),
-      runStart: Uint32Array.from(start),
+      runsOf, runFirst: first.slice(0, n), runLength: length.slice(0, n), runStart: start.slice(0, n),
     });
   }
 
