@@ -141,8 +141,6 @@ class Hub:
     def _edit(self, action: str, message: Message) -> Edit:
         session, view = self.session, self.view
         if action == "edit":
-            if message["kind"] in ("fill", "no_fill"):
-                raise ParameterError("kind", "another kind", repr(message["kind"]), "use fill")
             own = [view.detection(i) for i in message["detections"]]
             return session.edit(message["kind"], *own, name=message["name"])
         if action == "fill":

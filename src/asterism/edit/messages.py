@@ -22,6 +22,11 @@ _FIELDS: dict[str, dict[str, str]] = {
     "redo": {},
     "save": {},
 }
+_FILLS = ("fill", "no_fill")
+_KINDS = {
+    "edit": tuple(kind for kind in get_args(EditKind) if kind not in _FILLS),
+    "fill": _FILLS,
+}
 _MAX_TEXT = 200
 _MAX_DETECTIONS = 2
 
@@ -71,8 +76,8 @@ def parsed(action: str, body: bytes) -> Message:
     for name, kind in fields.items():
         if not _is(values[name], kind):
             raise ParameterError(name, kind, repr(values[name])[:60])
-    if action in ("edit", "fill") and values["kind"] not in get_args(EditKind):
-        raise ParameterError("kind", " or ".join(get_args(EditKind)), repr(values["kind"])[:60])
+    if "kind" in fields and values["kind"] not in (known := _KINDS[action]):
+        raise ParameterError("kind", " or ".join(known), repr(values["kind"])[:60])
     return values
 
 

@@ -182,8 +182,9 @@ async def _serve(
 
     server = Server(
         uvicorn.Config(
-            made_app(hub, port, token), log_config=None, access_log=False, server_header=False,
+            made_app(hub, port, token), log_config=None, log_level="error", access_log=False,
             ws="none", lifespan="off", timeout_graceful_shutdown=5, date_header=False,
+            server_header=False,
             h11_max_incomplete_event_size=16_384, proxy_headers=False,
         )
     )  # fmt: skip
