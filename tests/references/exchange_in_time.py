@@ -26,12 +26,18 @@ def best_interval(lanes, frame, is_short, log_likelihood, ratio_of):
         for end in sorted(cuts):
             if not first <= frame < end or any(first <= t < end for t in pins):
                 continue
-            gain = sum(g for lane in lanes for (_, t, g, _, _, _) in lane if first <= t < end)
-            for cut in (first, end):
-                gain -= cost(lanes, cut, is_short, log_likelihood, ratio_of)
+            gain = gain_of(lanes, first, end, is_short, log_likelihood, ratio_of)
             if best is None or gain > best[2] + 1e-12:
                 best = first, end, gain
     return best
+
+
+def gain_of(lanes, first, end, is_short, log_likelihood, ratio_of):
+    """Return the log odds that an exchange in an interval gains."""
+    gain = sum(g for lane in lanes for (_, t, g, _, _, _) in lane if first <= t < end)
+    for cut in (first, end):
+        gain -= cost(lanes, cut, is_short, log_likelihood, ratio_of)
+    return gain
 
 
 def cost(lanes, cut, is_short, log_likelihood, ratio_of):
