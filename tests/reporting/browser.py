@@ -77,7 +77,7 @@ class Browser:
         return json.loads(first)
 
     def page(self, path, *, width=1280, height=900, dark=False, scale=1, before=""):
-        """Open a file, after a script of ours, and wait until its player is ready."""
+        """Open a file or an address, after a script of ours, and wait until its player is ready."""
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         page = Page(self, session, target)
@@ -90,7 +90,8 @@ class Browser:
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         page.call("Emulation.setEmulatedMedia", features=[scheme])
         page.call("Page.addScriptToEvaluateOnNewDocument", source=before)
-        page.call("Page.navigate", url=Path(path).resolve().as_uri())
+        is_address = str(path).startswith("http://")
+        page.call("Page.navigate", url=path if is_address else Path(path).resolve().as_uri())
         page.wait("document.body?.dataset.ready === 'true'")
         return page
 

@@ -4,6 +4,7 @@ const SLOW = 0.25; // speed at a place to check
 
 const byId = (id) => document.getElementById(id);
 
+/** @returns {Record<string, (event: KeyboardEvent) => void>} actions by key, which the editor extends */
 export function connect({ capture, state, stage, timeline }) {
   const slider = byId("frame");
   slider.max = Math.max(0, capture.T - 1);
@@ -115,6 +116,7 @@ export function connect({ capture, state, stage, timeline }) {
   };
 
   addEventListener("keydown", (event) => {
+    if (event.defaultPrevented) return;
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (ownKeys(event)) return;
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -123,13 +125,14 @@ export function connect({ capture, state, stage, timeline }) {
     event.preventDefault();
     act(event);
   });
+  return keys;
 }
 
 /** Return whether the focused element handles a key itself. */
 function ownKeys(event) {
   const { target, key } = event;
   const tag = target.tagName;
-  if (tag === "SELECT") return true;
+  if (tag === "SELECT" || target.type === "text") return true;
   if (tag === "BUTTON" || tag === "SUMMARY" || tag === "A") return key === " " || key === "Enter";
   if (target.type === "checkbox") return key === " ";
   return target.type === "range" && (key.startsWith("Arrow") ? !event.shiftKey : false);

@@ -56,7 +56,7 @@ export class Lines {
 /** Trails: the last positions of each marker. */
 export class Trails extends Lines {
   constructor(capture, places) {
-    super(Math.min(capture.K, MAX_TRAILS) * MAX_SAMPLES);
+    super(Math.min(capture.K + 64, MAX_TRAILS) * MAX_SAMPLES);
     this.capture = capture;
     this.places = places;
     this.cycle = capture.header.colours.cycle.map((c) => new Color(c));

@@ -38,7 +38,7 @@ async function start() {
   const image = byId("image")
     ? new CameraImage(capture, state, byId("image"), byId("image-count"))
     : null;
-  connect({ capture, state, stage, timeline });
+  const keys = connect({ capture, state, stage, timeline });
   if (stage) connectPointer(stage, state);
 
   function draw() {
@@ -67,6 +67,7 @@ async function start() {
   if (stage && capture.T && capture.positions.length) message.hidden = true;
   else if (stage) message.textContent = capture.T ? "The capture has no points." : "The capture has no frames.";
   globalThis.asterism = script(capture, state, stage, image);
+  dispatchEvent(new CustomEvent("player", { detail: { capture, state, stage, timeline, keys, draw } }));
   document.body.dataset.ready = "true";
 }
 

@@ -7,6 +7,8 @@ import {
 import { hueOf } from "./colours.js";
 import { ABSENT, GAP } from "./places.js";
 
+const SPARE = 64; // dots for tracks that an editor adds
+
 const VERTEX = `
 attribute vec4 look; // colour, kind: 0 filled, 1 hollow, 2 clutter
 attribute vec4 ring; // colour, width in pixels (0 for none)
@@ -64,7 +66,7 @@ export class Markers {
     for (let t = 0; t < capture.T; t++) {
       most = Math.max(most, capture.clutterStart[t + 1] - capture.clutterStart[t]);
     }
-    const n = capture.K + most;
+    const n = capture.K + most + SPARE;
     const geometry = new BufferGeometry();
     for (const [name, size] of [["position", 3], ["look", 4], ["ring", 4]]) {
       const attribute = new BufferAttribute(new Float32Array(size * n), size);
@@ -88,6 +90,8 @@ export class Markers {
     this.missed = new Color(missed);
     /** Track of each dot that is drawn, -1 for clutter. */
     this.tracks = new Int32Array(n);
+    /** Index of the point of each dot, -1 in a gap. */
+    this.points = new Int32Array(n);
     this.count = 0;
   }
 
@@ -113,6 +117,7 @@ export class Markers {
       const isMarked = k === state.chosen || k === state.hovered;
       if (isWrong) paint(ring, n, this.wrong, 2.5);
       else paint(ring, n, ink, isMarked ? 1.8 : state.involved.includes(k) ? 1 : 0);
+      this.points[n] = point;
       this.tracks[n++] = k;
     }
     const last = capture.T ? capture.clutterStart[t + 1] : 0;
@@ -122,6 +127,7 @@ export class Markers {
       for (let a = 0; a < 3; a++) position.array[3 * n + a] = capture.positions[3 * i + a];
       paint(look, n, isMissed ? this.missed : this.clutter, 2);
       paint(ring, n, this.missed, isMissed ? 1.5 : 0);
+      this.points[n] = i;
       this.tracks[n++] = -1;
     }
     this.count = n;

@@ -49,7 +49,8 @@ export class Places {
     let low = runsOf[k];
     if (low === stop || runFirst[low] > t) return -1;
     const hint = this.last[k];
-    if (runFirst[hint] <= t && (hint + 1 === stop || runFirst[hint + 1] > t)) return hint;
+    // The editor changes runs and adds tracks.
+    if (hint >= low && hint < stop && runFirst[hint] <= t && (hint + 1 === stop || runFirst[hint + 1] > t)) return hint;
     let high = stop;
     while (high - low > 1) {
       const middle = (low + high) >> 1;

@@ -69,6 +69,23 @@ export class Stage {
     this.setUp(capture.header.up);
   }
 
+  /** Make room for more tracks and clutter than before. */
+  grow() {
+    const { capture, places } = this;
+    for (const [name, made] of [
+      ["markers", new Markers(capture, places)], ["trails", new Trails(capture, places)],
+    ]) {
+      const old = this[name].object;
+      this.root.remove(old);
+      old.geometry.dispose();
+      old.material.dispose();
+      this[name] = made;
+      this.root.add(made.object);
+    }
+    this.markers.uniforms.radius.value = Math.max(capture.header.radius, 0.002 * this.size);
+    this.resize();
+  }
+
   setUp(axis) {
     this.up = this.capture.axes === 2 ? "z" : axis;
     const to = this.capture.axes === 2 ? UP.z : UP.y;
@@ -278,13 +295,19 @@ export class Stage {
 
   /** Track with a dot at a position of the canvas, -1 for none. */
   pick(x, y) {
+    const n = this.dotAt(x, y, (track) => track >= 0);
+    return n < 0 ? -1 : this.markers.tracks[n];
+  }
+
+  /** Nearest dot at a position of the canvas among those of some tracks, -1 for none. */
+  dotAt(x, y, isOf) {
     let best = -1;
     let least = NEAR_PX;
     for (let n = 0; n < this.markers.count; n++) {
-      if (this.markers.tracks[n] < 0) continue;
+      if (!isOf(this.markers.tracks[n])) continue;
       const p = this.onCanvas(this.place(n, this.point));
       const off = Math.hypot(p.x - x, p.y - y) + (p.z > 1 ? 1e9 : 0);
-      if (off < least) [best, least] = [this.markers.tracks[n], off];
+      if (off < least) [best, least] = [n, off];
     }
     return best;
   }

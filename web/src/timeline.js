@@ -66,6 +66,18 @@ export class Timeline {
     return NAMES + (span > 0 ? (times[frame] - times[0]) / span : 0) * this.cells;
   }
 
+  /** Compute the strips of some tracks again, which may be new ones. */
+  renew(tracks) {
+    const { capture, cells } = this;
+    if (this.strips.length !== capture.K * cells) {
+      const before = this.strips;
+      this.strips = new Uint8Array(capture.K * cells);
+      this.strips.set(before);
+    }
+    this.rows.style.height = `${RULER + ROW * this.order.length + 6}px`;
+    this.gatherTracks(tracks);
+  }
+
   /** Compute the worst frame of each track and cell. */
   gather() {
     const { capture, cells } = this;
@@ -75,8 +87,22 @@ export class Timeline {
     if (!capture.T) return;
     const cell = new Uint32Array(capture.T);
     for (let t = 0; t < capture.T; t++) cell[t] = Math.min(cells - 1, this.x(t) - NAMES);
-    for (let k = 0; k < capture.K; k++) {
+    this.cell = cell;
+    this.gatherTracks(capture.starts.keys());
+    for (let t = 0; t < capture.T && truth && capture.verdict; t++) {
+      for (let i = capture.clutterStart[t]; i < capture.clutterStart[t + 1]; i++) {
+        if (capture.verdict[i] === 2) this.missed[cell[t]] = 1;
+      }
+    }
+  }
+
+  gatherTracks(tracks) {
+    const { capture, cells, cell } = this;
+    const { truth } = this.state.show;
+    for (const k of tracks) {
+      if (k < 0 || k >= capture.K) continue;
       const strip = this.strips.subarray(k * cells, (k + 1) * cells);
+      strip.fill(NONE);
       const worst = (i, value) => {
         if (strip[i] < value) strip[i] = value;
       };
@@ -95,11 +121,6 @@ export class Timeline {
         if (r + 1 < capture.runsOf[k + 1]) {
           for (let i = cell[end - 1]; i < cell[capture.runFirst[r + 1]]; i++) worst(i, SPAN);
         }
-      }
-    }
-    for (let t = 0; t < capture.T && truth && capture.verdict; t++) {
-      for (let i = capture.clutterStart[t]; i < capture.clutterStart[t + 1]; i++) {
-        if (capture.verdict[i] === 2) this.missed[cell[t]] = 1;
       }
     }
   }

@@ -18,6 +18,8 @@
  * @property {?Uint8Array} filled 1 where a point was filled in
  * @property {?Uint8Array} verdict of each point: 0 right, 1 wrong, 2 missed
  * @property {?Int32Array} marker true marker of each point, -1 for none
+ * @property {?Uint32Array} counts points of each frame, with an editor
+ * @property {?Uint16Array} point number of each point in its frame, with an editor
  * @property {Uint32Array} trouble tracks, ordered by severity, the worst first
  * @property {Float32Array} course x, y, z of the subject at evenly spaced frames
  * @property {Uint32Array} pairs tracks that are joined by lines, two by two
@@ -102,6 +104,7 @@ function capture(header, arrays) {
     course: arrays.course,
     runFirst: arrays.runFirst, runLength: arrays.runLength,
     confidence: arrays.confidence ?? null, filled: arrays.filled ?? null,
+    counts: arrays.counts ?? null, point: arrays.point ?? null,
     verdict: arrays.verdict ?? null, marker: arrays.marker ?? null,
     lenses: header.cameras.map((_, i) => arrays[`lens${i}`] ?? null),
   };

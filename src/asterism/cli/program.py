@@ -12,6 +12,7 @@ from asterism.cli.commands.camera import app as camera
 from asterism.cli.commands.chain import chain
 from asterism.cli.commands.corrupt import corrupt
 from asterism.cli.commands.demo import demo
+from asterism.cli.commands.edit import edit
 from asterism.cli.commands.estimate import estimate
 from asterism.cli.commands.evaluate import evaluate
 from asterism.cli.commands.fill import fill
@@ -59,7 +60,7 @@ def _root(  # pyright: ignore[reportUnusedFunction]
 
 
 _TITLES = {
-    "Tracks and markers": (track, stitch, name, fill, estimate, methods),
+    "Tracks and markers": (track, edit, stitch, name, fill, estimate, methods),
     "Captures and results": (info, evaluate, report, plot, view),
     "Simulations and experiments": (corrupt, simulate, scenes, demo, reproduce),
     "Cameras": (film, reconstruct, chain),

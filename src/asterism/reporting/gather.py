@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,17 +17,17 @@ from asterism.model.upwards import up_axis
 from asterism.reporting.connections import connections_of
 from asterism.reporting.judgement import judge
 from asterism.reporting.page import Contents, page
+from asterism.reporting.page.editing import editing_of
 from asterism.reporting.places import places_of
 from asterism.tracking.decisions import of_naming
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from pathlib import Path
 
     from asterism.model.upwards import Axis, UpReason
     from asterism.tracking import Naming
 
-__all__ = ["report"]
+__all__ = ["contents_of", "report"]
 
 
 def report(
@@ -40,6 +41,7 @@ def report(
     summary: Iterable[tuple[str, str]] = (),
     title: str | None = None,
     up: Axis | None = None,
+    editor: bool = False,
     overwrite_input: bool = False,
 ) -> None:
     """Write tracks as one self-contained HTML page with a player.
@@ -70,6 +72,9 @@ def report(
         Axis that points up; the page states it and can change it. By default the axis that is up
         in the images of the `rig`. Without a rig it is y for TRC, for Motive's CSV and if the
         lowest points stay near y = 0 and far from z = 0, and z otherwise.
+    editor : bool
+        Add an editor that collects edits and downloads them as a file, for ``asterism track
+        --edits`` on the same capture. Filled points are left out of such a page.
     overwrite_input : bool
         Allow `path` to be the file that the detections were read from.
 
@@ -86,6 +91,37 @@ def report(
     >>> truth = am.simulate.cube(seed=1)
     >>> am.report(am.track(truth.detections), "cube.html", truth=truth)  # doctest: +SKIP
     """
+    d, path = tracks.detections, check_path("path", path)
+    if editor:
+        check_kind("tracks", tracks, Tracks, "am.track(detections)")
+        tracks = tracks.measured()
+    contents = contents_of(
+        tracks, truth=truth, rig=rig, naming=naming, made=made, summary=summary, title=title, up=up
+    )
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise ParameterError("path", "a name ending in .html", repr(path.name))
+    if isinstance(d, Capture) and not overwrite_input and path.resolve() == d.path.resolve():
+        raise ParameterError("path", "another file than the one that was read", str(path))
+    if editor:
+        name = f"{Path(contents.title).stem}.edits.toml"
+        contents = replace(contents, editing=editing_of(tracks.detections, name))
+    text = page(contents)
+    with replacing(path) as file:
+        file.write(text)
+
+
+def contents_of(
+    tracks: Tracks,
+    *,
+    truth: Tracks | None = None,
+    rig: Rig | None = None,
+    naming: Naming | None = None,
+    made: str = "",
+    summary: Iterable[tuple[str, str]] = (),
+    title: str | None = None,
+    up: Axis | None = None,
+) -> Contents:
+    """Gather the contents of a page, with the parameters of `report`."""
     check_kind("tracks", tracks, Tracks, "am.track(detections)")
     if truth is not None:
         check_kind("truth", truth, Tracks)
@@ -93,20 +129,16 @@ def report(
         check_kind("rig", rig, Rig, "am.read_rig(path)")
     if up is not None:
         check_fields("up", [up], ("x", "y", "z"))
-    d, path = tracks.detections, check_path("path", path)
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise ParameterError("path", "a name ending in .html", repr(path.name))
+    d = tracks.detections
     if rig is not None and d.n_axes != 3:
         raise ParameterError("rig", "tracks in space to look at", f"{d.n_axes}-D tracks")
-    if isinstance(d, Capture) and not overwrite_input and path.resolve() == d.path.resolve():
-        raise ParameterError("path", "another file than the one that was read", str(path))
     if naming is not None and all(each.kind != "name" for each in tracks.decisions):
         tracks = replace(tracks, decisions=(*tracks.decisions, *of_naming(naming, tracks)))
     axis, about_up = _up(tracks, rig, up)
     if title is None:
         title = d.path.name if isinstance(d, Capture) else ""
     warnings = (*filter(None, [d.truncated]), *d.warnings) if isinstance(d, Capture) else ()
-    contents = Contents(
+    return Contents(
         title=title or "Tracks",
         tracks=tracks,
         made=made,
@@ -122,9 +154,6 @@ def report(
         if tracks.identity_confidence is None and not tracks.decisions
         else places_of(tracks),
     )
-    text = page(contents)
-    with replacing(path) as file:
-        file.write(text)
 
 
 _UP: dict[UpReason, str] = {

@@ -28,6 +28,11 @@ _Title = Annotated[
     str | None, typer.Option(help="Title of the page.", show_default="the file name")
 ]
 
+_Editor = Annotated[
+    bool,
+    typer.Option("--editor", help="Add an editor, which collects edits and downloads them."),
+]
+
 
 def report(
     source: _In,
@@ -36,6 +41,7 @@ def report(
     out: _Out = None,
     up: _Up = None,
     title: _Title = None,
+    editor: _Editor = False,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -61,8 +67,9 @@ def report(
     cameras = None if rig is None else am.read_rig(rig)
     with progress("writing the page"):
         am.report(
-            tracks, page, truth=true, rig=cameras, up=up, title=title, summary=_origin(tracks)
-        )
+            tracks, page, truth=true, rig=cameras, up=up, title=title, summary=_origin(tracks),
+            editor=editor,
+        )  # fmt: skip
     size = page.stat().st_size
     if json:
         print_json({"input": str(source), "output": str(page), "bytes": size})

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from asterism.reporting.places import Place
     from asterism.tracking import Naming
 
-__all__ = ["Connections", "Contents", "Judgement", "Score", "Verdict"]
+__all__ = ["Connections", "Contents", "Editing", "Judgement", "Score", "Verdict"]
 
 
 class Verdict(IntEnum):
@@ -94,6 +94,37 @@ class Connections:
     about: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class Editing:
+    """What the editor of a page needs.
+
+    Parameters
+    ----------
+    file : str
+        Name of the file of the edits.
+    sha256 : str
+        SHA-256 of the detections to which the edits refer; empty for a served page.
+    shift : int
+        Number of the first frame in the file of the edits, less that on the page.
+    is_served : bool
+        Whether a server solves the edits. Without one, the page collects them.
+    version : int
+        Number of changes that the tracks of the page contain.
+    names : tuple of str
+        Names of the marker sets, in their order.
+    saved : str
+        Name of the file to which the corrected tracks are saved; empty without a server.
+    """
+
+    file: str
+    sha256: str
+    shift: int
+    is_served: bool = False
+    version: int = 0
+    names: tuple[str, ...] = ()
+    saved: str = ""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contents:
     """Contents of a report page.
@@ -124,6 +155,8 @@ class Contents:
         Result of the naming by which the tracks have their names, None without one.
     places : tuple of Place or None
         Places to check, the worst first; None if the identities have no probabilities.
+    editing : Editing, optional
+        What the editor needs; None for a page without it.
     """
 
     title: str
@@ -138,3 +171,4 @@ class Contents:
     rig: Rig | None = None
     naming: Naming | None = None
     places: tuple[Place, ...] | None = None
+    editing: Editing | None = None

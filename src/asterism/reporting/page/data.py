@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from asterism.model import Capture
 from asterism.plot.style import CLUTTER, CYCLE, MISSED, WRONG
+from asterism.reporting.page.editing import numbers_of
 from asterism.reporting.page.lenses import SIDE, camera_header, lens_table
 from asterism.reporting.page.nearest import usual_distance
 from asterism.reporting.page.packing import grid_over, packed, residuals
@@ -102,6 +104,8 @@ def played(contents: Contents, order: NDArray[np.int64], shown: NDArray[np.int64
     if (judged := contents.judgement) is not None:
         arrays["verdict"] = judged.verdicts[kept][rows].astype(np.uint8)
         arrays["marker"] = judged.markers[kept][rows].astype(np.int32)
+    if contents.editing is not None:
+        arrays |= numbers_of(d, rows)
     cameras, tables, lens_error = _cameras(contents)
     arrays |= tables
     subject = subject_of(tracks)
@@ -123,6 +127,7 @@ def played(contents: Contents, order: NDArray[np.int64], shown: NDArray[np.int64
         "opens": _opening_frame(d),
         "cameras": cameras,
         "lensSide": SIDE,
+        "editor": None if contents.editing is None else asdict(contents.editing),
         "colours": {"cycle": CYCLE, "clutter": CLUTTER, "wrong": WRONG, "missed": MISSED},
     }
     n_outside = int(is_clutter.sum()) - len(drawn_clutter)

@@ -11,10 +11,11 @@ import numpy as np
 
 from asterism.reporting.page import uncertain
 from asterism.reporting.page.data import Played, played
+from asterism.reporting.page.editing import PANEL, editing_keys, tile
 from asterism.reporting.page.facts import cards, facts_of, in_words
 from asterism.reporting.page.findings import find_troubles
 from asterism.reporting.page.markup import Markup, element, joined
-from asterism.reporting.page.player import HELP, player
+from asterism.reporting.page.player import keys_table, player
 from asterism.reporting.page.thinning import MOST_POINTS, frames_to_show, stride_for
 
 if TYPE_CHECKING:
@@ -37,13 +38,15 @@ _ICON = (
 )
 
 
-def page(contents: Contents) -> bytes:
+def page(contents: Contents, shown: NDArray[np.int64] | None = None) -> bytes:
     """Build the page.
 
     Parameters
     ----------
     contents : Contents
         Contents of the page.
+    shown : ndarray of int, optional
+        Frames of the player, increasing; by default those of `frames_to_show`.
 
     Returns
     -------
@@ -51,14 +54,18 @@ def page(contents: Contents) -> bytes:
         HTML in UTF-8, the same for the same contents. Its policy forbids all requests, and all
         scripts and styles but its own.
     """
-    script, style = _bundled("player.js"), _bundled("player.css")
+    edits = contents.editing is not None
+    scripts = [_bundled("player.js"), *([_bundled("editor.js")] if edits else [])]
+    style = _bundled("player.css") + (_bundled("editor.css") if edits else "")
     findings = find_troubles(contents.tracks, contents.judgement, contents.naming)
-    shown = frames_to_show(contents.tracks, contents.places or ())
+    if shown is None:
+        shown = frames_to_show(contents.tracks, contents.places or ())
     play = played(contents, _by_trouble(contents, findings), shown)
+    policy = _policy(scripts, style, contents)
     head = element(
         "head",
         element("meta", charset="utf-8"),
-        element("meta", http_equiv="Content-Security-Policy", content=_policy(script, style)),
+        element("meta", http_equiv="Content-Security-Policy", content=policy),
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),
         element("meta", name="color-scheme", content="light dark"),
         element("meta", name="generator", content="Asterism"),
@@ -75,33 +82,40 @@ def page(contents: Contents) -> bytes:
                 "div",
                 _top(contents),
                 player(
-                    contents, joined(_places(contents, shown), _list(findings, contents, shown))
+                    contents,
+                    joined(
+                        _places(contents, shown) if contents.editing is None else PANEL,
+                        _list(findings, contents, shown),
+                    ),
                 ),
                 class_="screen",
             ),
             _scores(contents),
             _made(contents),
             _drawn(contents, play, shown),
-            HELP,
+            keys_table(editing_keys(contents)),
         ),
         # A block of data, which no browser runs.
         element("script", Markup(play.text), type="text/plain", id="data"),
-        element("script", Markup(script)),
+        *(element("script", Markup(script)) for script in scripts),
     )
     text = f"<!doctype html>\n{element('html', head, body, lang='en')}\n"
     # Half a surrogate pair, as a damaged name may have, has no place in UTF-8.
     return text.encode("utf-8", errors="replace")
 
 
-def _policy(script: str, style: str) -> str:
-    """Return a policy that forbids everything but the page's own script and style."""
+def _policy(scripts: Sequence[str], style: str, contents: Contents) -> str:
+    """Return a policy that forbids everything but the page's own script, style and server."""
 
     def hashed(text: str) -> str:
         return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
+    is_served = contents.editing is not None and contents.editing.is_served
+    connect = "connect-src 'self'; " if is_served else ""
+    allowed = " ".join(map(hashed, scripts))
     return (
-        f"default-src 'none'; script-src {hashed(script)}; style-src {hashed(style)}; "
-        "img-src data:; base-uri 'none'; form-action 'none'; "
+        f"default-src 'none'; script-src {allowed}; style-src {hashed(style)}; "
+        f"img-src data:; {connect}base-uri 'none'; form-action 'none'; "
         "require-trusted-types-for 'script'; trusted-types 'none'"
     )
 
@@ -126,7 +140,7 @@ def _by_trouble(contents: Contents, findings: Sequence[Finding]) -> NDArray[np.i
 def _top(contents: Contents) -> Markup:
     facts = facts_of(contents.tracks)
     numbers = [
-        uncertain.tile(contents),
+        uncertain.tile(contents) if contents.editing is None else tile(),
         *(
             element("div", element("dt", what), element("dd", number, data_fact=key))
             for key, number, what in cards(facts)

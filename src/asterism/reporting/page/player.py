@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 from asterism.reporting.page.markup import Markup, element, joined
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from asterism.reporting.page.contents import Contents
 
-__all__ = ["HELP", "player"]
+__all__ = ["keys_table", "player"]
 
 _KEYS = (
     ("Space", "play, pause"),
@@ -189,14 +191,18 @@ def _timeline(contents: Contents) -> Markup:
     )  # fmt: skip
 
 
-HELP = element(
-    "details",
-    element("summary", "Keys"),
-    element(
-        "dl",
-        *(element("div", element("dt", element("kbd", k)), element("dd", v)) for k, v in _KEYS),
-    ),
-    class_="keys",
-    id="keys",
-)
-"""Table of the keys."""
+def keys_table(added: Mapping[str, str]) -> Markup:
+    """Return the table of the keys, with those of the editor."""
+    return element(
+        "details",
+        element("summary", "Keys"),
+        element(
+            "dl",
+            *(
+                element("div", element("dt", element("kbd", keys)), element("dd", what))
+                for keys, what in {**dict(_KEYS), **added}.items()
+            ),
+        ),
+        class_="keys",
+        id="keys",
+    )

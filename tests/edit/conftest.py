@@ -1,0 +1,31 @@
+"""A served capture, and a browser that shows it."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.edit.served import Served, write_capture
+from tests.reporting.browser import Browser
+
+
+@pytest.fixture(scope="module")
+def browser():
+    made = Browser()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with a capture."""
+    write_capture(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def served(folder):
+    """A server of the capture."""
+    made = Served(folder)
+    yield made
+    if made.process.poll() is None:
+        assert made.stop() == (0, "")

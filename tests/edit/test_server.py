@@ -1,0 +1,123 @@
+"""Edits through the server: on disk when they are answered, and seen by every page."""
+
+from __future__ import annotations
+
+import signal
+
+import numpy as np
+
+import asterism as am
+from tests.edit.served import CAPTURE, Served, wait
+
+
+def same(served):
+    """Return an edit that joins the detections of two tracks of the first frame later on."""
+    tracks = am.edit.Session.open(
+        am.read(served.folder / CAPTURE), served.folder / "no.toml"
+    ).tracks
+    own = np.flatnonzero(tracks.labels == 3)
+    other = np.flatnonzero(tracks.labels == 4)
+    frame = tracks.detections.frame_of
+    later = other[frame[other] > frame[own[0]] + 40][0]
+    return tracks, {"kind": "same", "detections": [int(own[0]), int(later)], "name": ""}
+
+
+def test_an_edit_is_on_disk_when_it_is_answered(served):
+    capture, path = am.read(served.folder / CAPTURE), served.folder / "trial.edits.toml"
+    tracks, message = same(served)
+    status, answer = served.post("edit", **message)
+    assert status == 200
+    edits = am.io.read_edits(path, capture)
+    assert [each.kind for each in edits] == ["same"]
+    assert answer["version"] == 1
+    assert len(answer["edits"]) == 1
+    # The answer holds what changed, and nothing else.
+    session = am.edit.Session.open(capture, path)
+    changed = np.flatnonzero(session.tracks.labels != tracks.labels)
+    assert answer["detections"] == changed.tolist()
+    assert answer["labels"] == session.tracks.labels[changed].tolist()
+    assert 0 < len(changed) < 0.2 * len(tracks.labels)
+    assert sum(each["n_detections"] for each in answer["stretches"]) == len(changed)
+    status, answer = served.post("undo")
+    assert answer["labels"] == tracks.labels[changed].tolist()
+    assert am.io.read_edits(path, capture) == ()
+    assert answer["n_undone"] == 1
+    status, answer = served.post("redo")
+    assert (status, answer["n_undone"], len(answer["edits"])) == (200, 0, 1)
+    assert served.post("redo")[0] == 409
+
+
+def test_contradictions_are_refused_and_change_nothing(served):
+    _, message = same(served)
+    assert served.post("edit", **message)[0] == 200
+    before = (served.folder / "trial.edits.toml").read_bytes()
+    status, text = served.post("edit", **{**message, "kind": "different"})
+    assert status == 409
+    assert "contradicts" in text
+    assert (served.folder / "trial.edits.toml").read_bytes() == before
+
+
+def test_every_page_receives_every_event(served):
+    _, message = same(served)
+    one, other = served.listen(), served.listen()
+    wait(lambda: len(one) >= 2 and len(other) >= 2)
+    served.post("edit", **message)
+    for events in (one, other):
+        wait(lambda events=events: any(kind == "assessment" and e["assessment"] == 1
+                                       for kind, e in events))  # fmt: skip
+    served.post("undo")
+    for events in (one, other):
+        wait(lambda events=events: any(kind == "assessment" and e["assessment"] == 2
+                                       for kind, e in events))  # fmt: skip
+    for events in (one, other, served.listen()):
+        wait(lambda events=events: sum(kind == "change" for kind, _ in events) == 2)
+        versions = [event["version"] for kind, event in events if kind == "change"]
+        assert versions == [1, 2]
+    assert [kind for kind, _ in one] == [kind for kind, _ in other]
+    late = served.listen(since=1)
+    wait(lambda: any(kind == "change" for kind, _ in late))
+    assert [event["version"] for kind, event in late if kind == "change"] == [2]
+
+
+def test_decisions_are_chosen_and_followed(served):
+    events = served.listen()
+    wait(lambda: any(kind == "assessment" for kind, _ in events))
+    first = next(event for kind, event in events if kind == "assessment")
+    assert first["decisions"]
+    shares = [each["probability"] for each in first["decisions"]]
+    assert max(shares) < 0.8
+    status, answer = served.post("choose", assessment=0, decision=0, alternative=None)
+    assert status == 200, answer
+    wait(lambda: any(kind == "assessment" and e["assessment"] == 1 for kind, e in events))
+    then = next(e for kind, e in events if kind == "assessment" and e["assessment"] == 1)
+    gone = first["decisions"][0]
+    assert all((each["track"], each["at"]) != (gone["track"], gone["at"])
+               for each in then["decisions"])  # fmt: skip
+
+
+def test_saved_files_are_named_and_never_the_input(served):
+    _, message = same(served)
+    served.post("edit", **message)
+    input = (served.folder / CAPTURE).read_bytes()
+    for _ in range(2):  # the second time it replaces what it wrote itself
+        status, answer = served.post("save")
+        assert (status, answer["saved"]) == (200, "trial.corrected.c3d")
+    assert (served.folder / CAPTURE).read_bytes() == input
+    saved = am.io.read_tracks(served.folder / "trial.corrected.c3d")
+    edits = am.io.read_edits(served.folder / "trial.edits.toml", am.read(served.folder / CAPTURE))
+    expected = am.track(am.read(served.folder / CAPTURE), edits=edits)
+    assert saved.n_tracks == expected.n_tracks
+
+
+def test_a_session_is_continued_and_stopped(folder):
+    served = Served(folder)
+    _, message = same(served)
+    served.post("edit", **message)
+    served.listen()  # an open page does not hold it up
+    assert served.stop(signal.SIGTERM)[0] == 0
+    served = Served(folder)
+    events = served.listen()
+    wait(lambda: bool(events))
+    assert len(events[0][1]["edits"]) == 1
+    assert served.post("undo")[0] == 200
+    assert served.stop() == (0, "")
