@@ -99,14 +99,15 @@ class DistanceProfiles {
     return found;
   }
 
-  // Log densities of the distances of a part by the profile of each track, relative to its own; 0
+  // Log densities of the distances of a part by the profiles of other tracks, relative to its own; 0
   // where too few distances are known. The last is that of an unknown marker.
-  std::vector<double> densities(const TrackPart& part) {
-    std::vector<double> found(static_cast<std::size_t>(all_.n_tracks) + 1, 0);
+  std::vector<double> densities(const TrackPart& part, std::span<const std::int64_t> others) {
+    std::vector<double> found(others.size() + 1, 0);
     if (!choose_steady(part)) return found;
-    for (std::int32_t k = 0; k < static_cast<std::int32_t>(all_.n_tracks); ++k)
-      if (const double own = density(part.track, k); k != part.track && std::isfinite(own))
-        found[k] = own;
+    for (std::size_t i = 0; i < others.size(); ++i) {
+      const double other = density(part.track, static_cast<std::int32_t>(others[i]));
+      if (std::isfinite(other)) found[i] = other;
+    }
     found.back() = unknown(part.track);
     return found;
   }

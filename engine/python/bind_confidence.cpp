@@ -137,15 +137,16 @@ class Profiles {
                           others.give({n_parts, n_most}), densities.give({n_parts, n_most}));
   }
 
-  // For parts of tracks, as for `compare`: log densities of each track, and of an unknown marker,
-  // relative to the own track (P, K + 1).
+  // For parts of tracks, as for `compare`: log densities of n other tracks, and of an unknown marker,
+  // relative to the own track (P, n + 1).
   Out<double> densities(const In<std::int64_t>& tracks, const In<std::int64_t>& frames,
-                        const In<std::int64_t>& offsets) {
-    const std::size_t n = static_cast<std::size_t>(n_tracks_) + 1;
+                        const In<std::int64_t>& offsets, const In<std::int64_t>& others) {
+    for (const std::int64_t k : flat(others)) require_track(k);
+    const std::size_t n = others.size() + 1;
     Owned<double> found(tracks.size() * n);
     double* to = found.data.get();
     for (const TrackPart& part : parts_of(tracks, frames, offsets))
-      to = std::ranges::copy(profiles_->densities(part), to).out;
+      to = std::ranges::copy(profiles_->densities(part, flat(others)), to).out;
     return found.give({tracks.size(), n});
   }
 
@@ -192,5 +193,5 @@ void bind_confidence(nb::module_& module) {
            "points"_a, "labels"_a, "offsets"_a, "samples"_a, nb::kw_only(), "n_tracks"_a, "noise"_a)
       .def("agreements", &Profiles::agreements, "pairs"_a)
       .def("compare", &Profiles::compare, "tracks"_a, "frames"_a, "offsets"_a, "partners"_a)
-      .def("densities", &Profiles::densities, "tracks"_a, "frames"_a, "offsets"_a);
+      .def("densities", &Profiles::densities, "tracks"_a, "frames"_a, "offsets"_a, "others"_a);
 }

@@ -498,8 +498,8 @@ class DistanceProfiles:
     def compare(
         self, tracks: Ints, frames: Ints, offsets: Ints, partners: Ints
     ) -> tuple[NDArray[np.bool_], Floats, Ints, Floats]: ...
-    # Log densities of each track and of an unknown marker, relative to the own track.
-    def densities(self, tracks: Ints, frames: Ints, offsets: Ints) -> Floats: ...
+    # Log densities of other tracks and of an unknown marker, relative to the own track.
+    def densities(self, tracks: Ints, frames: Ints, offsets: Ints, others: Ints) -> Floats: ...
 
 # (predicted position of what was at `then`, its variance beyond `r`, log densities of points)
 def carried(

@@ -12,6 +12,7 @@ import pytest
 
 import asterism as am
 from asterism.records import MAX_REPR, record
+from asterism.tracking.pipeline import without_edits
 
 NAMESPACES = (
     "asterism", "asterism.simulate", "asterism.camera", "asterism.model", "asterism.filter",
@@ -131,6 +132,16 @@ def instances():
         am.model.Decision(
             kind="identity", track=3, first=5, last=17, n_detections=9, probability=1 / 3
         ),
+        am.model.Edit(kind="name", at=((3, 5),), name=LONG, who=LONG),
+        am.tracking.Stretch(
+            first=5, last=17, source=3, target=-1, n_detections=9, is_asked=True
+        ),
+        am.tracking.Change(
+            edit=am.model.Edit(kind="name", at=((3, 5),), name=LONG), detections=np.arange(9),
+            before=np.zeros(9), after=np.ones(9), stretches=(), names={},
+        ),
+        am.tracking.Correction(truth, plain),
+        am.edit.Session(am.track(d).recipe, without_edits(am.track(d).recipe, d), Path(LONG)),
         am.tracking.KeptNames(kept=(LONG,) * 9, moved=(), left_out=(LONG,), conflicts=()),
         am.tracking.NameChange(track=3, first=5, last=17, usual=LONG, name=None),
         am.tracking.NameConflict(name=LONG, first=5, last=17, found=LONG, probability=1 / 3),

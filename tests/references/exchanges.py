@@ -67,6 +67,15 @@ def _compare(model, times, t, a, b, log_miss):
     return Compared(total(exchanged) - total(kept), all(has), all(near))
 
 
+def exchange_ratio(model, times, t, a, b, log_miss):
+    """Return the log-likelihood ratio of an exchange of the tails of two tracks at a frame."""
+    (head_a, tail_a), (head_b, tail_b) = _cut(a, t), _cut(b, t)
+    pairs = [(head_a, tail_b, 1), (head_b, tail_a, 1), (head_a, tail_a, -1), (head_b, tail_b, -1)]
+    return sum(
+        sign * _log_likelihood(model, times, head, tail, log_miss) for head, tail, sign in pairs
+    )
+
+
 def _cut(track, t):
     frames, points = track
     n = int((frames < t).sum())

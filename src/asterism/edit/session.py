@@ -13,17 +13,9 @@ from asterism.errors import FormatError, ParameterError
 from asterism.io import read_edits, write, write_edits
 from asterism.model import Decision, Detections, Edit, Recipe
 from asterism.model.recipe import hash_of_edits
-from asterism.tracking import (
-    Correction,
-    Tracked,
-    Uncorrected,
-    assess,
-    conclude,
-    fill_gaps,
-    plan_tracking,
-    settled,
-    without_edits,
-)
+from asterism.tracking import Correction, Tracked, assess, fill_gaps, plan_tracking
+from asterism.tracking.correction import settled
+from asterism.tracking.pipeline import Uncorrected, conclude, without_edits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -118,6 +110,9 @@ class Session:
         for edit in edits:
             session._correction.apply(edit)
         return session
+
+    def __repr__(self) -> str:
+        return f"Session({self.tracks.n_tracks} tracks, {len(self.edits)} edits)"
 
     @property
     def tracks(self) -> Tracks:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 from asterism.checks import check_number
-from asterism.errors import ParameterError
+from asterism.errors import ParameterError, clipped
 from asterism.records import record
 
 __all__ = ["Edit", "EditKind"]
@@ -76,4 +76,5 @@ class Edit:
 
     def __repr__(self) -> str:
         places = ", ".join(f"frame {frame} point {point}" for frame, point in self.at)
-        return f"Edit({self.kind}{f' {self.name}' * bool(self.name)}: {places})"
+        name = f" {clipped(self.name, 80)}" if self.name else ""
+        return f"Edit({self.kind}{name}: {places})"

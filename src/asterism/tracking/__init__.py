@@ -2,7 +2,7 @@
 
 from asterism.tracking.choose import AUTO, Choice, choose_method
 from asterism.tracking.confidence import assess
-from asterism.tracking.correction import Change, Correction, Stretch, correct, settled
+from asterism.tracking.correction import Change, Correction, Stretch, correct
 from asterism.tracking.estimation import ModelEstimate, estimate_model
 from asterism.tracking.filling import FilledGap, Filling, fill_gaps
 from asterism.tracking.methods import (
@@ -28,14 +28,7 @@ from asterism.tracking.naming import (
     merge_marker_sets,
     name_tracks,
 )
-from asterism.tracking.pipeline import (
-    Tracked,
-    Uncorrected,
-    carry_out,
-    conclude,
-    track,
-    without_edits,
-)
+from asterism.tracking.pipeline import Tracked, carry_out, track
 from asterism.tracking.plan import Plan, plan_tracking
 from asterism.tracking.rigidity import Bonds, learn_bonds
 from asterism.tracking.stitching import (
@@ -76,13 +69,11 @@ __all__ = [
     "Stitching",
     "Stretch",
     "Tracked",
-    "Uncorrected",
     "Update",
     "assess",
     "carry_out",
     "check_names",
     "choose_method",
-    "conclude",
     "correct",
     "estimate_model",
     "fill_gaps",
@@ -92,9 +83,7 @@ __all__ = [
     "method_by_name",
     "name_tracks",
     "plan_tracking",
-    "settled",
     "stitch",
     "track",
     "tracklet_model",
-    "without_edits",
 ]

@@ -146,7 +146,7 @@ def compare(
         spacing = (lengths - 1) / np.maximum(counts - 1, 1)
         chosen = np.repeat(begins, counts) + (rank * np.repeat(spacing, counts)).astype(np.int64)
         frames = frame[order[chosen]].astype(np.int64)
-        profiles = learn_profiles(tracks, noise_sigma, frames)
+        profiles = learn_profiles(tracks.detections, tracks.labels, noise_sigma, frames)
         found = profiles.engine.compare(
             parts.track[used],
             np.searchsorted(profiles.frames, frames).astype(np.int64),

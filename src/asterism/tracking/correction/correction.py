@@ -28,6 +28,14 @@ __all__ = ["Change", "Correction", "Stretch", "correct", "settled"]
 
 CANDIDATES = 5
 """Number of other tracks that are considered for a part that leaves its track."""
+CLUTTER = -2
+"""Label, while an edit is solved, of the detections without a track that one of them begins."""
+TRACKED = 3.0
+"""Log odds of a detection that continues a track being of its marker instead of clutter."""
+IDLE = 50
+"""Frames along a track after which no more detections without a track are looked for."""
+MIN_FIT = -12.0
+"""Smallest log likelihood, relative to straight motion, of a detection that continues another."""
 
 
 @record
@@ -80,7 +88,7 @@ class Change:
     names: dict[int, tuple[str | None, str | None]]
 
     def __repr__(self) -> str:
-        return f"Change({repr(self.edit)[5:-1]}: {len(self.detections)} detections)"
+        return f"Change({self.edit.kind}: {len(self.detections)} detections)"
 
 
 def correct(
@@ -204,6 +212,9 @@ class Correction:
         self._constraints = Constraints(self._d)
         self._done: list[tuple[Change, Constraints, int]] = []
 
+    def __repr__(self) -> str:
+        return f"Correction({self._tracks.n_tracks} tracks, {len(self.edits)} edits)"
+
     @property
     def edits(self) -> tuple[Edit, ...]:
         """Edits that hold now, in their order."""
@@ -286,12 +297,14 @@ class Correction:
             return
         if a < 0 and b < 0:
             a = self._new_track()
-            self._move(own[0], -1, a)
+            self._take(own[0], a)
         if a < 0 or b < 0:
-            detection, track = (own[0], b) if a < 0 else (own[1], a)
-            self._move(detection, -1, track)
+            (one, other), track = (own, b) if a < 0 else ((own[1], own[0]), a)
+            self._take(one, track, beside=other)
             return
-        self._carry_out(self._solve(own[1], b, a), self._solve(own[0], a, b))
+        self._carry_out(
+            self._solve(own[1], b, a, beside=own[0]), self._solve(own[0], a, b, beside=own[1])
+        )
 
     def _part(self, own: Sequence[int], is_here: bool) -> None:
         """Bring two detections of one track to different tracks."""
@@ -301,14 +314,16 @@ class Correction:
         found: list[_Solution | None] = []
         later = max(own, key=lambda i: self._d.frame_of[i])
         cut = int(self._d.frame_of[later]) if is_here else None
-        for detection in own:
+        for detection, beside in ((own[0], own[1]), (own[1], own[0])):
             others = self._evidence.best(detection, self._labels, CANDIDATES)
             found += [
-                self._solve(detection, a, other, cut)
+                self._solve(detection, a, other, cut, beside=beside)
                 for other in (*others, len(self._names))
                 if self._may_be(detection, other)
             ]
         self._carry_out(*found)
+        if (self._labels == len(self._names)).any():
+            self._new_track()
 
     def _drop(self, detection: int) -> None:
         """Make the part of a detection clutter."""
@@ -330,7 +345,7 @@ class Correction:
         named = self._names.index(name) if name in self._names else -1
         if track < 0:
             track = named if named >= 0 else self._new_track()
-            self._move(detection, -1, track)
+            self._take(detection, track)
         elif named >= 0 and named != track:
             self._carry_out(self._solve(detection, track, named))
         elif named < 0:
@@ -357,13 +372,23 @@ class Correction:
         return len(self._names) - 1
 
     def _solve(
-        self, detection: int, source: int, target: int, cut: int | None = None
+        self,
+        detection: int,
+        source: int,
+        target: int,
+        cut: int | None = None,
+        beside: int | None = None,
+        labels: NDArray[np.int64] | None = None,
     ) -> _Solution | None:
-        """Return the gain and the labels with a detection and its group on another track."""
+        """Return the gain and the labels with a detection and its group on another track.
+
+        The detection `beside` of the same edit stays where it is.
+        """
         group = self._constraints.group(detection)
-        fixed = np.array(sorted((self._constraints.pinned - group) | self._constraints.clutter))
-        labels, frame = self._labels.copy(), self._d.frame_of
-        gain = 0.0
+        fixed = (self._constraints.pinned - group) | self._constraints.clutter
+        fixed = np.array(sorted(fixed | ({beside} if beside is not None else set())))
+        labels = self._labels.copy() if labels is None else labels
+        frame, gain = self._d.frame_of, 0.0
         for each in sorted(group, key=lambda i: (i != detection, i)):
             if labels[each] != source:
                 continue
@@ -394,7 +419,12 @@ class Correction:
         return Lane(
             detections=own,
             frames=self._d.frame_of[own],
-            gains=evidence.gains(own, labels, other),
+            gains=(
+                np.full(len(own), TRACKED if track == CLUTTER else -TRACKED)
+                if CLUTTER in (track, other)
+                else evidence.gains(own, labels, other)
+            ),
+            starts=starts,
             before=before,
             pinned=np.isin(own, fixed),
         )
@@ -405,25 +435,50 @@ class Correction:
         if not found:
             raise _NoSolution
         self._labels = max(found, key=lambda each: each[0])[1]
-        while len(self._names) <= self._labels.max(initial=-1):
-            self._names.append(None)
 
-    def _move(self, detection: int, source: int, target: int) -> None:
-        """Bring clutter to a track: the tracklet of a ghost, or one detection."""
-        part, frame = self._evidence.part_of, self._d.frame_of
-        own = np.array([detection])
-        if part[detection] >= 0:
-            own = np.flatnonzero((part == part[detection]) & (self._labels == source))
-            own = own[~np.isin(own, list(self._constraints.clutter))]
-        there = np.flatnonzero(self._labels == target)
-        pinned = frame[there[np.isin(there, list(self._constraints.pinned))]]
-        if frame[detection] in pinned:
-            raise _NoSolution
-        # Only where the track has no detection, and at the detection itself.
-        taken = np.isin(frame[own], frame[there]) & (own != detection)
-        own = own[~taken]
-        self._labels[there[frame[there] == frame[detection]]] = -1
-        self._labels[own] = target
+    def _take(self, detection: int, target: int, beside: int | None = None) -> None:
+        """Bring a detection without a track, and those around that continue it, to a track.
+
+        Where the track has a detection in the same frame, both may be exchanged.
+        """
+        labels, frame = self._labels.copy(), self._d.frame_of
+        chain = np.array(self._chain(detection, target))
+        is_taken = np.isin(frame[chain], frame[labels == target])
+        labels[chain[~is_taken]] = target
+        if labels[detection] != target:
+            labels[chain[is_taken]] = CLUTTER
+            found = self._solve(detection, CLUTTER, target, beside=beside, labels=labels)
+            if found is None:
+                raise _NoSolution
+            labels = found[1]
+            labels[labels == CLUTTER] = -1  # given for them, or not taken
+        self._labels = labels
+
+    def _chain(self, detection: int, target: int) -> list[int]:
+        """Return the detections without a track that continue one of them by motion."""
+        d, fixed, labels = self._d, self._constraints.clutter, self._labels
+        chain = [detection]
+        for way in (1, -1):
+            before, head, newest = -1, detection, int(d.frame_of[detection])
+            t = newest + way
+            while (
+                0 <= t < d.n_frames
+                and abs(t - int(d.frame_of[head])) <= self._motion.max_gap
+                and abs(t - newest) <= IDLE
+            ):
+                own = np.arange(d.offsets[t], d.offsets[t + 1])
+                own = own[(labels[own] < 0) | (labels[own] == target)]
+                own = own[[i not in fixed for i in own.tolist()]] if fixed else own
+                if len(own):
+                    fits = self._motion.continuation(before, head, own)
+                    best = int(np.argmax(fits))
+                    if fits[best] >= MIN_FIT:
+                        before, head = head, int(own[best])
+                        if labels[head] < 0:
+                            chain.append(head)
+                            newest = t
+                t += way
+        return chain
 
     def _change(
         self, edit: Edit, own: Sequence[int], labels: NDArray[np.int64], names: list[str | None]

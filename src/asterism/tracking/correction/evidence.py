@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asterism.model import Tracks
 from asterism.tracking.confidence.calibration import MARGINS, PART
 from asterism.tracking.confidence.identity import examine
 from asterism.tracking.confidence.parts import PART_FRAMES
@@ -15,7 +14,7 @@ from asterism.tracking.rigidity.profiles import learn_profiles
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.model import TrackingModel
+    from asterism.model import TrackingModel, Tracks
     from asterism.tracking.stitching import Stitching
 
 __all__ = ["Evidence"]
@@ -45,7 +44,7 @@ class Evidence:
         self, tracks: Tracks, model: TrackingModel, stitching: Stitching | None = None
     ) -> None:
         parts = examine(tracks, model, stitching).parts
-        self._tracks, self._noise = tracks, model.sensor.noise_sigma
+        self._detections, self._noise = tracks.detections, model.sensor.noise_sigma
         self.before = parts.before
         n = len(parts.track)
         self.part_of = np.full(len(tracks.labels), -1)
@@ -73,9 +72,9 @@ class Evidence:
         """
         if not len(detections):
             return np.empty(0)
-        found, counts = self._densities(detections, labels)
-        is_new = then >= found.shape[1] - 1 or not (labels == then).any()
-        density, factor = (found[:, -1], PART[1]) if is_new else (found[:, then], PART[2])
+        others = np.array([then] if (labels == then).any() else [], dtype=np.int64)
+        found, counts = self._densities(detections, labels, others)
+        density, factor = found[:, 0], PART[2] if len(others) else PART[1]
         gain = factor * np.clip(density, -MARGINS[1], -MARGINS[0])
         return np.repeat(gain / counts, counts)
 
@@ -94,15 +93,16 @@ class Evidence:
         own = np.flatnonzero(
             (self.part_of == self.part_of[detection]) & (labels == labels[detection])
         )
-        found = self._densities(own, labels)[0][0, :-1]
+        others = np.unique(labels[(labels >= 0) & (labels != labels[detection])])
+        found = self._densities(own, labels, others)[0][0, :-1]
         order = np.argsort(-found, kind="stable")
-        return [int(k) for k in order if k != labels[detection] and found[k] != 0][:n]
+        return [int(others[i]) for i in order if found[i] != 0][:n]
 
     def _densities(
-        self, detections: NDArray[np.int64], labels: NDArray[np.int64]
+        self, detections: NDArray[np.int64], labels: NDArray[np.int64], others: NDArray[np.int64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return the log densities of the parts of a track, and the lengths of the parts."""
-        d, parts = self._tracks.detections, self.part_of[detections]
+        d, parts = self._detections, self.part_of[detections]
         starts = np.flatnonzero(np.concatenate([[True], parts[1:] != parts[:-1]]))
         lengths = np.diff(np.append(starts, len(parts)))
         counts = np.minimum(lengths, PART_FRAMES)
@@ -111,11 +111,11 @@ class Evidence:
         spacing = (lengths - 1) / np.maximum(counts - 1, 1)
         chosen = np.repeat(starts, counts) + (rank * np.repeat(spacing, counts)).astype(np.int64)
         frames = d.frame_of[detections[chosen]].astype(np.int64)
-        tracks = Tracks(detections=d, labels=labels)
-        profiles = learn_profiles(tracks, self._noise, frames)
+        profiles = learn_profiles(d, labels, self._noise, frames)
         found = profiles.engine.densities(
             np.full(len(starts), labels[detections[0]]),
             np.searchsorted(profiles.frames, frames).astype(np.int64),
             offsets,
+            others,
         )
         return found, lengths

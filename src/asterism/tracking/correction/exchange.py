@@ -47,6 +47,8 @@ class Lane:
         Their frames.
     gains : ndarray of shape (n,)
         Log odds that each gains in the other lane.
+    starts : ndarray of bool, shape (n,)
+        Whether a part of the track begins with each; within a part no link is uncertain.
     before : ndarray of shape (n,)
         Probability of the link that leads to each.
     pinned : ndarray of bool, shape (n,)
@@ -56,6 +58,7 @@ class Lane:
     detections: NDArray[np.int64]
     frames: NDArray[np.int64]
     gains: NDArray[np.float64]
+    starts: NDArray[np.bool_]
     before: NDArray[np.float64]
     pinned: NDArray[np.bool_]
 
@@ -94,7 +97,7 @@ class Motion:
         usual = np.bincount(kind[1:]).argmax() if len(kind) > 1 else 0
         self._q = float(Q[usual, Q.shape[1] // 2, 0, 0])
         self._r = 6 * model.sensor.noise_sigma**2
-        self._max_gap = model.population.max_gap + 1
+        self.max_gap = model.population.max_gap + 1
         self._model = model
 
     def ratios(self, lanes: tuple[Lane, Lane], cuts: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -132,7 +135,27 @@ class Motion:
             Detections before and after, -1 for none.
         """
         n = self._frame[tail] - self._frame[head]
-        return (head >= 0) & (tail >= 0) & (n <= self._max_gap)
+        return (head >= 0) & (tail >= 0) & (n <= self.max_gap)
+
+    def continuation(
+        self, before: int, head: int, others: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Return how well detections of one frame continue two others, forward or backward.
+
+        Parameters
+        ----------
+        before, head : int
+            The two detections to continue; -1 for `before` if there is one alone.
+        others : ndarray of int, shape (n,)
+            Detections that may come next.
+        """
+        y, frame = self._d.points, self._frame
+        n = float(frame[others[0]] - frame[head])
+        velocity, factor = np.zeros(self._d.n_axes), 9.0
+        if before >= 0:
+            velocity, factor = (y[head] - y[before]) / (frame[head] - frame[before]), 1.0
+        off = y[others] - y[head] - n * velocity
+        return -(off**2).sum(axis=1) / (2 * factor * (self._r + self._q * abs(n) ** 3))
 
     def log_likelihood(
         self, before: NDArray[np.int64], head: NDArray[np.int64], tail: NDArray[np.int64]
@@ -150,7 +173,7 @@ class Motion:
         step = np.where(straight, frame[head] - frame[before], 1)[:, None]
         velocity = np.where(straight[:, None], (y[head] - y[before]) / step, 0)
         off = y[tail] - y[head] - n * velocity
-        variance = self._r + self._q * n[:, 0].clip(0, self._max_gap) ** 3
+        variance = self._r + self._q * n[:, 0].clip(0, self.max_gap) ** 3
         variance = np.where(straight, variance, 9 * variance)
         deviation = np.minimum((off**2).sum(axis=1) / (2 * variance), FARTHEST)
         return np.where(self.is_short(head, tail), -deviation, BEGIN)
@@ -185,8 +208,7 @@ def best_exchange(
         return None
     lowest = int(pins[pins < frame].max(initial=-1)) + 1
     highest = int(pins[pins > frame].min(initial=NEVER))
-    frames = np.concatenate([lane.frames for lane in lanes])
-    all_cuts = np.unique(np.concatenate([frames, [frames.max(initial=frame) + 1]]))
+    all_cuts = _cuts(lanes, (lowest, frame), (frame + 1, highest))
     costs = _costs(lanes, all_cuts, motion)
     total = np.zeros(len(all_cuts))
     for lane in lanes:
@@ -209,6 +231,18 @@ def best_exchange(
     return Exchange(
         first=int(all_cuts[i]), end=int(all_cuts[j]), gain=float(from_begin[i] + from_end[j])
     )
+
+
+def _cuts(lanes: tuple[Lane, Lane], *ranges: tuple[int, int]) -> NDArray[np.int64]:
+    """Return the frames in which parts begin or have ended, and all frames of a range without."""
+    frames = np.concatenate([lane.frames for lane in lanes])
+    begins = [lane.frames[lane.starts] for lane in lanes]
+    ends = [lane.frames[np.append(lane.starts[1:], True)[: len(lane.frames)]] + 1 for lane in lanes]
+    cuts = np.concatenate([*begins, *ends])
+    for low, high in ranges:
+        if not ((cuts >= low) & (cuts <= high)).any():
+            cuts = np.concatenate([cuts, frames[(frames >= low) & (frames <= high)], [high]])
+    return np.unique(cuts)
 
 
 def _costs(

@@ -12,7 +12,7 @@ from asterism.records import record
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asterism.model import Tracks
+    from asterism.model import Detections
 
 __all__ = ["Profiles", "learn_profiles"]
 
@@ -37,7 +37,10 @@ class Profiles:
 
 
 def learn_profiles(
-    tracks: Tracks, noise_sigma: float, also: NDArray[np.int64] | None = None
+    detections: Detections,
+    labels: NDArray[np.int64],
+    noise_sigma: float,
+    also: NDArray[np.int64] | None = None,
 ) -> Profiles:
     """Learn the distances of all tracks from frames spread through the capture.
 
@@ -45,14 +48,16 @@ def learn_profiles(
 
     Parameters
     ----------
-    tracks : Tracks
-        Tracks of a capture.
+    detections : Detections
+        Detections of a capture.
+    labels : ndarray of int, shape (N,)
+        Track of each detection.
     noise_sigma : float
         Standard deviation of a coordinate, metres.
     also : ndarray of int, optional
         Frames with parts of tracks that will be compared with the profiles.
     """
-    d = tracks.detections
+    d = detections
     n = min(SAMPLES, d.n_frames)
     samples = np.arange(n) * d.n_frames // max(n, 1)
     frames = samples if also is None else np.union1d(samples, also)
@@ -63,10 +68,10 @@ def learn_profiles(
         frames=frames,
         engine=_engine.DistanceProfiles(
             np.ascontiguousarray(d.points[rows]),
-            tracks.labels[rows],
+            labels[rows],
             offsets,
             np.searchsorted(frames, samples).astype(np.int64),
-            n_tracks=tracks.n_tracks,
+            n_tracks=int(labels.max(initial=-1)) + 1,
             noise=noise_sigma,
         ),
     )

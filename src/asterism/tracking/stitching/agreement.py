@@ -48,7 +48,8 @@ def agreeing(
     pairs = _in_turn(tracks, max_occlusion)
     if not len(pairs):
         return []
-    ratio = learn_profiles(tracks, noise_sigma).engine.agreements(pairs)
+    profiles = learn_profiles(tracks.detections, tracks.labels, noise_sigma)
+    ratio = profiles.engine.agreements(pairs)
     found: list[tuple[int, int]] = []
     for i in np.argsort(-ratio, kind="stable"):
         if ratio[i] < AGREEMENT:

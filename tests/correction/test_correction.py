@@ -1,0 +1,202 @@
+"""Corrections: edits hold, what does not depend on them keeps its bytes, and undo restores all."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.model import Edit
+from asterism.simulate import Burst, Ghosts
+from asterism.tracking.correction.constraints import detections_of
+from tests.scenes import sized
+
+
+@pytest.fixture(scope="module")
+def walk():
+    truth = am.simulate.person(activity="walk", frames=300, seed=3)
+    corrupted = am.simulate.corrupt(truth, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=3)
+    plan = am.tracking.plan_tracking(corrupted.detections)
+    model = am.tracking.tracklet_model(plan.recipe.model)
+    tracklets = am.track(corrupted.detections, plan.method, model=model, stitch=False)
+    return corrupted, am.stitch(tracklets, model), model
+
+
+def swapped(truth, a, b, first, end):
+    """Return tracks in which two markers are exchanged for a while."""
+    labels, frame = truth.labels.copy(), truth.detections.frame_of
+    inside = (frame >= first) & (frame < end)
+    labels[inside & (truth.labels == a)], labels[inside & (truth.labels == b)] = b, a
+    return am.Tracks(detections=truth.detections, labels=labels, names=truth.names)
+
+
+def at(d, *detections):
+    frames = [int(d.frame_of[i]) for i in detections]
+    return tuple((t, int(i - d.offsets[t])) for i, t in zip(detections, frames, strict=True))
+
+
+def nearest_pair(truth, frame):
+    positions = truth.positions()[frame]
+    off = np.linalg.norm(positions[:, None] - positions[None], axis=-1)
+    off[~np.isfinite(off) | (off == 0)] = np.inf
+    return tuple(map(int, np.unravel_index(off.argmin(), off.shape)))
+
+
+@pytest.mark.parametrize("end", [180, 300])
+def test_one_statement_mends_an_exchange_on_both_tracks(end):
+    truth = am.simulate.person(activity="walk", frames=300, seed=3)
+    a, b = nearest_pair(truth, 100)
+    tracks = swapped(truth, a, b, 100, end)
+    model = am.estimate_model(truth.detections).model
+    own = np.flatnonzero(truth.labels == a)
+    edit = Edit(kind="same", at=at(truth.detections, own[20], own[140]))
+    found = am.tracking.correct(tracks, [edit], model)
+    assert am.evaluate(tracks, truth).idf1 < 1
+    assert am.evaluate(found, truth).idf1 == 1
+
+
+def test_a_cut_parts_a_track_exactly_there():
+    truth = am.simulate.cube(frames=100, seed=2)
+    model = am.estimate_model(truth.detections).model
+    own = np.flatnonzero(truth.labels == 3)
+    edit = Edit(kind="cut", at=at(truth.detections, own[40], own[41]))
+    found = am.tracking.correct(truth, [edit], model)
+    sides = found.labels[own]
+    assert len(set(sides[:41])) == len(set(sides[41:])) == 1
+    assert sides[40] != sides[41]
+    others = truth.labels != 3
+    assert (found.labels[others] == truth.labels[others]).all()
+
+
+def test_a_name_goes_to_the_track_and_follows_the_marker():
+    truth = am.simulate.person(activity="walk", frames=200, seed=3)
+    named = am.Tracks(
+        detections=truth.detections, labels=truth.labels, names=(None,) * truth.n_tracks
+    )
+    model = am.estimate_model(truth.detections).model
+    one = int(np.flatnonzero(truth.labels == 4)[50])
+    edit = Edit(kind="name", at=at(truth.detections, one), name="ANKLE")
+    found = am.tracking.correct(named, [edit], model)
+    assert found.names.index("ANKLE") == 4
+    assert (found.labels == truth.labels).all()
+
+
+def test_clutter_deletes_a_part_and_same_brings_it_back(walk):
+    _, stitching, model = walk
+    tracks = stitching.tracks
+    correction = am.tracking.Correction(tracks, model, stitching)
+    own = np.flatnonzero(tracks.labels == 2)
+    change = correction.apply(Edit(kind="clutter", at=at(tracks.detections, own[10])))
+    assert own[10] in change.detections
+    assert set(change.after.tolist()) == {-1}
+    assert set(change.before.tolist()) == {2}
+
+
+def random_edit(rng, tracks):
+    d, labels = tracks.detections, tracks.labels
+    kind = str(rng.choice(["same", "same", "same", "different", "cut", "clutter", "name"]))
+    i, j = rng.choice(len(labels), 2, replace=False)
+    if kind == "cut":
+        own = np.flatnonzero(labels == labels[i])
+        if labels[i] < 0 or len(own) < 2:
+            return None
+        n = int(rng.integers(1, len(own)))
+        i, j = own[n - 1], own[n]
+    if kind in ("clutter", "name"):
+        name = str(rng.choice(["A", "B", "C"])) if kind == "name" else ""
+        return Edit(kind=kind, at=at(d, i), name=name)
+    return None if d.frame_of[i] == d.frame_of[j] else Edit(kind=kind, at=at(d, i, j))
+
+
+def holds(edit, tracks):
+    own = detections_of(edit, tracks.detections)
+    labels = tracks.labels[list(own)]
+    if edit.kind == "same":
+        return labels[0] == labels[1] >= 0
+    if edit.kind in ("different", "cut"):
+        return labels[0] != labels[1] or labels[0] < 0
+    if edit.kind == "name":
+        return tracks.names[labels[0]] == edit.name
+    return labels[0] < 0
+
+
+@pytest.mark.parametrize("seed", range(sized(12, 4)))
+def test_random_edits_hold_and_undo_restores_every_byte(seed, walk):
+    _, stitching, model = walk
+    rng = np.random.default_rng(seed)
+    correction = am.tracking.Correction(stitching.tracks, model, stitching)
+    states = [(correction.tracks.labels.tobytes(), correction.tracks.names)]
+    applied = []
+    for _ in range(40):
+        edit = random_edit(rng, correction.tracks)
+        if edit is None:
+            continue
+        before = correction.tracks.labels.copy()
+        try:
+            change = correction.apply(edit)
+        except am.ParameterError:
+            assert (correction.tracks.labels == before).all()
+            continue
+        applied.append(edit)
+        now = correction.tracks
+        assert all(holds(each, now) for each in applied), edit
+        changed = np.flatnonzero(now.labels != before)
+        assert changed.tolist() == change.detections.tolist()
+        assert (before[changed] == change.before).all()
+        touched = set(change.before.tolist()) | set(change.after.tolist())
+        assert len(touched - {-1}) <= 2 or edit.kind == "same"
+        assert sum(each.n_detections for each in change.stretches) == len(changed)
+        states.append((now.labels.tobytes(), now.names))
+    assert len(applied) > 10
+    replayed = am.tracking.Correction(stitching.tracks, model, stitching)
+    for edit in applied:
+        replayed.apply(edit)
+    assert replayed.tracks.labels.tobytes() == states[-1][0]
+    for labels, names in reversed(states):
+        assert correction.tracks.labels.tobytes() == labels
+        assert correction.tracks.names == names
+        correction.undo()
+    assert correction.undo() is None
+
+
+@pytest.mark.parametrize(
+    ("method", "stitch"), list(itertools.product(["gnn", "jpda", "mcmcda"], [False, True]))
+)
+def test_every_method_respects_edits_and_repeats_them(method, stitch):
+    truth = am.simulate.corrupt(
+        am.simulate.cube(frames=80, seed=4), missing=0.05, clutter=0.1, seed=4
+    )
+    d = truth.detections
+    own = np.flatnonzero(truth.labels == 1)
+    other = np.flatnonzero(truth.labels == 2)
+    edits = [
+        Edit(kind="same", at=at(d, own[5], own[-5])),
+        Edit(kind="different", at=at(d, own[5], other[20])),
+        Edit(kind="name", at=at(d, own[5]), name="CORNER"),
+    ]
+    tracks = am.track(d, method, stitch=stitch, edits=edits)
+    assert all(holds(edit, tracks) for edit in edits)
+    again = am.track(d, recipe=tracks.recipe, edits=edits)
+    assert (again.labels == tracks.labels).all()
+    assert again.names == tracks.names
+    with pytest.raises(am.ParameterError, match="edits"):
+        am.track(d, recipe=tracks.recipe)
+
+
+def test_a_gap_is_filled_or_left_open_as_stated():
+    truth = am.simulate.corrupt(
+        am.simulate.cube(frames=100, rate=100, seed=1), missing=0.05, seed=1
+    )
+    d = truth.detections
+    gap, other = truth.gaps()[:2]
+    own = np.flatnonzero(truth.labels == gap.track)
+    ends = [own[d.frame_of[own] < gap.first][-1], own[d.frame_of[own] > gap.last][0]]
+    fill, leave = (Edit(kind=kind, at=at(d, *ends)) for kind in ("fill", "no_fill"))
+    alone = am.fill_gaps(truth, longest=0.0, edits=[fill])
+    assert [(g.track, g.first) for g in alone.gaps if g.is_filled] == [(gap.track, gap.first)]
+    left = am.fill_gaps(truth, edits=[leave])
+    reasons = {(g.track, g.first): g.reason for g in left.gaps}
+    assert reasons[gap.track, gap.first] == "left open by an edit"
+    assert reasons[other.track, other.first] == ""
