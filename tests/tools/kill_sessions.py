@@ -13,6 +13,7 @@ import argparse
 import asyncio
 import json
 import os
+import select
 import signal
 import tempfile
 import time
@@ -51,7 +52,7 @@ def kill_one(session: Session, path: Path, seed: int) -> int:
         finally:
             os._exit(1)
     os.close(writer)
-    # The first steps are confirmed after some milliseconds.
+    select.select([reader], [], [])  # it has begun
     time.sleep(float(rng.uniform(0, MAX_SECONDS)))
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
