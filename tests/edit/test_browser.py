@@ -56,8 +56,8 @@ def press(page, selector):
 
 def assert_clean(page, served):
     assert page.complaints() == []
-    assert all(url.startswith(f"http://{served.own}/") or url.startswith(("data:", "blob:"))
-               for url in page.requests())  # fmt: skip
+    own = (f"http://{served.own}/", "data:", "blob:")
+    assert all(url.startswith(own) for url in page.requests())
 
 
 def labels_on_page(page):

@@ -12,7 +12,8 @@ import numpy as np
 from asterism.edit.view import View
 from asterism.errors import AsterismError, ParameterError
 from asterism.reporting.page import Editing
-from asterism.tracking import assess, settled
+from asterism.tracking import assess
+from asterism.tracking.correction import settled
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Sequence
