@@ -91,9 +91,9 @@ def report(
     >>> truth = am.simulate.cube(seed=1)
     >>> am.report(am.track(truth.detections), "cube.html", truth=truth)  # doctest: +SKIP
     """
+    check_kind("tracks", tracks, Tracks, "am.track(detections)")
     d, path = tracks.detections, check_path("path", path)
     if editor:
-        check_kind("tracks", tracks, Tracks, "am.track(detections)")
         tracks = tracks.measured()
     contents = contents_of(
         tracks, truth=truth, rig=rig, naming=naming, made=made, summary=summary, title=title, up=up

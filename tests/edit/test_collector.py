@@ -1,0 +1,71 @@
+"""The report page with an editor, without a server: edits are collected and downloaded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.cli import main
+from tests.edit.served import CAPTURE
+from tests.reporting.browser import CHROMIUM
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
+
+KEEP_DOWNLOADS = """
+  const made = URL.createObjectURL;
+  URL.createObjectURL = (blob) => {
+    blob.text().then((text) => { globalThis.downloaded = text; });
+    return made.call(URL, blob);
+  };
+"""
+
+
+def test_collected_edits_are_those_of_the_capture(browser, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    assert main(["track", CAPTURE, "-o", "tracked.csv", "-q"]) == 0
+    assert main(["report", "tracked.csv", "--editor", "-q"]) == 0
+    page = browser.page(folder / "tracked.html", before=KEEP_DOWNLOADS)
+    state = "document.getElementById('edit-state').textContent"
+    page.run("asterism.seek(100); asterism.choose(3)")
+    page.key("k")
+    page.wait(f"{state} === '1 edit in this page'")
+    page.run("asterism.choose(5)")
+    page.key("c")
+    page.wait(f"{state} === '2 edits in this page'")
+    page.key("z")
+    page.wait(f"{state} === '1 edit in this page'")
+    page.run("document.getElementById('edit-name').value = 'C7 \"a\"'")
+    page.run("document.getElementById('edit-give').click()")
+    page.wait(f"{state} === '2 edits in this page'")
+    page.key("b")
+    page.wait("globalThis.downloaded !== undefined")
+    text = page.run("downloaded")
+    (folder / "tracked.edits.toml").write_text(text)
+    capture = am.read(folder / "tracked.csv")
+    ghost, name = am.io.read_edits(folder / "tracked.edits.toml", capture)
+    labels = am.io.read_tracks(folder / "tracked.csv").labels
+    for edit, kind, track in ((ghost, "clutter", 3), (name, "name", 5)):
+        ((frame, point),) = edit.at
+        assert edit.kind == kind
+        assert labels[capture.offsets[frame] + point] == track
+    assert name.name == 'C7 "a"'
+    assert np.abs(ghost.at[0][0] - 100) < 20
+    assert page.complaints() == []
+    assert all(url.startswith(("file:", "blob:")) for url in page.requests())
+    page.close()
+    # They are respected by the tracking of the same file.
+    line = "track tracked.csv --edits tracked.edits.toml -o again.csv -q"
+    assert main(line.split()) == 0
+    again = am.io.read_tracks(folder / "again.csv")
+    assert again.names[again.labels[capture.offsets[name.at[0][0]] + name.at[0][1]]] == 'C7 "a"'
+
+
+def test_pages_without_an_editor_carry_none_of_it(folder):
+    tracks = am.track(am.read(folder / CAPTURE))
+    am.report(tracks, folder / "plain.html")
+    am.report(tracks, folder / "editor.html", editor=True)
+    plain, editor = ((folder / f"{name}.html").read_bytes() for name in ("plain", "editor"))
+    assert b"edit-swap" not in plain
+    assert b"x-asterism-token" not in plain
+    assert len(editor) < len(plain) + 100_000
