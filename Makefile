@@ -59,6 +59,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/calibration.py --seeds 6 --markdown docs/tables/calibration.md
 	$(BIN)/python benchmarks/identity_methods.py --markdown docs/tables/identity_methods.md
 	$(BIN)/python benchmarks/places.py --markdown docs/tables/places.md
+	$(BIN)/python benchmarks/correction.py --markdown docs/tables/correction.md
 	$(BIN)/python benchmarks/field.py --markdown docs/tables --figure docs/images/field_growth.svg
 	$(BIN)/python benchmarks/fills.py --markdown docs/tables/fills.md
 	$(BIN)/python benchmarks/names.py --markdown docs/tables/names.md

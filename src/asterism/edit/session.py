@@ -195,6 +195,9 @@ class Session:
     def refuse(self, change: Change, i: int) -> Change:
         """Take back one of the stretches that followed from an edit, by a further edit.
 
+        Where its former track now has the detections of the edit at that time, the stretch cannot
+        return to it; it is then stated to be of another marker than its new track.
+
         Parameters
         ----------
         change : Change
@@ -222,7 +225,12 @@ class Session:
         ]
         own = own[(frame[own] >= stretch.first) & (frame[own] <= stretch.last)]
         middle = int(own[len(own) // 2])
-        anchor = self._anchor(stretch.source, middle)
+        is_taken = any(
+            each.is_asked and each.target == stretch.source and each.first <= stretch.last
+            and each.last >= stretch.first
+            for each in change.stretches
+        )  # fmt: skip
+        anchor = None if is_taken else self._anchor(stretch.source, middle)
         if anchor is None:
             return self.apply(self.edit("different", middle, self._other(stretch.target, own)))
         return self.apply(self.edit("same", anchor, middle))
