@@ -139,7 +139,7 @@ def correct(
 
 
 def settled(tracks: Tracks, edits: Sequence[Edit]) -> Tracks:
-    """Return tracks without the doubts that edits settle.
+    """Return tracks in which what edits state is certain.
 
     Parameters
     ----------
