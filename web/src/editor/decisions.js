@@ -28,11 +28,16 @@ export class Decisions {
     if (same) {
       this.shown = same;
       this.draw(); // its probabilities may have changed
-    } else if (this.isWaiting && this.list.length) this.show(this.list[0]);
+    } else if ((this.isWaiting || this.isVisited()) && this.list.length) this.show(this.list[0]);
     else {
       this.shown = null;
       this.draw();
     }
+  }
+
+  /** Whether the reader is at the shown decision, and has not selected another track. */
+  isVisited() {
+    return this.shown !== null && this.state.chosen === this.shown.track;
   }
 
   /** Leave out what a change may have settled; the next assessment follows. */
