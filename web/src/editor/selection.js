@@ -79,9 +79,10 @@ export class Selection {
     const names = this.tracks.map((k) => this.capture.header.names[k]);
     const parts = names.slice(0, 4).flatMap((name, n) => [n ? ", " : "", named(name)]);
     if (names.length > 4) parts.push(` and ${names.length - 4} more`);
-    if (this.point >= 0) parts.push(parts.length ? " and a point of clutter" : "A point of clutter");
+    if (this.point >= 0) parts.push(parts.length ? " and a point of clutter" : "a point of clutter");
     if (this.kept >= 0 && this.point < 0) parts.push(": select a second one");
     if (!parts.length) parts.push("Select a marker to correct it.");
+    else parts.unshift("Selected: ");
     byId("selection").replaceChildren(...parts);
     const [n, hasPoint] = [this.tracks.length, this.point >= 0];
     const can = {

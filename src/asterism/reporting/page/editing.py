@@ -24,6 +24,7 @@ _KEYS = {
     "1 … 9": "choose the answer with that number",
     "X": "exchange two selected tracks from this frame on",
     "J": "join two selected tracks, or a point and a track",
+    "U": "select the next point of clutter in this frame",
     "E": "keep the selected track, to select a second one",
     "O": "lasso: draw around markers to select them",
     "C, Shift C": "cut the track: from this frame on, up to this frame",
