@@ -20,8 +20,8 @@ __all__ = ["Exchanges", "find_exchanges"]
 
 
 CHUNK, MARGIN = 4000, 64
-"""Number of frames that are searched at a time, and of those around that are looked at. They bound
-the memory, and do not depend on the length of the capture."""
+"""Number of frames that are searched at a time, and of those around that are looked at, in which a
+link can be too. They bound the memory, and do not depend on the length of the capture."""
 
 
 @record(eq=False)
@@ -107,14 +107,17 @@ def _in_frames(
     d, (low, high), (kind, F, Q) = tracks.detections, frames, steps
     first = int(d.offsets[low])
     rows = slice(first, int(d.offsets[high]))
-    # A tracklet that is in several tracks is one piece in each of them.
+    # A tracklet that is in several tracks is one piece in each of them, and a long gap, as an edit
+    # leaves it in a tracklet, ends a piece.
     pieces = tracklets[rows].astype(np.int64) * (tracks.n_tracks + 1) + tracks.labels[rows] + 1
     inside = np.flatnonzero(tracklets[rows] >= 0)
     _, piece = np.unique(pieces[inside], return_inverse=True)
     order = np.argsort(piece, kind="stable")
     own, piece = inside[order] + first, piece[order]
-    offsets = np.concatenate([[0], np.cumsum(np.bincount(piece))]).astype(np.int64)
     frame = d.frame_of[own].astype(np.int64) - low
+    ends = (np.diff(piece) != 0) | (np.diff(frame) > MARGIN)
+    piece = np.concatenate([[0], np.cumsum(ends)])[: len(own)]
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(piece))]).astype(np.int64)
     cut, *pair, ratios, _ = _engine.exchanges(
         motion_model(model, d.n_axes), d.times[low:high], kind[low:high], F, Q,
         np.ascontiguousarray(d.points[own]), frame, offsets,

@@ -1,5 +1,7 @@
 """Correction: tracks that respect the edits of a person."""
 
-from asterism.tracking.correction.correction import Change, Correction, Stretch, correct, settled
+from asterism.tracking.correction.change import Change, Stretch
+from asterism.tracking.correction.correct import correct, settled
+from asterism.tracking.correction.correction import Correction
 
 __all__ = ["Change", "Correction", "Stretch", "correct", "settled"]

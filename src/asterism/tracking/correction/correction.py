@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,8 +9,7 @@ import numpy as np
 from asterism.checks import check_kind
 from asterism.errors import ParameterError
 from asterism.model import Edit, TrackingModel, Tracks
-from asterism.records import record
-from asterism.tracking.confidence.calibration import WHOLE
+from asterism.tracking.correction.change import Change, change_of
 from asterism.tracking.correction.constraints import Constraints, detections_of
 from asterism.tracking.correction.evidence import Evidence
 from asterism.tracking.correction.exchange import Lane, Motion, best_exchange
@@ -21,10 +19,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from asterism.model import Decision
     from asterism.tracking.stitching import Stitching
 
-__all__ = ["Change", "Correction", "Stretch", "correct", "settled"]
+__all__ = ["Correction"]
 
 CANDIDATES = 5
 """Number of other tracks that are considered for a part that leaves its track."""
@@ -36,136 +33,6 @@ IDLE = 50
 """Frames along a track after which no more detections without a track are looked for."""
 MIN_FIT = -12.0
 """Smallest log likelihood, relative to straight motion, of a detection that continues another."""
-
-
-@record
-class Stretch:
-    """Detections that changed from one track to another, in a stretch of time.
-
-    Parameters
-    ----------
-    first, last : int
-        First and last frame.
-    source, target : int
-        Track before and after the change, -1 for clutter.
-    n_detections : int
-        Number of detections.
-    is_asked : bool
-        Whether a detection of the edit is among them; other stretches follow from it.
-    """
-
-    first: int
-    last: int
-    source: int
-    target: int
-    n_detections: int
-    is_asked: bool
-
-
-@record(eq=False)
-class Change:
-    """What an edit changed.
-
-    Parameters
-    ----------
-    edit : Edit
-        The edit.
-    detections : ndarray of int, shape (n,)
-        Detections whose track changed, rising.
-    before, after : ndarray of int, shape (n,)
-        Their tracks before and after the edit, -1 for clutter.
-    stretches : tuple of Stretch
-        The same by stretches of time.
-    names : dict of int to tuple of (str or None)
-        Name before and after of each track whose name changed.
-    """
-
-    edit: Edit
-    detections: NDArray[np.int64]
-    before: NDArray[np.int64]
-    after: NDArray[np.int64]
-    stretches: tuple[Stretch, ...]
-    names: dict[int, tuple[str | None, str | None]]
-
-    def __repr__(self) -> str:
-        return f"Change({self.edit.kind}: {len(self.detections)} detections)"
-
-
-def correct(
-    tracks: Tracks,
-    edits: Sequence[Edit],
-    model: TrackingModel,
-    stitching: Stitching | None = None,
-) -> Tracks:
-    """Change tracks so that they respect the edits of a person.
-
-    Parameters
-    ----------
-    tracks : Tracks
-        Tracks of a capture, from any method, stitched and named or not.
-    edits : sequence of Edit
-        Edits, which are solved in their order.
-    model : TrackingModel
-        Model of motion and noise with which they were tracked.
-    stitching : Stitching, optional
-        Stitching that made the tracks.
-
-    Returns
-    -------
-    Tracks
-        Tracks with the same numbers; those that lost all their detections are left out.
-
-    Raises
-    ------
-    ParameterError
-        If edits contradict each other or do not belong to these detections.
-
-    Examples
-    --------
-    >>> import asterism as am
-    >>> from asterism.model import Edit
-    >>> truth = am.simulate.cube(frames=40, seed=1)
-    >>> model = am.estimate_model(truth.detections).model
-    >>> d = truth.detections
-    >>> ghost = Edit(kind="clutter", at=((0, 0),))
-    >>> am.tracking.correct(truth, [ghost], model)
-    Tracks(7 tracks, 280 detections in them, 40 clutter, 40 frames)
-    """
-    correction = Correction(tracks, model, stitching)
-    for edit in edits:
-        correction.apply(edit)
-    found = correction.tracks
-    return found if found.lengths.all() or not edits else _without_empty(found, tracks.lengths)
-
-
-def settled(tracks: Tracks, edits: Sequence[Edit]) -> Tracks:
-    """Return tracks in which what edits state is certain.
-
-    Parameters
-    ----------
-    tracks : Tracks
-        Corrected tracks with identity confidences and decisions.
-    edits : sequence of Edit
-        Edits that they respect. The identity of a part with one of their detections is certain.
-    """
-    pinned = sorted(Constraints.of(edits, tracks.detections).pinned)
-    if not pinned or tracks.identity_confidence is None:
-        return tracks
-    frames = tracks.detections.frame_of
-    stated: dict[int, list[int]] = {}
-    for i in pinned:
-        stated.setdefault(int(tracks.labels[i]), []).append(int(frames[i]))
-    identity = tracks.identity_confidence.copy()
-    kept: list[Decision] = []
-    for each in tracks.decisions:
-        own = stated.get(each.track, [])
-        if each.kind != "identity" or not any(each.first <= t <= each.last for t in own):
-            kept.append(each)
-            continue
-        part = np.flatnonzero(tracks.labels == each.track)
-        part = part[(frames[part] >= each.first) & (frames[part] <= each.last)]
-        identity[part] = WHOLE
-    return replace(tracks, identity_confidence=identity, decisions=tuple(kept))
 
 
 class Correction:
@@ -273,7 +140,9 @@ class Correction:
                 "edits", "a solution that respects the earlier edits",
                 f"none for {repr(edit)[5:-1]}", hint,
             ) from error  # fmt: skip
-        change = self._change(edit, own, labels, names)
+        change = change_of(
+            edit, own, self._d.frame_of, (labels, self._labels), (names, self._names)
+        )
         self._done.append((change, self._constraints, len(names)))
         self._constraints = constraints
         return change
@@ -480,58 +349,9 @@ class Correction:
                 t += way
         return chain
 
-    def _change(
-        self, edit: Edit, own: Sequence[int], labels: NDArray[np.int64], names: list[str | None]
-    ) -> Change:
-        changed = np.flatnonzero(self._labels != labels)
-        before, after = labels[changed], self._labels[changed]
-        frame = self._d.frame_of[changed]
-        stretches: list[Stretch] = []
-        for source, target in dict.fromkeys(zip(before.tolist(), after.tolist(), strict=True)):
-            which = np.flatnonzero((before == source) & (after == target))
-            stretches += [
-                Stretch(
-                    first=int(frame[run[0]]), last=int(frame[run[-1]]), source=source,
-                    target=target, n_detections=len(run),
-                    is_asked=bool(np.isin(changed[run], own).any()),
-                )
-                for run in np.split(which, self._breaks(changed[which], source, labels))
-            ]  # fmt: skip
-        stretches.sort(key=lambda each: (not each.is_asked, each.first, each.source))
-        both = [*names, *[None] * (len(self._names) - len(names))]
-        return Change(
-            edit=edit, detections=changed, before=before, after=after, stretches=tuple(stretches),
-            names={
-                k: (old, new)
-                for k, (old, new) in enumerate(zip(both, self._names, strict=True))
-                if old != new
-            },
-        )  # fmt: skip
-
-    def _breaks(
-        self, moved: NDArray[np.int64], source: int, labels: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
-        """Return where detections of a track that moved do not follow each other in it."""
-        if source < 0:
-            return np.empty(0, dtype=np.int64)
-        place = np.searchsorted(np.flatnonzero(labels == source), moved)
-        return np.flatnonzero(np.diff(place) > 1) + 1
-
 
 _Solution = tuple[float, "NDArray[np.int64]"]
 
 
 class _NoSolution(Exception):
     """No exchange respects the earlier edits."""
-
-
-def _without_empty(tracks: Tracks, before: NDArray[np.int64]) -> Tracks:
-    """Leave out the tracks that edits emptied."""
-    old = np.zeros(tracks.n_tracks, dtype=bool)
-    old[: len(before)] = before == 0
-    kept = (tracks.lengths > 0) | old
-    numbers = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
-    return replace(
-        tracks, labels=numbers[tracks.labels],
-        names=tuple(name for name, keep in zip(tracks.names, kept, strict=True) if keep),
-    )  # fmt: skip

@@ -1,0 +1,127 @@
+"""What an edit changed, by detections and by stretches of time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from asterism.model import Edit
+
+__all__ = ["Change", "Stretch", "change_of"]
+
+
+@record
+class Stretch:
+    """Detections that changed from one track to another, in a stretch of time.
+
+    Parameters
+    ----------
+    first, last : int
+        First and last frame.
+    source, target : int
+        Track before and after the change, -1 for clutter.
+    n_detections : int
+        Number of detections.
+    is_asked : bool
+        Whether a detection of the edit is among them; other stretches follow from it.
+    """
+
+    first: int
+    last: int
+    source: int
+    target: int
+    n_detections: int
+    is_asked: bool
+
+
+@record(eq=False)
+class Change:
+    """What an edit changed.
+
+    Parameters
+    ----------
+    edit : Edit
+        The edit.
+    detections : ndarray of int, shape (n,)
+        Detections whose track changed, rising.
+    before, after : ndarray of int, shape (n,)
+        Their tracks before and after the edit, -1 for clutter.
+    stretches : tuple of Stretch
+        The same by stretches of time.
+    names : dict of int to tuple of (str or None)
+        Name before and after of each track whose name changed.
+    """
+
+    edit: Edit
+    detections: NDArray[np.int64]
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
+    stretches: tuple[Stretch, ...]
+    names: dict[int, tuple[str | None, str | None]]
+
+    def __repr__(self) -> str:
+        return f"Change({self.edit.kind}: {len(self.detections)} detections)"
+
+
+def change_of(
+    edit: Edit,
+    own: Sequence[int],
+    frame_of: NDArray[np.int64],
+    labels: tuple[NDArray[np.int64], NDArray[np.int64]],
+    names: tuple[list[str | None], list[str | None]],
+) -> Change:
+    """Return what an edit changed.
+
+    Parameters
+    ----------
+    edit : Edit
+        The edit.
+    own : sequence of int
+        Its detections.
+    frame_of : ndarray of int, shape (N,)
+        Frame of each detection.
+    labels : tuple of two ndarray of int, shape (N,)
+        Track of each detection before and after.
+    names : tuple of two list
+        Names of the tracks before and after; more tracks may be there after.
+    """
+    changed = np.flatnonzero(labels[0] != labels[1])
+    before, after = labels[0][changed], labels[1][changed]
+    frame = frame_of[changed]
+    stretches: list[Stretch] = []
+    for source, target in dict.fromkeys(zip(before.tolist(), after.tolist(), strict=True)):
+        which = np.flatnonzero((before == source) & (after == target))
+        stretches += [
+            Stretch(
+                first=int(frame[run[0]]), last=int(frame[run[-1]]), source=source,
+                target=target, n_detections=len(run),
+                is_asked=bool(np.isin(changed[run], own).any()),
+            )
+            for run in np.split(which, _breaks(changed[which], source, labels[0]))
+        ]  # fmt: skip
+    stretches.sort(key=lambda each: (not each.is_asked, each.first, each.source))
+    old = [*names[0], *[None] * (len(names[1]) - len(names[0]))]
+    return Change(
+        edit=edit, detections=changed, before=before, after=after, stretches=tuple(stretches),
+        names={
+            k: (one, other)
+            for k, (one, other) in enumerate(zip(old, names[1], strict=True))
+            if one != other
+        },
+    )  # fmt: skip
+
+
+def _breaks(moved: NDArray[np.int64], source: int, labels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return where detections of a track that moved do not follow each other in it."""
+    if source < 0:
+        return np.empty(0, dtype=np.int64)
+    place = np.searchsorted(np.flatnonzero(labels == source), moved)
+    return np.flatnonzero(np.diff(place) > 1) + 1
