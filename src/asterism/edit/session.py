@@ -12,7 +12,7 @@ from asterism.checks import check_kind, check_path
 from asterism.errors import FormatError, ParameterError
 from asterism.io import read_edits, write, write_edits
 from asterism.model import Decision, Detections, Edit, Recipe
-from asterism.model.recipe import hash_of_edits
+from asterism.model.recipe import hash_of_edits, sha256_of
 from asterism.tracking import Correction, Tracked, assess, fill_gaps, plan_tracking
 from asterism.tracking.correction import settled
 from asterism.tracking.pipeline import Uncorrected, conclude, without_edits
@@ -59,6 +59,7 @@ class Session:
         self.recipe, self.begun, self.path, self.who = recipe, begun, path, who
         self._correction = Correction(begun.tracks, begun.model, begun.stitching)
         self._undone: list[Edit] = []
+        self._sha256 = sha256_of(begun.tracks.detections)
 
     @classmethod
     def open(
@@ -167,7 +168,7 @@ class Session:
         """
         change = self._correction.apply(edit)
         try:
-            write_edits(self.path, self.edits, self.tracks.detections)
+            self._write(self.edits)
         except FormatError:
             self._correction.undo()
             raise
@@ -179,7 +180,7 @@ class Session:
         edits = self.edits
         if not edits:
             return None
-        write_edits(self.path, edits[:-1], self.tracks.detections)
+        self._write(edits[:-1])
         self._undone.append(edits[-1])
         return self._correction.undo()
 
@@ -329,6 +330,9 @@ class Session:
         if not 0 < at < len(own) or (frame[at - 1], frame[at]) != (first - 1, last + 1):
             raise ParameterError("track", f"a gap from {first} to {last}", f"track {track}")
         return self.edit(kind, int(own[at - 1]), int(own[at]))
+
+    def _write(self, edits: Sequence[Edit]) -> None:
+        write_edits(self.path, edits, self.begun.tracks.detections, sha256=self._sha256)
 
     def result(self) -> Tracked:
         """Return what ``am.track`` returns for these edits."""

@@ -78,7 +78,9 @@ def read_edits(path: str | Path, detections: Detections) -> tuple[Edit, ...]:
     return tuple(edits)
 
 
-def write_edits(path: str | Path, edits: Sequence[Edit], detections: Detections) -> None:
+def write_edits(
+    path: str | Path, edits: Sequence[Edit], detections: Detections, *, sha256: str = ""
+) -> None:
     """Write edits to a file, completely or not at all.
 
     Parameters
@@ -89,6 +91,8 @@ def write_edits(path: str | Path, edits: Sequence[Edit], detections: Detections)
         Edits, in their order.
     detections : Detections
         Detections to which they refer; their SHA-256 is in the file.
+    sha256 : str
+        That SHA-256, where it is known already; it takes 10 ms for 500 000 points.
 
     Raises
     ------
@@ -96,7 +100,7 @@ def write_edits(path: str | Path, edits: Sequence[Edit], detections: Detections)
         If the file cannot be written.
     """
     shift = detections.first_frame if isinstance(detections, Capture) else 1
-    lines = [HEAD, f'sha256 = "{sha256_of(detections)}"\n']
+    lines = [HEAD, f'sha256 = "{sha256 or sha256_of(detections)}"\n']
     for edit in edits:
         places = ", ".join(f"[{frame + shift}, {point}]" for frame, point in edit.at)
         lines.append(f'\n[[edit]]\nkind = "{edit.kind}"\nat = [{places}]\n')

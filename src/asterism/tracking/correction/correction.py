@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Correction"]
 
-CANDIDATES = 5
+CANDIDATES = 3
 """Number of other tracks that are considered for a part that leaves its track."""
 CLUTTER = -2
 """Label, while an edit is solved, of the detections without a track that one of them begins."""
@@ -78,6 +78,7 @@ class Correction:
         self._names = list(tracks.names)
         self._constraints = Constraints(self._d)
         self._done: list[tuple[Change, Constraints, int]] = []
+        self._now: Tracks | None = None  # made when it is asked for
 
     def __repr__(self) -> str:
         return f"Correction({self._tracks.n_tracks} tracks, {len(self.edits)} edits)"
@@ -97,10 +98,12 @@ class Correction:
         """Tracks now, with the numbers from before; emptied tracks have no detection."""
         if not self._done:
             return self._tracks
-        return Tracks(
-            detections=self._d, labels=self._labels, names=tuple(self._names),
-            info=self._tracks.info, recipe=self._tracks.recipe,
-        )  # fmt: skip
+        if self._now is None:
+            self._now = Tracks(
+                detections=self._d, labels=self._labels, names=tuple(self._names),
+                info=self._tracks.info, recipe=self._tracks.recipe,
+            )  # fmt: skip
+        return self._now
 
     def apply(self, edit: Edit) -> Change:
         """Change the tracks so that they respect one more edit.
@@ -144,6 +147,7 @@ class Correction:
             edit, own, self._d.frame_of, (labels, self._labels), (names, self._names)
         )
         self._done.append((change, self._constraints, len(names)))
+        self._now = None
         self._constraints = constraints
         return change
 
@@ -153,6 +157,7 @@ class Correction:
             return None
         change, self._constraints, n = self._done.pop()
         self._labels[change.detections] = change.before
+        self._now = None
         del self._names[n:]
         for track, (before, _) in change.names.items():
             if track < n:
