@@ -49,8 +49,7 @@ class ExchangeSearch {
   double ratio(std::int64_t t) const {
     Piece piece(*this);
     piece.move_to(t, std::array<std::int32_t, 2>{0, 1});
-    Cursor &a = piece.cursors[0], &b = piece.cursors[1];
-    return piece.tail(a, b) + piece.tail(b, a) - piece.tail(a, a) - piece.tail(b, b);
+    return piece.tail(0, 1) + piece.tail(1, 0) - piece.tail(0, 0) - piece.tail(1, 1);
   }
 
   // Exchanges by rising frame. Pieces of time are searched in parallel.
@@ -91,11 +90,7 @@ class ExchangeSearch {
   struct Cursor {
     std::span<const Point> points;
     std::span<const std::int64_t> frames;
-    std::size_t next = 0;    // index of the first detection of the tail
-    std::size_t stated = 0;  // value of `next` to which `head` belongs
-    std::size_t kept_at = 0;  // value of `next` to which `kept` belongs
-    double kept = 0;          // log likelihood of the own tail after the head
-    MotionState head;         // after the detection before `next`
+    std::size_t next = 0;  // index of the first detection of the tail
 
     bool has_head() const { return next > 0; }
     bool has_tail() const { return next < frames.size(); }
@@ -103,6 +98,12 @@ class ExchangeSearch {
     void move_to(std::int64_t t) {
       while (next < frames.size() && frames[next] < t) ++next;
     }
+  };
+  // What is computed of a track at a cut where it is first needed.
+  struct Filtered {
+    std::size_t head_at = 0, kept_at = 0;  // values of `next` to which these belong
+    MotionState head;  // after the last detection of the head
+    double kept = 0;   // log likelihood of the own tail after the head
   };
   // An open track at the frame of a cut, with its head in straight motion.
   struct Open {
@@ -142,16 +143,18 @@ class ExchangeSearch {
       open[k] = i;
     }
     void compare(const Open& head, std::size_t from, std::size_t to) {
+      // Copies, which nothing that is written can change: so the compiler vectorises the loop.
       const double shared = head.has_tail ? 1 : 0, since = static_cast<double>(head.frame);
+      const double reach_of_head = head.reach2;
+      const auto [x0, y0, z0] = static_cast<std::array<double, kMaxAxes>>(head.at);
+      const auto [vx, vy, vz] = static_cast<std::array<double, kMaxAxes>>(head.velocity);
       const double *x = at[0].data(), *y = at[1].data(), *z = at[2].data(), *f = frame.data(),
                    *r = reach2.data();
       double* out = excess.data();
       for (std::size_t k = from; k < to; ++k) {
         const double n = f[k] - since;
-        const double dx = x[k] - head.at[0] - n * head.velocity[0];
-        const double dy = y[k] - head.at[1] - n * head.velocity[1];
-        const double dz = z[k] - head.at[2] - n * head.velocity[2];
-        out[k] = dx * dx + dy * dy + dz * dz - (head.reach2 + shared * r[k]);
+        const double dx = x[k] - x0 - n * vx, dy = y[k] - y0 - n * vy, dz = z[k] - z0 - n * vz;
+        out[k] = dx * dx + dy * dy + dz * dz - (reach_of_head + shared * r[k]);
       }
     }
   };
@@ -159,8 +162,8 @@ class ExchangeSearch {
   // The search in a piece of time, with its own places in the tracks.
   struct Piece {
     explicit Piece(const ExchangeSearch& all) : s(all) {
-      for (const Track& own : s.tracks_)
-        cursors.push_back({own.points, own.frames, 0, 0, 0, 0, {}});
+      for (const Track& own : s.tracks_) cursors.push_back({own.points, own.frames});
+      filtered.resize(cursors.size());
     }
 
     template <typename Tracks>
@@ -229,13 +232,25 @@ class ExchangeSearch {
         const Open& one = opened[i];
         if (!one.has_head) continue;
         const double reach = std::sqrt(one.reach2);
-        const auto x_of = &std::pair<double, std::int32_t>::first;
-        const auto from = std::ranges::lower_bound(by_x, one.x - reach, {}, x_of) - by_x.begin();
-        const auto to = std::ranges::upper_bound(by_x, one.x + reach, {}, x_of) - by_x.begin();
-        compare(t, i, from, to, found);
+        const double low = one.x - reach, high = one.x + reach;
+        compare(t, i, tails_until([&](double x) { return x < low; }),
+                tails_until([&](double x) { return x <= high; }), found);
         // A tail that begins later is compared only where the own link is cut.
         if (one.arrives) compare(t, i, by_x.size(), tails.open.size(), found);
       }
+    }
+    // Number of tails in `by_x` up to the last one for which a property of their place holds, which
+    // holds for all before. The search has no branch that depends on the places: the processor
+    // would predict every second one wrongly.
+    template <typename Holds>
+    std::size_t tails_until(Holds&& holds) const {
+      std::size_t at = 0;
+      for (std::size_t n = by_x.size(); n > 0;) {
+        const std::size_t half = n - n / 2;
+        at += holds(by_x[at + half - 1].first) * half;
+        n -= half;
+      }
+      return at;
     }
     // Compares the head of a track with tails.
     void compare(std::int64_t t, std::int32_t i, std::size_t from, std::size_t to,
@@ -254,39 +269,42 @@ class ExchangeSearch {
       if (!other.arrives && !one.arrives) return;
       if (is_mutual && s.deviation(one, other) + s.deviation(other, one) > one.reach2 + other.reach2)
         return;
-      Cursor &a = cursors[one.track], &b = cursors[other.track];
+      const std::int32_t a = one.track, b = other.track;
       const double kept_a = one.has_tail ? kept(a) : 0, kept_b = other.has_head ? kept(b) : 0;
       // Least log likelihood of what is exchanged; most pairs are far below.
       const double min = kMinGain - kRounding + kept_a + kept_b;
-      double gain = tail(a, b, is_mutual ? min - s.highest(a) : min);
+      double gain = tail(a, b, is_mutual ? min - s.highest(cursors[a]) : min);
       if (is_mutual && gain != kNone) gain += tail(b, a, min - gain);
       gain = gain - kept_a - kept_b;
       if (!(gain >= kMinGain)) return;
-      Exchange& made = found.emplace_back(Exchange{t, {one.track, other.track}, {}, gain});
-      if (other.track < one.track) std::swap(made.track[0], made.track[1]);
+      Exchange& made = found.emplace_back(Exchange{t, {std::min(a, b), std::max(a, b)}, {}, gain});
       for (const int side : {0, 1})
         made.tail[side] = static_cast<std::int64_t>(cursors[made.track[side]].next);
     }
 
-    const MotionState& head(Cursor& own) const {
-      if (own.stated == own.next) return own.head;
+    const MotionState& head(std::int32_t k) {
+      const Cursor& own = cursors[k];
+      Filtered& known = filtered[k];
+      if (known.head_at == own.next) return known.head;
       const std::size_t first = own.next - std::min(own.next, kHead);
-      own.head = begin_state(s.m_, own.points[first]);
+      known.head = begin_state(s.m_, own.points[first]);
       for (std::size_t j = first + 1; j < own.next; ++j)
-        s.advance(own.head, own.frames[j - 1], own, j);
-      own.stated = own.next;
-      return own.head;
+        s.advance(known.head, own.frames[j - 1], own, j);
+      known.head_at = own.next;
+      return known.head;
     }
     // Log likelihood of the first detections of the own tail after the head.
-    double kept(Cursor& own) const {
-      if (own.kept_at != own.next) own.kept = tail(own, own);
-      own.kept_at = own.next;
-      return own.kept;
+    double kept(std::int32_t k) {
+      Filtered& known = filtered[k];
+      if (known.kept_at != cursors[k].next) known.kept = tail(k, k);
+      known.kept_at = cursors[k].next;
+      return known.kept;
     }
-    // Log likelihood of the first detections of a tail after a head; -inf as soon as it is below a
-    // minimum whatever follows.
-    double tail(Cursor& before, const Cursor& after, double min = kNone) const {
-      MotionState state = head(before);
+    // Log likelihood of the first detections of the tail of track b after the head of track a; -inf
+    // as soon as it is below a minimum whatever follows.
+    double tail(std::int32_t a, std::int32_t b, double min = kNone) {
+      const Cursor &before = cursors[a], &after = cursors[b];
+      MotionState state = head(a);
       std::int64_t last = before.frames[before.next - 1];
       double sum = s.log_miss_ * static_cast<double>(after.frames[after.next] - last - 1);
       const std::size_t end = after.tail_end();
@@ -300,6 +318,7 @@ class ExchangeSearch {
 
     const ExchangeSearch& s;
     std::vector<Cursor> cursors;
+    std::vector<Filtered> filtered;
     std::vector<std::int32_t> open;
     // Of the frame that is compared.
     std::vector<Open> opened;
