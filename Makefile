@@ -38,6 +38,7 @@ bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/smooth.py --lengths 500 1000 2000 4000 8000 \
 	  --markdown docs/tables/whole_captures.md
 	$(BIN)/python benchmarks/stream.py --markdown docs/tables/stream.md
+	$(BIN)/python benchmarks/stream.py --flat --markdown docs/tables/stream_flat.md
 	$(BIN)/python benchmarks/joint.py --markdown docs/tables/joint.md
 	$(BIN)/python benchmarks/k_best.py --markdown docs/tables/k_best.md
 	$(BIN)/python benchmarks/threads.py --markdown docs/tables/threads.md

@@ -9,7 +9,10 @@ the third row is that step without the time that the method takes inside it. Tim
 processor in the thread, because others share the machine. Memory is that of the process after a
 third of `--min-frames`, when the method has seen all recorded frames, and at the end of the stream.
 
-    python benchmarks/stream.py [--frames N] [--min-frames N] [--seconds S] [--recorded N]
+With `--flat`, one stream of `--frames` frames is measured instead: GNN, stitched, of the cube's
+markers in bursts, with the mean step and the memory of each tenth.
+
+    python benchmarks/stream.py [--flat] [--frames N] [--min-frames N] [--seconds S] [--recorded N]
                                 [--methods NAME …] [--jobs N] [--markdown FILE]
 """
 
@@ -115,6 +118,25 @@ def measured(
     return 1e3 * taken[:n], early, resident()
 
 
+def flat_rows(n_frames: int, n_recorded: int) -> list[list[str]]:
+    """Measure a long stitched stream of few markers: a row for each tenth of it."""
+    cube = am.simulate.cube(frames=n_recorded, seed=1)
+    capture = am.simulate.corrupt(cube, burst=Burst(), ghosts=Ghosts(), noise=3e-4, seed=1)
+    method = am.tracking.Stitched(method=METHODS["gnn"])
+    state = method.init(am.estimate_model(capture.detections).model)
+    rows: list[list[str]] = []
+    tenth, spent = n_frames // 10, 0.0
+    for t, (now, points) in enumerate(back_and_forth(capture.detections, 10 * tenth), start=1):
+        start = thread_time()
+        state, _ = method.step(state, now, points)
+        spent += thread_time() - start
+        if t % tenth == 0:
+            rows.append([f"{t:,}", f"{1e3 * spent / tenth:.4f}", f"{resident():.1f}"])
+            print(*rows[-1], flush=True)
+            spent = 0.0
+    return rows
+
+
 def rows_of(options: argparse.Namespace, name: str) -> list[list[str]]:
     """Measure a method in a stream: a row of its own, and two of its stitching if that is asked."""
     person = am.simulate.person(seed=1, frames=min(options.recorded, options.frames))
@@ -144,8 +166,16 @@ def main() -> None:
     parser.add_argument("--recorded", type=int, default=6000, help="frames through which it goes")
     parser.add_argument("--methods", nargs="+", choices=list(METHODS), default=list(METHODS))
     parser.add_argument("--jobs", type=int, default=1, help="methods measured at a time")
+    parser.add_argument("--flat", action="store_true", help="one long stream of few markers")
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
+    if options.flat:
+        lines = table(
+            ["frames", "mean step since the row before, ms", "MB"],
+            flat_rows(options.frames, options.recorded),
+        )
+        publish([*lines, "", f"Processor time. {conditions()}."], options.markdown)
+        return
     options.min_frames = min(options.min_frames, options.frames)
     rows: list[list[str]] = []
     spawn = multiprocessing.get_context("spawn")

@@ -66,11 +66,13 @@ class DistanceProfiles {
   // Log density ratio of two tracks being of one marker against two, by the steadiest distances that
   // both have; -inf without enough of them.
   double agreement(std::int32_t a, std::int32_t b) {
-    const std::vector<Distance>&of_a = profile(a), &of_b = profile(b);
     steady_.clear();
-    for (std::size_t r = 0; r < references_.size(); ++r)
-      if (references_[r] != a && references_[r] != b && of_a[r].is_known() && of_b[r].is_known())
-        steady_.push_back({std::hypot(of_a[r].spread, of_b[r].spread), r});
+    for (std::size_t r = 0; r < references_.size(); ++r) {
+      if (references_[r] == a || references_[r] == b) continue;
+      const Distance &of_a = distance(a, r), &of_b = distance(b, r);
+      if (of_a.is_known() && of_b.is_known())
+        steady_.push_back({std::hypot(of_a.spread, of_b.spread), r});
+    }
     if (steady_.size() < kMinAgreeing) return -std::numeric_limits<double>::infinity();
     const std::size_t n = std::min(steady_.size(), kNeighbours);
     std::partial_sort(steady_.begin(), steady_.begin() + static_cast<std::ptrdiff_t>(n),
@@ -78,7 +80,7 @@ class DistanceProfiles {
     double sum = 0;
     for (std::size_t i = 0; i < n; ++i) {
       const auto& [spread, r] = steady_[i];
-      const double off = of_a[r].median - of_b[r].median;
+      const double off = distance(a, r).median - distance(b, r).median;
       sum += log_t(off, spread) - log_t(off, std::hypot(spread, kUnknownSpread));
     }
     return sum / static_cast<double>(n);
@@ -123,21 +125,21 @@ class DistanceProfiles {
   static constexpr double kMaxPresent = 0.2;  // share of a part in which an alternative is present
 
   struct Distance {
-    double median = -1, spread = 0;
+    double median = kNone, spread = 0;
     bool is_known() const { return median >= 0; }
   };
+  // Medians of a distance that is not known, and of one that has not been computed.
+  static constexpr double kNone = -1, kLater = -2;
 
   // Measures the distances of a part, and chooses the steadiest ones of its own track. Returns
   // whether there are enough.
   bool choose_steady(const TrackPart& part) {
     measure(part);
-    const std::vector<Distance>& profile_of_own = profile(part.track);
     steady_.clear();
     for (std::size_t r = 0; r < references_.size(); ++r) {
-      const Distance& own = profile_of_own[r];
-      if (references_[r] != part.track && own.is_known() && distances_[r] >= 0 &&
-          own.spread < kSteady)
-        steady_.push_back({own.spread, r});
+      if (distances_[r] < 0) continue;
+      const Distance& own = distance(part.track, r);
+      if (own.is_known() && own.spread < kSteady) steady_.push_back({own.spread, r});
     }
     if (steady_.size() < kMinNeighbours) return false;
     const std::size_t n = std::min(steady_.size(), kNeighbours);
@@ -148,10 +150,9 @@ class DistanceProfiles {
   }
   // Log density of the chosen distances for an unknown marker, relative to the own track.
   double unknown(std::int32_t own) {
-    const std::vector<Distance>& profile_of_own = profile(own);
     double of_own = 0, of_unknown = 0;
     for (const auto& [spread, r] : steady_) {
-      const double off = distances_[r] - profile_of_own[r].median;
+      const double off = distances_[r] - distance(own, r).median;
       of_own += log_t(off, spread);
       of_unknown += log_t(off, std::hypot(spread, kUnknownSpread));
     }
@@ -160,14 +161,14 @@ class DistanceProfiles {
   // Log density of the chosen distances by the profile of another track, relative to the own; -inf
   // without enough of them.
   double density(std::int32_t own, std::int32_t other) {
-    const std::vector<Distance>&of_own = profile(own), &of_other = profile(other);
     double sum = 0;
     std::size_t n_common = 0;
     for (const auto& [spread, r] : steady_) {
-      if (!of_other[r].is_known() || references_[r] == other) continue;
+      const Distance& of_other = distance(other, r);
+      if (!of_other.is_known()) continue;
       ++n_common;
-      sum += log_t(distances_[r] - of_other[r].median, of_other[r].spread) -
-             log_t(distances_[r] - of_own[r].median, spread);
+      sum += log_t(distances_[r] - of_other.median, of_other.spread) -
+             log_t(distances_[r] - distance(own, r).median, spread);
     }
     return n_common >= kMinNeighbours ? sum / static_cast<double>(n_common)
                                       : -std::numeric_limits<double>::infinity();
@@ -183,8 +184,8 @@ class DistanceProfiles {
     double sum = 0;
     std::size_t n = 0;
     for (const auto& [spread, r] : steady_) {
-      const Distance &a = profile(own)[r], &b = profile(other)[r];
-      if (!b.is_known() || references_[r] == other) continue;
+      const Distance &a = distance(own, r), &b = distance(other, r);
+      if (!b.is_known()) continue;
       const double both = std::hypot(a.spread, b.spread);
       sum += log_t(a.median - b.median, both) - log_t(0, both);
       ++n;
@@ -192,10 +193,10 @@ class DistanceProfiles {
     return n >= kMinNeighbours && sum > kSame * static_cast<double>(n);
   }
   bool has_both(std::int32_t a, std::int32_t b) const {
-    const auto &of_a = samples_[a], &of_b = samples_[b];
+    const std::span<const Sample> of_a = samples_of(a), of_b = samples_of(b);
     for (std::size_t i = 0, j = 0; i < of_a.size() && j < of_b.size();) {
-      if (of_a[i].first == of_b[j].first) return true;
-      of_a[i].first < of_b[j].first ? ++i : ++j;
+      if (of_a[i].frame == of_b[j].frame) return true;
+      of_a[i].frame < of_b[j].frame ? ++i : ++j;
     }
     return false;
   }
@@ -228,51 +229,61 @@ class DistanceProfiles {
     n_present_.resize(all_.n_tracks);
   }
 
-  // Calls take(track, reference or -1, point) for the detections of a frame that are in tracks.
+  // Calls take(track, index of its point) for the detections of a frame that are in tracks.
   template <typename Take>
   void each_in(std::int64_t frame, Take&& take) const {
     for (std::int64_t i = all_.offsets[frame]; i < all_.offsets[frame + 1]; ++i)
       if (const std::int64_t k = all_.labels[i]; k >= 0)
-        take(static_cast<std::int32_t>(k), reference_of_[k], all_.points[i]);
+        take(static_cast<std::int32_t>(k), i);
   }
 
+  // A detection of a track in one of the sampled frames.
+  struct Sample {
+    std::int32_t frame = 0, point = 0;
+  };
+  std::span<const Sample> samples_of(std::int32_t track) const {
+    return std::span(samples_).subspan(begin_[track], begin_[track + 1] - begin_[track]);
+  }
   // Collects the detections of the sampled frames.
   void sample() {
-    const std::size_t R = references_.size();
-    const auto n_samples = static_cast<std::int64_t>(all_.samples.size());
-    samples_.resize(all_.n_tracks);
-    at_.assign(static_cast<std::size_t>(n_samples) * R, {});
-    has_.assign(at_.size(), 0);
-    profiles_.resize(all_.n_tracks);
-    for (std::int64_t s = 0; s < n_samples; ++s)
-      each_in(all_.samples[s], [&](std::int32_t k, std::int32_t r, const Point& y) {
-        samples_[k].push_back({s, y});
-        if (r < 0) return;
-        at_[s * R + r] = y;
-        has_[s * R + r] = 1;
+    begin_.assign(all_.n_tracks + 1, 0);
+    for (const std::int64_t frame : all_.samples)
+      each_in(frame, [&](std::int32_t k, std::int64_t) { ++begin_[k + 1]; });
+    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+    samples_.resize(begin_.back());
+    std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
+    at_.assign(all_.samples.size() * references_.size(), -1);
+    for (std::size_t s = 0; s < all_.samples.size(); ++s)
+      each_in(all_.samples[s], [&](std::int32_t k, std::int64_t i) {
+        const auto point = static_cast<std::int32_t>(i);
+        samples_[next[k]++] = {static_cast<std::int32_t>(s), point};
+        if (const std::int32_t r = reference_of_[k]; r >= 0) at_[r * all_.samples.size() + s] = point;
       });
+    profiles_.resize(all_.n_tracks);
   }
 
-  // The profile of a track, which is computed when it is first needed.
-  const std::vector<Distance>& profile(std::int32_t track) {
+  // The distance of a track to a reference, which is computed when it is first needed.
+  const Distance& distance(std::int32_t track, std::size_t r) {
     std::vector<Distance>& profile = profiles_[track];
-    if (!profile.empty()) return profile;
-    const std::size_t R = references_.size();
-    profile.resize(R);
+    if (profile.empty()) profile.assign(references_.size(), {kLater});
+    if (profile[r].median == kLater) profile[r] = learn(track, r);
+    return profile[r];
+  }
+  Distance learn(std::int32_t track, std::size_t r) {
+    if (references_[r] == track) return {};
     std::vector<double>& values = of_samples_;
-    for (std::size_t r = 0; r < R; ++r) {
-      if (references_[r] == track) continue;
-      values.clear();
-      for (const auto& [s, y] : samples_[track])
-        if (has_[s * R + r]) values.push_back(std::sqrt(squared_distance(y, at_[s * R + r], all_.D)));
-      if (values.size() < kMinFrames) continue;
-      Distance& distance = profile[r];
-      distance.median = median_of(values);
-      for (double& value : values) value = std::abs(value - distance.median);
-      const double spread = kOfNormal * median_of(values), bend = kBend * distance.median;
-      distance.spread = std::sqrt(spread * spread + floor2_ + bend * bend);
-    }
-    return profile;
+    values.clear();
+    const std::int32_t* of_reference = at_.data() + r * all_.samples.size();
+    for (const auto& [s, point] : samples_of(track))
+      if (const std::int32_t other = of_reference[s]; other >= 0)
+        values.push_back(squared_distance(all_.points[point], all_.points[other], all_.D));
+    if (values.size() < kMinFrames) return {};
+    // The root of the median is the median of the roots, which most of the time are not needed.
+    Distance found{std::sqrt(median_of(values))};
+    for (double& value : values) value = std::abs(std::sqrt(value) - found.median);
+    const double spread = kOfNormal * median_of(values), bend = kBend * found.median;
+    found.spread = std::sqrt(spread * spread + floor2_ + bend * bend);
+    return found;
   }
   // The median distances of a part to the references, -1 where there is none.
   void measure(const TrackPart& part) {
@@ -283,13 +294,13 @@ class DistanceProfiles {
     counts_.assign(R, 0);
     for (const std::int64_t frame : part.frames) {
       Point own;
-      each_in(frame, [&](std::int32_t k, std::int32_t, const Point& y) {
+      each_in(frame, [&](std::int32_t k, std::int64_t i) {
         n_present_[k] += 1;
-        if (k == part.track) own = y;
+        if (k == part.track) own = all_.points[i];
       });
-      each_in(frame, [&](std::int32_t, std::int32_t r, const Point& y) {
-        if (r >= 0)
-          values_[r * n_measured_ + counts_[r]++] = std::sqrt(squared_distance(own, y, all_.D));
+      each_in(frame, [&](std::int32_t k, std::int64_t i) {
+        if (const std::int32_t r = reference_of_[k]; r >= 0)
+          values_[r * n_measured_ + counts_[r]++] = squared_distance(own, all_.points[i], all_.D);
       });
     }
     for (std::size_t r = 0; r < R; ++r) {
@@ -297,7 +308,7 @@ class DistanceProfiles {
       if (counts_[r] == 0) continue;
       const auto begin = values_.begin() + static_cast<std::ptrdiff_t>(r * n_measured_);
       std::nth_element(begin, begin + counts_[r] / 2, begin + counts_[r]);
-      distances_[r] = *(begin + counts_[r] / 2);
+      distances_[r] = std::sqrt(*(begin + counts_[r] / 2));
     }
   }
 
@@ -306,9 +317,9 @@ class DistanceProfiles {
   LabelledFrames all_;
   double floor2_;
   std::vector<std::int32_t> references_, reference_of_;
-  std::vector<std::vector<std::pair<std::int64_t, Point>>> samples_;  // of each track
-  std::vector<Point> at_;  // of the references in the sampled frames
-  std::vector<char> has_;  // whether a reference is present
+  std::vector<Sample> samples_;  // one track after the other
+  std::vector<std::size_t> begin_;  // of each track in `samples_`
+  std::vector<std::int32_t> at_;  // point of each reference in the sampled frames, -1 for none
   std::vector<std::vector<Distance>> profiles_;  // of each track, empty until it is needed
   std::vector<double> of_samples_;
   // Of the part that is compared.

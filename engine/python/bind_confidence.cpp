@@ -22,12 +22,14 @@ void require_finite(const In<double>& points) {
           "points: finite");
 }
 
-// Returns (frames, tracks a, tracks b, log-likelihood ratios) of the possible exchanges.
+// Returns the possible exchanges: the last points before (n, 2), the first points after (n, 2), both
+// -1 for none, the log-likelihood ratios, and their frames.
 nb::tuple exchanges(const MotionModel& m, const In<double>& times, const In<std::int32_t>& kind,
                     const In<double>& F, const In<double>& Q, const In<double>& points,
                     const In<std::int64_t>& frames, const In<std::int64_t>& offsets,
-                    double p_detection) {
+                    double p_detection, std::int32_t n_threads) {
   require(p_detection >= 0 && p_detection < 1, "p_detection: from 0 to below 1");
+  require(n_threads >= 1, "n_threads: at least 1");
   require_finite(points);
   const Timeline line = timeline(m, times, kind, F, Q);
   const TrackPoints tracks(points, frames, offsets, m.axis.D, line.times.size());
@@ -37,13 +39,18 @@ nb::tuple exchanges(const MotionModel& m, const In<double>& times, const In<std:
     ExchangeSearch search(m, line, p_detection);
     for (std::size_t k = 0; k < tracks.n_tracks(); ++k)
       search.add(tracks.points_of(k), tracks.frames_of(k));
-    found = search.find();
+    found = search.find(n_threads);
   }
-  return nb::make_tuple(array_of<std::int64_t>(found, &Exchange::frame),
-                        array_of<std::int32_t>(found, &Exchange::a),
-                        array_of<std::int32_t>(found, &Exchange::b),
+  Owned<std::int64_t> before(2 * found.size()), after(2 * found.size());
+  for (std::size_t i = 0; i < found.size(); ++i)
+    for (const int side : {0, 1}) {
+      const std::int64_t k = found[i].track[side], at = tracks.offsets[k] + found[i].tail[side];
+      before.data[2 * i + side] = at > tracks.offsets[k] ? at - 1 : -1;
+      after.data[2 * i + side] = at < tracks.offsets[k + 1] ? at : -1;
+    }
+  return nb::make_tuple(before.give({found.size(), 2}), after.give({found.size(), 2}),
                         array_of<double>(found, &Exchange::gain),
-                        array_of<bool>(found, &Exchange::is_mutual));
+                        array_of<std::int64_t>(found, &Exchange::frame));
 }
 
 // Returns the log-likelihood ratios of the exchanges of two tracks at some frames.
@@ -184,7 +191,7 @@ class Profiles {
 
 void bind_confidence(nb::module_& module) {
   module.def("exchanges", &exchanges, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a, "points"_a,
-             "frames"_a, "offsets"_a, nb::kw_only(), "p_detection"_a);
+             "frames"_a, "offsets"_a, nb::kw_only(), "p_detection"_a, "n_threads"_a);
   module.def("exchange_ratios", &exchange_ratios, "motion"_a, "times"_a, "kind"_a, "F"_a, "Q"_a,
              "points"_a, "frames"_a, "offsets"_a, "cuts"_a, nb::kw_only(), "p_detection"_a);
   nb::class_<Profiles>(module, "DistanceProfiles")

@@ -64,7 +64,8 @@ inline std::vector<Point> to_points(const In<double>& array, int D) {
   const std::size_t width = array.shape(1);
   std::vector<Point> points(array.shape(0), Point{});
   for (std::size_t i = 0; i < points.size(); ++i) {
-    std::copy_n(array.data() + i * width, D, points[i].begin());
+    // A loop of fixed length, because a call to copy three numbers takes longer than that.
+    for (int d = 0; d < kMaxAxes; ++d) points[i][d] = d < D ? array.data()[i * width + d] : 0;
     if (width > n_axes) points[i].r = array.data()[i * width + n_axes];
   }
   return points;

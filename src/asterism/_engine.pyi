@@ -451,7 +451,7 @@ def judge_distances(
 # (R, from, to, rms): b = R (a - from) + to, in three axes.
 def fit_rigid(a: Floats, b: Floats, weights: Floats) -> tuple[Floats, Floats, Floats, float]: ...
 
-# (frames, tracks a, tracks b, log-likelihood ratios, whether both tracks continue)
+# (last points before (n, 2), first points after (n, 2), log-likelihood ratios, frames)
 def exchanges(
     motion: MotionModel,
     times: Floats,
@@ -463,7 +463,8 @@ def exchanges(
     offsets: Ints,
     *,
     p_detection: float,
-) -> tuple[Ints, Shorts, Shorts, Floats, NDArray[np.bool_]]: ...
+    n_threads: int,
+) -> tuple[Ints, Ints, Floats, Ints]: ...
 
 # Log-likelihood ratios of the exchanges of two tracks at the frames `cuts`.
 def exchange_ratios(

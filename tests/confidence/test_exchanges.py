@@ -137,6 +137,18 @@ def test_parts_of_the_capture_give_the_same_exchanges(monkeypatch):
     assert whole.ratios == pytest.approx(parts.ratios, abs=1e-9)
 
 
+def test_any_number_of_threads_gives_the_same_exchanges():
+    truth = crowd(3)
+    labels, model = broken(truth, np.random.default_rng(3)), small_model(noise_sigma=0.01)
+    tracks = am.Tracks(detections=truth.detections, labels=labels)
+    one = find_exchanges(tracks, labels, model)
+    for threads in (2, 3, 50):
+        found = find_exchanges(tracks, labels, model, threads=threads)
+        assert found.before.tobytes() == one.before.tobytes()
+        assert found.after.tobytes() == one.after.tobytes()
+        assert found.ratios.tobytes() == one.ratios.tobytes()
+
+
 def arguments(**changes):
     model = small_model()
     times = np.array([0.0, 0.1])
@@ -144,7 +156,7 @@ def arguments(**changes):
     values = {
         "motion": motion_model(model, 3), "times": times, "kind": kind, "F": F, "Q": Q,
         "points": np.zeros((2, 3)), "frames": np.array([0, 1]), "offsets": np.array([0, 2]),
-        "p_detection": 0.9,
+        "p_detection": 0.9, "n_threads": 1,
     }  # fmt: skip
     return values | changes
 
@@ -169,6 +181,7 @@ def arguments(**changes):
         {"p_detection": 1.0},
         {"p_detection": np.nan},
         {"p_detection": -0.1},
+        {"n_threads": 0},
     ],
 )
 def test_damaged_input_is_refused(changes):

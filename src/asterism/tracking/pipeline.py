@@ -272,7 +272,8 @@ def conclude(recipe: Recipe, begun: Uncorrected, edits: Sequence[Edit] = ()) -> 
     """
     model, stitching, naming = begun.model, begun.stitching, begun.naming
     tracks = correct(begun.tracks, edits, model, stitching) if edits else begun.tracks
-    tracks = settled(assess(tracks, model, stitching), edits)
+    threads = recipe.options.get("threads", 1)
+    tracks = settled(assess(tracks, model, stitching, threads=threads), edits)
     decisions = tracks.decisions
     if stitching is not None:
         decisions += of_stitching(stitching, tracks)

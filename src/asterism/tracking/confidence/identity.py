@@ -36,7 +36,13 @@ OTHER_JOIN = 0.95
 """Probability of a join of tracklets that stitching did not make, as by names."""
 
 
-def assess(tracks: Tracks, model: TrackingModel, stitching: Stitching | None = None) -> Tracks:
+def assess(
+    tracks: Tracks,
+    model: TrackingModel,
+    stitching: Stitching | None = None,
+    *,
+    threads: int = 1,
+) -> Tracks:
     """Estimate how certain links and identities are, and list the uncertain ones.
 
     The identity of a detection is right if its track is there on the same marker as in most of its
@@ -55,6 +61,8 @@ def assess(tracks: Tracks, model: TrackingModel, stitching: Stitching | None = N
         Model of motion and noise with which they were tracked.
     stitching : Stitching, optional
         Stitching that made the tracks of the same detections.
+    threads : int
+        Number of threads; it has no influence on the result.
 
     Returns
     -------
@@ -71,7 +79,7 @@ def assess(tracks: Tracks, model: TrackingModel, stitching: Stitching | None = N
     >>> float(tracks.identity_confidence.min()) > 0.99, tracks.decisions
     (True, ())
     """
-    found = examine(tracks, model, stitching)
+    found = examine(tracks, model, stitching, threads=threads)
     parts, order = found.parts, tracks.by_track[0]
     probability = _probability(parts, found.evidence, tracks.n_tracks)
     identity = np.where(tracks.labels >= 0, WHOLE, 0.0)
@@ -119,16 +127,22 @@ class Examined:
     evidence: Evidence
 
 
-def examine(tracks: Tracks, model: TrackingModel, stitching: Stitching | None = None) -> Examined:
+def examine(
+    tracks: Tracks,
+    model: TrackingModel,
+    stitching: Stitching | None = None,
+    *,
+    threads: int = 1,
+) -> Examined:
     """Find the uncertain links and parts of tracks, with the evidence for each.
 
     Parameters
     ----------
-    tracks, model, stitching
+    tracks, model, stitching, threads
         As for `assess`.
     """
     tracklets = tracks.labels if stitching is None else stitching.tracklets
-    exchanges = find_exchanges(tracks, tracklets, model)
+    exchanges = find_exchanges(tracks, tracklets, model, threads=threads)
     uncertain, link, partner = _after_exchanges(exchanges, tracks.labels)
     cuts = [(uncertain, link)]
     if tracks.confidence is not None:

@@ -57,7 +57,11 @@ class Exchanges:
 
 
 def find_exchanges(
-    tracks: Tracks, tracklets: NDArray[np.int32] | NDArray[np.int64], model: TrackingModel
+    tracks: Tracks,
+    tracklets: NDArray[np.int32] | NDArray[np.int64],
+    model: TrackingModel,
+    *,
+    threads: int = 1,
 ) -> Exchanges:
     """Find places where two tracks may have exchanged their later parts.
 
@@ -73,6 +77,8 @@ def find_exchanges(
         Tracklet of each detection, -1 for none; the labels of the tracks, if no join made them.
     model : TrackingModel
         Model of motion and noise.
+    threads : int
+        Number of threads, which search pieces of time; it has no influence on the result.
 
     Returns
     -------
@@ -84,7 +90,7 @@ def find_exchanges(
     found: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]] = []
     for begin in range(0, d.n_frames, CHUNK):
         low, high = max(begin - MARGIN, 0), min(begin + CHUNK + MARGIN, d.n_frames)
-        found.append(_in_frames(tracks, tracklets, model, steps, (low, high), begin))
+        found.append(_in_frames(tracks, tracklets, model, steps, (low, high), begin, threads))
     both = [np.concatenate(each) for each in zip(*found, strict=True)] if found else []
     if not both:
         none = np.empty((0, 2), dtype=np.int64)
@@ -102,6 +108,7 @@ def _in_frames(
     steps: tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]],
     frames: tuple[int, int],
     begin: int,
+    threads: int,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Return (before, after, ratios) of the exchanges in `CHUNK` frames from `begin`."""
     d, (low, high), (kind, F, Q) = tracks.detections, frames, steps
@@ -109,24 +116,27 @@ def _in_frames(
     rows = slice(first, int(d.offsets[high]))
     # A tracklet that is in several tracks is one piece in each of them, and a long gap, as an edit
     # leaves it in a tracklet, ends a piece.
-    pieces = tracklets[rows].astype(np.int64) * (tracks.n_tracks + 1) + tracks.labels[rows] + 1
     inside = np.flatnonzero(tracklets[rows] >= 0)
-    _, piece = np.unique(pieces[inside], return_inverse=True)
-    order = np.argsort(piece, kind="stable")
-    own, piece = inside[order] + first, piece[order]
+    keys = [tracks.labels[rows][inside] + 1, tracklets[rows][inside]]
+    order = np.lexsort([_short(key) for key in keys])
+    is_first = np.ones(len(order), dtype=bool)
+    is_first[1:] = np.logical_or(*(np.diff(key[order]) != 0 for key in keys))
+    own = inside[order] + first
     frame = d.frame_of[own].astype(np.int64) - low
-    ends = (np.diff(piece) != 0) | (np.diff(frame) > MARGIN)
-    piece = np.concatenate([[0], np.cumsum(ends)])[: len(own)]
-    offsets = np.concatenate([[0], np.cumsum(np.bincount(piece))]).astype(np.int64)
-    cut, *pair, ratios, _ = _engine.exchanges(
+    is_first[1:] |= np.diff(frame) > MARGIN
+    offsets = np.append(np.flatnonzero(is_first), len(own)).astype(np.int64)
+    before, after, ratios, cut = _engine.exchanges(
         motion_model(model, d.n_axes), d.times[low:high], kind[low:high], F, Q,
         np.ascontiguousarray(d.points[own]), frame, offsets,
-        p_detection=min(model.sensor.p_detection, 0.999),
+        p_detection=min(model.sensor.p_detection, 0.999), n_threads=threads,
     )  # fmt: skip
     kept = (cut + low >= begin) & (cut + low < begin + CHUNK)
-    cut, sides = cut[kept], np.stack(pair, axis=1)[kept].astype(np.int64)
-    at = np.searchsorted(piece * (high - low) + frame, sides * (high - low) + cut[:, None])
     own = np.append(own, -1)
-    before = np.where(at > offsets[sides], own[at - 1], -1)
-    after = np.where(at < offsets[sides + 1], own[np.minimum(at, len(own) - 1)], -1)
-    return before, after, ratios[kept]
+    return own[before[kept]], own[after[kept]], ratios[kept]
+
+
+def _short(
+    values: NDArray[np.int32] | NDArray[np.int64],
+) -> NDArray[np.uint16] | NDArray[np.int32] | NDArray[np.int64]:
+    """Return the values in 16 bits if they fit: NumPy sorts these in linear time."""
+    return values.astype(np.uint16) if values.max(initial=0) <= np.iinfo(np.uint16).max else values

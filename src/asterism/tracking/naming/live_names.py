@@ -119,15 +119,18 @@ class LiveNames:
             Names after these frames, and what has changed: name and probability by label, or None
             for a track that has lost its name.
         """
-        after = replace(self, turn=self.turn + 1)
+        turn, sums = self.turn + 1, self.sums
         points, labels = recent[-1]
-        if after.turn % EVERY == 0:
-            sums = self.sums + _distance_sums(self.marker_of, points, labels, self.sums.shape[1])
-            after = replace(after, sums=sums)
-        alive = np.unique(labels[labels >= 0])
+        if turn % EVERY == 0:
+            sums = sums + _distance_sums(self.marker_of, points, labels, sums.shape[1])
+        after = LiveNames(
+            sets=self.sets, marker_of=self.marker_of, sizes=self.sizes, sums=sums,
+            subject=self.subject, rivals=self.rivals, turn=turn,
+        )  # fmt: skip
+        alive = sorted({*labels.tolist()} - {-1})
         if len(recent) < self.LENGTH or len(alive) < 2:
             return after, {}
-        return after._examined(alive, recent)
+        return after._examined(np.array(alive, dtype=np.int64), recent)
 
     def _examined(self, alive: NDArray[np.int64], recent: Frames) -> tuple[LiveNames, Changes]:
         window = _Window(self, alive, _dense(alive, recent))
@@ -142,10 +145,11 @@ class LiveNames:
             self._rename(after, window, k)
             if self.turn % EVERY == EVERY // 2:
                 subject = self._with_row(int(window.marker[k]))
-        return (
-            replace(self, marker_of=after.marker_of, rivals=after.rivals, subject=subject),
-            after.changes,
-        )
+        made = LiveNames(
+            sets=self.sets, marker_of=after.marker_of, sizes=self.sizes, sums=self.sums,
+            subject=subject, rivals=after.rivals, turn=self.turn,
+        )  # fmt: skip
+        return made, after.changes
 
     def _name_new(self, after: _Changed, window: _Window, k: int) -> None:
         """Name a track without a name, if its best free marker leads clearly, or repeatedly."""

@@ -176,7 +176,10 @@ class Named(Method[NamedState]):
         recent = (*_revised(state.recent, update), frame)
         while len(recent) > MIN_FRAMES and recent[0].time < time - FIRST:
             recent = recent[1:]
-        after = replace(state, tracks=tracks, recent=recent)
+        after = NamedState(
+            tracks=tracks, names=state.names, probabilities=state.probabilities, recent=recent,
+            live=state.live, next_search=state.next_search, wait=state.wait,
+        )  # fmt: skip
         if after.live is not None:
             after = self._followed(after)
         elif time >= state.next_search:
@@ -231,13 +234,14 @@ def _revised(recent: tuple[_Frame, ...], update: Update) -> tuple[_Frame, ...]:
     """Return the frames with the labels that an update revises."""
     if not len(update.revised) or not recent:
         return recent
-    out: list[_Frame] = []
-    for frame in recent:
+    oldest, newest = int(update.revised.min()), int(update.revised.max())
+    out = list(recent)
+    for i, frame in enumerate(recent):
+        if newest < frame.first or frame.first + len(frame.labels) <= oldest:
+            continue
         own = update.revised - frame.first
         inside = (own >= 0) & (own < len(frame.labels))
-        if inside.any():
-            labels = frame.labels.copy()
-            labels[own[inside]] = update.revised_labels[inside]
-            frame = replace(frame, labels=labels)
-        out.append(frame)
+        labels = frame.labels.copy()
+        labels[own[inside]] = update.revised_labels[inside]
+        out[i] = _Frame(frame.first, frame.time, frame.points, labels)
     return tuple(out)
