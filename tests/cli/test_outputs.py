@@ -7,6 +7,7 @@ import os
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import asterism as am
@@ -18,6 +19,7 @@ FILES = {
     "track -o": ("track in.csv -o OUT", ".csv"),
     "track --report": ("track in.csv -o new.csv --report OUT", ".html"),
     "track --run -o": ("track in.csv --run new -o OUT", ".csv"),
+    "edit": ("edit in.csv --script edits.toml -o OUT", ".csv"),
     "stitch": ("stitch truth.csv -o OUT", ".csv"),
     "fill": ("fill truth.csv -o OUT", ".csv"),
     "markerset learn": ("markerset learn truth.csv -o OUT", ".toml"),
@@ -49,6 +51,7 @@ FOLDERS = {
 # Files that are written where none is named.
 DEFAULTS = {
     "track in.csv": "in.tracked.csv",
+    "edit in.csv --script edits.toml": "in.corrected.csv",
     "report truth.csv": "truth.html",
     "plot presence truth.csv": "truth.presence.pdf",
 }
@@ -82,6 +85,13 @@ def inputs(tmp_path_factory):
     am.io.write_observations(am.simulate.film(truth, rig).observations, folder / "seen.csv")
     am.learn_marker_set(truth).to_toml(folder / "set.toml")
     am.learn_marker_set(sensed).to_toml(folder / "other.toml")
+    own = np.flatnonzero(sensed.labels == 0)
+    at = [
+        (int(sensed.detections.frame_of[i]), int(i - sensed.detections.offsets[t]))
+        for t, i in zip(sensed.detections.frame_of[own[[0, 9]]], own[[0, 9]], strict=True)
+    ]
+    edits = [am.model.Edit(kind="same", at=at)]
+    am.io.write_edits(folder / "edits.toml", edits, am.read(folder / "in.csv"))
     return folder
 
 
