@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism.model import Decision
+    from asterism.model.edit import EditKind
     from asterism.tracking import Change
 
 ENOUGH = 0.999
@@ -146,13 +147,13 @@ class Corrector:
             self.edit("same", int(own[np.abs(frame[own] - frame[detection]).argmin()]), detection)
         return True
 
-    def edit(self, kind: str, *detections: int) -> Change | None:
+    def edit(self, kind: EditKind, *detections: int) -> Change | None:
         """Apply an edit, and measure how long that takes."""
         frame, offsets = self.d.frame_of, self.d.offsets
         at = tuple((int(frame[i]), int(i - offsets[frame[i]])) for i in detections)
         start = time.perf_counter()
         try:
-            return self.correction.apply(Edit(kind=kind, at=at))  # type: ignore[arg-type]
+            return self.correction.apply(Edit(kind=kind, at=at))
         except ParameterError:
             self.refused += 1
             return None

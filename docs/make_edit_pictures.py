@@ -41,11 +41,16 @@ def session(browser: Browser, address: str) -> None:
     photograph(page, "changed")
     gap = page.run("""(() => {
       const c = asterism.capture;
-      for (const least of [20, 10, 4]) for (const k of c.trouble) for (let r = c.runsOf[k]; r + 1 < c.runsOf[k + 1]; r++) {
-        const n = c.runFirst[r + 1] - c.runFirst[r] - c.runLength[r];
-        if (n >= least && n < 40 && c.runLength[r] > 20) return [k, c.runFirst[r] + c.runLength[r] + 1];
+      for (const min of [20, 10, 4]) {
+        for (const k of c.trouble) {
+          for (let r = c.runsOf[k]; r + 1 < c.runsOf[k + 1]; r++) {
+            const end = c.runFirst[r] + c.runLength[r];
+            const n = c.runFirst[r + 1] - end;
+            if (n >= min && n < 40 && c.runLength[r] > 20) return [k, end + 1];
+          }
+        }
       }
-    })()""")  # noqa: E501
+    })()""")
     page.run(f"asterism.choose({gap[0]}); asterism.seek({gap[1]})")
     page.run("document.querySelector('#trails').value = '0'")
     page.key("g")

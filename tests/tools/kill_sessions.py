@@ -7,6 +7,7 @@ hold the state after the last confirmed step, or after the step that was under w
     python -m tests.tools.kill_sessions --count 1000
 """
 
+# ruff: noqa: T201
 from __future__ import annotations
 
 import argparse
@@ -123,7 +124,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         session = begun(Path(folder))
         steps = [kill_one(session, Path(folder) / "trial.edits.toml", i) for i in range(count)]
-    print(f"{count} sessions killed after {sum(steps)} confirmed steps: none lost, all readable")  # noqa: T201
+    print(f"{count} sessions killed after {sum(steps)} confirmed steps: none lost, all readable")
 
 
 if __name__ == "__main__":

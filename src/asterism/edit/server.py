@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import secrets
 import signal
 import socket
+import threading
 from typing import TYPE_CHECKING, Any
 
 from asterism.edit.guard import Guard
@@ -193,8 +195,9 @@ async def _serve(
         server.should_exit = True
         hub.close()
 
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
-            loop.add_signal_handler(number, stop)
+    # Only the main thread has signals, and the event loop of Windows has no handlers of them; uvicorn
+    # then stops the server by its own.
+    if os.name == "posix" and threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(number, stop)
     await server.serve(sockets=[listener])
