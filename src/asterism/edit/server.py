@@ -195,8 +195,8 @@ async def _serve(
         server.should_exit = True
         hub.close()
 
-    # Only the main thread has signals, and the event loop of Windows has no handlers of them; uvicorn
-    # then stops the server by its own.
+    # Only the main thread has signals, and the event loop of Windows has no handlers of them. Then
+    # uvicorn stops the server by its own handlers.
     if os.name == "posix" and threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
             asyncio.get_running_loop().add_signal_handler(number, stop)
