@@ -70,6 +70,20 @@ def test_a_cut_parts_a_track_exactly_there():
     assert (found.labels[others] == truth.labels[others]).all()
 
 
+def test_a_group_on_both_sides_of_another_statement_follows_a_cut():
+    truth = am.simulate.cube(frames=100, seed=2)
+    d, model = truth.detections, am.estimate_model(truth.detections).model
+    own = np.flatnonzero(truth.labels == 3)
+    edits = [
+        Edit(kind="same", at=at(d, own[41], own[70])),
+        Edit(kind="name", at=at(d, own[55]), name="CORNER"),
+        Edit(kind="cut", at=at(d, own[40], own[41])),
+    ]
+    found = am.tracking.correct(truth, edits, model)
+    assert all(holds(edit, found) for edit in edits)
+    assert found.labels[own[41]] != found.labels[own[55]]
+
+
 def test_a_name_goes_to_the_track_and_follows_the_marker():
     truth = am.simulate.person(activity="walk", frames=200, seed=3)
     named = am.Tracks(
