@@ -76,7 +76,7 @@ def test_a_group_on_both_sides_of_another_statement_follows_a_cut():
     own = np.flatnonzero(truth.labels == 3)
     edits = [
         Edit(kind="same", at=at(d, own[41], own[70])),
-        Edit(kind="name", at=at(d, own[55]), name="CORNER"),
+        Edit(kind="same", at=at(d, own[40], own[55])),
         Edit(kind="cut", at=at(d, own[40], own[41])),
     ]
     found = am.tracking.correct(truth, edits, model)
