@@ -1,4 +1,5 @@
 from . import (
+    batch,
     camera,
     edit,
     filter,
@@ -70,6 +71,7 @@ __all__ = [
     "TrackingModel",
     "Tracks",
     "__version__",
+    "batch",
     "camera",
     "edit",
     "estimate_model",

@@ -40,6 +40,7 @@ FILES = {
     "camera map": ("camera map rig.toml -o OUT", ".png"),
 }
 FOLDERS = {
+    "batch": "batch in.csv -o OUT",
     "track": "track in.csv --run OUT",
     "film": "film truth.csv --rig ring4 -o OUT",
     "film a scene": "film cube --rig ring4 -o OUT",
@@ -56,6 +57,7 @@ DEFAULTS = {
     "plot presence truth.csv": "truth.presence.pdf",
 }
 WORK = {
+    "asterism.batch": ("run", "plan_batch"),
     "asterism": ("read", "read_rig", "track", "estimate_model"),
     "asterism.io": ("read_tracks", "read_observations"),
     "asterism.tracking": ("plan_tracking",),

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 import asterism
+from asterism.cli.commands.batch import batch
 from asterism.cli.commands.camera import app as camera
 from asterism.cli.commands.chain import chain
 from asterism.cli.commands.corrupt import corrupt
@@ -60,7 +61,7 @@ def _root(  # pyright: ignore[reportUnusedFunction]
 
 
 _TITLES = {
-    "Tracks and markers": (track, edit, stitch, name, fill, estimate, methods),
+    "Tracks and markers": (track, batch, edit, stitch, name, fill, estimate, methods),
     "Captures and results": (info, evaluate, report, plot, view),
     "Simulations and experiments": (corrupt, simulate, scenes, demo, reproduce),
     "Cameras": (film, reconstruct, chain),
