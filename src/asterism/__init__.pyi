@@ -10,6 +10,7 @@ from . import (
     plot,
     simulate,
     solve,
+    sweep,
     tracking,
 )
 from .camera import Camera, Observations, Rig
@@ -95,6 +96,7 @@ __all__ = [
     "simulate",
     "solve",
     "stitch",
+    "sweep",
     "track",
     "tracking",
     "write",

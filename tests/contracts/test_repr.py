@@ -18,7 +18,7 @@ NAMESPACES = (
     "asterism", "asterism.simulate", "asterism.camera", "asterism.model", "asterism.filter",
     "asterism.tracking.methods", "asterism.tracking", "asterism.multiview", "asterism.solve",
     "asterism.metrics", "asterism.io", "asterism.io.calibrations", "asterism.plot",
-    "asterism.reporting", "asterism.batch", "asterism.errors",
+    "asterism.reporting", "asterism.batch", "asterism.sweep", "asterism.errors",
 )  # fmt: skip
 
 
@@ -134,6 +134,11 @@ def instances():
         ),
         am.batch.Planned(job=job, state="failed", reason=LONG),
         outcome := am.batch.Outcome(error=LONG, warnings=(LONG,) * 30),
+        study := am.sweep.Study(
+            scenes={LONG: {"scene": "cube"}}, methods={LONG: {}}, seeds=tuple(range(50))
+        ),
+        study.cases()[0],
+        am.sweep.Sweep(rows=[{}] * 30, summary=[], scores=(LONG,), n_done_before=0, failed={}),
         am.batch.Batch(out=LONG, planned=(), outcomes={LONG: outcome}),
         am.model.Alternative(track=3, probability=1 / 3, name=LONG),
         am.model.Decision(

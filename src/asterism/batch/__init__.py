@@ -3,6 +3,6 @@
 from asterism.batch.find import Planned, plan_batch
 from asterism.batch.job import Job, Settings
 from asterism.batch.perform import Outcome
-from asterism.batch.run import Batch, run
+from asterism.batch.run_batch import Batch, run
 
 __all__ = ["Batch", "Job", "Outcome", "Planned", "Settings", "plan_batch", "run"]
