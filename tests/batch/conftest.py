@@ -56,9 +56,14 @@ def out(batch, tmp_path):
 
 
 def contents(folder):
-    """Bytes of all files by name; the index and the table differ by the paths of the captures."""
+    """Bytes of all files by name, without the temporary ones that a process was killed over.
+
+    The index and the table differ by the paths of the captures.
+    """
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name not in ("index.html", "summary.csv")
+        if path.is_file()
+        and path.suffix != ".part"
+        and path.name not in ("index.html", "summary.csv")
     }

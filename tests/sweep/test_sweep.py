@@ -126,6 +126,16 @@ def test_a_capture_is_known_by_its_content(tmp_path):
         ("[scenes.a]\nscene = 'cube'\n[methods.b]\nmethod = 'gmm'\n", "methods.b.method"),
         ("scores = ['idf2']\n[scenes.a]\nscene = 'cube'\n[methods.b]\n", "idf2"),
         ("seeds = [1, 1]\n[scenes.a]\nscene = 'cube'\n[methods.b]\n", "different numbers"),
+        ("[scenes.a]\nscene = 'cube'\nframe = 3\n[methods.b]\n", "Did you mean 'frames'"),
+        ("[scenes.a]\nscene = 'cube'\n[methods.b]\nwindow = 3\n", "methods.b"),
+        (
+            "[scenes.a]\nscene = 'cube'\n[methods.b]\nmethod = 'smp'\nwindo = 3\n",
+            "Did you mean 'window'",
+        ),
+        (
+            "[scenes.a]\nscene = 'cube'\n[corruptions.c]\nmising = 0.1\n[methods.b]\n",
+            "Did you mean 'missing'",
+        ),
         ("seed = 3\n[scenes.a]\nscene = 'cube'\n[methods.b]\n", "seed"),
     ],
 )

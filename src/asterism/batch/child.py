@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
 import logging
@@ -16,10 +15,11 @@ from tempfile import mkdtemp
 from typing import TYPE_CHECKING
 
 from asterism.batch.carry_out import carry_out
+from asterism.batch.job import key_of
 from asterism.batch.page import write_page
 from asterism.batch.run_folder import CONFIG, DECISIONS, SUMMARY, Run
 from asterism.batch.storage import fetch
-from asterism.errors import AsterismError
+from asterism.errors import AsterismError, ParameterError
 from asterism.io import read, read_edits
 from asterism.io.atomic import write_text
 from asterism.io.decisions import write_decisions
@@ -28,6 +28,9 @@ from asterism.tracking import method_by_name, plan_tracking
 from asterism.tracking.naming.from_file import read_markers
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import IO
+
     from asterism.batch.job import Job
 
 JOB, RESULT, OUTCOME = "job.pickle", "result", "outcome.json"
@@ -36,6 +39,12 @@ _SECONDS = 0.2  # between two messages about the progress
 
 def main(folder: Path) -> None:
     """Track the capture of a job, and write its files and the outcome into a folder."""
+    stream = _messages()
+
+    def tell(stage: str, done: int, total: int) -> None:
+        stream.write(json.dumps([stage, done, total]) + "\n")
+        stream.flush()
+
     threading.Thread(target=_end_with_parent, daemon=True).start()
     job: Job
     local: dict[str, Path]
@@ -44,8 +53,8 @@ def main(folder: Path) -> None:
     warnings = _collected()
     start = time.monotonic()
     try:
-        limit_memory(memory)
-        _track(job, folder, local)
+        _limit_memory(memory)
+        _track(job, folder, local, tell)
         error = ""
     except AsterismError as failure:
         error = str(failure)
@@ -69,7 +78,9 @@ def main(folder: Path) -> None:
     (folder / OUTCOME).write_text(json.dumps(outcome), encoding="utf-8")
 
 
-def _track(job: Job, folder: Path, local: dict[str, Path]) -> None:
+def _track(
+    job: Job, folder: Path, local: dict[str, Path], tell: Callable[[str, int, int], None]
+) -> None:
     """Track the capture; the files have the names that they have in the output folder."""
     out, run_folder = folder / RESULT / job.output, folder / RESULT / job.run
     for each in (out.parent, run_folder):
@@ -81,11 +92,16 @@ def _track(job: Job, folder: Path, local: dict[str, Path]) -> None:
             local[place] = fetch(place, Path(mkdtemp(dir=folder)))
         return local[place]
 
+    if key_of(job, lambda place: at(place).read_bytes()) != job.key:
+        raise ParameterError(
+            job.source, "the input and the versions with which the batch began", "others",
+            "run the batch again, with the same versions of the software on all machines",
+        )  # fmt: skip
     capture = read(at(job.source))
     sets = [read_markers(at(place)) for place in job.markers] or None
     edits = [] if job.edits is None else read_edits(at(job.edits), capture)
     made = None if settings.method is None else method_by_name(settings.method, **settings.options)
-    _tell("estimating the model", 0, 0)
+    tell("estimating the model", 0, 0)
     plan = plan_tracking(
         capture, made, model=settings.model, stitch=settings.stitch, seed=settings.seed,
         marker_sets=sets, edits=edits, fill=settings.fill,
@@ -101,14 +117,14 @@ def _track(job: Job, folder: Path, local: dict[str, Path]) -> None:
         nonlocal last
         if time.monotonic() - last > _SECONDS:
             last = time.monotonic()
-            _tell(f"tracking with {recipe.method}", done, capture.n_frames)
+            tell(f"tracking with {recipe.method}", done, capture.n_frames)
 
     result, summary = carry_out(run, capture, out, marker_sets=sets, edits=edits, progress=advance)
     run.write(run_folder / CONFIG)
     for name in DECISIONS:
         write_decisions(result.tracks, run_folder / name)
     if job.page is not None:
-        _tell("writing the report", 0, 0)
+        tell("writing the report", 0, 0)
         named = dataclasses.replace(summary, output=job.output)
         write_page(result, folder / RESULT / job.page, recipe, plan.estimate, named, timed=False)
     values = summary.to_dict() | {"input": job.source, "output": job.output}
@@ -117,8 +133,11 @@ def _track(job: Job, folder: Path, local: dict[str, Path]) -> None:
     write_text(run_folder / SUMMARY, to_json({"key": job.key, **values}) + "\n")
 
 
-def _tell(stage: str, done: int, total: int) -> None:
-    print(json.dumps([stage, done, total]), flush=True)  # noqa: T201
+def _messages() -> IO[str]:
+    """Return the stream of messages to the parent; what else is printed goes to stderr."""
+    stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    return stream
 
 
 def _collected() -> list[str]:
@@ -133,7 +152,7 @@ def _collected() -> list[str]:
     return texts
 
 
-def limit_memory(memory: int | None) -> None:
+def _limit_memory(memory: int | None) -> None:
     """Limit the memory of this process, in bytes, where the system can."""
     if memory is not None and sys.platform == "linux":
         import resource
@@ -142,13 +161,15 @@ def limit_memory(memory: int | None) -> None:
 
 
 def _peak_bytes() -> int:
-    """Return the largest resident memory of this process; 0 where it is not known."""
-    with contextlib.suppress(ImportError):  # there is no such module on Windows
-        import resource
+    """Return the largest resident memory of this process; 0 where it is not known.
 
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return peak if sys.platform == "darwin" else peak * 1024
-    return 0
+    The figure of ``getrusage`` is at least that of the parent process when it started this one.
+    """
+    status = Path("/proc/self/status")
+    if not status.is_file():
+        return 0
+    line = next(each for each in status.read_text().splitlines() if each.startswith("VmHWM"))
+    return int(line.split()[1]) * 1024
 
 
 def _end_with_parent() -> None:
@@ -159,5 +180,5 @@ def _end_with_parent() -> None:
 
 if __name__ == "__main__":
     main(Path(sys.argv[1]))
-    sys.stdout.flush()
+    sys.stderr.flush()
     os._exit(0)  # the thread that waits for the parent would hold the process

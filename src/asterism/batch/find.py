@@ -9,22 +9,31 @@ from typing import TYPE_CHECKING, Literal
 
 from asterism.batch.job import Job, Settings, key_of
 from asterism.batch.result_file import output_format
-from asterism.batch.storage import files_below, inside, is_url, read_bytes
+from asterism.batch.storage import (
+    files_below,
+    files_beside,
+    inside,
+    is_file,
+    is_url,
+    read_bytes,
+    split,
+)
 from asterism.errors import AsterismError, FormatError, ParameterError
 from asterism.io import CAPTURE_FORMATS
+from asterism.io.captures.files import HEAD, fitting_formats
 from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from typing import Any
 
-__all__ = ["MARKER_SET", "Planned", "plan_batch"]
+__all__ = ["MARKER_SET", "Planned", "captures_below", "plan_batch"]
 
 MARKER_SET = "markers.toml"
 """Name of the marker set of the captures in a folder and below it."""
 _EDITS = ".edits.toml"
-_SURE = (".c3d", ".trc")  # no other kind of file has these suffixes
-_HEAD = 4096
+_SURE = (".c3d", ".trc")  # suffixes that only captures have
+_RESULTS = (".tracked", ".corrected")  # before the suffix of a result of this program
 
 
 @record
@@ -60,7 +69,8 @@ def plan_batch(
     Parameters
     ----------
     sources : sequence of str
-        Captures and folders, by path or URL. In folders, files of the known formats are captures.
+        Captures and folders, by path or URL. In folders, files of the known formats are captures,
+        but for results such as ``trial.tracked.c3d``.
     out : str
         Output folder, by path or URL; captures inside it are left out.
     settings : Settings
@@ -81,7 +91,8 @@ def plan_batch(
     ParameterError
         If no capture is found, or two have the same result.
     """
-    found = [job for source in sources for job in _jobs(source, out, settings, tuple(markers))]
+    every = (each for source in sources for each in _jobs(source, out, settings, tuple(markers)))
+    found = list({job.source: (job, reason) for job, reason in every}.values())
     if not found:
         raise ParameterError("sources", "captures, or folders with captures", ", ".join(sources))
     owners: dict[str, str] = {}
@@ -114,77 +125,75 @@ def _examined(job: Job, out: str, reason: str) -> Planned:
     return Planned(job=job, state="done" if same else "changed")
 
 
+def captures_below(folder: str) -> list[str]:
+    """Return the names of the captures below a folder or URL, sorted.
+
+    A suffix that only captures have, such as .c3d, decides; other files are examined.
+    """
+    names = (name for name, reason in files_below(folder) if not reason)
+    return sorted(name for name in names if _formats(folder, name))
+
+
 def _jobs(
     source: str, out: str, settings: Settings, markers: tuple[str, ...]
 ) -> Iterator[tuple[Job, str]]:
     """Iterate over the captures of one source, each with the reason why it cannot be read."""
-    if _is_file(source):
-        folder, _, name = source.rpartition("/") if is_url(source) else _parted(source)
-        names, failed = [name], {}
-        listed = {each for each, _ in _beside(folder)}
+    if is_file(source):
+        folder, name = split(source)
+        names, listed = {name: ""}, files_beside(source)
     else:
         folder = source
-        every = list(_listed(folder, out))
-        listed = {name for name, error in every if error is None}
-        failed = {name: error for name, error in every if error is not None}
-        names = [name for name in listed | set(failed) if name in failed or _is_one(folder, name)]
+        every = dict(each for each in files_below(folder) if not _is_in(folder, each[0], out))
+        listed = {name for name, reason in every.items() if not reason}
+        names = {
+            name: reason
+            for name, reason in every.items()
+            if reason or (_formats(folder, name) and not _is_result(name))
+        }
     for name in sorted(names):
-        error = failed.get(name)
-        reason = "" if error is None else f"{inside(folder, name)}: {error.strerror or error}"
         sets = markers or tuple(inside(folder, each) for each in _sets_of(name, listed))
         stem = PurePosixPath(name).with_suffix("")
         edits = f"{stem}{_EDITS}"
-        format = settings.format or _format_of(folder, name)
-        ending = _ending(name, format)
+        of_input = next(iter(_formats(folder, name)), "c3d")
+        format = settings.format or output_format(None, None, of_input)
         yield (
             Job(
-                source=inside(folder, name), name=name, output=f"{stem}.tracked{ending}",
-                format=format, settings=settings, markers=sets,
-                edits=inside(folder, edits) if edits in listed else None,
+                source=inside(folder, name), name=name,
+                output=f"{stem}.tracked{_suffix(name, format)}", format=format, settings=settings,
+                markers=sets, edits=inside(folder, edits) if edits in listed else None,
             ),
-            reason,
+            names[name],
         )  # fmt: skip
 
 
-def _parted(source: str) -> tuple[str, str, str]:
-    return str(Path(source).parent), "/", Path(source).name
-
-
-def _is_file(source: str) -> bool:
-    if not is_url(source):
-        if not Path(source).exists():
-            raise ParameterError("sources", "captures or folders that exist", source)
-        return Path(source).is_file()
-    return bool(PurePosixPath(source).suffix)
-
-
-def _beside(folder: str) -> Iterator[tuple[str, OSError | None]]:
-    if is_url(folder):
-        return files_below(folder)
-    return iter([(path.name, None) for path in Path(folder).iterdir() if path.is_file()])
-
-
-def _listed(folder: str, out: str) -> Iterator[tuple[str, OSError | None]]:
-    """Iterate over the files below a folder that are not results."""
-    results = "" if is_url(folder) or is_url(out) else Path(out).resolve()
-    for name, error in files_below(folder):
-        if results and Path(folder, name).resolve().is_relative_to(results):
-            continue
-        yield name, error
-
-
-def _is_one(folder: str, name: str) -> bool:
-    """Return whether a file of a folder is a capture: by its ending, or by its first bytes."""
-    ending = PurePosixPath(name).suffix.lower()
-    if ending in _SURE:
-        return True
-    if not ending or ending not in {e for f in CAPTURE_FORMATS.values() for e in f.extensions}:
+def _is_in(folder: str, name: str, out: str) -> bool:
+    """Return whether a file of a folder is in the output folder."""
+    if is_url(folder) != is_url(out):
         return False
+    place = inside(folder, name)
+    if is_url(out):
+        return place.startswith(f"{out.rstrip('/')}/")
+    return Path(place).resolve().is_relative_to(Path(out).resolve())
+
+
+def _is_result(name: str) -> bool:
+    return PurePosixPath(PurePosixPath(name).stem).suffix in _RESULTS
+
+
+def _formats(folder: str, name: str) -> list[str]:
+    """Return the formats that a file may have; none for a file that is no capture.
+
+    A file that cannot be read has the formats of its suffix, so that it is reported later.
+    """
+    suffix = PurePosixPath(name).suffix.lower()
+    named = [f.name for f in CAPTURE_FORMATS.values() if suffix and suffix in f.extensions]
+    if suffix in _SURE or not named:
+        return named
     try:
-        head = read_bytes(inside(folder, name))[:_HEAD]
+        head = read_bytes(inside(folder, name), HEAD)
     except FormatError:
-        return True  # it is reported as one that cannot be read
-    return any(f.sniff(head) for f in CAPTURE_FORMATS.values() if ending in f.extensions)
+        return named
+    return [f.name for f in fitting_formats(head) if f.name in named]
 
 
 def _sets_of(name: str, listed: set[str]) -> Iterator[str]:
@@ -195,17 +204,7 @@ def _sets_of(name: str, listed: set[str]) -> Iterator[str]:
             return
 
 
-def _format_of(folder: str, name: str) -> str:
-    """Return the format of the result: that of the capture, or one that holds tracks."""
-    ending = PurePosixPath(name).suffix.lower()
-    fitting = [f for f in CAPTURE_FORMATS.values() if ending and ending in f.extensions]
-    if len(fitting) > 1:
-        head = read_bytes(inside(folder, name))[:_HEAD]
-        fitting = [f for f in fitting if f.sniff(head)] or fitting
-    return output_format(None, None, fitting[0].name if fitting else "c3d")
-
-
-def _ending(name: str, format: str) -> str:
+def _suffix(name: str, format: str) -> str:
     known = CAPTURE_FORMATS[format].extensions
-    ending = PurePosixPath(name).suffix
-    return ending if ending.lower() in known else known[0]
+    suffix = PurePosixPath(name).suffix
+    return suffix if suffix.lower() in known else known[0]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from asterism.batch.job import Job
 
-__all__ = ["INDEX", "TABLE", "write_index"]
+__all__ = ["INDEX", "TABLE", "holds_batch", "write_index"]
 
 INDEX, TABLE = "index.html", "summary.csv"
 _COLUMNS = (
@@ -46,10 +46,21 @@ _STYLE = (
     "a{color:var(--accent)}.clear{color:var(--clear)}.some{color:var(--some)}"
     ".many{color:var(--many);font-weight:600}"
 )
+_FIRST = b"capture,state,reason,"  # of a table of a batch
 _MANY = 5  # places from which their number is shown as many
 
 
-def write_index(out: str, jobs: Sequence[Job], failed: Mapping[str, str]) -> None:
+def holds_batch(out: str) -> bool:
+    """Return whether an output folder or URL is that of a batch, which is resumed in it."""
+    try:
+        return read_bytes(inside(out, TABLE), len(_FIRST)) == _FIRST
+    except FormatError:
+        return False
+
+
+def write_index(
+    out: str, jobs: Sequence[Job], failed: Mapping[str, str], *, overwrite: bool
+) -> None:
     """Write ``index.html`` and ``summary.csv`` from the summaries in the output folder.
 
     Captures without a result come first, then those with the largest expected number of wrong
@@ -63,6 +74,8 @@ def write_index(out: str, jobs: Sequence[Job], failed: Mapping[str, str]) -> Non
         Captures of the batch.
     failed : mapping of str
         Reasons by the name of each capture without a result.
+    overwrite : bool
+        Whether files of the same names that are not of a batch may be replaced.
 
     Raises
     ------
@@ -74,8 +87,10 @@ def write_index(out: str, jobs: Sequence[Job], failed: Mapping[str, str]) -> Non
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
     writer.writerows([row[name] for name in _COLUMNS] for row in rows)
-    deliver(inside(out, TABLE), text.getvalue().encode(), overwrite=True)
-    deliver(inside(out, INDEX), _page(rows).encode("utf-8", errors="replace"), overwrite=True)
+    overwrite = overwrite or holds_batch(out)
+    page = _page(rows).encode("utf-8", errors="replace")
+    deliver(inside(out, INDEX), page, overwrite=overwrite)
+    deliver(inside(out, TABLE), text.getvalue().encode(), overwrite=overwrite)
 
 
 def _row(out: str, job: Job, reason: str) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from asterism.records import record
 from asterism.tracking import method_by_name
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Callable
 
 __all__ = ["Job", "Settings", "key_of"]
 
@@ -141,6 +141,11 @@ class Job:
         return f"runs/{self.name}"
 
     @property
+    def inputs(self) -> tuple[str, ...]:
+        """Places of all files that are read."""
+        return (self.source, *self.markers, *(() if self.edits is None else (self.edits,)))
+
+    @property
     def summary(self) -> str:
         """Name of the summary, which is written last and holds the key."""
         return f"{self.run}/{SUMMARY}"
@@ -153,10 +158,17 @@ class Job:
         return (self.output, *page, *run)
 
 
-def key_of(job: Job) -> str:
+def key_of(job: Job, read: Callable[[str], bytes] = read_bytes) -> str:
     """Return the SHA-256 of all that determines a result.
 
     These are the contents of the files, the settings and the versions.
+
+    Parameters
+    ----------
+    job : Job
+        The capture.
+    read : callable
+        Function from the place of a file to its content.
 
     Raises
     ------
@@ -164,8 +176,8 @@ def key_of(job: Job) -> str:
         If a file cannot be read.
     """
 
-    def hashed(place: str | Path) -> str:
-        return hashlib.sha256(read_bytes(str(place))).hexdigest()
+    def hashed(place: str) -> str:
+        return hashlib.sha256(read(place)).hexdigest()
 
     values = {
         "input": hashed(job.source),

@@ -55,10 +55,10 @@ class Outcome:
 def perform(
     job: Job,
     out: str,
-    *,
     inputs: Mapping[str, bytes] | None = None,
     memory: int | None = None,
     overwrite: bool = False,
+    *,
     progress: Callable[[str, int, int], Any] | None = None,
 ) -> Outcome:
     """Track one capture in a process of its own, and write its files.

@@ -1,17 +1,15 @@
-"""Format and path of the result of a capture."""
+"""Format and path of the result of a capture, and the folder of many."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from asterism.checks import check_fields
 from asterism.errors import ParameterError
 from asterism.io import CAPTURE_FORMATS
+from asterism.io.atomic import holds_files
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-__all__ = ["default_output", "output_format"]
+__all__ = ["check_folder", "default_output", "output_format"]
 
 # A log of point clouds cannot hold labels.
 _WITHOUT_TRACKS = ("pointcloud",)
@@ -68,3 +66,29 @@ def default_output(source: Path, format: str) -> Path:
     suffixes = CAPTURE_FORMATS[format].extensions
     ending = source.suffix if source.suffix.lower() in suffixes else suffixes[0]
     return source.with_name(f"{source.stem}.tracked{ending}")
+
+
+def check_folder(out: str, what: str, *, allowed: bool) -> None:
+    """Raise unless an output folder is new, empty, or allowed to hold files.
+
+    Parameters
+    ----------
+    out : str
+        Folder.
+    what : str
+        What the folder would be resumed as, for the message, such as "a batch".
+    allowed : bool
+        Whether it may hold files.
+
+    Raises
+    ------
+    ParameterError
+        If it is a file, or holds files.
+    """
+    path = Path(out)
+    if path.exists() and not path.is_dir():
+        raise ParameterError("out", "a folder or a new name", f"the file {path}")
+    if path.is_dir() and holds_files(path) and not allowed:
+        expected = f"a new folder, an empty one, or that of {what}"
+        hint = "give overwrite=True to add to it"
+        raise ParameterError("out", expected, f"{path}, which holds files", hint)

@@ -7,23 +7,25 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asterism.batch.cluster import has_cluster, on_cluster
 from asterism.batch.find import plan_batch
-from asterism.batch.index import TABLE, write_index
+from asterism.batch.index import holds_batch, write_index
 from asterism.batch.job import Settings
 from asterism.batch.perform import Outcome, deliver_all, perform
+from asterism.batch.result_file import check_folder
 from asterism.batch.storage import inside, is_url, read_bytes
-from asterism.checks import check_kind, check_number
+from asterism.batch.tasks import number_of_workers, run_tasks
+from asterism.checks import check_kind
 from asterism.errors import AsterismError, ParameterError
+from asterism.io.atomic import remove_leftovers
 from asterism.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from asterism.batch.find import Planned
     from asterism.batch.job import Job
 
-__all__ = ["Batch", "holds_batch", "run"]
+__all__ = ["Batch", "run"]
 
 _SHARE = 0.8  # of the memory of the machine, for all processes together
 
@@ -108,8 +110,8 @@ def run(
     scheduler : str, optional
         Address of a Dask scheduler whose workers track the captures.
     send : bool
-        Whether captures are sent to the workers and the results come back. By default the workers
-        read and write the files, at the same paths or URLs.
+        Whether captures are sent to the workers of the scheduler and the results come back. By
+        default the workers read and write the files, at the same paths or URLs.
     memory : int, optional
         Largest memory of the process of a capture, in bytes (Linux). By default 80 % of the memory
         of this machine are shared by the workers; with a `scheduler` there is no bound.
@@ -127,7 +129,8 @@ def run(
     Raises
     ------
     ParameterError
-        If no capture is found, an argument is impossible, or the scheduler is not reached.
+        If no capture is found, an argument is impossible, the folder holds other files, or the
+        scheduler is not reached.
     FormatError
         If the index cannot be written.
 
@@ -146,111 +149,74 @@ def run(
     """
     settings = Settings() if settings is None else settings
     check_kind("settings", settings, Settings, "am.batch.Settings(method=...)")
-    if workers is None:
-        workers = (os.cpu_count() or 1) if has_cluster() and scheduler is None else 1
-    check_number("workers", workers, above=0, integer=True)
+    workers = number_of_workers(workers, scheduler)
+    if send and scheduler is None:
+        raise ParameterError("send", "a scheduler, to whose workers captures are sent", "none")
     if memory is None and scheduler is None:
         memory = _memory_of_machine(workers)
     place = str(out)
-    _check_out(place, overwrite=overwrite)
+    if not is_url(place):
+        check_folder(place, "a batch", allowed=overwrite or holds_batch(place))
     planned = plan_batch(
         [str(source) for source in sources], place, settings, markers=[str(m) for m in markers],
         progress=None if progress is None else lambda n, of: progress("", "examining", n, of),
     )  # fmt: skip
+    jobs = [each.job for each in planned]
+    write_index(place, jobs, {}, overwrite=overwrite)  # from now on the folder is that of a batch
     outcomes: dict[str, Outcome] = {}
-    todo: dict[str, Planned] = {}
+    todo: dict[str, Job] = {}
     for each in planned:
-        if each.state == "failed":
-            outcomes[each.job.name] = Outcome(error=each.reason)
-        elif each.state == "changed" and not overwrite:
-            outcomes[each.job.name] = Outcome(error=_changed(place, each))
-        elif each.state != "done":
-            todo[each.job.name] = each
-    for name, outcome in outcomes.items():
+        job = each.job
+        if each.state == "new" or (each.state == "changed" and overwrite):
+            todo[job.name] = job
+            continue
+        if each.state != "done":
+            reason = _changed(place, job) if each.state == "changed" else each.reason
+            outcomes[job.name] = Outcome(error=reason)
         if progress is not None:
-            progress(name, "failed" if outcome.error else "done", 0, 0)
-    sent = {"memory": memory, "overwrite": overwrite}
-    for name, result in _outcomes(todo, place, sent, send, workers, scheduler, progress):
-        outcome = result
-        if isinstance(result, BaseException):
-            outcome = Outcome(error=f"{todo[name].job.source}: {_reason(result)}")
-        elif result.files:
-            outcome = _delivered(result, place, overwrite=overwrite)
+            progress(job.name, "done" if each.state == "done" else "failed", 0, 0)
+
+    def arguments(name: str) -> tuple[Any, ...]:
+        inputs = {file: read_bytes(file) for file in todo[name].inputs} if send else None
+        return todo[name], place, inputs, memory, overwrite
+
+    for name, result in run_tasks(
+        perform, list(todo), arguments, scheduler=scheduler, workers=workers, progress=progress
+    ):
+        outcome = _delivered(result, todo[name], place, overwrite=overwrite)
         outcomes[name] = outcome
         for text in outcome.warnings:
             log.warning("%s", text)
         if progress is not None:
             progress(name, "failed" if outcome.error else "done", 0, 0)
+    if not is_url(place):
+        remove_leftovers(Path(place))
     batch = Batch(out=place, planned=tuple(planned), outcomes=outcomes)
-    write_index(place, [each.job for each in planned], batch.failed)
+    write_index(place, jobs, batch.failed, overwrite=overwrite)
     return batch
 
 
-def _outcomes(
-    todo: dict[str, Planned],
-    out: str,
-    sent: dict[str, Any],
-    send: bool,
-    workers: int,
-    scheduler: str | None,
-    progress: Callable[[str, str, int, int], Any] | None,
-) -> Iterator[tuple[str, Any]]:
-    """Iterate over the outcomes of the captures as they come."""
-    if scheduler is None and (workers == 1 or len(todo) < 2):
-        for name, each in todo.items():
-            inner = None if progress is None else _of(progress, name)
-            inputs = _inputs(each) if send else None
-            yield name, perform(each.job, out, inputs=inputs, progress=inner, **sent)
-        return
-    tasks = {
-        name: (each.job, out, _inputs(each) if send else None, sent) for name, each in todo.items()
-    }
-    yield from on_cluster(
-        _performed, tasks, scheduler=scheduler, workers=workers, progress=progress
-    )
-
-
-def _performed(
-    job: Job,
-    out: str,
-    inputs: dict[str, bytes] | None,
-    sent: dict[str, Any],
-    progress: Callable[[str, int, int], Any] | None,
-) -> Outcome:
-    """Carry out one job on a worker of a cluster."""
-    return perform(job, out, inputs=inputs, progress=progress, **sent)
-
-
-def _inputs(planned: Planned) -> dict[str, bytes]:
-    job = planned.job
-    edits = () if job.edits is None else (job.edits,)
-    return {place: read_bytes(place) for place in (job.source, *job.markers, *edits)}
-
-
-def _delivered(outcome: Outcome, out: str, *, overwrite: bool) -> Outcome:
+def _delivered(result: Any, job: Job, out: str, *, overwrite: bool) -> Outcome:
+    """Return the outcome of a task, after the files that came with it are written."""
+    if isinstance(result, AsterismError):
+        return Outcome(error=str(result))
+    if isinstance(result, BaseException):
+        reason = f"{type(result).__name__}: {result}"
+        if type(result).__name__ == "KilledWorker":
+            reason = "the workers that tracked it were killed, as by a lack of memory"
+        return Outcome(error=f"{job.source}: {reason}")
     try:
-        deliver_all(outcome.files, out, overwrite=overwrite)
+        deliver_all(result.files, out, overwrite=overwrite)
     except AsterismError as error:
         return Outcome(error=str(error))
-    return outcome
+    return result
 
 
-def _of(progress: Callable[[str, str, int, int], Any], name: str) -> Callable[[str, int, int], Any]:
-    return lambda stage, done, total: progress(name, stage, done, total)
-
-
-def _changed(out: str, planned: Planned) -> str:
+def _changed(out: str, job: Job) -> str:
     return (
-        f"{inside(out, planned.job.output)}: expected a result of the same input, settings and "
-        "versions, found another. Give overwrite to replace it."
+        f"{inside(out, job.output)}: expected a result of the same input, settings and versions, "
+        "found another. Give overwrite=True (--overwrite) to replace it."
     )
-
-
-def _reason(error: BaseException) -> str:
-    """Return why a task has no result."""
-    if type(error).__name__ == "KilledWorker":
-        return "the workers that tracked it were killed, as by a lack of memory"
-    return f"{type(error).__name__}: {error}"
 
 
 def _memory_of_machine(workers: int) -> int | None:
@@ -259,22 +225,3 @@ def _memory_of_machine(workers: int) -> int | None:
     if "SC_PHYS_PAGES" not in names or "SC_PAGE_SIZE" not in names:
         return None
     return int(_SHARE * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / workers)
-
-
-def holds_batch(out: str) -> bool:
-    """Return whether an output folder is that of a batch, which is resumed in it."""
-    return is_url(out) or Path(out, TABLE).is_file() or Path(out, "runs").is_dir()
-
-
-def _check_out(out: str, *, overwrite: bool) -> None:
-    """Raise unless the output folder is new, empty, or that of a batch."""
-    if is_url(out):
-        return
-    path = Path(out)
-    if path.exists() and not path.is_dir():
-        raise ParameterError("out", "a folder or a new name", f"the file {path}")
-    if path.is_dir() and any(path.iterdir()) and not (overwrite or holds_batch(out)):
-        raise ParameterError(
-            "out", "a new folder, an empty one, or that of a batch", f"{path}, which holds files",
-            "give overwrite to add to it",
-        )  # fmt: skip

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import os
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from asterism.errors import FormatError, ParameterError, not_read
+from asterism.errors import AsterismError, FormatError, ParameterError, not_read, not_written
 from asterism.io.atomic import replacing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator, Iterator
 
-__all__ = ["deliver", "fetch", "files_below", "inside", "is_url", "read_bytes"]
+__all__ = [
+    "deliver", "fetch", "files_below", "files_beside", "inside", "is_file", "is_url", "read_bytes",
+    "split",
+]  # fmt: skip
 
 
-def is_url(place: str | Path) -> bool:
+def is_url(place: str) -> bool:
     """Return whether a place is a URL, such as ``s3://bucket/trial.c3d``."""
-    return isinstance(place, str) and "://" in place
+    return "://" in place
 
 
 def inside(folder: str, name: str) -> str:
@@ -25,26 +29,53 @@ def inside(folder: str, name: str) -> str:
     return f"{folder.rstrip('/')}/{name}" if is_url(folder) else str(Path(folder, name))
 
 
-def read_bytes(place: str) -> bytes:
-    """Read a file.
+def split(place: str) -> tuple[str, str]:
+    """Return the folder and the name of a file."""
+    if is_url(place):
+        folder, _, name = place.rpartition("/")
+        return folder, name
+    return str(Path(place).parent), Path(place).name
+
+
+def is_file(place: str) -> bool:
+    """Return whether a place is a file; False for a folder.
+
+    Raises
+    ------
+    ParameterError
+        If nothing is there.
+    """
+    if is_url(place):
+        with _remote(place) as (system, path):
+            if not system.exists(path):
+                raise ParameterError("sources", "captures or folders that exist", place)
+            return system.isfile(path)
+    if not Path(place).exists():
+        raise ParameterError("sources", "captures or folders that exist", place)
+    return Path(place).is_file()
+
+
+def read_bytes(place: str, n: int | None = None) -> bytes:
+    """Read a file, or its first `n` bytes.
 
     Parameters
     ----------
     place : str
         Path or URL.
+    n : int, optional
+        Number of bytes; by default all.
 
     Raises
     ------
     FormatError
         If the file does not exist or cannot be read.
     """
+    if is_url(place):
+        with _remote(place) as (system, path):
+            return system.cat_file(path, end=n)
     try:
-        if is_url(place):
-            system, path = _remote(place)
-            return system.cat_file(path)
-        return Path(place).read_bytes()
-    except FileNotFoundError:
-        raise FormatError(Path(place), "", "", "no such file") from None
+        with Path(place).open("rb") as file:
+            return file.read(n)
     except OSError as error:
         raise not_read(Path(place), error) from error
 
@@ -75,28 +106,37 @@ def deliver(place: str, content: bytes, *, overwrite: bool) -> None:
     FormatError
         If the file cannot be written, or exists with other bytes.
     """
-    path = Path(place)
     if is_url(place):
-        system, inner = _remote(place)
-        if not overwrite and system.exists(inner) and system.cat_file(inner) != content:
-            raise _exists(path)
-        system.makedirs(str(PurePosixPath(inner).parent), exist_ok=True)
-        system.pipe_file(inner, content)  # object stores replace an object as a whole
+        with _remote(place) as (system, path):
+            if not overwrite and system.exists(path) and system.cat_file(path) != content:
+                raise _exists(place)
+            system.makedirs(str(PurePosixPath(path).parent), exist_ok=True)
+            system.pipe_file(path, content)  # object stores replace an object as a whole
         return
+    path = Path(place)
     if path.is_file():
         if path.read_bytes() == content:
             return
         if not overwrite:
-            raise _exists(path)
+            raise _exists(place)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise not_read(path.parent, error) from error
+        raise not_written(path, error) from error
     with replacing(path) as file:
         file.write(content)
 
 
-def files_below(folder: str) -> Iterator[tuple[str, OSError | None]]:
+def files_beside(place: str) -> set[str]:
+    """Return the names of the files in the folder of a file."""
+    folder, _ = split(place)
+    if is_url(folder):
+        with _remote(folder) as (system, path):
+            return {PurePosixPath(each).name for each in system.ls(path, detail=False)}
+    return {path.name for path in Path(folder).iterdir() if path.is_file()}
+
+
+def files_below(folder: str) -> Iterator[tuple[str, str]]:
     """Iterate over all files below a folder or URL, sorted, without hidden ones.
 
     Parameters
@@ -108,41 +148,50 @@ def files_below(folder: str) -> Iterator[tuple[str, OSError | None]]:
     ------
     name : str
         Name relative to the folder, with ``/`` between its parts.
-    error : OSError or None
-        Error, if the name is a folder that cannot be listed.
+    reason : str
+        Reason why the name, a folder, cannot be listed; empty for a file.
     """
     if is_url(folder):
-        system, root = _remote(folder)
-        for path in sorted(system.find(root)):
-            name = str(PurePosixPath(path).relative_to(PurePosixPath(root)))
+        with _remote(folder) as (system, root):
+            names = [
+                str(PurePosixPath(path).relative_to(PurePosixPath(root)))
+                for path in sorted(system.find(root))
+            ]
+        for name in names:
             if not any(part.startswith(".") for part in name.split("/")):
-                yield name, None
+                yield name, ""
         return
     failed: list[OSError] = []
     for at, folders, names in os.walk(folder, onerror=failed.append):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(names):
             if not name.startswith("."):
-                yield Path(at, name).relative_to(folder).as_posix(), None
+                yield Path(at, name).relative_to(folder).as_posix(), ""
     for error in failed:
-        yield Path(os.fsdecode(error.filename)).relative_to(folder).as_posix(), error
+        path = Path(os.fsdecode(error.filename))
+        yield path.relative_to(folder).as_posix(), f"{path}: {error.strerror or error}"
 
 
-def _exists(path: Path) -> FormatError:
+def _exists(place: str) -> FormatError:
     return FormatError(
-        path, "the file", "none, or one with the same bytes", "another one",
-        "give overwrite to replace it",
+        place, "the file", "none, or one with the same bytes", "another one",
+        "give overwrite=True (--overwrite) to replace it",
     )  # fmt: skip
 
 
-def _remote(url: str) -> tuple[Any, str]:
-    """Return the file system of a URL, and the path in it."""
+@contextmanager
+def _remote(url: str) -> Generator[tuple[Any, str], None, None]:
+    """Open the file system of a URL, with the path in it; its errors name the URL."""
     try:
         from fsspec.core import url_to_fs
     except ImportError:
         hint = "run pip install 'asterism[cluster]'"
         raise ParameterError("URL", "fsspec, which is optional", "not installed", hint) from None
     try:
-        return url_to_fs(url)
-    except (ImportError, ValueError) as error:
-        raise ParameterError("URL", "a protocol of fsspec", f"{url}: {error}") from error
+        yield url_to_fs(url)
+    except AsterismError:
+        raise
+    except FileNotFoundError:
+        raise FormatError(url, "", "", "no such file") from None
+    except Exception as error:  # each file system of fsspec has errors of its own
+        raise FormatError(url, "", "", f"{type(error).__name__}: {error}") from error

@@ -7,9 +7,10 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asterism.batch.cluster import has_cluster, on_cluster
-from asterism.checks import check_kind, check_number
-from asterism.errors import AsterismError, ParameterError, not_written
+from asterism.batch.result_file import check_folder
+from asterism.batch.tasks import number_of_workers, run_tasks
+from asterism.checks import check_kind
+from asterism.errors import not_written
 from asterism.io.atomic import replacing
 from asterism.plot.export import write_figure
 from asterism.plot.sweep import plot_sweep
@@ -19,7 +20,7 @@ from asterism.sweep.study import Study
 from asterism.sweep.table import as_csv, rows_of, summarize
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable
 
     from asterism.sweep.study import Case
 
@@ -113,15 +114,8 @@ def run(
     """
     check_kind("study", study, Study, "am.sweep.read_study(path)")
     folder = Path(out)
-    if workers is None:
-        workers = (os.cpu_count() or 1) if has_cluster() and scheduler is None else 1
-    check_number("workers", workers, above=0, integer=True)
-    holds_files = folder.is_dir() and any(folder.iterdir())
-    if holds_files and not (overwrite or (folder / CASES).is_file()):
-        raise ParameterError(
-            "out", "a new folder, an empty one, or that of a sweep", f"{out}, which holds files",
-            "give overwrite to add to it",
-        )  # fmt: skip
+    workers = number_of_workers(workers, scheduler)
+    check_folder(str(folder), "a sweep", allowed=overwrite or (folder / CASES).is_file())
     cases = study.cases()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -131,7 +125,11 @@ def run(
         with (folder / CASES).open("a", encoding="utf-8") as file:
             if file.tell() and not (folder / CASES).read_bytes().endswith(b"\n"):
                 file.write("\n")  # the line of a run that was stopped while it wrote
-            for n, (key, found) in enumerate(_found(todo, study.scores, workers, scheduler)):
+            results = run_tasks(
+                score_case, list(todo), lambda key: (todo[key], study.scores),
+                scheduler=scheduler, workers=workers,
+            )  # fmt: skip
+            for n, (key, found) in enumerate(results):
                 if isinstance(found, BaseException):
                     failed[_described(todo[key])] = str(found) or type(found).__name__
                 else:
@@ -153,21 +151,6 @@ def run(
     return Sweep(
         rows=rows, summary=summary, scores=study.scores, n_done_before=n_before, failed=failed
     )
-
-
-def _found(
-    todo: dict[str, Case], scores: Sequence[str], workers: int, scheduler: str | None
-) -> Iterator[tuple[str, Any]]:
-    """Iterate over the scores of cases by key, or the errors, as they come."""
-    if scheduler is None and (workers == 1 or len(todo) < 2):
-        for key, case in todo.items():
-            try:
-                yield key, score_case(case, tuple(scores))
-            except AsterismError as error:
-                yield key, error
-        return
-    tasks = {key: (case, tuple(scores)) for key, case in todo.items()}
-    yield from on_cluster(score_case, tasks, scheduler=scheduler, workers=workers)
 
 
 def _read(path: Path) -> dict[str, dict[str, float]]:

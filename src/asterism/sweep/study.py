@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import inspect
 import itertools
 import json
 from pathlib import Path
@@ -15,8 +16,8 @@ from asterism.metrics import Evaluation
 from asterism.model.recipe import versions
 from asterism.model.toml_file import read_toml
 from asterism.records import record
-from asterism.simulate import SCENES
-from asterism.tracking.methods import METHODS
+from asterism.simulate import SCENES, corrupt
+from asterism.tracking.methods import METHODS, options_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -25,6 +26,7 @@ __all__ = ["Case", "Study", "read_study"]
 
 SCORES = ("idf1", "mota", "hota", "switches")
 """Scores of a study that names none."""
+_GIVEN = ("truth", "seed", "rig")  # arguments of `corrupt` that no study sets
 _SECTIONS = ("scenes", "corruptions", "methods", "seeds", "scores")
 _KNOWN_SCORES = tuple(
     field.name
@@ -119,12 +121,23 @@ class Study:
             if ("scene" in table) == ("capture" in table):
                 raise ParameterError(f"scenes.{name}", "either scene or capture", repr(table))
             if "scene" in table:
-                check_fields(f"scenes.{name}.scene", _values(table["scene"]), SCENES)
+                chosen = _values(table["scene"])
+                check_fields(f"scenes.{name}.scene", chosen, SCENES)
+                for each in chosen:
+                    known = [*inspect.signature(SCENES[each].make).parameters, "scene"]
+                    known.remove("seed")
+                    check_fields(f"scenes.{name}", table, known)
             else:
                 check_fields(f"scenes.{name}", table, ("capture",))
+        for name, table in self.corruptions.items():
+            known = [each for each in inspect.signature(corrupt).parameters if each not in _GIVEN]
+            check_fields(f"corruptions.{name}", table, known)
         for name, table in self.methods.items():
             chosen = _values(table.get("method", "auto"))
             check_fields(f"methods.{name}.method", chosen, ("auto", *METHODS))
+            for each in chosen:
+                options = [] if each == "auto" else options_of(METHODS[each]())
+                check_fields(f"methods.{name}", table, ["method", "stitch", *options])
         if not self.seeds or len(set(self.seeds)) < len(self.seeds):
             raise ParameterError("seeds", "different numbers", repr(self.seeds))
         for seed in self.seeds:

@@ -102,7 +102,7 @@ def batch(
         asterism batch captures -o tracked --scheduler tcp://node1:8786
     """
     import asterism as am
-    from asterism.batch.run_batch import holds_batch
+    from asterism.batch.index import holds_batch
     from asterism.batch.storage import is_url
     from asterism.checks import check_number
     from asterism.cli.commands.track import made_method

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -22,8 +22,6 @@ from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     import asterism as am
-
-_TABLE = "summary.csv"  # of a batch
 
 _Labels = Annotated[Path, typer.Argument(metavar="LABELS", help="Tracks to score, or a folder.")]
 _Truth = Annotated[Path, typer.Argument(metavar="TRUTH", help="True tracks, or a folder.")]
@@ -114,14 +112,16 @@ def _evaluate_folders(labels: Path, truth: Path, *, quiet: bool, json: bool) -> 
 
 def _pairs(labels: Path, truth: Path) -> dict[str, tuple[Path, Path]]:
     """Return the captures of two folders that belong together, by name."""
+    from asterism.batch.find import captures_below
+
     for name, folder in (("LABELS", labels), ("TRUTH", truth)):
         if not folder.is_dir():
             raise ParameterError(name, "a folder, as the other is one", str(folder))
-    true = {_stem(path, truth): path for path in _captures(truth)}
+    true = {_stem(name): truth / name for name in captures_below(str(truth))}
     pairs = {
-        stem: (path, true[stem])
-        for path in _captures(labels)
-        if (stem := _stem(path, labels)) in true
+        _stem(name): (labels / name, true[_stem(name)])
+        for name in captures_below(str(labels))
+        if _stem(name) in true
     }
     if not pairs:
         hint = "walk.tracked.c3d is compared with walk.c3d"
@@ -129,20 +129,8 @@ def _pairs(labels: Path, truth: Path) -> dict[str, tuple[Path, Path]]:
     return pairs
 
 
-def _captures(folder: Path) -> list[Path]:
-    import asterism as am
-
-    suffixes = {e for f in am.io.CAPTURE_FORMATS.values() for e in f.extensions if e}
-    runs = folder / "runs"  # of a batch: the results are beside it
-    return sorted(
-        path
-        for path in folder.rglob("*")
-        if path.suffix.lower() in suffixes and runs not in path.parents and path.name != _TABLE
-    )
-
-
-def _stem(path: Path, folder: Path) -> str:
-    return path.relative_to(folder).with_suffix("").as_posix().removesuffix(".tracked")
+def _stem(name: str) -> str:
+    return str(PurePosixPath(name).with_suffix("")).removesuffix(".tracked")
 
 
 def _write_by_frame(scores: am.metrics.Evaluation, path: Path) -> None:

@@ -68,7 +68,7 @@ def report(
         raise ParameterError(", ".join(given), "one capture", f"{len(sources)}")
     pages = [source.with_suffix(".html") if out is None else out for source in sources]
     check_ending("--out", out, ".html", ".htm")
-    written = {"--out": pages[0]} if len(pages) == 1 else {f"--out ({p.name})": p for p in pages}
+    written = {"--out": pages[0]} if len(pages) == 1 else {f"--out ({p})": p for p in pages}
     check_outputs(written, [*sources, truth, rig], overwrite=overwrite)
     true = None if truth is None else am.io.read_tracks(truth)
     cameras = None if rig is None else am.read_rig(rig)
