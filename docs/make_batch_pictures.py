@@ -5,9 +5,10 @@ CAPTURES is a folder with real captures; Chromium draws. The study is that of th
 
 from __future__ import annotations
 
-import io
+import os
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -17,9 +18,9 @@ from PIL import Image
 import asterism as am
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "reporting"))
-from browser import Browser
+from browser import CHROMIUM
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).resolve().parent
 NAMES = ("walking_1.c3d", "PronetoRun01.c3d", "mocap36.c3d", "HC030A22.c3d")
 
 
@@ -35,16 +36,24 @@ def write_captures(data: Path, folder: Path) -> None:
     (folder / "damaged.c3d").write_bytes(b"\x02\x50" + b"junk" * 200)
 
 
+def photograph(page: Path, picture: Path) -> None:
+    """Save what Chromium shows of a page without scripts."""
+    options = ("--headless", "--no-sandbox", "--hide-scrollbars", "--window-size=1000,330")
+    shot = page.with_suffix(".png")
+    subprocess.run([CHROMIUM, *options, f"--screenshot={shot}", page.as_uri()], check=True)
+    Image.open(shot).convert("RGB").save(picture, optimize=True)
+
+
 def main() -> None:
+    """Make both pictures."""
+    data = Path(sys.argv[1]).resolve()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "captures").mkdir()
-        write_captures(Path(sys.argv[1]), folder / "captures")
-        am.batch.run([folder / "captures"], folder / "tracked")
-        with Browser() as browser:
-            page = browser.page((folder / "tracked/index.html").as_uri(), width=1000, height=330)
-            picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-            picture.save(DOCS / "images" / "batch_index.png", optimize=True)
+        write_captures(data, folder / "captures")
+        os.chdir(folder)  # the page shows the paths as they are given
+        am.batch.run(["captures"], "tracked")
+        photograph(folder / "tracked" / "index.html", DOCS / "images" / "batch_index.png")
         guide = (DOCS / "guides" / "sweep.md").read_text(encoding="utf-8")
         found = re.search(r"```toml\n(.*?)```", guide, re.DOTALL)
         assert found is not None

@@ -40,7 +40,7 @@ _STYLE = (
     "table{width:100%;border-collapse:collapse;font-size:14px}"
     "th,td{padding:6px 12px;border-top:1px solid var(--line);text-align:right;white-space:nowrap}"
     "thead th{border-top:0;color:var(--muted);font-weight:500}"
-    "th:first-child,td:nth-child(2),thead th:nth-child(2){text-align:left}"
+    "th:first-child{text-align:left}"
     "tbody th{min-width:24ch;font-weight:600;overflow-wrap:anywhere;white-space:normal}"
     "td.why{text-align:left;white-space:normal;overflow-wrap:anywhere}"
     "a{color:var(--accent)}.clear{color:var(--clear)}.some{color:var(--some)}"
