@@ -1,4 +1,4 @@
-"""One capture in a process of its own: ``python -m asterism.batch.child FOLDER``."""
+"""Track one capture in a separate process: ``python -m asterism.batch.child FOLDER``."""
 
 from __future__ import annotations
 

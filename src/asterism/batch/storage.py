@@ -1,4 +1,4 @@
-"""Files by path, or by URL through fsspec."""
+"""Files on disk, and through fsspec at URLs. A *place* is the path or the URL of a file."""
 
 from __future__ import annotations
 

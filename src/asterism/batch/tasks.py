@@ -1,4 +1,4 @@
-"""Tasks, here or on a Dask cluster: the loss of a worker or a scheduler costs time, no result."""
+"""Tasks in this process or on a Dask cluster, repeated if a worker or the scheduler is lost."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def plot_sweep(
     *,
     ax: Sequence[Axes] | None = None,
 ) -> list[Axes]:
-    """Draw the scores of a study: over the varied number, or one row for each condition.
+    """Draw the mean scores of a study with their confidence intervals.
 
     Parameters
     ----------

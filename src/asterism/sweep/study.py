@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Case", "Study", "read_study"]
 
 SCORES = ("idf1", "mota", "hota", "switches")
-"""Scores of a study that names none."""
+"""Default scores of a study."""
 _GIVEN = ("truth", "seed", "rig")  # arguments of `corrupt` that no study sets
 _SECTIONS = ("scenes", "corruptions", "methods", "seeds", "scores")
 _KNOWN_SCORES = tuple(
