@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import socket
@@ -146,6 +147,34 @@ def test_a_task_that_kills_its_workers_fails_alone():
     results = found(deadly, range(6), scheduler=None, workers=2)
     assert type(results.pop("2")).__name__ == "KilledWorker"
     assert results == {f"{x}": x for x in range(6) if x != 2}
+
+
+def test_a_task_that_waited_at_a_killed_worker_is_tried_alone(monkeypatch):
+    """Which tasks wait there depends on the moment, so the rounds of the cluster are written down."""
+
+    class KilledWorker(Exception):
+        pass
+
+    rounds = []
+
+    @contextlib.contextmanager
+    def connected(scheduler, workers, patience):
+        del scheduler, workers, patience
+        yield None
+
+    def results(client, keys, send):
+        del client, send
+        rounds.append(list(keys))
+        for key in rounds[-1]:
+            dies = key == "2" or (key == "3" and len(rounds[-1]) > 1)
+            yield key, KilledWorker() if dies else int(key)
+
+    monkeypatch.setattr("asterism.batch.tasks._connected", connected)
+    monkeypatch.setattr("asterism.batch.tasks._results", results)
+    got = found(squared, range(5), scheduler=None, workers=2)
+    assert rounds == [["0", "1", "2", "3", "4"], ["2"], ["3"]]
+    assert isinstance(got.pop("2"), KilledWorker)
+    assert got == {"0": 0, "1": 1, "3": 3, "4": 4}
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -21,7 +21,7 @@ STUDY = am.sweep.Study(
     corruptions={"missing": {"missing": [0.0, 0.3], "noise": 0.001}},
     methods={"gnn": {"method": "gnn"}, "smp": {"method": "smp", "window": 3}},
     seeds=(1, 2, 3),
-    scores=("idf1", "switches"),
+    scores=("idf1", "switches", "n_true"),
 )
 
 
@@ -44,7 +44,13 @@ def test_each_case_is_one_row_with_the_scores_of_its_settings(whole):
         am.simulate.cube(frames=20, seed=2), missing=0.3, noise=0.001, seed=2
     )
     tracks = am.track(truth.detections, am.SMP(window=3), seed=2)
-    assert row["idf1"] == am.evaluate(tracks, truth).idf1
+    found = am.evaluate(tracks, truth)
+    assert {name: row[name] for name in STUDY.scores} == {
+        name: getattr(found, name) for name in STUDY.scores
+    }
+    # The other seeds give other figures, so that a wrong seed would be noticed.
+    same = [r for r in sweep.rows if r["method"] == "smp" and r["corruption.missing"] == 0.3]
+    assert len({r["n_true"] for r in same}) > 1
     assert {r["idf1"] for r in sweep.rows if r["corruption.missing"] == 0} == {1.0}
 
 

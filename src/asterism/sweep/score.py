@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from asterism.io import read
 from asterism.metrics import evaluate
-from asterism.model import Detections
 from asterism.simulate import SCENES, Burst, Ghosts, Visits, corrupt
 from asterism.tracking import method_by_name, track
 
@@ -55,9 +54,7 @@ def score_case(case: Case, scores: tuple[str, ...], *, progress: Any = None) -> 
     truth = corrupt(truth, **options, seed=case.seed)
     name, stitch = method.pop("method", "auto"), method.pop("stitch", "auto")
     made = None if name == "auto" else method_by_name(name, **method)
-    d = truth.detections
-    points = Detections(times=d.times, offsets=d.offsets, points=d.points)
-    tracks = track(points, made, stitch=stitch, seed=case.seed)
+    tracks = track(truth.detections, made, stitch=stitch, seed=case.seed)
     found = evaluate(tracks, truth)
     return {score: float(getattr(found, score)) for score in scores}
 

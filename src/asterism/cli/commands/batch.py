@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["batch"]
 
 _In = Annotated[
-    list[str], typer.Argument(metavar="IN...", help="Captures and folders, by path or URL.")
+    list[str], typer.Argument(metavar="IN", help="Captures and folders, by path or URL.")
 ]
 _Out = Annotated[str, typer.Option("--out", "-o", help="Output folder, by path or URL.")]
 _Method = Annotated[

@@ -13,7 +13,7 @@ from asterism.cli.console import Json, Quiet, print_json, print_table
 if TYPE_CHECKING:
     import asterism as am
 
-_Files = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Captures to describe.")]
+_Files = Annotated[list[Path], typer.Argument(metavar="FILE", help="Captures to describe.")]
 
 
 def info(files: _Files, quiet: Quiet = False, json: Json = False) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["report"]
 
-_In = Annotated[list[Path], typer.Argument(metavar="TRACKED...", help="Captures with tracks.")]
+_In = Annotated[list[Path], typer.Argument(metavar="TRACKED", help="Captures with tracks.")]
 _Truth = Annotated[Path | None, typer.Option(help="True tracks; wrong labels are marked.")]
 _Rig = Annotated[Path | None, typer.Option(help="Calibration of the cameras.")]
 _Out = Annotated[
