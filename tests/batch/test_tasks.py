@@ -150,7 +150,7 @@ def test_a_task_that_kills_its_workers_fails_alone():
 
 
 def test_a_task_that_waited_at_a_killed_worker_is_tried_alone(monkeypatch):
-    """Which tasks wait there depends on the moment, so the rounds of the cluster are written down."""
+    """Which tasks wait there depends on the moment, so the rounds of the cluster are given."""
 
     class KilledWorker(Exception):
         pass

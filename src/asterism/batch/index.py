@@ -128,9 +128,8 @@ def _need(row: Mapping[str, Any]) -> tuple[bool, float, int, str]:
 def _page(rows: Sequence[Mapping[str, Any]]) -> str:
     n, places = len(rows), sum(int(row["places"] or 0) for row in rows)
     failed = sum(row["state"] != "tracked" for row in rows)
-    lead = (
-        f"Captures: {n:,}. Without a result: {failed:,}. Places to check in the others: {places:,}."
-    )
+    lead = f"Captures: {n:,}. Without a result: {failed:,}. "
+    lead += f"Places to check in the others: {places:,}."
     titles = (
         "capture", "places to check", "wrong labels expected", "tracks", "named", "labelled",
         "gaps", "frames",
