@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["holds_files", "remove_leftovers", "replacing", "write_text"]
 
 _LEFTOVER = re.compile(r"\.[0-9a-f]{16}\.part")
-_STALE = 60.0  # seconds after which nobody writes a temporary file any more
+_STALE = 60.0  # seconds after which a temporary file is no longer being written
 
 
 @contextmanager
