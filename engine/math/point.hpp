@@ -18,5 +18,10 @@ inline double squared_distance(const Point& a, const Point& b, int D) {
   for (int d = 0; d < D; ++d) sum += (a[d] - b[d]) * (a[d] - b[d]);
   return sum;
 }
+// The same, without a loop of unknown length: the coordinates beyond the axes are 0.
+inline double squared_distance(const Point& a, const Point& b) {
+  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+  return x * x + y * y + z * z;
+}
 
 }  // namespace asterism

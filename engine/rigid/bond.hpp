@@ -34,6 +34,10 @@ inline constexpr auto kShares = [] {
   return shares;
 }();
 
+inline double inverse(std::int64_t n) {
+  return n <= kMemory ? kShares[static_cast<std::size_t>(n)] : 1 / static_cast<double>(n);
+}
+
 struct Bond {
   std::int32_t other = 0;
   std::int64_t n = 0;
@@ -48,8 +52,7 @@ struct Bond {
 };
 
 inline double predictive_variance(const Bond& bond, double r) {
-  const double unobserved =
-      bond.mean * (kBend + 1 / static_cast<double>(std::max<std::int64_t>(bond.n, 1)));
+  const double unobserved = bond.mean * (kBend + inverse(std::max<std::int64_t>(bond.n, 1)));
   return std::max(bond.variance, 2 * r) + unobserved * unobserved;
 }
 

@@ -113,9 +113,13 @@ class Neighbours {
       if (!shared.has_value()) shared = SharedCopy<Bonds>(Bonds{});
       Bonds& bonds = shared.own();
       if (bonds.size() == 0 || (n_frames_ + one.marker) % kLookEvery == 0) look_around(seen, one, bonds);
-      for (Bond& bond : bonds.span())
-        if (const Point* other = places_.find(bond.other)) bond.add(std::sqrt(squared_distance(one.at, *other, D_)));
-      sort(bonds);
+      Variances variances;
+      for (std::size_t k = 0; k < bonds.size(); ++k) {
+        if (const Point* other = places_.find(bonds[k].other))
+          bonds[k].add(std::sqrt(squared_distance(one.at, *other)));
+        variances[k] = variance(bonds[k]);
+      }
+      sort(bonds, variances);
     }
   }
 
@@ -158,10 +162,10 @@ class Neighbours {
     std::size_t n_ = 0;
   };
 
+  using Variances = std::array<double, kMaxNeighbours>;
+
   // Variances change little from frame to frame, so an insertion sort is fast.
-  void sort(Bonds& bonds) const {
-    std::array<double, kMaxNeighbours> variances;
-    for (std::size_t k = 0; k < bonds.size(); ++k) variances[k] = variance(bonds[k]);
+  static void sort(Bonds& bonds, Variances& variances) {
     for (std::size_t k = 1; k < bonds.size(); ++k) {
       const auto is_before = [&](double own, std::int32_t other, std::size_t at) {
         return own < variances[at] || (own == variances[at] && other < bonds[at].other);
@@ -186,7 +190,7 @@ class Neighbours {
     near_.clear();
     for (const MarkerPoint& other : seen)
       if (other.marker != one.marker)
-        near_.push_back({squared_distance(one.at, other.at, D_), other.marker});
+        near_.push_back({squared_distance(one.at, other.at), other.marker});
     const std::size_t n = std::min(bonds.size() == 0 ? kMaxNeighbours : kNearest, near_.size());
     std::partial_sort(near_.begin(), near_.begin() + static_cast<std::ptrdiff_t>(n), near_.end());
     for (std::size_t k = 0; k < n; ++k) {

@@ -36,7 +36,9 @@ class BackgroundDensity {
     sums.assign(at.seen.size(), 0);
     for (std::size_t i = 0; i < sums.size(); ++i)
       for (std::size_t j = i + 1; j < sums.size(); ++j) {
-        const double peak = peak_at(squared_distance(at.seen[i].at, at.seen[j].at, D_));
+        const double distance2 = squared_distance(at.seen[i].at, at.seen[j].at);
+        if (distance2 > kSurelyNoPeak * radius2_) continue;  // saves the division for most pairs
+        const double peak = peak_at(distance2);
         sums[i] += peak;
         sums[j] += peak;
       }
@@ -53,10 +55,13 @@ class BackgroundDensity {
   }
 
  private:
+  static constexpr double kNoPeak = 40;  // squared radii from which a peak counts as 0
+  static constexpr double kSurelyNoPeak = 41;  // beyond any rounding
+
   // A peak relative to its height, by the squared distance from the marker.
   double peak_at(double distance2) const {
     const double far = distance2 / radius2_;
-    return far < 40 ? std::exp(-0.5 * far) : 0;
+    return far < kNoPeak ? std::exp(-0.5 * far) : 0;
   }
 
   int D_;

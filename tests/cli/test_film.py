@@ -294,6 +294,7 @@ def test_the_coverage_is_that_of_the_level_of_the_markers(scale):
 
 @pytest.mark.data
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no real captures at {DATA}")
+@pytest.mark.usefixtures("plain_pictures")
 def test_a_real_walk_through_its_own_cameras(here, capsys):
     (source,) = DATA.rglob("walking_1.c3d")
     rig = source.with_suffix(".xcp")

@@ -16,7 +16,7 @@ from tests.cli.runs import refused, run
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """A person of whom markers are occluded for a while, beside ghosts; and tracks of gnn alone."""
+    """A person of whom markers are occluded for a while, beside ghosts; tracks of gnn; its set."""
     folder = tmp_path_factory.mktemp("recorded")
     person, p, truth, alone = (
         str(folder / name) for name in ("person.csv", "p.c3d", "pt.c3d", "alone.c3d")
@@ -25,6 +25,7 @@ def recorded(tmp_path_factory):
     assert main(["simulate", "person", "-o", person, "--seed=1", "-q"]) == 0
     assert main(["corrupt", person, "-o", p, "--truth", truth, *options.split()]) == 0
     assert main(["track", p, "--method", "gnn", "-o", alone, "-q"]) == 0
+    assert main(["markerset", "learn", person, "-o", str(folder / "set.toml"), "-q"]) == 0
     return folder
 
 
@@ -109,8 +110,7 @@ def test_the_marker_set_of_one_capture_names_the_next(person, capsys):
 
 
 def test_one_command_tracks_names_and_fills(person, capsys):
-    run("markerset learn person.csv -o subject.toml", capsys)
-    line = "track p.c3d --markers subject.toml --fill -o named.c3d --report page.html --run runs/a"
+    line = "track p.c3d --markers set.toml --fill -o named.c3d --report page.html --run runs/a"
     out = run(line, capsys)
     for row in ("names given", "names not found", "gaps filled", "page.html"):
         assert row in out
@@ -123,7 +123,7 @@ def test_one_command_tracks_names_and_fills(person, capsys):
     assert summary["filled"]["n_filled"] > 0
     run("track --from runs/a/run.toml -o again.c3d", capsys)
     assert Path("again.c3d").read_bytes() == Path("named.c3d").read_bytes()
-    am.MarkerSet.from_toml("subject.toml").of_subject("Ann").to_toml("other.toml")
+    am.MarkerSet.from_toml("set.toml").of_subject("Ann").to_toml("other.toml")
     err = refused("track --from runs/a/run.toml --markers other.toml -o b.c3d", capsys)
     assert "--markers: expected those of" in err
 
@@ -164,9 +164,8 @@ def test_a_capture_keeps_its_own_names(person, capsys):
 
 
 def test_sets_are_merged_and_names_checked(person, capsys):
-    run("markerset learn person.csv -o one.toml", capsys)
-    run("markerset learn person.csv -o two.toml", capsys)
-    out = run("markerset merge one.toml two.toml -o both.toml", capsys)
+    shutil.copy("set.toml", "again.toml")
+    out = run("markerset merge set.toml again.toml -o both.toml", capsys)
     assert "subjects" in out
     assert am.MarkerSet.from_toml("both.toml").n_subjects == 2
     assert "none" in run("markerset check both.toml person.csv", capsys)

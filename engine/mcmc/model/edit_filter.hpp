@@ -33,9 +33,10 @@ double link_gain(const Partition<Filter>& p, std::int32_t i, std::int32_t j) {
 
 // Filters the next planned detection of an edit, with its continuation. Before the update of the
 // state, calls goes_on(gain of the score by the detection); if that is false, returns false and
-// leaves the detection planned.
+// leaves the detection planned. `expected` is working memory.
 template <typename Filter, typename GoesOn>
-bool filter_next(const Partition<Filter>& p, Edit<Filter>& edit, GoesOn&& goes_on) {
+bool filter_next(const Partition<Filter>& p, Edit<Filter>& edit, GoesOn&& goes_on,
+                 typename Filter::Expected& expected) {
   const DetectionWindow& window = p.window();
   Tail<Filter>& tail = edit.tail;
   const std::size_t n = tail.states.size();
@@ -48,11 +49,11 @@ bool filter_next(const Partition<Filter>& p, Edit<Filter>& edit, GoesOn&& goes_o
     const std::int32_t i = before(p, edit, n);
     const auto gap = static_cast<int>(window[j].frame - window[i].frame);
     p.filter().expect(p.motion(), window, n == 0 ? p.state(i) : tail.states.back(),
-                      window[i].frame, gap, p.expected());
-    const double gain = p.gap_score(gap) + p.filter().weigh(p.motion(), p.expected(), window[j].y);
+                      window[i].frame, gap, expected);
+    const double gain = p.gap_score(gap) + p.filter().weigh(p.motion(), expected, window[j].y);
     if (!goes_on(gain)) return false;
     tail.scores.push_back((n == 0 ? p.score(i) : tail.scores.back()) + gain);
-    p.filter().take(p.motion(), p.expected(), window[j].y, tail.states.emplace_back());
+    p.filter().take(p.motion(), expected, window[j].y, tail.states.emplace_back());
   }
   if (p.is_continuation(j))
     tail.scores.back() +=
@@ -60,11 +61,21 @@ bool filter_next(const Partition<Filter>& p, Edit<Filter>& edit, GoesOn&& goes_o
   return true;
 }
 
+template <typename Filter, typename GoesOn>
+bool filter_next(const Partition<Filter>& p, Edit<Filter>& edit, GoesOn&& goes_on) {
+  return filter_next(p, edit, goes_on, p.expected());
+}
+
 // Appends a detection to the tail of an edit, with its continuation if it has one.
 template <typename Filter>
-void append(const Partition<Filter>& p, Edit<Filter>& edit, std::int32_t j) {
+void append(const Partition<Filter>& p, Edit<Filter>& edit, std::int32_t j,
+            typename Filter::Expected& expected) {
   edit.tail.nodes.push_back(j);
-  filter_next(p, edit, [](double) { return true; });
+  filter_next(p, edit, [](double) { return true; }, expected);
+}
+template <typename Filter>
+void append(const Partition<Filter>& p, Edit<Filter>& edit, std::int32_t j) {
+  append(p, edit, j, p.expected());
 }
 // Appends the present next detection, whose state and score stay valid without earlier changes.
 template <typename Filter>

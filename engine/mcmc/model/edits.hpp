@@ -46,6 +46,13 @@ struct Edit {
   std::int32_t track = -1;
   std::int32_t keep = 0;
   Tail<Filter> tail;
+
+  // Empties the edit and keeps its memory.
+  void clear() {
+    track = -1;
+    keep = 0;
+    tail.clear();
+  }
 };
 
 }  // namespace asterism

@@ -1,13 +1,19 @@
 // Initial state of the chain in a new frame: the exact assignment of its detections to predicted
 // tracks, or links given by the caller. Also finds the ambiguous links.
+//
+// The tracks are predicted and updated in blocks, on several threads. The results of the blocks are
+// merged in order, so they do not depend on the number of threads. The filter of the whole partition
+// caches nothing, so the threads share it.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
+#include "base/parallel.hpp"
 #include "base/scratch.hpp"
 #include "mcmc/chain/ambiguous_links.hpp"
 #include "mcmc/chain/chain_stats.hpp"
@@ -32,8 +38,8 @@ template <typename Filter>
 class FrameStart {
  public:
   // A link is ambiguous if its log likelihood is within `ambiguous_within` nats of an alternative.
-  FrameStart(bool has_assignment, double ambiguous_within)
-      : has_assignment_(has_assignment), within_(ambiguous_within) {}
+  FrameStart(bool has_assignment, double ambiguous_within, std::int32_t n_threads)
+      : has_assignment_(has_assignment), within_(ambiguous_within), n_threads_(n_threads) {}
 
   void give(GivenLabels labels) {
     given_ = std::make_shared<const GivenLabels>(std::move(labels));
@@ -63,21 +69,26 @@ class FrameStart {
     for (std::int32_t r = 0; r < n_rows; ++r) {
       const std::int32_t j = s_.match[r];
       if (j < 0 || (!has_assignment_ && s_.row_given[j] != r)) continue;
-      Edit<Filter>& edit = s_.edits.emplace_back();
+      Edit<Filter>& edit = next_edit();
       edit.track = s_.rows[r];
       edit.keep = p.track(edit.track).size();
-      append(p, edit, ids[j]);
+      s_.added.push_back(ids[j]);
     }
+    const std::size_t n_begun = s_.n_edits - s_.added.size();
+    in_blocks(s_.added.size(), [&](typename Filter::Expected& expected, std::size_t, std::size_t n) {
+      append(p, s_.edits[n_begun + n], s_.added[n], expected);
+    });
     s_.missed.clear();
     for (std::int32_t r = 0; r < n_rows; ++r)
       if (s_.match[r] < 0) s_.missed.push_back(p.last(s_.rows[r]));
-    p.apply(s_.edits);  // invalidates the numbers of tracks
+    p.apply(std::span(s_.edits).first(s_.n_edits));  // invalidates the numbers of tracks
     add_ambiguous_births(p, ambiguous);
     for (const std::int32_t last : s_.missed) add_ambiguous_before_last(p, last, ambiguous);
   }
 
  private:
   static constexpr std::int32_t kNone = -1, kNewTrack = -2;
+  static constexpr std::size_t kBlock = 128;  // tracks; fewer take less time than a thread's start
   struct Last {
     std::int32_t detection = -1;
     std::int64_t number = -1;
@@ -101,7 +112,8 @@ class FrameStart {
     const DetectionWindow& window = p.window();
     const auto& ids = window.frame(window.now()).ids;
     s_.row_given.assign(ids.size(), kNone);
-    s_.edits.clear();
+    s_.n_edits = 0;
+    s_.added.clear();
     if (!given_) return;
     for (std::size_t c = 0; c < ids.size(); ++c) {
       const std::int32_t j = ids[c];
@@ -116,7 +128,7 @@ class FrameStart {
         s_.row_given[c] = s_.row_of[p.track_of(i)];
       } else if (is_here && p.is_free(i)) {
         s_.row_given[c] = kNewTrack;
-        Edit<Filter>& edit = s_.edits.emplace_back();
+        Edit<Filter>& edit = next_edit();
         append(p, edit, i);
         append(p, edit, j);
       } else if (!is_new) {
@@ -131,25 +143,54 @@ class FrameStart {
     const DetectionWindow& window = p.window();
     const auto& ids = window.frame(window.now()).ids;
     const DetectionWindow::Places& places = *window.frame(window.now()).places;
-    s_.candidates.clear();
-    s_.others.clear();
     s_.is_given.assign(s_.rows.size(), false);
     for (const std::int32_t row : s_.row_given)
       if (row >= 0) s_.is_given[row] = true;
-    for (std::int32_t r = 0; r < static_cast<std::int32_t>(s_.rows.size()); ++r) {
+    for (Found& found : s_.found) found.clear();
+    s_.found.resize(std::max(s_.found.size(), n_blocks(s_.rows.size())));
+    in_blocks(s_.rows.size(), [&](typename Filter::Expected& expected, std::size_t block, std::size_t r) {
       const std::int32_t i = p.last(s_.rows[r]);
       const auto gap = static_cast<int>(window.now() - window[i].frame);
-      p.filter().expect(p.motion(), window, p.state(i), window[i].frame, gap, s_.expected);
+      p.filter().expect(p.motion(), window, p.state(i), window[i].frame, gap, expected);
       const double base = p.gap_score(gap) - p.end_score(i);
-      const double radius = Filter::radius(s_.expected, -base - within_, places.grid.max_r());
-      if (radius < 0) continue;
-      places.grid.within(Filter::center(s_.expected), radius, [&](std::int32_t j, double) {
-        const double gain = base + Filter::log_likelihood(p.motion(), s_.expected, places.points[j]);
+      const double radius = Filter::radius(expected, -base - within_, places.grid.max_r());
+      if (radius < 0) return;
+      Found& found = s_.found[block];
+      places.grid.within(Filter::center(expected), radius, [&](std::int32_t j, double) {
+        const double gain = base + Filter::log_likelihood(p.motion(), expected, places.points[j]);
         if (gain < -within_ || !window.is_linkable(i, ids[j])) return;
         const bool is_open = gain > 0 && !s_.is_given[r] && s_.row_given[j] == kNone;
-        (is_open ? s_.candidates : s_.others).push_back({r, j, gain, 0});
+        (is_open ? found.candidates : found.others)
+            .push_back({static_cast<std::int32_t>(r), j, gain, 0});
       });
+    });
+    s_.candidates.clear();
+    s_.others.clear();
+    for (const Found& found : s_.found) {
+      s_.candidates.insert(s_.candidates.end(), found.candidates.begin(), found.candidates.end());
+      s_.others.insert(s_.others.end(), found.others.begin(), found.others.end());
     }
+  }
+
+  // Calls task(working memory of the thread, block, n) for every n below `size`.
+  template <typename Task>
+  void in_blocks(std::size_t size, Task&& task) {
+    s_.expected_of.resize(std::max<std::size_t>(n_threads_, 1));
+    in_parallel(static_cast<std::int64_t>(n_blocks(size)), n_threads_,
+                [&](std::int32_t worker, std::int64_t k) {
+      const auto block = static_cast<std::size_t>(k);
+      const std::size_t end = std::min(size, (block + 1) * kBlock);
+      for (std::size_t n = block * kBlock; n < end; ++n) task(s_.expected_of[worker], block, n);
+    });
+  }
+  static std::size_t n_blocks(std::size_t size) { return (size + kBlock - 1) / kBlock; }
+
+  // An empty edit, in the memory of one of an earlier frame.
+  Edit<Filter>& next_edit() {
+    if (s_.n_edits == s_.edits.size()) s_.edits.emplace_back();
+    Edit<Filter>& edit = s_.edits[s_.n_edits++];
+    edit.clear();
+    return edit;
   }
 
   // Adds ambiguous links between a free detection of an earlier frame and one of the newest frame,
@@ -202,18 +243,32 @@ class FrameStart {
     });
   }
 
+  // The links of a block of tracks.
+  struct Found {
+    std::vector<Candidate> candidates, others;
+
+    void clear() {
+      candidates.clear();
+      others.clear();
+    }
+  };
   struct Memory {
     std::vector<std::int32_t> rows, row_given, match, missed;
+    std::vector<std::int32_t> added;  // detections of the last edits
     std::vector<std::int32_t> row_of;  // by track, only for those listed in `rows`
     std::vector<char> is_given;
     std::vector<Candidate> candidates, others;
-    std::vector<Edit<Filter>> edits;
+    std::vector<Found> found;  // by block
+    std::vector<Edit<Filter>> edits;  // the first `n_edits` are those of this frame
+    std::size_t n_edits = 0;
     Assignment assignment;
     typename Filter::Expected expected;
+    std::vector<typename Filter::Expected> expected_of;  // by thread
   };
 
   bool has_assignment_;
   double within_;  // ambiguous_within
+  std::int32_t n_threads_;
   std::shared_ptr<const GivenLabels> given_;
   std::unordered_map<std::int64_t, Last> last_;  // last detection of each given label
   Scratch<Memory> s_;

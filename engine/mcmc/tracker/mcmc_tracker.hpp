@@ -48,7 +48,7 @@ class McmcTracker {
       : partition_(m, sm),
         opt_(options),
         seed_(seed),
-        start_(options.has_assignment, options.split.ambiguous_within),
+        start_(options.has_assignment, options.split.ambiguous_within, options.n_threads),
         chains_(chain, options.n_chains, options.n_threads),
         sweep_(options.block, sm.max_gap) {}
 

@@ -135,9 +135,17 @@ def _best(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, int, i
     n = both.sum(axis=0)
     x, y = np.where(both, x, 0.0), np.where(both, y, 0.0)
 
+    first, last = np.triu_indices(len(x) + 1, 1)
+    counts = np.concatenate([np.zeros((1, len(n)), dtype=np.int64), np.cumsum(both, axis=0)])
+    inside = counts[last] - counts[first]
+    is_long = np.minimum(inside, n - inside).min(axis=1) >= MIN_FRAMES
+    if not is_long.any():
+        return -np.inf, 0, 0
+    first, last = first[is_long], last[is_long]
+
     def within(values: NDArray[np.float64]) -> NDArray[np.float64]:
         sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-        return sums[None] - sums[:, None]  # (first, last, C)
+        return sums[last] - sums[first]  # of each stretch, and column
 
     def log_spread(s: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[np.float64]:
         return 0.5 * np.log(np.maximum(squares / n - (s / n) ** 2, 0) + NOISE**2)
@@ -146,8 +154,6 @@ def _best(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, int, i
     sx, sy, sx2, sy2 = x.sum(axis=0), y.sum(axis=0), (x**2).sum(axis=0), (y**2).sum(axis=0)
     before = log_spread(sx, sx2) + log_spread(sy, sy2)
     after = log_spread(sx + move, sx2 + move2) + log_spread(sy - move, sy2 - move2)
-    gain = 0.5 * (before - after).mean(axis=2)
-    inside = within(both.astype(np.float64))
-    gain[np.minimum(inside, n - inside).min(axis=2) < MIN_FRAMES] = -np.inf
-    first, last = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    return float(gain[first, last]), int(first), int(last)
+    gain = 0.5 * (before - after).mean(axis=1)
+    best = int(np.argmax(gain))
+    return float(gain[best]), int(first[best]), int(last[best])

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -21,32 +23,38 @@ def disjoint_cliques(n: int, pairs: NDArray[np.int64]) -> tuple[tuple[int, ...],
     pairs : ndarray of int, shape (M, 2)
         Nodes that are joined.
     """
-    friends: list[set[int]] = [set() for _ in range(n)]
+    friends = [0] * n  # of each node, a bit for each other one
     for i, j in pairs.tolist():
-        friends[i].add(j)
-        friends[j].add(i)
+        friends[i] |= 1 << j
+        friends[j] |= 1 << i
     found: list[tuple[int, ...]] = []
     while (largest := _largest_clique(friends)) is not None:
         found.append(largest)
-        for i in largest:
-            for j in friends[i]:
-                friends[j].discard(i)
-            friends[i] = set()
+        used = sum(1 << i for i in largest)
+        friends = [0 if used >> i & 1 else own & ~used for i, own in enumerate(friends)]
     return tuple(found)
 
 
-def _largest_clique(friends: list[set[int]]) -> tuple[int, ...] | None:
+def _largest_clique(friends: list[int]) -> tuple[int, ...] | None:
     """Find the largest of the maximal cliques grown greedily from each pair, of at least three."""
-    best: tuple[int, ...] | None = None
-    for i in range(len(friends)):
-        for j in sorted(friends[i]):
-            if j < i or (best is not None and len(friends[i]) < len(best)):
-                continue
-            own, common = [i, j], friends[i] & friends[j]
-            while common:  # the candidate that keeps the most others
-                more = max(sorted(common), key=lambda k: len(common & friends[k]))
-                own.append(more)
+    best: list[int] = []
+    for i, own in enumerate(friends):
+        for j in _nodes(own >> i << i):
+            clique, common = [i, j], own & friends[j]
+            # No clique that the candidates cannot make larger than the best is grown to its end.
+            while common and len(clique) + common.bit_count() > len(best):
+                # The candidate that keeps the most others, the first of equals.
+                n_kept = {k: (common & friends[k]).bit_count() for k in _nodes(common)}
+                more = max(n_kept, key=n_kept.__getitem__)
+                clique.append(more)
                 common &= friends[more]
-            if len(own) >= 3 and (best is None or len(own) > len(best)):
-                best = tuple(sorted(own))
-    return best
+            if not common and len(clique) >= 3 and len(clique) > len(best):
+                best = clique
+    return tuple(sorted(best)) or None
+
+
+def _nodes(bits: int) -> Iterator[int]:
+    """Yield the nodes whose bits are set, in increasing order."""
+    while bits:
+        yield (bits & -bits).bit_length() - 1
+        bits &= bits - 1
