@@ -1,0 +1,237 @@
+// One frame of one tile of a large scene: the candidates of the tile's tracks, and the exact
+// assignment of every group that no other tile can reach.
+//
+// A tile has the tracks whose predictions lie in it and every point that one of them may take. A
+// point that several tiles have is shared. A group of candidates without a shared point is complete
+// in this tile, so its best assignment is final. The candidates of the other groups are returned;
+// the caller joins those of all tiles and solves them (solve_joined). A group is therefore always
+// solved as a whole, from the same candidates in the same order, however the scene is cut.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "filter/gating.hpp"
+#include "filter/imm.hpp"
+#include "filter/track_filter.hpp"
+#include "math/log_sums.hpp"
+#include "solve/assignment.hpp"
+#include "solve/connected_components.hpp"
+#include "tracks/live_tracks.hpp"
+
+namespace asterism {
+
+// The gains of a pairing in a large scene, as in frame/frame_tracker.hpp: a tentative track is
+// weighted with the odds that it is a marker, so that all tracks compete in one assignment.
+struct PairingGains {
+  ScoreModel sm;
+  double over = softplus(sm.log_birth + sm.log_detect - sm.log_clutter);
+
+  double hit(std::int32_t gap) const { return sm.log_survive + sm.log_hit(gap) - sm.log_clutter; }
+  double miss(std::int32_t gap) const { return sm.log_survive + sm.log_missed(gap); }
+
+  // Gain of a pairing from the log likelihoods with it and without it.
+  double gain(bool is_confirmed, double score, double with, double without) const {
+    if (is_confirmed) return with - without - over;
+    return softplus(score + with) - softplus(score + without) - over;
+  }
+};
+
+// What the assignment reads of a track. The state is predicted to the first frame.
+struct TileTrack {
+  MotionState state;
+  Point last{};
+  double last_time = 0, score = 0;
+  std::int32_t gap = 0;
+  bool is_confirmed = false;
+};
+
+// The region in which a track may take a detection of one frame: the gate of the prediction from
+// the decided frames. It bounds which points of later frames a tile needs.
+struct Region {
+  Point center{};
+  double radius = -1;
+};
+
+// A frame, and for later frames the step that leads to it from the one before.
+struct TileFrame {
+  double time = 0;
+  MotionStep step;
+  std::vector<Point> points;
+};
+
+struct TileResult {
+  std::vector<std::int32_t> match;   // by track of the tile: its point, or -1
+  std::vector<Candidate> candidates; // of the groups with a shared point, by row and column
+  std::int64_t n_candidates = 0, n_groups = 0, largest_group = 0;  // groups that were solved
+};
+
+// Solves group by group. A group with a row for which is_left(group) holds is left out.
+template <typename Left>
+void solve_groups_but(std::span<const Candidate> candidates, std::int32_t n_columns, Left&& is_left,
+                      TileResult& out) {
+  Assignment assignment;
+  const auto n_rows = static_cast<std::int32_t>(out.match.size());
+  const Groups groups = connected_groups(candidates, n_rows, n_columns);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    if (is_left(groups[g])) {
+      out.candidates.insert(out.candidates.end(), groups[g].begin(), groups[g].end());
+      continue;
+    }
+    assignment.solve(groups[g], out.match);
+    ++out.n_groups;
+    out.largest_group = std::max<std::int64_t>(out.largest_group, groups[g].size());
+  }
+}
+
+// The gains of the candidates of the first of several frames. The later ones are the look-ahead: the
+// value of a choice includes the best continuation of the track through them,
+//
+//   V_f(track) = max( miss + V_f+1,  max_j  hit_j - leftover + V_f+1 )    V_F = 0
+//
+// so a track does not take a detection after which it would be lost. A wrong exchange of two tracks
+// that cross agrees with their predictions at the crossing, and not with the frames after it.
+class LookAhead {
+ public:
+  LookAhead(const MotionModel& m, const PairingGains& gains, double gate,
+            std::span<const TileFrame> frames, std::span<const Region> regions)
+      : m_(m), gains_(gains), gate_(gate), frames_(frames), regions_(regions),
+        grids_(frames.size()) {
+    const std::size_t F = frames.size();
+    for (std::size_t f = 0; f < F; ++f) {
+      double sum = 0;
+      for (std::size_t k = f; k < regions.size(); k += F) sum += std::max(regions[k].radius, 0.0);
+      grids_[f].build(frames[f].points, m.axis.D,
+                      sum * static_cast<double>(F) / static_cast<double>(regions.size()));
+    }
+  }
+
+  // Adds the candidates of track i with a positive gain, by column.
+  void list(std::size_t i, const TileTrack& track, std::vector<Candidate>& out) {
+    own_ = regions_.subspan(i * frames_.size(), frames_.size());
+    const std::size_t first = out.size();
+    const Prediction prediction(m_, track.state);
+    each_hit(0, prediction, track.last, track.last_time, track.gap, kDrop,
+             [&](std::int32_t j, double distance2, double log_likelihood, const auto& each) {
+      const Point& y = frames_[0].points[j];
+      double with = gains_.hit(track.gap) + log_likelihood;
+      if (frames_.size() > 1) {
+        MotionState state = track.state;
+        update(m_, each, log_likelihood, y, state);
+        with += value(1, state, y, frames_[0].time, 0);
+      }
+      out.push_back({static_cast<std::int32_t>(i), j, with, distance2});
+    });
+    if (out.size() == first) return;
+    const double without = gains_.miss(track.gap) +
+        value(1, track.state, track.last, track.last_time, track.gap + 1);
+    std::size_t n = first;
+    for (std::size_t e = first; e < out.size(); ++e) {
+      const double gain = gains_.gain(track.is_confirmed, track.score, out[e].gain, without);
+      if (!(gain > 0) || !std::isfinite(gain)) continue;
+      out[n] = out[e];
+      out[n++].gain = gain;
+    }
+    out.resize(n);
+    // The order of the grid depends on all points of the tile; that by column does not.
+    std::sort(out.begin() + static_cast<std::ptrdiff_t>(first), out.end(),
+              [](const Candidate& a, const Candidate& b) { return a.column < b.column; });
+  }
+
+ private:
+  // A detection whose own gain is this far below zero is no candidate, whatever follows. Later
+  // detections must have a gain of their own.
+  static constexpr double kDrop = 4;
+
+  // Calls visit(point, squared distance, log likelihood, that of each mode).
+  template <typename Visit>
+  void each_hit(std::size_t f, const Prediction& prediction, const Point& last, double last_time,
+                std::int32_t gap, double drop, Visit&& visit) const {
+    const double least = gains_.miss(gap) + gains_.over - gains_.hit(gap) - drop;
+    const double radius = prediction.radius(gate_, least, 0);
+    if (!(radius >= 0)) return;
+    const Region& region = own_[f];
+    const double dt = frames_[f].time - last_time, radius2 = region.radius * region.radius;
+    std::array<double, kMaxModes> each{};
+    grids_[f].within(prediction.center, radius, [&](std::int32_t j, double distance2) {
+      const Point& y = frames_[f].points[j];
+      if (squared_distance(region.center, y, m_.axis.D) > radius2) return;
+      if (!is_reachable(gains_.sm, last, y, dt, m_.axis.D)) return;
+      if (!prediction.is_gated(y, gate_)) return;
+      const double log_likelihood = prediction.log_likelihood(y, each);
+      if (log_likelihood >= least) visit(j, distance2, log_likelihood, each);
+    });
+  }
+
+  double value(std::size_t f, MotionState state, const Point& last, double last_time,
+               std::int32_t gap) const {
+    if (f >= frames_.size() || gap >= gains_.sm.max_gap) return 0;
+    predict(m_, frames_[f].step, state);
+    const Prediction prediction(m_, state);
+    double best = gains_.miss(gap) + value(f + 1, state, last, last_time, gap + 1);
+    each_hit(f, prediction, last, last_time, gap, 0,
+             [&](std::int32_t j, double, double log_likelihood, const auto& each) {
+      const Point& y = frames_[f].points[j];
+      double own = gains_.hit(gap) + log_likelihood - gains_.over;
+      if (f + 1 < frames_.size()) {
+        MotionState next = state;
+        update(m_, each, log_likelihood, y, next);
+        own += value(f + 1, next, y, frames_[f].time, 0);
+      }
+      best = std::max(best, own);
+    });
+    return best;
+  }
+
+  const MotionModel& m_;
+  const PairingGains& gains_;
+  double gate_;
+  std::span<const TileFrame> frames_;
+  std::span<const Region> regions_, own_;
+  std::vector<PointGrid> grids_;
+};
+
+inline TileResult solve_tile(const MotionModel& m, const PairingGains& gains, double gate,
+                             std::int64_t max_candidates, std::span<const TileTrack> tracks,
+                             std::span<const Region> regions, std::span<const TileFrame> frames,
+                             std::span<const std::uint8_t> is_shared) {
+  TileResult out;
+  out.match.assign(tracks.size(), -1);
+  if (tracks.empty() || frames[0].points.empty()) return out;
+  LookAhead ahead(m, gains, gate, frames, regions);
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    ahead.list(i, tracks[i], candidates);
+    if (static_cast<std::int64_t>(candidates.size()) > max_candidates)
+      throw CandidateLimit("too many candidates in a frame");
+  }
+  out.n_candidates = static_cast<std::int64_t>(candidates.size());
+  solve_groups_but(
+      candidates, static_cast<std::int32_t>(frames[0].points.size()),
+      [&](std::span<const Candidate> group) {
+        return std::ranges::any_of(group, [&](const Candidate& c) { return is_shared[c.column]; });
+      },
+      out);
+  return out;
+}
+
+// Solves the groups that the tiles have left. The candidates of all tiles may stand in any order.
+inline TileResult solve_joined(std::vector<Candidate>& candidates, std::size_t n_tracks,
+                               std::size_t n_points) {
+  TileResult out;
+  out.match.assign(n_tracks, -1);
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return std::tuple(a.row, a.column) < std::tuple(b.row, b.column);
+  });
+  out.n_candidates = static_cast<std::int64_t>(candidates.size());
+  solve_groups_but(candidates, static_cast<std::int32_t>(n_points),
+                   [](std::span<const Candidate>) { return false; }, out);
+  return out;
+}
+
+}  // namespace asterism
