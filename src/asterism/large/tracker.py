@@ -181,7 +181,8 @@ class LargeTracker:
     >>> for time, points in d:
     ...     state, decided = tracker.step(state, time, points)
     ...     labels += [frame.labels for frame in decided]
-    >>> labels += [frame.labels for frame in tracker.finish(state)]
+    >>> state, decided = tracker.finish(state)
+    >>> labels += [frame.labels for frame in decided]
     >>> len(labels), labels[0].tolist()
     (40, [0, 1, 2, 3, 4, 5, 6, 7])
     """
@@ -273,25 +274,29 @@ class LargeTracker:
             state = replace(state, frames=state.frames[1:])
         return state, decided
 
-    def finish(self, state: LargeState, *, mapper: Mapper | Any = map) -> list[DecidedFrame]:
-        """Decide all remaining frames, without changing the state.
+    def finish(
+        self, state: LargeState, *, mapper: Mapper | Any = map
+    ) -> tuple[LargeState, list[DecidedFrame]]:
+        """Decide all remaining frames.
 
         Parameters
         ----------
         state : LargeState
-            State after the last frame.
+            State after the last frame; it is left unchanged.
         mapper : callable
             As for `step`.
 
         Returns
         -------
-        list of DecidedFrame
+        state : LargeState
+            State at the end, without undecided frames.
+        decided : list of DecidedFrame
             Remaining frames in order.
         """
         while state.n_ahead:
             state = self._advanced(state, mapper)
         state = self._confirmed(self._started(state, START_FRAMES - 1))
-        return [_decided(frame) for frame in state.frames]
+        return replace(state, frames=()), [_decided(frame) for frame in state.frames]
 
     def _advanced(self, state: LargeState, mapper: Any) -> LargeState:
         """Assign the oldest frame that is not yet assigned, and update the life cycles."""
