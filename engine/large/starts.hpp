@@ -62,13 +62,14 @@ class ChainSearch {
 
   // Adds the chains from one detection of the first frame, best first.
   void from(std::int32_t a, std::vector<Chain>& out) const {
+    Memory memory;
     Chain chain;
     chain.path.fill(-1);
     chain.path[0] = a;
     const Point& y = frames_[0].points[a];
     chain.score = gains_.sm.log_birth + gains_.sm.log_detect - gains_.sm.log_clutter;
     const std::size_t first = out.size();
-    extend(1, 1, 0, y, frames_[0].time, begin_state(m_, y), chain, out);
+    extend(1, 1, 0, y, frames_[0].time, begin_state(m_, y), chain, memory, out);
     const auto begin = out.begin() + static_cast<std::ptrdiff_t>(first);
     std::sort(begin, out.end(), is_better);
     if (out.end() - begin > opt_.max_chains) out.resize(first + opt_.max_chains);
@@ -79,6 +80,11 @@ class ChainSearch {
   }
 
  private:
+  // The states of each depth of the search.
+  struct Memory {
+    std::array<MotionState, kMaxStartFrames> predicted, updated;
+  };
+
   // Cells a little wider than a typical displacement, which bounds the number of cells in a gate.
   double cell(double dt) const {
     const double sigma = std::sqrt(m_.axis.P0[m_.axis.n > 1 ? m_.axis.n + 1 : 0]);
@@ -86,7 +92,8 @@ class ChainSearch {
   }
 
   void extend(std::size_t f, int n_taken, int n_missed, const Point& last, double last_time,
-              MotionState state, Chain& chain, std::vector<Chain>& out) const {
+              const MotionState& from, Chain& chain, Memory& memory,
+              std::vector<Chain>& out) const {
     if (f == frames_.size()) {
       if (n_taken >= opt_.min_detections && chain.score > opt_.min_score) out.push_back(chain);
       return;
@@ -94,6 +101,8 @@ class ChainSearch {
     const auto n_left = static_cast<int>(frames_.size() - f);
     if (n_taken + n_left < opt_.min_detections) return;
     if (chain.score + n_left * max_gain_ < opt_.min_score) return;
+    MotionState& state = memory.predicted[f];
+    copy_state(m_, from, state);
     predict(m_, frames_[f].step, state);
     const Prediction prediction(m_, state);
     const double before = chain.score, hit = gains_.hit(n_missed);
@@ -111,16 +120,17 @@ class ChainSearch {
         if (!prediction.is_gated(y, opt_.gate)) return;
         const double log_likelihood = prediction.log_likelihood(y, each);
         if (!(log_likelihood >= least)) return;
-        MotionState next = state;
+        MotionState& next = memory.updated[f];
+        copy_state(m_, state, next);
         update(m_, each, log_likelihood, y, next);
         chain.path[f] = j;
         chain.score = before + hit + log_likelihood;
-        extend(f + 1, n_taken + 1, 0, y, frames_[f].time, next, chain, out);
+        extend(f + 1, n_taken + 1, 0, y, frames_[f].time, next, chain, memory, out);
       });
     chain.path[f] = -1;
     chain.score = before + gains_.miss(n_missed);
     if (static_cast<int>(f) - n_taken < opt_.max_missed)
-      extend(f + 1, n_taken, n_missed + 1, last, last_time, state, chain, out);
+      extend(f + 1, n_taken, n_missed + 1, last, last_time, state, chain, memory, out);
     chain.score = before;
   }
   // Every point that the track can have reached lies this close to the prediction.

@@ -89,6 +89,12 @@ void solve_groups_but(std::span<const Candidate> candidates, std::int32_t n_colu
   }
 }
 
+// Copies the modes that the model has, a third of the state for one mode.
+inline void copy_state(const MotionModel& m, const MotionState& from, MotionState& to) {
+  for (int b = 0; b < m.M; ++b) to.mode[b] = from.mode[b];
+  to.w = from.w;
+}
+
 // The gains of the candidates of the first of several frames. The later ones are the look-ahead: the
 // value of a choice includes the best continuation of the track through them,
 //
@@ -101,7 +107,7 @@ class LookAhead {
   LookAhead(const MotionModel& m, const PairingGains& gains, double gate,
             std::span<const TileFrame> frames, std::span<const Region> regions)
       : m_(m), gains_(gains), gate_(gate), frames_(frames), regions_(regions),
-        grids_(frames.size()) {
+        grids_(frames.size()), predicted_(frames.size()), updated_(frames.size()) {
     const std::size_t F = frames.size();
     for (std::size_t f = 0; f < F; ++f) {
       double sum = 0;
@@ -121,9 +127,9 @@ class LookAhead {
       const Point& y = frames_[0].points[j];
       double with = gains_.hit(track.gap) + log_likelihood;
       if (frames_.size() > 1) {
-        MotionState state = track.state;
-        update(m_, each, log_likelihood, y, state);
-        with += value(1, state, y, frames_[0].time, 0);
+        copy_state(m_, track.state, updated_[0]);
+        update(m_, each, log_likelihood, y, updated_[0]);
+        with += value(1, updated_[0], y, frames_[0].time, 0);
       }
       out.push_back({static_cast<std::int32_t>(i), j, with, distance2});
     });
@@ -168,9 +174,12 @@ class LookAhead {
     });
   }
 
-  double value(std::size_t f, MotionState state, const Point& last, double last_time,
-               std::int32_t gap) const {
+  // `before` is the state in the frame before. The states of each depth have their own memory.
+  double value(std::size_t f, const MotionState& before, const Point& last, double last_time,
+               std::int32_t gap) {
     if (f >= frames_.size() || gap >= gains_.sm.max_gap) return 0;
+    MotionState& state = predicted_[f];
+    copy_state(m_, before, state);
     predict(m_, frames_[f].step, state);
     const Prediction prediction(m_, state);
     double best = gains_.miss(gap) + value(f + 1, state, last, last_time, gap + 1);
@@ -179,9 +188,9 @@ class LookAhead {
       const Point& y = frames_[f].points[j];
       double own = gains_.hit(gap) + log_likelihood - gains_.over;
       if (f + 1 < frames_.size()) {
-        MotionState next = state;
-        update(m_, each, log_likelihood, y, next);
-        own += value(f + 1, next, y, frames_[f].time, 0);
+        copy_state(m_, state, updated_[f]);
+        update(m_, each, log_likelihood, y, updated_[f]);
+        own += value(f + 1, updated_[f], y, frames_[f].time, 0);
       }
       best = std::max(best, own);
     });
@@ -194,6 +203,7 @@ class LookAhead {
   std::span<const TileFrame> frames_;
   std::span<const Region> regions_, own_;
   std::vector<PointGrid> grids_;
+  std::vector<MotionState> predicted_, updated_;  // by frame
 };
 
 inline TileResult solve_tile(const MotionModel& m, const PairingGains& gains, double gate,

@@ -23,6 +23,7 @@ from asterism.model import (
     DWNA,
     Detections,
     Population,
+    RandomWalk,
     Sensor,
     TrackingModel,
     Tracks,
@@ -44,7 +45,10 @@ SAMPLE_POINTS = 1500
 """Frames, and detections of the first of them, from which the model is estimated."""
 _SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7)
 """Standard deviations of a coordinate's displacement in a frame that are tried, in spacings."""
-_ROUNDS = 6  # of expectation maximisation
+_ROUNDS = 4  # of expectation maximisation
+_COARSE, _FINE = (0.7, 1.0, 1.4), (0.85, 1.0, 1.2, 1.4)
+"""Factors on the fitted acceleration that are tried, because wrong links look like jolts: in each
+round, and in the end."""
 _MIN_LINKS = 30
 _MAX_GAP = 60
 
@@ -123,8 +127,11 @@ def estimate_from_start(frames: Iterable[tuple[float, NDArray[np.float64]]]) -> 
             better = _refined(tracks, model)
             if better is None:
                 break
-            refined = model = better
-            _, tracks = _tracked(sample, model)
+            tries = [(*_tracked(sample, one), one) for one in _scaled(better, _COARSE)]
+            _, tracks, model = max(tries, key=lambda one: one[0])
+            refined = model
+    if refined is not None:
+        refined = max(_scaled(refined, _FINE), key=lambda one: _tracked(sample, one)[0])
     try:
         usual = estimate_model(sample).model
     except ParameterError:
@@ -173,6 +180,16 @@ def _guesses(sample: Detections) -> list[TrackingModel]:
             )
         )
     return models
+
+
+def _scaled(model: TrackingModel, factors: tuple[float, ...]) -> list[TrackingModel]:
+    """Return the model with weaker and stronger random motion."""
+    (own,) = model.motion.modes
+    name = "walk_sigma" if isinstance(own, RandomWalk) else "acceleration_sigma"
+    level = float(getattr(own, name))
+    return [
+        replace(model, motion=replace(own, **{name: factor * level})) for factor in factors
+    ]
 
 
 def _spacing(sample: Detections) -> float:

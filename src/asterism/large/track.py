@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from asterism.large.rows import Table, TableFrame
     from asterism.large.tracker import DecidedFrame
 
-__all__ = ["ENDINGS", "LargeRun", "open_table", "track"]
+__all__ = ["ENDINGS", "LargeRun", "check_form", "open_table", "track"]
 
 ENDINGS = {".parquet": ParquetTable, ".pq": ParquetTable, ".csv": CsvTable, ".tsv": CsvTable,
            ".txt": CsvTable}  # fmt: skip
@@ -120,6 +120,35 @@ def open_table(path: str | Path, columns: Columns | None = None) -> Table:
     return kind(path=path, columns=columns or Columns())
 
 
+def check_form(source: Path, out: Path) -> None:
+    """Raise unless both are tables of the same form, because the rows are copied.
+
+    Parameters
+    ----------
+    source, out : Path
+        Input and output.
+
+    Raises
+    ------
+    ParameterError
+        If an ending is not that of a table, or the output has another form.
+
+    Examples
+    --------
+    >>> check_form(Path("swarm.csv"), Path("tracked.parquet"))
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: out: expected a name ending in .csv, .tsv, .txt, found ...
+    """
+    kind = ENDINGS.get(source.suffix.lower())
+    if kind is None:
+        raise ParameterError("source", f"a name ending in {', '.join(ENDINGS)}", str(source))
+    if ENDINGS.get(out.suffix.lower()) is not kind:
+        able = ", ".join(ending for ending, other in ENDINGS.items() if other is kind)
+        hint = "the rows are copied in the form of the input"
+        raise ParameterError("out", f"a name ending in {able}", str(out), hint)
+
+
 def track(
     source: str | Path,
     out: str | Path,
@@ -194,10 +223,8 @@ def track(
     (8, 320, 't,x,y,z,track')
     """
     table, out = open_table(source, columns), check_path("out", out)
+    check_form(table.path, out)
     check_file(table.path, "a table")
-    if ENDINGS.get(out.suffix.lower()) is not ENDINGS[table.path.suffix.lower()]:
-        expected = "a name with the ending of the input, whose rows are copied"
-        raise ParameterError("out", expected, str(out))
     if out.exists() and out.samefile(table.path):
         raise ParameterError("out", "a path of its own", f"{out}, the input")
     if model is None:

@@ -37,7 +37,7 @@ START_FRAMES = 4
 """Frames through which a new track is sought. It has a detection in at least three of them."""
 LAG = 8
 """Frames after which a frame is decided. Until then a tentative track can be confirmed."""
-LOOK_AHEAD = 2
+LOOK_AHEAD = 1
 """Later frames that are seen before a frame is assigned."""
 _START_GATE = 1e-4  # probability that a link of a true chain lies outside its gate
 _MAX_CHAINS = 16  # that begin at one detection
