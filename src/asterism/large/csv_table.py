@@ -92,7 +92,7 @@ class CsvTable:
                 if not all(map(str.strip, texts)):
                     places = places[[bool(text.strip()) for text in texts]]
                     texts = [text for text in texts if text.strip()]
-                values = _numbers(texts, delimiter, wanted)
+                values = _numbers(texts, delimiter, wanted, len(names))
                 if values is None:
                     raise self._wrong(texts, places, delimiter, names, layout)
                 yield Chunk.of(
@@ -157,18 +157,20 @@ class _CsvWriter:
 
 
 def _numbers(
-    texts: list[str], delimiter: str, wanted: list[int]
+    texts: list[str], delimiter: str, wanted: list[int], width: int
 ) -> NDArray[np.float64] | None:
-    """Parse some columns; None if a line cannot be parsed."""
+    """Parse some of `width` columns; None if a line cannot be parsed."""
     if not texts:
         return np.zeros((0, len(wanted)))
-    width = texts[0].count(delimiter)
-    if '"' not in texts[0] and any(text.count(delimiter) != width for text in texts):
-        return None
+    for text in texts:
+        if '"' not in text:
+            if text.count(delimiter) + 1 != width:
+                return None
+        elif text.count('"') % 2 or len(next(csv.reader([text], delimiter=delimiter))) != width:
+            return None
     try:
-        values = np.loadtxt(
+        return np.loadtxt(
             texts, delimiter=delimiter, usecols=wanted, comments=None, quotechar='"', ndmin=2
         )
     except ValueError:
         return None
-    return values if len(values) == len(texts) else None
