@@ -1,9 +1,9 @@
 """Large scenes: time, memory and identity from 1000 to 1 000 000 markers, beside other programs.
 
 Scene: smooth paths that cross (benchmarks/large_scene.py), 5 % missing, 5 % clutter, noise 5 mm;
-the mean distance to the nearest neighbour is 1.5 times the mean displacement in a frame. Each run is
-a process of its own, whose memory is its peak. The model is estimated from the first frames; its
-time is stated apart. Times are processor times with one thread and include reading and writing.
+the mean distance to the nearest neighbour is 1.5 times the mean displacement in a frame. Each run
+is a process of its own, whose memory is its peak. The model is estimated from the first frames; its
+time is not counted. Times are processor times with one thread and include reading and writing.
 
     python benchmarks/large.py [--parts growth memory tilings peers] [--sizes N …]
         [--markdown FILE] [--figure FILE] [--folder FOLDER]
@@ -119,7 +119,8 @@ def by_peer(folder: Path, n: int, frames: int, peer: str) -> dict[str, Any]:
     else:
         import laptrack  # pyright: ignore[reportMissingImports]
 
-        tracker: Any = laptrack.LapTrack(
+        make_tracker: Any = laptrack.LapTrack
+        tracker: Any = make_tracker(
             cutoff=TOP_DISPLACEMENT**2, gap_closing_cutoff=(2 * TOP_DISPLACEMENT) ** 2,
             gap_closing_max_frame_count=3, alternative_cost_percentile=100,
         )  # fmt: skip
@@ -225,8 +226,8 @@ def peers(folder: Path, sizes: Sequence[int]) -> list[str]:
             figures = [f"{r['seconds']:.3g} s", memory(r["rss"]), f"{r['idf1']:.4f}"]
             rows.append([f"{n:,}", name, *figures])
     about = (
-        "The other programs are given the largest displacement of a marker, 0.15 m, as their search "
-        "range, a memory of 3 frames, and (trackpy) the velocity of the nearest particle as "
+        "The other programs are given the largest displacement of a marker, 0.15 m, as their "
+        "search range, a memory of 3 frames, and (trackpy) the velocity of the nearest particle as "
         "prediction. They hold the whole scene in memory."
     )
     head = ["markers", "program", "time a frame", "peak memory", "IDF1"]

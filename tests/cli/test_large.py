@@ -38,7 +38,8 @@ def test_a_table_is_tracked(here, capsys):
 
 
 def test_the_model_is_estimated(here, capsys):
-    assert main("large in.csv -o out.csv --label id --rate 100 --unit mm -q".split()) == 0
+    line = "large in.csv -o out.csv --label id --rate 100 --unit mm -q"
+    assert main(line.split()) == 0
     assert (here / "out.csv").read_text().startswith("frame,x,y,z,id\n")
 
 

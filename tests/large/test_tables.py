@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import builtins
-import os
+import sys
+from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
@@ -69,7 +69,7 @@ def test_row_groups_are_whole_frames(tmp_path, scene, monkeypatch):
     file = pq.ParquetFile(tmp_path / "out.parquet")
     groups = [file.read_row_group(i)["frame"].to_pylist() for i in range(file.num_row_groups)]
     assert len(groups) > 3
-    assert all(set(a).isdisjoint(b) for a, b in zip(groups, groups[1:], strict=False))
+    assert all(set(a).isdisjoint(b) for a, b in pairwise(groups))
 
 
 def test_the_text_of_a_row_stays_as_it_is(tmp_path):
@@ -174,7 +174,7 @@ def test_damaged_parquet(tmp_path, scene):
     whole = write_parquet(tmp_path / "in.parquet", rows_of(scene.detections), row_group_size=200)
     content = bytearray(whole.read_bytes())
     rng = np.random.default_rng(1)
-    n_refused = 0
+    n_refused, messages = 0, []
     for k in range(60):
         bad = content[: rng.integers(0, len(content))] if k % 2 else bytearray(content)
         if k % 2 == 0:
@@ -186,9 +186,10 @@ def test_damaged_parquet(tmp_path, scene):
             (tmp_path / "out.parquet").unlink()
         except (am.FormatError, am.SolverLimit) as error:
             n_refused += 1
-            assert isinstance(error, am.SolverLimit) or str(whole) in str(error)
+            messages.append(str(error))
         assert [p.name for p in tmp_path.iterdir()] == ["in.parquet"]
     assert n_refused > 30
+    assert all(str(whole) in text or "gates" in text for text in messages)
 
 
 def test_nulls_and_text_in_parquet(tmp_path):
@@ -202,14 +203,7 @@ def test_nulls_and_text_in_parquet(tmp_path):
 
 
 def test_without_pyarrow_the_error_says_what_to_install(tmp_path, monkeypatch):
-    real = builtins.__import__
-
-    def without(name, *args, **options):
-        if name.startswith("pyarrow"):
-            raise ImportError(name)
-        return real(name, *args, **options)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     with pytest.raises(am.ParameterError, match=r"pip install 'asterism\[large\]'"):
         am.large.track(tmp_path / "a.parquet", tmp_path / "b.parquet")
 
@@ -223,7 +217,7 @@ def test_an_interrupt_leaves_nothing(tmp_path, scene):
 
     with pytest.raises(KeyboardInterrupt):
         am.large.track(source, tmp_path / "out.csv", model=MODEL, progress=stop)
-    assert os.listdir(tmp_path) == ["in.csv"]
+    assert [p.name for p in tmp_path.iterdir()] == ["in.csv"]
 
 
 def test_a_full_disk_and_a_table_of_another_form(tmp_path, scene):

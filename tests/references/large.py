@@ -6,12 +6,14 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
-import asterism as am
+if TYPE_CHECKING:
+    import asterism as am
 
 DROP = 4.0  # nats below zero at which a detection is no candidate, whatever follows
 

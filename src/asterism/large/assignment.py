@@ -18,7 +18,6 @@ import numpy as np
 
 from asterism.errors import SolverLimit
 from asterism.large.tiles import cut
-from asterism.model import TrackingModel
 from asterism.records import record
 from asterism.tracking.methods.options import MAX_CANDIDATES
 
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asterism.large.tracks import LiveTracks
+    from asterism.model import TrackingModel
 
     T = TypeVar("T")
     R = TypeVar("R")

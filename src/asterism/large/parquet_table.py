@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from asterism.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -36,11 +37,10 @@ def check_installed() -> None:
         If the extra ``large`` is missing.
     """
     try:
-        import pyarrow.parquet
+        importlib.import_module("pyarrow.parquet")
     except ImportError:
         expected, hint = "pyarrow, which is optional", "run pip install 'asterism[large]'"
         raise ParameterError("Parquet", expected, "not installed", hint) from None
-    del pyarrow
 
 
 @record(eq=False)

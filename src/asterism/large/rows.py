@@ -93,7 +93,8 @@ class Chunk:
         points = np.ascontiguousarray(values[:, n:]) / layout.per_metre
         back = np.flatnonzero(np.diff(keys) < 0)
         if len(back):
-            raise _unordered(path, place(int(back[0]) + 1), keys[back[0] + 1], keys[back[0]])
+            k = int(back[0])
+            raise _unordered(path, place(k + 1), float(keys[k + 1]), float(keys[k]))
         return cls(keys=keys, times=times, points=points, rows=rows)
 
 
@@ -206,7 +207,8 @@ def frames_of(path: Path, chunks: Iterable[Chunk]) -> Iterator[TableFrame]:
             )  # fmt: skip
             if parts and part.keys[0] != parts[0].keys[0]:
                 if part.keys[0] < parts[0].keys[0]:
-                    raise _unordered(path, _frame(part.keys[0]), part.keys[0], parts[0].keys[0])
+                    now, before = float(part.keys[0]), float(parts[0].keys[0])
+                    raise _unordered(path, _frame(now), now, before)
                 frame = _joined(path, parts, last)
                 last, parts = frame.time, []
                 yield frame

@@ -1,8 +1,8 @@
 """The tracking model of a large scene, estimated from a spatial crop of its first frames.
 
 `estimate_model` starts from unambiguous links between consecutive frames. Where markers move about
-as far as they are apart there are few of these, all of slow markers. Here the sample is also tracked
-by the large tracker itself with models of several speeds; the best of them is refined by
+as far as they are apart there are few of these, all of slow markers. Here the sample is also
+tracked by the large tracker itself with models of several speeds; the best of them is refined by
 expectation maximisation with its tracks. The log posterior of the tracked sample decides between
 all models.
 """
@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -188,13 +188,15 @@ def _scaled(model: TrackingModel, factors: tuple[float, ...]) -> list[TrackingMo
     name = "walk_sigma" if isinstance(own, RandomWalk) else "acceleration_sigma"
     level = float(getattr(own, name))
     return [
-        replace(model, motion=replace(own, **{name: factor * level})) for factor in factors
+        replace(model, motion=replace(cast("DWNA", own), **{name: factor * level}))
+        for factor in factors
     ]
 
 
 def _spacing(sample: Detections) -> float:
     """Return the median distance of a detection to the nearest other one of its frame, metres."""
-    nearest = [KDTree(points).query(points, k=2)[0][:, 1] for _, points in sample if len(points) > 1]
+    frames = [points for _, points in sample if len(points) > 1]
+    nearest = [KDTree(points).query(points, k=2)[0][:, 1] for points in frames]
     return float(np.median(np.concatenate(nearest))) if nearest else 0.0
 
 

@@ -1,9 +1,9 @@
 """Cutting of a frame into spatial tiles with overlap.
 
 Every track belongs to the tile in which its predicted position lies. A tile has all detections that
-one of its tracks can reach, so neighbouring tiles overlap by the radii of their gates. How the scene
-is cut changes the time of a frame and not its result: a group of tracks and detections that more
-than one tile can reach is joined and solved as a whole.
+one of its tracks can reach, so neighbouring tiles overlap by the radii of their gates. How the
+scene is cut changes the time of a frame and not its result: a group of tracks and detections that
+more than one tile can reach is joined and solved as a whole.
 """
 
 from __future__ import annotations

@@ -6,7 +6,6 @@ import time as clock
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,16 +18,17 @@ from asterism.large.parquet_table import ParquetTable
 from asterism.large.rows import frames_of
 from asterism.large.sample import estimate_from_start
 from asterism.large.tracker import LAG, LOOK_AHEAD, LargeTracker
-from asterism.model import TrackingModel
 from asterism.records import record
 from asterism.tracking.methods.options import Gate, Lifecycle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     from asterism.large.assignment import Mapper
     from asterism.large.rows import Table, TableFrame
     from asterism.large.tracker import DecidedFrame
+    from asterism.model import TrackingModel
 
 __all__ = ["ENDINGS", "LargeRun", "check_form", "open_table", "track"]
 
@@ -59,6 +59,7 @@ class LargeRun:
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> import asterism as am
     >>> model = am.estimate_model(am.simulate.cube(frames=20, seed=1).detections).model
     >>> LargeRun(
@@ -135,6 +136,7 @@ def check_form(source: Path, out: Path) -> None:
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> check_form(Path("swarm.csv"), Path("tracked.parquet"))
     Traceback (most recent call last):
     ...
@@ -163,7 +165,7 @@ def track(
     lifecycle: Lifecycle | None = None,
     progress: Callable[[int], Any] | None = None,
 ) -> LargeRun:
-    """Track a table of detections into the same table with a column of track labels.
+    r"""Track a table of detections into the same table with a column of track labels.
 
     The table is read and written a part at a time, so the memory does not depend on the number of
     frames. The output has the rows of the input in the same order; -1 is no track. It appears under
@@ -211,13 +213,13 @@ def track(
 
     Examples
     --------
-    >>> import tempfile
+    >>> import pathlib, tempfile
     >>> import asterism as am
     >>> d = am.simulate.cube(frames=40, seed=1).detections
     >>> rows = [f"{t},{x},{y},{z}" for t, p in d for x, y, z in p.tolist()]
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     source, out = Path(folder, "cube.csv"), Path(folder, "tracked.csv")
-    ...     _ = source.write_text("\\n".join(["t,x,y,z", *rows]))
+    ...     source, out = (pathlib.Path(folder, f"{name}.csv") for name in ("cube", "tracked"))
+    ...     _ = source.write_text("\n".join(["t,x,y,z", *rows]))
     ...     run = track(source, out)
     ...     run.n_tracks, run.n_labelled, out.read_text().splitlines()[0]
     (8, 320, 't,x,y,z,track')
@@ -239,9 +241,7 @@ def track(
         return _run(table, out, tracker, chosen, progress)
 
 
-def _run(
-    table: Table, out: Path, tracker: LargeTracker, mapper: Any, progress: Any
-) -> LargeRun:
+def _run(table: Table, out: Path, tracker: LargeTracker, mapper: Any, progress: Any) -> LargeRun:
     start = clock.perf_counter()
     empty = tracker.model.population.max_gap + tracker.look_ahead + LAG
     state, waiting = tracker.init(), deque["TableFrame | None"]()

@@ -341,9 +341,7 @@ class LargeTracker:
         )  # fmt: skip
         done = len(state.frames) - state.n_ahead
         together = (*state.frames[:done], frame, *state.frames[done + 1 :])
-        return replace(
-            state, tracks=tracks, frames=together, n_ahead=state.n_ahead - 1, last=found
-        )
+        return replace(state, tracks=tracks, frames=together, n_ahead=state.n_ahead - 1, last=found)
 
     def _confirmed(self, state: LargeState) -> LargeState:
         """Confirm the tentative tracks whose odds are high enough."""

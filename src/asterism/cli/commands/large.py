@@ -30,9 +30,7 @@ _Time = Annotated[
 ]
 _Axes = Annotated[
     str | None,
-    typer.Option(
-        metavar="X,Y[,Z]", help="Columns of the coordinates.", show_default="x, y and z"
-    ),
+    typer.Option(metavar="X,Y[,Z]", help="Columns of the coordinates.", show_default="x, y and z"),
 ]
 _Unit = Annotated[
     str | None,
