@@ -21,6 +21,7 @@
 #include "filter/gating.hpp"
 #include "filter/imm.hpp"
 #include "filter/track_filter.hpp"
+#include "large/spatial_order.hpp"
 #include "large/tile.hpp"
 #include "tracks/live_tracks.hpp"
 
@@ -129,7 +130,9 @@ class ChainSearch {
       });
     chain.path[f] = -1;
     chain.score = before + gains_.miss(n_missed);
-    if (static_cast<int>(f) - n_taken < opt_.max_missed)
+    // After a missed second frame the third one has most of the search and few of the tracks. Such
+    // a track starts one frame later.
+    if (f > 1 && static_cast<int>(f) - n_taken < opt_.max_missed)
       extend(f + 1, n_taken, n_missed + 1, last, last_time, state, chain, memory, out);
     chain.score = before;
   }
@@ -149,14 +152,20 @@ class ChainSearch {
 // The selected chains, ordered by their first detection.
 inline std::vector<Chain> find_starts(const MotionModel& m, const PairingGains& gains,
                                       const StartOptions& options,
-                                      std::span<const StartFrame> frames, std::int32_t n_threads) {
+                                      std::vector<StartFrame> frames, std::int32_t n_threads) {
   constexpr std::int64_t per_task = 1024;
+  std::vector<std::vector<std::int32_t>> order;
+  const double cell = cell_of(frames[0].points, m.axis.D);
+  for (StartFrame& frame : frames) order.push_back(sort_in_space(frame.points, m.axis.D, cell));
   const ChainSearch search(m, gains, options, frames);
   const auto n = static_cast<std::int64_t>(frames[0].points.size());
   std::vector<std::vector<Chain>> found((n + per_task - 1) / per_task);
   in_parallel(static_cast<std::int64_t>(found.size()), n_threads, [&](std::int32_t, std::int64_t k) {
     for (std::int64_t a = k * per_task; a < std::min(n, (k + 1) * per_task); ++a)
       search.from(static_cast<std::int32_t>(a), found[k]);
+    for (Chain& chain : found[k])
+      for (std::size_t f = 0; f < frames.size(); ++f)
+        if (chain.path[f] >= 0) chain.path[f] = order[f][chain.path[f]];
   });
   std::vector<Chain> all;
   for (std::vector<Chain>& part : found) {

@@ -13,12 +13,13 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "filter/gating.hpp"
 #include "filter/imm.hpp"
 #include "filter/track_filter.hpp"
+#include "large/spatial_order.hpp"
 #include "math/log_sums.hpp"
 #include "solve/assignment.hpp"
 #include "solve/connected_components.hpp"
@@ -71,6 +72,13 @@ struct TileResult {
   std::int64_t n_candidates = 0, n_groups = 0, largest_group = 0;  // groups that were solved
 };
 
+// The order in which they are solved, which does not depend on the tiling.
+inline void order_candidates(std::vector<Candidate>& candidates) {
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return std::pair(a.row, a.column) < std::pair(b.row, b.column);
+  });
+}
+
 // Solves group by group. A group with a row for which is_left(group) holds is left out.
 template <typename Left>
 void solve_groups_but(std::span<const Candidate> candidates, std::int32_t n_columns, Left&& is_left,
@@ -105,19 +113,22 @@ inline void copy_state(const MotionModel& m, const MotionState& from, MotionStat
 class LookAhead {
  public:
   LookAhead(const MotionModel& m, const PairingGains& gains, double gate,
-            std::span<const TileFrame> frames, std::span<const Region> regions)
-      : m_(m), gains_(gains), gate_(gate), frames_(frames), regions_(regions),
-        grids_(frames.size()), predicted_(frames.size()), updated_(frames.size()) {
-    const std::size_t F = frames.size();
+            std::vector<TileFrame> frames, std::span<const Region> regions)
+      : m_(m), gains_(gains), gate_(gate), frames_(std::move(frames)), regions_(regions),
+        grids_(frames_.size()), predicted_(frames_.size()), updated_(frames_.size()) {
+    const std::size_t F = frames_.size();
+    const double cell = cell_of(frames_[0].points, m.axis.D);
     for (std::size_t f = 0; f < F; ++f) {
+      std::vector<std::int32_t> order = sort_in_space(frames_[f].points, m.axis.D, cell);
+      if (f == 0) number_ = std::move(order);
       double sum = 0;
       for (std::size_t k = f; k < regions.size(); k += F) sum += std::max(regions[k].radius, 0.0);
-      grids_[f].build(frames[f].points, m.axis.D,
+      grids_[f].build(frames_[f].points, m.axis.D,
                       sum * static_cast<double>(F) / static_cast<double>(regions.size()));
     }
   }
 
-  // Adds the candidates of track i with a positive gain, by column.
+  // Adds the candidates of track i with a positive gain.
   void list(std::size_t i, const TileTrack& track, std::vector<Candidate>& out) {
     own_ = regions_.subspan(i * frames_.size(), frames_.size());
     const std::size_t first = out.size();
@@ -131,7 +142,7 @@ class LookAhead {
         update(m_, each, log_likelihood, y, updated_[0]);
         with += value(1, updated_[0], y, frames_[0].time, 0);
       }
-      out.push_back({static_cast<std::int32_t>(i), j, with, distance2});
+      out.push_back({static_cast<std::int32_t>(i), number_[j], with, distance2});
     });
     if (out.size() == first) return;
     const double without = gains_.miss(track.gap) +
@@ -144,9 +155,6 @@ class LookAhead {
       out[n++].gain = gain;
     }
     out.resize(n);
-    // The order of the grid depends on all points of the tile; that by column does not.
-    std::sort(out.begin() + static_cast<std::ptrdiff_t>(first), out.end(),
-              [](const Candidate& a, const Candidate& b) { return a.column < b.column; });
   }
 
  private:
@@ -200,7 +208,8 @@ class LookAhead {
   const MotionModel& m_;
   const PairingGains& gains_;
   double gate_;
-  std::span<const TileFrame> frames_;
+  std::vector<TileFrame> frames_;     // their points in spatial order
+  std::vector<std::int32_t> number_;  // of each point of the first frame, in the caller's order
   std::span<const Region> regions_, own_;
   std::vector<PointGrid> grids_;
   std::vector<MotionState> predicted_, updated_;  // by frame
@@ -208,21 +217,27 @@ class LookAhead {
 
 inline TileResult solve_tile(const MotionModel& m, const PairingGains& gains, double gate,
                              std::int64_t max_candidates, std::span<const TileTrack> tracks,
-                             std::span<const Region> regions, std::span<const TileFrame> frames,
+                             std::span<const Region> regions, std::vector<TileFrame> frames,
                              std::span<const std::uint8_t> is_shared) {
   TileResult out;
   out.match.assign(tracks.size(), -1);
   if (tracks.empty() || frames[0].points.empty()) return out;
-  LookAhead ahead(m, gains, gate, frames, regions);
+  const auto n_points = static_cast<std::int32_t>(frames[0].points.size());
+  std::vector<Point> centers;
+  for (std::size_t i = 0; i < tracks.size(); ++i)
+    centers.push_back(regions[i * frames.size()].center);
+  const double cell = cell_of(frames[0].points, m.axis.D);
+  LookAhead ahead(m, gains, gate, std::move(frames), regions);
   std::vector<Candidate> candidates;
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
+  for (const std::int32_t i : spatial_order(centers, m.axis.D, cell)) {
     ahead.list(i, tracks[i], candidates);
     if (static_cast<std::int64_t>(candidates.size()) > max_candidates)
       throw CandidateLimit("too many candidates in a frame");
   }
+  order_candidates(candidates);
   out.n_candidates = static_cast<std::int64_t>(candidates.size());
   solve_groups_but(
-      candidates, static_cast<std::int32_t>(frames[0].points.size()),
+      candidates, n_points,
       [&](std::span<const Candidate> group) {
         return std::ranges::any_of(group, [&](const Candidate& c) { return is_shared[c.column]; });
       },
@@ -235,9 +250,7 @@ inline TileResult solve_joined(std::vector<Candidate>& candidates, std::size_t n
                                std::size_t n_points) {
   TileResult out;
   out.match.assign(n_tracks, -1);
-  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    return std::tuple(a.row, a.column) < std::tuple(b.row, b.column);
-  });
+  order_candidates(candidates);
   out.n_candidates = static_cast<std::int64_t>(candidates.size());
   solve_groups_but(candidates, static_cast<std::int32_t>(n_points),
                    [](std::span<const Candidate>) { return false; }, out);

@@ -97,8 +97,8 @@ auto solve_one_tile(const MotionModel& m, const ScoreModel& score, double gate,
       std::copy_n(row, D, places[k].center.begin());
       places[k].radius = row[D];
     }
-    found = solve_tile(m, PairingGains{score}, gate, max_candidates, tracks, places, frames,
-                       flat(is_shared));
+    found = solve_tile(m, PairingGains{score}, gate, max_candidates, tracks, places,
+                       std::move(frames), flat(is_shared));
   }
   return std::tuple(array_of<std::int32_t>(found.match),
                     array_of<std::int32_t>(found.candidates, &Candidate::row),

@@ -170,7 +170,7 @@ def starts(model, frames, *, gate, min_detections, max_missed):
         for j, y in enumerate(points):
             if track.may_take(y, time, gate):
                 extend(track.updated(y, time), [*path, j])
-        if sum(j < 0 for j in path) < max_missed:
+        if f > 1 and sum(j < 0 for j in path) < max_missed:
             extend(track.missed(), [*path, -1])
 
     time, points = frames[0]

@@ -110,10 +110,12 @@ def cut(
         order = np.lexsort(cells.T[::-1])  # stable, so the tracks of a cell stay increasing
         is_new = (np.diff(cells[order], axis=0) != 0).any(axis=1)
         groups = np.split(order, np.flatnonzero(is_new) + 1)
-    low, high = centers - reach, centers + reach
-    boxes = [(low[tracks].min(axis=0), high[tracks].max(axis=0)) for tracks in groups]
+    together = np.concatenate(groups)
+    begins = np.cumsum([0, *map(len, groups[:-1])])
+    lows = np.minimum.reduceat((centers - reach)[together], begins)
+    highs = np.maximum.reduceat((centers + reach)[together], begins)
     inside = [
-        _in_boxes(np.asarray(points), [(start[f], end[f]) for start, end in boxes])
+        _in_boxes(np.asarray(points), list(zip(lows[:, f], highs[:, f], strict=True)))
         for f, points in enumerate(frames)
     ]
     return [
@@ -127,11 +129,14 @@ def _in_boxes(
 ) -> list[NDArray[np.int64]]:
     """Return the indices of the points in each box from one corner to the other, increasing."""
     along = np.argsort(points[:, 0], kind="stable")
-    x = points[along, 0]
+    columns = [points[along, d] for d in range(points.shape[1])]  # each contiguous
     found: list[NDArray[np.int64]] = []
     for start, end in boxes:
-        first = np.searchsorted(x, start[0], "left")
-        near = along[first : np.searchsorted(x, end[0], "right")]
-        is_inside = ((points[near] >= start) & (points[near] <= end)).all(axis=1)
-        found.append(np.sort(near[is_inside]))
+        first = np.searchsorted(columns[0], start[0], "left")
+        last = np.searchsorted(columns[0], end[0], "right")
+        is_inside = np.ones(max(last - first, 0), dtype=bool)
+        for d in range(1, len(columns)):
+            values = columns[d][first:last]
+            is_inside &= (values >= start[d]) & (values <= end[d])
+        found.append(np.sort(along[first:last][is_inside]))
     return found
