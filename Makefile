@@ -42,6 +42,8 @@ bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/joint.py --markdown docs/tables/joint.md
 	$(BIN)/python benchmarks/k_best.py --markdown docs/tables/k_best.md
 	$(BIN)/python benchmarks/threads.py --markdown docs/tables/threads.md
+	$(BIN)/python benchmarks/large.py --markdown docs/tables/large.md \
+	  --figure docs/images/large_growth.svg
 
 # The tables of scenes and of captures in the docs; the second needs the real captures beside the
 # project.
