@@ -1,4 +1,5 @@
 from . import (
+    batch,
     camera,
     edit,
     filter,
@@ -10,6 +11,7 @@ from . import (
     plot,
     simulate,
     solve,
+    sweep,
     tracking,
 )
 from .camera import Camera, Observations, Rig
@@ -71,6 +73,7 @@ __all__ = [
     "TrackingModel",
     "Tracks",
     "__version__",
+    "batch",
     "camera",
     "edit",
     "estimate_model",
@@ -95,6 +98,7 @@ __all__ = [
     "simulate",
     "solve",
     "stitch",
+    "sweep",
     "track",
     "tracking",
     "write",

@@ -8,7 +8,8 @@ from typing import ClassVar, Literal
 import pytest
 
 import asterism as am
-from asterism.cli.options import flat, nested, parsed, record_options, scene_options
+from asterism.batch.page import flat
+from asterism.cli.options import nested, parsed, record_options, scene_options
 from asterism.errors import ParameterError
 
 

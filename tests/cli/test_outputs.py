@@ -41,6 +41,8 @@ FILES = {
     "camera map": ("camera map rig.toml -o OUT", ".png"),
 }
 FOLDERS = {
+    "batch": "batch in.csv -o OUT",
+    "sweep": "sweep study.toml -o OUT",
     "track": "track in.csv --run OUT",
     "film": "film truth.csv --rig ring4 -o OUT",
     "film a scene": "film cube --rig ring4 -o OUT",
@@ -57,6 +59,8 @@ DEFAULTS = {
     "plot presence truth.csv": "truth.presence.pdf",
 }
 WORK = {
+    "asterism.batch": ("run", "plan_batch"),
+    "asterism.sweep": ("run", "read_study"),
     "asterism": ("read", "read_rig", "track", "estimate_model"),
     "asterism.io": ("read_tracks", "read_observations"),
     "asterism.tracking": ("plan_tracking",),
@@ -95,6 +99,7 @@ def inputs(tmp_path_factory):
         for t, i in zip(sensed.detections.frame_of[own[[0, 9]]], own[[0, 9]], strict=True)
     ]
     edits = [am.model.Edit(kind="same", at=at)]
+    (folder / "study.toml").write_text("")
     am.io.write_edits(folder / "edits.toml", edits, am.read(folder / "in.csv"))
     return folder
 

@@ -18,7 +18,8 @@ NAMESPACES = (
     "asterism", "asterism.simulate", "asterism.camera", "asterism.model", "asterism.filter",
     "asterism.tracking.methods", "asterism.tracking", "asterism.multiview", "asterism.solve",
     "asterism.metrics", "asterism.io", "asterism.io.calibrations", "asterism.plot",
-    "asterism.reporting", "asterism.large", "asterism.errors",
+    "asterism.reporting", "asterism.batch", "asterism.sweep", "asterism.large",
+    "asterism.errors",
 )  # fmt: skip
 
 
@@ -128,6 +129,18 @@ def instances():
         am.tracking.learn_bonds(truth), am.learn_marker_set(truth),
         am.name_tracks(tracks, am.learn_marker_set(truth)),
         am.tracking.Tracked(tracks=tracks),
+        settings := am.batch.Settings(method="smp", options={"window": 3}, model=plain, seed=7),
+        job := am.batch.Job(
+            source=LONG, name=LONG, output=LONG, format="c3d", settings=settings, markers=(LONG,)
+        ),
+        am.batch.Planned(job=job, state="failed", reason=LONG),
+        outcome := am.batch.Outcome(error=LONG, warnings=(LONG,) * 30),
+        study := am.sweep.Study(
+            scenes={LONG: {"scene": "cube"}}, methods={LONG: {}}, seeds=tuple(range(50))
+        ),
+        study.cases()[0],
+        am.sweep.Sweep(rows=[{}] * 30, summary=[], scores=(LONG,), n_done_before=0, failed={}),
+        am.batch.Batch(out=LONG, planned=(), outcomes={LONG: outcome}),
         am.model.Alternative(track=3, probability=1 / 3, name=LONG),
         am.model.Decision(
             kind="identity", track=3, first=5, last=17, n_detections=9, probability=1 / 3

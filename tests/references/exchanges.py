@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tests.references.filters import imm_log_densities
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from asterism.model import TrackingModel
 
 HEAD, TAIL, NEAR, MIN_GAIN = 6, 4, 10, -4.0
 FAR, TIMES = 100, 4
 
 
-class Compared(NamedTuple):
-    """Gain of an exchange, and whether all deviations from straight motion are within reach."""
+class Compared:
+    """Whether an exchange is of four parts, whether all deviations are within reach, its gain."""
 
-    gain: float
-    is_mutual: bool
-    is_near: bool
+    def __init__(self, is_mutual: bool, is_near: bool, compute_gain: Callable[[], float]) -> None:
+        self.is_mutual, self.is_near, self._compute_gain = is_mutual, is_near, compute_gain
+
+    @functools.cached_property
+    def gain(self) -> float:
+        """Log-likelihood ratio, computed at first use: most exchanges are far out of reach."""
+        return self._compute_gain()
 
 
 def every_exchange(
@@ -31,40 +38,49 @@ def every_exchange(
 
     Returns the comparisons by frame and tracks.
     """
+
+    @functools.cache  # several frames and pairs compare the same link
+    def link(head: int, n_head: int, tail: int, n_before: int) -> float:
+        (frames, points), (later, ends) = tracks[head], tracks[tail]
+        return _log_likelihood(
+            model, times, (frames[:n_head], points[:n_head]), (later[n_before:], ends[n_before:]),
+            np.log1p(-p_detection),
+        )  # fmt: skip
+
     found: dict[tuple[int, int, int], Compared] = {}
     for t in range(len(times)):
         is_open = [
             len(frames) > 0 and frames[0] - NEAR <= t <= frames[-1] + NEAR for frames, _ in tracks
         ]
-        for a, b in itertools.combinations(np.flatnonzero(is_open), 2):
-            one = _compare(model, times, t, tracks[a], tracks[b], np.log1p(-p_detection))
+        for a, b in itertools.combinations(np.flatnonzero(is_open).tolist(), 2):
+            one = _compare(model, times, t, tracks, a, b, link)
             if one is not None:
-                found[t, int(a), int(b)] = one
+                found[t, a, b] = one
     return found
 
 
-def _compare(model, times, t, a, b, log_miss):
-    (head_a, tail_a), (head_b, tail_b) = _cut(a, t), _cut(b, t)
+def _compare(model, times, t, tracks, a, b, link):
+    (head_a, tail_a), (head_b, tail_b) = _cut(tracks[a], t), _cut(tracks[b], t)
     has = [len(each[0]) > 0 for each in (head_a, tail_a, head_b, tail_b)]
     arrive_a, arrive_b = (has_tail and tail[0][0] == t for has_tail, tail in
                           ((has[1], tail_a), (has[3], tail_b)))  # fmt: skip
     if sum(has) < 3 or not (arrive_a or arrive_b):
         return None
-    kept, exchanged = [(head_a, tail_a), (head_b, tail_b)], [(head_a, tail_b), (head_b, tail_a)]
+    heads, tails = {a: head_a, b: head_b}, {a: tail_a, b: tail_b}
 
     def total(pairs):
         return sum(
-            _log_likelihood(model, times, head, tail, log_miss)
-            for head, tail in pairs
-            if len(head[0]) and len(tail[0])
+            link(i, len(heads[i][0]), j, len(heads[j][0]))
+            for i, j in pairs
+            if len(heads[i][0]) and len(tails[j][0])
         )
 
     near = [
-        _deviation(head, tail) <= _reach(model, times, t, head, own)
-        for (head, tail), (_, own) in zip(exchanged, kept, strict=True)
-        if len(head[0]) and len(tail[0])
+        _deviation(heads[i], tails[j]) <= _reach(model, times, t, heads[i], tails[i])
+        for i, j in ((a, b), (b, a))
+        if len(heads[i][0]) and len(tails[j][0])
     ]
-    return Compared(total(exchanged) - total(kept), all(has), all(near))
+    return Compared(all(has), all(near), lambda: total([(a, b), (b, a)]) - total([(a, a), (b, b)]))
 
 
 def exchange_ratio(model, times, t, a, b, log_miss):

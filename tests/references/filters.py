@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import TYPE_CHECKING
 
@@ -75,17 +76,19 @@ def imm_log_densities(model: TrackingModel, times, frames, points):
     w = np.linalg.lstsq(np.vstack([T.T - np.eye(M), np.ones(M)]), np.eye(M + 1)[M], rcond=None)[0]
     x = [np.outer(points[0], h / (h @ h)) for _ in modes]
     P = [model.initial_covariance(D) for _ in modes]
+    steps = functools.cache(
+        lambda dt: [(mode.transition(dt)[0], mode.process_noise(dt)[0]) for mode in modes]
+    )
     out = [0.0]
     i = 1
     for t in range(frames[0] + 1, frames[-1] + 1):
-        dt = times[t] - times[t - 1]
         prior = w @ T
         new_x, new_P = [], []
         for b in range(M):
             share = w * T[:, b] / prior[b]
             mean = sum(share[a] * x[a] for a in range(M))
             spread = sum(share[a] * (P[a] + (x[a] - mean).T @ (x[a] - mean) / D) for a in range(M))
-            F, Q = modes[b].transition(dt)[0], modes[b].process_noise(dt)[0]
+            F, Q = steps(times[t] - times[t - 1])[b]
             new_x.append(mean @ F.T)
             new_P.append(F @ spread @ F.T + Q)
         x, P, w = new_x, new_P, prior

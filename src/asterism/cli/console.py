@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
 import sys
 from contextlib import contextmanager
@@ -26,7 +24,6 @@ __all__ = [
     "print_json",
     "print_table",
     "progress",
-    "to_json",
 ]
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
@@ -73,26 +70,11 @@ def print_table(
     screen.out("\n".join(lines), highlight=False)
 
 
-def to_json(value: Mapping[str, Any]) -> str:
-    """Return plain values as JSON text; NaN and infinities, which JSON lacks, become null."""
-    return json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False)
-
-
 def print_json(value: Mapping[str, Any]) -> None:
     """Print plain values as one JSON object."""
+    from asterism.io.json_text import to_json
+
     console().print(to_json(value), markup=False, soft_wrap=True)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    if value is None or isinstance(value, (bool, int, str)):
-        return value
-    return value.item() if hasattr(value, "item") else str(value)
 
 
 @contextmanager

@@ -8,10 +8,9 @@ import inspect
 import re
 import types
 import typing
-from collections.abc import Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Union, cast
+from typing import TYPE_CHECKING, Any, Literal, Union
 
 import typer
 
@@ -19,12 +18,11 @@ from asterism.checks import check_fields
 from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Sequence
+    from collections.abc import Callable, Generator, Mapping, Sequence
 
 __all__ = [
     "Option",
     "as_options",
-    "flat",
     "nested",
     "parsed",
     "record_options",
@@ -117,18 +115,6 @@ def nested(values: Mapping[str, Any], known: Mapping[str, Option]) -> dict[str, 
         if made.setdefault(table, {}) is None:
             raise ParameterError(table, f"true, as {name} is given", "false")
         made[table][key] = value
-    return made
-
-
-def flat(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return options with tables as dotted names; the inverse of `nested`."""
-    made: dict[str, Any] = {}
-    for name, value in options.items():
-        if isinstance(value, Mapping):
-            inner = flat(cast("Mapping[str, Any]", value))
-            made |= {f"{name}.{key}": each for key, each in inner.items()}
-        else:
-            made[name] = value
     return made
 
 

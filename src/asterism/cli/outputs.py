@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from asterism.errors import ParameterError
+from asterism.io.atomic import holds_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -115,7 +116,7 @@ def _check_file(option: str, path: Path, *, overwrite: bool) -> None:
 def _check_folder(option: str, path: Path, *, overwrite: bool) -> None:
     if path.exists() and not path.is_dir():
         raise ParameterError(option, "a folder or a new name", f"the file {path}")
-    if path.is_dir() and any(path.iterdir()) and not overwrite:
+    if path.is_dir() and holds_files(path) and not overwrite:
         hint = "give --overwrite to replace files of the same names"
         raise ParameterError(option, "a new or an empty folder", f"{path}, which holds files", hint)
     there = path.resolve()

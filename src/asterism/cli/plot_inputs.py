@@ -128,7 +128,7 @@ def is_observations(path: Path) -> bool:
 
 def summary_of(path: Path) -> dict[str, Any]:
     """Return the summary of a run folder, or an empty one for a file."""
-    from asterism.cli.run_folder import SUMMARY
+    from asterism.batch.run_folder import SUMMARY
 
     if not path.is_dir():
         return {}

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 import asterism
+from asterism.cli.commands.batch import batch
 from asterism.cli.commands.camera import app as camera
 from asterism.cli.commands.chain import chain
 from asterism.cli.commands.corrupt import corrupt
@@ -28,6 +29,7 @@ from asterism.cli.commands.report import report
 from asterism.cli.commands.reproduce import reproduce
 from asterism.cli.commands.simulate import simulate
 from asterism.cli.commands.stitch import stitch
+from asterism.cli.commands.sweep import sweep
 from asterism.cli.commands.track import track
 from asterism.cli.commands.view import view
 from asterism.cli.options import with_option_names
@@ -61,9 +63,9 @@ def _root(  # pyright: ignore[reportUnusedFunction]
 
 
 _TITLES = {
-    "Tracks and markers": (track, large, edit, stitch, name, fill, estimate, methods),
+    "Tracks and markers": (track, batch, large, edit, stitch, name, fill, estimate, methods),
     "Captures and results": (info, evaluate, report, plot, view),
-    "Simulations and experiments": (corrupt, simulate, scenes, demo, reproduce),
+    "Simulations and experiments": (corrupt, simulate, scenes, sweep, demo, reproduce),
     "Cameras": (film, reconstruct, chain),
 }
 for _title, _commands in _TITLES.items():

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
-from contextlib import contextmanager
+import time
+from contextlib import contextmanager, suppress
 from typing import IO, TYPE_CHECKING
 
 from asterism.errors import not_written
@@ -13,7 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Generator
     from pathlib import Path
 
-__all__ = ["replacing", "write_text"]
+__all__ = ["holds_files", "remove_leftovers", "replacing", "write_text"]
+
+_LEFTOVER = re.compile(r"\.[0-9a-f]{16}\.part")
+_STALE = 60.0  # seconds after which a temporary file is no longer being written
 
 
 @contextmanager
@@ -64,6 +69,19 @@ def replacing(path: Path) -> Generator[IO[bytes], None, None]:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise not_written(path, error) from error
+
+
+def holds_files(folder: Path) -> bool:
+    """Return whether a folder holds anything but temporary files of killed processes."""
+    return any(not _LEFTOVER.fullmatch(path.name) for path in folder.iterdir())
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove temporary files of killed processes from a folder and all below it."""
+    for path in folder.rglob(".*.part"):
+        with suppress(FileNotFoundError):  # it is of a process that has just renamed it
+            if _LEFTOVER.fullmatch(path.name) and time.time() - path.stat().st_mtime > _STALE:
+                path.unlink()
 
 
 def write_text(path: Path, text: str) -> None:

@@ -160,8 +160,8 @@ def _first(wanted: Sequence[str], names: Sequence[str]) -> str | None:
 
 def _axes(names: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
     """Return the columns x, y and z, and the unit in their names."""
-    for ending in ("", *(f"_{unit}" for unit in PER_METRE)):
-        axes = tuple(axis + ending for axis in _AXES if axis + ending in names)
-        if axes[:2] == (f"x{ending}", f"y{ending}"):
-            return axes, parse_unit(ending[1:]) if ending else None
+    for suffix in ("", *(f"_{unit}" for unit in PER_METRE)):
+        axes = tuple(axis + suffix for axis in _AXES if axis + suffix in names)
+        if axes[:2] == (f"x{suffix}", f"y{suffix}"):
+            return axes, parse_unit(suffix[1:]) if suffix else None
     return (), None

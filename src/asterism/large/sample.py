@@ -241,9 +241,9 @@ def _refined(tracks: Tracks, model: TrackingModel) -> TrackingModel | None:
     # So long that fewer than one burst of missed detections is longer, and so short that a coasting
     # track is predicted to within the spacing.
     needed = 1 - math.log(2 * n_links) / math.log(p_missed)
-    bridged = (3 * (spacing / (fit.levels[0] * d.step**2)) ** 2) ** (1 / 3)
+    coasted = (3 * (spacing / (fit.levels[0] * d.step**2)) ** 2) ** (1 / 3)
     if fit.kind == "random_walk":
-        bridged = (spacing / fit.levels[0]) ** 2 / d.step
+        coasted = (spacing / fit.levels[0]) ** 2 / d.step
     return replace(
         model,
         motion=fit.motion(speed),
@@ -256,6 +256,6 @@ def _refined(tracks: Tracks, model: TrackingModel) -> TrackingModel | None:
             birth_density=(n_births + 1) / d.n_frames / inner,
             p_disappear=(n_deaths + 0.5) / (n_links + 1),
             max_speed=2 * top + 4 * fit.noise / d.step,
-            max_gap=max(3, round(max(min(bridged, _MAX_GAP), min(needed, _MAX_GAP)))),
+            max_gap=max(3, round(max(min(coasted, _MAX_GAP), min(needed, _MAX_GAP)))),
         ),
     )

@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from asterism.large.tracker import DecidedFrame
     from asterism.model import TrackingModel
 
-__all__ = ["ENDINGS", "LargeRun", "check_form", "open_table", "track"]
+__all__ = ["SUFFIXES", "LargeRun", "check_form", "open_table", "track"]
 
-ENDINGS = {".parquet": ParquetTable, ".pq": ParquetTable, ".csv": CsvTable, ".tsv": CsvTable,
+SUFFIXES = {".parquet": ParquetTable, ".pq": ParquetTable, ".csv": CsvTable, ".tsv": CsvTable,
            ".txt": CsvTable}  # fmt: skip
-"""Kinds of table by the ending of their files."""
+"""Kinds of table by the suffix of their files."""
 
 
 @record
@@ -89,7 +89,7 @@ class LargeRun:
 
 
 def open_table(path: str | Path, columns: Columns | None = None) -> Table:
-    """Open a table by the ending of its file.
+    """Open a table by the suffix of its file.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def open_table(path: str | Path, columns: Columns | None = None) -> Table:
     Raises
     ------
     ParameterError
-        If the ending is none of these, or pyarrow is needed and not installed.
+        If the suffix is none of these, or pyarrow is needed and not installed.
 
     Examples
     --------
@@ -115,9 +115,9 @@ def open_table(path: str | Path, columns: Columns | None = None) -> Table:
     path = check_path("source", path)
     if columns is not None:
         check_kind("columns", columns, Columns, "am.large.Columns()")
-    kind = ENDINGS.get(path.suffix.lower())
+    kind = SUFFIXES.get(path.suffix.lower())
     if kind is None:
-        raise ParameterError("source", f"a name ending in {', '.join(ENDINGS)}", str(path))
+        raise ParameterError("source", f"the suffix {', '.join(SUFFIXES)}", str(path))
     return kind(path=path, columns=columns or Columns())
 
 
@@ -132,7 +132,7 @@ def check_form(source: Path, out: Path) -> None:
     Raises
     ------
     ParameterError
-        If an ending is not that of a table, or the output has another form.
+        If a suffix is not that of a table, or the output has another form.
 
     Examples
     --------
@@ -140,15 +140,15 @@ def check_form(source: Path, out: Path) -> None:
     >>> check_form(Path("swarm.csv"), Path("tracked.parquet"))
     Traceback (most recent call last):
     ...
-    asterism.errors.ParameterError: out: expected a name ending in .csv, .tsv, .txt, found ...
+    asterism.errors.ParameterError: out: expected the suffix .csv, .tsv, .txt, found tracked.parquet ...
     """
-    kind = ENDINGS.get(source.suffix.lower())
+    kind = SUFFIXES.get(source.suffix.lower())
     if kind is None:
-        raise ParameterError("source", f"a name ending in {', '.join(ENDINGS)}", str(source))
-    if ENDINGS.get(out.suffix.lower()) is not kind:
-        able = ", ".join(ending for ending, other in ENDINGS.items() if other is kind)
+        raise ParameterError("source", f"the suffix {', '.join(SUFFIXES)}", str(source))
+    if SUFFIXES.get(out.suffix.lower()) is not kind:
+        able = ", ".join(suffix for suffix, other in SUFFIXES.items() if other is kind)
         hint = "the rows are copied in the form of the input"
-        raise ParameterError("out", f"a name ending in {able}", str(out), hint)
+        raise ParameterError("out", f"the suffix {able}", str(out), hint)
 
 
 def track(

@@ -19,6 +19,7 @@ from asterism.plot.presence import plot_errors, plot_presence
 from asterism.plot.projections import plot_projections
 from asterism.plot.rerun_scene import view
 from asterism.plot.rig import plot_rig
+from asterism.plot.sweep import plot_sweep
 from asterism.plot.trajectories import plot_trajectories
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "plot_projections",
     "plot_reliability",
     "plot_rig",
+    "plot_sweep",
     "plot_trajectories",
     "view",
 ]

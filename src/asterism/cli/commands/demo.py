@@ -49,10 +49,10 @@ def demo(
         asterism demo -o /tmp/demo --seed 7
     """
     import asterism as am
+    from asterism.batch.carry_out import carry_out
+    from asterism.batch.run_folder import Run
     from asterism.checks import check_number
     from asterism.cli.outputs import Folder, check_outputs
-    from asterism.cli.run_folder import Run
-    from asterism.cli.tracking import carry_out
     from asterism.io.atomic import write_text
 
     check_number("--seed", seed, above=0, closed=True, integer=True)
@@ -73,8 +73,8 @@ def demo(
             capture, method, model=estimate.model, stitch=stitch, seed=seed
         )
         why_all += plan.recipe.chosen or ""
-        run = Run(recipe=plan.recipe, source=out / "capture.c3d", format="c3d")
-        result, summary = carry_out(run, capture, folder / "tracked.c3d", folder)
+        run = Run(recipe=plan.recipe, source=str(out / "capture.c3d"), format="c3d")
+        result, summary = carry_out(run, capture, folder / "tracked.c3d", folder=folder)
         tracks = result.tracks
         am.write(tracks, folder / "tracked.csv")
         _draw(tracks, truth, folder)

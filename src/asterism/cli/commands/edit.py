@@ -91,8 +91,8 @@ def edit(
         asterism edit trial.c3d --script trial.edits.toml -o corrected.c3d
     """
     import asterism as am
+    from asterism.batch.result_file import output_format
     from asterism.cli.outputs import check_outputs
-    from asterism.cli.tracking import output_format
     from asterism.edit.server import check_installed, serve
     from asterism.io.captures.files import format_of
 
@@ -157,7 +157,7 @@ def _session(
     """Track a capture and take up its edits."""
     import asterism as am
     from asterism.cli.commands.track import made_method
-    from asterism.cli.naming import read_markers
+    from asterism.tracking.naming.from_file import read_markers
 
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
     chosen = made_method(method, [])
@@ -181,13 +181,13 @@ def _run_in(
     folder: Path, markers: list[Path] | None, method: str | None, seed: int | None
 ) -> tuple[Path, Recipe, list[Path]]:
     """Return the input, the recipe and the marker sets of a run."""
-    from asterism.cli.run_folder import CONFIG, Run
+    from asterism.batch.run_folder import CONFIG, Run
 
     given = {"--markers": markers, "--method": method, "--seed": seed}
     if found := [name for name, value in given.items() if value not in (None, [])]:
         raise ParameterError("IN", "no settings beside those of the run", ", ".join(found))
     run = Run.read(folder / CONFIG)
-    return run.source, run.recipe, list(run.markers)
+    return Path(run.source), run.recipe, list(map(Path, run.markers))
 
 
 def _user() -> str:

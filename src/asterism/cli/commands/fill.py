@@ -58,8 +58,8 @@ def fill(
         asterism fill trial.tracked.c3d -o filled.trc --unflagged
     """
     import asterism as am
+    from asterism.batch.result_file import output_format
     from asterism.cli.outputs import check_outputs, read_model
-    from asterism.cli.tracking import output_format
 
     format = output_format(out, None)
     if not (am.io.CAPTURE_FORMATS[format].keeps_filled or unflagged):

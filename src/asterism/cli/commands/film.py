@@ -98,12 +98,12 @@ def film(
 
         asterism film crossing --rig wall4 -o film --seeing noise_px=0.2
     """
-    from asterism.cli.console import to_json
     from asterism.cli.filming import film_all, frames_between
     from asterism.cli.outputs import Folder, check_outputs
     from asterism.cli.recording import rig_from, seeing_from
     from asterism.io.atomic import write_text
     from asterism.io.calibrations import write_rig
+    from asterism.io.json_text import to_json
     from asterism.io.observations import write_observations
     from asterism.model.recipe import versions
 

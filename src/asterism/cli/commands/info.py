@@ -13,27 +13,65 @@ from asterism.cli.console import Json, Quiet, print_json, print_table
 if TYPE_CHECKING:
     import asterism as am
 
-_File = Annotated[Path, typer.Argument(metavar="FILE", help="Capture to describe.")]
+_Files = Annotated[list[Path], typer.Argument(metavar="FILE", help="Captures to describe.")]
 
 
-def info(file: _File, quiet: Quiet = False, json: Json = False) -> None:
+def info(files: _Files, quiet: Quiet = False, json: Json = False) -> None:
     """Describe a capture: markers, gaps, motion, warnings and tracking difficulty.
 
-    Nothing is tracked and no file is written.
+    Nothing is tracked and no file is written. Several captures are one table, a row each; the exit
+    code is 1 if one of them cannot be read.
 
     For example:
 
         asterism info trial.c3d
 
+        asterism info captures/*.c3d
+
         asterism info trial.c3d --json
     """
     import asterism as am
 
-    found = am.io.describe(am.read(file))
+    if len(files) > 1:
+        _print_several(files, quiet=quiet, json=json)
+        return
+    found = am.io.describe(am.read(files[0]))
     if json:
         print_json(dataclasses.asdict(found))
     elif not quiet:
         print_table(_rows(found))
+
+
+def _print_several(files: list[Path], *, quiet: bool, json: bool) -> None:
+    """Print one row for each capture."""
+    import asterism as am
+
+    found: list[am.io.CaptureInfo | str] = []
+    for path in files:
+        try:
+            found.append(am.io.describe(am.read(path)))
+        except am.FormatError as error:
+            found.append(str(error))
+    if json:
+        plain: list[dict[str, object]] = []
+        for path, each in zip(files, found, strict=True):
+            failed = isinstance(each, str)
+            plain.append({"path": path, "error": each} if failed else dataclasses.asdict(each))
+        print_json({"captures": plain})
+    elif not quiet:
+        header = ("file", "frames", "Hz", "named", "points a frame", "difficulty")
+        rows = [
+            (path, "–", "–", "–", "–", each)
+            if isinstance(each, str)
+            else (
+                path, each.n_frames, f"{each.rate:g}", each.n_named, f"{each.points_mean:.4g}",
+                f"{each.difficulty}: {each.reason}",
+            )
+            for path, each in zip(files, found, strict=True)
+        ]  # fmt: skip
+        print_table(rows, header)
+    if any(isinstance(each, str) for each in found):
+        raise typer.Exit(1)
 
 
 def _rows(found: am.io.CaptureInfo) -> list[tuple[str, str]]:

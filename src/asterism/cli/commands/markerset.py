@@ -60,8 +60,8 @@ def learn(
         asterism markerset learn static.c3d walk.c3d -o ann.toml
     """
     import asterism as am
-    from asterism.cli.naming import labelled_tracks
     from asterism.cli.outputs import check_ending, check_outputs
+    from asterism.tracking.naming.from_file import labelled_tracks
 
     check_ending("--out", out, ".toml")
     check_outputs({"--out": out}, captures, overwrite=overwrite)
@@ -123,7 +123,8 @@ def check(
         asterism markerset check static.c3d walk.c3d
     """
     import asterism as am
-    from asterism.cli.naming import conflict_figures, labelled_tracks, read_markers
+    from asterism.reporting.names_found import conflict_figures
+    from asterism.tracking.naming.from_file import labelled_tracks, read_markers
 
     made = read_markers(path, option="SET")
     rows: list[tuple[str, ...]] = []

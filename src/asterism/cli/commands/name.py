@@ -50,9 +50,10 @@ def name(
         asterism name labelled.c3d -o named.c3d
     """
     import asterism as am
-    from asterism.cli.naming import naming_figures, naming_rows, read_markers
+    from asterism.batch.result_file import output_format
     from asterism.cli.outputs import check_outputs
-    from asterism.cli.tracking import output_format
+    from asterism.reporting.names_found import naming_figures, naming_rows
+    from asterism.tracking.naming.from_file import read_markers
     from asterism.tracking.naming.own_names import has_own_names
 
     format = output_format(out, None)

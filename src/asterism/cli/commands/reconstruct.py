@@ -79,9 +79,9 @@ def reconstruct(
     import numpy as np
 
     import asterism as am
+    from asterism.batch.result_file import output_format
     from asterism.cli.options import as_options
     from asterism.cli.outputs import check_outputs
-    from asterism.cli.tracking import output_format
 
     outputs = {"--out": out, "--truth": truth}
     formats = {p: output_format(p, None, option=name) for name, p in outputs.items() if p}

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
+from asterism.errors import ParameterError
 
 if TYPE_CHECKING:
     import asterism as am
 
 __all__ = ["report"]
 
-_In = Annotated[Path, typer.Argument(metavar="TRACKED", help="Capture with tracks.")]
+_In = Annotated[list[Path], typer.Argument(metavar="TRACKED", help="Captures with tracks.")]
 _Truth = Annotated[Path | None, typer.Option(help="True tracks; wrong labels are marked.")]
 _Rig = Annotated[Path | None, typer.Option(help="Calibration of the cameras.")]
 _Out = Annotated[
@@ -35,7 +36,7 @@ _Editor = Annotated[
 
 
 def report(
-    source: _In,
+    sources: _In,
     truth: _Truth = None,
     rig: _Rig = None,
     out: _Out = None,
@@ -48,33 +49,45 @@ def report(
 ) -> None:
     """Write tracks as one HTML page that leads with the places to check.
 
-    The page opens in any browser and loads nothing from the network.
+    The page opens in any browser and loads nothing from the network. Each capture has its own.
 
     For example:
 
         asterism report trial.tracked.c3d
+
+        asterism report tracked/*.c3d
 
         asterism report tracked.c3d --truth truth.c3d --rig trial.xcp -o page.html
     """
     import asterism as am
     from asterism.cli.outputs import check_ending, check_outputs, read_labels
 
-    page = out or source.with_suffix(".html")
-    check_ending("--out", page, ".html", ".htm")
-    check_outputs({"--out": page}, [source, truth, rig], overwrite=overwrite)
-    tracks = read_labels(source)
+    single = {"--out": out, "--truth": truth, "--title": title}
+    given = [name for name, value in single.items() if value is not None]
+    if len(sources) > 1 and given:
+        raise ParameterError(", ".join(given), "one capture", f"{len(sources)}")
+    pages = [source.with_suffix(".html") if out is None else out for source in sources]
+    check_ending("--out", out, ".html", ".htm")
+    written = {"--out": pages[0]} if len(pages) == 1 else {f"--out ({p})": p for p in pages}
+    check_outputs(written, [*sources, truth, rig], overwrite=overwrite)
     true = None if truth is None else am.io.read_tracks(truth)
     cameras = None if rig is None else am.read_rig(rig)
-    with progress("writing the page"):
-        am.report(
-            tracks, page, truth=true, rig=cameras, up=up, title=title, summary=_origin(tracks),
-            editor=editor,
-        )  # fmt: skip
-    size = page.stat().st_size
+    with progress("writing the page", len(sources)) as advance:
+        for n, (source, page) in enumerate(zip(sources, pages, strict=True)):
+            tracks = read_labels(source)
+            am.report(
+                tracks, page, truth=true, rig=cameras, up=up, title=title,
+                summary=_origin(tracks), editor=editor,
+            )  # fmt: skip
+            advance(n + 1)
+    made = [
+        {"input": str(source), "output": str(page), "bytes": page.stat().st_size}
+        for source, page in zip(sources, pages, strict=True)
+    ]
     if json:
-        print_json({"input": str(source), "output": str(page), "bytes": size})
+        print_json(made[0] if len(made) == 1 else {"reports": made})
     elif not quiet:
-        rows: list[tuple[str, Any]] = [("written", f"{page}, {size / 1e6:.2f} MB")]
+        rows = [("written", f"{page}, {page.stat().st_size / 1e6:.2f} MB") for page in pages]
         print_table(rows, title="Report")
 
 

@@ -57,9 +57,9 @@ def stitch(
         asterism stitch tracks.csv -o markers.csv --json
     """
     import asterism as am
+    from asterism.batch.result_file import output_format
     from asterism.cli.bond_rows import bond_figures, bond_rows
     from asterism.cli.outputs import check_outputs, read_model
-    from asterism.cli.tracking import output_format
 
     format = output_format(out, None)
     check_outputs({"--out": out}, [source, model], overwrite=overwrite)

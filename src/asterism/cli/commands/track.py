@@ -15,9 +15,8 @@ from asterism.errors import FormatError, ParameterError
 
 if TYPE_CHECKING:
     import asterism as am
+    from asterism.batch.run_folder import Run
     from asterism.cli.outputs import Folder
-    from asterism.cli.run_folder import Run
-    from asterism.cli.summary import Summary
     from asterism.model import Recipe
 
 log = logging.getLogger(__name__)
@@ -150,11 +149,13 @@ def track(
         asterism track --from runs/first/run.toml -o again.c3d
     """
     import asterism as am
-    from asterism.cli.naming import read_markers
+    from asterism.batch.carry_out import carry_out
+    from asterism.batch.page import write_page
+    from asterism.batch.result_file import default_output, output_format
+    from asterism.batch.run_folder import Run
     from asterism.cli.outputs import check_ending, check_outputs, read_model
-    from asterism.cli.run_folder import Run
-    from asterism.cli.tracking import carry_out, default_output, output_format
     from asterism.io.captures.files import format_of
+    from asterism.tracking.naming.from_file import read_markers
 
     check_ending("--report", report, ".html", ".htm")
     job: Run | None = None
@@ -163,9 +164,9 @@ def track(
                     "--start": start or None, "--stitch": stitch or None,
                     "--fill": fill or None}  # fmt: skip
         job = _run_of(repeat, source, [k for k, v in settings.items() if v not in (None, [])])
-        source, format = job.source, format or job.format
-        markers = markers or list(job.markers)
-        edits = edits or list(job.edits)
+        source, format = Path(job.source), format or job.format
+        markers = markers or list(map(Path, job.markers))
+        edits = edits or list(map(Path, job.edits))
     if source is None:
         raise ParameterError("IN", "a capture to track", "nothing", "see asterism track --help")
     chosen_format = output_format(out, format, format_of(source).name)
@@ -205,12 +206,16 @@ def track(
         if recipe.chosen:
             print_table([("method", recipe.chosen)])
     job = Run(
-        recipe=recipe, source=source, format=chosen_format, markers=tuple(markers or []),
-        edits=tuple(edits or []),
+        recipe=recipe, source=str(source), format=chosen_format,
+        markers=tuple(map(str, markers or [])), edits=tuple(map(str, edits or [])),
     )  # fmt: skip
-    result, summary = carry_out(job, capture, out, run)
+    with progress(f"tracking with {recipe.method}", capture.n_frames) as advance:
+        result, summary = carry_out(
+            job, capture, out, folder=run, marker_sets=sets, edits=stated, progress=advance
+        )
     if report is not None:
-        _write_report(result, report, recipe, estimate, summary)
+        with progress("writing the report"):
+            write_page(result, report, recipe, estimate, summary)
     if prints:
         rows = summary.rows() + ([("report", str(report))] if report is not None else [])
         print_table(rows, title=f"\nTracked with {recipe.method}")
@@ -242,8 +247,8 @@ def _settings_of(recipe: Recipe) -> dict[str, Any]:
 
 def _outputs(out: Path, run: Path | None) -> dict[str, Path | Folder | None]:
     """Return the outputs by option; the tracks may be in the folder of the run."""
+    from asterism.batch.run_folder import FILES
     from asterism.cli.outputs import Folder
-    from asterism.cli.run_folder import FILES
 
     if run is None:
         return {"--out": out}
@@ -273,15 +278,15 @@ def made_method(name: str | None, texts: list[str]) -> am.tracking.Method[Any] |
 
 def _run_of(path: Path, source: Path | None, settings: list[str]) -> Run:
     """Read a run, with the present path of its input."""
-    from asterism.cli.run_folder import Run
+    from asterism.batch.run_folder import Run
 
     if settings:
         raise ParameterError("--from", "no settings beside those of the run", ", ".join(settings))
     job = Run.read(path)
-    job = dataclasses.replace(job, source=source or job.source)
-    if not job.source.is_file():
+    job = dataclasses.replace(job, source=job.source if source is None else str(source))
+    if not Path(job.source).is_file():
         hint = "give its new path: asterism track IN --from RUN.TOML"
-        raise FormatError(job.source, "the input of the run", "", "no such file", hint)
+        raise FormatError(Path(job.source), "the input of the run", "", "no such file", hint)
     return job
 
 
@@ -306,41 +311,10 @@ def _checked(
     found = sha256_of(capture, capture.labels if recipe.has_start else None)
     if found != recipe.sha256:
         raise FormatError(
-            job.source, "SHA-256 of its points", f"{recipe.sha256} of {path}", found,
+            Path(job.source), "SHA-256 of its points", f"{recipe.sha256} of {path}", found,
             "repeat the run with the same input",
         )  # fmt: skip
     return recipe
-
-
-def _write_report(
-    result: am.tracking.Tracked,
-    page: Path,
-    recipe: Recipe,
-    estimate: am.tracking.ModelEstimate | None,
-    summary: Summary,
-) -> None:
-    """Write the report page, with the method, its figures and the model."""
-    import asterism as am
-    from asterism.cli.options import flat
-
-    stitched = ", then stitched" if recipe.stitch else ""
-    options = ", ".join(f"{name}={value}" for name, value in flat(recipe.options).items())
-    rows = [("method", recipe.method + stitched)]
-    rows += [("method selected", recipe.chosen)] if recipe.chosen else []
-    rows += [("options", options)] if options else []
-    rows += summary.rows()
-    made = f"Tracked with {recipe.method}{stitched + ',' * recipe.stitch} in "
-    made += f"{summary.seconds:.2g} s ({summary.frames_per_second:,.0f} frames a second). "
-    if estimate is None:
-        rows.append(("model", "given, not estimated"))
-        made += "The model was given."
-    else:
-        reasons = estimate.reasons
-        rows += [(f"model: {name}", f"{value}: {why}") for name, value, why in reasons]
-        name, value, _ = reasons[0]
-        made += f"The model was estimated from the capture ({name} {value}; the others are below)."
-    with progress("writing the report"):
-        am.report(result.tracks, page, naming=result.naming, made=made, summary=rows)
 
 
 def _print_capture(capture: am.Capture) -> None:

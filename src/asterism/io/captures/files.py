@@ -19,11 +19,20 @@ if TYPE_CHECKING:
     from collections.abc import Generator
     from pathlib import Path
 
-__all__ = ["format_of", "format_to_write", "read", "read_tracks", "write"]
+__all__ = [
+    "HEAD",
+    "fitting_formats",
+    "format_of",
+    "format_to_write",
+    "read",
+    "read_tracks",
+    "write",
+]
 
 log = logging.getLogger(__name__)
 
-_HEAD = 4096  # bytes from which every format is recognised
+HEAD = 4096
+"""Number of first bytes from which every format is recognised."""
 
 
 def read(path: str | Path, *, format: str | None = None) -> Capture:
@@ -196,6 +205,12 @@ def format_of(path: Path) -> CaptureFormat:
         return _find(path, None)
 
 
+def fitting_formats(head: bytes) -> list[CaptureFormat]:
+    """Return the formats that the first `HEAD` bytes of a file fit."""
+    text = as_utf8(head)
+    return [f for f in CAPTURE_FORMATS.values() if f.sniff(text)]
+
+
 def format_to_write(path: Path, format: str | None) -> CaptureFormat:
     """Return the requested format to write, or the format of the suffix.
 
@@ -253,8 +268,8 @@ def _find(path: Path, asked: CaptureFormat | None) -> CaptureFormat:
     if asked is not None:
         return asked
     with path.open("rb") as file:
-        head = file.read(_HEAD)
-    fitting = [f for f in CAPTURE_FORMATS.values() if f.sniff(as_utf8(head))]
+        head = file.read(HEAD)
+    fitting = fitting_formats(head)
     ending = path.suffix.lower()
     named = [f for f in CAPTURE_FORMATS.values() if ending and ending in f.extensions]
     if fitting:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from asterism.errors import ParameterError
 from asterism.model import Capture
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from pathlib import Path
 
-    import asterism as am
+    from asterism.tracking import KeptNames, NameConflict, Naming
 
-__all__ = ["conflict_figures", "labelled_tracks", "naming_figures", "naming_rows", "read_markers"]
+__all__ = ["conflict_figures", "naming_figures", "naming_rows"]
 
 UNCERTAIN = 0.9
 """Probability of a name below which it is listed."""
@@ -21,38 +19,7 @@ MOST = 8
 """Number of rows of a list."""
 
 
-def read_markers(path: Path, *, option: str = "--markers") -> am.MarkerSet:
-    """Read a marker set, or learn that of a labelled capture; errors name the `option`."""
-    import asterism as am
-
-    suffixes = [e for f in am.io.CAPTURE_FORMATS.values() for e in f.extensions]
-    if path.name.lower().endswith(tuple(e for e in suffixes if e)):
-        return am.learn_marker_set(labelled_tracks(path, None, option=option))
-    return am.read_marker_set(path)
-
-
-def labelled_tracks(path: Path, subject: str | None, *, option: str = "IN") -> am.Tracks:
-    """Read the tracks of a labelled capture, of one subject if it is given.
-
-    Errors name the `option` that gives the capture.
-    """
-    import asterism as am
-    from asterism.io.captures.marker_names import is_unlabelled
-
-    capture = am.read(path)
-    tracks = capture.tracks.measured()
-    named = [k for k, name in enumerate(tracks.names) if name and not is_unlabelled(name)]
-    if subject is not None:
-        named = [k for k in named if str(tracks.names[k]).startswith(f"{subject}:")]
-    if not named:
-        of = f" of {subject}" if subject is not None else ""
-        n = tracks.n_tracks
-        got = f"{n} tracks in {path}, none with a name{of}" if n else f"no tracks in {path}"
-        raise ParameterError(option, f"a capture with named markers{of}", got)
-    return tracks if subject is None else tracks.select(named)
-
-
-def naming_rows(found: am.tracking.Naming) -> list[tuple[str, str]]:
+def naming_rows(found: Naming) -> list[tuple[str, str]]:
     """Return the result of `name_tracks` as rows: names, missing ones, uncertain ones, changes."""
     names = [name for name in found.tracks.names if name is not None]
     rows = [
@@ -81,7 +48,7 @@ def naming_rows(found: am.tracking.Naming) -> list[tuple[str, str]]:
     return rows
 
 
-def _own_rows(found: am.tracking.Naming, own: am.tracking.KeptNames) -> list[tuple[str, str]]:
+def _own_rows(found: Naming, own: KeptNames) -> list[tuple[str, str]]:
     """Return the result for the names in the file as rows."""
     kept, moved, left_out = len(own.kept), len(own.moved), len(own.left_out)
     rows = [("names in the file", f"{kept} kept, {moved} moved, {left_out} left out")]
@@ -97,9 +64,7 @@ def _own_rows(found: am.tracking.Naming, own: am.tracking.KeptNames) -> list[tup
     return rows
 
 
-def conflict_figures(
-    conflicts: Iterable[am.tracking.NameConflict], at: int
-) -> list[dict[str, Any]]:
+def conflict_figures(conflicts: Iterable[NameConflict], at: int) -> list[dict[str, Any]]:
     """Return names that are contradicted as plain values; `at` is the number of the first frame."""
     return [
         {
@@ -113,7 +78,7 @@ def conflict_figures(
     ]
 
 
-def naming_figures(found: am.tracking.Naming) -> dict[str, Any]:
+def naming_figures(found: Naming) -> dict[str, Any]:
     """Return the result of `name_tracks` as plain values, with the frame numbers of the file."""
     at, own = _first_frame(found), found.own
     rows = zip(
@@ -159,6 +124,6 @@ def naming_figures(found: am.tracking.Naming) -> dict[str, Any]:
     }
 
 
-def _first_frame(found: am.tracking.Naming) -> int:
+def _first_frame(found: Naming) -> int:
     capture = found.tracks.detections
     return capture.first_frame if isinstance(capture, Capture) else 0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import asterism as am
-from asterism.cli.naming import naming_figures, naming_rows
+from asterism.reporting.names_found import naming_figures, naming_rows
 from asterism.reporting.places import places_of
 
 if TYPE_CHECKING:

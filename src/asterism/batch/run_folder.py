@@ -14,12 +14,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
-import asterism as am
+from asterism.batch.storage import is_url
 from asterism.checks import check_fields
 from asterism.errors import FormatError, ParameterError
+from asterism.io import CAPTURE_FORMATS
 from asterism.io.atomic import write_text
 from asterism.model import Recipe
 from asterism.model.toml_file import read_toml, write_toml
+from asterism.tracking import method_by_name
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -39,29 +41,29 @@ class Run:
     ----------
     recipe : Recipe
         Model, method, options and seed.
-    source : Path
-        Path of the capture.
+    source : str
+        Path of the capture, or its URL.
     format : str
         Format of the result, a key of `asterism.io.CAPTURE_FORMATS`.
-    markers : tuple of Path
+    markers : tuple of str
         Marker sets by which the tracks are named.
-    edits : tuple of Path
+    edits : tuple of str
         Files of the edits that the tracks respect.
     """
 
     recipe: Recipe
-    source: Path
+    source: str
     format: str
-    markers: tuple[Path, ...] = ()
-    edits: tuple[Path, ...] = ()
+    markers: tuple[str, ...] = ()
+    edits: tuple[str, ...] = ()
 
     def write(self, path: Path) -> None:
         """Write the run as ``run.toml``."""
         values = self.recipe.to_dict()
-        values["input"] = {"path": str(self.source.resolve()), **values["input"]}
+        values["input"] = {"path": _absolute(self.source), **values["input"]}
         values["names"] = {
-            "paths": [str(path.resolve()) for path in self.markers],
-            "edit_paths": [str(path.resolve()) for path in self.edits],
+            "paths": [_absolute(path) for path in self.markers],
+            "edit_paths": [_absolute(path) for path in self.edits],
             **values["names"],
         }
         write_text(path, write_toml({**values, "output": {"format": self.format}}, None))
@@ -90,18 +92,17 @@ class Run:
             for name, paths in (("names.paths", markers), ("names.edit_paths", edits)):
                 if not isinstance(paths, list):
                     raise ParameterError(name, "a list of files", repr(paths))
-            check_fields("output.format", [format], am.io.CAPTURE_FORMATS)
+            check_fields("output.format", [format], CAPTURE_FORMATS)
             recipe = Recipe.from_dict(values)
-            am.tracking.method_by_name(recipe.method, **recipe.options)
+            method_by_name(recipe.method, **recipe.options)
         except ParameterError as error:
             raise FormatError(path, error.name, error.expected, error.got, error.hint) from error
-        sets, edited = (
-            tuple(Path(str(path)) for path in cast("list[Any]", paths))
-            for paths in (markers, edits)
-        )
-        return cls(
-            recipe=recipe, source=Path(source), format=format, markers=sets, edits=edited
-        )  # fmt: skip
+        sets, edited = (tuple(map(str, cast("list[Any]", paths))) for paths in (markers, edits))
+        return cls(recipe=recipe, source=source, format=format, markers=sets, edits=edited)
+
+
+def _absolute(place: str) -> str:
+    return place if is_url(place) else str(Path(place).resolve())
 
 
 @contextmanager

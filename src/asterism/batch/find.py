@@ -1,0 +1,210 @@
+"""Captures of a batch, each with its marker sets, its edits and the state of its result."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Literal
+
+from asterism.batch.job import Job, Settings, key_of
+from asterism.batch.result_file import output_format
+from asterism.batch.storage import (
+    files_below,
+    files_beside,
+    inside,
+    is_file,
+    is_url,
+    read_bytes,
+    split,
+)
+from asterism.errors import AsterismError, FormatError, ParameterError
+from asterism.io import CAPTURE_FORMATS
+from asterism.io.captures.files import HEAD, fitting_formats
+from asterism.records import record
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from typing import Any
+
+__all__ = ["MARKER_SET", "Planned", "captures_below", "plan_batch"]
+
+MARKER_SET = "markers.toml"
+"""Name of the marker set of the captures in a folder and below it."""
+_EDITS = ".edits.toml"
+_SURE = (".c3d", ".trc")  # suffixes that only captures have
+_RESULTS = (".tracked", ".corrected")  # before the suffix of a result of this program
+
+
+@record
+class Planned:
+    """State of one capture before a batch runs.
+
+    Parameters
+    ----------
+    job : Job
+        The capture.
+    state : str
+        ``new``; ``done``, if the output folder holds the result of the same input and settings;
+        ``changed``, if it holds that of others; ``failed``, if the input cannot be read.
+    reason : str
+        Reason of the state ``failed``.
+    """
+
+    job: Job
+    state: Literal["new", "done", "changed", "failed"]
+    reason: str = ""
+
+
+def plan_batch(
+    sources: Sequence[str],
+    out: str,
+    settings: Settings,
+    *,
+    markers: Sequence[str] = (),
+    progress: Callable[[int, int], Any] | None = None,
+) -> list[Planned]:
+    """Find the captures of a batch and the state of each result; nothing is tracked.
+
+    Parameters
+    ----------
+    sources : sequence of str
+        Captures and folders, by path or URL. In folders, files of the known formats are captures,
+        but for results such as ``trial.tracked.c3d``.
+    out : str
+        Output folder, by path or URL; captures inside it are left out.
+    settings : Settings
+        Settings of the batch.
+    markers : sequence of str
+        Marker sets of all captures. By default the file `MARKER_SET` in the folder of a capture, or
+        in the nearest folder above it, names its tracks.
+    progress : callable, optional
+        Called with the number of captures that were examined, and the number of all.
+
+    Returns
+    -------
+    list of Planned
+        In the order of the sources, those of a folder by name.
+
+    Raises
+    ------
+    ParameterError
+        If no capture is found, or two have the same result.
+    """
+    every = (each for source in sources for each in _jobs(source, out, settings, tuple(markers)))
+    found = list({job.source: (job, reason) for job, reason in every}.values())
+    if not found:
+        raise ParameterError("sources", "captures, or folders with captures", ", ".join(sources))
+    owners: dict[str, str] = {}
+    for job, _ in found:
+        for name in (*job.files, job.run):
+            if owners.setdefault(name, job.source) != job.source:
+                got = f"{name}, the result of both {owners[name]} and {job.source}"
+                raise ParameterError("sources", "one result for each capture", got)
+    planned: list[Planned] = []
+    for n, (job, reason) in enumerate(found):
+        planned.append(_examined(job, out, reason))
+        if progress is not None:
+            progress(n + 1, len(found))
+    return planned
+
+
+def _examined(job: Job, out: str, reason: str) -> Planned:
+    """Return a capture with its key and the state of its result."""
+    if reason:
+        return Planned(job=job, state="failed", reason=reason)
+    try:
+        job = dataclasses.replace(job, key=key_of(job))
+    except AsterismError as error:
+        return Planned(job=job, state="failed", reason=str(error))
+    try:
+        before = json.loads(read_bytes(inside(out, job.summary)))
+    except (FormatError, ValueError):
+        return Planned(job=job, state="new")
+    same = isinstance(before, dict) and before.get("key") == job.key
+    return Planned(job=job, state="done" if same else "changed")
+
+
+def captures_below(folder: str) -> list[str]:
+    """Return the names of the captures below a folder or URL, sorted.
+
+    A suffix that only captures have, such as .c3d, decides; other files are examined.
+    """
+    names = (name for name, reason in files_below(folder) if not reason)
+    return sorted(name for name in names if _formats(folder, name))
+
+
+def _jobs(
+    source: str, out: str, settings: Settings, markers: tuple[str, ...]
+) -> Iterator[tuple[Job, str]]:
+    """Iterate over the captures of one source, each with the reason why it cannot be read."""
+    if is_file(source):
+        folder, name = split(source)
+        names, listed = {name: ""}, files_beside(source)
+    else:
+        folder = source
+        every = dict(each for each in files_below(folder) if not _is_in(folder, each[0], out))
+        listed = {name for name, reason in every.items() if not reason}
+        names = {
+            name: reason
+            for name, reason in every.items()
+            if reason or (_formats(folder, name) and not _is_result(name))
+        }
+    for name in sorted(names):
+        sets = markers or tuple(inside(folder, each) for each in _sets_of(name, listed))
+        stem = PurePosixPath(name).with_suffix("")
+        edits = f"{stem}{_EDITS}"
+        of_input = next(iter(_formats(folder, name)), "c3d")
+        format = settings.format or output_format(None, None, of_input)
+        yield (
+            Job(
+                source=inside(folder, name), name=name,
+                output=f"{stem}.tracked{_suffix(name, format)}", format=format, settings=settings,
+                markers=sets, edits=inside(folder, edits) if edits in listed else None,
+            ),
+            names[name],
+        )  # fmt: skip
+
+
+def _is_in(folder: str, name: str, out: str) -> bool:
+    """Return whether a file of a folder is in the output folder."""
+    if is_url(folder) != is_url(out):
+        return False
+    place = inside(folder, name)
+    if is_url(out):
+        return place.startswith(f"{out.rstrip('/')}/")
+    return Path(place).resolve().is_relative_to(Path(out).resolve())
+
+
+def _is_result(name: str) -> bool:
+    return PurePosixPath(PurePosixPath(name).stem).suffix in _RESULTS
+
+
+def _formats(folder: str, name: str) -> list[str]:
+    """Return the formats that a file may have; none for a file that is no capture.
+
+    A file that cannot be read has the formats of its suffix, so that it is reported later.
+    """
+    suffix = PurePosixPath(name).suffix.lower()
+    named = [f.name for f in CAPTURE_FORMATS.values() if suffix and suffix in f.extensions]
+    if suffix in _SURE or not named:
+        return named
+    try:
+        head = read_bytes(inside(folder, name), HEAD)
+    except FormatError:
+        return named
+    return [f.name for f in fitting_formats(head) if f.name in named]
+
+
+def _sets_of(name: str, listed: set[str]) -> Iterator[str]:
+    """Iterate over the marker set in the nearest folder, if any."""
+    for folder in PurePosixPath(name).parents:
+        if (path := str(folder / MARKER_SET)) in listed:
+            yield path
+            return
+
+
+def _suffix(name: str, format: str) -> str:
+    known = CAPTURE_FORMATS[format].extensions
+    suffix = PurePosixPath(name).suffix
+    return suffix if suffix.lower() in known else known[0]

@@ -1,0 +1,191 @@
+"""The index of a batch: one page and one table of all captures, the worst first."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import hashlib
+import io
+import json
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from asterism.batch.storage import deliver, inside, read_bytes
+from asterism.errors import FormatError
+from asterism.reporting.page.markup import Markup, element
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from asterism.batch.job import Job
+
+__all__ = ["INDEX", "TABLE", "holds_batch", "write_index"]
+
+INDEX, TABLE = "index.html", "summary.csv"
+_COLUMNS = (
+    "capture", "state", "reason", "places", "expected_wrong", "n_tracks", "n_named", "n_frames",
+    "n_detections", "n_labelled", "n_clutter", "n_gaps", "n_filled", "method", "output", "page",
+    "input", "key",
+)  # fmt: skip
+_STYLE = (
+    ":root{--paper:#f6f7f8;--card:#fff;--ink:#1d2329;--muted:#56606b;--line:#dde1e6;"
+    "--accent:#005f99;--clear:#1a7447;--some:#875600;--many:#b0330a;color-scheme:light dark}"
+    "@media(prefers-color-scheme:dark){:root{--paper:#12161a;--card:#1a1f25;--ink:#e7eaed;"
+    "--muted:#a2adb8;--line:#323a43;--accent:#6cbdf0;--clear:#5fcf92;--some:#f0b43c;"
+    "--many:#ff8a5c}}"
+    "body{margin:0;background:var(--paper);color:var(--ink);font:15px/1.5 system-ui,sans-serif;"
+    "font-variant-numeric:tabular-nums}main{max-width:1200px;margin:0 auto;padding:16px 20px 32px}"
+    "h1{font-size:21px;margin:0}p{margin:2px 0 14px;color:var(--muted)}.sheet{overflow-x:auto;"
+    "border:1px solid var(--line);border-radius:8px;background:var(--card)}"
+    "table{width:100%;border-collapse:collapse;font-size:14px}"
+    "th,td{padding:6px 12px;border-top:1px solid var(--line);text-align:right;white-space:nowrap}"
+    "thead th{border-top:0;color:var(--muted);font-weight:500}"
+    "th:first-child{text-align:left}"
+    "tbody th{min-width:24ch;font-weight:600;overflow-wrap:anywhere;white-space:normal}"
+    "td.why{text-align:left;white-space:normal;overflow-wrap:anywhere}"
+    "a{color:var(--accent)}.clear{color:var(--clear)}.some{color:var(--some)}"
+    ".many{color:var(--many);font-weight:600}"
+)
+_FIRST = b"capture,state,reason,"  # of a table of a batch
+_MANY = 5  # places from which their number is shown as many
+
+
+def holds_batch(out: str) -> bool:
+    """Return whether an output folder or URL is that of a batch, which is resumed in it."""
+    try:
+        return read_bytes(inside(out, TABLE), len(_FIRST)) == _FIRST
+    except FormatError:
+        return False
+
+
+def write_index(
+    out: str, jobs: Sequence[Job], failed: Mapping[str, str], *, overwrite: bool
+) -> None:
+    """Write ``index.html`` and ``summary.csv`` from the summaries in the output folder.
+
+    Captures without a result come first, then those with the largest expected number of wrong
+    labels.
+
+    Parameters
+    ----------
+    out : str
+        Output folder, by path or URL.
+    jobs : sequence of Job
+        Captures of the batch.
+    failed : mapping of str
+        Reasons by the name of each capture without a result.
+    overwrite : bool
+        Whether files of the same names that are not of a batch may be replaced.
+
+    Raises
+    ------
+    FormatError
+        If a file cannot be written.
+    """
+    rows = sorted((_row(out, job, failed.get(job.name, "")) for job in jobs), key=_need)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_COLUMNS)
+    writer.writerows([row[name] for name in _COLUMNS] for row in rows)
+    overwrite = overwrite or holds_batch(out)
+    page = _page(rows).encode("utf-8", errors="replace")
+    deliver(inside(out, INDEX), page, overwrite=overwrite)
+    deliver(inside(out, TABLE), text.getvalue().encode(), overwrite=overwrite)
+
+
+def _row(out: str, job: Job, reason: str) -> dict[str, Any]:
+    """Return the figures of a capture by column."""
+    row: dict[str, Any] = dict.fromkeys(_COLUMNS, "")
+    row |= {"capture": job.name, "input": job.source, "key": job.key, "reason": reason}
+    try:
+        if reason:
+            raise ValueError(reason)
+        values: dict[str, Any] = json.loads(read_bytes(inside(out, job.summary)))
+    except (FormatError, ValueError):
+        return row | {"state": "failed" if reason else "not tracked"}
+    naming, filled = values["naming"] or {}, values["filled"] or {}
+    found = {name: values[name] for name in _COLUMNS if name in values}
+    return (
+        row
+        | found
+        | {
+            "state": "tracked",
+            "expected_wrong": f"{values['expected_wrong']:.6g}",
+            "n_named": naming.get("n_named", ""),
+            "n_filled": filled.get("n_filled", ""),
+            "page": job.page or "",
+            "input": job.source,
+        }
+    )
+
+
+def _need(row: Mapping[str, Any]) -> tuple[bool, float, int, str]:
+    if row["state"] != "tracked":
+        return False, 0.0, 0, row["capture"]
+    return True, -float(row["expected_wrong"]), -int(row["places"]), row["capture"]
+
+
+def _page(rows: Sequence[Mapping[str, Any]]) -> str:
+    n, places = len(rows), sum(int(row["places"] or 0) for row in rows)
+    failed = sum(row["state"] != "tracked" for row in rows)
+    lead = f"Captures: {n:,}. Without a result: {failed:,}. "
+    lead += f"Places to check in the others: {places:,}."
+    titles = (
+        "capture", "places to check", "wrong labels expected", "tracks", "named", "labelled",
+        "gaps", "frames",
+    )  # fmt: skip
+    policy = base64.b64encode(hashlib.sha256(_STYLE.encode()).digest()).decode()
+    head = element(
+        "head",
+        element("meta", charset="utf-8"),
+        element(
+            "meta", http_equiv="Content-Security-Policy",
+            content=f"default-src 'none'; style-src 'sha256-{policy}'; base-uri 'none'",
+        ),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        element("title", "Batch – Asterism"),
+        element("style", Markup(_STYLE)),
+    )  # fmt: skip
+    table = element(
+        "table",
+        element("thead", element("tr", *(element("th", each, scope="col") for each in titles))),
+        element("tbody", *map(_line, rows)),
+    )
+    body = element(
+        "body",
+        element(
+            "main",
+            element("h1", "Tracked captures"),
+            element("p", lead),
+            element("div", table, class_="sheet"),
+        ),
+    )
+    return f"<!doctype html>\n{element('html', head, body, lang='en')}\n"
+
+
+def _line(row: Mapping[str, Any]) -> Markup:
+    """Return the row of one capture."""
+    name = element("bdi", row["capture"])
+    if row["state"] != "tracked":
+        why = row["reason"] or "not tracked yet"
+        return element(
+            "tr",
+            element("th", name, scope="row"),
+            element("td", element("span", why, class_="many"), colspan=7, class_="why"),
+        )
+    target = row["page"] or row["output"]
+    linked = element("a", name, href=quote(target))
+    places = int(row["places"])
+    kind = "clear" if not places else "some" if places < _MANY else "many"
+    share = 100 * int(row["n_labelled"]) / max(int(row["n_detections"]), 1)
+    return element(
+        "tr",
+        element("th", linked, scope="row"),
+        element("td", element("span", f"{places:,}", class_=kind)),
+        element("td", f"{float(row['expected_wrong']):,.0f}"),
+        element("td", f"{row['n_tracks']:,}"),
+        element("td", f"{row['n_named'] if row['n_named'] != '' else '–'}"),
+        element("td", f"{share:.1f} %"),
+        element("td", f"{row['n_gaps']:,}"),
+        element("td", f"{row['n_frames']:,}"),
+    )

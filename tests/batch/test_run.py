@@ -1,0 +1,274 @@
+"""A batch: results, resumption, failures."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import asterism as am
+from asterism.batch.perform import perform
+from asterism.batch.storage import deliver
+from asterism.cli import main
+from asterism.errors import FormatError, ParameterError
+from asterism.tracking.methods import options_of
+from tests.batch.conftest import contents
+
+RESULTS = (
+    "first/turn.tracked.csv", "first/turn.tracked.html", "first/walk.tracked.c3d",
+    "first/walk.tracked.html", "second/walk.tracked.c3d", "second/walk.tracked.html",
+)  # fmt: skip
+
+
+def test_all_captures_are_tracked_and_the_reason_of_a_failure_is_given(batch):
+    assert repr(batch) == "Batch(3 captures tracked, 0 done before, 1 failed)"
+    assert "word 9: expected data that begin within" in batch.failed["second/damaged.c3d"]
+    out = Path(batch.out)
+    assert set(RESULTS) <= set(contents(out))
+    assert all(am.io.read_tracks(out / "first/walk.tracked.c3d").names)  # by the set of the folder
+    with (out / "summary.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["state"] for row in rows] == ["failed", "tracked", "tracked", "tracked"]
+    assert rows[0]["capture"] == "second/damaged.c3d"
+    named = {row["capture"]: row["n_named"] for row in rows}
+    assert (named["first/walk.c3d"], named["second/walk.c3d"]) == ("8", "")
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert page.index("damaged.c3d") < page.index('href="first/walk.tracked.html"')
+
+
+def test_a_result_is_that_of_track(made_captures, batch, tmp_path):
+    source, alone = made_captures / "second" / "walk.c3d", tmp_path / "alone.c3d"
+    assert main(["track", str(source), "-o", str(alone), "--quiet"]) == 0
+    assert alone.read_bytes() == Path(batch.out, "second/walk.tracked.c3d").read_bytes()
+    run, again = Path(batch.out, "runs/second/walk.c3d/run.toml"), tmp_path / "again.c3d"
+    assert main(["track", "--from", str(run), "-o", str(again), "--quiet"]) == 0
+    assert again.read_bytes() == alone.read_bytes()
+
+
+def test_finished_work_is_known_by_its_content(captures, out):
+    before = contents(out)
+    again = am.batch.run([captures], out, workers=1)
+    assert (again.n_tracked, again.n_done_before) == (0, 3)
+    # The same name with another content is other work, and replaces nothing by itself.
+    source = captures / "second" / "walk.c3d"
+    source.write_bytes((captures / "first" / "walk.c3d").read_bytes())
+    again = am.batch.run([captures], out, workers=1)
+    assert "found another. Give overwrite" in again.failed["second/walk.c3d"]
+    assert contents(out) == before
+    again = am.batch.run([captures], out, workers=1, overwrite=True)
+    assert (again.n_tracked, again.n_done_before) == (1, 2)
+    assert contents(out) != before
+
+
+@pytest.mark.parametrize("change", ["settings", "marker set", "edits"])
+def test_all_that_determines_a_result_is_in_its_key(captures, change):
+    settings, source = am.batch.Settings(report=False), captures / "first" / "walk.c3d"
+    before = am.batch.plan_batch([str(captures)], "out", settings)
+    if change == "settings":
+        settings = dataclasses.replace(settings, fill=True)
+    elif change == "marker set":
+        path = captures / "first" / "markers.toml"
+        path.write_text(path.read_text(encoding="utf-8") + "\n# by another\n", encoding="utf-8")
+    else:
+        edits = [am.model.Edit(kind="clutter", at=((3, 0),))]
+        am.io.write_edits(captures / "first" / "walk.edits.toml", edits, am.read(source))
+    after = am.batch.plan_batch([str(captures)], "out", settings)
+    changed = {a.job.name for a, b in zip(before, after, strict=True) if a.job.key != b.job.key}
+    assert (
+        changed
+        == {
+            "settings": {
+                "first/walk.c3d",
+                "first/turn.csv",
+                "second/walk.c3d",
+                "second/damaged.c3d",
+            },
+            "marker set": {"first/walk.c3d", "first/turn.csv"},
+            "edits": {"first/walk.c3d"},
+        }[change]
+    )
+
+
+def test_edits_beside_a_capture_are_respected(captures, tmp_path):
+    source = captures / "second" / "walk.c3d"
+    edits = [am.model.Edit(kind="clutter", at=((3, 0),))]
+    am.io.write_edits(captures / "second" / "walk.edits.toml", edits, am.read(source))
+    am.batch.run([source], tmp_path / "out", workers=1)
+    tracks = am.io.read_tracks(tmp_path / "out" / "walk.tracked.c3d")
+    d = tracks.detections
+    at = d.offsets[3] + [tuple(p) for p in d.frame(3)].index(tuple(am.read(source).frame(3)[0]))
+    assert tracks.labels[at] == -1
+
+
+def test_a_stopped_batch_is_resumed(made_captures, serial, tmp_path):
+    """It is killed with SIGKILL when some files are there; the end is as if it had never been."""
+    out = tmp_path / "out"
+    line = [sys.executable, "-m", "asterism.cli", "batch", str(made_captures), "-o", str(out)]
+    for n in (1, 5):  # files of results, which are six for each capture
+        process = subprocess.Popen([*line, "--workers", "1", "-q"], stderr=subprocess.DEVNULL)
+        while process.poll() is None and (not out.is_dir() or len(contents(out)) < n):
+            time.sleep(0.002)
+        process.send_signal(signal.SIGKILL)
+        assert process.wait() == -signal.SIGKILL
+        assert n <= len(contents(out)) < len(serial)
+    unfinished = out / "second" / f".{16 * 'a'}.part"
+    unfinished.parent.mkdir(exist_ok=True)
+    unfinished.write_bytes(b"C3")
+    os.utime(unfinished, (0, 0))
+    batch = am.batch.run([made_captures], out, workers=1)
+    assert set(batch.failed) == {"second/damaged.c3d"}
+    assert contents(out) == serial
+    assert not unfinished.exists()
+
+
+def test_the_bound_of_the_memory_is_kept(captures, tmp_path):
+    batch = am.batch.run([captures / "first"], tmp_path / "out", workers=1, memory=60_000_000)
+    assert set(batch.failed) == {"walk.c3d", "turn.csv"}
+    for reason in batch.failed.values():
+        # The engine ends the process where a thread has no memory.
+        assert "needs more memory than the bound of 0.06 GB" in reason or "SIGABRT" in reason
+
+
+def test_the_memory_of_a_capture_is_its_own(captures, tmp_path):
+    held = np.ones(60_000_000)  # of this process, which is not counted
+    batch = am.batch.run([captures / "first"], tmp_path / "out", workers=1)
+    peaks = [each.peak_bytes for each in batch.outcomes.values()]
+    if sys.platform == "linux":
+        assert all(30e6 < peak < held.nbytes for peak in peaks)
+
+
+def test_an_input_that_changes_in_between_is_refused(captures, tmp_path):
+    plan = am.batch.plan_batch([str(captures / "first")], "out", am.batch.Settings())
+    job = next(each.job for each in plan if each.job.name == "walk.c3d")
+    (captures / "first" / "walk.c3d").write_bytes((captures / "second" / "walk.c3d").read_bytes())
+    outcome = perform(job, str(tmp_path / "out"))
+    assert "expected the input and the versions with which the batch began" in outcome.error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("method", am.tracking.METHODS)
+def test_each_method_has_a_key(captures, method):
+    made = am.tracking.method_by_name(method)
+    settings = am.batch.Settings(method=method, options=options_of(made))
+    default = am.batch.Settings(method=method)
+    for given in (settings, default):
+        plan = am.batch.plan_batch([str(captures / "first" / "walk.c3d")], "out", given)
+        assert len(plan[0].job.key) == 64
+
+
+def test_what_cannot_be_read_is_reported(captures, tmp_path):
+    for name in ("gone.csv", "lost.c3d"):
+        (captures / "first" / name).symlink_to(captures / "nowhere")
+    states = {
+        each.job.name: (each.state, each.reason)
+        for each in am.batch.plan_batch([str(captures)], "out", am.batch.Settings())
+    }
+    for name in ("first/gone.csv", "first/lost.c3d"):
+        assert states[name][0] == "failed"
+        assert "no such file" in states[name][1]
+    assert states["first/walk.c3d"][0] == "new"
+
+
+def test_a_folder_that_cannot_be_listed_is_reported(captures, monkeypatch):
+    closed, listed = captures / "first", os.scandir
+
+    def scandir(path):
+        if str(path) == str(closed):
+            raise PermissionError(13, "Permission denied", str(path))
+        return listed(path)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    planned = am.batch.plan_batch([str(captures)], "out", am.batch.Settings())
+    states = {each.job.name: (each.state, each.reason) for each in planned}
+    assert states["first"] == ("failed", f"{closed}: Permission denied")
+    assert states["second/walk.c3d"][0] == "new"
+
+
+def test_a_full_disk_is_reported(captures, tmp_path, monkeypatch):
+    def full(place, content, *, overwrite):
+        del content, overwrite
+        raise FormatError(place, "", "", "no space left on device")
+
+    monkeypatch.setattr("asterism.batch.perform.deliver", full)
+    batch = am.batch.run([captures / "first"], tmp_path / "out", workers=1)
+    assert all("no space left on device" in reason for reason in batch.failed.values())
+    monkeypatch.setattr("asterism.batch.perform.deliver", deliver)
+    assert am.batch.run([captures / "first"], tmp_path / "out", workers=1).n_tracked == 2
+
+
+def test_what_another_has_put_there_is_kept(captures, tmp_path):
+    for name in ("index.html", "summary.csv", "runs", "walk.tracked.c3d"):
+        other = tmp_path / name.replace(".", "-")
+        other.mkdir()
+        path = other / name
+        path.mkdir() if name == "runs" else path.write_text("precious")
+        with pytest.raises(ParameterError, match="which holds files"):
+            am.batch.run([captures / "first"], other, workers=1)
+        assert list(other.iterdir()) == [path]
+
+
+def test_a_result_that_another_has_changed_is_kept(captures, out):
+    path = out / "second" / "walk.tracked.c3d"
+    path.write_text("precious")
+    (out / "runs/second/walk.c3d/summary.json").unlink()
+    batch = am.batch.run([captures], out, workers=1)
+    assert "expected none, or one with the same bytes" in batch.failed["second/walk.c3d"]
+    assert path.read_text() == "precious"
+    assert am.batch.run([captures], out, workers=1, overwrite=True).n_tracked == 1
+    assert path.read_bytes()[:2] == b"\x02\x50"
+
+
+def test_two_captures_with_one_result_are_refused(captures):
+    places = [str(captures / "first" / "walk.c3d"), str(captures / "second" / "walk.c3d")]
+    with pytest.raises(ParameterError, match="the result of both"):
+        am.batch.plan_batch(places, "out", am.batch.Settings())
+
+
+def test_results_inside_the_folder_are_no_captures(captures):
+    out = captures / "first" / "out"
+    shutil.copytree(captures / "second", out)
+    shutil.copy(captures / "first" / "walk.c3d", captures / "first" / "walk.tracked.c3d")
+    planned = am.batch.plan_batch([str(captures / "first")], str(out), am.batch.Settings())
+    assert [each.job.name for each in planned] == ["turn.csv", "walk.c3d"]
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"method": "gmm"}, "method"),
+        ({"options": {"window": 3}}, "options: expected a method that has them"),
+        ({"method": "smp", "options": {"windw": 3}}, "windw"),
+        ({"stitch": "yes"}, "stitch"),
+        ({"seed": -1}, "seed"),
+        ({"format": "c4d"}, "format"),
+    ],
+)
+def test_settings_are_checked(given, says):
+    with pytest.raises(ParameterError, match=says):
+        am.batch.Settings(**given)
+
+
+def test_the_command_reports_and_fails_with_1(captures, out, capsys):
+    new = f"{out}.new"
+    assert main(["batch", str(captures), "-o", new, "--dry-run", "--json"]) == 0
+    planned = json.loads(capsys.readouterr().out)["captures"]
+    assert [each["state"] for each in planned] == ["new"] * 4
+    assert not Path(new).exists()
+    assert main(["batch", str(captures), "-o", str(out), "--workers", "1", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert (found["n_done_before"], list(found["failed"])) == (3, ["second/damaged.c3d"])
+    (captures / "second" / "damaged.c3d").unlink()
+    assert main(["batch", str(captures), "-o", str(out), "--workers", "1"]) == 0
+    assert "done before  3" in capsys.readouterr().out
+    assert main(["batch", f"{captures}/nothing", "-o", str(out)]) == 2
+    assert "expected captures or folders that exist" in capsys.readouterr().err
