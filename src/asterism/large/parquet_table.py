@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import FormatError, ParameterError, not_read
+from asterism.checks import check_extra
+from asterism.errors import FormatError, not_read
 from asterism.io.atomic import replacing
 from asterism.large.columns import Columns, Layout
 from asterism.large.rows import Chunk
@@ -22,25 +22,10 @@ if TYPE_CHECKING:
 
     from asterism.large.rows import Writer
 
-__all__ = ["ParquetTable", "check_installed"]
+__all__ = ["ParquetTable"]
 
 _ROWS = 2**17
 """Rows that are read at once, and the smallest row group that is written, of whole frames."""
-
-
-def check_installed() -> None:
-    """Raise if the package that reads Parquet is not installed.
-
-    Raises
-    ------
-    ParameterError
-        If the extra ``large`` is missing.
-    """
-    try:
-        importlib.import_module("pyarrow.parquet")
-    except ImportError:
-        expected, hint = "pyarrow, which is optional", "run pip install 'asterism[large]'"
-        raise ParameterError("Parquet", expected, "not installed", hint) from None
 
 
 @record(eq=False)
@@ -76,7 +61,7 @@ class ParquetTable:
     columns: Columns = Columns()
 
     def __post_init__(self) -> None:
-        check_installed()
+        check_extra("Parquet", "parquet", "pyarrow")
 
     @property
     def layout(self) -> Layout:
@@ -146,7 +131,7 @@ class ParquetTable:
             kind: type[OSError] = IsADirectoryError if self.path.is_dir() else FileNotFoundError
             raise not_read(self.path, kind())
         try:
-            file = pq.ParquetFile(self.path)
+            file = pq.ParquetFile(self.path, pre_buffer=False)  # else all that was read is kept
         except PermissionError as error:
             raise not_read(self.path, error) from error
         except (pa.ArrowException, OSError) as error:

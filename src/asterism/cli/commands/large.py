@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -48,6 +49,10 @@ _Tile = Annotated[
     ),
 ]
 _Threads = Annotated[int, typer.Option(help="Threads. They do not change the result.")]
+_Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers solve the tiles."),
+]
 _LookAhead = Annotated[
     int, typer.Option(help="Later frames that are seen before a frame is assigned, 0 to 4.")
 ]
@@ -65,6 +70,7 @@ def large(
     label: _Label = "track",
     tile: _Tile = None,
     threads: _Threads = 1,
+    scheduler: _Scheduler = None,
     look_ahead: _LookAhead = 1,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
@@ -75,7 +81,8 @@ def large(
     The rows must stand in the order of frames. They are read and written a part at a time, so the
     memory does not depend on the number of frames. The output has the rows of IN in the same order
     and a column of track labels, -1 for none. It appears when it is complete; after an error or an
-    interrupt nothing is left. Parquet needs pip install 'asterism\[large]'.
+    interrupt nothing is left. Parquet needs pip install 'asterism\[parquet]', and a scheduler
+    pip install 'asterism\[cluster]'.
 
     For example:
 
@@ -96,10 +103,11 @@ def large(
         rate=rate, label=label,
     )  # fmt: skip
     given = None if model is None else read_model(model)
-    with progress("tracking") as advance:
+    where = nullcontext() if scheduler is None else am.batch.cluster_map(scheduler)
+    with where as mapper, progress("tracking") as advance:
         run = am.large.track(
             source, out, model=given, columns=columns, tile=tile, threads=threads,
-            look_ahead=look_ahead, progress=advance,
+            mapper=mapper, look_ahead=look_ahead, progress=advance,
         )  # fmt: skip
     if json:
         print_json(_figures(source, run))
