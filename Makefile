@@ -57,6 +57,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/several_frames.py --markdown docs/tables/several_frames.md
 	$(BIN)/python benchmarks/scenes.py --seeds 5 --markdown docs/tables/scenes.md
 	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md
+	$(BIN)/python benchmarks/batch.py --markdown docs/tables/batch.md
 	$(BIN)/python benchmarks/whole_call.py --markdown docs/tables/whole_call.md
 	$(BIN)/python benchmarks/identity.py --markdown docs/tables/identity.md
 	$(BIN)/python benchmarks/calibration.py --seeds 6 --markdown docs/tables/calibration.md
