@@ -42,6 +42,8 @@ bench: $(VENV)/.bench
 	$(BIN)/python benchmarks/joint.py --markdown docs/tables/joint.md
 	$(BIN)/python benchmarks/k_best.py --markdown docs/tables/k_best.md
 	$(BIN)/python benchmarks/threads.py --markdown docs/tables/threads.md
+	$(BIN)/python benchmarks/large.py --markdown docs/tables/large.md \
+	  --figure docs/images/large_growth.svg
 
 # The tables of scenes and of captures in the docs; the second needs the real captures beside the
 # project.
@@ -55,6 +57,7 @@ tables: $(VENV)/.bench
 	$(BIN)/python benchmarks/several_frames.py --markdown docs/tables/several_frames.md
 	$(BIN)/python benchmarks/scenes.py --seeds 5 --markdown docs/tables/scenes.md
 	$(BIN)/python benchmarks/captures.py --markdown docs/tables/captures.md
+	$(BIN)/python benchmarks/batch.py --markdown docs/tables/batch.md
 	$(BIN)/python benchmarks/whole_call.py --markdown docs/tables/whole_call.md
 	$(BIN)/python benchmarks/identity.py --markdown docs/tables/identity.md
 	$(BIN)/python benchmarks/calibration.py --seeds 6 --markdown docs/tables/calibration.md

@@ -1,109 +1,101 @@
-"""Every scene, sensed and tracked by every method with the estimated model; means over seeds.
+"""Every scene, tracked by every method with the estimated model: three sweeps.
 
 10 % of the detections missing, 10 % clutter, noise of 5 mm for the scenes of points and 0.3 mm for
 those in metres and seconds. People are tracked a second time from what two or more of four cameras
 see past their limbs.
 
-    python benchmarks/scenes.py [--seeds N] [--only NAME] [--markdown FILE]
+    python benchmarks/scenes.py [--seeds N] [--folder FOLDER] [--markdown FILE]
+
+Scores of finished cases are kept in FOLDER, so an interrupted benchmark goes on where it ended.
 """
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 import asterism as am
-from methods import METHODS, LinkConfidence
 from report import conditions, publish, table
 
-# What is made, and the noise in metres; a rig where the scene is also seen through cameras.
-CASES: dict[str, tuple[str, dict[str, Any], float, bool]] = {
-    "cube": ("cube", {}, 0.005, False),
-    "crossing": ("crossing", {}, 0.005, False),
-    "wander": ("wander", {}, 0.005, False),
-    "walk": ("walk", {}, 0.005, False),
-    "attracted": ("attracted", {}, 0.005, False),
-    "smooth, 50": ("smooth", {"n_markers": 50, "frames": 200}, 0.005, False),
-    "smooth, 200": ("smooth", {"n_markers": 200, "frames": 100}, 0.005, False),
-    "swarm": ("swarm", {}, 3e-4, False),
-    "person walks": ("person", {"activity": "walk"}, 3e-4, True),
-    "person runs": ("person", {"activity": "run"}, 3e-4, True),
-    "person jumps": ("person", {"activity": "jump"}, 3e-4, True),
-    "person turns": ("person", {"activity": "turn"}, 3e-4, True),
-    "two people cross": ("two_people", {"activity": "cross"}, 3e-4, True),
-    "two people hug": ("two_people", {"activity": "hug"}, 3e-4, True),
-    "fingers": ("fingers", {}, 3e-4, False),
-    "juggler": ("juggler", {}, 3e-4, True),
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+POINTS: dict[str, dict[str, Any]] = {
+    "cube": {"scene": "cube"},
+    "crossing": {"scene": "crossing"},
+    "wander": {"scene": "wander"},
+    "walk": {"scene": "walk"},
+    "attracted": {"scene": "attracted"},
+    "smooth, 50": {"scene": "smooth", "n_markers": 50, "frames": 200},
+    "smooth, 200": {"scene": "smooth", "n_markers": 200, "frames": 100},
 }
+PEOPLE: dict[str, dict[str, Any]] = {
+    "person walks": {"scene": "person", "activity": "walk"},
+    "person runs": {"scene": "person", "activity": "run"},
+    "person jumps": {"scene": "person", "activity": "jump"},
+    "person turns": {"scene": "person", "activity": "turn"},
+    "two people cross": {"scene": "two_people", "activity": "cross"},
+    "two people hug": {"scene": "two_people", "activity": "hug"},
+    "juggler": {"scene": "juggler"},
+}
+METRES = {"swarm": {"scene": "swarm"}, "fingers": {"scene": "fingers"}, **PEOPLE}
+METHODS: dict[str, dict[str, Any]] = {
+    "gnn": {"method": "gnn"},
+    "smp": {"method": "smp"},
+    "smp, window=3": {"method": "smp", "window": 3},
+    "jpda": {"method": "jpda"},
+    "splitting": {"method": "splitting"},
+    "tomht": {"method": "tomht"},
+    "mht": {"method": "mht"},
+    "mcmcda": {"method": "mcmcda"},
+}
+COMMON = {"missing": 0.1, "clutter": 0.1}
 
 
-def sensed(case: str, seed: int, *, through_cameras: bool) -> am.Tracks:
-    scene, options, noise, _ = CASES[case]
-    truth = am.simulate.SCENES[scene].make(seed=seed, **options)
-    rig = None
-    if through_cameras:
-        points = truth.detections.points
-        middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        reach = 3.0 + float(np.ptp(points[:, :2], axis=0).max())
-        rig = am.Rig.ring(4, radius=reach, height=2.8, target=middle)
-    return am.simulate.corrupt(truth, missing=0.1, clutter=0.1, noise=noise, rig=rig, seed=seed)
+def studies(
+    seeds: Sequence[int], methods: dict[str, dict[str, Any]] = METHODS
+) -> dict[str, am.sweep.Study]:
+    """Return the studies by their names."""
+    given: dict[str, Any] = {"methods": methods, "seeds": tuple(seeds)}
+    given["scores"] = ("idf1", "switches_per_1000")
+    bodies = {**COMMON, "noise": 3e-4}
+    return {
+        "points": am.sweep.Study(
+            scenes=POINTS, corruptions={"5 mm": {**COMMON, "noise": 0.005}}, **given
+        ),
+        "metres": am.sweep.Study(scenes=METRES, corruptions={"0.3 mm": bodies}, **given),
+        "cameras": am.sweep.Study(
+            scenes=PEOPLE, corruptions={"4 cameras": {**bodies, "cameras": 4}}, **given
+        ),
+    }
 
 
-def row_of(
-    case: str, seeds: int, confidence: LinkConfidence, *, through_cameras: bool
-) -> tuple[list[str], list[str]]:
-    """Give the scores of every method, and the tracks that each found for one marker."""
-    found: dict[str, list[tuple[float, ...]]] = {name: [] for name in METHODS}
-    oracles: list[float] = []
-    seen: list[float] = []
-    for seed in range(seeds):
-        truth = sensed(case, seed, through_cameras=through_cameras)
-        model = am.estimate_model(truth.detections).model
-        oracle = am.metrics.oracle_tracks(truth, model.population.max_gap)
-        oracles.append(am.evaluate(oracle, truth).idf1)
-        seen.append(float((truth.labels >= 0).sum()) / truth.detections.n_frames / truth.n_tracks)
-        for name, method in METHODS.items():
-            tracks = am.track(truth.detections, method, model=model)
-            e = am.evaluate(tracks, truth)
-            figures = (e.idf1, e.switches_per_1000, e.n_tracks / e.n_markers)
-            found[name].append(figures)
-            confidence.add(name, tracks, truth)
-    scene = f"{case}, 4 cameras" if through_cameras else case
-    row = [scene, f"{100 * np.mean(seen):.0f} %", f"{np.mean(oracles):.3f}"]
-    each = [scene]
-    for name in METHODS:
-        idf1, switches, tracks = np.array(found[name]).T
-        row.append(f"{idf1.mean():.3f} ± {idf1.std():.3f} ({switches.mean():.1f})")
-        each.append(f"{tracks.mean():.2f}")
-    return row, each
+def rows_of(sweep: am.sweep.Sweep) -> list[list[str]]:
+    """Return a row for each scene with a figure for each method."""
+    cells: dict[str, dict[str, str]] = {}
+    for each in sweep.summary:
+        seen = ", 4 cameras" if each["corruption"] == "4 cameras" else ""
+        half = (each["idf1_high"] - each["idf1_low"]) / 2
+        figure = f"{each['idf1']:.3f} ± {half:.3f} ({each['switches_per_1000']:.1f})"
+        cells.setdefault(each["scene"] + seen, {})[each["method"]] = figure
+    return [[scene, *(row[name] for name in METHODS)] for scene, row in cells.items()]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--only", default="")
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--folder", type=Path, default=Path("build/scenes"))
     parser.add_argument("--markdown", type=Path)
     options = parser.parse_args()
     rows: list[list[str]] = []
-    ratios: list[list[str]] = []
-    confidence = LinkConfidence()
-    for case, (_, _, _, has_cameras) in CASES.items():
-        if options.only in case:
-            for through_cameras in (False, True)[: 1 + has_cameras]:
-                row, each = row_of(case, options.seeds, confidence, through_cameras=through_cameras)
-                rows.append(row)
-                ratios.append(each)
-                print(*row, flush=True)
-    lines = ["IDF1 ± its standard deviation between seeds, and switches for 1000 detections:", ""]
-    lines += [*table(["scene", "seen", "oracle d̄", *METHODS], rows), ""]
-    lines += ["Tracks found for each true one:", "", *table(["scene", *METHODS], ratios), ""]
-    lines += ["Confidence of the links of all scenes, where a method has any:", ""]
-    lines += [*confidence.table(), ""]
-    lines += [f"Means over {options.seeds} seeds. {conditions()}."]
-    publish(lines, options.markdown)
+    for name, study in studies(range(options.seeds)).items():
+        sweep = am.sweep.run(study, options.folder / name)
+        assert not sweep.failed, sweep.failed
+        rows += rows_of(sweep)
+    lines = ["IDF1 ± half of its 95 % confidence interval, and switches for 1000 detections:", ""]
+    lines += [*table(["scene", *METHODS], rows), ""]
+    publish([*lines, f"Means over {options.seeds} seeds. {conditions()}."], options.markdown)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ import asterism as am
 from captures import captures
 from identity import CONDITIONS
 from report import conditions, publish, table
-from scenes import CASES, sensed
+from scenes import studies
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -61,10 +61,9 @@ def way_of(method: str, stitch: bool) -> str:
 
 
 def clips(seeds: int, data: Path, points: int) -> Iterator[tuple[str, am.Tracks]]:
-    for case, (*_, has_cameras) in CASES.items():
-        for through_cameras in (False, True)[: 1 + has_cameras]:
-            for seed in range(seeds):
-                yield "scenes", sensed(case, seed, through_cameras=through_cameras)
+    for study in studies(range(seeds), {"auto": {"method": "auto"}}).values():
+        for case in study.cases():
+            yield "scenes", am.sweep.truth_of(case)
     for path in captures(data):
         capture = am.read(path)
         if any(capture.names) and capture.n_points <= points:

@@ -20,4 +20,5 @@ NB_MODULE(_engine, module) {
   bind_reconstruct(module);
   bind_naming(module);
   bind_confidence(module);
+  bind_large(module);
 }

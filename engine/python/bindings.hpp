@@ -16,3 +16,4 @@ void bind_stitcher(nanobind::module_& module);
 void bind_reconstruct(nanobind::module_& module);
 void bind_naming(nanobind::module_& module);
 void bind_confidence(nanobind::module_& module);
+void bind_large(nanobind::module_& module);

@@ -36,6 +36,10 @@ class Assignment {
     v_.assign(by_.n_columns(), 0);
     column_of_.assign(n_rows, kAlone);
     row_of_.assign(by_.n_columns(), -1);
+    distance_.assign(v_.size(), kUnreached);
+    from_.assign(v_.size(), -1);
+    is_done_.assign(v_.size(), 0);
+    reached_.clear();
     for (std::size_t e = 0; e < group.size(); ++e)
       u_[by_.row_of[e]] = std::min(u_[by_.row_of[e]], -group[e].gain);
     for (std::int32_t i = 0; i < n_rows; ++i) augment(i);
@@ -65,16 +69,20 @@ class Assignment {
 
  private:
   static constexpr std::int32_t kAlone = -1;
+  static constexpr double kUnreached = std::numeric_limits<double>::infinity();
 
   void augment(std::int32_t start) {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
-    distance_.assign(v_.size(), infinity);
-    from_.assign(v_.size(), -1);
-    is_done_.assign(v_.size(), 0);
+    // Only the columns that the last path has reached are reset. In a large group that is a small
+    // part of all columns.
+    for (const std::int32_t j : reached_) {
+      distance_[j] = kUnreached;
+      is_done_[j] = 0;
+    }
+    reached_.clear();
     scanned_.clear();
     while (!heap_.empty()) heap_.pop();
 
-    double best_end = infinity;  // length of the shortest path to any end found so far
+    double best_end = kUnreached;  // length of the shortest path to any end found so far
     std::int32_t end_row = -1, end_column = kAlone;
     std::int32_t row = start;
     double length = 0;
@@ -90,6 +98,7 @@ class Assignment {
         if (is_done_[j]) continue;
         const double d = length - group_[e].gain - u_[row] - v_[j];
         if (d < distance_[j]) {
+          if (distance_[j] == kUnreached) reached_.push_back(j);
           distance_[j] = d;
           from_[j] = row;
           heap_.push({d, j});
@@ -119,7 +128,7 @@ class Assignment {
       if (d >= best_end) continue;
       u_[r] += best_end - d;
     }
-    for (std::size_t j = 0; j < v_.size(); ++j)
+    for (const std::int32_t j : reached_)
       if (is_done_[j] && distance_[j] < best_end) v_[j] -= best_end - distance_[j];
     flip(start, end_row, end_column);
   }
@@ -142,6 +151,7 @@ class Assignment {
   std::vector<std::int32_t> column_of_, row_of_, from_;
   std::vector<double> u_, v_, distance_;
   std::vector<char> is_done_;
+  std::vector<std::int32_t> reached_;  // columns with a distance
   std::vector<std::pair<std::int32_t, double>> scanned_;
   std::priority_queue<HeapItem, std::vector<HeapItem>, std::greater<>> heap_;
 };

@@ -615,3 +615,65 @@ def window_scores(
     variances: Floats,
     weights: Floats,
 ) -> Floats: ...
+
+class StartOptions:
+    def __init__(
+        self,
+        *,
+        gate: float,
+        min_detections: int,
+        max_missed: int,
+        min_score: float,
+        max_chains: int,
+    ) -> None: ...
+
+def packed_width(model: MotionModel) -> int: ...
+def predict_tracks(
+    model: MotionModel, *, gate: float, F: Floats, Q: Floats, states: Floats, n_threads: int
+) -> tuple[Floats, Floats]: ...
+def solve_tile(
+    model: MotionModel,
+    score: ScoreModel,
+    *,
+    gate: float,
+    max_candidates: int,
+    times: Floats,
+    F: Floats,
+    Q: Floats,
+    states: Floats,
+    regions: Floats,
+    last: Floats,
+    last_times: Floats,
+    scores: Floats,
+    gaps: Shorts,
+    is_confirmed: NDArray[np.uint8],
+    offsets: Ints,
+    points: Floats,
+    is_shared: NDArray[np.uint8],
+) -> tuple[Shorts, Shorts, Shorts, Floats, tuple[int, int, int]]: ...
+def solve_joined(
+    *, rows: Shorts, columns: Shorts, gains: Floats, n_tracks: int, n_points: int
+) -> tuple[Shorts, tuple[int, int, int]]: ...
+def update_tracks(
+    model: MotionModel,
+    score: ScoreModel,
+    *,
+    states: Floats,
+    scores: Floats,
+    gaps: Shorts,
+    match: Shorts,
+    points: Floats,
+    n_threads: int,
+) -> tuple[Floats, Floats]: ...
+def find_starts(
+    model: MotionModel,
+    score: ScoreModel,
+    options: StartOptions,
+    *,
+    times: Floats,
+    F: Floats,
+    Q: Floats,
+    offsets: Ints,
+    points: Floats,
+    n_threads: int,
+) -> tuple[Shorts, Floats, Floats, Shorts]: ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import os
 import re
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "check_array",
+    "check_extra",
     "check_fields",
     "check_file",
     "check_kind",
@@ -192,6 +194,37 @@ def check_file(path: Path, expected: str = "a file") -> None:
     if not path.exists():
         raise FormatError(path, "", "", "no such file")
     raise FormatError(path, "", expected, "a folder" if path.is_dir() else "a device or pipe")
+
+
+def check_extra(name: str, extra: str, *packages: str) -> None:
+    """Raise unless packages that are optional are installed.
+
+    Parameters
+    ----------
+    name : str
+        What needs them, for the message.
+    extra : str
+        Extra of the project that installs them.
+    *packages : str
+        Names under which they are imported.
+
+    Raises
+    ------
+    ParameterError
+        If one is missing.
+
+    Examples
+    --------
+    >>> check_extra("format", "parquet", "parquet_of_nowhere")
+    Traceback (most recent call last):
+    ...
+    asterism.errors.ParameterError: format: expected parquet_of_nowhere, which is optional, ...
+    """
+    missing = [each for each in packages if importlib.util.find_spec(each) is None]
+    if missing:
+        expected = f"{' and '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} optional"
+        hint = f"run pip install 'asterism[{extra}]'"
+        raise ParameterError(name, expected, "not installed", hint)
 
 
 def check_array(

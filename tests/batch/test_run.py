@@ -272,3 +272,19 @@ def test_the_command_reports_and_fails_with_1(captures, out, capsys):
     assert "done before  3" in capsys.readouterr().out
     assert main(["batch", f"{captures}/nothing", "-o", str(out)]) == 2
     assert "expected captures or folders that exist" in capsys.readouterr().err
+
+
+def test_the_summary_is_written_as_parquet_too(captures, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
+    am.batch.run([captures], tmp_path / "out", workers=1, parquet=True)
+    rows = parquet.read_table(tmp_path / "out" / "summary.parquet").to_pylist()
+    with (tmp_path / "out" / "summary.csv").open(newline="") as file:
+        expected = list(csv.DictReader(file))
+    assert [row["capture"] for row in rows] == [row["capture"] for row in expected]
+    for row, text in zip(rows, expected, strict=True):
+        for name, value in row.items():
+            assert text[name] == ("" if value is None else f"{value:.6g}" if
+                                  isinstance(value, float) else str(value))  # fmt: skip
+    assert rows[0]["state"] == "failed"
+    assert rows[0]["n_frames"] is None
+    assert {row["n_frames"] for row in rows[1:]} == {30}

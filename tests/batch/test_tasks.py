@@ -17,6 +17,7 @@ import asterism as am
 from asterism.batch.tasks import run_tasks
 from asterism.errors import FormatError, ParameterError
 from tests.batch.conftest import contents
+from tests.large.scenes import dense, labels_of
 
 pytest.importorskip("distributed", reason="needs the extra cluster")
 
@@ -169,7 +170,7 @@ def test_a_task_that_waited_at_a_killed_worker_is_tried_alone(monkeypatch):
             dies = key == "2" or (key == "3" and len(rounds[-1]) > 1)
             yield key, KilledWorker() if dies else int(key)
 
-    monkeypatch.setattr("asterism.batch.tasks._connected", connected)
+    monkeypatch.setattr("asterism.batch.tasks.connected", connected)
     monkeypatch.setattr("asterism.batch.tasks._results", results)
     got = found(squared, range(5), scheduler=None, workers=2)
     assert rounds == [["0", "1", "2", "3", "4"], ["2"], ["3"]]
@@ -246,3 +247,22 @@ def test_the_index_of_another_is_not_replaced_at_a_url(made_captures, tmp_path):
     with pytest.raises(FormatError, match="another one"):
         am.batch.run([f"file://{made_captures}/first"], f"file://{tmp_path}", workers=1)
     assert (tmp_path / "index.html").read_text() == "precious"
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_tiles_on_a_cluster_outlive_its_scheduler(processes):
+    d = dense(n=160, frames=13).detections
+    n_calls = 0
+    with am.batch.cluster_map(processes.address) as on_cluster:
+
+        def mapper(function, items):
+            nonlocal n_calls
+            n_calls += 1
+            if n_calls == 4:
+                processes.stop()
+                processes.start()
+            return on_cluster(function, items)
+
+        there = labels_of(d, tile=0.37, mapper=mapper)
+    assert n_calls > 4
+    assert [own.tolist() for own in there] == [own.tolist() for own in labels_of(d)]

@@ -19,6 +19,7 @@ FILES = {
     "track -o": ("track in.csv -o OUT", ".csv"),
     "track --report": ("track in.csv -o new.csv --report OUT", ".html"),
     "track --run -o": ("track in.csv --run new -o OUT", ".csv"),
+    "large": ("large plain.csv -o OUT", ".csv"),
     "edit": ("edit in.csv --script edits.toml -o OUT", ".csv"),
     "stitch": ("stitch truth.csv -o OUT", ".csv"),
     "fill": ("fill truth.csv -o OUT", ".csv"),
@@ -63,6 +64,7 @@ WORK = {
     "asterism": ("read", "read_rig", "track", "estimate_model"),
     "asterism.io": ("read_tracks", "read_observations"),
     "asterism.tracking": ("plan_tracking",),
+    "asterism.large": ("track",),
     "asterism.cli.outputs": ("read_labels", "read_model"),
     "asterism.cli.recording": ("made_scene", "rig_from"),
     "asterism.cli.plot_inputs": ("tracks_of", "summary_of"),
@@ -82,6 +84,8 @@ def inputs(tmp_path_factory):
     truth = am.simulate.cube(seed=1, frames=20)
     sensed = am.simulate.corrupt(truth, noise=1e-3, seed=1)
     am.write(sensed, folder / "truth.csv")
+    rows = [f"{t},{x},{y},{z}" for t, p in sensed.detections for x, y, z in p.tolist()]
+    (folder / "plain.csv").write_text("\n".join(["time,x,y,z", *rows]))
     clutter = [-1] * sensed.detections.n_points
     am.write(am.Tracks(detections=sensed.detections, labels=clutter), folder / "in.csv")
     rig = am.Rig.ring(4, radius=5, height=2)
@@ -199,6 +203,7 @@ def test_overwrite_replaces_the_file(here, capsys, name):
 
 INPUTS = {
     "track in.csv -o in.csv": "in.csv",
+    "large plain.csv -o plain.csv": "plain.csv",
     "stitch truth.csv -o truth.csv": "truth.csv",
     "fill truth.csv -o truth.csv": "truth.csv",
     "markerset merge set.toml other.toml -o set.toml": "set.toml",

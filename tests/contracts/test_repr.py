@@ -18,7 +18,8 @@ NAMESPACES = (
     "asterism", "asterism.simulate", "asterism.camera", "asterism.model", "asterism.filter",
     "asterism.tracking.methods", "asterism.tracking", "asterism.multiview", "asterism.solve",
     "asterism.metrics", "asterism.io", "asterism.io.calibrations", "asterism.plot",
-    "asterism.reporting", "asterism.batch", "asterism.sweep", "asterism.errors",
+    "asterism.reporting", "asterism.batch", "asterism.sweep", "asterism.large",
+    "asterism.errors",
 )  # fmt: skip
 
 
@@ -154,6 +155,14 @@ def instances():
         ),
         am.tracking.Correction(truth, plain),
         am.edit.Session(am.track(d).recipe, without_edits(am.track(d).recipe, d), Path(LONG)),
+        am.large.LargeTracker(model=plain, tile=1 / 3), am.large.LargeTracker(model=plain).init(),
+        am.large.Columns(axes=(LONG, LONG), label=LONG[:70]),
+        am.large.DecidedFrame(number=3, labels=np.zeros(9, dtype=int)),
+        am.large.LargeRun(
+            output=Path(LONG), n_frames=10**6, n_points=10**12, n_tracks=10**9, n_labelled=10**12,
+            n_tiles=99, largest_group=99, n_joined=10**9, seconds=1 / 3, frame_seconds=1 / 3,
+            model=plain,
+        ),
         am.tracking.KeptNames(kept=(LONG,) * 9, moved=(), left_out=(LONG,), conflicts=()),
         am.tracking.NameChange(track=3, first=5, last=17, usual=LONG, name=None),
         am.tracking.NameConflict(name=LONG, first=5, last=17, found=LONG, probability=1 / 3),

@@ -14,7 +14,8 @@ DOCS = ROOT / "docs"
 if not DOCS.is_dir():
     pytest.skip("the documentation is not in a source distribution", allow_module_level=True)
 RUN = (
-    *(f"guides/{name}" for name in ("track", "stitch", "fill", "name", "confidence", "evaluate")),
+    *(f"guides/{name}" for name in ("track", "stitch", "fill", "large", "name")),
+    *(f"guides/{name}" for name in ("confidence", "evaluate")),
     *(f"workflows/{name}" for name in ("opensim", "stream")),
 )
 PAGES = [

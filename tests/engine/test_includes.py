@@ -8,7 +8,7 @@ from tests.paths import ROOT
 
 ENGINE = ROOT / "engine"
 ROOMS = (
-    "math", "base", "filter", "solve", "rigid", "tracks", "frame", "trees", "mht",
+    "math", "base", "filter", "solve", "rigid", "tracks", "frame", "large", "trees", "mht",
     "mcmc/model", "mcmc/moves", "mcmc/chain", "mcmc/tracker", "confidence", "stitch", "naming",
     "camera", "multiview",
     "python",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Literal
 
@@ -33,6 +34,7 @@ MARKER_SET = "markers.toml"
 """Name of the marker set of the captures in a folder and below it."""
 _EDITS = ".edits.toml"
 _SURE = (".c3d", ".trc")  # suffixes that only captures have
+_READERS = 8  # captures that are read and hashed at the same time
 _RESULTS = (".tracked", ".corrected")  # before the suffix of a result of this program
 
 
@@ -102,10 +104,11 @@ def plan_batch(
                 got = f"{name}, the result of both {owners[name]} and {job.source}"
                 raise ParameterError("sources", "one result for each capture", got)
     planned: list[Planned] = []
-    for n, (job, reason) in enumerate(found):
-        planned.append(_examined(job, out, reason))
-        if progress is not None:
-            progress(n + 1, len(found))
+    with ThreadPoolExecutor(_READERS) as pool:
+        for each in pool.map(lambda one: _examined(one[0], out, one[1]), found):
+            planned.append(each)
+            if progress is not None:
+                progress(len(planned), len(found))
     return planned
 
 

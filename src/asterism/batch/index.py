@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["INDEX", "TABLE", "holds_batch", "write_index"]
 
-INDEX, TABLE = "index.html", "summary.csv"
+INDEX, TABLE, PARQUET = "index.html", "summary.csv", "summary.parquet"
 _COLUMNS = (
     "capture", "state", "reason", "places", "expected_wrong", "n_tracks", "n_named", "n_frames",
     "n_detections", "n_labelled", "n_clutter", "n_gaps", "n_filled", "method", "output", "page",
@@ -59,7 +59,7 @@ def holds_batch(out: str) -> bool:
 
 
 def write_index(
-    out: str, jobs: Sequence[Job], failed: Mapping[str, str], *, overwrite: bool
+    out: str, jobs: Sequence[Job], failed: Mapping[str, str], *, parquet: bool, overwrite: bool
 ) -> None:
     """Write ``index.html`` and ``summary.csv`` from the summaries in the output folder.
 
@@ -74,6 +74,8 @@ def write_index(
         Captures of the batch.
     failed : mapping of str
         Reasons by the name of each capture without a result.
+    parquet : bool
+        Whether ``summary.parquet`` is written too, with the same rows and typed columns.
     overwrite : bool
         Whether files of the same names that are not of a batch may be replaced.
 
@@ -91,6 +93,30 @@ def write_index(
     page = _page(rows).encode("utf-8", errors="replace")
     deliver(inside(out, INDEX), page, overwrite=overwrite)
     deliver(inside(out, TABLE), text.getvalue().encode(), overwrite=overwrite)
+    if parquet:
+        deliver(inside(out, PARQUET), _parquet(rows), overwrite=overwrite)
+
+
+def _parquet(rows: Sequence[Mapping[str, Any]]) -> bytes:
+    """Return the rows as Parquet; what is not known is null."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    def kind(name: str) -> Any:
+        if name == "expected_wrong":
+            return pa.float64()
+        return pa.int64() if name == "places" or name.startswith("n_") else pa.string()
+
+    def value(name: str, given: Any) -> Any:
+        if given == "":
+            return None
+        return float(given) if name == "expected_wrong" else given
+
+    schema = pa.schema([(name, kind(name)) for name in _COLUMNS])
+    columns = [[value(name, row[name]) for row in rows] for name in _COLUMNS]
+    sink = io.BytesIO()
+    pq.write_table(pa.table(columns, schema=schema), sink)
+    return sink.getvalue()
 
 
 def _row(out: str, job: Job, reason: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from asterism.batch.perform import Outcome, deliver_all, perform
 from asterism.batch.result_file import check_folder
 from asterism.batch.storage import inside, is_url, read_bytes
 from asterism.batch.tasks import number_of_workers, run_tasks
-from asterism.checks import check_kind
+from asterism.checks import check_extra, check_kind
 from asterism.errors import AsterismError, ParameterError
 from asterism.io.atomic import remove_leftovers
 from asterism.records import record
@@ -82,6 +82,7 @@ def run(
     scheduler: str | None = None,
     send: bool = False,
     memory: int | None = None,
+    parquet: bool = False,
     overwrite: bool = False,
     progress: Callable[[str, str, int, int], Any] | None = None,
 ) -> Batch:
@@ -115,6 +116,8 @@ def run(
     memory : int, optional
         Largest memory of the process of a capture, in bytes (Linux). By default 80 % of the memory
         of this machine are shared by the workers; with a `scheduler` there is no bound.
+    parquet : bool
+        Whether ``summary.parquet`` is written too, which needs the extra ``parquet``.
     overwrite : bool
         Whether results of another input, or of other settings, are replaced.
     progress : callable, optional
@@ -149,6 +152,8 @@ def run(
     """
     settings = Settings() if settings is None else settings
     check_kind("settings", settings, Settings, "am.batch.Settings(method=...)")
+    if parquet:
+        check_extra("summary.parquet", "parquet", "pyarrow")
     workers = number_of_workers(workers, scheduler)
     if send and scheduler is None:
         raise ParameterError("send", "a scheduler, to whose workers captures are sent", "none")
@@ -162,7 +167,7 @@ def run(
         progress=None if progress is None else lambda n, of: progress("", "examining", n, of),
     )  # fmt: skip
     jobs = [each.job for each in planned]
-    write_index(place, jobs, {}, overwrite=overwrite)  # from now on the folder is that of a batch
+    write_index(place, jobs, {}, parquet=parquet, overwrite=overwrite)
     outcomes: dict[str, Outcome] = {}
     todo: dict[str, Job] = {}
     for each in planned:
@@ -192,7 +197,7 @@ def run(
     if not is_url(place):
         remove_leftovers(Path(place))
     batch = Batch(out=place, planned=tuple(planned), outcomes=outcomes)
-    write_index(place, jobs, batch.failed, overwrite=overwrite)
+    write_index(place, jobs, batch.failed, parquet=parquet, overwrite=overwrite)
     return batch
 
 

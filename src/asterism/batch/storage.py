@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
+from asterism.checks import check_extra
 from asterism.errors import AsterismError, FormatError, ParameterError, not_read, not_written
 from asterism.io.atomic import replacing
 
@@ -182,11 +183,9 @@ def _exists(place: str) -> FormatError:
 @contextmanager
 def _remote(url: str) -> Generator[tuple[Any, str], None, None]:
     """Open the file system of a URL, with the path in it; its errors name the URL."""
-    try:
-        from fsspec.core import url_to_fs
-    except ImportError:
-        hint = "run pip install 'asterism[cluster]'"
-        raise ParameterError("URL", "fsspec, which is optional", "not installed", hint) from None
+    check_extra("URL", "cluster", "fsspec")
+    from fsspec.core import url_to_fs
+
     try:
         yield url_to_fs(url)
     except AsterismError:

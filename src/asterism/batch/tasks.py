@@ -8,10 +8,11 @@ import secrets
 import time
 from contextlib import contextmanager, suppress
 from functools import partial
+from importlib.util import find_spec
 from itertools import islice
 from typing import TYPE_CHECKING, Any, cast
 
-from asterism.checks import check_number
+from asterism.checks import check_extra, check_number
 from asterism.errors import AsterismError, ParameterError
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from distributed import Client, Future
 
-__all__ = ["number_of_workers", "run_tasks"]
+__all__ = ["connected", "lost_errors", "number_of_workers", "run_tasks"]
 
 PATIENCE = 600.0
 """Seconds for which a lost scheduler is awaited."""
@@ -29,27 +30,11 @@ _STEP = 1.0  # seconds between two attempts to reach it
 log = logging.getLogger(__name__)
 
 
-def _has_cluster() -> bool:
-    """Return whether the packages of the extra ``cluster`` are installed."""
-    try:
-        import distributed
-    except ImportError:
-        return False
-    del distributed
-    return True
-
-
-def _check_installed(name: str) -> None:
-    """Raise if the extra ``cluster`` is missing; the error has the `name` of what needs it."""
-    if not _has_cluster():
-        hint = "run pip install 'asterism[cluster]'"
-        raise ParameterError(name, "dask.distributed, which is optional", "not installed", hint)
-
-
 def number_of_workers(workers: int | None, scheduler: str | None) -> int:
     """Return the checked number of workers; by default the cores, if the extra is installed."""
     if workers is None:
-        workers = (os.cpu_count() or 1) if _has_cluster() and scheduler is None else 1
+        has_cluster = find_spec("distributed") is not None
+        workers = (os.cpu_count() or 1) if has_cluster and scheduler is None else 1
     check_number("workers", workers, above=0, integer=True)
     return workers
 
@@ -102,12 +87,12 @@ def run_tasks(
         for key in keys:
             yield key, _result(function, arguments, key, progress)
         return
-    _check_installed("workers" if scheduler is None else "scheduler")
+    check_extra("workers" if scheduler is None else "scheduler", "cluster", "distributed")
     left, waited = dict.fromkeys(keys), 0.0
     batch = f"asterism-{secrets.token_hex(8)}"  # other clients may use the same scheduler
     suspects: set[str] = set()
     while left:
-        with _connected(scheduler, workers, waited) as client:
+        with connected(scheduler, workers, waited) as client:
             if progress is not None:
                 client.subscribe_topic(batch, partial(_forward, progress))
             topic = None if progress is None else batch
@@ -141,16 +126,22 @@ def _result(
         return error
 
 
+def lost_errors() -> tuple[type[BaseException], ...]:
+    """Return the errors that say that the scheduler is lost."""
+    from concurrent.futures import CancelledError
+
+    from distributed.comm.core import CommClosedError
+
+    return CancelledError, CommClosedError, OSError, TimeoutError
+
+
 def _results(
     client: Client, keys: Iterator[str], send: Callable[[str], Future[Any]]
 ) -> Iterator[tuple[str, Any]]:
     """Iterate over the results until all have come, or the scheduler is lost."""
-    from concurrent.futures import CancelledError
-
     from distributed import as_completed
-    from distributed.comm.core import CommClosedError
 
-    lost = (CancelledError, CommClosedError, OSError, TimeoutError)
+    lost = lost_errors()
     pending: dict[Any, str] = {}
     is_idle = False
     try:
@@ -219,7 +210,7 @@ def _called(
 
 
 @contextmanager
-def _connected(
+def connected(
     scheduler: str | None, workers: int, patience: float
 ) -> Generator[Client, None, None]:
     """Connect to a scheduler, or start a cluster on this machine, while the block runs."""

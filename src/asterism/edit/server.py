@@ -12,6 +12,7 @@ import socket
 import threading
 from typing import TYPE_CHECKING, Any
 
+from asterism.checks import check_extra
 from asterism.edit.guard import Guard
 from asterism.edit.messages import parsed
 from asterism.errors import AsterismError, ParameterError
@@ -25,27 +26,9 @@ if TYPE_CHECKING:
 
     from asterism.edit.hub import Hub
 
-__all__ = ["check_installed", "made_app", "serve"]
+__all__ = ["made_app", "serve"]
 
 _ALIVE_SECONDS = 15.0  # after which a line is sent, by which a lost page is noticed
-
-
-def check_installed() -> None:
-    """Raise if the packages of the server are not installed.
-
-    Raises
-    ------
-    ParameterError
-        If the extra ``edit`` is missing.
-    """
-    try:
-        import starlette
-        import uvicorn
-    except ImportError:
-        hint = "run pip install 'asterism[edit]'"
-        expected = "starlette and uvicorn, which are optional"
-        raise ParameterError("edit", expected, "not installed", hint) from None
-    del starlette, uvicorn
 
 
 def made_app(hub: Hub, port: int, token: str) -> ASGIApp:
@@ -146,7 +129,7 @@ def serve(
     ParameterError
         If the port is taken, or the packages of the server are missing.
     """
-    check_installed()
+    check_extra("edit", "edit", "starlette", "uvicorn")
     with contextlib.closing(_listening(port)) as listener:
         asyncio.run(_serve(make_hub, listener, begin))
 

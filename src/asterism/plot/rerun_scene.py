@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.checks import check_path
+from asterism.checks import check_extra, check_path
 from asterism.errors import ParameterError, not_written
 from asterism.plot.style import CLUTTER, CYCLE
 
@@ -60,11 +60,9 @@ def view(tracks: Tracks, *, rig: Rig | None = None, path: str | Path | None = No
     >>> import asterism as am
     >>> am.plot.view(am.simulate.cube(seed=1), path="cube.rrd")  # doctest: +SKIP
     """
-    try:
-        import rerun  # pyright: ignore[reportMissingImports]  # an extra
-    except ImportError:
-        hint = "run pip install 'asterism[view]'"
-        raise ParameterError("view", "Rerun, which is optional", "none installed", hint) from None
+    check_extra("view", "view", "rerun")
+    import rerun  # pyright: ignore[reportMissingImports]  # an extra
+
     if not tracks.detections.n_points:
         raise ParameterError("tracks", "at least one detection", "none")
     if path is not None:

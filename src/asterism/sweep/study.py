@@ -27,6 +27,8 @@ __all__ = ["Case", "Study", "read_study"]
 SCORES = ("idf1", "mota", "hota", "switches")
 """Default scores of a study."""
 _GIVEN = ("truth", "seed", "rig")  # arguments of `corrupt` that no study sets
+RING = "cameras"
+"""Option of a corruption in place of a rig: the number of cameras around the scene."""
 _SECTIONS = ("scenes", "corruptions", "methods", "seeds", "scores")
 _KNOWN_SCORES = tuple(
     field.name
@@ -76,7 +78,8 @@ class Study:
         ``stitch`` is that of `asterism.track`, and the others are options of the method.
     corruptions : dict of dict
         Options of `asterism.simulate.corrupt` by name; by default nothing is corrupted. ``burst``,
-        ``ghosts`` and ``visits`` are tables of their fields.
+        ``ghosts`` and ``visits`` are tables of their fields. ``cameras`` is a number of cameras on
+        a ring around the scene, two of which must see a marker.
     seeds : tuple of int
         Seeds; each case is repeated with each.
     scores : tuple of str
@@ -131,6 +134,7 @@ class Study:
                 check_fields(f"scenes.{name}", table, ("capture",))
         for name, table in self.corruptions.items():
             known = [each for each in inspect.signature(corrupt).parameters if each not in _GIVEN]
+            known.append(RING)
             check_fields(f"corruptions.{name}", table, known)
         for name, table in self.methods.items():
             chosen = _values(table.get("method", "auto"))

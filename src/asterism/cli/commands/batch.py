@@ -60,6 +60,7 @@ _Memory = Annotated[
     float | None,
     typer.Option(metavar="GB", help="Memory of each capture.", show_default="80 % / workers"),
 ]
+_Parquet = Annotated[bool, typer.Option("--parquet", help="Write summary.parquet too.")]
 _DryRun = Annotated[bool, typer.Option("--dry-run", help="List the captures, and track none.")]
 
 
@@ -79,6 +80,7 @@ def batch(
     scheduler: _Scheduler = None,
     send: _Send = False,
     memory: _Memory = None,
+    parquet: _Parquet = False,
     dry_run: _DryRun = False,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
@@ -129,8 +131,8 @@ def batch(
     with _shown() as show:
         done = am.batch.run(
             sources, out, settings, markers=markers or [], workers=workers, scheduler=scheduler,
-            send=send, memory=None if memory is None else int(memory * 1e9), overwrite=overwrite,
-            progress=show,
+            send=send, memory=None if memory is None else int(memory * 1e9), parquet=parquet,
+            overwrite=overwrite, progress=show,
         )  # fmt: skip
     if json:
         values = {

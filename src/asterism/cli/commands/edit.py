@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asterism.checks import check_number
+from asterism.checks import check_extra, check_number
 from asterism.cli.console import Json, Overwrite, Quiet, print_json, print_table, progress
 from asterism.errors import ParameterError
 
@@ -93,11 +93,11 @@ def edit(
     import asterism as am
     from asterism.batch.result_file import output_format
     from asterism.cli.outputs import check_outputs
-    from asterism.edit.server import check_installed, serve
+    from asterism.edit.server import serve
     from asterism.io.captures.files import format_of
 
     if script is None:
-        check_installed()
+        check_extra("edit", "edit", "starlette", "uvicorn")
     elif given := [n for n, v in {"--edits": edits, "--port": port}.items() if v is not None]:
         raise ParameterError("--script", "no option of the page", ", ".join(given))
     elif no_browser:
