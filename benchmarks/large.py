@@ -223,6 +223,8 @@ def peers(folder: Path, sizes: Sequence[int]) -> list[str]:
         for name, r in zip(("asterism", *PEERS), (own, *runs), strict=True):
             if "failed" in r:
                 reason = f"not within {MAX_SECONDS} s" if r["failed"] < 0 else r["why"][:60]
+                if "MemoryError" in r["why"]:
+                    reason = "not within the memory"
                 rows.append([f"{n:,}", str(frames), name, reason, "–", "–"])
                 continue
             figures = [f"{r['seconds']:.3g} s", memory(r["rss"]), f"{r['idf1']:.4f}"]

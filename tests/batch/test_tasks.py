@@ -145,7 +145,7 @@ def test_arguments_are_made_when_they_are_sent():
 
 @pytest.mark.filterwarnings("ignore")
 def test_a_task_that_kills_its_workers_fails_alone():
-    results = found(deadly, range(6), scheduler=None, workers=2)
+    results = found(deadly, range(6), scheduler=None, workers=2, patience=20.0)
     assert type(results.pop("2")).__name__ == "KilledWorker"
     assert results == {f"{x}": x for x in range(6) if x != 2}
 
@@ -163,8 +163,8 @@ def test_a_task_that_waited_at_a_killed_worker_is_tried_alone(monkeypatch):
         del scheduler, workers, patience
         yield None
 
-    def results(client, keys, send):
-        del client, send
+    def results(client, keys, send, patience):
+        del client, send, patience
         rounds.append(list(keys))
         for key in rounds[-1]:
             dies = key == "2" or (key == "3" and len(rounds[-1]) > 1)

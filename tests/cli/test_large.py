@@ -47,8 +47,8 @@ def test_the_model_is_estimated(here, capsys):
     ("line", "says"),
     [
         ("large nowhere.csv -o out.csv", "nowhere.csv: no such file"),
-        ("large in.csv -o out.parquet", "--out: expected the suffix .csv, .tsv, .txt"),
-        ("large in.c3d -o out.c3d", "expected the suffix .parquet"),
+        ("large in.csv -o out.parquet", "--out: expected a name ending in .csv, .tsv, .txt"),
+        ("large in.c3d -o out.c3d", "expected a name ending in .parquet"),
         ("large in.csv -o out.csv --tile 0", "--tile: expected a number > 0"),
         ("large in.csv -o out.csv --threads 0", "--threads: expected a whole number in [1, 1024]"),
         ("large in.csv -o out.csv --unit parsec", "--unit: expected one of mm, cm, m"),

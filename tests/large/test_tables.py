@@ -224,7 +224,7 @@ def test_a_full_disk_and_a_table_of_another_form(tmp_path, scene):
     source = write_csv(tmp_path / "in.csv", rows_of(scene.detections))
     with pytest.raises(am.FormatError, match="cannot be written"):
         am.large.track(source, tmp_path / "nowhere" / "out.csv", model=MODEL)
-    with pytest.raises(am.ParameterError, match=r"expected the suffix \.csv"):
+    with pytest.raises(am.ParameterError, match=r"expected a name ending in \.csv"):
         am.large.track(source, tmp_path / "out.parquet", model=MODEL)
     with pytest.raises(am.ParameterError, match="a path of its own"):
         am.large.track(source, source, model=MODEL)

@@ -70,7 +70,7 @@ def run_tasks(
     progress : callable, optional
         Called with the key of a task and the items of its message, perhaps from another thread.
     patience : float
-        Seconds for which a lost scheduler is awaited.
+        Seconds for which a lost scheduler is awaited, and the result of a finished task.
 
     Yields
     ------
@@ -101,7 +101,7 @@ def run_tasks(
             # A task that kills its workers takes along those that wait there. Each of them is tried
             # again, alone.
             for keys in [several] if several else [[key] for key in left]:
-                for key, result in _results(client, iter(keys), send):
+                for key, result in _results(client, iter(keys), send, patience):
                     if several and type(result).__name__ == "KilledWorker":
                         suspects.add(key)
                         continue
@@ -109,7 +109,7 @@ def run_tasks(
                     yield key, result
         waited = patience
         if not suspects >= left.keys():
-            log.warning("the scheduler was lost; %d tasks are sent again", len(left))
+            log.warning("the scheduler or a result was lost; %d tasks are sent again", len(left))
 
 
 def _result(
@@ -136,7 +136,7 @@ def lost_errors() -> tuple[type[BaseException], ...]:
 
 
 def _results(
-    client: Client, keys: Iterator[str], send: Callable[[str], Future[Any]]
+    client: Client, keys: Iterator[str], send: Callable[[str], Future[Any]], patience: float
 ) -> Iterator[tuple[str, Any]]:
     """Iterate over the results until all have come, or the scheduler is lost."""
     from distributed import as_completed
@@ -171,7 +171,10 @@ def _results(
             error = future.exception() if future.status == "error" else None
             if isinstance(error, lost):
                 return
-            yield pending.pop(future), future.result() if error is None else error
+            # A worker that dies now takes its results along. They are computed again, unless no
+            # worker is left; then the wait ends and the tasks are sent again.
+            result = future.result(timeout=patience) if error is None else error
+            yield pending.pop(future), result
             future.release()
     except lost:
         return

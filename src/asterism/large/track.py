@@ -117,7 +117,7 @@ def open_table(path: str | Path, columns: Columns | None = None) -> Table:
         check_kind("columns", columns, Columns, "am.large.Columns()")
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None:
-        raise ParameterError("source", f"the suffix {', '.join(SUFFIXES)}", str(path))
+        raise ParameterError("source", f"a name ending in {', '.join(SUFFIXES)}", str(path))
     return kind(path=path, columns=columns or Columns())
 
 
@@ -140,15 +140,15 @@ def check_form(source: Path, out: Path) -> None:
     >>> check_form(Path("swarm.csv"), Path("tracked.parquet"))
     Traceback (most recent call last):
     ...
-    asterism.errors.ParameterError: out: expected the suffix .csv, .tsv, .txt, found ...
+    asterism.errors.ParameterError: out: expected a name ending in .csv, .tsv, .txt, found ...
     """
     kind = SUFFIXES.get(source.suffix.lower())
     if kind is None:
-        raise ParameterError("source", f"the suffix {', '.join(SUFFIXES)}", str(source))
+        raise ParameterError("source", f"a name ending in {', '.join(SUFFIXES)}", str(source))
     if SUFFIXES.get(out.suffix.lower()) is not kind:
         able = ", ".join(suffix for suffix, other in SUFFIXES.items() if other is kind)
         hint = "the rows are copied in the form of the input"
-        raise ParameterError("out", f"the suffix {able}", str(out), hint)
+        raise ParameterError("out", f"a name ending in {able}", str(out), hint)
 
 
 def track(
