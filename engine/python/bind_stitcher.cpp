@@ -89,6 +89,31 @@ nb::tuple step_stitcher(const LiveStitcher& before, const In<double>& F, const I
                         array_of<std::int64_t>(reported, &Change::second));
 }
 
+// Returns (markers, frames since their last detection, means, covariances) of the markers that are
+// not among `markers`, the present ones with their positions; -1 is none.
+nb::tuple unseen_markers(LiveStitcher& self, const In<std::int64_t>& markers,
+                         const In<bool>& is_seen, const In<double>& points) {
+  const std::vector<Point> at = to_points(points, self.motion().axis.D);
+  require(markers.size() == at.size() && is_seen.size() == at.size(),
+          "markers and is_seen: one for each point");
+  Places present;
+  std::vector<std::int32_t> known;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const std::int64_t marker = markers.data()[i];
+    require(marker >= -1 && marker < std::int64_t{1} << 30, "markers: -1 to 2^30");
+    if (marker < 0) continue;
+    known.push_back(static_cast<std::int32_t>(marker));
+    if (is_seen.data()[i]) present.set(known.back(), at[i]);
+  }
+  const std::vector<LiveStitcher::UnseenMarker> unseen = self.unseen(present, known);
+  std::vector<AxisState> states;
+  for (const LiveStitcher::UnseenMarker& one : unseen) states.push_back(one.state);
+  const auto [means, covariances] = state_arrays(self.motion(), states);
+  return nb::make_tuple(array_of<std::int64_t>(unseen, &LiveStitcher::UnseenMarker::marker),
+                        array_of<std::int64_t>(unseen, &LiveStitcher::UnseenMarker::gap), means,
+                        covariances);
+}
+
 std::vector<RigidPair> to_pairs(const In<double>& a, const In<double>& b,
                                 const In<double>& weights) {
   require(a.ndim() == 2 && a.shape(1) >= 1 && a.shape(1) <= kMaxAxes && b.ndim() == 2 &&
@@ -262,6 +287,13 @@ void bind_stitcher(nb::module_& module) {
            "options"_a, nb::kw_only(), "lag"_a)
       .def("step", &step_stitcher, "F"_a, "Q"_a, "points"_a, "labels"_a, "revised"_a,
            "revised_labels"_a)
+      .def(
+          "markers_of",
+          [](const LiveStitcher& self, const In<std::int64_t>& labels) {
+            return array_of<std::int64_t>(self.markers_of(flat(labels)));
+          },
+          "labels"_a)
+      .def("unseen", &unseen_markers, "markers"_a, "is_seen"_a, "points"_a)
       .def_prop_ro("n_seen", &LiveStitcher::n_seen)
       .def_prop_ro("n_joins", &LiveStitcher::n_joins)
       .def_prop_ro("n_ghosts", &LiveStitcher::n_ghosts)

@@ -562,6 +562,12 @@ class LiveStitcher:
         revised: Ints,
         revised_labels: Ints,
     ) -> tuple[LiveStitcher, Ints, Ints, Ints]: ...
+    # The present marker of each label of the tracker, -1 for none.
+    def markers_of(self, labels: Ints) -> Ints: ...
+    # (markers not among the given ones, frames since their last detection, means, covariances)
+    def unseen(
+        self, markers: Ints, is_seen: NDArray[np.bool_], points: Floats
+    ) -> tuple[Ints, Ints, Floats, Floats]: ...
     n_seen: Final[int]
     n_joins: Final[int]
     n_ghosts: Final[int]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -11,7 +12,7 @@ from asterism.checks import check_kind
 from asterism.errors import ParameterError
 from asterism.model import Detections, MarkerSet, Tracks
 from asterism.records import record
-from asterism.tracking.methods import Method, Update
+from asterism.tracking.methods import Method, TrackStates, Update
 from asterism.tracking.naming.first_names import MIN_FOUND, MIN_LENGTH
 from asterism.tracking.naming.live_names import LiveNames
 from asterism.tracking.naming.name import name_tracks
@@ -185,7 +186,8 @@ class Named(Method[NamedState]):
         elif time >= state.next_search:
             after = self._searched(after)
         names = tuple(after.names.get(label) for label in update.labels.tolist())
-        return after, replace(update, names=names)
+        read = partial(_tracks_of, update, after)
+        return after, replace(update, names=names, read_tracks=read)
 
     def _searched(self, state: NamedState) -> NamedState:
         """Search for the first names as soon as there are enough frames and tracks."""
@@ -228,6 +230,18 @@ class Named(Method[NamedState]):
             if found is not None:
                 names[label], probabilities[label] = found
         return replace(state, live=live, names=names, probabilities=probabilities)
+
+
+def _tracks_of(update: Update, state: NamedState) -> TrackStates | None:
+    """Return the states of the tracks with their names."""
+    if update.tracks is None:
+        return None
+    ids = update.tracks.ids.tolist()
+    return replace(
+        update.tracks,
+        names=tuple(state.names.get(label) for label in ids),
+        identity_confidence=np.array([state.probabilities.get(k, np.nan) for k in ids]),
+    )
 
 
 def _revised(recent: tuple[_Frame, ...], update: Update) -> tuple[_Frame, ...]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import field
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from asterism import _engine
 from asterism.checks import check_kind, check_number
 from asterism.model import TrackingModel
 from asterism.model.compiled import motion_model, no_transition, transition
 from asterism.records import record
-from asterism.tracking.methods import SMP, Method, Update
+from asterism.tracking.methods import SMP, Method, TrackStates, Update
 from asterism.tracking.methods.base import MethodState, checked_frame
 from asterism.tracking.stitching.tracklets import tracklet_model
 from asterism.tracking.stitching.whole import check_options, stitch_options
@@ -196,5 +199,28 @@ class Stitched(Method[StitchedState]):
             last_time=time,
         )  # fmt: skip
         return after, Update(
-            labels=labels, revised=revised, revised_labels=revised_labels, info=found.info
-        )
+            labels=labels, revised=revised, revised_labels=revised_labels, info=found.info,
+            read_tracks=partial(_tracks_of, stitcher, found),
+        )  # fmt: skip
+
+
+def _tracks_of(stitcher: _engine.LiveStitcher, found: Update) -> TrackStates | None:
+    """Return the states of the markers: those of their tracklets, and of the occluded markers."""
+    tracklets = found.tracks
+    if tracklets is None:
+        return None
+    markers = stitcher.markers_of(tracklets.ids)
+    ids, gaps, means, covariances = stitcher.unseen(
+        markers, tracklets.is_seen, np.ascontiguousarray(tracklets.positions)
+    )
+    kept = markers >= 0
+    log_odds = tracklets.log_odds
+    if log_odds is not None:
+        log_odds = np.concatenate([log_odds[kept], np.full(len(ids), np.nan)])
+    return TrackStates(
+        ids=np.concatenate([markers[kept], ids]),
+        means=np.concatenate([tracklets.means[kept], means]),
+        covariances=np.concatenate([tracklets.covariances[kept], covariances]),
+        gaps=np.concatenate([tracklets.gaps[kept], gaps]),
+        log_odds=log_odds,
+    )
