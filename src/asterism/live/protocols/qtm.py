@@ -227,7 +227,6 @@ def encode_markers(
     missing = np.isnan(markers).any(axis=1)
     if missing.any():
         # Clients test a missing marker by all 32 bits, which is one of many patterns of NaN.
-        rows["place"][missing] = np.uint32(0xFFFFFFFF).view(np.float32)
         rows.view(f"{order}u4").reshape(len(rows), -1)[missing, :3] = 0xFFFFFFFF
     return _component(kind, rows, order)
 
