@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from asterism.edit.guard import MAX_BYTES
+from asterism.reporting.guard import MAX_BYTES
 from asterism.edit.messages import parsed
 from asterism.errors import ParameterError
 from tests.edit.served import Served, write_capture

@@ -12,7 +12,7 @@ import socket
 import threading
 from typing import TYPE_CHECKING, Any
 
-from asterism.edit.guard import Guard
+from asterism.reporting.guard import Guard
 from asterism.edit.messages import parsed
 from asterism.errors import AsterismError, ParameterError
 

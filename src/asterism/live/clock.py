@@ -10,7 +10,7 @@ import numpy as np
 __all__ = ["SourceClock"]
 
 _WINDOW = 1.0  # seconds, of which the frame with the shortest delay counts
-_N_WINDOWS = 120
+_N_WINDOWS = 60
 _MIN_WINDOWS = 5
 
 
@@ -18,7 +18,7 @@ class SourceClock:
     """Line through source time and arrival time, robust against delays.
 
     A delay makes a frame late and never early. The earliest frame of each second is therefore
-    kept, and the line is the median of the slopes of all pairs of the last 120 of them (Theil and
+    kept, and the line is the median of the slopes of all pairs of the last 60 of them (Theil and
     Sen). A stall of less than half of this time does not change the slope.
 
     Examples

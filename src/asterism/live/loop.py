@@ -20,6 +20,7 @@ from asterism.live.live_run import LiveRun
 from asterism.live.live_tracker import LiveTracker
 from asterism.live.low_latency import low_latency
 from asterism.live.queue import FrameQueue
+from asterism.live.sinks.page import PageSink
 from asterism.live.receiver import Connected, Disconnected, Ended, Receiver
 
 if TYPE_CHECKING:
@@ -47,6 +48,8 @@ SILENCE = 1.0
 """Seconds without a frame that are a pause."""
 COLLECT = 256
 """Number of frames between two collections of garbage."""
+STATUS = 0.5
+"""Seconds between two reports of the counts."""
 _IDLE = 0.05  # seconds, after which the loop looks at the clock
 
 
@@ -162,14 +165,23 @@ class LiveLoop:
                 log.info("%s: connected again", self._source.name)
             now = perf_counter()
             self._notice_silence(now, is_frame=item is not None)
-            if status is not None and now >= next_status:
-                next_status = now + 0.5
-                status(self.snapshot())
+            if now >= next_status and (waits or not len(queue)):
+                next_status = now + STATUS
+                self._report(status)
             # The next frame is a few milliseconds away: this is the time for everything else.
             if waits or not len(queue):
                 self._learn()
             while (waits or not len(queue)) and tracker.rehearse():
                 pass
+
+    def _report(self, status: Callable[[LiveRun], Any] | None) -> None:
+        """Pass on the present counts."""
+        run = self.snapshot()
+        for sink in self._sinks:
+            if isinstance(sink, PageSink):
+                sink.show(run)
+        if status is not None:
+            status(run)
 
     def _track(self, accepted: Accepted, period: float) -> None:
         frame = accepted.frame
