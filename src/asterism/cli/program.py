@@ -20,6 +20,7 @@ from asterism.cli.commands.fill import fill
 from asterism.cli.commands.film import film
 from asterism.cli.commands.info import info
 from asterism.cli.commands.markerset import app as markerset
+from asterism.cli.commands.live import live
 from asterism.cli.commands.methods import methods, scenes
 from asterism.cli.commands.name import name
 from asterism.cli.commands.plot import plot
@@ -64,6 +65,7 @@ def _root(  # pyright: ignore[reportUnusedFunction]
 _TITLES = {
     "Tracks and markers": (track, batch, edit, stitch, name, fill, estimate, methods),
     "Captures and results": (info, evaluate, report, plot, view),
+    "Streams": (live,),
     "Simulations and experiments": (corrupt, simulate, scenes, sweep, demo, reproduce),
     "Cameras": (film, reconstruct, chain),
 }

@@ -10,6 +10,7 @@ from asterism.live.address import split_address
 from asterism.live.servers import natnet, qtm
 from asterism.live.sinks.lsl import LslSink
 from asterism.live.sinks.osc import OscSink
+from asterism.live.sinks.page import PageSink
 from asterism.live.sinks.recording import RecordingSink
 from asterism.live.sinks.server import ServerSink
 from asterism.live.sinks.text import CsvSink, JsonFileSink, JsonUdpSink, StandardOutput
@@ -25,6 +26,7 @@ _KNOWN: dict[str, tuple[str, ...]] = {
     "lsl": (),
     "osc": (),
     "udp": (),
+    "page": (),
     "": (),
 }
 
@@ -37,8 +39,8 @@ def parse_sink(text: str) -> Sink:
     text : str
         ``qtm://[HOST][:PORT]`` and ``natnet://[HOST][:PORT][?version=…&multicast=…]`` are servers
         on an interface, by default for this machine only. ``osc://HOST:PORT`` and
-        ``udp://HOST:PORT`` send datagrams, ``lsl://STREAM`` publishes a stream, ``-`` is standard
-        output, and a file ends in ``.jsonl``, ``.csv`` or ``.c3d``.
+        ``udp://HOST:PORT`` send datagrams, ``lsl://STREAM`` publishes a stream, ``page://:PORT`` is
+        a page in the browser, ``-`` is standard output, and a file ends in ``.jsonl``, ``.csv`` or ``.c3d``.
 
     Returns
     -------
@@ -78,6 +80,10 @@ def parse_sink(text: str) -> Sink:
             return OscSink(text, host, port)
         case "udp":
             return JsonUdpSink(text, host, port)
+        case "page":
+            if address.host:
+                raise ParameterError("--to", "page://:PORT, for this machine only", repr(text))
+            return PageSink(port)
         case _:
             return _file(text)
 

@@ -26,12 +26,16 @@ class Source(Protocol):
         The source, as the user wrote it.
     rate : float
         Nominal frame rate, Hz; 0 while it is unknown.
+    waits : bool
+        Whether the source waits while tracking is behind, as a file does. Otherwise late frames are
+        dropped.
     faults : dict of str to int
         Number of messages that could not be decoded and were ignored, by reason.
     """
 
     name: str
     rate: float
+    waits: bool
     faults: dict[str, int]
 
     def open(self) -> None:

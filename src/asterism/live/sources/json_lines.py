@@ -40,6 +40,7 @@ class UdpSource:
     def __init__(self, name: str, host: str, port: int) -> None:
         self.name, self._address = name, (host, port)
         self.rate = 0.0
+        self.waits = False
         self.faults: dict[str, int] = {}
         self._socket: socket.socket | None = None
         self._lines: list[tuple[bytes, float]] = []
@@ -111,6 +112,7 @@ class StandardInput:
     def __init__(self, stream: BinaryIO | None = None) -> None:
         self.name = "-"
         self.rate = 0.0
+        self.waits = True  # as a pipe does
         self.faults: dict[str, int] = {}
         self._stream = stream
         self._lines: queue.Queue[tuple[bytes, float] | None] = queue.Queue(_QUEUE)

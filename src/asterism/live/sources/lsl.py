@@ -33,6 +33,7 @@ class LslSource:
     def __init__(self, name: str, stream: str) -> None:
         self.name, self._stream = name, stream
         self.rate = 0.0
+        self.waits = False
         self.faults: dict[str, int] = {}
         self._inlet: Any = None
         self._number = 0

@@ -58,6 +58,7 @@ class NatNetSource:
         self.name, self._address = name, (host, port)
         self._local, self._multicast = local, multicast
         self.rate = 0.0
+        self.waits = False
         self.faults: dict[str, int] = {}
         self._command: socket.socket | None = None
         self._data: socket.socket | None = None

@@ -39,6 +39,7 @@ class QtmSource:
     def __init__(self, name: str, host: str, port: int) -> None:
         self.name, self._address = name, (host, port)
         self.rate = 0.0
+        self.waits = False
         self.faults: dict[str, int] = {}
         self._socket: socket.socket | None = None
         self._received = bytearray()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,6 +35,7 @@ class ReplaySource:
     def __init__(self, name: str, path: Path, speed: float = 1.0) -> None:
         self.name, self._path, self._speed = name, path, speed
         self.rate = 0.0
+        self.waits = math.isinf(speed)
         self.faults: dict[str, int] = {}
         self._capture: Detections | None = None
         self._next = 0
