@@ -156,8 +156,9 @@ def test_a_pause_costs_what_a_gap_of_that_length_costs(scene, seconds, restarts,
         state, update = method.step(state, float(now), frame)
         if len(frame):
             expected.append(update.labels)
-    own = [f.labels for f in found]
-    assert all((a == b).all() for a, b in zip(own[:300], expected[:300], strict=True))
+    if seconds < 1:
+        assert all((f.labels == labels).all() for f, labels in zip(found, expected, strict=True))
+        return
     kept = [*range(300), *range(300 + n_lost, d.n_frames)]
     offline = [
         dataclasses.replace(f, labels=labels, number=t)
@@ -233,13 +234,15 @@ def test_tracking_that_falls_behind_drops_frames_and_stays_in_time(scene, monkey
 def test_a_stop_from_another_thread_ends_the_stream(scene):
     stop, sink = threading.Event(), Kept()
     frames = frames_of(scene[0].detections)
-    threading.Timer(0.3, stop.set).start()
-    began = time.perf_counter()
-    run = am.live.run(
-        Memory(frames, waits=False, period=0.01), [sink], model=scene[1], stop=stop
-    )
-    assert time.perf_counter() - began < 3
-    assert 0 < run.n_frames < 200
+
+    def end():
+        while not sink.frames:
+            time.sleep(0.01)
+        stop.set()
+
+    threading.Thread(target=end, daemon=True).start()
+    run = am.live.run(Memory(frames, waits=False, period=0.1), [sink], model=scene[1], stop=stop)
+    assert 0 < run.n_frames < 300
     assert not sink.is_open
 
 
