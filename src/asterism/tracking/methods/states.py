@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from asterism.records import record
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["TrackStates"]
+__all__ = ["TrackStates", "states_of"]
 
 
 @record(eq=False)
@@ -108,19 +108,15 @@ class TrackStates:
         return 1 / (1 + np.exp(-np.clip(self.log_odds, -700.0, 700.0)))
 
 
-def states_of(live: dict[str, NDArray[Any]]) -> TrackStates:
-    """Return the states of an engine's tracker.
-
-    Parameters
-    ----------
-    live : dict of ndarray
-        What `EngineState.live` returns.
-
-    Returns
-    -------
-    TrackStates
-    """
+def states_of(
+    ids: NDArray[np.int64],
+    gaps: NDArray[np.int64],
+    log_odds: NDArray[np.float64] | None,
+    means: NDArray[np.float64],
+    covariances: NDArray[np.float64],
+) -> TrackStates:
+    """Return states in the order in which the engine returns them."""
     return TrackStates(
-        ids=live["ids"], means=live["means"], covariances=live["covariances"], gaps=live["gaps"],
-        log_odds=live["log_odds"],
+        ids=ids, means=means, covariances=covariances, gaps=gaps, log_odds=log_odds,
+        names=(None,) * len(ids),
     )  # fmt: skip
