@@ -46,7 +46,7 @@ WARM_UP = 2.0
 
 
 def scene(rate: float) -> am.Detections:
-    """A person whose markers are occluded in bursts."""
+    """Simulate a person whose markers are occluded in bursts."""
     truth = am.simulate.person(frames=int(8 * rate), rate=rate, n_markers=N_MARKERS, seed=1)
     burst = am.simulate.Burst(n=4, shortest=10, longest=120)
     return am.simulate.corrupt(truth, burst=burst, noise=3e-4, clutter=0.02, seed=1).detections
@@ -62,7 +62,7 @@ def back_and_forth(d: am.Detections) -> Iterator[tuple[int, NDArray[np.float64]]
 
 
 def free_port() -> int:
-    """A port that nobody uses."""
+    """Return a free port."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
@@ -131,9 +131,7 @@ def measured(name: str, options: argparse.Namespace) -> list[str]:
     sender.start()
     client.start()
     stop = threading.Event()
-    threading.Thread(
-        target=lambda: (client.join(), stop.set()), name="end", daemon=True
-    ).start()
+    threading.Thread(target=lambda: (client.join(), stop.set()), name="end", daemon=True).start()
     if name != "JSON over UDP":
         time.sleep(6)  # a server must be there before its client
     run = am.live.run(inward, [outward], model=model, stop=stop)
@@ -182,7 +180,7 @@ class Day:
         self._n += 1
         now = 3600 * hour + at / self.rate
         return SourceFrame(
-            number=int(round(now * self.rate)), time=now, points=points, received=now * (1 + 2e-5)
+            number=round(now * self.rate), time=now, points=points, received=now * (1 + 2e-5)
         )
 
 

@@ -35,9 +35,7 @@ def frame(number):
     seen = gaps == 0
     points = np.concatenate([at[seen], [[0.5, 0.5, 1.5]]])
     labels = np.append(tracks.ids[seen], -1)
-    return LiveFrame(
-        number=number, time=number / 100, points=points, labels=labels, tracks=tracks
-    )
+    return LiveFrame(number=number, time=number / 100, points=points, labels=labels, tracks=tracks)
 
 
 class Shown:
@@ -157,13 +155,13 @@ def test_the_page_draws_the_markers(shown, dark):
         assert faults == ["lost", "12", "reordered", "3"]
         x = page.run("asterism.capture.positions[0]")
         page.wait(f"asterism.capture.positions[0] > {x}")
-        hollow = page.run(
-            "[...asterism.capture.filled.slice(0, 100)].reduce((a, b) => a + b)"
-        )
+        hollow = page.run("[...asterism.capture.filled.slice(0, 100)].reduce((a, b) => a + b)")
         assert hollow == 10
         assert page.run("document.getElementById('state').hidden")
         page.run("document.getElementById('show-names').click()")
         page.settle()
-        assert page.run("asterism.capture.header.names.filter((n) => n.startsWith('M')).length") == 50
+        assert (
+            page.run("asterism.capture.header.names.filter((n) => n.startsWith('M')).length") == 50
+        )
     finally:
         browser.close()

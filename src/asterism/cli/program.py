@@ -19,8 +19,8 @@ from asterism.cli.commands.evaluate import evaluate
 from asterism.cli.commands.fill import fill
 from asterism.cli.commands.film import film
 from asterism.cli.commands.info import info
-from asterism.cli.commands.markerset import app as markerset
 from asterism.cli.commands.live import live
+from asterism.cli.commands.markerset import app as markerset
 from asterism.cli.commands.methods import methods, scenes
 from asterism.cli.commands.name import name
 from asterism.cli.commands.plot import plot

@@ -211,7 +211,5 @@ def _tracks_of(stitcher: _engine.LiveStitcher, found: Update) -> TrackStates | N
     if own is None:
         return None
     log_odds = np.full(len(own), np.nan) if own.log_odds is None else own.log_odds
-    merged = states_of(
-        *stitcher.states(own.ids, own.gaps, log_odds, own.means, own.covariances)
-    )
+    merged = states_of(*stitcher.states(own.ids, own.gaps, log_odds, own.means, own.covariances))
     return merged if own.log_odds is not None else replace(merged, log_odds=None)
