@@ -40,6 +40,8 @@ QUEUE = 256
 """Number of frames that wait at most."""
 MAX_AGE = 1.0
 """Seconds after which a waiting frame is dropped, if a later one waits too."""
+BEHIND = 0.1
+"""Age of a frame, seconds, from which on tracking is behind."""
 FIRST_SECONDS = 2.0
 """Seconds of frames from which the first model is estimated."""
 REFINE = (10.0, 30.0, 60.0)
@@ -154,6 +156,9 @@ class LiveLoop:
                     continue
                 accepted = intake.take(item)
                 if accepted is not None:
+                    # Frames that are missing are tracked as empty ones only if there is time.
+                    if not waits and perf_counter() - item.received > BEHIND:
+                        accepted = accepted._replace(n_missing=0)
                     self._track(accepted, intake.period)
             elif isinstance(item, Ended):
                 if item.error is not None:

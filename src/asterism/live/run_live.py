@@ -12,7 +12,7 @@ from asterism.live.sinks.parse import parse_sink
 from asterism.live.sources.parse import parse_source
 from asterism.model import MarkerSet, TrackingModel
 from asterism.tracking import Stitched, method_by_name
-from asterism.tracking.methods import Method
+from asterism.tracking.methods import MCMCDA, Method
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -52,7 +52,8 @@ def run(
         Sinks, such as ``"qtm://:22223"``, ``"udp://127.0.0.1:5001"``, ``"out.c3d"`` or
         ``"page://:8000"``.
     method : Method or str, optional
-        Method, or its name; `Stitched` by default, whose identities outlast occlusions.
+        Method as it is, or the name of one that is stitched, because only then identities outlast
+        occlusions; ``Stitched()`` by default. ``"gnn"`` takes half of its time.
     model : TrackingModel, optional
         Tracking model. It is not refined.
     marker_set : MarkerSet or sequence of MarkerSet
@@ -83,11 +84,11 @@ def run(
     >>> stop = threading.Event()  # stop.set() in another thread ends the call
     >>> am.live.run("qtm://192.168.0.10", ["page://:8000"], stop=stop)  # doctest: +SKIP
     """
-    if isinstance(method, str):
-        method = method_by_name(method)
-    chosen = Stitched() if method is None else method
+    chosen = method
+    if not isinstance(method, Method):
+        chosen = Stitched() if method is None else Stitched(method=method_by_name(method))
     check_kind("method", chosen, Method, 'am.GNN(), or "gnn"')
-    if getattr(chosen, "window", 1) is None:
+    if isinstance(chosen, MCMCDA) and chosen.window is None:
         raise ParameterError("method", "a method for streams", "mcmcda with window=None")
     if model is not None:
         check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")

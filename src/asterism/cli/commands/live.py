@@ -50,7 +50,10 @@ _Model = Annotated[
 ]
 _Method = Annotated[
     str | None,
-    typer.Option(help="Method, one of `asterism methods`.", show_default="smp, stitched"),
+    typer.Option(
+        help="Method whose tracklets are stitched, one of `asterism methods`.",
+        show_default="smp over three frames",
+    ),
 ]
 _Options = Annotated[
     list[str] | None,
@@ -89,6 +92,7 @@ def live(
     from asterism.cli.outputs import read_model
     from asterism.live import run
     from asterism.live.sinks.page import PageSink
+    from asterism.tracking import Stitched
     from asterism.live.sinks.parse import parse_sink
     from asterism.tracking.naming.from_file import read_markers
 
@@ -105,7 +109,7 @@ def live(
             )
     with _stop_signals() as stop, _status(quiet=quiet or json) as status:
         result = run(
-            source, sinks, method=chosen, model=read_model(model) if model else None,
+            source, sinks, method=None if chosen is None else Stitched(method=chosen), model=read_model(model) if model else None,
             marker_set=sets, seed=seed, stop=stop, status=status,
         )  # fmt: skip
     if json:
