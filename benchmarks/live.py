@@ -148,7 +148,8 @@ def measured(name: str, options: argparse.Namespace) -> list[str]:
         return f"{1e3 * seconds:.2f}"
 
     return [
-        name, f"{run.n_frames:,}", ms(spent), *(ms(info[f"latency_{k}"]) for k in ("median", "p99", "p999")),
+        name, f"{run.n_frames:,}", ms(spent),
+        *(ms(info[f"latency_{k}"]) for k in ("median", "p99", "p999")),
         *(ms(float(np.quantile(whole, q))) for q in (0.5, 0.99, 0.999)),
         ", ".join(f"{k} {v}" for k, v in (run.faults or {}).items()) or "none",
     ]  # fmt: skip

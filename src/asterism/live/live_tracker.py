@@ -203,7 +203,9 @@ class LiveTracker:
         labels = np.concatenate([*rehearsal.labels[-n:], np.empty(0, dtype=np.int64)])
         old = np.concatenate([past.labels for past in self._history] or [labels])
         before = self._switchable_state()
-        ids, next_id = ids_by_votes(labels, old, 0 if before is None else before.next_id)
+        ids, next_id = None, int(labels.max(initial=-1)) + 1
+        if before is not None:
+            ids, next_id = ids_by_votes(labels, old, before.next_id)
         n_seen = 0 if before is None else before.n_seen
         state = SwitchableState(
             inner=rehearsal.state, ids=ids, next_id=next_id,

@@ -92,8 +92,8 @@ def live(
     from asterism.cli.outputs import read_model
     from asterism.live import run
     from asterism.live.sinks.page import PageSink
-    from asterism.tracking import Stitched
     from asterism.live.sinks.parse import parse_sink
+    from asterism.tracking import Stitched
     from asterism.tracking.naming.from_file import read_markers
 
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
@@ -109,9 +109,15 @@ def live(
             )
     with _stop_signals() as stop, _status(quiet=quiet or json) as status:
         result = run(
-            source, sinks, method=None if chosen is None else Stitched(method=chosen), model=read_model(model) if model else None,
-            marker_set=sets, seed=seed, stop=stop, status=status,
-        )  # fmt: skip
+            source,
+            sinks,
+            method=None if chosen is None else Stitched(method=chosen),
+            model=read_model(model) if model else None,
+            marker_set=sets,
+            seed=seed,
+            stop=stop,
+            status=status,
+        )
     if json:
         numbers = {k: v if math.isfinite(v) else None for k, v in result.info.items()}
         learnt = None if result.model is None else result.model.to_dict()
