@@ -215,9 +215,7 @@ def test_a_stop_from_another_thread_ends_the_stream(scene):
     frames = frames_of(scene[0].detections)
     threading.Timer(0.3, stop.set).start()
     began = time.perf_counter()
-    run = am.live.run(
-        Memory(frames, waits=False, period=0.01), [sink], model=scene[1], stop=stop
-    )
+    run = am.live.run(Memory(frames, waits=False, period=0.01), [sink], model=scene[1], stop=stop)
     assert time.perf_counter() - began < 3
     assert 0 < run.n_frames < 200
     assert not sink.is_open

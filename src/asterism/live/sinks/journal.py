@@ -148,7 +148,9 @@ def _tracks(
         points=np.concatenate([np.empty((0, 3)), *points]),
     )
     given: list[str] = list(header.get("names") or ())
-    joined, track_names = _joined(detections, np.concatenate([np.empty(0, np.int64), *labels]), names, given)
+    joined, track_names = _joined(
+        detections, np.concatenate([np.empty(0, np.int64), *labels]), names, given
+    )
     return Tracks(detections=detections, labels=joined, names=track_names)
 
 
