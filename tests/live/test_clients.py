@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import json
+import shutil
 import subprocess
 import sys
 import threading
@@ -80,6 +82,36 @@ def test_qtm_rt_is_refused_another_version():
     with qtm_server() as server:
         client = asyncio.run(qtm_rt.connect("127.0.0.1", port=server.port, version="1.40"))
     assert client is None
+
+
+@pytest.mark.parametrize("version", ["1.19", "1.25"])
+def test_qualisys_rt_in_javascript(version):
+    folder = ROOT / "build" / "node"
+    if shutil.which("node") is None or not (folder / "node_modules" / "qualisys-rt").is_dir():
+        pytest.skip("needs Node.js, and: npm install --prefix build/node qualisys-rt")
+    with qtm_server() as server:
+        script = ROOT / "tests" / "live" / "qualisys_rt_client.js"
+        command = ["node", script, folder, str(server.port), str(len(FRAMES)), version]
+        client = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert server.wait_for_client(30)
+        for frame in FRAMES:
+            server.send(frame)
+            until(lambda: not any(c.pending for c in server._clients), 20)
+        out, _ = client.communicate(timeout=30)
+        assert (client.returncode, server.faults) == (0, {})
+    found = json.loads(out)
+    assert found["state"] == {"id": 1, "name": "Connected"}
+    assert len(found["settings"]["the3d"]["labels"]) == 60
+    for frame, got in zip(FRAMES, found["frames"], strict=True):
+        assert got["frame"] == frame.number
+        markers = [[m["x"], m["y"], m["z"]] for m in got["components"]["3d"]["markers"]]
+        # JSON has null where a marker is missing.
+        markers = np.array(markers, np.float64).astype(np.float32)
+        np.testing.assert_array_equal(markers, millimetres(frame.markers))
+        points = got["components"]["3dNoLabels"]["markers"]
+        places = np.array([[p["x"], p["y"], p["z"]] for p in points], np.float32)
+        np.testing.assert_array_equal(places, millimetres(frame.points))
+        assert [p["id"] for p in points] == frame.ids.tolist()
 
 
 def test_the_vendors_sdk_in_motioncapture():
