@@ -71,7 +71,7 @@ def serve(
     Examples
     --------
     >>> import asterism as am, threading
-    >>> truth = am.simulate.cube(frames=20, seed=1)
+    >>> truth = am.simulate.cube(frames=20, rate=30, seed=1)
     >>> server = am.live.QtmServer(port=0, discovery_port=0)
     >>> stop = threading.Event()
     >>> am.live.serve(truth, server, labelled=True, begin=stop.set, stop=stop)  # before a client
