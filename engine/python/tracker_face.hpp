@@ -127,21 +127,15 @@ AxisState present_state(const MotionModel& m, const LiveTrack<More>& track) {
   return collapse(m, fused ? *fused : track.state);
 }
 
-// The data of the confirmed tracks.
+// The states of the confirmed tracks (see TrackArrays).
 template <typename Tracker>
-nb::dict tracks(const Tracker& tracker) {
+nb::tuple tracks(const Tracker& tracker) {
   const auto& live = tracker.live();
   const auto tracks = confirmed(live);
-  std::vector<AxisState> states;
-  for (const auto* track : tracks) states.push_back(present_state(tracker.motion(), *track));
-  const auto [means, covariances] = state_arrays(tracker.motion(), states);
-  nb::dict out;
-  out["ids"] = array_of<std::int64_t>(tracks, [](const auto* t) { return t->id; });
-  out["gaps"] = array_of<std::int64_t>(tracks, [](const auto* t) { return t->gap; });
-  out["log_odds"] = array_of<double>(tracks, [](const auto* t) { return t->score; });
-  out["means"] = means;
-  out["covariances"] = covariances;
-  return out;
+  TrackArrays out(tracker.motion(), tracks.size());
+  for (const auto* track : tracks)
+    out.add(track->id, track->gap, track->score, present_state(tracker.motion(), *track));
+  return out.give();
 }
 
 template <typename Tracker>

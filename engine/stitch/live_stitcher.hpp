@@ -84,13 +84,14 @@ class LiveStitcher {
     std::int64_t gap = 0;
     AxisState state;
   };
-  // Returns the markers that are not among `known`. `present` holds the detected markers.
+  // Returns the markers that are not among `known`, which are sorted. `present` holds the detected
+  // ones.
   std::vector<UnseenMarker> unseen(const Places& present, std::span<const std::int32_t> known) {
     const MotionModel& m = motion();
     std::vector<UnseenMarker> out;
     stitcher_.each_unseen(
         present,
-        [&](std::int32_t k) { return std::find(known.begin(), known.end(), k) == known.end(); },
+        [&](std::int32_t k) { return !std::binary_search(known.begin(), known.end(), k); },
         [&](const Stitcher::Unseen& unseen) {
           UnseenMarker& to = out.emplace_back();
           to.marker = unseen.marker;

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import time
 
 import numpy as np
 import pytest
@@ -139,8 +141,6 @@ def test_estimates_are_those_of_estimate_model(kind):
 
 
 def waited(estimator):
-    import time
-
     end = time.monotonic() + 60
     while (result := estimator.result()) is None and time.monotonic() < end:
         time.sleep(0.01)
@@ -150,7 +150,5 @@ def waited(estimator):
 def test_models_differ_by_noise_and_motion():
     d = am.simulate.cube(frames=80, seed=1).detections
     model = am.estimate_model(d).model
-    import dataclasses
-
     sensor = dataclasses.replace(model.sensor, noise_sigma=1.5 * model.sensor.noise_sigma)
     assert differs(dataclasses.replace(model, sensor=sensor), model)

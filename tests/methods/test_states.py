@@ -93,9 +93,9 @@ def test_states_are_those_of_the_textbook_filter_over_the_labels_so_far(method):
 
 
 def test_smp_without_a_model_of_clutter_does_not_know_whether_a_track_exists():
-    made, model = corrupted(frames=10)
+    made = am.simulate.cube(frames=10, seed=1)
     method = am.SMP(strict=True)
-    state = method.init(model)
+    state = method.init(am.estimate_model(made.detections).model)
     for time, points in made.detections:
         state, update = method.step(state, time, points)
     assert np.isnan(update.tracks.existence).all()

@@ -163,9 +163,9 @@ class Intake:
         if is_good.all():
             return frame
         kept = is_good.all(axis=1)
-        self._faults.add(
-            "bad_points", f"a point is not finite or beyond {MAX_COORDINATE:g} m and is dropped",
-            int((~kept).sum()),
-        )  # fmt: skip
+        # Systems send NaN for a marker that they do not see.
+        if n_bad := int((~kept & ~np.isnan(points).any(axis=1)).sum()):
+            reason = f"a point is infinite or beyond {MAX_COORDINATE:g} m and is dropped"
+            self._faults.add("bad_points", reason, n_bad)
         own = None if frame.covariances is None else frame.covariances[kept]
         return replace(frame, points=points[kept], covariances=own)

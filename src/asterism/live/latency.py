@@ -63,7 +63,7 @@ class LatencyHistogram:
         left = share * self.n
         for place, count in enumerate(self.counts):
             left -= count
-            if left <= 1e-9:
+            if left <= 1e-9 and place < len(self.counts) - 1:
                 return min(_FIRST * 10 ** (place / _PER_DECADE), self.longest)
         return self.longest
 

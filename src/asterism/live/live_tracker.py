@@ -31,10 +31,9 @@ log = logging.getLogger(__name__)
 
 HISTORY = 10.0
 """Seconds of frames from which the model is refined, and which a refined model tracks first."""
-LONG_STEP = 5
-"""Number of missing frames from which on they are tracked as frames without points."""
-LONG_GAP = 130
-"""Largest number of them; by then every motion is too old to predict."""
+MAX_EMPTY = 130
+"""Largest number of missing frames that are tracked as frames without points, as a recording has
+them. By then every motion is too old to predict."""
 
 
 class _Past:
@@ -129,8 +128,8 @@ class LiveTracker:
         """
         frame = accepted.frame
         begin = self._last_time
-        if accepted.n_missing >= LONG_STEP and begin is not None:
-            for k in range(1, min(accepted.n_missing, LONG_GAP) + 1):
+        if begin is not None:
+            for k in range(1, min(accepted.n_missing, MAX_EMPTY) + 1):
                 self._take(begin + k * period, np.empty((0, frame.points.shape[1])), None)
         return self._take(frame.time, frame.points, frame.covariances)
 

@@ -1,6 +1,7 @@
 /** The present frame of a stream, in the form of a capture of one frame that the stage draws. */
 
 const CLUTTER = 512; // points that are drawn at most
+const SMOOTH = 0.3; // seconds
 
 export class LiveCapture {
   /** @param {object} header colours, vertical axis and radius of the markers */
@@ -42,6 +43,7 @@ export class LiveCapture {
    * @returns {boolean} whether there is room for more tracks than before
    */
   take({ frame, time, ids, seen, at, clutter }) {
+    const step = time - this.times[0];
     this.frames[0] = frame;
     this.times[0] = time;
     const grows = this.assign(ids);
@@ -56,7 +58,7 @@ export class LiveCapture {
     const n = Math.min(clutter.length / 3, CLUTTER);
     for (let i = 0; i < 3 * n; i++) this.positions[3 * this.K + i] = clutter[i] / 1e4;
     this.clutterStart[1] = this.K + n;
-    this.follow();
+    this.follow(step);
     return grows;
   }
 
@@ -86,8 +88,8 @@ export class LiveCapture {
     for (const [id, k] of this.slots) this.header.names[k] = names[id] ?? `track ${id}`;
   }
 
-  /** The middle of the markers, with which the view moves. */
-  follow() {
+  /** The middle of the seen markers, with which the view moves, `step` seconds after the last. */
+  follow(step) {
     const sum = [0, 0, 0];
     let n = 0;
     for (let k = 0; k < this.K; k++) {
@@ -96,7 +98,8 @@ export class LiveCapture {
       n++;
     }
     if (!n) return;
-    const share = this.isPlaced ? 0.05 : 1; // smooth, so that an occlusion does not move the view
+    // Smooth, so that an occlusion does not move the view.
+    const share = this.isPlaced && step > 0 ? 1 - Math.exp(-step / SMOOTH) : 1;
     for (let a = 0; a < 3; a++) this.course[a] += share * (sum[a] / n - this.course[a]);
     this.isPlaced = true;
   }

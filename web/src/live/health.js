@@ -63,7 +63,7 @@ export class Health {
       pen.fillRect(x(s), 14, 1.5, base - 14);
     });
     byId("quantiles").textContent = MARKS.map(
-      ([name, text]) => `${text} ${seconds(info[`latency_${name}`])}`,
+      ([name, text]) => `${text} ${seconds(info[`latency_${name}`])}`.replaceAll(" ", "\u00a0"),
     ).join(" · ");
   }
 }

@@ -59,7 +59,8 @@ export function live(block) {
     isFitted = true;
     capture.header.box = [low, high];
     stage.drawFloor();
-    byId("scale").textContent = `squares of ${+(100 * stage.floor.cell).toPrecision(3)} cm`;
+    const { cell } = stage.floor;
+    byId("scale").textContent = `squares of ${cell < 1 ? `${+(100 * cell).toPrecision(3)} c` : `${cell} `}m`;
     const middle = [...capture.course];
     capture.header.subject = [0, 1, 2, 3, 4, 5, 6, 7].map((n) =>
       low.map((l, i) => ((n >> i) & 1 ? high[i] : l) - middle[i]),
