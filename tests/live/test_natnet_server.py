@@ -130,8 +130,7 @@ def test_a_pause_is_no_loss_and_a_silent_server_is(monkeypatch):
         source.open()
         assert source.receive(1.5) is None  # echoes keep it
     with pytest.raises(SourceLost):
-        for _ in range(30):
-            source.receive(0.1)
+        [source.receive(0.1) for _ in range(30)]
     begin = time.monotonic()
     with pytest.raises(SourceLost):
         source.receive(5)

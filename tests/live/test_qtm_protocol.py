@@ -1,4 +1,4 @@
-"""Packets of the Qualisys protocol: what is encoded is decoded, and garbage raises one error only."""
+"""Packets of the Qualisys protocol: what is encoded is decoded; garbage raises one error only."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def test_a_killed_recording_loses_nothing_that_was_sent(tmp_path, seed):
     n = tracks.detections.n_frames
     # The frame that was being written when the process was killed may be there.
     assert sent + 1 <= n <= sent + 2
-    assert tracks["A"][:, 0].tolist() == list(range(n))
+    np.testing.assert_allclose(tracks["A"][:, 0], range(n), atol=1e-6)
     assert am.read(path).n_frames == 1
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out.c3d", "out.recovered.c3d"]
 

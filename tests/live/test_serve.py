@@ -61,10 +61,7 @@ def test_labelled_markers_with_their_names():
 
 @pytest.mark.parametrize("kind", ["qtm", "natnet"])
 def test_points_without_labels(kind):
-    if kind == "qtm":
-        server = QtmServer(port=0, discovery_port=0)
-    else:
-        server = NatNetServer(port=0)
+    server = QtmServer(port=0, discovery_port=0) if kind == "qtm" else NatNetServer(port=0)
     thread, sent = serving(WALK, server)
     source = (QtmSource if kind == "qtm" else NatNetSource)(kind, "127.0.0.1", server.port)
     source.open()
@@ -137,7 +134,7 @@ def test_the_command(tmp_path, protocol):
     ]  # fmt: skip
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    said = json.loads(process.stdout.readline())
+    said = json.loads("".join(iter(process.stdout.readline, "}\n")) + "}")
     assert said["address"] == f"127.0.0.1:{port}"
     assert said["corruption"] == {"missing": 0.1, "clutter": 0.1, "seed": 0, "keep_unnamed": True}
     known = am.io.read_tracks(truth)

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -218,7 +219,7 @@ def test_standard_output_has_whole_lines():
 
 
 def test_a_full_disk_is_counted(tmp_path):
-    if not os.path.exists("/dev/full"):
+    if not Path("/dev/full").exists():
         pytest.skip("needs /dev/full")
     sink = JsonFileSink(tmp_path / "out.jsonl")
     sink.open(HEADER)

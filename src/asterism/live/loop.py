@@ -20,8 +20,8 @@ from asterism.live.live_run import LiveRun
 from asterism.live.live_tracker import LiveTracker
 from asterism.live.low_latency import low_latency
 from asterism.live.queue import FrameQueue
-from asterism.live.receiver import Connected, Disconnected, Ended, Receiver
 from asterism.live.sinks.page import PageSink
+from asterism.live.receiver import Connected, Disconnected, Ended, Receiver
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
