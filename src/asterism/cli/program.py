@@ -27,6 +27,7 @@ from asterism.cli.commands.plot import plot
 from asterism.cli.commands.reconstruct import reconstruct
 from asterism.cli.commands.report import report
 from asterism.cli.commands.reproduce import reproduce
+from asterism.cli.commands.serve import serve
 from asterism.cli.commands.simulate import simulate
 from asterism.cli.commands.stitch import stitch
 from asterism.cli.commands.sweep import sweep
@@ -65,7 +66,7 @@ def _root(  # pyright: ignore[reportUnusedFunction]
 _TITLES = {
     "Tracks and markers": (track, batch, edit, stitch, name, fill, estimate, methods),
     "Captures and results": (info, evaluate, report, plot, view),
-    "Streams": (live,),
+    "Streams": (live, serve),
     "Simulations and experiments": (corrupt, simulate, scenes, sweep, demo, reproduce),
     "Cameras": (film, reconstruct, chain),
 }

@@ -61,10 +61,15 @@ class _Rehearsal:
         self.n_done = 0  # of the frames of the history, as counted from its begin
 
     def step(self, past: _Past) -> None:
-        self.state, update = self.method.step(
-            self.state, past.time, past.points, covariances=past.covariances
-        )
-        self.labels.append(update.labels)
+        labels = np.full(len(past.points), -1, dtype=np.int64)
+        try:
+            self.state, update = self.method.step(
+                self.state, past.time, past.points, covariances=past.covariances
+            )
+            labels = update.labels
+        except SolverLimit:  # as in the stream itself, the frame is left out
+            pass
+        self.labels.append(labels)
         self.n_done += 1
 
 
@@ -162,23 +167,12 @@ class LiveTracker:
 
     def recent(self) -> Detections:
         """Return the frames of the last seconds."""
-        noise = None
-        if self._history and all(p.covariances is not None for p in self._history):
-            noise = [p.covariances for p in self._history]
         times = [past.time for past in self._history]
-        points = [past.points for past in self._history]
-        made = Detections.from_frames(times, points)
-        if noise is None:
+        made = Detections.from_frames(times, [past.points for past in self._history])
+        noise = [past.covariances for past in self._history if past.covariances is not None]
+        if len(noise) < len(times) or not noise:
             return made
-        return Detections(
-            times=made.times, offsets=made.offsets, points=made.points,
-            covariances=np.concatenate(noise),
-        )  # fmt: skip
-
-    @property
-    def span(self) -> float:
-        """Seconds of the frames of `recent`."""
-        return self._history[-1].time - self._history[0].time if self._history else 0.0
+        return replace(made, covariances=np.concatenate(noise))
 
     def replace_model(self, model: TrackingModel) -> None:
         """Begin to track with another model."""
@@ -221,7 +215,9 @@ class LiveTracker:
         self.n_models += 1
 
     def _switchable_state(self) -> SwitchableState | None:
-        return self._state.tracks if isinstance(self._state, NamedState) else self._state
+        state = self._state.tracks if isinstance(self._state, NamedState) else self._state
+        assert state is None or isinstance(state, SwitchableState)
+        return state
 
     @property
     def n_names(self) -> int:

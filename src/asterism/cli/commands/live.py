@@ -104,9 +104,7 @@ def live(
     prints = not (quiet or json) and "-" not in (to or [])
     for sink in sinks:
         if isinstance(sink, PageSink):
-            sink.on_address = lambda address: console(stderr=True).print(
-                f"page: {address}", markup=False, soft_wrap=True
-            )
+            sink.on_address = _print_address
     with _stop_signals() as stop, _status(quiet=quiet or json) as status:
         result = run(
             source,
@@ -124,6 +122,10 @@ def live(
         print_json({"source": source, "sinks": to or [], **numbers, "model": learnt})
     elif prints:
         print_table(_rows(result), title="Stream")
+
+
+def _print_address(address: str) -> None:
+    console(stderr=True).print(f"page: {address}", markup=False, soft_wrap=True)
 
 
 def _rows(run: am.live.LiveRun) -> list[tuple[str, str]]:

@@ -63,11 +63,10 @@ def decode_line(line: bytes) -> tuple[int, float, NDArray[np.float64]]:
     if not isinstance(found, dict):
         raise PacketError("a line that is no JSON object")
     record = cast("dict[str, Any]", found)
-    number, time, points = (record.get(key) for key in ("frame", "time", "points"))
-    if not _is_number(number) or not -(2**62) < number < 2**62 or int(number) != number:
+    number, time = _number(record, "frame"), _number(record, "time")
+    if not -(2**62) < number < 2**62 or int(number) != number:
         raise PacketError("a frame that is no whole number")
-    if not _is_number(time):
-        raise PacketError("a time that is no number")
+    points = record.get("points")
     if not isinstance(points, list):
         raise PacketError("points that are no list")
     rows = [row for row in cast("list[Any]", points) if row is not None]
@@ -83,13 +82,15 @@ def decode_line(line: bytes) -> tuple[int, float, NDArray[np.float64]]:
     return int(number), float(time), places
 
 
-def _is_number(value: Any) -> bool:
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return is_number and abs(value) < 1e300 and math.isfinite(value)
+def _number(record: dict[str, Any], key: str) -> float:
+    value = record.get(key)
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300:
+        return value
+    raise PacketError(f"a {key} that is no number")
 
 
 def encode_line(frame: LiveFrame) -> bytes:
-    """Write a frame as a line, with the line feed.
+    r"""Write a frame as a line, with the line feed.
 
     Parameters
     ----------

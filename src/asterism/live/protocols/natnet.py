@@ -197,7 +197,7 @@ def text_bytes(text: str) -> bytes:
 
 
 def encode_message(kind: Message, body: bytes = b"") -> bytes:
-    """Make a packet.
+    r"""Make a packet.
 
     Raises
     ------

@@ -374,7 +374,8 @@ def decode_2d(body: bytes | memoryview, order: str = "<") -> list[NDArray[np.flo
     if len(body) < 8:
         raise PacketError("a component without a whole header")
     (n_cameras,) = struct.unpack_from(f"{order}I", body)
-    dtype, at, cameras = _IMAGE_ROW[order], 8, list[NDArray["np.float64"]]()
+    dtype, at = _IMAGE_ROW[order], 8
+    cameras: list[NDArray[np.float64]] = []
     for _ in range(n_cameras):
         if len(body) < at + 5:
             raise PacketError("a component with fewer cameras than it states")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 from xml.etree import ElementTree
 
@@ -25,6 +26,7 @@ SECTIONS = (
 """Lower-case names of the sections that clients may ask for."""
 _COLOUR = "16777215"  # white: three bytes, red lowest
 _LONGEST = 4 * 2**20  # characters
+_NOT_IN_XML = re.compile("[^\\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 class Parameters(NamedTuple):
@@ -123,7 +125,7 @@ def _general(root: ElementTree.Element, rate: float) -> None:
 
 
 def _add(parent: ElementTree.Element, tag: str, text: str) -> None:
-    ElementTree.SubElement(parent, tag).text = "".join(c for c in text if c >= " ")
+    ElementTree.SubElement(parent, tag).text = _NOT_IN_XML.sub("", text)
 
 
 def read_parameters(text: str) -> Parameters:
@@ -145,7 +147,7 @@ def read_parameters(text: str) -> Parameters:
     Parameters(rate=240.0, names=('LASI',))
     """
     # An entity that refers to entities could grow without bound.
-    if len(text) > _LONGEST or "<!" in text:
+    if len(text) > _LONGEST or "<!DOCTYPE" in text:
         raise PacketError("settings that are too long or define entities")
     try:
         root = ElementTree.fromstring(text)

@@ -33,8 +33,8 @@ class ServedFrame:
     Examples
     --------
     >>> import numpy as np
-    >>> ServedFrame(
-    ...     number=1, time=0.01, markers=np.zeros((2, 3)), points=np.ones((1, 3)), ids=np.array([7]))
+    >>> markers, points = np.zeros((2, 3)), np.ones((1, 3))
+    >>> ServedFrame(number=1, time=0.01, markers=markers, points=points, ids=np.array([7]))
     ServedFrame(number=1, time=0.01, markers=array (2, 3), points=array (1, 3), ids=[7])
     """
 

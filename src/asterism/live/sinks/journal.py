@@ -52,10 +52,11 @@ def frame_record(frame: LiveFrame, known: dict[int, str]) -> bytes:
     known : dict of int to str
         Names by label that earlier records state; new ones are added.
     """
-    new: dict[int, str] = {}
-    for label, name in zip(frame.labels.tolist(), frame.names or (), strict=False):
-        if name is not None and label >= 0 and known.get(label) != name:
-            new[label] = name
+    new = {
+        label: name
+        for label, name in zip(frame.labels.tolist(), frame.names or (), strict=False)
+        if name is not None and label >= 0 and known.get(label) != name
+    }
     known |= new
     names = json.dumps(new).encode() if new else b""
     points = np.ascontiguousarray(frame.points, "<f8").tobytes()
@@ -148,7 +149,9 @@ def _tracks(
         points=np.concatenate([np.empty((0, 3)), *points]),
     )
     given: list[str] = list(header.get("names") or ())
-    joined, track_names = _joined(detections, np.concatenate([np.empty(0, np.int64), *labels]), names, given)
+    joined, track_names = _joined(
+        detections, np.concatenate([np.empty(0, np.int64), *labels]), names, given
+    )
     return Tracks(detections=detections, labels=joined, names=track_names)
 
 
@@ -158,7 +161,7 @@ def _joined(
     names: dict[int, str],
     given: list[str],
 ) -> tuple[NDArray[np.int64], tuple[str | None, ...]]:
-    """Number the tracks: first those of the marker set, then others as they appear."""
+    """Give the tracks numbers: first those of the marker set, then others as they appear."""
     found: dict[str | int, int] = {name: k for k, name in enumerate(given)}
     known, first, index = np.unique(labels, return_index=True, return_inverse=True)
     number = np.full(len(known), -1, dtype=np.int64)

@@ -76,4 +76,3 @@ class LslSink:
     def close(self) -> None:
         """End the stream."""
         self._outlet = None
-

@@ -40,8 +40,8 @@ def parse_sink(text: str) -> Sink:
         ``qtm://[HOST][:PORT]`` and ``natnet://[HOST][:PORT][?version=…&multicast=…]`` are servers
         on an interface, by default for this machine only. ``osc://HOST:PORT`` and
         ``udp://HOST:PORT`` send datagrams, ``lsl://STREAM`` publishes a stream, ``page://:PORT`` is
-        a page in the browser, ``-`` is standard output, and a file
-        ends in ``.jsonl``, ``.csv`` or ``.c3d``.
+        a page in the browser, ``-`` is standard output, and a file ends in ``.jsonl``, ``.csv`` or
+        ``.c3d``.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """Sink that records a C3D, of which a crash loses nothing but the frame that is being written.
 
 A C3D states its number of points and frames at the beginning, so it cannot grow. The frames go to a
-journal beside it, which becomes the C3D when the sink is closed. After a crash the journal is there,
-and the next recording with the same name, or `recover`, makes a C3D of it.
+journal beside it, which becomes the C3D when the sink is closed. After a crash the journal is
+there, and the next recording with the same name, or `recover`, makes a C3D of it.
 """
 
 from __future__ import annotations

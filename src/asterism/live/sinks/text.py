@@ -6,7 +6,6 @@ import os
 import queue
 import sys
 import threading
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from asterism.errors import SinkError
@@ -15,6 +14,7 @@ from asterism.live.sinks.osc import connected
 
 if TYPE_CHECKING:
     import socket
+    from pathlib import Path
 
     from asterism.live.frame import LiveFrame, StreamHeader
 

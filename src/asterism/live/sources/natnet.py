@@ -7,6 +7,7 @@ import select
 import socket
 import struct
 import time
+from collections import deque
 from typing import TYPE_CHECKING
 
 from asterism.errors import SourceError, SourceLost
@@ -33,6 +34,7 @@ _CONNECT_SECONDS, _TRIES = 1.0, 5
 _ALIVE_SECONDS = 1.0  # between messages that keep a unicast client subscribed
 _SILENT_SECONDS = 5.0  # without any packet, after which the server counts as lost
 _READ = 65_536
+_EARLY = 1024  # frames that may arrive while the source connects
 
 
 class NatNetSource:
@@ -63,6 +65,7 @@ class NatNetSource:
         self._command: socket.socket | None = None
         self._data: socket.socket | None = None
         self._version = VERSIONS[-1]
+        self._early: deque[tuple[bytes, float]] = deque(maxlen=_EARLY)
         self._kept_alive = self._heard = 0.0
 
     def open(self) -> None:
@@ -74,6 +77,7 @@ class NatNetSource:
             If the server cannot be reached, or speaks NatNet 2.
         """
         self.close()
+        self._early.clear()
         try:
             self._command = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self._command.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2**20)
@@ -102,24 +106,27 @@ class NatNetSource:
         self._kept_alive = self._heard = time.monotonic()
 
     def _read_rate(self) -> None:
-        body = self._ask(encode_message(Message.REQUEST, b"FrameRate\0"), Message.RESPONSE)
+        body = self._ask(encode_message(Message.REQUEST, b"FrameRate\0"), Message.RESPONSE, 1)
         if len(body) == 4:
             (rate,) = struct.unpack("<f", body)
             self.rate = rate if 0 < rate < 1e6 else 0.0
 
-    def _ask(self, message: bytes, kind: Message) -> memoryview:
-        """Send a message until its answer arrives."""
+    def _ask(self, message: bytes, kind: Message, tries: int = _TRIES) -> memoryview:
+        """Send a message until its answer arrives; frames that arrive before it are kept."""
         assert self._command is not None
-        for _ in range(_TRIES):
+        for _ in range(tries):
             self._command.send(message)
             end = time.monotonic() + _CONNECT_SECONDS
             while (left := end - time.monotonic()) > 0:
                 if not select.select([self._command], [], [], left)[0]:
                     break
+                packet = self._command.recv(_READ)
                 with contextlib.suppress(PacketError):
-                    found, body = decode_message(self._command.recv(_READ))
+                    found, body = decode_message(packet)
                     if found == kind:
                         return body
+                    if found == Message.FRAME:
+                        self._early.append((packet, time.perf_counter()))
         raise TimeoutError(0, "no answer")
 
     def receive(self, timeout: float) -> SourceFrame | None:
@@ -134,6 +141,10 @@ class NatNetSource:
         while True:
             if self._command is None:
                 raise SourceLost(f"{self.name}: is not open.")
+            while self._early:
+                found = self._decoded(*self._early.popleft())
+                if found is not None:
+                    return found
             self._keep_alive()
             left = min(max(0.0, end - time.monotonic()), _ALIVE_SECONDS)
             sockets = [s for s in (self._data, self._command) if s is not None]

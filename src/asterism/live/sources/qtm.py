@@ -80,8 +80,10 @@ class QtmSource:
             first, last = _VERSIONS[-1], _VERSIONS[0]
             raise SourceError(f"{self.name}: speaks none of the versions {first} to {last}.")
         kind, text = self._ask("GetParameters General 3D")
+        self.rate = 0.0
         if kind == Packet.XML:
-            self.rate = read_parameters(text).rate
+            with contextlib.suppress(PacketError):  # the stream is of use without its rate
+                self.rate = read_parameters(text).rate
         self._send("StreamFrames AllFrames 3D 3DNoLabels")
 
     def _send(self, command: str) -> None:

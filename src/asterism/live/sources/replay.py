@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from asterism.errors import FormatError, SourceError
 from asterism.io import read
 from asterism.live.frame import SourceFrame
 from asterism.live.sources.base import EndOfSource
-from asterism.model import Capture
 
 if TYPE_CHECKING:
-    from asterism.model import Detections
+    from pathlib import Path
+
+    from asterism.model import Capture
 
 __all__ = ["ReplaySource"]
 
@@ -37,10 +37,9 @@ class ReplaySource:
         self.rate = 0.0
         self.waits = math.isinf(speed)
         self.faults: dict[str, int] = {}
-        self._capture: Detections | None = None
+        self._capture: Capture | None = None
         self._next = 0
         self._begin = 0.0
-        self._first_frame = 0
 
     def open(self) -> None:
         """Read the capture and begin at its first frame.
@@ -57,7 +56,6 @@ class ReplaySource:
         if capture.n_axes != 3:
             raise SourceError(f"{self._path}: expected a capture of 3-D points, found 2-D.")
         self.rate = round(1 / capture.step, 6) if capture.step else 0.0
-        self._first_frame = capture.first_frame if isinstance(capture, Capture) else 0
         self._capture, self._next = capture, 0
         self._begin = time.perf_counter()
 
@@ -82,7 +80,7 @@ class ReplaySource:
         self._next += 1
         rows = slice(int(d.offsets[t]), int(d.offsets[t + 1]))
         return SourceFrame(
-            number=self._first_frame + t,
+            number=d.first_frame + t,
             time=float(d.times[t]),
             points=d.frame(t),
             received=time.perf_counter(),
