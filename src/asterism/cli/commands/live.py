@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from asterism.checks import check_number
-from asterism.cli.console import Json, Quiet, console, print_json, print_table
+from asterism.cli.console import Json, Overwrite, Quiet, console, print_json, print_table
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -70,6 +70,7 @@ def live(
     method: _Method = None,
     option: _Options = None,
     seed: _Seed = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -89,7 +90,7 @@ def live(
         asterism live trial.c3d?speed=max --to tracked.csv
     """
     from asterism.cli.commands.track import made_method
-    from asterism.cli.outputs import read_model
+    from asterism.cli.outputs import check_ending, check_outputs, read_model
     from asterism.live import run
     from asterism.live.sinks.page import PageSink
     from asterism.live.sinks.parse import parse_sink
@@ -98,19 +99,30 @@ def live(
 
     check_number("--seed", seed or 0, above=0, closed=True, integer=True)
     chosen = made_method(method, option or [])
+    files = {text: Path(text) for text in to or [] if "://" not in text and text != "-"}
+    for path in files.values():
+        check_ending("--to", path, ".c3d", ".csv", ".jsonl")
+    replayed = None if "://" in source or source == "-" else Path(source.partition("?")[0])
+    check_outputs(
+        {f"--to {text}": path for text, path in files.items()},
+        [replayed, model, *(markers or [])], overwrite=overwrite,
+    )  # fmt: skip
     sinks = [parse_sink(text) for text in to or []]
+    tracking_model = None if model is None else read_model(model)
     sets = [read_markers(each) for each in markers or []]
     # Standard output may be a sink.
     prints = not (quiet or json) and "-" not in (to or [])
     for sink in sinks:
         if isinstance(sink, PageSink):
             sink.on_address = _print_address
+    for path in files.values():
+        path.unlink(missing_ok=True)
     with _stop_signals() as stop, _status(quiet=quiet or json) as status:
         result = run(
             source,
             sinks,
             method=None if chosen is None else Stitched(method=chosen),
-            model=read_model(model) if model else None,
+            model=tracking_model,
             marker_set=sets,
             seed=seed,
             stop=stop,
