@@ -266,3 +266,26 @@ def test_a_marker_set_names_the_points(scene):
     named = [name for name in last.names if name]
     assert len(named) == len(set(named)) > 35
     assert set(named) <= set(marker_set.names)
+
+
+@pytest.mark.parametrize("given", [True, False], ids=["model", "no model"])
+def test_a_marker_set_is_learnt_from_the_first_seconds(scene, given, monkeypatch):
+    monkeypatch.setattr("asterism.live.live_tracker.LEARN_SECONDS", 2.0)
+    made, model = scene
+    run, frames = followed(frames_of(made.detections), model if given else None, marker_set="learn")
+    assert run.n_names > 40
+    first = next(f for f in frames if f.names is not None)
+    assert first.time == pytest.approx(2.0 if given else 4.0, abs=0.2)
+    # A marker keeps its name.
+    marker_of = {}
+    d = made.detections
+    n_right = n_all = 0
+    for frame in frames[first.number :]:
+        truth = made.labels[d.offsets[frame.number] : d.offsets[frame.number + 1]]
+        for name, marker in zip(frame.names, truth.tolist(), strict=True):
+            if name is not None and marker >= 0:
+                n_all += 1
+                n_right += marker_of.setdefault(name, marker) == marker
+    assert n_all > 5000
+    assert n_right > 0.97 * n_all
+    assert max(f.names is None for f in frames[first.number :]) is False

@@ -5,14 +5,14 @@ from __future__ import annotations
 import logging
 from collections import deque
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from asterism.errors import SolverLimit
 from asterism.live.switchable import Switchable, SwitchableState, ids_by_votes
-from asterism.model import Detections
-from asterism.tracking import Named, NamedState
+from asterism.model import Detections, Tracks
+from asterism.tracking import Named, NamedState, learn_marker_set
 from asterism.tracking.methods import Update
 
 if TYPE_CHECKING:
@@ -29,8 +29,12 @@ __all__ = ["LiveTracker"]
 
 log = logging.getLogger(__name__)
 
+LEARN_SECONDS = 5.0
+"""Seconds of tracks from which a marker set is learnt."""
 HISTORY = 10.0
 """Seconds of frames from which the model is refined, and which a refined model tracks first."""
+MIN_MARKERS = 4
+"""Smallest number of markers of a learnt marker set."""
 MAX_EMPTY = 130
 """Largest number of missing frames that are tracked as frames without points, as a recording has
 them. By then every motion is too old to predict."""
@@ -84,8 +88,9 @@ class LiveTracker:
     ----------
     method : Method
         Method that tracks.
-    marker_sets : sequence of MarkerSet
-        Marker sets that name the tracks; empty for none.
+    marker_sets : sequence of MarkerSet, or "learn"
+        Marker sets that name the tracks; empty for none. A set that is learnt has the names M1,
+        M2, … for the markers of the first `LEARN_SECONDS` seconds.
     model : TrackingModel, optional
         Model, if it is known.
     seed : int, optional
@@ -97,7 +102,7 @@ class LiveTracker:
     def __init__(
         self,
         method: Method[Any],
-        marker_sets: Sequence[MarkerSet],
+        marker_sets: Sequence[MarkerSet] | Literal["learn"],
         model: TrackingModel | None,
         seed: int | None,
         faults: Faults,
@@ -105,11 +110,12 @@ class LiveTracker:
         self._method, self._seed, self._faults = method, seed, faults
         self._inner = Switchable(method=method)
         self._outer: Method[Any] = self._inner
-        if marker_sets:
+        self._learns_names = marker_sets == "learn"
+        if not isinstance(marker_sets, str) and marker_sets:
             self._outer = Named(marker_sets=tuple(marker_sets), method=self._inner)
         self.model = model
         self._state: Any = None if model is None else self._outer.init(model, seed=seed)
-        self._keeps_history = model is None
+        self._refines = model is None
         self._history: deque[_Past] = deque()
         self._n_forgotten = 0
         self._rehearsal: _Rehearsal | None = None
@@ -154,7 +160,7 @@ class LiveTracker:
                 self._faults.add("too_dense", f"a frame cannot be tracked ({error})")
                 return update
         self._last_time = time
-        if self._keeps_history:
+        if self._refines or self._learns_names:
             self._history.append(_Past(time, points, covariances, update.labels))
             # What a rehearsal still has to track is kept.
             n_needed = 0 if self._rehearsal is None else self._rehearsal.n_done
@@ -190,6 +196,38 @@ class LiveTracker:
             return True
         self._switch(rehearsal)
         return False
+
+    def learn_names(self) -> bool:
+        """Learn a marker set when that is wanted and there are enough frames; return whether."""
+        history, state = self._history, self._state
+        if not self._learns_names or self._rehearsal is not None or state is None or not history:
+            return False
+        last = history[-1].time
+        recent = [p for p in history if p.time > last - LEARN_SECONDS]
+        # Before the first model no frame has labels.
+        if last - recent[0].time < 0.95 * LEARN_SECONDS or not (recent[0].labels >= 0).any():
+            return False
+        labels = np.concatenate([past.labels for past in recent])
+        ids, counts = np.unique(labels[labels >= 0], return_counts=True)
+        ids = ids[2 * counts > len(recent)]
+        if len(ids) < MIN_MARKERS:
+            return False
+        names = {int(identity): f"M{n}" for n, identity in enumerate(ids, 1)}
+        place = np.searchsorted(ids, labels).clip(max=len(ids) - 1)
+        made = Detections.from_frames([p.time for p in recent], [p.points for p in recent])
+        learnt = learn_marker_set(
+            Tracks(
+                detections=made,
+                labels=np.where(ids[place] == labels, place, -1),
+                names=tuple(names.values()),
+            )
+        )
+        self._outer = outer = Named(marker_sets=learnt, method=self._inner)
+        self._state = outer.begin(state, names, [(p.points, p.labels) for p in recent])
+        self._learns_names = False
+        if not self._refines:
+            history.clear()
+        return True
 
     def _switch(self, rehearsal: _Rehearsal) -> None:
         """Let the new model take over."""

@@ -7,7 +7,7 @@ import logging
 import math
 import threading
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from asterism.errors import AsterismError
 from asterism.live.clock import SourceClock
@@ -73,14 +73,15 @@ class LiveLoop:
         *,
         method: Method[Any],
         model: TrackingModel | None,
-        marker_sets: Sequence[MarkerSet],
+        marker_sets: Sequence[MarkerSet] | Literal["learn"],
         seed: int | None,
     ) -> None:
         self._source, self._sinks = source, list(sinks)
         self._faults = Faults(source.name)
         self._clock, self._latency = SourceClock(), LatencyHistogram()
         self._tracker = LiveTracker(method, marker_sets, model, seed, self._faults)
-        self._names = tuple(name for made in marker_sets for name in made.full_names)
+        known = () if isinstance(marker_sets, str) else marker_sets
+        self._names = tuple(name for made in known for name in made.full_names)
         self._estimator: Estimator | None = None
         self._next_estimate = FIRST_SECONDS if model is None else math.inf
         self._first_time: float | None = None
@@ -222,6 +223,8 @@ class LiveLoop:
         """Begin an estimate of the model when it is due, and take up its result."""
         estimator, tracker = self._estimator, self._tracker
         assert estimator is not None
+        if tracker.learn_names():
+            log.info("%s: a marker set of %d names", self._source.name, tracker.n_names)
         if self._elapsed >= self._next_estimate and not estimator.is_busy:
             estimator.start(tracker.recent())
             late = REFINE[-1] * (1 + self._elapsed // REFINE[-1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from asterism.checks import check_kind
 from asterism.errors import ParameterError
@@ -30,7 +30,7 @@ def run(
     *,
     method: Method[Any] | str | None = None,
     model: TrackingModel | None = None,
-    marker_set: MarkerSet | Sequence[MarkerSet] = (),
+    marker_set: MarkerSet | Sequence[MarkerSet] | Literal["learn"] = (),
     seed: int | None = None,
     stop: threading.Event | None = None,
     status: Callable[[LiveRun], Any] | None = None,
@@ -56,8 +56,10 @@ def run(
         occlusions; ``Stitched()`` by default. ``"gnn"`` takes half of its time.
     model : TrackingModel, optional
         Tracking model. It is not refined.
-    marker_set : MarkerSet or sequence of MarkerSet
-        Marker set of the subject, or of each subject, by which tracks are named.
+    marker_set : MarkerSet, sequence of MarkerSet, or "learn"
+        Marker set of the subject, or of each subject, by which tracks are named. "learn" learns one
+        from the first five seconds of tracks, with the names M1, M2, …, by which a marker that
+        comes back as a new track is found again.
     seed : int, optional
         Seed of the methods that draw random numbers.
     stop : threading.Event, optional
@@ -92,9 +94,12 @@ def run(
         raise ParameterError("method", "a method for streams", "mcmcda with window=None")
     if model is not None:
         check_kind("model", model, TrackingModel, "am.estimate_model(detections).model")
-    sets = (marker_set,) if isinstance(marker_set, MarkerSet) else tuple(marker_set)
-    for made in sets:
-        check_kind("marker_set", made, MarkerSet, "am.read_marker_set(path)")
+    sets = (marker_set,) if isinstance(marker_set, MarkerSet) else marker_set
+    if not isinstance(sets, str):
+        for made in sets:
+            check_kind("marker_set", made, MarkerSet, "am.read_marker_set(path)")
+    elif sets != "learn":
+        raise ParameterError("marker_set", 'a marker set, or "learn"', repr(sets))
     loop = LiveLoop(
         parse_source(source) if isinstance(source, str) else source,
         [parse_sink(sink) if isinstance(sink, str) else sink for sink in sinks],

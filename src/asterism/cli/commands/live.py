@@ -42,7 +42,10 @@ _To = Annotated[
 _Markers = Annotated[
     list[Path] | None,
     typer.Option(
-        "--markers", metavar="SET", help="Marker set that names the tracks; one for each subject."
+        "--markers",
+        metavar="SET",
+        help="Marker set that names the tracks, one for each subject; or learn, for a set of the "
+        "names M1, M2, … from the first five seconds.",
     ),
 ]
 _Model = Annotated[
@@ -109,7 +112,8 @@ def live(
     )  # fmt: skip
     sinks = [parse_sink(text) for text in to or []]
     tracking_model = None if model is None else read_model(model)
-    sets = [read_markers(each) for each in markers or []]
+    learns = [str(each) for each in markers or []] == ["learn"]
+    sets = "learn" if learns else [read_markers(each) for each in markers or []]
     # Standard output may be a sink.
     prints = not (quiet or json) and "-" not in (to or [])
     for sink in sinks:

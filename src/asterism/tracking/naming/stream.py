@@ -18,7 +18,7 @@ from asterism.tracking.naming.live_names import LiveNames
 from asterism.tracking.naming.name import name_tracks
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -135,6 +135,45 @@ class Named(Method[NamedState]):
     def _sets(self) -> tuple[MarkerSet, ...]:
         sets = self.marker_sets
         return (sets,) if isinstance(sets, MarkerSet) else tuple(sets)
+
+    def begin(
+        self,
+        tracks: MethodState,
+        names: Mapping[int, str],
+        recent: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]],
+    ) -> NamedState:
+        """Return a state in which the tracks have names already, without a search for them.
+
+        Parameters
+        ----------
+        tracks : MethodState
+            State of the method that tracks.
+        names : mapping of int to str
+            Name of each named track, by its label; their probability is 1.
+        recent : sequence of (points, labels)
+            The last frames, by which the subjects are measured.
+
+        Returns
+        -------
+        NamedState
+
+        Examples
+        --------
+        >>> import asterism as am
+        >>> truth = am.simulate.fingers(frames=60, seed=1)
+        >>> method = am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN())
+        >>> state = method.method.init(am.estimate_model(truth.detections).model)
+        >>> d = truth.detections
+        >>> recent = [(d.frame(t), truth.labels[d.offsets[t] : d.offsets[t + 1]]) for t in range(9)]
+        >>> method.begin(state, dict(enumerate(truth.names)), recent)
+        NamedState(23 names)
+        """
+        return NamedState(
+            tracks=tracks,
+            names=dict(names),
+            probabilities=dict.fromkeys(names, 1.0),
+            live=LiveNames.of(self._sets, names, recent),
+        )
 
     def init(self, model: TrackingModel, *, n_axes: int = 3, seed: int | None = None) -> NamedState:
         """Return the state before the first frame.
