@@ -56,12 +56,11 @@ class TrackStates:
     >>> d = am.simulate.cube(frames=20, seed=1).detections
     >>> method = am.GNN()
     >>> state = method.init(am.estimate_model(d).model)
-    >>> for time, points in d:
-    ...     state, update = method.step(state, time, points)
-    >>> state, update = method.step(state, d.times[-1] + d.step, points[1:])
+    >>> state, labels, _ = method.run(state, d.part(0, 19))
+    >>> state, update = method.step(state, d.times[19], d.frame(19)[1:])
     >>> tracks = update.tracks
-    >>> tracks, tracks.ids[~tracks.is_seen], tracks.positions.shape
-    (TrackStates(8 tracks, 1 occluded), array([0]), (8, 3))
+    >>> tracks, tracks.ids[~tracks.is_seen].tolist(), tracks.positions.shape
+    (TrackStates(8 tracks, 1 occluded), [0], (8, 3))
     >>> bool((tracks.existence > 0.99).all())
     True
     """
