@@ -86,9 +86,13 @@ def run(
     >>> stop = threading.Event()  # stop.set() in another thread ends the call
     >>> am.live.run("qtm://192.168.0.10", ["page://:8000"], stop=stop)  # doctest: +SKIP
     """
-    chosen = method
-    if not isinstance(method, Method):
-        chosen = Stitched() if method is None else Stitched(method=method_by_name(method))
+    chosen: Method[Any]
+    if method is None:
+        chosen = Stitched()
+    elif isinstance(method, str):
+        chosen = Stitched(method=method_by_name(method))
+    else:
+        chosen = method
     check_kind("method", chosen, Method, 'am.GNN(), or "gnn"')
     if isinstance(chosen, MCMCDA) and chosen.window is None:
         raise ParameterError("method", "a method for streams", "mcmcda with window=None")
