@@ -36,6 +36,7 @@ FILES = {
     "corrupt --truth": ("corrupt truth.csv -o new.csv --truth OUT", ".csv"),
     "simulate --out": ("simulate cube -o OUT", ".csv"),
     "simulate --truth": ("simulate cube -o new.csv --truth OUT", ".csv"),
+    "serve --truth": ("serve --scene cube --truth OUT", ".csv"),
     "reconstruct -o": ("reconstruct seen.csv --rig rig.toml -o OUT", ".csv"),
     "reconstruct --truth": ("reconstruct seen.csv --rig rig.toml -o new.csv --truth OUT", ".csv"),
     "camera convert": ("camera convert rig.toml OUT", ".toml"),
@@ -191,9 +192,10 @@ def test_an_output_that_nobody_named_is_safe_too(here, idle, capsys, line):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_overwrite_replaces_the_file(here, capsys, name):
+def test_overwrite_replaces_the_file(here, capsys, monkeypatch, name):
     if name == "view":
         pytest.importorskip("rerun")
+    monkeypatch.setattr(am.live, "serve", lambda *_, **__: 0)  # it would wait for a client
     line, ending = FILES[name]
     Path(f"old{ending}").write_text("precious")
     assert main([*line.replace("OUT", f"old{ending}").split(), "--overwrite", "--quiet"]) == 0

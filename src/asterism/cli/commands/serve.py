@@ -73,7 +73,9 @@ _Corruption = Annotated[
 ]
 _Truth = Annotated[
     Path | None,
-    typer.Option(help="File for the points as served, with true names.", show_default=False),
+    typer.Option(
+        "--truth", help="File for the points as served, with true names.", show_default=False
+    ),
 ]
 _Seed = Annotated[int | None, typer.Option(help="Random seed.", show_default="0")]
 
@@ -93,7 +95,7 @@ def serve(
     markers: _Markers = None,
     option: _Options = None,
     corruption: _Corruption = None,
-    truth: _Truth = None,
+    save: _Truth = None,
     seed: _Seed = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
@@ -120,23 +122,23 @@ def serve(
     if (capture is None) == (scene is None):
         got = "none" if capture is None else "both"
         raise ParameterError("serve", "a capture, or a scene by --scene", got)
-    if truth is not None:
+    if save is not None:
         with as_options({"path": "--truth"}):
-            format_to_write(truth, None)
-    check_outputs({"--truth": truth}, [capture], overwrite=overwrite)
+            format_to_write(save, None)
+    check_outputs({"--truth": save}, [capture], overwrite=overwrite)
     server = _server(system, host, port, version, multicast)
     given = {"frames": frames, "rate": rate, "markers": markers}
     tracks, about = _tracks(
         capture, scene, given, option or [], corruption or [], seed, labelled=labelled
     )
-    if truth is not None:
-        am.write(tracks, truth)
+    if save is not None:
+        am.write(tracks, save)
 
     def begin() -> None:
         address = f"{server.host}:{server.port}"
         record: dict[str, Any] = {"address": address, "protocol": system.value, **about}
-        if truth is not None:
-            record["truth"] = str(truth)
+        if save is not None:
+            record["truth"] = str(save)
         if json:
             print_json(record)
         elif not quiet:
@@ -145,7 +147,7 @@ def serve(
                 (f"{system.value} server", address),
                 ("frames", f"{d.n_frames} at {server.rate:g} Hz"),
                 ("labelled markers", len(server.names)),
-                *([] if truth is None else [("truth", truth)]),
+                *([] if save is None else [("truth", save)]),
                 ("stop with", "Ctrl-C"),
             ]
             print_table(rows)

@@ -117,6 +117,10 @@ class NatNetServer:
         self._thread: threading.Thread | None = None
         self._latest: ServedFrame | None = None
 
+    def __repr__(self) -> str:
+        n, k = len(self.names), self.n_clients
+        return f"NatNetServer({self.host}:{self.port}, {n} markers, {k} clients)"
+
     @property
     def n_clients(self) -> int:
         """Number of clients that have connected and are alive."""

@@ -95,6 +95,10 @@ class QtmServer:
         self._thread: threading.Thread | None = None
         self._is_closing = False
 
+    def __repr__(self) -> str:
+        n, k = len(self.names), self.n_clients
+        return f"QtmServer({self.host}:{self.port}, {n} markers, {k} clients)"
+
     @property
     def n_clients(self) -> int:
         """Number of connected clients."""
