@@ -289,3 +289,14 @@ def test_a_marker_set_is_learnt_from_the_first_seconds(scene, given, monkeypatch
     assert n_all > 5000
     assert n_right > 0.97 * n_all
     assert max(f.names is None for f in frames[first.number :]) is False
+
+
+def test_after_a_long_pause_tracks_begin_anew_and_get_their_names_again(scene):
+    made, model = scene
+    marker_set = am.learn_marker_set(am.simulate.person(frames=200, rate=RATE, seed=3))
+    frames = paused(frames_of(made.detections), 300, 120.0, restarts=False)
+    _, found = followed(frames, model, marker_set=marker_set)
+    before, after = found[299], found[-1]
+    assert not set(before.tracks.ids.tolist()) & set(after.tracks.ids.tolist())
+    assert 45 < len(after.tracks) < 65
+    assert len(set(after.names) & set(before.names) - {None}) > 35

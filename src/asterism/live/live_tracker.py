@@ -33,6 +33,8 @@ LEARN_SECONDS = 5.0
 """Seconds of tracks from which a marker set is learnt."""
 HISTORY = 10.0
 """Seconds of frames from which the model is refined, and which a refined model tracks first."""
+FORGET_SECONDS = 60.0
+"""Length of a pause after which no track continues; a marker set still finds the names."""
 MIN_MARKERS = 4
 """Smallest number of markers of a learnt marker set."""
 MAX_EMPTY = 130
@@ -139,7 +141,9 @@ class LiveTracker:
         """
         frame = accepted.frame
         begin = self._last_time
-        if begin is not None:
+        if begin is not None and frame.time - begin > FORGET_SECONDS:
+            self._forget()
+        elif begin is not None:
             for k in range(1, min(accepted.n_missing, MAX_EMPTY) + 1):
                 self._take(begin + k * period, np.empty((0, frame.points.shape[1])), None)
         return self._take(frame.time, frame.points, frame.covariances)
@@ -170,6 +174,17 @@ class LiveTracker:
                 self._history.popleft()
                 self._n_forgotten += 1
         return update
+
+    def _forget(self) -> None:
+        """Begin without tracks; new ones get identities that were never used."""
+        before = self._switchable_state()
+        if before is None or self.model is None:
+            return
+        state = SwitchableState(
+            inner=self._method.init(self.model, seed=self._seed),
+            ids=np.empty(0, dtype=np.int64), next_id=before.next_id, n_before=before.n_seen,
+        )  # fmt: skip
+        self._state = NamedState(tracks=state) if isinstance(self._state, NamedState) else state
 
     def recent(self) -> Detections:
         """Return the frames of the last seconds."""

@@ -97,7 +97,8 @@ class Named(Method[NamedState]):
     It corresponds to `name_tracks` for a whole capture. The first names come after half a second,
     from any posture and movement; that step takes as long as naming a short capture. Each later
     frame examines one named track, and one that has no name: a track that clearly is another
-    marker is renamed, and a marker that comes back as a new track gets its name again.
+    marker is renamed, and a marker that comes back as a new track gets its name again. When no
+    named track is left, as after a long pause, the names are searched as at first.
 
     Parameters
     ----------
@@ -220,6 +221,8 @@ class Named(Method[NamedState]):
             tracks=tracks, names=state.names, probabilities=state.probabilities, recent=recent,
             live=state.live, next_search=state.next_search, wait=state.wait,
         )  # fmt: skip
+        if after.live is not None and _has_lost_all(after):
+            after = replace(after, live=None, names={}, probabilities={})
         if after.live is not None:
             after = self._followed(after)
         elif time >= state.next_search:
@@ -269,6 +272,20 @@ class Named(Method[NamedState]):
             if found is not None:
                 names[label], probabilities[label] = found
         return replace(state, live=live, names=names, probabilities=probabilities)
+
+
+def _has_lost_all(state: NamedState) -> bool:
+    """Return whether the tracks of half a second are all without a name, as after a long pause.
+
+    Tracks are examined beside named ones. Without any, all names are searched again.
+    """
+    recent = state.recent
+    if len(recent) < MIN_FRAMES or recent[-1].time - recent[0].time < 0.9 * FIRST:
+        return False
+    if any(label in state.names for label in recent[-1].labels.tolist()):
+        return False
+    labels = {label for frame in recent for label in frame.labels.tolist()}
+    return not labels & state.names.keys()
 
 
 def _tracks_of(update: Update, state: NamedState) -> TrackStates | None:
