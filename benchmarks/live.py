@@ -107,6 +107,20 @@ def receive(address: str, got: SynchronizedArray[float], begin: Any) -> None:
             last = time.perf_counter() + 3
 
 
+def wait_for(address: str) -> None:
+    """Wait until a server answers."""
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        source = parse_source(address)
+        try:
+            source.open()
+        except am.AsterismError:
+            time.sleep(0.2)
+            continue
+        source.close()
+        return
+
+
 ROUTES = {
     "JSON over UDP": ("udp://127.0.0.1:{a}", "udp://127.0.0.1:{b}"),
     "Qualisys RT": ("qtm://127.0.0.1:{a}", "qtm://127.0.0.1:{b}"),
@@ -133,7 +147,7 @@ def measured(name: str, options: argparse.Namespace) -> list[str]:
     stop = threading.Event()
     threading.Thread(target=lambda: (client.join(), stop.set()), name="end", daemon=True).start()
     if name != "JSON over UDP":
-        time.sleep(6)  # a server must be there before its client
+        wait_for(inward)
     before = time.process_time()
     run = am.live.run(inward, [outward], method=options.method, model=model, stop=stop)
     spent = (time.process_time() - before) / max(run.n_frames, 1)
