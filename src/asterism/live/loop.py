@@ -153,6 +153,7 @@ class LiveLoop:
                     n = int(is_late) + queue.n_dropped - n_dropped
                     n_dropped = queue.n_dropped
                     self._faults.add("late", "tracking is behind and frames are dropped", n)
+                    intake.dropped(n)
                 if is_late:
                     continue
                 accepted = intake.take(item)
