@@ -181,7 +181,7 @@ def instances():
         *am.io.CALIBRATION_FORMATS.values(), am.io.CALIBRATION_FORMATS, am.tracking.METHODS,
         am.ParameterError(LONG, LONG, LONG, LONG), am.FormatError(LONG, LONG, LONG, LONG),
         am.SolverLimit(LONG, 3, 2, LONG), am.AsterismError(LONG),
-        SourceError(LONG), SourceLost(LONG), SinkError(LONG), am.live.EndOfSource(LONG),
+        SourceError(LONG), SourceLost(LONG), SinkError(LONG), am.live.EndOfSource("qtm"),
         update.tracks, am.tracking.track_states(tracks, model=plain),
         am.live.LatencyHistogram(), am.live.LiveRun(source=LONG),
         am.live.SourceFrame(number=1, time=1 / 3, points=d.frame(0), received=1 / 3),
