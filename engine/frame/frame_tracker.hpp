@@ -134,7 +134,9 @@ class FrameTracker {
   template <typename Label>
   void begin_strictly(double time, std::span<const Point> points, Label&& label) {
     for (std::size_t j = 0; j < points.size(); ++j) {
-      LiveTrack<NoMore>& track = live_.begin(j, points[j], time, 0.0);
+      // Without a model of clutter the odds that the track is a marker are unknown.
+      LiveTrack<NoMore>& track =
+          live_.begin(j, points[j], time, std::numeric_limits<double>::quiet_NaN());
       track.pending = {};
       track.id = live_.next_id++;
       label(live_.so_far.n_seen + static_cast<std::int64_t>(j), track.id, 1.0);

@@ -2,6 +2,8 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
 
+#include <algorithm>
+#include <limits>
 #include <optional>
 #include <tuple>
 
@@ -87,6 +89,41 @@ nb::tuple step_stitcher(const LiveStitcher& before, const In<double>& F, const I
   return nb::make_tuple(std::move(after), array_of<std::int64_t>(own),
                         array_of<std::int64_t>(reported, &Change::first),
                         array_of<std::int64_t>(reported, &Change::second));
+}
+
+// Returns the states of the markers (see TrackArrays): those of the tracklets with these labels, and
+// of the markers without one, whose log odds are unknown.
+nb::tuple marker_states(LiveStitcher& self, const In<std::int64_t>& labels,
+                        const In<std::int64_t>& gaps, const In<double>& log_odds,
+                        const In<double>& means, const In<double>& covariances) {
+  const MotionModel& m = self.motion();
+  const std::size_t K = labels.size(), D = m.axis.D, n = m.axis.n;
+  require(labels.ndim() == 1 && gaps.size() == K && log_odds.size() == K,
+          "gaps and log_odds: one for each label");
+  require(means.size() == K * D * n && covariances.size() == K * n * n,
+          "means and covariances: shape (K, D, n) and (K, n, n)");
+  const std::vector<std::int32_t> markers = self.markers_of(flat(labels));
+  Places present;
+  std::vector<std::int32_t> known;
+  for (std::size_t k = 0; k < K; ++k) {
+    if (markers[k] < 0) continue;
+    known.push_back(markers[k]);
+    if (gaps.data()[k] > 0) continue;
+    AxisState state;
+    for (std::size_t d = 0; d < D; ++d)
+      std::copy_n(means.data() + (k * D + d) * n, n, state.x[d].begin());
+    present.set(markers[k], observed(m.axis, state));
+  }
+  std::sort(known.begin(), known.end());
+  const std::vector<LiveStitcher::UnseenMarker> unseen = self.unseen(present, known);
+  TrackArrays out(m, known.size() + unseen.size());
+  for (std::size_t k = 0; k < K; ++k)
+    if (markers[k] >= 0)
+      out.add(markers[k], gaps.data()[k], log_odds.data()[k], means.data() + k * D * n,
+              covariances.data() + k * n * n);
+  for (const LiveStitcher::UnseenMarker& one : unseen)
+    out.add(one.marker, one.gap, std::numeric_limits<double>::quiet_NaN(), one.state);
+  return out.give();
 }
 
 std::vector<RigidPair> to_pairs(const In<double>& a, const In<double>& b,
@@ -262,6 +299,8 @@ void bind_stitcher(nb::module_& module) {
            "options"_a, nb::kw_only(), "lag"_a)
       .def("step", &step_stitcher, "F"_a, "Q"_a, "points"_a, "labels"_a, "revised"_a,
            "revised_labels"_a)
+      .def("states", &marker_states, "labels"_a, "gaps"_a, "log_odds"_a, "means"_a,
+           "covariances"_a)
       .def_prop_ro("n_seen", &LiveStitcher::n_seen)
       .def_prop_ro("n_joins", &LiveStitcher::n_joins)
       .def_prop_ro("n_ghosts", &LiveStitcher::n_ghosts)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <chrono>
 #include <cstdint>
 #include <span>
@@ -110,6 +111,54 @@ inline std::pair<Out<double>, Out<double>> state_arrays(const MotionModel& m,
   }
   return {means.give({K, D, n}), covariances.give({K, n, n})};
 }
+
+// The states of K tracks, in two blocks of memory: one array for each would take longer than the
+// states themselves.
+class TrackArrays {
+ public:
+  TrackArrays(const MotionModel& m, std::size_t K)
+      : D_(m.axis.D), n_(m.axis.n), K_(K), whole_(2 * K), real_(K * (1 + D_ * n_ + n_ * n_)) {}
+
+  void add(std::int64_t id, std::int64_t gap, double log_odds, const AxisState& state) {
+    for (std::size_t d = 0; d < D_; ++d)
+      std::copy_n(state.x[d].begin(), n_, means() + (k_ * D_ + d) * n_);
+    std::copy_n(state.P.begin(), n_ * n_, covariances() + k_ * n_ * n_);
+    add(id, gap, log_odds);
+  }
+  void add(std::int64_t id, std::int64_t gap, double log_odds, const double* mean,
+           const double* covariance) {
+    std::copy_n(mean, D_ * n_, means() + k_ * D_ * n_);
+    std::copy_n(covariance, n_ * n_, covariances() + k_ * n_ * n_);
+    add(id, gap, log_odds);
+  }
+  // Returns (ids, gaps, log odds, means (K, D, n), covariances (K, n, n)).
+  nb::tuple give() {
+    assert(k_ == K_);
+    const auto owner = [](auto* raw) {
+      return nb::capsule(raw, [](void* p) noexcept { delete[] static_cast<decltype(raw)>(p); });
+    };
+    double *mean = means(), *covariance = covariances();
+    std::int64_t* ids = whole_.data.release();
+    double* log_odds = real_.data.release();
+    const nb::capsule whole = owner(ids), real = owner(log_odds);
+    return nb::make_tuple(Out<std::int64_t>(ids, {K_}, whole), Out<std::int64_t>(ids + K_, {K_}, whole),
+                          Out<double>(log_odds, {K_}, real), Out<double>(mean, {K_, D_, n_}, real),
+                          Out<double>(covariance, {K_, n_, n_}, real));
+  }
+
+ private:
+  double* means() { return real_.data.get() + K_; }
+  double* covariances() { return means() + K_ * D_ * n_; }
+  void add(std::int64_t id, std::int64_t gap, double log_odds) {
+    whole_.data[k_] = id;
+    whole_.data[K_ + k_] = gap;
+    real_.data[k_++] = log_odds;
+  }
+
+  std::size_t D_, n_, K_, k_ = 0;
+  Owned<std::int64_t> whole_;
+  Owned<double> real_;
+};
 
 // Consecutive frames: their steps and points.
 struct FrameRun {

@@ -2,13 +2,16 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "python/motion_arrays.hpp"
+#include "rigid/carried_state.hpp"
 #include "tracks/live_tracks.hpp"
 
 namespace asterism {
@@ -113,21 +116,26 @@ std::vector<const LiveTrack<More>*> confirmed(const LiveTracks<More>& live) {
   return out;
 }
 
-// The data of the confirmed tracks for a live display.
+// The present state of a track. While its marker is occluded, the position that neighbours predict is
+// used as in association.
+template <typename More>
+AxisState present_state(const MotionModel& m, const LiveTrack<More>& track) {
+  const std::optional<MotionState> fused =
+      std::isfinite(track.place.variance)
+          ? fuse(m, track.state, Prediction(m, track.state), track.place)
+          : std::nullopt;
+  return collapse(m, fused ? *fused : track.state);
+}
+
+// The states of the confirmed tracks (see TrackArrays).
 template <typename Tracker>
-nb::dict tracks(const Tracker& tracker) {
+nb::tuple tracks(const Tracker& tracker) {
   const auto& live = tracker.live();
   const auto tracks = confirmed(live);
-  std::vector<AxisState> states;
-  for (const auto* track : tracks) states.push_back(collapse(tracker.motion(), track->state));
-  const auto [means, covariances] = state_arrays(tracker.motion(), states);
-  nb::dict out;
-  out["ids"] = array_of<std::int64_t>(tracks, [](const auto* t) { return t->id; });
-  out["gaps"] = array_of<std::int64_t>(tracks, [](const auto* t) { return t->gap; });
-  out["log_odds"] = array_of<double>(tracks, [](const auto* t) { return t->score; });
-  out["means"] = means;
-  out["covariances"] = covariances;
-  return out;
+  TrackArrays out(tracker.motion(), tracks.size());
+  for (const auto* track : tracks)
+    out.add(track->id, track->gap, track->score, present_state(tracker.motion(), *track));
+  return out.give();
 }
 
 template <typename Tracker>

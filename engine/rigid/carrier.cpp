@@ -7,9 +7,6 @@
 
 namespace asterism {
 
-namespace {
-
-// The element with the smallest sum of distances to the others, the first of equals.
 const Carriage& middle(std::span<const Carriage> ways, int D) {
   std::size_t best = 0;
   double min_sum = std::numeric_limits<double>::infinity();
@@ -24,8 +21,6 @@ const Carriage& middle(std::span<const Carriage> ways, int D) {
   }
   return ways[best];
 }
-
-}  // namespace
 
 Carried Carrier::place(const RigidPrediction& found, const Accuracy& accuracy, std::int64_t frames,
                        double r) const {

@@ -38,6 +38,9 @@ struct Carriage {
   std::int32_t n_neighbours = 0;
 };
 
+// The element with the smallest sum of distances to the others, the first of equals.
+const Carriage& middle(std::span<const Carriage> ways, int D);
+
 // Mean squared error per axis of the positions predicted by a rotation over kLag frames, and its
 // expected value. The means have a memory of kRecent predictions.
 struct Accuracy {

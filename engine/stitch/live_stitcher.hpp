@@ -8,11 +8,14 @@
 #include <algorithm>
 #include <cstdint>
 #include <deque>
+#include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "base/shared_copy.hpp"
+#include "rigid/carried_state.hpp"
 #include "stitch/stitcher.hpp"
 
 namespace asterism {
@@ -57,7 +60,68 @@ class LiveStitcher {
     if (recent_.size() > n_waiting_ + n_kept_) recent_.pop_front();
   }
 
+  // The present marker of each tracker's label, -1 for none. If several labels have the same marker,
+  // those of undecided tracklets lose it.
+  std::vector<std::int32_t> markers_of(std::span<const std::int64_t> labels) const {
+    std::vector<std::int32_t> markers;
+    std::vector<char> is_open;
+    for (const std::int64_t label : labels) {
+      const Stitcher::Continued found = stitcher_.continued_by(label);
+      markers.push_back(std::max(found.marker, -1));
+      is_open.push_back(found.is_open);
+    }
+    std::vector<std::int32_t> out = markers;
+    for (std::size_t i = 0; i < out.size(); ++i)
+      if (is_open[i] && std::count(markers.begin(), markers.end(), markers[i]) > 1) out[i] = -1;
+    return out;
+  }
+
+  // A marker without a living track, and its present state. Values that are unknown are NaN: the
+  // velocity, if neighbours alone predict the position, and everything without neighbours and
+  // without a motion.
+  struct UnseenMarker {
+    std::int32_t marker = 0;
+    std::int64_t gap = 0;
+    AxisState state;
+  };
+  // Returns the markers that are not among `known`, which are sorted. `present` holds the detected
+  // ones.
+  std::vector<UnseenMarker> unseen(const Places& present, std::span<const std::int32_t> known) {
+    const MotionModel& m = motion();
+    std::vector<UnseenMarker> out;
+    stitcher_.each_unseen(
+        present,
+        [&](std::int32_t k) { return !std::binary_search(known.begin(), known.end(), k); },
+        [&](const Stitcher::Unseen& unseen) {
+          UnseenMarker& to = out.emplace_back();
+          to.marker = unseen.marker;
+          to.gap = unseen.gap;
+          std::optional<MotionState> state = unseen.motion;
+          for (const SharedCopy<Recent>& frame : recent_) {
+            if (frame->is_taken) continue;
+            ++to.gap;
+            if (state) predict(m, frame->step, *state);
+          }
+          if (state && unseen.place)
+            if (const auto fused = fuse(m, *state, Prediction(m, *state), *unseen.place); fused)
+              state = *fused;
+          to.state = state ? collapse(m, *state) : at_place(unseen.place);
+        });
+    return out;
+  }
+
  private:
+  AxisState at_place(const std::optional<Carried>& place) const {
+    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+    AxisState out;
+    for (AxisVector& x : out.x) x.fill(kUnknown);
+    out.P.fill(kUnknown);
+    if (!place) return out;
+    for (int d = 0; d < kMaxAxes; ++d) out.x[d][0] = place->at[d];
+    out.P[0] = place->variance;
+    return out;
+  }
+
   struct Known {
     std::int32_t tracklet = -1, reported = -2;
   };
@@ -111,20 +175,10 @@ class LiveStitcher {
       return f < 0 || !stitcher_.is_open(f);
     });
   }
-  // If several detections of a frame have the same marker, those of undecided tracklets lose it.
   template <typename Report>
   void report_waiting(Recent& frame, Report&& report) {
-    markers_.clear();
-    is_open_.clear();
-    for (const std::int64_t label : frame.labels) {
-      const Stitcher::Continued found = stitcher_.continued_by(label);
-      markers_.push_back(found.marker);
-      is_open_.push_back(found.is_open);
-    }
-    for (std::size_t i = 0; i < markers_.size(); ++i)
-      if (is_open_[i] && std::count(markers_.begin(), markers_.end(), markers_[i]) > 1)
-        markers_[i] = -1;
-    for (std::size_t i = 0; i < markers_.size(); ++i) report_one(frame, i, markers_[i], report);
+    const std::vector<std::int32_t> markers = markers_of(frame.labels);
+    for (std::size_t i = 0; i < markers.size(); ++i) report_one(frame, i, markers[i], report);
   }
   template <typename Report>
   void report_one(Recent& frame, std::size_t i, std::int32_t marker, Report&& report) {
@@ -138,8 +192,7 @@ class LiveStitcher {
   std::int64_t n_seen_ = 0, n_joins_ = 0, n_ghosts_ = 0;
   std::deque<SharedCopy<Recent>> recent_;
   // Scratch of one frame.
-  std::vector<std::int32_t> tracklets_, markers_;
-  std::vector<char> is_open_;
+  std::vector<std::int32_t> tracklets_;
 };
 
 }  // namespace asterism

@@ -150,6 +150,16 @@ class RigidNeighbours {
     for (const Looks& looks : w_.looks) total += std::exp(looks.mean() - max_gain);
     return max_gain + std::log(total / static_cast<double>(w_.looks.size()));
   }
+  // Position of the occluded marker k predicted from the markers detected at `now`, as in
+  // `log_odds`.
+  std::optional<Carried> place(std::int32_t k, std::span<const Anchor> anchors, const Places& now) {
+    w_.ways.clear();
+    carrier_.carry(
+        k, anchors, now, kNoise * square(noise_), [](const Anchor&) { return Carrier::kLag; },
+        [&](const Anchor&, const Carriage& way) { w_.ways.push_back(way); });
+    if (w_.ways.empty()) return std::nullopt;
+    return middle(w_.ways, D_).place;
+  }
 
  private:
   static constexpr std::size_t kLooks = 3;  // frames of a tracklet in which it is compared
@@ -312,6 +322,7 @@ class RigidNeighbours {
     std::size_t n_common = 0;
     std::vector<std::pair<double, std::int32_t>> nearest;
     std::vector<Looks> looks;
+    std::vector<Carriage> ways;
     std::vector<RigidPair> pairs;
     RigidPredictions predictions;
     std::vector<std::int32_t> using_it;  // occluded markers with a certain neighbour

@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -96,6 +97,29 @@ class Stitcher {
     if (f == nullptr || !can_continue(*id, *f)) return {};
     const bool is_undecided = f->marker == Decision::kOpen;
     return {*id, is_undecided ? f->guess : f->marker, is_undecided};
+  }
+  // A marker without a detection in the present frame: frames since its last one, its own motion
+  // if that is extrapolated so far, and the position that its neighbours predict.
+  struct Unseen {
+    std::int32_t marker = 0;
+    std::int64_t gap = 0;
+    std::optional<MotionState> motion;
+    std::optional<Carried> place;
+  };
+  // Calls use(unseen) for every marker for which is_selected(marker) holds. `present` holds the
+  // markers detected in the present frame.
+  template <typename Selected, typename Use>
+  void each_unseen(const Places& present, Selected&& is_selected, Use&& use) {
+    for (const auto& [k, known] : markers_) {
+      if (!is_selected(k)) continue;
+      Marker marker = known;
+      marker.is_occluded = true;
+      prepare(k, marker);
+      Unseen out{k, now() - marker.last, std::nullopt, std::nullopt};
+      if (out.gap <= kMotionFrames) out.motion = *marker.state;
+      out.place = neighbours_.place(k, *marker.anchors, present);
+      use(out);
+    }
   }
   // Computes the best candidates of all undecided tracklets, as if no further frame came.
   void guess() {

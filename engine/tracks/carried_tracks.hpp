@@ -86,6 +86,7 @@ class CarriedTracks {
   }
   void miss(LiveTrack<>& track, std::size_t i, FrameStats& stats) const {
     if (opt_.is_on && s_.replaced_by[i] >= 0) track.gap = max_gap_ + track.carried;
+    track.place = is_carried(i) ? s_.place[i] : Carried{};
     if (!is_carried(i) || s_.is_uncertain[i] || track.gap > opt_.max_carried) return;
     ++track.carried;
     ++stats.n_carried;

@@ -23,6 +23,7 @@
 #include "filter/imm.hpp"
 #include "filter/track_filter.hpp"
 #include "math/log_sums.hpp"
+#include "rigid/carried.hpp"
 #include "solve/connected_components.hpp"
 
 namespace asterism {
@@ -56,6 +57,9 @@ struct LiveTrack {
   double first_time = 0, last_time = 0;
   Point last{};
   MotionState state;
+  // Where neighbours predict the occluded marker in the last frame, if the variance is finite. It is
+  // no part of `state`.
+  Carried place;
   std::vector<Pending> pending;
   [[no_unique_address]] More more;
 
@@ -222,6 +226,7 @@ class LiveTracks {
     track.last = y;
     track.last_time = time;
     track.gap = track.carried = 0;
+    track.place = {};
     if (track.is_confirmed()) {
       label(so_far.n_seen + j, track.id, confidence);
       return;

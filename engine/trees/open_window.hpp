@@ -79,6 +79,7 @@ struct OpenWindow {
     predict(live.m, frame.step, track.state);
     const NeighbourAdvice* advice = frame.advice_to(track.more.key);
     const Expected expected = grower.expected(track.state, track.gap, advice);
+    track.place = own < 0 && expected.is_carried() ? advice->place : Carried{};
     if (own >= 0) {
       const Point& y = frame.points[own];
       const Prediction& prediction = expected.of(y);

@@ -2,8 +2,8 @@
 
 Detections in, tracks out: every method searches the posterior of one generative model and states
 how certain each link is. The names here are for everyday use; the rest is in the namespaces
-`camera`, `edit`, `filter`, `io`, `large`, `metrics`, `model`, `multiview`, `plot`, `simulate`,
-`solve` and `tracking`.
+`camera`, `edit`, `filter`, `io`, `large`, `live`, `metrics`, `model`, `multiview`, `plot`,
+`simulate`, `solve` and `tracking`.
 
 >>> import asterism as am
 >>> capture = am.read("trial.c3d")                        # doctest: +SKIP

@@ -15,7 +15,10 @@ __all__ = [
     "AsterismError",
     "FormatError",
     "ParameterError",
+    "SinkError",
     "SolverLimit",
+    "SourceError",
+    "SourceLost",
     "clipped",
     "not_read",
     "not_written",
@@ -136,6 +139,30 @@ class SolverLimit(AsterismError, RuntimeError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.what, self.size, self.limit, self.hint)
+
+
+class SourceError(AsterismError):
+    """A source of a stream cannot be reached, or refuses.
+
+    Parameters
+    ----------
+    message : str
+        The source, what is wrong, and what to do about it.
+    """
+
+
+class SourceLost(SourceError):
+    """The connection to a source of a stream is gone."""
+
+
+class SinkError(AsterismError):
+    """A sink of a stream is not available.
+
+    Parameters
+    ----------
+    message : str
+        The sink, what is wrong, and what to do about it.
+    """
 
 
 def not_read(path: str | Path, error: OSError) -> FormatError:

@@ -20,6 +20,8 @@ FILES = {
     "track --report": ("track in.csv -o new.csv --report OUT", ".html"),
     "track --run -o": ("track in.csv --run new -o OUT", ".csv"),
     "large": ("large plain.csv -o OUT", ".csv"),
+    "live": ("live in.csv?speed=max --to OUT", ".csv"),
+    "live, C3D": ("live in.csv?speed=max --to OUT", ".c3d"),
     "edit": ("edit in.csv --script edits.toml -o OUT", ".csv"),
     "stitch": ("stitch truth.csv -o OUT", ".csv"),
     "fill": ("fill truth.csv -o OUT", ".csv"),
@@ -35,6 +37,7 @@ FILES = {
     "corrupt --truth": ("corrupt truth.csv -o new.csv --truth OUT", ".csv"),
     "simulate --out": ("simulate cube -o OUT", ".csv"),
     "simulate --truth": ("simulate cube -o new.csv --truth OUT", ".csv"),
+    "serve --truth": ("serve --scene cube --truth OUT", ".csv"),
     "reconstruct -o": ("reconstruct seen.csv --rig rig.toml -o OUT", ".csv"),
     "reconstruct --truth": ("reconstruct seen.csv --rig rig.toml -o new.csv --truth OUT", ".csv"),
     "camera convert": ("camera convert rig.toml OUT", ".toml"),
@@ -65,6 +68,7 @@ WORK = {
     "asterism.io": ("read_tracks", "read_observations"),
     "asterism.tracking": ("plan_tracking",),
     "asterism.large": ("track",),
+    "asterism.live": ("run",),
     "asterism.cli.outputs": ("read_labels", "read_model"),
     "asterism.cli.recording": ("made_scene", "rig_from"),
     "asterism.cli.plot_inputs": ("tracks_of", "summary_of"),
@@ -192,9 +196,10 @@ def test_an_output_that_nobody_named_is_safe_too(here, idle, capsys, line):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_overwrite_replaces_the_file(here, capsys, name):
+def test_overwrite_replaces_the_file(here, capsys, monkeypatch, name):
     if name == "view":
         pytest.importorskip("rerun")
+    monkeypatch.setattr(am.live, "serve", lambda *_, **__: 0)  # it would wait for a client
     line, ending = FILES[name]
     Path(f"old{ending}").write_text("precious")
     assert main([*line.replace("OUT", f"old{ending}").split(), "--overwrite", "--quiet"]) == 0
@@ -204,6 +209,7 @@ def test_overwrite_replaces_the_file(here, capsys, name):
 INPUTS = {
     "track in.csv -o in.csv": "in.csv",
     "large plain.csv -o plain.csv": "plain.csv",
+    "live in.csv?speed=max --to in.csv": "in.csv",
     "stitch truth.csv -o truth.csv": "truth.csv",
     "fill truth.csv -o truth.csv": "truth.csv",
     "markerset merge set.toml other.toml -o set.toml": "set.toml",

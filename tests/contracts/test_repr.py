@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import asterism as am
+from asterism.errors import SinkError, SourceError, SourceLost
 from asterism.records import MAX_REPR, record
 from asterism.tracking.pipeline import without_edits
 
@@ -18,7 +19,7 @@ NAMESPACES = (
     "asterism", "asterism.simulate", "asterism.camera", "asterism.model", "asterism.filter",
     "asterism.tracking.methods", "asterism.tracking", "asterism.multiview", "asterism.solve",
     "asterism.metrics", "asterism.io", "asterism.io.calibrations", "asterism.plot",
-    "asterism.reporting", "asterism.batch", "asterism.sweep", "asterism.large",
+    "asterism.reporting", "asterism.batch", "asterism.sweep", "asterism.large", "asterism.live",
     "asterism.errors",
 )  # fmt: skip
 
@@ -36,7 +37,9 @@ def public():
 
 PUBLIC = public()
 # Contracts that other classes fill, and the base of the lists of what can be chosen.
-ABSTRACT = {name for name, kind in PUBLIC.items() if inspect.isabstract(kind)} | {"Motion"}
+ABSTRACT = {name for name, kind in PUBLIC.items() if inspect.isabstract(kind)} | {
+    "Motion", "Sink", "Source",
+}  # fmt: skip
 LONG = "a name that is much longer than any that people would give a camera or a marker " * 5
 
 
@@ -93,6 +96,7 @@ def instances():
         *methods, changed["gate"], changed["lifecycle"], changed["rigid"],
         am.tracking.ChainOptions(groups="cells", distance=1 / 3),
         am.tracking.Stitched(), am.tracking.Stitched().init(plain), state, update,
+        update.tracks, am.tracking.track_states(truth, model=plain),
         am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN()),
         am.tracking.Named(marker_sets=am.learn_marker_set(truth), method=am.GNN()).init(plain),
         am.MCMCDA(window=50, moves=12.345, deadline=1 / 3, confidence=12.345, end_odds=123.4,
@@ -186,6 +190,18 @@ def instances():
         *am.io.CALIBRATION_FORMATS.values(), am.io.CALIBRATION_FORMATS, am.tracking.METHODS,
         am.ParameterError(LONG, LONG, LONG, LONG), am.FormatError(LONG, LONG, LONG, LONG),
         am.SolverLimit(LONG, 3, 2, LONG), am.AsterismError(LONG),
+        SourceError(LONG), SourceLost(LONG), SinkError(LONG), am.live.EndOfSource("qtm"),
+        update.tracks, am.tracking.track_states(tracks, model=plain),
+        am.live.LatencyHistogram(), am.live.LiveRun(source=LONG),
+        am.live.SourceFrame(number=1, time=1 / 3, points=d.frame(0), received=1 / 3),
+        am.live.StreamHeader(source=LONG, rate=1 / 3, names=(LONG,) * 60),
+        am.live.LiveFrame(
+            number=1, time=1 / 3, points=d.frame(0), labels=np.zeros(60), names=(LONG,) * 60
+        ),
+        am.live.ServedFrame(
+            number=1, time=1 / 3, markers=d.frame(0), points=d.frame(0), ids=np.arange(60)
+        ),
+        am.live.QtmServer(names=(LONG,) * 60), am.live.NatNetServer(names=(LONG,) * 60),
     ]  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-/** The player of a report page: unpacks the data of the page and connects its parts. */
+/** The player of a page: of a report, whose data it unpacks, or of a stream. */
 
 import "./style.css";
 
@@ -6,6 +6,7 @@ import { hueOf } from "./colours.js";
 import { connect, connectPointer } from "./controls.js";
 import { Details } from "./details.js";
 import { CameraImage } from "./image.js";
+import { live } from "./live/main.js";
 import { Stage } from "./stage.js";
 import { State } from "./state.js";
 import { onTheme } from "./theme.js";
@@ -124,4 +125,6 @@ function script(capture, state, stage, image) {
   };
 }
 
-start();
+const stream = byId("live");
+if (stream) live(stream);
+else start();

@@ -144,7 +144,7 @@ class McmcTracker {
       LiveTrack<NoMore>& track = live.tracks.emplace_back();
       track.id = is_finished() ? sweep_.labels()[number] : id_of(k);
       track.gap = static_cast<std::int32_t>(p.window().now() - p.window()[i].frame);
-      track.score = p.score(i);
+      track.score = p.score(i) + live.misses_gain(0, track.gap);
       track.state = state_now(i);
     }
     std::sort(live.tracks.begin(), live.tracks.end(),

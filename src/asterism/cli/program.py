@@ -20,6 +20,7 @@ from asterism.cli.commands.fill import fill
 from asterism.cli.commands.film import film
 from asterism.cli.commands.info import info
 from asterism.cli.commands.large import large
+from asterism.cli.commands.live import live
 from asterism.cli.commands.markerset import app as markerset
 from asterism.cli.commands.methods import methods, scenes
 from asterism.cli.commands.name import name
@@ -27,6 +28,7 @@ from asterism.cli.commands.plot import plot
 from asterism.cli.commands.reconstruct import reconstruct
 from asterism.cli.commands.report import report
 from asterism.cli.commands.reproduce import reproduce
+from asterism.cli.commands.serve import serve
 from asterism.cli.commands.simulate import simulate
 from asterism.cli.commands.stitch import stitch
 from asterism.cli.commands.sweep import sweep
@@ -65,6 +67,7 @@ def _root(  # pyright: ignore[reportUnusedFunction]
 _TITLES = {
     "Tracks and markers": (track, batch, large, edit, stitch, name, fill, estimate, methods),
     "Captures and results": (info, evaluate, report, plot, view),
+    "Streams": (live, serve),
     "Simulations and experiments": (corrupt, simulate, scenes, sweep, demo, reproduce),
     "Cameras": (film, reconstruct, chain),
 }

@@ -5,6 +5,7 @@ from asterism.tracking.confidence import assess
 from asterism.tracking.correction import Change, Correction, Stretch, correct
 from asterism.tracking.estimation import ModelEstimate, estimate_model
 from asterism.tracking.filling import FilledGap, Filling, fill_gaps
+from asterism.tracking.history import TrackHistory, track_states
 from asterism.tracking.methods import (
     METHODS,
     ChainOptions,
@@ -13,6 +14,7 @@ from asterism.tracking.methods import (
     Lifecycle,
     Method,
     Rigidity,
+    TrackStates,
     Update,
     method_by_name,
 )
@@ -68,6 +70,8 @@ __all__ = [
     "StitchedState",
     "Stitching",
     "Stretch",
+    "TrackHistory",
+    "TrackStates",
     "Tracked",
     "Update",
     "assess",
@@ -85,5 +89,6 @@ __all__ = [
     "plan_tracking",
     "stitch",
     "track",
+    "track_states",
     "tracklet_model",
 ]

@@ -1,10 +1,7 @@
-"""The page: its document, and the policy that restricts it."""
+"""The page of a report."""
 
 from __future__ import annotations
 
-import base64
-import hashlib
-from importlib import resources
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +11,7 @@ from asterism.reporting.page.data import Played, played
 from asterism.reporting.page.editing import PANEL, editing_keys, tile
 from asterism.reporting.page.facts import cards, facts_of, in_words
 from asterism.reporting.page.findings import find_troubles
+from asterism.reporting.page.head import bundled, document
 from asterism.reporting.page.markup import Markup, element, joined
 from asterism.reporting.page.player import keys_table, player
 from asterism.reporting.page.thinning import MOST_POINTS, frames_to_show, stride_for
@@ -30,12 +28,6 @@ __all__ = ["MOST_LISTED", "page"]
 
 MOST_LISTED = 60
 """Length of each list; the page states the total number."""
-_ICON = (
-    "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 16 16'%3E"
-    "%3Cpath d='M3 12 8 3l5 6z' fill='none' stroke='%230072B2'/%3E%3Cg fill='%230072B2'%3E"
-    "%3Ccircle cx='3' cy='12' r='2'/%3E%3Ccircle cx='8' cy='3' r='2'/%3E"
-    "%3Ccircle cx='13' cy='9' r='2'/%3E%3C/g%3E%3C/svg%3E"
-)
 
 
 def page(contents: Contents, shown: NDArray[np.int64] | None = None) -> bytes:
@@ -55,24 +47,12 @@ def page(contents: Contents, shown: NDArray[np.int64] | None = None) -> bytes:
         scripts and styles but its own.
     """
     edits = contents.editing is not None
-    scripts = [_bundled("player.js"), *([_bundled("editor.js")] if edits else [])]
-    style = _bundled("player.css") + (_bundled("editor.css") if edits else "")
+    scripts = [bundled("player.js"), *([bundled("editor.js")] if edits else [])]
+    style = bundled("player.css") + (bundled("editor.css") if edits else "")
     findings = find_troubles(contents.tracks, contents.judgement, contents.naming)
     if shown is None:
         shown = frames_to_show(contents.tracks, contents.places or ())
     play = played(contents, _by_trouble(contents, findings), shown)
-    policy = _policy(scripts, style, contents)
-    head = element(
-        "head",
-        element("meta", charset="utf-8"),
-        element("meta", http_equiv="Content-Security-Policy", content=policy),
-        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("meta", name="color-scheme", content="light dark"),
-        element("meta", name="generator", content="Asterism"),
-        element("link", rel="icon", href=_ICON),
-        element("title", f"{contents.title} – Asterism"),
-        element("style", Markup(style)),
-    )
     body = element(
         "body",
         element("a", "Skip to the player", href="#player", class_="skip"),
@@ -99,29 +79,8 @@ def page(contents: Contents, shown: NDArray[np.int64] | None = None) -> bytes:
         element("script", Markup(play.text), type="text/plain", id="data"),
         *(element("script", Markup(script)) for script in scripts),
     )
-    text = f"<!doctype html>\n{element('html', head, body, lang='en')}\n"
-    # Half a surrogate pair, as a damaged name may have, has no place in UTF-8.
-    return text.encode("utf-8", errors="replace")
-
-
-def _policy(scripts: Sequence[str], style: str, contents: Contents) -> str:
-    """Return a policy that forbids everything but the page's own script, style and server."""
-
-    def hashed(text: str) -> str:
-        return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
-
     is_served = contents.editing is not None and contents.editing.is_served
-    connect = "connect-src 'self'; " if is_served else ""
-    allowed = " ".join(map(hashed, scripts))
-    return (
-        f"default-src 'none'; script-src {allowed}; style-src {hashed(style)}; "
-        f"img-src data:; {connect}base-uri 'none'; form-action 'none'; "
-        "require-trusted-types-for 'script'; trusted-types 'none'"
-    )
-
-
-def _bundled(name: str) -> str:
-    return resources.files("asterism.reporting.page").joinpath(name).read_text(encoding="utf-8")
+    return document(contents.title, body, style, scripts, is_served=is_served)
 
 
 def _by_trouble(contents: Contents, findings: Sequence[Finding]) -> NDArray[np.int64]:

@@ -10,6 +10,7 @@ from asterism.tracking.methods.mht import MHT, HypothesisCluster
 from asterism.tracking.methods.options import Gate, Lifecycle, Rigidity
 from asterism.tracking.methods.registry import METHODS, method_by_name, options_of
 from asterism.tracking.methods.smp import SMP
+from asterism.tracking.methods.states import TrackStates
 from asterism.tracking.methods.tomht import TOMHT
 from asterism.tracking.methods.track_splitting import TrackSplitting
 
@@ -29,6 +30,7 @@ __all__ = [
     "Method",
     "Rigidity",
     "TrackSplitting",
+    "TrackStates",
     "Update",
     "method_by_name",
     "options_of",

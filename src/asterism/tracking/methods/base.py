@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from asterism.model import Detections, TrackingModel
+    from asterism.tracking.methods.states import TrackStates
 
 __all__ = ["Method", "MethodState", "Update", "checked_covariances", "checked_frame"]
 
@@ -78,6 +80,9 @@ class Update:
         Counts of the step, such as tracks, groups and candidates.
     names : tuple of (str or None), or None
         Name of the marker of each point, if the method names tracks (`Named`).
+    read_tracks : callable, optional
+        Computes `tracks` at its first use, from the state after the frame. It refers to that state,
+        which is kept as long as the update.
 
     Examples
     --------
@@ -89,8 +94,8 @@ class Update:
     ...     state, update = method.step(state, time, points)
     >>> update
     Update(8 detections, 8 in tracks, 0 earlier labels revised)
-    >>> update.labels.tolist()
-    [0, 1, 2, 3, 4, 5, 6, 7]
+    >>> update.labels.tolist(), update.tracks
+    ([0, 1, 2, 3, 4, 5, 6, 7], TrackStates(8 tracks, 0 occluded))
     """
 
     labels: NDArray[np.int64]
@@ -100,6 +105,12 @@ class Update:
     revised_confidence: NDArray[np.float64] | None = None
     info: Mapping[str, float] = field(default_factory=dict[str, float])
     names: tuple[str | None, ...] | None = None
+    read_tracks: Callable[[], TrackStates | None] | None = None
+
+    @cached_property
+    def tracks(self) -> TrackStates | None:
+        """States of the tracks after the frame; None if the method does not report them."""
+        return None if self.read_tracks is None else self.read_tracks()
 
     def __repr__(self) -> str:
         sure = "" if self.confidence is None else ", with confidence"

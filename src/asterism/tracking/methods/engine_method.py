@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from asterism.model import TrackingModel
 from asterism.records import record
 from asterism.tracking.methods import options
 from asterism.tracking.methods.base import Method, Update, checked_covariances, checked_frame
+from asterism.tracking.methods.states import TrackStates, states_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -106,7 +108,8 @@ class EngineState:
         """
         from asterism import _engine
 
-        live = self.tracker.tracks()
+        names = ("ids", "gaps", "log_odds", "means", "covariances")
+        live: dict[str, NDArray[Any]] = dict(zip(names, self.tracker.tracks(), strict=True))
         if isinstance(self.tracker, _engine.TreeTracker):
             live |= self.tracker.chi2()
         return live
@@ -210,6 +213,7 @@ class EngineMethod(Method[EngineState]):
             confidence=found.confidence if has_confidence else None,
             revised_confidence=found.revised_confidence if has_confidence else None,
             info=self._about(found.stats),
+            read_tracks=partial(_tracks_of, found.tracker),
         )
         return replace(state, tracker=found.tracker), update
 
@@ -261,6 +265,10 @@ class EngineMethod(Method[EngineState]):
                 progress(end)
         confidence = sure[first:] if tracker.has_confidence else None
         return replace(state, tracker=tracker), labels[first:], confidence
+
+
+def _tracks_of(tracker: Tracker) -> TrackStates:
+    return states_of(*tracker.tracks())
 
 
 def _too_many(error: Exception) -> SolverLimit:

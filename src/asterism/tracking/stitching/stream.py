@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from asterism import _engine
 from asterism.checks import check_kind, check_number
 from asterism.model import TrackingModel
 from asterism.model.compiled import motion_model, no_transition, transition
 from asterism.records import record
-from asterism.tracking.methods import SMP, Method, Update
+from asterism.tracking.methods import SMP, Method, TrackStates, Update
 from asterism.tracking.methods.base import MethodState, checked_frame
+from asterism.tracking.methods.states import states_of
 from asterism.tracking.stitching.tracklets import tracklet_model
 from asterism.tracking.stitching.whole import check_options, stitch_options
 
@@ -196,5 +200,16 @@ class Stitched(Method[StitchedState]):
             last_time=time,
         )  # fmt: skip
         return after, Update(
-            labels=labels, revised=revised, revised_labels=revised_labels, info=found.info
-        )
+            labels=labels, revised=revised, revised_labels=revised_labels, info=found.info,
+            read_tracks=partial(_tracks_of, stitcher, found),
+        )  # fmt: skip
+
+
+def _tracks_of(stitcher: _engine.LiveStitcher, found: Update) -> TrackStates | None:
+    """Return the states of the markers: those of their tracklets, and of the occluded markers."""
+    own = found.tracks
+    if own is None:
+        return None
+    log_odds = np.full(len(own), np.nan) if own.log_odds is None else own.log_odds
+    merged = states_of(*stitcher.states(own.ids, own.gaps, log_odds, own.means, own.covariances))
+    return merged if own.log_odds is not None else replace(merged, log_odds=None)

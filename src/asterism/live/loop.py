@@ -1,0 +1,247 @@
+"""The loop of a stream: receive, check, track, pass on; estimate and refine the model meanwhile."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import math
+import threading
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Literal
+
+from asterism.errors import AsterismError
+from asterism.live.clock import SourceClock
+from asterism.live.estimation import BackgroundEstimator, DirectEstimator, differs
+from asterism.live.faults import Faults
+from asterism.live.frame import LiveFrame, SourceFrame, StreamHeader
+from asterism.live.intake import Accepted, Intake
+from asterism.live.latency import LatencyHistogram
+from asterism.live.live_run import LiveRun
+from asterism.live.live_tracker import LiveTracker
+from asterism.live.low_latency import low_latency
+from asterism.live.queue import FrameQueue
+from asterism.live.receiver import Connected, Disconnected, Ended, Receiver
+from asterism.live.sinks.page import PageSink
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from asterism.live.estimation import Estimator
+    from asterism.live.sinks.base import Sink
+    from asterism.live.sources.base import Source
+    from asterism.model import MarkerSet, TrackingModel
+    from asterism.tracking.methods import Method
+
+__all__ = ["LiveLoop"]
+
+log = logging.getLogger(__name__)
+
+QUEUE = 256
+"""Number of frames that wait at most."""
+MAX_AGE = 1.0
+"""Seconds after which a waiting frame is dropped, if a later one waits too."""
+BEHIND = 0.1
+"""Age of a frame, seconds, from which on tracking is behind."""
+FIRST_SECONDS = 2.0
+"""Seconds of frames from which the first model is estimated."""
+REFINE = (10.0, 30.0, 60.0)
+"""Seconds of the stream at which the model is refined; then at multiples of the last."""
+SILENCE = 1.0
+"""Seconds without a frame that are a pause."""
+COLLECT = 256
+"""Number of frames between two collections of garbage."""
+STATUS = 0.5
+"""Seconds between two reports of the counts."""
+_IDLE = 0.05  # seconds, after which the loop looks at the clock
+
+
+class LiveLoop:
+    """One stream from a source to sinks.
+
+    Parameters
+    ----------
+    source, sinks
+        Source and sinks, not yet open.
+    method, model, marker_sets, seed
+        As for `run`.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        sinks: Sequence[Sink],
+        *,
+        method: Method[Any],
+        model: TrackingModel | None,
+        marker_sets: Sequence[MarkerSet] | Literal["learn"],
+        seed: int | None,
+    ) -> None:
+        self._source, self._sinks = source, list(sinks)
+        self._faults = Faults(source.name)
+        self._clock, self._latency = SourceClock(), LatencyHistogram()
+        self._tracker = LiveTracker(method, marker_sets, model, seed, self._faults)
+        known = () if isinstance(marker_sets, str) else marker_sets
+        self._names = tuple(name for made in known for name in made.full_names)
+        self._estimator: Estimator | None = None
+        self._next_estimate = FIRST_SECONDS if model is None else math.inf
+        self._first_time: float | None = None
+        self._elapsed = 0.0  # seconds of the stream
+        self._n_frames = self._n_tracks = 0
+        self._last_arrival = math.inf
+        self._is_silent = False
+
+    def run(self, stop: threading.Event, status: Callable[[LiveRun], Any] | None = None) -> LiveRun:
+        """Open everything, track until the source ends or `stop` is set, and close everything."""
+        source, opened = self._source, list[Any]()
+        waits = source.waits
+        queue = FrameQueue(QUEUE, waits=waits)
+        ending = threading.Event()
+        receiver = Receiver(source, queue, ending)
+        try:
+            source.open()
+            header = StreamHeader(source=source.name, rate=source.rate, names=self._names)
+            for sink in self._sinks:
+                sink.open(header)
+                opened.append(sink)
+            self._intake = intake = Intake(
+                self._faults, self._clock, rate=source.rate, in_real_time=not waits
+            )
+            self._estimator = DirectEstimator() if waits else BackgroundEstimator()
+            if math.isfinite(self._next_estimate):
+                self._estimator.prepare()
+            with low_latency():
+                receiver.start()
+                self._follow(queue, intake, stop, status, waits=waits)
+        finally:
+            ending.set()
+            if receiver.ident is not None:
+                receiver.join(2.0)
+            else:
+                source.close()
+            if self._estimator is not None:
+                self._estimator.close()
+            for sink in opened:
+                sink.close()
+        return self.snapshot()
+
+    def snapshot(self) -> LiveRun:
+        """Return the present counts."""
+        faults = dict(self._faults.counts)
+        for other in (self._source, *self._sinks):
+            faults |= {f"{other.name} {kind}": n for kind, n in other.faults.items() if n}
+        period = self._intake.period
+        return LiveRun(
+            source=self._source.name, n_frames=self._n_frames, n_tracks=self._n_tracks,
+            n_names=self._tracker.n_names, rate=1 / period if period else math.nan,
+            latency=self._latency, drift=self._clock.drift, faults=faults,
+            model=self._tracker.model, n_models=self._tracker.n_models,
+        )  # fmt: skip
+
+    def _follow(
+        self,
+        queue: FrameQueue,
+        intake: Intake,
+        stop: threading.Event,
+        status: Callable[[LiveRun], Any] | None,
+        *,
+        waits: bool,
+    ) -> None:
+        tracker, next_status, n_dropped = self._tracker, 0.0, 0
+        while not stop.is_set():
+            item = queue.get(_IDLE)
+            if isinstance(item, SourceFrame):
+                is_late = not waits and len(queue) > 0 and perf_counter() - item.received > MAX_AGE
+                if is_late or queue.n_dropped > n_dropped:
+                    n = int(is_late) + queue.n_dropped - n_dropped
+                    n_dropped = queue.n_dropped
+                    self._faults.add("late", "tracking is behind and frames are dropped", n)
+                    intake.dropped(n)
+                if is_late:
+                    continue
+                accepted = intake.take(item)
+                if accepted is not None:
+                    # Frames that are missing are tracked as empty ones only if there is time.
+                    if not waits and perf_counter() - item.received > BEHIND:
+                        accepted = accepted._replace(n_missing=0)
+                    self._track(accepted, intake.period)
+            elif isinstance(item, Ended):
+                if item.error is not None:
+                    raise item.error
+                return
+            elif isinstance(item, Disconnected):
+                self._faults.add("disconnects", f"{item.message} It is connected again when it can")
+            elif isinstance(item, Connected):
+                log.info("%s: connected again", self._source.name)
+            now = perf_counter()
+            self._notice_silence(now, is_frame=item is not None)
+            if now >= next_status and (waits or not len(queue)):
+                next_status = now + STATUS
+                self._report(status)
+            # The next frame is a few milliseconds away: this is the time for everything else.
+            if waits or not len(queue):
+                self._learn()
+            while (waits or not len(queue)) and tracker.rehearse():
+                pass
+
+    def _report(self, status: Callable[[LiveRun], Any] | None) -> None:
+        """Pass on the present counts."""
+        run = self.snapshot()
+        for sink in self._sinks:
+            if isinstance(sink, PageSink):
+                sink.show(run)
+        if status is not None:
+            status(run)
+
+    def _track(self, accepted: Accepted, period: float) -> None:
+        frame = accepted.frame
+        if self._first_time is None:
+            self._first_time = frame.time
+        self._elapsed = frame.time - self._first_time
+        update = self._tracker.step(accepted, period)
+        tracks = update.tracks
+        self._n_tracks = 0 if tracks is None else len(tracks)
+        done = LiveFrame(
+            number=frame.number, time=frame.time, points=frame.points, labels=update.labels,
+            names=update.names, tracks=tracks, received=frame.received, done=perf_counter(),
+        )  # fmt: skip
+        for sink in tuple(self._sinks):
+            try:
+                sink.send(done)
+            except (AsterismError, OSError) as error:
+                self._faults.add("sinks", f"{sink.name} fails and is left out ({error})")
+                self._sinks.remove(sink)
+        self._latency.add(perf_counter() - frame.received)
+        self._n_frames += 1
+        if self._n_frames % COLLECT == 0:
+            gc.collect()
+
+    def _notice_silence(self, now: float, *, is_frame: bool) -> None:
+        if is_frame:
+            self._last_arrival, self._is_silent = now, False
+        elif not self._is_silent and now - self._last_arrival > SILENCE:
+            self._is_silent = True
+            self._faults.add("pauses", f"no frame for {SILENCE:g} s")
+
+    def _learn(self) -> None:
+        """Begin an estimate of the model when it is due, and take up its result."""
+        estimator, tracker = self._estimator, self._tracker
+        assert estimator is not None
+        if tracker.learn_names():
+            log.info("%s: a marker set of %d names", self._source.name, tracker.n_names)
+        if self._elapsed >= self._next_estimate and not estimator.is_busy:
+            estimator.start(tracker.recent())
+            late = REFINE[-1] * (1 + self._elapsed // REFINE[-1])
+            self._next_estimate = next((t for t in REFINE if t > self._elapsed), late)
+        result = estimator.result()
+        if result is None:
+            return
+        if isinstance(result, str):
+            self._faults.add("no_model", f"no model can be estimated yet ({result})")
+            if tracker.model is None:
+                self._next_estimate = self._elapsed + FIRST_SECONDS
+        elif tracker.model is None or differs(result, tracker.model):
+            log.info(
+                "%s: %s model, noise %.2g mm", self._source.name,
+                "first" if tracker.model is None else "refined", 1e3 * result.sensor.noise_sigma,
+            )  # fmt: skip
+            tracker.replace_model(result)

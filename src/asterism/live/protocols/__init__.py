@@ -1,0 +1,1 @@
+"""Packets of the vendors' protocols: encoding and decoding, pure functions on bytes."""

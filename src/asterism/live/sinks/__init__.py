@@ -1,0 +1,1 @@
+"""Sinks of a stream, one file each."""

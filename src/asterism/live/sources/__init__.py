@@ -1,0 +1,1 @@
+"""Sources of a stream, one file each."""

@@ -1,0 +1,177 @@
+"""Source: the real-time stream of Qualisys Track Manager, over TCP."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import time
+
+import numpy as np
+
+from asterism.errors import SourceError, SourceLost
+from asterism.live.frame import SourceFrame
+from asterism.live.protocols import qtm
+from asterism.live.protocols.packet_error import PacketError
+from asterism.live.protocols.qtm import Component, Packet
+from asterism.live.protocols.qtm_parameters import read_parameters
+
+__all__ = ["QtmSource"]
+
+_VERSIONS = ("1.25", "1.24", "1.23", "1.22", "1.21", "1.20", "1.19")
+_CONNECT_SECONDS = 5.0
+_READ = 256 * 1024  # bytes
+
+
+class QtmSource:
+    """Source of the points of Qualisys Track Manager: labelled markers and unidentified points.
+
+    Names of the system are not used, because the tracker names the points itself.
+
+    Parameters
+    ----------
+    name : str
+        The source, as the user wrote it.
+    host, port : str and int
+        Address of the system, and its port for little-endian clients.
+    """
+
+    def __init__(self, name: str, host: str, port: int) -> None:
+        self.name, self._address = name, (host, port)
+        self.rate = 0.0
+        self.waits = False
+        self.faults: dict[str, int] = {}
+        self._socket: socket.socket | None = None
+        self._received = bytearray()
+        self._arrived = 0.0
+
+    def open(self) -> None:
+        """Connect, agree on a version and ask for all frames.
+
+        Raises
+        ------
+        SourceError
+            If the system cannot be reached or refuses.
+        """
+        self.close()
+        self._received.clear()
+        try:
+            self._socket = socket.create_connection(self._address, _CONNECT_SECONDS)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._handshake()
+        except (OSError, PacketError) as error:
+            self.close()
+            text = getattr(error, "strerror", None) or str(error) or "no answer"
+            hint = "Check that QTM runs and that its real-time output is switched on"
+            raise SourceError(f"{self.name}: cannot connect: {text.lower()}. {hint}.") from error
+        except SourceError:
+            self.close()
+            raise
+
+    def _handshake(self) -> None:
+        kind, text = self._answer()
+        if kind != Packet.COMMAND or not text.startswith("QTM RT Interface connected"):
+            raise SourceError(f"{self.name}: expected a Qualisys system, found {text[:60]!r}.")
+        for version in _VERSIONS:
+            kind, text = self._ask(f"Version {version}")
+            if kind == Packet.COMMAND:
+                break
+        else:
+            first, last = _VERSIONS[-1], _VERSIONS[0]
+            raise SourceError(f"{self.name}: speaks none of the versions {first} to {last}.")
+        kind, text = self._ask("GetParameters General 3D")
+        self.rate = 0.0
+        if kind == Packet.XML:
+            with contextlib.suppress(PacketError):  # the stream is of use without its rate
+                self.rate = read_parameters(text).rate
+        self._send("StreamFrames AllFrames 3D 3DNoLabels")
+
+    def _send(self, command: str) -> None:
+        assert self._socket is not None
+        self._socket.sendall(qtm.encode_text(Packet.COMMAND, command))
+
+    def _ask(self, command: str) -> tuple[int, str]:
+        self._send(command)
+        return self._answer()
+
+    def _answer(self) -> tuple[int, str]:
+        """Wait for the answer to a command; events may arrive before it."""
+        end = time.monotonic() + _CONNECT_SECONDS
+        while time.monotonic() < end:
+            found = self._packet(end - time.monotonic())
+            if found is not None and found[0] in (Packet.ERROR, Packet.COMMAND, Packet.XML):
+                return found[0], qtm.text_of(found[1])
+        raise PacketError("no answer in time")
+
+    def _packet(self, timeout: float) -> tuple[int, bytes] | None:
+        """Return the next packet, as soon as it is complete."""
+        assert self._socket is not None
+        end = time.monotonic() + timeout
+        while True:
+            found = qtm.split(self._received)
+            if found is not None:
+                kind, view = found
+                body = bytes(view)
+                view.release()
+                del self._received[: len(body) + 8]
+                return kind, body
+            left = end - time.monotonic()
+            if left < 0 or not select.select([self._socket], [], [], left)[0]:
+                return None
+            received = self._socket.recv(_READ)
+            self._arrived = time.perf_counter()
+            if not received:
+                raise ConnectionResetError(0, "the system has closed the connection")
+            self._received += received
+
+    def receive(self, timeout: float) -> SourceFrame | None:
+        """Wait for the next frame.
+
+        Raises
+        ------
+        SourceLost
+            If the connection is gone.
+        """
+        if self._socket is None:
+            raise SourceLost(f"{self.name}: is not open.")
+        end = time.monotonic() + timeout
+        while True:
+            try:
+                found = self._packet(max(0.0, end - time.monotonic()))
+            except (OSError, PacketError) as error:
+                # After a wrong size the boundary of packets is lost.
+                self.close()
+                text = getattr(error, "strerror", None) or str(error)
+                raise SourceLost(f"{self.name}: the connection is lost: {text}.") from error
+            if found is None:
+                return None
+            if found[0] != Packet.DATA:
+                continue
+            try:
+                return self._frame(found[1])
+            except PacketError as error:
+                reason = str(error)
+                self.faults[reason] = self.faults.get(reason, 0) + 1
+
+    def _frame(self, body: bytes) -> SourceFrame:
+        data = qtm.decode_data(body)
+        points: list[np.ndarray[tuple[int, int], np.dtype[np.float64]]] = []
+        if Component.MARKERS in data.components:
+            markers = qtm.decode_markers(data.components[Component.MARKERS])
+            # All 32 bits set mark a marker that is not there.
+            points.append(markers[~np.isnan(markers).all(axis=1)])
+        if Component.POINTS in data.components:
+            points.append(qtm.decode_points(data.components[Component.POINTS])[0])
+        return SourceFrame(
+            number=data.number,
+            time=data.time,
+            points=np.concatenate([np.empty((0, 3)), *points]),
+            received=self._arrived,
+        )
+
+    def close(self) -> None:
+        """Disconnect."""
+        if self._socket is not None:
+            with contextlib.suppress(OSError):
+                self._socket.close()
+            self._socket = None
