@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asterism.errors import ParameterError, SinkError
+from asterism.checks import check_extra
+from asterism.errors import SinkError
 from asterism.reporting.guard import Guard
 from asterism.reporting.page.stream import stream_page
 
@@ -62,7 +63,7 @@ class PageSink:
     """
 
     def __init__(self, port: int = 0, *, on_address: Callable[[str], Any] | None = None) -> None:
-        check_installed()
+        check_extra("page://", "live", "starlette", "uvicorn")
         self.name, self.faults = f"page://:{port}", dict[str, int]()
         self.on_address = on_address
         self._port = port
@@ -169,24 +170,6 @@ class PageSink:
                 next_health = now + _HEALTH
                 yield json.dumps({"health": _health_of(run)}) + "\n"
             await asyncio.sleep(_PERIOD)
-
-
-def check_installed() -> None:
-    """Raise if the packages of the page are not installed.
-
-    Raises
-    ------
-    ParameterError
-        If the extra ``live`` is missing.
-    """
-    try:
-        import starlette
-        import uvicorn
-    except ImportError:
-        hint = "run pip install 'asterism[live]'"
-        expected = "starlette and uvicorn, which are optional"
-        raise ParameterError("page://", expected, "not installed", hint) from None
-    del starlette, uvicorn
 
 
 def _listening(name: str, port: int) -> socket.socket:
